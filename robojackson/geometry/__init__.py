@@ -1,0 +1,1 @@
+"""Rotations and the only places where axes change."""

@@ -1,0 +1,56 @@
+"""A reference motion as arrays that a thousand environments can read at their own step.
+
+A cyclic clip goes on for ever: step s is step s mod S of lap s // S, moved by that many lap
+offsets. A clip that is not cyclic holds its last step. Frames and units as in `ReferenceMotion`.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from robojackson.motion.reference import ReferenceMotion
+
+
+@dataclass(frozen=True)
+class ClipStep:
+    """The reference at one step for each of N environments."""
+
+    qpos: Float[np.ndarray, "N nq"]
+    qvel: Float[np.ndarray, "N nv"]
+    points: Float[np.ndarray, "N K 3"]
+    phase: Float[np.ndarray, " N"]
+
+
+class Clip:
+    """Random access to a reference motion by step."""
+
+    def __init__(self, reference: ReferenceMotion) -> None:
+        self.steps, self.cyclic, self.dt = len(reference), reference.cyclic, reference.dt
+        self.names = reference.keypoint_names
+        self._qpos = np.asarray(reference.qpos, float)
+        self._qvel = np.asarray(reference.qvel, float)
+        self._points = np.asarray(reference.keypoints_w, float)
+        self._offset = np.asarray(reference.lap_offset, float)
+
+    def at(self, step: Int[np.ndarray, " N"]) -> ClipStep:
+        """The reference at each environment's step."""
+        lap, index = self._split(step)
+        offset = lap[:, None] * self._offset
+        qpos = self._qpos[index].copy()
+        qpos[:, :3] += offset
+        points = self._points[index] + offset[:, None]
+        return ClipStep(qpos, self._qvel[index], points, index / self.steps)
+
+    def ended(self, step: Int[np.ndarray, " N"]) -> np.ndarray:
+        """Whether a clip that is not cyclic has been danced to its end."""
+        return np.zeros(len(step), bool) if self.cyclic else step >= self.steps - 1
+
+    def horizon(self, seconds: float) -> int:
+        """Steps of a rollout: the given time when cyclic, the whole clip otherwise."""
+        return round(seconds / self.dt) if self.cyclic else self.steps - 1
+
+    def _split(self, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        if self.cyclic:
+            return step // self.steps, step % self.steps
+        return np.zeros_like(step), np.minimum(step, self.steps - 1)

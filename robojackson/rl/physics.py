@@ -1,0 +1,133 @@
+"""Many copies of one stock robot, stepped in threads, with a PD law outside the model.
+
+Stock physics (architecture page): the model as gymnasium ships it. The torque is computed once a
+substep from the state at its beginning, clipped to the stock limit and written to `ctrl`; a servo
+inside the model would be evaluated within the stages of RK4, which is another robot.
+
+World frame, metres, radians, seconds, newton-metres. MuJoCo releases the interpreter lock in
+`mj_step`, so two threads keep two cores busy.
+"""
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import pairwise
+
+import mujoco
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from robojackson.retarget.robot import Robot
+from robojackson.rl.config import ControlConfig
+
+
+@dataclass(frozen=True)
+class Motors:
+    """Actuators of the robot: which hinge each one drives and how strongly.
+
+    Attributes:
+        hinge: Index of the driven hinge among `qpos[7:]`, one an actuator.
+        gear: Torque per unit of control, N m.
+        limit: Largest torque, N m (gear x the control range).
+    """
+
+    hinge: Int[np.ndarray, " nu"]
+    gear: Float[np.ndarray, " nu"]
+    limit: Float[np.ndarray, " nu"]
+
+    @staticmethod
+    def of(model: mujoco.MjModel) -> "Motors":
+        """Read the motors of a model whose first joint is free and whose others are hinges."""
+        gear = model.actuator_gear[:, 0].copy()
+        return Motors(
+            hinge=model.jnt_qposadr[model.actuator_trnid[:, 0]] - 7,
+            gear=gear,
+            limit=gear * model.actuator_ctrlrange[:, 1],
+        )
+
+
+class Simulation:
+    """N copies of a robot.
+
+    Attributes:
+        qpos, qvel: State of every copy after the last `step` or `place`.
+        points: Positions of the keypoint sites, world, in step with `qpos`.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        control: ControlConfig,
+        n: int,
+        threads: int = 1,
+    ) -> None:
+        model = robot.model
+        self.model, self.n, self._sites, self._control = model, n, robot.keypoint_sites, control
+        self.motors = Motors.of(model)
+        self._datas = [mujoco.MjData(model) for _ in range(n)]
+        self._q = [data.qpos[7:] for data in self._datas]
+        self._v = [data.qvel[6:] for data in self._datas]
+        self._ctrl = [data.ctrl for data in self._datas]
+        self.kp = control.stiffness * self.motors.limit
+        self.kd = control.damping * self.kp
+        bounds = np.linspace(0, n, min(threads, n) + 1).astype(int)
+        self._chunks = list(pairwise(bounds))
+        self._pool = ThreadPoolExecutor(len(self._chunks)) if len(self._chunks) > 1 else None
+        self.qpos = np.zeros((n, model.nq))
+        self.qvel = np.zeros((n, model.nv))
+        self.points = np.zeros((n, len(robot.keypoint_names), 3))
+        self.dt = control.substeps * model.opt.timestep
+
+    def place(
+        self,
+        indices: Int[np.ndarray, " I"],
+        qpos: Float[np.ndarray, "I nq"],
+        qvel: Float[np.ndarray, "I nv"],
+    ) -> None:
+        """Put some copies into a state, forgetting their past (contacts, warm start, time)."""
+        for row, i in enumerate(indices):
+            data = self._datas[i]
+            mujoco.mj_resetData(self.model, data)
+            data.qpos[:], data.qvel[:] = qpos[row], qvel[row]
+            mujoco.mj_forward(self.model, data)
+        self._gather(indices)
+
+    def step(
+        self, targets: Float[np.ndarray, "N nu"], active: Bool[np.ndarray, " N"] | None = None
+    ) -> None:
+        """One control step towards target hinge angles, in actuator order, rad.
+
+        Copies that are not `active` stay as they are; None steps all of them.
+        """
+        rows = np.ones(self.n, bool) if active is None else active
+        if self._pool is None:
+            self._advance(0, self.n, targets, rows)
+        else:
+            jobs = [self._pool.submit(self._advance, *c, targets, rows) for c in self._chunks]
+            for job in jobs:
+                job.result()
+        self._gather(np.arange(self.n))
+
+    def close(self) -> None:
+        """Stop the threads."""
+        if self._pool is not None:
+            self._pool.shutdown()
+
+    def _advance(self, lo: int, hi: int, targets: np.ndarray, rows: np.ndarray) -> None:
+        live = [i for i in range(lo, hi) if rows[i]]
+        motors, step, model = self.motors, mujoco.mj_step, self.model
+        for _ in range(self._control.substeps):
+            angle = np.array(self._q[lo:hi])[:, motors.hinge]
+            speed = np.array(self._v[lo:hi])[:, motors.hinge]
+            torque = self.kp * (targets[lo:hi] - angle) - self.kd * speed
+            control = np.clip(torque, -motors.limit, motors.limit) / motors.gear
+            for i in live:
+                self._ctrl[i][:] = control[i - lo]
+                step(model, self._datas[i])
+        for i in live:
+            mujoco.mj_kinematics(model, self._datas[i])
+
+    def _gather(self, indices: np.ndarray) -> None:
+        datas = [self._datas[i] for i in indices]
+        self.qpos[indices] = [data.qpos for data in datas]
+        self.qvel[indices] = [data.qvel for data in datas]
+        self.points[indices] = np.array([data.site_xpos for data in datas])[:, self._sites]

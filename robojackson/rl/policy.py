@@ -1,0 +1,90 @@
+"""A trained policy: a small network as numpy arrays, kept in one safetensors file.
+
+The file holds the layers of the actor (ReLU between them, tanh at the end) and, as JSON in its
+header, what the policy was trained for. Reading it executes nothing and needs neither jax nor
+torch.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+from safetensors import SafetensorError, safe_open
+from safetensors.numpy import save
+
+from robojackson.errors import BadPolicy
+
+FORMAT = "robojackson-policy-1"
+
+
+@dataclass(frozen=True)
+class Policy:
+    """A deterministic policy.
+
+    Attributes:
+        layers: (weight (in, out), bias (out,)) from the observation to the action.
+        facts: What the policy was trained for: robot, control law, trainer, seed, steps.
+    """
+
+    layers: tuple[tuple[np.ndarray, np.ndarray], ...]
+    facts: Mapping[str, object]
+
+    def act(self, observation: Float[np.ndarray, "N D"]) -> Float[np.ndarray, "N nu"]:
+        """The mean action, -1..1, of each observation."""
+        hidden = np.asarray(observation, np.float32)
+        for weight, bias in self.layers[:-1]:
+            hidden = np.maximum(hidden @ weight + bias, 0.0)
+        weight, bias = self.layers[-1]
+        return np.tanh(hidden @ weight + bias)
+
+    @property
+    def observation_size(self) -> int:
+        """Length of the observation that the first layer takes."""
+        return self.layers[0][0].shape[0]
+
+    def to_bytes(self) -> bytes:
+        """The content of the policy's file."""
+        tensors: dict[str, np.ndarray] = {}
+        for i, (weight, bias) in enumerate(self.layers):
+            tensors[f"layer{i}.weight"] = np.ascontiguousarray(weight, np.float32)
+            tensors[f"layer{i}.bias"] = np.ascontiguousarray(bias, np.float32)
+        return save(tensors, {FORMAT: json.dumps(dict(self.facts), sort_keys=True)})
+
+
+def load_policy(path: Path) -> Policy:
+    """Read a policy file.
+
+    Raises:
+        BadPolicy: the file is missing, foreign or has layers that do not fit each other.
+    """
+    try:
+        with safe_open(path, framework="np") as file:
+            header = file.metadata() or {}
+            names = set(file.keys())
+            tensors = {name: file.get_tensor(name) for name in names}
+    except (OSError, SafetensorError) as error:
+        raise BadPolicy(f"{path} is not a policy file of ours ({error})") from error
+    if FORMAT not in header:
+        raise BadPolicy(f"{path} is not a {FORMAT} file; `robojackson train` writes them")
+    layers = _layers(path, tensors)
+    return Policy(layers, json.loads(header[FORMAT]))
+
+
+def _layers(
+    path: Path, tensors: Mapping[str, np.ndarray]
+) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+    count = len(tensors) // 2
+    try:
+        layers = tuple(
+            (tensors[f"layer{i}.weight"], tensors[f"layer{i}.bias"]) for i in range(count)
+        )
+    except KeyError as error:
+        raise BadPolicy(f"{path} lacks tensor {error}") from error
+    widths = [weight.shape[1] for weight, _ in layers[:-1]]
+    fits = all(w == nxt.shape[0] for w, (nxt, _) in zip(widths, layers[1:], strict=True))
+    if not layers or not fits or any(w.shape[1:] != b.shape for w, b in layers):
+        raise BadPolicy(f"{path} has layers that do not fit each other")
+    return layers

@@ -1,0 +1,174 @@
+"""The tracking environment: N robots that follow one reference motion, as array code.
+
+Action: residual joint angles in actuator order, -1..1, times `ControlConfig.residual` radians,
+added to the reference's next hinge angles and followed by the PD law of `Simulation`. Observation:
+`observation.observe`. Reward: the sum of `rewards.reward_terms`. Episodes start as `starts` says
+and end by a fall, by getting lost, by the time limit or at the end of a clip that is not cyclic;
+the last two are truncations and are bootstrapped.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from robojackson.errors import UnknownName
+from robojackson.motion.reference import ReferenceMotion
+from robojackson.retarget.robot import Robot
+from robojackson.rl.clip import Clip
+from robojackson.rl.config import TrackConfig
+from robojackson.rl.observation import observation_size, observe
+from robojackson.rl.physics import Simulation
+from robojackson.rl.rewards import fallen, lost, reward_terms, tracking_errors
+from robojackson.rl.starts import SettledStates, StartPhases, default_stand, noisy, stand_at
+
+SETTLED_SECONDS = 1.0
+SETTLED_STATES_NEEDED = 32
+PELVIS = "pelvis"
+EXTREMITIES = ("left_hand", "right_hand", "head")
+
+
+@dataclass
+class StepResult:
+    """What one step of all robots brought; arrays have N rows.
+
+    Attributes:
+        observation: After resets.
+        final_observation: Before resets (differs where done).
+        reward, terms: Their sum and its parts.
+        terminated, truncated: Ends by failure; by time or at the clip's end.
+        episodes: One summary row for each episode that ended.
+    """
+
+    observation: Float[np.ndarray, "N D"]
+    final_observation: Float[np.ndarray, "N D"]
+    reward: Float[np.ndarray, " N"]
+    terms: dict[str, Float[np.ndarray, " N"]]
+    terminated: np.ndarray
+    truncated: np.ndarray
+    episodes: list[dict[str, float]] = field(default_factory=list)
+
+
+class TrackingCore:
+    """N robots that follow one reference motion."""
+
+    def __init__(
+        self, robot: Robot, reference: ReferenceMotion, config: TrackConfig, n: int, seed: int
+    ) -> None:
+        self.config, self.n, self.clip = config, n, Clip(reference)
+        names = robot.keypoint_names
+        if names != reference.keypoint_names:
+            unknown = sorted(set(reference.keypoint_names) ^ set(names))
+            raise UnknownName("keypoint", ", ".join(unknown), "reference motion", names)
+        self.pelvis = names.index(PELVIS)
+        self.extremities = tuple(names.index(name) for name in EXTREMITIES)
+        self.sim = Simulation(robot, config.control, n, config.threads)
+        self.starts = StartPhases(self.clip, config.reset.failure_share)
+        self._settled = SettledStates(robot.model.nq, robot.model.nv)
+        self._stand = default_stand(robot.model)
+        self.rng = np.random.default_rng(seed)
+        self.limit = round(config.episode_seconds / self.clip.dt)
+        self.step_index = np.zeros(n, int)
+        self._start, self._age = np.zeros(n, int), np.zeros(n, int)
+        self._last = np.zeros((n, robot.model.nu))
+        self._sums: dict[str, np.ndarray] = {}
+        self.observation_size = observation_size(robot.model.nq - 7, robot.model.nu, len(names))
+        self.action_size = robot.model.nu
+
+    def reseed(self, seed: int) -> None:
+        """Restart the random numbers; the next `reset` is then determined."""
+        self.rng = np.random.default_rng(seed)
+
+    def reset(self) -> Float[np.ndarray, "N D"]:
+        """Begin N new episodes."""
+        self._begin(np.arange(self.n))
+        return self._observe()
+
+    def step(self, action: Float[np.ndarray, "N nu"]) -> StepResult:
+        """One control step of all robots; those whose episode ended begin a new one."""
+        action = np.clip(np.asarray(action, float), -1, 1)
+        following = self.clip.at(self.step_index + 1)
+        hinge = self.sim.motors.hinge
+        self.sim.step(following.qpos[:, 7:][:, hinge] + self.config.control.residual * action)
+        self.step_index += 1
+        self._age += 1
+        errors = tracking_errors(
+            self.sim.qpos, self.sim.qvel, self.sim.points, following, self.pelvis, self.extremities
+        )
+        change = np.mean((action - self._last) ** 2, -1)
+        self._last = action
+        terms = reward_terms(errors, change, self.config.reward)
+        reward = np.sum(list(terms.values()), 0)
+        rules = self.config.termination
+        terminated = fallen(self.sim.qpos, rules) | lost(errors, rules)
+        ended = (self._age >= self.limit) | self.clip.ended(self.step_index)
+        result = StepResult(
+            *(2 * (self._observe(),)), reward, terms, terminated, ended & ~terminated
+        )
+        self._accumulate(reward, terms, errors.site_mean)
+        done = np.flatnonzero(terminated | ended)
+        if len(done):
+            result.episodes = self._close(done, terminated)
+            self._begin(done)
+            result.observation = self._observe()
+        return result
+
+    def close(self) -> None:
+        """Stop the threads of the simulation."""
+        self.sim.close()
+
+    def _observe(self) -> np.ndarray:
+        target = self.clip.at(self.step_index + 1)
+        return observe(self.sim.qpos, self.sim.qvel, self.sim.points, target, self._last)
+
+    def _accumulate(
+        self, reward: np.ndarray, terms: dict[str, np.ndarray], site: np.ndarray
+    ) -> None:
+        rows = {"episode_return": reward, "site_error_m": site}
+        rows |= {f"reward_{name}": value for name, value in terms.items()}
+        for name, value in rows.items():
+            self._sums.setdefault(name, np.zeros(self.n))
+            self._sums[name] += value
+
+    def _close(self, done: Int[np.ndarray, " I"], failed: np.ndarray) -> list[dict[str, float]]:
+        self.starts.record(self._start[done], failed[done])
+        rows = []
+        for i in done:
+            row = {name: float(total[i]) for name, total in self._sums.items()}
+            age = int(self._age[i])
+            row["site_error_m"] /= age
+            rows.append(row | {"episode_length": age, "survived_s": age * self.clip.dt})
+        for total in self._sums.values():
+            total[done] = 0.0
+        return rows
+
+    def _begin(self, indices: Int[np.ndarray, " I"]) -> None:
+        reset, rng = self.config.reset, self.rng
+        self._remember(indices)
+        phase = self.starts.draw(len(indices), rng)
+        at = self.clip.at(phase)
+        qpos, qvel = noisy(at.qpos, at.qvel, reset, rng)
+        kind = rng.random(len(indices))
+        for row in np.flatnonzero(kind < reset.stand_share):
+            qpos[row], qvel[row] = stand_at(self._stand, at.qpos[row, :7]), 0.0
+        if len(self._settled) >= SETTLED_STATES_NEEDED:
+            chosen = (kind >= reset.stand_share) & (kind < reset.stand_share + reset.settled_share)
+            for row in np.flatnonzero(chosen):
+                qpos[row], qvel[row], phase[row] = self._settled.draw(rng)
+        self.sim.place(indices, qpos, qvel)
+        self.step_index[indices] = self._start[indices] = phase
+        self._age[indices] = 0
+        self._last[indices] = 0.0
+
+    def _remember(self, indices: Int[np.ndarray, " I"]) -> None:
+        """Keep how long-lived episodes ended their time limit: states worth starting from."""
+        if not self.clip.cyclic:
+            return
+        for i in indices:
+            if self._age[i] >= self.limit and self._age[i] * self.clip.dt >= SETTLED_SECONDS:
+                lap = self.step_index[i] // self.clip.steps
+                shift = self.clip.at(np.array([lap * self.clip.steps])).qpos[0, :3]
+                home = self.clip.at(np.array([0])).qpos[0, :3]
+                qpos = self.sim.qpos[i].copy()
+                qpos[:3] -= shift - home
+                self._settled.add(qpos, self.sim.qvel[i], int(self.step_index[i] % self.clip.steps))

@@ -1,0 +1,79 @@
+"""A robot and a short cyclic reference motion, made here from joint curves."""
+
+from collections.abc import Callable
+
+import mujoco
+import numpy as np
+import pytest
+
+from configs.loader import load
+from robojackson.motion.reference import ReferenceMotion
+from robojackson.retarget.robot import Robot, RobotDescription, load_robot
+
+DT = 0.015
+
+
+@pytest.fixture(scope="session")
+def robot() -> Robot:
+    return load_robot(load(RobotDescription, "robots/humanoid"))
+
+
+@pytest.fixture(scope="session")
+def sway(robot: Robot) -> ReferenceMotion:
+    """1.2 s of knee bends and light arms, feet on the floor, exactly cyclic."""
+    return make_reference(robot, sway_angles)
+
+
+def sway_angles(phase: np.ndarray) -> dict[str, np.ndarray]:
+    wave = np.sin(phase)
+    return {
+        "left_knee": -0.5 + 0.2 * wave,
+        "right_knee": -0.5 - 0.2 * wave,
+        "left_hip_y": -0.25 + 0.1 * wave,
+        "right_hip_y": -0.25 - 0.1 * wave,
+        "left_shoulder1": -0.3 + 0.3 * wave,
+        "right_shoulder1": 0.3 + 0.3 * wave,
+        "left_elbow": -0.8 + 0.2 * np.cos(phase),
+        "right_elbow": -0.8 - 0.2 * np.cos(phase),
+    }
+
+
+def make_reference(
+    robot: Robot, angles: Callable[[np.ndarray], dict[str, np.ndarray]], cyclic: bool = True
+) -> ReferenceMotion:
+    model, steps = robot.model, 80
+    data = mujoco.MjData(model)
+    qpos = np.tile(model.qpos0, (steps, 1))
+    for name, curve in angles(2 * np.pi * np.arange(steps) / steps).items():
+        qpos[:, model.joint(name).qposadr[0]] = curve
+    points = np.zeros((steps, len(robot.keypoint_names), 3))
+    bodies = np.zeros((steps, model.nbody, 3))
+    for t in range(steps):
+        data.qpos[:] = qpos[t]
+        mujoco.mj_kinematics(model, data)
+        feet = data.site_xpos[robot.keypoint_sites][robot.contact_keypoints]
+        qpos[t, 2] -= (feet[:, 2] - robot.contact_radii).min()
+        data.qpos[:] = qpos[t]
+        mujoco.mj_kinematics(model, data)
+        points[t], bodies[t] = data.site_xpos[robot.keypoint_sites], data.xpos
+    qvel = np.zeros((steps, model.nv))
+    for t in range(steps):
+        mujoco.mj_differentiatePos(model, qvel[t], 2 * DT, qpos[t - 1], qpos[(t + 1) % steps])
+    return ReferenceMotion(
+        robot=robot.description.name,
+        model_sha256=robot.sha256,
+        dt=DT,
+        cyclic=cyclic,
+        lap_offset=np.zeros(3),
+        qpos=qpos,
+        qvel=qvel,
+        body_pos_w=bodies,
+        keypoints_w=points,
+        contact=np.ones((steps, 2), np.int8),
+        torque_ratio=np.zeros((steps, model.nu)),
+        source_time_s=np.arange(steps) * DT,
+        joint_names=robot.joint_names,
+        body_names=robot.body_names,
+        keypoint_names=robot.keypoint_names,
+        contact_names=robot.contact_names,
+    )

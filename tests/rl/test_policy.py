@@ -1,0 +1,58 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+from safetensors.numpy import save_file
+
+from robojackson.errors import BadPolicy
+from robojackson.rl.policy import Policy, load_policy
+
+
+def small_policy() -> Policy:
+    rng = np.random.default_rng(0)
+    shapes = [(5, 8), (8, 8), (8, 3)]
+    layers = tuple(
+        (rng.normal(size=s).astype(np.float32), rng.normal(size=s[1]).astype(np.float32))
+        for s in shapes
+    )
+    return Policy(layers, {"robot": "humanoid", "seed": 3})
+
+
+def test_a_saved_policy_acts_the_same(tmp_path: Path) -> None:
+    path = tmp_path / "policy.safetensors"
+    path.write_bytes(small_policy().to_bytes())
+    observation = np.random.default_rng(1).normal(size=(7, 5)).astype(np.float32)
+    loaded = load_policy(path)
+    np.testing.assert_array_equal(loaded.act(observation), small_policy().act(observation))
+    assert loaded.facts == {"robot": "humanoid", "seed": 3}
+
+
+def test_actions_stay_inside_the_action_space() -> None:
+    assert np.abs(small_policy().act(np.full((1, 5), 1e4))).max() <= 1.0
+
+
+@pytest.mark.parametrize("content", [b"", b"not a policy", b"PK\x03\x04" + b"\0" * 64])
+def test_a_foreign_file_is_refused(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "policy.safetensors"
+    path.write_bytes(content)
+    with pytest.raises(BadPolicy, match=r"policy\.safetensors"):
+        load_policy(path)
+
+
+def test_a_missing_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BadPolicy, match=r"nowhere"):
+        load_policy(tmp_path / "nowhere.safetensors")
+
+
+def test_weights_of_somebody_else_are_refused(tmp_path: Path) -> None:
+    save_file({"w": np.zeros(3, np.float32)}, tmp_path / "other.safetensors")
+    with pytest.raises(BadPolicy, match="robojackson train"):
+        load_policy(tmp_path / "other.safetensors")
+
+
+def test_layers_that_do_not_fit_are_refused(tmp_path: Path) -> None:
+    first, _, last = small_policy().layers
+    wrong = Policy(((first[0], first[1]), (last[0][:4], last[1])), {})
+    (tmp_path / "p.safetensors").write_bytes(wrong.to_bytes())
+    with pytest.raises(BadPolicy, match="fit"):
+        load_policy(tmp_path / "p.safetensors")

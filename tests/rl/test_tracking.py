@@ -1,0 +1,134 @@
+import dataclasses
+
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env as check_gymnasium
+from stable_baselines3.common.env_checker import check_env as check_sb3
+
+from robojackson.errors import UnknownName
+from robojackson.motion.reference import ReferenceMotion
+from robojackson.retarget.robot import Robot
+from robojackson.rl.clip import Clip
+from robojackson.rl.config import RewardConfig, TerminationConfig, TrackConfig
+from robojackson.rl.rewards import fallen, reward_terms, tracking_errors
+from robojackson.rl.tracking import TrackingCore
+from robojackson.rl.vec_env import TrackingEnv, TrackingVecEnv
+
+
+def core(robot: Robot, sway: ReferenceMotion, n: int = 4, seed: int = 0) -> TrackingCore:
+    return TrackingCore(robot, sway, TrackConfig(), n, seed)
+
+
+def reward_at(
+    sway: ReferenceMotion, qpos: np.ndarray, qvel: np.ndarray, points: np.ndarray
+) -> float:
+    target = Clip(sway).at(np.array([10]))
+    errors = tracking_errors(qpos[None], qvel[None], points[None], target, 0, (11, 12, 13))
+    terms = reward_terms(errors, np.zeros(1), RewardConfig())
+    return float(sum(term[0] for term in terms.values()))
+
+
+def test_gymnasium_accepts_the_environment(robot: Robot, sway: ReferenceMotion) -> None:
+    check_gymnasium(TrackingEnv(robot, sway, TrackConfig()), skip_render_check=True)
+
+
+def test_stable_baselines_accepts_the_environment(robot: Robot, sway: ReferenceMotion) -> None:
+    check_sb3(TrackingEnv(robot, sway, TrackConfig()), skip_render_check=True)
+
+
+def test_the_same_seed_gives_the_same_rollout(robot: Robot, sway: ReferenceMotion) -> None:
+    runs = []
+    for _ in range(2):
+        env = core(robot, sway, seed=7)
+        env.reset()
+        actions = np.random.default_rng(1).uniform(-1, 1, (30, 4, robot.model.nu))
+        runs.append(np.array([env.step(action).observation for action in actions]))
+    np.testing.assert_array_equal(runs[0], runs[1])
+
+
+def test_another_seed_gives_another_rollout(robot: Robot, sway: ReferenceMotion) -> None:
+    first, second = core(robot, sway, seed=1).reset(), core(robot, sway, seed=2).reset()
+    assert not np.allclose(first, second)
+
+
+def test_observations_share_no_memory_with_the_environment(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    env = core(robot, sway)
+    before = env.reset()
+    kept = before.copy()
+    env.step(np.zeros((4, robot.model.nu)))
+    np.testing.assert_array_equal(before, kept)
+
+
+def test_the_reward_is_greatest_at_the_reference(sway: ReferenceMotion) -> None:
+    best = reward_at(sway, sway.qpos[10], sway.qvel[10], sway.keypoints_w[10])
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        qpos = sway.qpos[10] + rng.normal(0, 0.05, sway.qpos.shape[1])
+        qpos[3:7] /= np.linalg.norm(qpos[3:7])
+        qvel = sway.qvel[10] + rng.normal(0, 0.5, sway.qvel.shape[1])
+        points = sway.keypoints_w[10] + rng.normal(0, 0.05, sway.keypoints_w[10].shape)
+        assert reward_at(sway, qpos, qvel, points) < best
+    weights = [getattr(RewardConfig(), f.name.removesuffix("_width")) for f in
+               dataclasses.fields(RewardConfig()) if f.name.endswith("_width")]  # fmt: skip
+    assert best == pytest.approx(sum(weights))
+
+
+def test_the_hands_are_compared(sway: ReferenceMotion) -> None:
+    """A hand in the wrong place costs reward although every body origin is right."""
+    best = reward_at(sway, sway.qpos[10], sway.qvel[10], sway.keypoints_w[10])
+    points = sway.keypoints_w[10].copy()
+    points[sway.keypoint_names.index("left_hand")] += 0.2
+    assert reward_at(sway, sway.qpos[10], sway.qvel[10], points) < best - 0.05
+
+
+def test_a_reference_with_another_skeleton_is_refused(robot: Robot, sway: ReferenceMotion) -> None:
+    other = dataclasses.replace(sway, keypoint_names=("left_hnad", *sway.keypoint_names[1:]))
+    with pytest.raises(UnknownName, match=r"left_hnad.*Known:.*left_hand"):
+        core(robot, other)
+
+
+def test_a_cyclic_clip_goes_on_with_continuous_state(sway: ReferenceMotion) -> None:
+    moved = dataclasses.replace(sway, lap_offset=np.array([0.5, 0.1, 0.0]))
+    clip = Clip(moved)
+    before, after = clip.at(np.array([79])), clip.at(np.array([80]))
+    np.testing.assert_allclose(after.qpos[0, :2], moved.qpos[0, :2] + [0.5, 0.1])
+    np.testing.assert_allclose(after.qpos[0, 2:], moved.qpos[0, 2:])
+    assert np.abs(after.qvel - before.qvel).max() < 0.5
+
+
+def test_a_clip_that_is_not_cyclic_ends_its_episode_as_a_truncation(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    env = core(robot, dataclasses.replace(sway, cyclic=False), n=8)
+    env.reset()
+    ends = [env.step(np.zeros((8, robot.model.nu))) for _ in range(80)]
+    assert any(step.truncated.any() for step in ends)
+
+
+@pytest.mark.parametrize(
+    ("height", "tilt_deg", "falls"),
+    [(0.71, 0, False), (0.69, 0, True), (1.2, 59, False), (1.2, 61, True)],
+)
+def test_the_fall_rule_is_the_papers(
+    sway: ReferenceMotion, height: float, tilt_deg: float, falls: bool
+) -> None:
+    qpos = sway.qpos[:1].copy()
+    half = np.radians(tilt_deg) / 2
+    qpos[0, 2:7] = [height, np.cos(half), np.sin(half), 0, 0]
+    assert bool(fallen(qpos, TerminationConfig())[0]) is falls
+
+
+def test_an_episode_that_ends_hands_out_its_own_last_observation(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    env = TrackingVecEnv(core(robot, sway))
+    env.reset()
+    for _ in range(200):
+        _, _, done, infos = env.step(np.full((4, robot.model.nu), 1.0))
+        if done.any():
+            break
+    ended = int(np.flatnonzero(done)[0])
+    assert infos[ended]["terminal_observation"].shape == (env.core.observation_size,)
+    assert infos[ended]["episode"]["l"] >= 1

@@ -1,0 +1,183 @@
+import dataclasses
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robojackson.errors import BadConfiguration, BadPolicy
+from robojackson.motion.reference import ReferenceMotion
+from robojackson.retarget.robot import Robot
+from robojackson.rl.config import EvaluateConfig, TqcConfig, TrackConfig, TrainConfig
+from robojackson.rl.evaluate import STAND, evaluate
+from robojackson.rl.policy import load_policy
+from robojackson.rl.tracking import TrackingCore
+from robojackson.rl.train import TrainResult, train
+from robojackson.rl.trainer import make_trainer
+from robojackson.rl.vec_env import TrackingVecEnv
+
+SMALL = TqcConfig(
+    n_envs=4, warmup=64, batch=32, updates_per_round=2, buffer=2000, actor=(16, 16), critic=(16, 16)
+)
+BRIEF = EvaluateConfig(seconds=0.6, phases=3, resets=2)
+
+
+def brief(trainer: str, steps: int = 320) -> TrainConfig:
+    return TrainConfig(trainer=trainer, steps=steps, tqc=SMALL, progress_seconds=0.01)  # type: ignore[arg-type]
+
+
+def run(robot: Robot, sway: ReferenceMotion, config: TrainConfig, out: Path) -> TrainResult:
+    return train(sway, robot, config, out)
+
+
+@pytest.fixture(scope="module", params=["sbx", "sb3"])
+def trained(
+    request: pytest.FixtureRequest,
+    robot: Robot,
+    sway: ReferenceMotion,
+    tmp_path_factory: pytest.TempPathFactory,
+) -> tuple[TrainResult, list[dict[str, float]], list[dict[str, float]], str]:
+    episodes: list[dict[str, float]] = []
+    progress: list[dict[str, float]] = []
+    result = train(
+        sway,
+        robot,
+        brief(request.param),
+        tmp_path_factory.mktemp(request.param),
+        progress=progress.append,
+        sink=episodes.extend,
+    )
+    return result, episodes, progress, request.param
+
+
+def test_both_trainers_end_at_their_budget_with_a_policy(trained: tuple) -> None:
+    result, _, _, name = trained
+    assert result.steps == 320
+    assert result.updates > 0
+    assert result.stopped == "steps"
+    assert load_policy(result.policy).facts["trainer"] == name
+
+
+def test_every_episode_leaves_a_row_with_each_reward_term(trained: tuple) -> None:
+    _, episodes, _, _ = trained
+    assert [row["episode"] for row in episodes] == list(range(1, len(episodes) + 1))
+    for row in episodes:
+        terms = [value for key, value in row.items() if key.startswith("reward_")]
+        assert sum(terms) == pytest.approx(row["episode_return"])
+
+
+def test_progress_tells_rate_and_time_left(trained: tuple) -> None:
+    _, _, progress, _ = trained
+    assert all(row["steps_per_s"] > 0 and row["seconds_left"] >= 0 for row in progress)
+    assert progress
+
+
+def test_a_finished_run_asked_for_more_steps_goes_on(
+    trained: tuple, robot: Robot, sway: ReferenceMotion
+) -> None:
+    result, _, _, name = trained
+    rows: list[dict[str, float]] = []
+    longer = train(sway, robot, brief(name, 480), result.policy.parent, sink=rows.extend)
+    assert longer.steps == 480
+    assert longer.seconds > result.seconds
+
+
+def test_a_checkpoint_of_another_configuration_is_refused(
+    trained: tuple, robot: Robot, sway: ReferenceMotion
+) -> None:
+    result, _, _, name = trained
+    other = dataclasses.replace(brief(name), seed=5)
+    with pytest.raises(BadConfiguration, match="another configuration"):
+        run(robot, sway, other, result.policy.parent)
+
+
+@pytest.mark.parametrize("name", ["sbx", "sb3"])
+def test_the_policy_file_acts_as_the_trainers_own_actor(
+    robot: Robot, sway: ReferenceMotion, name: str
+) -> None:
+    env = TrackingVecEnv(TrackingCore(robot, sway, TrackConfig(), 4, 0))
+    trainer = make_trainer(name, env, SMALL, seed=0)
+    observation = env.reset()
+    if name == "sbx":
+        state = trainer.model.policy.actor_state  # type: ignore[attr-defined]
+        mean = state.apply_fn(state.params, observation).mode()
+    else:
+        mean, _ = trainer.model.predict(observation, deterministic=True)  # type: ignore[attr-defined]
+    hidden = observation
+    *inner, (weight, bias) = trainer.layers()
+    for w, b in inner:
+        hidden = np.maximum(hidden @ w + b, 0)
+    np.testing.assert_allclose(np.tanh(hidden @ weight + bias), np.asarray(mean), atol=1e-5)
+
+
+def test_training_is_determined_by_the_seed(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    files = [run(robot, sway, brief("sbx"), tmp_path / str(i)).policy for i in range(2)]
+    assert files[0].read_bytes() == files[1].read_bytes()
+
+
+def test_an_interrupted_run_keeps_its_replay_and_resumes(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    def interrupt(row: dict[str, float]) -> None:
+        if row["steps"] > 150:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train(sway, robot, brief("sbx"), tmp_path, progress=interrupt)
+    state = json.loads((tmp_path / "checkpoint" / "run.json").read_text())
+    with np.load(tmp_path / "checkpoint" / "replay.npz") as replay:
+        assert int(replay["pos"]) * SMALL.n_envs == pytest.approx(state["steps"], abs=8)
+    assert run(robot, sway, brief("sbx"), tmp_path).steps == 320
+
+
+def test_a_run_without_a_budget_is_refused(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    with pytest.raises(BadConfiguration, match="budget"):
+        run(robot, sway, TrainConfig(), tmp_path)
+
+
+def test_the_table_of_an_evaluation_has_every_start_and_baseline(
+    trained: tuple, robot: Robot, sway: ReferenceMotion
+) -> None:
+    result, _, _, _ = trained
+    verdict = evaluate(load_policy(result.policy), sway, robot, BRIEF)
+    policies = {row["policy"] for row in verdict.rows}
+    assert policies == {"trained", "statue", "mean_pose", "zero_residual", "random"}
+    own = [row for row in verdict.rows if row["policy"] == "trained"]
+    assert len(own) == 3 * 2 + 1
+    assert own[-1]["phase"] == STAND
+    assert 0 <= verdict.summary["success"] <= 1  # type: ignore[operator]
+    assert set(verdict.summary["baselines"]) == policies - {"trained"}  # type: ignore[call-overload]
+
+
+def test_an_evaluation_is_repeatable(trained: tuple, robot: Robot, sway: ReferenceMotion) -> None:
+    result, _, _, _ = trained
+    policy = load_policy(result.policy)
+    first, second = (evaluate(policy, sway, robot, BRIEF) for _ in range(2))
+    np.testing.assert_array_equal(first.rollout_qpos, second.rollout_qpos)
+
+
+def test_a_policy_for_another_robot_is_refused(
+    trained: tuple, robot: Robot, sway: ReferenceMotion
+) -> None:
+    result, _, _, _ = trained
+    policy = load_policy(result.policy)
+    (weight, bias), *rest = policy.layers
+    other = dataclasses.replace(policy, layers=((weight[:-1], bias), *rest))
+    with pytest.raises(BadPolicy, match="trained for"):
+        evaluate(other, sway, robot, BRIEF)
+
+
+def test_evaluation_needs_neither_jax_nor_torch_nor_prefect() -> None:
+    code = (
+        "import sys, robojackson.rl.evaluate, robojackson.rl.policy\n"
+        "heavy = {'jax', 'torch', 'stable_baselines3', 'prefect'} & set(sys.modules)\n"
+        "assert not heavy, heavy\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
