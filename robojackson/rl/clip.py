@@ -14,11 +14,12 @@ from robojackson.motion.reference import ReferenceMotion
 
 @dataclass(frozen=True)
 class ClipStep:
-    """The reference at one step for each of N environments."""
+    """The reference at one step for each of N environments; `moved` in m/s."""
 
     qpos: Float[np.ndarray, "N nq"]
     qvel: Float[np.ndarray, "N nv"]
     points: Float[np.ndarray, "N K 3"]
+    moved: Float[np.ndarray, "N K 3"]
     phase: Float[np.ndarray, " N"]
 
 
@@ -32,6 +33,7 @@ class Clip:
         self._qvel = np.asarray(reference.qvel, float)
         self._points = np.asarray(reference.keypoints_w, float)
         self._offset = np.asarray(reference.lap_offset, float)
+        self._moved = self._velocities()
 
     def at(self, step: Int[np.ndarray, " N"]) -> ClipStep:
         """The reference at each environment's step."""
@@ -40,7 +42,7 @@ class Clip:
         qpos = self._qpos[index].copy()
         qpos[:, :3] += offset
         points = self._points[index] + offset[:, None]
-        return ClipStep(qpos, self._qvel[index], points, index / self.steps)
+        return ClipStep(qpos, self._qvel[index], points, self._moved[index], index / self.steps)
 
     def ended(self, step: Int[np.ndarray, " N"]) -> np.ndarray:
         """Whether a clip that is not cyclic has been danced to its end."""
@@ -49,6 +51,12 @@ class Clip:
     def horizon(self, seconds: float) -> int:
         """Steps of a rollout: the given time when cyclic, the whole clip otherwise."""
         return round(seconds / self.dt) if self.cyclic else self.steps - 1
+
+    def _velocities(self) -> Float[np.ndarray, "S K 3"]:
+        """Backward differences, as a simulation that is read once a step sees them."""
+        before = np.roll(self._points, 1, axis=0)
+        before[0] = self._points[-1] - self._offset if self.cyclic else self._points[0]
+        return (self._points - before) / self.dt
 
     def _split(self, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         if self.cyclic:

@@ -57,23 +57,27 @@ class RewardConfig:
         orientation, orientation_width: Root orientation, rad.
         velocity, velocity_width: Root linear velocity, m/s.
         joint_speed, joint_speed_width: Hinge speeds, root mean square, rad/s.
+        limb_speed, limb_speed_width: Velocities of feet, hands and head, root mean square, m/s:
+            keeps a robot from balancing by flailing or stepping where the dancer stands.
         height, height_width: Root height, m.
         drift, drift_width: Root position, m.
         action_rate: Penalty on the mean squared change of the action.
     """
 
-    joints: float = 0.25
+    joints: float = 0.20
     joints_width: float = 0.25
-    sites: float = 0.20
-    sites_width: float = 0.12
+    sites: float = 0.15
+    sites_width: float = 0.10
     hands: float = 0.10
-    hands_width: float = 0.15
-    orientation: float = 0.15
+    hands_width: float = 0.12
+    orientation: float = 0.10
     orientation_width: float = 0.4
-    velocity: float = 0.10
+    velocity: float = 0.05
     velocity_width: float = 0.6
     joint_speed: float = 0.05
     joint_speed_width: float = 2.0
+    limb_speed: float = 0.20
+    limb_speed_width: float = 0.6
     height: float = 0.10
     height_width: float = 0.1
     drift: float = 0.05

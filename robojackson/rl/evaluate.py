@@ -30,10 +30,10 @@ from robojackson.rl.observation import observation_size
 from robojackson.rl.policy import Policy
 from robojackson.rl.rollouts import Controller, Rollouts, Starts, roll_out
 from robojackson.rl.starts import default_stand, noisy, stand_at
-from robojackson.rl.tracking import EXTREMITIES, PELVIS
+from robojackson.rl.tracking import EXTREMITIES, FEET, PELVIS
 
 KNEES = ("left_knee", "right_knee")
-LIMB_ENDS = ("left_foot", "right_foot", *EXTREMITIES)
+LIMB_ENDS = (*FEET, *EXTREMITIES)
 STAND = -1
 """`phase` of the row that starts in the default stand."""
 

@@ -17,6 +17,21 @@ from robojackson.rl.config import RewardConfig, TerminationConfig
 
 
 @dataclass(frozen=True)
+class TrackedPoints:
+    """Which of the points are special: indices, bound by name.
+
+    Attributes:
+        pelvis: What the others are compared relative to.
+        hands: Hands and head.
+        limbs: Feet, hands and head: the ends that must not flail.
+    """
+
+    pelvis: int
+    hands: tuple[int, ...]
+    limbs: tuple[int, ...]
+
+
+@dataclass(frozen=True)
 class TrackingErrors:
     """How far each of N robots is from its reference.
 
@@ -28,6 +43,7 @@ class TrackingErrors:
         site_mean: Mean distance of the sites relative to the pelvis, m.
         orientation: Of the root, rad.
         velocity: Of the root, m/s.
+        limb_speed: Root mean square over the limb ends' velocity differences, m/s.
         height: Of the root, signed, m.
         drift: Of the root over the floor, m.
     """
@@ -39,6 +55,7 @@ class TrackingErrors:
     site_mean: Float[np.ndarray, " N"]
     orientation: Float[np.ndarray, " N"]
     velocity: Float[np.ndarray, " N"]
+    limb_speed: Float[np.ndarray, " N"]
     height: Float[np.ndarray, " N"]
     drift: Float[np.ndarray, " N"]
 
@@ -47,22 +64,25 @@ def tracking_errors(
     qpos: Float[np.ndarray, "N nq"],
     qvel: Float[np.ndarray, "N nv"],
     points: Float[np.ndarray, "N K 3"],
+    moved: Float[np.ndarray, "N K 3"],
     target: ClipStep,
-    pelvis: int,
-    extremities: tuple[int, ...],
+    which: TrackedPoints,
 ) -> TrackingErrors:
-    """Compare states with their reference; `pelvis` and `extremities` index the points."""
-    relative = points - points[:, pelvis, None]
-    wanted = target.points - target.points[:, pelvis, None]
+    """Compare states with their reference; `moved` is the velocity of the points, m/s."""
+    relative = points - points[:, which.pelvis, None]
+    wanted = target.points - target.points[:, which.pelvis, None]
     squared = np.sum((relative - wanted) ** 2, -1)
+    limbs = list(which.limbs)
+    hurry = np.sum((moved[:, limbs] - target.moved[:, limbs]) ** 2, -1)
     return TrackingErrors(
         joints=np.sqrt(np.mean((qpos[:, 7:] - target.qpos[:, 7:]) ** 2, -1)),
         joint_speed=np.sqrt(np.mean((qvel[:, 6:] - target.qvel[:, 6:]) ** 2, -1)),
         sites=np.sqrt(np.mean(squared, -1)),
-        hands=np.sqrt(np.mean(squared[:, list(extremities)], -1)),
+        hands=np.sqrt(np.mean(squared[:, list(which.hands)], -1)),
         site_mean=np.mean(np.sqrt(squared), -1),
         orientation=quat_angle(qpos[:, 3:7], target.qpos[:, 3:7]),
         velocity=np.linalg.norm(qvel[:, :3] - target.qvel[:, :3], axis=-1),
+        limb_speed=np.sqrt(np.mean(hurry, -1)),
         height=qpos[:, 2] - target.qpos[:, 2],
         drift=np.linalg.norm(qpos[:, :2] - target.qpos[:, :2], axis=-1),
     )
@@ -80,6 +100,7 @@ def reward_terms(
         "orientation": bell(config.orientation, errors.orientation, config.orientation_width),
         "velocity": bell(config.velocity, errors.velocity, config.velocity_width),
         "joint_speed": bell(config.joint_speed, errors.joint_speed, config.joint_speed_width),
+        "limb_speed": bell(config.limb_speed, errors.limb_speed, config.limb_speed_width),
         "height": bell(config.height, errors.height, config.height_width),
         "drift": bell(config.drift, errors.drift, config.drift_width),
         "action_rate": -config.action_rate * action_change,

@@ -19,12 +19,19 @@ from robojackson.rl.clip import Clip
 from robojackson.rl.config import TrackConfig
 from robojackson.rl.observation import observation_size, observe
 from robojackson.rl.physics import Simulation
-from robojackson.rl.rewards import fallen, lost, reward_terms, tracking_errors
+from robojackson.rl.rewards import (
+    TrackedPoints,
+    fallen,
+    lost,
+    reward_terms,
+    tracking_errors,
+)
 from robojackson.rl.starts import SettledStates, StartPhases, default_stand, noisy, stand_at
 
 SETTLED_SECONDS = 1.0
 SETTLED_STATES_NEEDED = 32
 PELVIS = "pelvis"
+FEET = ("left_foot", "right_foot")
 EXTREMITIES = ("left_hand", "right_hand", "head")
 
 
@@ -60,8 +67,11 @@ class TrackingCore:
         if names != reference.keypoint_names:
             unknown = sorted(set(reference.keypoint_names) ^ set(names))
             raise UnknownName("keypoint", ", ".join(unknown), "reference motion", names)
-        self.pelvis = names.index(PELVIS)
-        self.extremities = tuple(names.index(name) for name in EXTREMITIES)
+        self._which = TrackedPoints(
+            pelvis=names.index(PELVIS),
+            hands=tuple(names.index(name) for name in EXTREMITIES),
+            limbs=tuple(names.index(name) for name in (*FEET, *EXTREMITIES)),
+        )
         self.sim = Simulation(robot, config.control, n, config.threads)
         self.starts = StartPhases(self.clip, config.reset.failure_share)
         self._settled = SettledStates(robot.model.nq, robot.model.nv)
@@ -89,18 +99,18 @@ class TrackingCore:
         action = np.clip(np.asarray(action, float), -1, 1)
         following = self.clip.at(self.step_index + 1)
         hinge = self.sim.motors.hinge
+        before = self.sim.points.copy()
         self.sim.step(following.qpos[:, 7:][:, hinge] + self.config.control.residual * action)
         self.step_index += 1
         self._age += 1
-        errors = tracking_errors(
-            self.sim.qpos, self.sim.qvel, self.sim.points, following, self.pelvis, self.extremities
-        )
+        sim, moved = self.sim, (self.sim.points - before) / self.clip.dt
+        errors = tracking_errors(sim.qpos, sim.qvel, sim.points, moved, following, self._which)
         change = np.mean((action - self._last) ** 2, -1)
         self._last = action
         terms = reward_terms(errors, change, self.config.reward)
         reward = np.sum(list(terms.values()), 0)
         rules = self.config.termination
-        terminated = fallen(self.sim.qpos, rules) | lost(errors, rules)
+        terminated = fallen(sim.qpos, rules) | lost(errors, rules)
         ended = (self._age >= self.limit) | self.clip.ended(self.step_index)
         result = StepResult(
             *(2 * (self._observe(),)), reward, terms, terminated, ended & ~terminated

@@ -10,9 +10,11 @@ from robojackson.motion.reference import ReferenceMotion
 from robojackson.retarget.robot import Robot
 from robojackson.rl.clip import Clip
 from robojackson.rl.config import RewardConfig, TerminationConfig, TrackConfig
-from robojackson.rl.rewards import fallen, reward_terms, tracking_errors
+from robojackson.rl.rewards import TrackedPoints, fallen, reward_terms, tracking_errors
 from robojackson.rl.tracking import TrackingCore
 from robojackson.rl.vec_env import TrackingEnv, TrackingVecEnv
+
+WHICH = TrackedPoints(pelvis=0, hands=(11, 12, 13), limbs=(5, 6, 11, 12, 13))
 
 
 def core(robot: Robot, sway: ReferenceMotion, n: int = 4, seed: int = 0) -> TrackingCore:
@@ -20,10 +22,12 @@ def core(robot: Robot, sway: ReferenceMotion, n: int = 4, seed: int = 0) -> Trac
 
 
 def reward_at(
-    sway: ReferenceMotion, qpos: np.ndarray, qvel: np.ndarray, points: np.ndarray
+    sway: ReferenceMotion, qpos: np.ndarray, qvel: np.ndarray, points: np.ndarray, rush: float = 0.0
 ) -> float:
     target = Clip(sway).at(np.array([10]))
-    errors = tracking_errors(qpos[None], qvel[None], points[None], target, 0, (11, 12, 13))
+    errors = tracking_errors(
+        qpos[None], qvel[None], points[None], target.moved + rush, target, WHICH
+    )
     terms = reward_terms(errors, np.zeros(1), RewardConfig())
     return float(sum(term[0] for term in terms.values()))
 
@@ -81,6 +85,11 @@ def test_the_hands_are_compared(sway: ReferenceMotion) -> None:
     points = sway.keypoints_w[10].copy()
     points[sway.keypoint_names.index("left_hand")] += 0.2
     assert reward_at(sway, sway.qpos[10], sway.qvel[10], points) < best - 0.05
+
+
+def test_flailing_costs_reward_even_in_the_right_pose(sway: ReferenceMotion) -> None:
+    state = (sway.qpos[10], sway.qvel[10], sway.keypoints_w[10])
+    assert reward_at(sway, *state, rush=0.5) < reward_at(sway, *state) - 0.05
 
 
 def test_a_reference_with_another_skeleton_is_refused(robot: Robot, sway: ReferenceMotion) -> None:
