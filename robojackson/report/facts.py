@@ -1,0 +1,100 @@
+"""Names, units and meaning of the figures that the page shows."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Fact:
+    """One line of a table.
+
+    Attributes:
+        label: What it is.
+        value: With its unit, ready to read.
+        meaning: What to make of it, or empty.
+    """
+
+    label: str
+    value: str
+    meaning: str = ""
+
+
+@dataclass(frozen=True)
+class _Form:
+    """How a figure is written: factor, digits, unit."""
+
+    label: str
+    unit: str = ""
+    digits: int = 0
+    factor: float = 1.0
+    meaning: str = ""
+
+
+_FORMS: Mapping[str, _Form] = {
+    "frames": _Form("frames"),
+    "fps": _Form("frame rate", "fps", 2),
+    "duration_s": _Form("length", "s", 2),
+    "detected": _Form("frames with a person"),
+    "missing_joints": _Form("missing landmarks M", meaning="summed over the clip"),
+    "jitter": _Form("jitter J", "", 3, meaning="image units, summed over the clip"),
+    "stability_score": _Form("stability score M + J", "", 2, meaning="lower is steadier"),
+    "missing_joints_per_frame": _Form("missing landmarks a frame", "", 2),
+    "jitter_per_frame": _Form("jitter a frame", "", 4),
+    "valid_share": _Form("frames seen, not filled in", "%", 1, 100.0),
+    "contact_share": _Form("time with a foot on the floor", "%", 0, 100.0),
+    "planted_share": _Form("time with a planted foot", "%", 0, 100.0),
+    "height_m": _Form("height of the recovered person", "m", 2),
+    "seconds": _Form("length", "s", 2),
+    "steps": _Form("control steps"),
+    "cyclic": _Form("cyclic"),
+    "keypoint_mm": _Form("keypoint error", "mm", 1, meaning="robot against its targets"),
+    "keypoint_p95_mm": _Form("keypoint error, 95th percentile", "mm", 1),
+    "bone_deg": _Form("bone direction error", "deg", 1),
+    "limit_violations": _Form("joint limit violations", meaning="must be 0"),
+    "nan_count": _Form("values that are no numbers", meaning="must be 0"),
+    "floor_penetration_mm": _Form("floor penetration", "mm", 2, meaning="at most 5"),
+    "self_penetration_mm": _Form("self penetration", "mm", 2),
+    "planted_slip_cm_s": _Form("slip of planted feet", "cm/s", 2),
+    "joint_speed_max_rad_s": _Form("fastest joint", "rad/s", 2),
+    "torque_ratio_p95": _Form("torque over limit, 95th percentile", "", 2, meaning="1 is all"),
+    "torque_over_share": _Form("steps that ask too much of a motor", "%", 1, 100.0),
+    "seam_deg": _Form("jump at the seam of a lap", "deg", 2),
+    "updates": _Form("gradient updates"),
+    "training_s": _Form("training time", "min", 1, 1 / 60),
+    "survived_s": _Form("survival", "s", 1),
+    "success": _Form("success", "%", 0, 100.0),
+    "strict_success": _Form("strict success", "%", 0, 100.0),
+    "skill": _Form("skill", "", 2),
+    "site_error_m": _Form("site error", "mm", 0, 1000.0),
+    "limb_gain": _Form("limb gain", "", 2),
+    "rollouts": _Form("rollouts"),
+}
+_FLAGS = ("cyclic",)
+
+
+def fact(key: str, value: Any) -> Fact:
+    """A figure by its key; one that is not known keeps its key as its label."""
+    form = _FORMS.get(key, _Form(key.replace("_", " "), digits=3))
+    return Fact(form.label, written(key, value), form.meaning)
+
+
+def written(key: str, value: Any) -> str:
+    """A value with its unit; a dash where there is none."""
+    form = _FORMS.get(key, _Form(key, digits=3))
+    if key in _FLAGS or isinstance(value, bool):
+        return "yes" if value else "no"
+    if value is None or (isinstance(value, float) and not math.isfinite(value)):
+        return "–"
+    if not isinstance(value, int | float):
+        return str(value)
+    number = f"{value * form.factor:,.{form.digits}f}" if key in _FORMS else f"{value:,.4g}"
+    space = "" if form.unit == "%" else " "
+    return f"{number}{space}{form.unit}".strip()
+
+
+def facts(values: Mapping[str, Any], only: tuple[str, ...] = ()) -> list[Fact]:
+    """A table of figures, in the order of `only` where it is given."""
+    keys = [key for key in only if key in values] if only else list(values)
+    return [fact(key, values[key]) for key in keys]

@@ -1,0 +1,151 @@
+"""The page: complete, escaped, offline; and what it says is what was measured."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robojackson.clips.stability import Stability
+from robojackson.clips.video import VideoInfo
+from robojackson.motion.reference import ReferenceMotion
+from robojackson.motion.smpl import SmplSequence
+from robojackson.report import plots
+from robojackson.report.facts import fact, written
+from robojackson.report.page import PageContent, render, write_page
+from robojackson.report.summary import Results, page_content, versions
+
+POLICIES = ("trained", "statue")
+SUMMARY = {
+    "survived_s": 8.25, "success": 0.62, "strict_success": 0.5, "skill": 0.31,
+    "site_error_m": 0.048, "limb_gain": 0.9, "limb_gain_left_hand": 0.93,
+    "limb_gain_left_foot": float("nan"), "rollouts": 73.0,
+    "baselines": {"statue": {"survived_s": 1.0, "success": 0.03, "rollouts": 73.0}},
+}  # fmt: skip
+
+
+@pytest.fixture
+def results(sequence: SmplSequence, reference: ReferenceMotion) -> Results:
+    rows = [
+        {"policy": policy, "phase": phase, "reset": reset, "survived_s": 3.0 * (1 + reset)}
+        for policy in POLICIES for phase in (0, 9, 18) for reset in range(3)
+    ]  # fmt: skip
+    episodes = [
+        {"step": 100 * k, "episode": k, "episode_return": 2.0 * k, "episode_length": k}
+        for k in range(1, 40)
+    ]
+    return Results(
+        title="hip shake",
+        info=VideoInfo(Path("a/hip <i>shake.mp4"), 640, 480, 30.0, 12, 0.4, 0),
+        stability=Stability(12, 12, 3, 0.1, 3.1, 0.25, 0.01),
+        sequence=sequence,
+        reference=reference,
+        training={"trainer": "sbx", "steps": 1200, "training_s": 90.0},
+        episodes=episodes,
+        evaluation=SUMMARY,
+        evaluations=rows,
+        rollout_qpos=reference.qpos,
+    )
+
+
+def test_page_shows_every_stage(results: Results) -> None:
+    html = render(page_content(results, "dance.mp4"))
+    headings = re.findall(r"<h2>(.*?)</h2>", html)
+    for title in ("Evaluation", "Source clip", "Stability", "Motion capture", "Retargeting"):
+        assert title in headings
+
+
+def test_page_shows_every_plot_inside_itself(results: Results) -> None:
+    html = render(page_content(results, "dance.mp4"))
+    assert html.count('src="data:image/png;base64,') == 5
+
+
+def test_page_asks_for_nothing_but_the_video(results: Results) -> None:
+    html = render(page_content(results, "my dance.mp4"))
+    addresses = set(re.findall(r'(?:src|href)="((?!data:)[^"]*)"', html))
+    assert addresses == {"my%20dance.mp4"}
+
+
+def test_markup_in_names_is_text(results: Results) -> None:
+    html = render(page_content(replace(results, title="<script>alert(1)</script>"), None))
+    assert "<script>" not in html
+    assert "hip <i>shake" not in html
+
+
+def test_headline_names_the_best_baseline() -> None:
+    html = render(PageContent(title="x", evaluation=SUMMARY))
+    assert "finished 62% of 73 rollouts without a fall; the best baseline (statue) 3%." in html
+
+
+def test_missing_figure_is_a_dash() -> None:
+    html = render(PageContent(title="x", evaluation=SUMMARY))
+    row = re.search(r"statue.*?</tr>", html[html.index("<tbody>") :], re.S)
+    assert row is not None
+    assert row.group().count("<td>–</td>") == 4
+
+
+def test_page_before_training_has_no_verdict() -> None:
+    assert "<h2>Evaluation</h2>" not in render(PageContent(title="x"))
+
+
+def test_notes_are_told(results: Results) -> None:
+    assert '<p class="note">the camera moves</p>' in render(page_content(results, None))
+
+
+def test_written_page_is_whole(results: Results, tmp_path: Path) -> None:
+    page = write_page(page_content(results, None), tmp_path / "index.html")
+    assert page.read_text().rstrip().endswith("</html>")
+    assert list(tmp_path.iterdir()) == [page]
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "text"),
+    [
+        ("site_error_m", 0.0482, "48 mm"),
+        ("success", 0.625, "62%"),
+        ("training_s", 90.0, "1.5 min"),
+        ("steps", 1203456, "1,203,456"),
+        ("skill", float("nan"), "–"),
+        ("cyclic", 1.0, "yes"),
+        ("trainer", "sbx", "sbx"),
+    ],
+)
+def test_figures_are_written_with_their_units(key: str, value: object, text: str) -> None:
+    assert written(key, value) == text
+
+
+def test_unknown_figure_keeps_its_name() -> None:
+    assert fact("some_new_figure", 0.12345).label == "some new figure"
+
+
+def test_versions_leave_out_what_is_not_installed() -> None:
+    found = versions(("numpy", "no-such-program-of-ours"))
+    assert found == {"numpy": np.__version__}
+
+
+def test_survival_bars_are_means_over_resets(results: Results) -> None:
+    axes = plots.survival_by_phase(results.evaluations, 0.015).axes[0]
+    assert [bar.get_height() for bar in axes.patches] == [6.0, 6.0, 6.0]
+
+
+def test_default_stand_is_no_phase(results: Results) -> None:
+    stand = {"policy": "trained", "phase": -1, "reset": 0, "survived_s": 99.0}
+    axes = plots.survival_by_phase([*results.evaluations, stand], 0.015).axes[0]
+    assert len(axes.patches) == 3
+
+
+def test_training_curve_is_the_median() -> None:
+    rows = [{"step": 10, "episode_length": n, "episode_return": 0.0} for n in (100, 200, 900)]
+    line = plots.training_curve(rows, 0.01).axes[0].lines[0]
+    np.testing.assert_allclose(line.get_ydata(), [2.0])
+
+
+def test_limb_that_does_not_move_is_told_so() -> None:
+    texts = [text.get_text() for text in plots.limb_gains(SUMMARY).axes[0].texts]
+    assert texts == [" 0.93", " does not move in the reference"]
+
+
+def test_plot_is_a_png(results: Results) -> None:
+    figure = plots.contact_strip(results.sequence, results.reference)
+    assert plots.png(figure).startswith(b"\x89PNG")

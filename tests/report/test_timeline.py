@@ -1,0 +1,50 @@
+"""All panels show the same moment, over laps and past the end."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from robojackson.motion.reference import ReferenceMotion
+from robojackson.report.timeline import reference_qpos, timeline
+
+
+def test_cyclic_reference_starts_again_after_a_lap(reference: ReferenceMotion) -> None:
+    when = timeline(reference, 30.0, 12, 2 * len(reference), 1 / reference.dt, 99.0)
+    np.testing.assert_array_equal(when.step[27:54], when.step[:27])
+
+
+def test_laps_are_counted(reference: ReferenceMotion) -> None:
+    when = timeline(reference, 30.0, 12, 2 * len(reference), 1 / reference.dt, 99.0)
+    np.testing.assert_array_equal(when.lap, np.repeat([0, 1], 27))
+
+
+def test_motion_that_is_not_cyclic_holds_its_last_step(reference: ReferenceMotion) -> None:
+    once = replace(reference, cyclic=False)
+    when = timeline(once, 30.0, 12, 2 * len(once), 1 / once.dt, 99.0)
+    assert set(when.step[27:]) == {len(once) - 1}
+
+
+def test_frame_is_the_one_that_the_step_was_made_from(reference: ReferenceMotion) -> None:
+    when = timeline(reference, 30.0, 12, 0, 30.0, 99.0)
+    np.testing.assert_array_equal(when.frame, np.arange(12))
+
+
+def test_trimmed_start_of_the_clip_is_not_shown(reference: ReferenceMotion) -> None:
+    late = replace(reference, source_time_s=reference.source_time_s + 0.1)
+    assert timeline(late, 30.0, 40, 0, 30.0, 99.0).frame[0] == 3
+
+
+def test_rollout_that_ends_early_is_held_and_marked(reference: ReferenceMotion) -> None:
+    when = timeline(reference, 30.0, 12, 10, 1 / reference.dt, 99.0)
+    assert when.rollout.max() == 9
+    np.testing.assert_array_equal(np.flatnonzero(when.ended), np.arange(10, 27))
+
+
+def test_video_is_no_longer_than_asked(reference: ReferenceMotion) -> None:
+    assert len(timeline(reference, 30.0, 12, 4000, 30.0, 2.0)) == 60
+
+
+def test_reference_moves_on_by_a_lap(reference: ReferenceMotion) -> None:
+    when = timeline(reference, 30.0, 12, 2 * len(reference), 1 / reference.dt, 99.0)
+    qpos = reference_qpos(reference, when)
+    np.testing.assert_allclose(qpos[27, :3] - qpos[0, :3], reference.lap_offset)

@@ -1,0 +1,1 @@
+"""How the assets were made: pose bundles, rendered dancers, the authored hip-shake."""

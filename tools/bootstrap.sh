@@ -1,0 +1,97 @@
+#!/bin/sh
+# What `make` runs first. POSIX sh, nothing of ours installed.
+#   bootstrap.sh missing   print the apt packages that this machine lacks, on one line
+#   bootstrap.sh check     one sentence and exit 1 when something is lacking, before any work
+#   bootstrap.sh install   create .venv or bring it up to date; does nothing when it is
+# Environment: PYTHON (an interpreter 3.11), TORCH_INDEX (where torch comes from).
+set -eu
+cd "$(dirname "$0")/.."
+VENV=.venv
+STAMP=$VENV/.stamp
+
+is_python() { "$1" -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' 2>/dev/null; }
+has_venv() { "$1" -c 'import venv, ensurepip' 2>/dev/null; }
+
+# The interpreter: one that can make an environment if there is any, else any 3.11.
+find_python() {
+    found=
+    for name in ${PYTHON:-} python3.11 /usr/bin/python3.11 python3 /usr/bin/python3; do
+        is_python "$name" || continue
+        [ -n "$found" ] || found=$name
+        if has_venv "$name"; then
+            found=$name
+            break
+        fi
+    done
+    echo "$found"
+}
+
+libraries() { { ldconfig -p || /sbin/ldconfig -p; } 2>/dev/null; }
+
+has_mesa() {
+    for file in /usr/lib/*/dri/*_dri.so /usr/lib/dri/*_dri.so /usr/lib64/dri/*_dri.so; do
+        [ -e "$file" ] && return 0
+    done
+    return 1
+}
+
+missing() {
+    packages=
+    python=$(find_python)
+    [ -n "$python" ] || packages="python3.11 python3.11-venv"
+    [ -z "$python" ] || has_venv "$python" || packages="python3.11-venv"
+    known=$(libraries)
+    for pair in libEGL.so.1:libegl1 libGLESv2.so.2:libgles2 libOpenGL.so.0:libopengl0; do
+        case $known in *"${pair%%:*}"*) ;; *) packages="$packages ${pair#*:}" ;; esac
+    done
+    has_mesa || packages="$packages libgl1-mesa-dri"
+    echo $packages
+}
+
+check() {
+    packages=$(missing)
+    [ -z "$packages" ] && return 0
+    echo "This machine lacks system packages that RoboJackson needs; install them with:" \
+        "apt-get install --no-install-recommends $packages" >&2
+    exit 1
+}
+
+wanted() { { cat pyproject.toml constraints.txt tools/bootstrap.sh; echo "${TORCH_INDEX:-}"; } | cksum; }
+
+pinned() { sed -n "s/^$1==//p" constraints.txt; }
+
+say() { echo "setup: $*" >&2; }
+
+install() {
+    check
+    if [ -f "$STAMP" ] && [ "$(cat "$STAMP")" = "$(wanted)" ] && is_python "$VENV/bin/python"; then
+        return 0
+    fi
+    if ! is_python "$VENV/bin/python"; then
+        say "creating $VENV"
+        rm -rf "$VENV"
+        "$(find_python)" -m venv "$VENV"
+    fi
+    pip="$VENV/bin/python -m pip --disable-pip-version-check --quiet"
+    say "torch $(pinned torch) (some minutes, some gigabytes)"
+    # First and alone: what comes later would bring a CUDA build of several gigabytes.
+    $pip install ${TORCH_INDEX:+--index-url "$TORCH_INDEX"} "torch==$(pinned torch)"
+    say "the rest"
+    $pip install --constraint constraints.txt --editable ".[fast,s3,dev]"
+    # MediaPipe and scenedetect bring two more OpenCV builds; all three share one folder, and the
+    # one with windows needs libraries that a server has not.
+    say "headless OpenCV alone"
+    $pip uninstall --yes opencv-python opencv-contrib-python
+    $pip install --no-deps --force-reinstall \
+        "opencv-python-headless==$(pinned opencv-python-headless)"
+    wanted >"$STAMP"
+    say "done"
+}
+
+case ${1:-} in
+missing | check | install) "$1" ;;
+*)
+    echo "usage: bootstrap.sh missing|check|install" >&2
+    exit 2
+    ;;
+esac
