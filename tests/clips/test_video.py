@@ -1,0 +1,135 @@
+"""Laws of reading videos: what is there is told, what is broken gets one clear line."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robojackson.clips.video import VideoLimits, list_videos, probe, read_frames, trim
+from robojackson.errors import (
+    RoboJacksonError,
+    TrackTooShort,
+    TruncatedVideo,
+    UnreadableVideo,
+    VideoTooLong,
+)
+
+LIMITS = VideoLimits()
+QUARTER_TURN_CLOCKWISE = (0, 1 << 16, 0, -(1 << 16), 0, 0)
+
+
+def turn_by_metadata(path: Path) -> None:
+    """Write a quarter turn clockwise into the track header's matrix, as a phone does."""
+    data = bytearray(path.read_bytes())
+    start = data.index(b"tkhd") + 4 + 40
+    for index, value in enumerate(QUARTER_TURN_CLOCKWISE):
+        data[start + 4 * index : start + 4 * index + 4] = value.to_bytes(4, "big", signed=True)
+    path.write_bytes(bytes(data))
+
+
+def test_probe_tells_what_was_written(write_video) -> None:
+    info = probe(write_video(frames=20, size=(64, 48), fps=20), LIMITS)
+    assert (info.width, info.height, info.fps, info.frames) == (64, 48, 20.0, 20)
+    assert info.duration_s == pytest.approx(1.0)
+
+
+def test_every_frame_is_read_in_order(write_video) -> None:
+    levels = [int(image[:, 40:].mean()) for image in read_frames(write_video(frames=20))]
+    assert np.abs(np.array(levels) - 2 * np.arange(20)).max() <= 2
+
+
+def test_frames_have_no_padding_between_rows(write_video) -> None:
+    image = next(read_frames(write_video(size=(90, 48))))
+    assert image.flags.c_contiguous
+
+
+def test_rotation_tag_swaps_width_and_height(write_video) -> None:
+    path = write_video(size=(64, 48))
+    turn_by_metadata(path)
+    info = probe(path, LIMITS)
+    assert (info.width, info.height, info.rotation) == (48, 64, 90)
+
+
+def test_rotation_tag_turns_the_bright_left_half_up(write_video) -> None:
+    path = write_video(size=(64, 48))
+    turn_by_metadata(path)
+    image = next(read_frames(path)).astype(int)
+    assert image.shape == (64, 48, 3)
+    assert image[:30].mean() > image[34:].mean() + 40
+
+
+def test_text_file_named_mp4_is_not_a_video(tmp_path: Path) -> None:
+    path = tmp_path / "notes.mp4"
+    path.write_text("this is no video\n" * 50)
+    with pytest.raises(UnreadableVideo, match=r"notes\.mp4: not a video"):
+        probe(path, LIMITS)
+
+
+def test_empty_file_is_told_as_empty(tmp_path: Path) -> None:
+    path = tmp_path / "empty.mp4"
+    path.touch()
+    with pytest.raises(UnreadableVideo, match="empty"):
+        probe(path, LIMITS)
+
+
+def test_missing_file_is_told_as_missing(tmp_path: Path) -> None:
+    with pytest.raises(UnreadableVideo, match="no such file"):
+        probe(tmp_path / "nowhere.mp4", LIMITS)
+
+
+@pytest.mark.parametrize("index_first", [True, False])
+def test_half_a_file_is_truncated(write_video, index_first: bool) -> None:
+    path = write_video(frames=60, size=(320, 240), index_first=index_first)
+    data = path.read_bytes()
+    path.write_bytes(data[: len(data) // 2])
+    with pytest.raises(TruncatedVideo, match="copy or download"):
+        probe(path, LIMITS)
+
+
+def test_one_frame_is_too_short(write_video) -> None:
+    with pytest.raises(TrackTooShort, match="1 frame"):
+        probe(write_video(frames=1), LIMITS)
+
+
+def test_long_clip_is_refused_with_both_figures(write_video) -> None:
+    with pytest.raises(VideoTooLong, match=r"1\.0 s .* 0\.5 s"):
+        probe(write_video(frames=20, fps=20), VideoLimits(max_duration_s=0.5))
+
+
+def test_every_refusal_is_one_line(write_video, tmp_path: Path) -> None:
+    path = tmp_path / "notes.mp4"
+    path.write_text("no video")
+    with pytest.raises(RoboJacksonError) as caught:
+        probe(path, LIMITS)
+    assert "\n" not in str(caught.value)
+
+
+def test_range_of_frames_includes_its_start_and_excludes_its_end(write_video) -> None:
+    path = write_video(frames=20, fps=20)
+    levels = [int(image[:, 40:].mean()) for image in read_frames(path, 0.25, 0.5)]
+    assert np.abs(np.array(levels) - [10, 12, 14, 16, 18]).max() <= 2
+
+
+def test_trim_keeps_exactly_the_range(write_video, tmp_path: Path) -> None:
+    out = trim(write_video(frames=20, fps=20), 0.25, 0.75, tmp_path / "part.mp4")
+    levels = [int(image[:, 40:].mean()) for image in read_frames(out)]
+    assert probe(out, LIMITS).frames == 10
+    assert abs(levels[0] - 10) <= 3
+
+
+def test_trim_of_nothing_leaves_no_file(write_video, tmp_path: Path) -> None:
+    out = tmp_path / "part.mp4"
+    with pytest.raises(TrackTooShort):
+        trim(write_video(frames=20, fps=20), 5.0, 6.0, out)
+    assert list(tmp_path.glob("*.mp4")) == [tmp_path / "clip.mp4"]
+
+
+def test_folder_lists_its_videos_by_name(write_video, tmp_path: Path) -> None:
+    second, first = write_video("b.mp4", frames=2), write_video("a.MOV", frames=2)
+    (tmp_path / "readme.txt").write_text("text")
+    assert list_videos(tmp_path) == (first, second)
+
+
+def test_folder_without_videos_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UnreadableVideo, match="holds no video"):
+        list_videos(tmp_path)

@@ -1,0 +1,85 @@
+"""Laws of the repair of a track: gaps are bridged, swapped sides put back, nobody is an error."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from robojackson.clips.track import LandmarkTrack
+from robojackson.errors import NoPersonFound, TrackTooShort, UnknownName
+from robojackson.mocap.blazepose import LANDMARK_NAMES, MIRROR, fill_gaps, landmark, repair
+
+
+def without(track: LandmarkTrack, frames: list[int]) -> LandmarkTrack:
+    """The track with nobody found in some frames."""
+    arrays = [np.array(a) for a in (track.landmarks, track.world_landmarks, track.visibility)]
+    for array in arrays:
+        array[frames] = np.nan
+    landmarks, world, visibility = arrays
+    return replace(track, landmarks=landmarks, world_landmarks=world, visibility=visibility)
+
+
+def swapped(track: LandmarkTrack, frames: list[int]) -> LandmarkTrack:
+    """The track with left and right exchanged in some frames."""
+    arrays = [np.array(a) for a in (track.landmarks, track.world_landmarks, track.visibility)]
+    for array in arrays:
+        array[frames] = array[frames][:, MIRROR]
+    landmarks, world, visibility = arrays
+    return replace(track, landmarks=landmarks, world_landmarks=world, visibility=visibility)
+
+
+def test_gap_inside_is_bridged_linearly() -> None:
+    values = np.array([[0.0], [np.nan], [np.nan], [3.0]])
+    found = np.array([True, False, False, True])
+    assert np.allclose(fill_gaps(values, found)[:, 0], [0, 1, 2, 3])
+
+
+def test_gap_at_an_end_holds_the_nearest_frame() -> None:
+    values = np.array([[np.nan], [5.0], [6.0], [np.nan]])
+    assert np.allclose(fill_gaps(values, ~np.isnan(values[:, 0]))[:, 0], [5, 5, 6, 6])
+
+
+def test_mirror_pairs_left_with_right() -> None:
+    assert (MIRROR[MIRROR] == np.arange(33)).all()
+    assert LANDMARK_NAMES[MIRROR[landmark("mouth_left")]] == "mouth_right"
+
+
+def test_a_clean_track_is_left_alone(hip_shake: LandmarkTrack) -> None:
+    repaired = repair(hip_shake)
+    assert repaired.swapped == 0
+    assert np.array_equal(repaired.local, hip_shake.world_landmarks)
+
+
+@pytest.mark.parametrize("frames", [[50], list(range(30, 60)), [10, 11, 12, 90]])
+def test_exchanged_sides_are_put_back(hip_shake: LandmarkTrack, frames: list[int]) -> None:
+    repaired = repair(swapped(hip_shake, frames))
+    assert repaired.swapped == len(frames)
+    assert np.allclose(repaired.image, repair(hip_shake).image)
+
+
+def test_undetected_frames_are_invalid_and_invisible(hip_shake: LandmarkTrack) -> None:
+    repaired = repair(without(hip_shake, [20, 21]))
+    assert np.flatnonzero(~repaired.valid).tolist() == [20, 21]
+    assert (repaired.visibility[20:22] == 0.0).all()
+    assert not np.isnan(repaired.local).any()
+
+
+def test_nobody_in_the_clip_names_the_frames(hip_shake: LandmarkTrack) -> None:
+    with pytest.raises(NoPersonFound, match="no person found in 120 of 120 frames"):
+        repair(without(hip_shake, list(range(120))))
+
+
+def test_one_frame_is_too_short(hip_shake: LandmarkTrack) -> None:
+    one = replace(
+        hip_shake,
+        landmarks=hip_shake.landmarks[:1],
+        world_landmarks=hip_shake.world_landmarks[:1],
+        visibility=hip_shake.visibility[:1],
+    )
+    with pytest.raises(TrackTooShort, match="at least 2 frames"):
+        repair(one)
+
+
+def test_unknown_landmark_names_the_known_ones() -> None:
+    with pytest.raises(UnknownName, match="left_shoulder"):
+        landmark("left_sholder")

@@ -1,0 +1,147 @@
+"""Laws of the whole stage on the recorded hip-shake: consistent, grounded, smooth, refusing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from robojackson.clips.track import LandmarkTrack
+from robojackson.errors import NoPersonFound
+from robojackson.metrics.motion import floor_penetration, foot_slide, jerk
+from robojackson.mocap.body import pose_sequence
+from robojackson.mocap.feet import foot_points
+from robojackson.mocap.recover import MocapConfig, recover
+from robojackson.mocap.skeleton import keypoint
+from robojackson.motion.smpl import AIR, PLANTED, SmplSequence
+
+
+@pytest.fixture(scope="module")
+def motion(hip_shake: LandmarkTrack) -> SmplSequence:
+    return recover(hip_shake, MocapConfig())
+
+
+@pytest.fixture(scope="module")
+def feet(motion: SmplSequence) -> np.ndarray:
+    return foot_points(pose_sequence(motion), motion.rest_joints)
+
+
+def test_parameters_pose_the_joints_that_are_stored(motion: SmplSequence) -> None:
+    assert np.allclose(pose_sequence(motion).points, motion.keypoints_w, atol=1e-9)
+    assert np.array_equal(motion.joints, motion.keypoints_w[:, :24])
+
+
+def test_every_frame_of_the_clip_has_a_row(motion: SmplSequence, hip_shake: LandmarkTrack) -> None:
+    assert len(motion) == len(hip_shake) == len(motion.contact) == len(motion.confidence)
+
+
+def test_nothing_is_nan(motion: SmplSequence) -> None:
+    for array in (motion.global_orient, motion.body_pose, motion.transl, motion.keypoints_w):
+        assert np.isfinite(array).all()
+
+
+def test_the_person_stands_upright_and_faces_the_camera(motion: SmplSequence) -> None:
+    trunk = motion.joints[:, keypoint("neck")] - motion.joints[:, 0]
+    across = motion.joints[:, keypoint("left_hip")] - motion.joints[:, keypoint("right_hip")]
+    assert (trunk[:, 2] > 0.9 * np.linalg.norm(trunk, axis=-1)).all()
+    assert (across[:, 1] > 0.8 * np.linalg.norm(across, axis=-1)).all()
+
+
+def test_the_first_pelvis_is_over_the_origin(motion: SmplSequence) -> None:
+    assert np.allclose(motion.joints[0, 0, :2], 0.0, atol=1e-9)
+    assert 0.75 < motion.joints[0, 0, 2] < 1.1
+
+
+def test_feet_of_a_hip_shake_are_planted_all_the_time(motion: SmplSequence) -> None:
+    assert (motion.contact == PLANTED).mean() > 0.97
+    assert not (motion.contact == AIR).all(1).any()
+
+
+def test_planted_feet_do_not_slide(motion: SmplSequence, feet: np.ndarray) -> None:
+    assert foot_slide(feet, motion.contact == PLANTED, motion.fps) < 0.005
+
+
+def test_no_foot_is_under_the_floor(feet: np.ndarray) -> None:
+    assert floor_penetration(feet) < 0.002
+
+
+def test_the_motion_is_smoother_than_what_was_seen(
+    motion: SmplSequence, hip_shake: LandmarkTrack
+) -> None:
+    left_wrist = hip_shake.world_landmarks[:, 15:16]
+    ours = motion.joints[:, [keypoint("left_wrist")]] - motion.joints[:, :1]
+    assert jerk(ours, motion.fps) < 0.3 * jerk(left_wrist, motion.fps)
+
+
+def test_bones_keep_their_length(motion: SmplSequence) -> None:
+    shin = motion.joints[:, keypoint("left_ankle")] - motion.joints[:, keypoint("left_knee")]
+    assert np.ptp(np.linalg.norm(shin, axis=-1)) < 1e-9
+
+
+def test_same_track_same_motion(motion: SmplSequence, hip_shake: LandmarkTrack) -> None:
+    assert np.array_equal(recover(hip_shake, MocapConfig()).body_pose, motion.body_pose)
+
+
+def test_frames_without_a_person_are_marked_and_noted(hip_shake: LandmarkTrack) -> None:
+    holes = [np.array(a) for a in (hip_shake.landmarks, hip_shake.world_landmarks)]
+    for array in holes:
+        array[40:44] = np.nan
+    track = replace(hip_shake, landmarks=holes[0], world_landmarks=holes[1])
+    found = recover(track, MocapConfig())
+    assert np.flatnonzero(~found.valid).tolist() == [40, 41, 42, 43]
+    assert (found.confidence[40:44] == 0.0).all()
+    assert "no person in 4 of 120 frames" in found.notes[0]
+
+
+def test_a_clip_without_a_person_is_refused(hip_shake: LandmarkTrack) -> None:
+    nobody = replace(hip_shake, landmarks=np.full_like(hip_shake.landmarks, np.nan))
+    with pytest.raises(NoPersonFound, match="120 of 120"):
+        recover(nobody, MocapConfig())
+
+
+def test_two_frames_are_enough(hip_shake: LandmarkTrack) -> None:
+    short = replace(
+        hip_shake,
+        landmarks=hip_shake.landmarks[:2],
+        world_landmarks=hip_shake.world_landmarks[:2],
+        visibility=hip_shake.visibility[:2],
+    )
+    assert len(recover(short, MocapConfig())) == 2
+
+
+def test_camera_in_the_result_sees_the_person_where_the_video_shows_him(
+    motion: SmplSequence, hip_shake: LandmarkTrack
+) -> None:
+    turn, place = (np.array(motion.camera[key]) for key in ("rotation_w", "position_w"))
+    seen = (motion.joints[:, keypoint("neck")] - place) @ turn
+    focal = float(motion.camera["focal_px"])
+    across = seen[:, 0] / seen[:, 2] * focal + hip_shake.width / 2.0
+    shoulders = hip_shake.landmarks[:, [11, 12], 0].mean(1) * hip_shake.width
+    assert np.abs(across - shoulders).max() < 0.03 * hip_shake.width
+
+
+@pytest.mark.parametrize("method", ["adaptive", "naive"])
+def test_both_solves_give_a_grounded_motion(hip_shake: LandmarkTrack, method: str) -> None:
+    found = recover(hip_shake, MocapConfig(method=method))
+    points = foot_points(pose_sequence(found), found.rest_joints)
+    assert floor_penetration(points) < 0.002
+
+
+def test_a_jump_leaves_the_floor_and_comes_back(hip_shake: LandmarkTrack) -> None:
+    """The recorded person thrown up for 0.6 s: 0.44 m high at the top, both feet in the air."""
+    time = np.arange(len(hip_shake)) / hip_shake.fps - 1.5
+    height = np.where((time > 0) & (time < 0.6), 2.943 * time - 4.905 * time**2, 0.0)
+    still = np.repeat(hip_shake.landmarks[:1], len(hip_shake), axis=0)
+    body_px = np.ptp(still[0, :, 1])
+    still[..., 1] -= (height * body_px / 1.65)[:, None]
+    track = replace(
+        hip_shake,
+        landmarks=still,
+        world_landmarks=np.repeat(hip_shake.world_landmarks[:1], len(hip_shake), axis=0),
+    )
+    found = recover(track, MocapConfig())
+    rise = found.joints[:, 0, 2] - found.joints[0, 0, 2]
+    top = int(height.argmax())
+    assert rise[top] == pytest.approx(0.44, abs=0.12)
+    assert (found.contact[top - 3 : top + 4] == AIR).all()
+    assert (found.contact[:30] == PLANTED).all()
+    assert abs(rise[-1]) < 0.02
