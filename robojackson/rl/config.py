@@ -17,12 +17,15 @@ class ControlConfig:
         stiffness: Proportional gain, multiples of the stock torque limit, 1/rad.
         damping: Derivative gain, multiples of the proportional one, seconds.
         residual: Largest offset that the policy adds to the reference's joint angles, rad.
+        arm_residual: The same for the arms: enough to hold them up, too little to balance by
+            flailing.
     """
 
     substeps: int = Field(default=5, ge=1)
     stiffness: float = Field(default=4.0, gt=0)
     damping: float = Field(default=0.1, ge=0)
     residual: float = Field(default=0.5, gt=0)
+    arm_residual: float = Field(default=0.25, gt=0)
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -27,6 +27,7 @@ from robojackson.retarget.robot import Robot
 from robojackson.rl.clip import Clip
 from robojackson.rl.config import ControlConfig, EvaluateConfig, ResetConfig, TerminationConfig
 from robojackson.rl.observation import observation_size
+from robojackson.rl.physics import residual_scale
 from robojackson.rl.policy import Policy
 from robojackson.rl.rollouts import Controller, Rollouts, Starts, roll_out
 from robojackson.rl.starts import default_stand, noisy, stand_at
@@ -189,11 +190,12 @@ def _controllers(
 ) -> Mapping[str, Controller]:
     """The policy and the baselines: each gives target hinge angles."""
     order = np.argsort(robot.model.jnt_qposadr[robot.model.actuator_trnid[:, 0]])
+    scale = residual_scale(robot, control)
     rng = np.random.default_rng(config.seed)
     mean_pose = reference.qpos[:, 7:].mean(0)
 
     def trained(seen: np.ndarray, following: np.ndarray, start: np.ndarray) -> np.ndarray:
-        return following + control.residual * policy.act(seen)[:, order]
+        return following + (scale * policy.act(seen))[:, order]
 
     def statue(seen: np.ndarray, following: np.ndarray, start: np.ndarray) -> np.ndarray:
         return np.asarray(reference.qpos, float)[start % len(reference), 7:]
@@ -205,7 +207,7 @@ def _controllers(
         return following
 
     def flail(seen: np.ndarray, following: np.ndarray, start: np.ndarray) -> np.ndarray:
-        return following + control.residual * rng.uniform(-1, 1, following.shape)
+        return following + scale[order] * rng.uniform(-1, 1, following.shape)
 
     return {
         "trained": trained,

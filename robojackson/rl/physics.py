@@ -45,10 +45,33 @@ class Motors:
         )
 
 
+def residual_scale(robot: Robot, control: ControlConfig) -> Float[np.ndarray, " nu"]:
+    """Radians that a full action moves each motor's target: less for the arms."""
+    model = robot.model
+    arms = _moved_by(robot, ("left_hand", "right_hand")) - _moved_by(robot, ("head",))
+    legs = _moved_by(robot, ("left_foot", "right_foot"))
+    joints = model.actuator_trnid[:, 0]
+    is_arm = [int(joint) in arms - legs for joint in joints]
+    return np.where(is_arm, control.arm_residual, control.residual)
+
+
+def _moved_by(robot: Robot, keypoints: tuple[str, ...]) -> set[int]:
+    """Joints between the root and the bodies that carry the keypoints."""
+    model, found = robot.model, set()
+    for name in keypoints:
+        body = model.site_bodyid[robot.keypoint_sites[robot.keypoint_names.index(name)]]
+        while body > 0:
+            first = model.body_jntadr[body]
+            found |= set(range(first, first + model.body_jntnum[body]))
+            body = model.body_parentid[body]
+    return found
+
+
 class Simulation:
     """N copies of a robot.
 
     Attributes:
+        residual: Radians that a full action moves each motor's target.
         qpos, qvel: State of every copy after the last `step` or `place`.
         points: Positions of the keypoint sites, world, in step with `qpos`.
     """
@@ -69,6 +92,7 @@ class Simulation:
         self._ctrl = [data.ctrl for data in self._datas]
         self.kp = control.stiffness * self.motors.limit
         self.kd = control.damping * self.kp
+        self.residual = residual_scale(robot, control)
         bounds = np.linspace(0, n, min(threads, n) + 1).astype(int)
         self._chunks = list(pairwise(bounds))
         self._pool = ThreadPoolExecutor(len(self._chunks)) if len(self._chunks) > 1 else None

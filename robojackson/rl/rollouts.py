@@ -71,7 +71,7 @@ def roll_out(
         target = clip.at(starts.step + t + 1)
         seen = observe(sim.qpos, sim.qvel, sim.points, target, action)
         wish = controller(seen, target.qpos[:, 7:], starts.step)
-        action = np.clip((wish - target.qpos[:, 7:])[:, hinge] / control.residual, -1, 1)
+        action = np.clip((wish - target.qpos[:, 7:])[:, hinge] / sim.residual, -1, 1)
         sim.step(wish[:, hinge], alive)
         alive = alive & ~fallen(sim.qpos, rules) & (t < horizon)
         length += alive

@@ -1,6 +1,6 @@
 """The tracking environment: N robots that follow one reference motion, as array code.
 
-Action: residual joint angles in actuator order, -1..1, times `ControlConfig.residual` radians,
+Action: residual joint angles in actuator order, -1..1, times `Simulation.residual` radians,
 added to the reference's next hinge angles and followed by the PD law of `Simulation`. Observation:
 `observation.observe`. Reward: the sum of `rewards.reward_terms`. Episodes start as `starts` says
 and end by a fall, by getting lost, by the time limit or at the end of a clip that is not cyclic;
@@ -100,7 +100,7 @@ class TrackingCore:
         following = self.clip.at(self.step_index + 1)
         hinge = self.sim.motors.hinge
         before = self.sim.points.copy()
-        self.sim.step(following.qpos[:, 7:][:, hinge] + self.config.control.residual * action)
+        self.sim.step(following.qpos[:, 7:][:, hinge] + self.sim.residual * action)
         self.step_index += 1
         self._age += 1
         sim, moved = self.sim, (self.sim.points - before) / self.clip.dt

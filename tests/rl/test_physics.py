@@ -5,7 +5,7 @@ import numpy as np
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.retarget.robot import Robot
 from robojackson.rl.config import ControlConfig
-from robojackson.rl.physics import Motors, Simulation
+from robojackson.rl.physics import Motors, Simulation, residual_scale
 
 
 def placed(robot: Robot, sway: ReferenceMotion, n: int, threads: int) -> Simulation:
@@ -76,3 +76,10 @@ def test_every_motor_drives_the_hinge_of_its_own_name(robot: Robot) -> None:
     motors = Motors.of(robot.model)
     for actuator, hinge in enumerate(motors.hinge):
         assert robot.model.actuator(actuator).name == robot.joint_names[hinge]
+
+
+def test_only_the_arms_get_the_small_residual(robot: Robot) -> None:
+    scale = residual_scale(robot, ControlConfig(residual=0.5, arm_residual=0.2))
+    arms = {robot.model.actuator(i).name for i in np.flatnonzero(scale == 0.2)}
+    assert arms == {f"{side}_{joint}" for side in ("left", "right")
+                    for joint in ("shoulder1", "shoulder2", "elbow")}  # fmt: skip
