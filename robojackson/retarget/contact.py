@@ -1,0 +1,121 @@
+"""The floor under a human motion: free fall, the states of the robot's ball feet, the ground refit.
+
+Metres, seconds, world frame (z up, floor at z = 0).
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy.ndimage import gaussian_filter1d, median_filter
+
+from robojackson.motion.smpl import AIR, CONTACT_POINTS, PLANTED, SLIDING
+from robojackson.retarget.human import HumanClip
+from robojackson.retarget.robot import Robot
+
+GRAVITY = 9.81
+_SLOW_FOOT = 0.40  # m/s: above it a foot on the floor is pivoting or sliding on purpose
+_STILL_FOOT = 0.20  # m/s: a foot near the floor that is slower stands, with or without a label
+_HEEL_OFF_M = 0.07  # m over the lowest foot: a ball follows the ankle and leaves with the heel
+_WANDER_M = 0.06  # m: a planted foot stays this near to where it stands
+_NEAR_FLOOR = 0.03  # m over the lowest foot
+_FREE_FALL = 0.5  # share of gravity that the hips must be falling with to count as airborne
+_SHORTEST_FLIGHT = 0.08  # s
+
+
+def free_fall(human: Mapping[str, np.ndarray], clip: HumanClip) -> Bool[np.ndarray, " N"]:
+    """Stretches without contact over which the hips lose speed as fast as a falling body does."""
+    hips = (human["left_hip"] + human["right_hip"])[:, 2] / 2
+    smooth = gaussian_filter1d(hips, 0.02 / clip.dt, mode=clip.edges)
+    rise = np.gradient(smooth, clip.dt)
+    out = np.zeros(len(hips), bool)
+    for start, end in runs((clip.contact == AIR).all(axis=1)):
+        seconds = (end - start) * clip.dt
+        fall = (rise[start] - rise[end - 1]) / max(seconds - clip.dt, clip.dt)
+        out[start:end] = seconds >= _SHORTEST_FLIGHT and fall > _FREE_FALL * GRAVITY
+    return out
+
+
+def without(airborne: Bool[np.ndarray, " N"], hovering: np.ndarray) -> Bool[np.ndarray, " N"]:
+    """The flights in which the body hovers in less than a third of the steps."""
+    out = np.zeros_like(airborne)
+    for start, end in runs(airborne):
+        out[start:end] = hovering[start:end].mean() < 1 / 3
+    return out
+
+
+def runs(flags: Bool[np.ndarray, " N"]) -> list[tuple[int, int]]:
+    """First and one-past-last index of each stretch of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def ball_contact(
+    clip: HumanClip, robot: Robot, keypoints: np.ndarray, airborne: np.ndarray
+) -> Int[np.ndarray, "N C"]:
+    """States of the robot's balls: heel and toe joined, planted where they are slow.
+
+    A foot that stands still near the floor is planted whatever its label; a body that touches
+    nothing and does not fall stands on its lowest foot.
+    """
+    mode = clip.edges
+    balls = keypoints[:, robot.contact_keypoints]
+    above = balls[..., 2] - balls[..., 2].min(axis=1, keepdims=True)
+    bare = (clip.contact == AIR).all(axis=1) & ~airborne
+    window = 2 * round(0.045 / clip.dt) + 1
+    out = np.zeros(balls.shape[:2], int)
+    for column, point in enumerate(robot.description.contacts.values()):
+        own = [i for i, name in enumerate(CONTACT_POINTS) if name.startswith(point.side)]
+        speed = _speed(balls[:, column], clip)
+        stands = (above[:, column] < _NEAR_FLOOR) & (speed < _STILL_FOOT) & ~airborne
+        stands |= bare & (above[:, column] < 0.01)
+        reaches = above[:, column] < _HEEL_OFF_M
+        touching = ((clip.contact[:, own] != AIR).any(axis=1) & reaches) | stands
+        touching = median_filter(touching.astype(int), window, mode=mode) > 0
+        slow = (clip.contact[:, own] == PLANTED).any(axis=1) & (speed < _SLOW_FOOT)
+        still = (slow | stands) & (speed < _SLOW_FOOT)
+        still = median_filter(still.astype(int), window, mode=mode) > 0
+        still = _standing_runs(still & touching, balls[:, column])
+        out[:, column] = np.where(touching, np.where(still, PLANTED, SLIDING), AIR)
+    return out
+
+
+def _standing_runs(
+    still: Bool[np.ndarray, " N"], path: Float[np.ndarray, "N 3"]
+) -> Bool[np.ndarray, " N"]:
+    """Only the stretches in which the foot does not wander; the others slide on purpose."""
+    out = np.zeros(len(still), bool)
+    for start, end in runs(still):
+        flat = path[start:end, :2]
+        reach = np.linalg.norm(flat - np.median(flat, axis=0), axis=1).max()
+        out[start:end] = reach < _WANDER_M
+    return out
+
+
+def refit_ground(
+    keypoints: np.ndarray, contact: np.ndarray, robot: Robot, clip: HumanClip
+) -> Float[np.ndarray, "N K 3"]:
+    """Shift each step so that the lowest carrying sole is at z = 0; interpolated in the air."""
+    soles = keypoints[:, robot.contact_keypoints, 2] - robot.contact_radii
+    carried = (contact != AIR).any(axis=1)
+    if not carried.any():
+        shift = np.full(len(soles), -soles.min())
+    else:
+        lowest = np.where(contact != AIR, soles, np.inf).min(axis=1)
+        steps = np.arange(len(soles))
+        period = {"period": len(soles)} if clip.lap is not None else {}
+        shift = np.interp(steps, steps[carried], -lowest[carried], **period)
+        mode = clip.edges
+        shift = gaussian_filter1d(shift, 0.05 / clip.dt, mode=mode)
+    out = keypoints.copy()
+    out[..., 2] += shift[:, None]
+    return out
+
+
+def _speed(path: Float[np.ndarray, "N 3"], clip: HumanClip) -> Float[np.ndarray, " N"]:
+    """Horizontal speed, m/s."""
+    flat = path[:, :2]
+    if clip.lap is not None:
+        flat = np.concatenate([flat[-1:] - clip.lap[:2], flat, flat[:1] + clip.lap[:2]])
+        return np.asarray(np.linalg.norm(flat[2:] - flat[:-2], axis=1) / (2 * clip.dt))
+    return np.asarray(np.linalg.norm(np.gradient(flat, clip.dt, axis=0), axis=1))

@@ -1,0 +1,106 @@
+"""Retargeting: a human motion becomes a reference motion of a robot, with its score card.
+
+optimise: bone-direction targets, whole-clip solver at half the control rate from two starts, the
+cheaper one polished at the control rate. paper: Table I of RoboJackson, literally. framefix: the
+same with the axes and signs of the hinges corrected.
+"""
+
+import logging
+
+import numpy as np
+from jaxtyping import Float
+
+from robojackson.motion.reference import ReferenceMotion
+from robojackson.motion.smpl import SmplSequence
+from robojackson.retarget import paper
+from robojackson.retarget.config import RetargetConfig
+from robojackson.retarget.cycle import Lap, human_clip
+from robojackson.retarget.dynamics import effort
+from robojackson.retarget.human import HumanClip
+from robojackson.retarget.kinematics import pose, tree
+from robojackson.retarget.optimise import optimise
+from robojackson.retarget.resample import velocities
+from robojackson.retarget.robot import Robot
+from robojackson.retarget.scorecard import BARS, hovers, score
+from robojackson.retarget.targets import Targets, targets
+
+_log = logging.getLogger(__name__)
+__all__ = ["RetargetConfig", "assemble", "retarget"]
+
+
+def retarget(sequence: SmplSequence, robot: Robot, config: RetargetConfig) -> ReferenceMotion:
+    """The reference motion of a human motion, at the robot's control step, score card inside.
+
+    Raises:
+        TrackTooShort: Fewer frames than the solver needs.
+    """
+    dt = robot.description.control_dt
+    cyclic = config.cyclic if config.method == "optimise" else "no"
+    clip, lap = human_clip(sequence, dt, cyclic, config.tempo, config.cycle)
+    aims = targets(clip, robot)
+    extra = _notes(sequence, clip, lap, config)
+    if config.method == "optimise":
+        found, floor_mm = optimise(aims, robot, config)
+        hovering = hovers(robot, found.qpos, aims.dt)
+        if hovering.mean() > BARS["unsupported_share"] / 2 and aims.airborne.any():
+            _log.info("a flight that does not fall is taken back: solving again")
+            found, floor_mm = optimise(targets(clip, robot, hovering), robot, config)
+        qpos, aims = found.qpos, found.aims
+        extra |= {"keypoint_floor_mm": floor_mm, "lean_deg": found.lean_deg}
+    else:
+        qpos = paper.mapped(sequence, robot, clip.time_s, corrected=config.method == "framefix")
+    return assemble(qpos, clip, aims, robot, extra)
+
+
+def assemble(
+    qpos: Float[np.ndarray, "S nq"],
+    clip: HumanClip,
+    aims: Targets,
+    robot: Robot,
+    extra: dict[str, float],
+) -> ReferenceMotion:
+    """Everything that follows from the poses, and the score card."""
+    posed = pose(tree(robot), qpos)
+    loads = effort(robot, qpos, aims.contact, aims.dt, aims.lap)
+    parts = {
+        "robot": robot.description.name,
+        "model_sha256": robot.sha256,
+        "dt": aims.dt,
+        "cyclic": aims.lap is not None,
+        "lap_offset": np.zeros(3) if aims.lap is None else aims.lap,
+        "qpos": qpos,
+        "qvel": velocities(qpos, aims.dt, aims.lap),
+        "body_pos_w": posed.body_pos[:, 1:],
+        "keypoints_w": posed.site_pos,
+        "contact": aims.contact,
+        "torque_ratio": loads.torque_ratio,
+        "source_time_s": clip.time_s,
+        "joint_names": robot.joint_names,
+        "body_names": robot.body_names,
+        "keypoint_names": robot.keypoint_names,
+        "contact_names": robot.contact_names,
+    }
+    card = score(ReferenceMotion(**parts), robot, aims)  # type: ignore[arg-type]
+    card["root_residual_bw"] = float(np.median(loads.residual_bw))
+    return ReferenceMotion(**parts, scorecard={**extra, **card})  # type: ignore[arg-type]
+
+
+def _notes(
+    sequence: SmplSequence, clip: HumanClip, lap: Lap | None, config: RetargetConfig
+) -> dict[str, float]:
+    """What was done to the clip."""
+    frames = len(sequence) if lap is None else lap.end - lap.start
+    stretch = 1.0
+    if lap is not None:
+        stretch = len(clip.time_s) * clip.dt * config.tempo * sequence.fps / frames
+    return {
+        "source_frames": float(len(sequence)),
+        "source_fps": float(sequence.fps),
+        "tempo": config.tempo,
+        "cyclic": float(lap is not None),
+        "trimmed_s": max(0.0, (len(sequence) - frames) / sequence.fps),
+        "time_scale": stretch,
+        "seam_source_mm": 0.0 if lap is None else 1e3 * lap.seam_m,
+        "seam_source_deg": 0.0 if lap is None else lap.seam_deg,
+        "lap_travel_m": 0.0 if clip.lap is None else float(np.linalg.norm(clip.lap)),
+    }

@@ -1,0 +1,165 @@
+"""The score card: how good a reference motion is, and the gate that refuses a bad one.
+
+All figures are measured on the motion as the trainer will get it, at the control step.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from robojackson.errors import RejectedReference
+from robojackson.geometry.rotations import quat_to_matrix
+from robojackson.metrics import retarget as metric
+from robojackson.motion.reference import ReferenceMotion
+from robojackson.motion.smpl import AIR, PLANTED
+from robojackson.retarget.collision import Detector
+from robojackson.retarget.kinematics import centre_of_mass, pose, sole_velocities, tree
+from robojackson.retarget.resample import forward_velocities, seam_angle
+from robojackson.retarget.robot import KEYPOINTS, Robot
+from robojackson.retarget.targets import BONES, Targets
+
+BARS: Mapping[str, float] = {
+    "nan_count": 0.0,
+    "limit_violations": 0.0,
+    "quat_error": 1e-6,
+    "floor_penetration_mm": 5.0,
+    "self_penetration_mm": 5.0,
+    "speed_over_limit": 1.0,
+    "planted_slip_cm_s": 1.0,
+    "planted_slip_p95_cm_s": 3.0,
+    "contact_gap_mm": 5.0,
+    "unsupported_share": 0.05,
+    "seam_deg": 5.0,
+}
+"""Largest allowed value of each gated figure (issue 2, stage 4)."""
+
+_MENDING = {
+    "seam_deg": "cyclic: no",
+    "speed_over_limit": "a slower tempo",
+    "planted_slip_cm_s": "method: optimise, or better contact labels",
+    "contact_gap_mm": "method: optimise, or better contact labels",
+    "unsupported_share": "method: optimise, or better contact labels",
+}
+
+
+def score(motion: ReferenceMotion, robot: Robot, aims: Targets) -> dict[str, float]:
+    """All figures of a motion; `passed` is 1 when every bar holds."""
+    card = {
+        "steps": float(len(motion)),
+        "seconds": len(motion) * motion.dt,
+        **_validity(motion, robot),
+        **_collision(motion, robot),
+        **_contact(motion, robot, aims),
+        **_fidelity(motion, robot, aims),
+        **_posture(motion),
+    }
+    lap = motion.lap_offset if motion.cyclic else None
+    card["seam_deg"] = 0.0 if lap is None else seam_angle(motion.qpos, motion.dt, lap)
+    card["torque_ratio_p95"] = float(np.quantile(motion.torque_ratio, 0.95))
+    card["torque_over_share"] = float((motion.torque_ratio > 1).any(axis=1).mean())
+    card["passed"] = float(not failures(card))
+    return card
+
+
+def hovers(robot: Robot, qpos: Float[np.ndarray, "S nq"], dt: float) -> Bool[np.ndarray, " S"]:
+    """Steps in which the robot neither stands nor falls."""
+    posed = pose(tree(robot), qpos)
+    soles = posed.site_pos[:, robot.contact_keypoints, 2] - robot.contact_radii
+    return metric.unsupported(soles, centre_of_mass(tree(robot), posed)[:, 2], dt)
+
+
+def failures(card: Mapping[str, float]) -> list[str]:
+    """Names of the gated figures over their bars; one that is missing or not a number fails."""
+    return [name for name, bar in BARS.items() if not card.get(name, np.nan) <= bar]
+
+
+def check(card: Mapping[str, float]) -> None:
+    """The gate of training.
+
+    Raises:
+        RejectedReference: A figure is over its bar; the message names it and what may mend it.
+    """
+    failed = failures(card)
+    if failed:
+        name = failed[0]
+        others = f" (and {', '.join(failed[1:])})" if failed[1:] else ""
+        raise RejectedReference(
+            f"reference refused: {name} is {card.get(name, np.nan):.4g}, at most {BARS[name]:g} is "
+            f"allowed{others}; try {_MENDING.get(name, 'method: optimise')}"
+        )
+
+
+def _validity(motion: ReferenceMotion, robot: Robot) -> dict[str, float]:
+    lap = motion.lap_offset if motion.cyclic else None
+    hinges = motion.qpos[:, 7:]
+    steps = forward_velocities(motion.qpos, motion.dt, lap)[:, 6:]
+    fastest = max(float(np.abs(steps).max()), float(np.abs(motion.qvel[:, 6:]).max()))
+    arrays = (motion.qpos, motion.qvel, motion.body_pos_w, motion.keypoints_w, motion.torque_ratio)
+    return {
+        "nan_count": float(sum(np.count_nonzero(~np.isfinite(a)) for a in arrays)),
+        "limit_violations": float(
+            np.count_nonzero(metric.limit_excess(hinges, robot.lower, robot.upper) > 1e-9)
+        ),
+        "limit_excess_max_deg": float(
+            np.degrees(metric.limit_excess(hinges, robot.lower, robot.upper).max())
+        ),
+        "quat_error": float(np.abs(np.linalg.norm(motion.qpos[:, 3:7], axis=1) - 1).max()),
+        "joint_speed_max_rad_s": fastest,
+        "speed_over_limit": fastest / robot.description.max_joint_speed,
+        "hinge_jerk_rms_rad_s3": metric.hinge_jerk_rms(hinges, motion.dt),
+    }
+
+
+def _collision(motion: ReferenceMotion, robot: Robot) -> dict[str, float]:
+    touches = Detector(robot, 0.0).touches(motion.qpos)
+    depth = -1e3 * touches.distance
+    return {
+        "floor_penetration_mm": float(depth[touches.floor].max(initial=0.0)),
+        "self_penetration_mm": float(depth[~touches.floor].max(initial=0.0)),
+    }
+
+
+def _contact(motion: ReferenceMotion, robot: Robot, aims: Targets) -> dict[str, float]:
+    shape = tree(robot)
+    posed = pose(shape, motion.qpos)
+    ground = posed.site_pos[:, robot.contact_keypoints].copy()
+    ground[..., 2] -= robot.contact_radii
+    lap = motion.lap_offset if motion.cyclic else None
+    speed = sole_velocities(robot, posed, motion.dt, lap)
+    slip = metric.slip_cm_s(speed, aims.contact == PLANTED)
+    height = np.abs(ground[..., 2])
+    gap = 1e3 * height[aims.contact != AIR]
+    return {
+        "planted_slip_cm_s": float(slip.mean()) if len(slip) else 0.0,
+        "planted_slip_p95_cm_s": float(np.quantile(slip, 0.95)) if len(slip) else 0.0,
+        "contact_gap_mm": float(gap.mean()) if len(gap) else 0.0,
+        "contact_gap_max_mm": float(gap.max(initial=0.0)),
+        "planted_gap_max_mm": float(1e3 * height[aims.contact == PLANTED].max(initial=0.0)),
+        "contact_share": float((aims.contact != AIR).any(axis=1).mean()),
+        "planted_share": float((aims.contact == PLANTED).any(axis=1).mean()),
+        "unsupported_share": float(hovers(robot, motion.qpos, motion.dt).mean()),
+    }
+
+
+def _fidelity(motion: ReferenceMotion, robot: Robot, aims: Targets) -> dict[str, float]:
+    weighted = robot.keypoint_weights > 0
+    error = metric.keypoint_error_mm(motion.keypoints_w, aims.keypoints_w, weighted)
+    bones = [(KEYPOINTS.index(a), KEYPOINTS.index(b)) for a, b in BONES]
+    angles = metric.bone_angles_deg(motion.keypoints_w, aims.keypoints_w, bones)
+    return {
+        "keypoint_mm": float(error.mean()),
+        "keypoint_p95_mm": float(np.quantile(error, 0.95)),
+        "bone_deg": float(angles.mean()),
+        "bone_p95_deg": float(np.quantile(angles, 0.95)),
+        "keypoint_jerk_m_s3": metric.jerk(motion.keypoints_w[:, weighted], motion.dt),
+        "source_jerk_m_s3": metric.jerk(aims.keypoints_w[:, weighted], motion.dt),
+    }
+
+
+def _posture(motion: ReferenceMotion) -> dict[str, float]:
+    up: Float[np.ndarray, " S"] = quat_to_matrix(motion.qpos[:, 3:7])[:, 2, 2]
+    return {
+        "tilt_max_deg": float(np.degrees(np.arccos(np.clip(up.min(), -1.0, 1.0)))),
+        "torso_height_min_m": float(motion.qpos[:, 2].min()),
+    }

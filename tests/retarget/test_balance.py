@@ -1,0 +1,70 @@
+"""The support of ball feet, and the lean that brings a standing body over it."""
+
+import numpy as np
+import pytest
+
+from robojackson.retarget import RetargetConfig, Robot, retarget
+from robojackson.retarget.balance import moment_points, support_shares
+from robojackson.retarget.kinematics import centre_of_mass, pose, tree
+from robojackson.retarget.problem import Problem, Weights
+from robojackson.retarget.targets import Targets
+from tests.retarget.conftest import human, robot_motion
+
+FEET = np.array([[[0.0, 0.2], [0.0, -0.2]]])
+BOTH, LEFT = np.array([[True, True]]), np.array([[True, False]])
+
+
+@pytest.mark.parametrize(
+    ("point", "touching", "nearest"),
+    [
+        ([0.3, 0.05], BOTH, [0.0, 0.05]),
+        ([0.0, 0.9], BOTH, [0.0, 0.2]),
+        ([0.1, -0.1], LEFT, [0.0, 0.2]),
+    ],
+)
+def test_the_nearest_support_is_on_the_line_between_the_feet(point, touching, nearest):
+    shares = support_shares(np.array([point]), FEET, touching)
+    np.testing.assert_allclose(np.einsum("nc,nci->ni", shares, FEET)[0], nearest, atol=1e-12)
+
+
+def test_a_body_in_the_air_has_no_support():
+    shares = support_shares(np.zeros((1, 2)), FEET, np.array([[False, False]]))
+    np.testing.assert_array_equal(shares, 0.0)
+
+
+def _distance_mm(motion, robot: Robot) -> float:
+    """Mean static distance of the centre of mass from the line between the feet."""
+    posed = pose(tree(robot), motion.qpos)
+    com, feet = centre_of_mass(tree(robot), posed)[:, :2], posed.site_pos[:, [5, 6], :2]
+    along = feet[:, 1] - feet[:, 0]
+    off = com - feet[:, 0]
+    area = along[:, 0] * off[:, 1] - along[:, 1] * off[:, 0]
+    return float(1e3 * np.mean(np.abs(area) / np.linalg.norm(along, axis=1)))
+
+
+def test_a_standing_dance_is_leaned_over_its_feet(robot: Robot):
+    upright = retarget(human("hip_shake"), robot, RetargetConfig(lean_deg=0.0))
+    leaned = robot_motion("hip_shake")
+    assert leaned.scorecard["lean_deg"] > 1.0
+    assert _distance_mm(leaned, robot) < 20.0
+    assert _distance_mm(leaned, robot) < 0.5 * _distance_mm(upright, robot)
+
+
+def test_a_walk_keeps_its_posture():
+    assert robot_motion("walk").scorecard["lean_deg"] == 0.0
+
+
+def test_the_moment_point_of_a_still_body_is_its_centre_of_mass(robot: Robot):
+    still = np.tile(robot.standing, (20, 1))
+    posed = pose(tree(robot), still)
+    aims = Targets(
+        keypoints_w=posed.site_pos,
+        weights=np.ones((20, 14)),
+        contact=np.ones((20, 2), int),
+        heading=np.tile(np.eye(3), (20, 1, 1)),
+        dt=0.015,
+        lap=None,
+        airborne=np.zeros(20, bool),
+    )
+    points = moment_points(Problem.of(robot, aims, Weights()), posed)
+    np.testing.assert_allclose(points, centre_of_mass(tree(robot), posed)[:, :2], atol=1e-9)

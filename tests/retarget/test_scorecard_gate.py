@@ -1,0 +1,123 @@
+"""Red team: no spoilt motion passes the gate, and the message names the figure."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from robojackson.errors import RejectedReference
+from robojackson.motion.reference import ReferenceMotion
+from robojackson.retarget import RetargetConfig, Robot
+from robojackson.retarget.cycle import human_clip
+from robojackson.retarget.kinematics import pose, tree
+from robojackson.retarget.resample import velocities
+from robojackson.retarget.scorecard import check, score
+from robojackson.retarget.targets import Targets, targets
+from tests.retarget.conftest import human, robot_motion, stock
+
+DT = 0.015
+
+
+def _aims(robot: Robot) -> Targets:
+    clip, _ = human_clip(human("hip_shake"), DT, "auto", 1.0, RetargetConfig().cycle)
+    return targets(clip, robot)
+
+
+def _spoilt(change: Callable[[np.ndarray], None]) -> ReferenceMotion:
+    """The hip shake with its poses changed and all that follows from them made anew."""
+    motion = robot_motion("hip_shake")
+    qpos = motion.qpos.copy()
+    change(qpos)
+    posed = pose(tree(stock()), qpos)
+    return replace(
+        motion,
+        qpos=qpos,
+        qvel=velocities(qpos, motion.dt, motion.lap_offset),
+        keypoints_w=posed.site_pos,
+        body_pos_w=posed.body_pos[:, 1:],
+    )
+
+
+def _levitate(qpos: np.ndarray) -> None:
+    qpos[:, 2] += 0.05
+
+
+def _sink(qpos: np.ndarray) -> None:
+    qpos[:, 2] -= 0.03
+
+
+def _slide(qpos: np.ndarray) -> None:
+    qpos[:, 0] += 0.1 * np.sin(np.linspace(0, 2 * np.pi, len(qpos), endpoint=False))
+
+
+def _overbend(qpos: np.ndarray) -> None:
+    qpos[7, 13] = np.radians(5.0)
+
+
+def _jerk(qpos: np.ndarray) -> None:
+    qpos[50, 20] += 0.4
+
+
+def _shrink(qpos: np.ndarray) -> None:
+    qpos[:, 3:7] *= 0.999
+
+
+def _lose(qpos: np.ndarray) -> None:
+    qpos[30, 12] = np.nan
+
+
+def _tear(qpos: np.ndarray) -> None:
+    ramp = np.linspace(0, 1, len(qpos))
+    qpos[:, 7] += np.radians(20.0) * ramp
+
+
+@pytest.mark.parametrize(
+    ("change", "figure"),
+    [
+        (_levitate, "contact_gap_mm"),
+        (_sink, "floor_penetration_mm"),
+        (_slide, "planted_slip_cm_s"),
+        (_overbend, "limit_violations"),
+        (_jerk, "speed_over_limit"),
+        (_shrink, "quat_error"),
+        (_lose, "nan_count"),
+        (_tear, "seam_deg"),
+    ],
+)
+def test_a_spoilt_motion_is_refused_by_name(change, figure: str, robot: Robot):
+    card = score(_spoilt(change), robot, _aims(robot))
+    with pytest.raises(RejectedReference, match=figure):
+        check(card)
+    assert card["passed"] == 0.0
+
+
+def test_the_untouched_motion_passes(robot: Robot):
+    check(score(_spoilt(lambda qpos: None), robot, _aims(robot)))
+
+
+def test_levitation_without_contact_labels_is_refused_too(robot: Robot):
+    aims = _aims(robot)
+    unlabelled = replace(aims, contact=np.zeros_like(aims.contact))
+    card = score(_spoilt(_levitate), robot, unlabelled)
+    assert card["contact_gap_mm"] == 0.0
+    with pytest.raises(RejectedReference, match="unsupported_share"):
+        check(card)
+
+
+def test_a_card_without_figures_is_refused():
+    with pytest.raises(RejectedReference, match="nan_count"):
+        check({})
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5])
+def test_a_damped_motion_is_farther_from_the_targets(share: float, robot: Robot):
+    """Frozen in the mean pose, or half the amplitude: worse on the headline figure."""
+
+    def damp(qpos: np.ndarray) -> None:
+        qpos[:, 7:] = qpos[:, 7:].mean(axis=0) + share * (qpos[:, 7:] - qpos[:, 7:].mean(axis=0))
+
+    aims = _aims(robot)
+    spoilt, real = score(_spoilt(damp), robot, aims), robot_motion("hip_shake").scorecard
+    assert spoilt["keypoint_mm"] > 1.3 * real["keypoint_mm"]
+    assert spoilt["bone_deg"] > 1.3 * real["bone_deg"]
