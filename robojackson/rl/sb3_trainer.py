@@ -6,6 +6,7 @@ from typing import Any
 import torch
 from sb3_contrib import TQC
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
 from robojackson.errors import BadConfiguration
@@ -42,6 +43,7 @@ class Sb3Trainer:
             seed=seed,
             device="cpu",
         )
+        self.model.set_logger(Logger(folder=None, output_formats=[]))
 
     def learn(self, callback: BaseCallback) -> None:
         self.model.learn(

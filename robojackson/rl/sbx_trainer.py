@@ -21,6 +21,7 @@ import numpy as np
 from sbx import TQC
 from sbx.common.type_aliases import ReplayBufferSamplesNp
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
 from robojackson.rl.config import TqcConfig
@@ -122,6 +123,7 @@ class SbxTrainer:
             },
             seed=seed,
         )
+        self.model.set_logger(Logger(folder=None, output_formats=[]))
 
     def learn(self, callback: BaseCallback) -> None:
         self.model.learn(

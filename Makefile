@@ -1,0 +1,42 @@
+# Two commands on a fresh machine: `make dance` and `make test`. Everything else is for developers.
+#
+#   make dance    the hip-shake clip, from video to a dancing robot (ARGS="--minutes 5" and others)
+#   make test     all tests (ARGS="tests/mocap -x")
+#   make bench    accuracy of the mocap stage against ground truth
+#   make lint     ruff and mypy
+#   make doctor   what is installed and what is missing
+#   make clean    remove the environment and all caches; the store stays
+#
+# Each sets up its own environment, .venv, and reuses it. TORCH_INDEX chooses where torch comes from,
+# PYTHON the interpreter (3.11), ROBOJACKSON_STORE where results are kept.
+
+PY := .venv/bin/python
+ARGS ?=
+export OMP_NUM_THREADS ?= 1
+
+.PHONY: dance test bench lint doctor clean setup
+.DEFAULT_GOAL := dance
+
+setup:
+	@sh tools/bootstrap.sh install
+
+dance: setup
+	@.venv/bin/robojackson dance $(ARGS)
+
+test: setup
+	@$(PY) -m pytest -q $(ARGS)
+
+bench: setup
+	@$(PY) -m benchmarks.mocap $(ARGS)
+
+lint: setup
+	@$(PY) -m ruff check .
+	@$(PY) -m ruff format --check .
+	@$(PY) -m mypy
+
+doctor: setup
+	@.venv/bin/robojackson doctor $(ARGS)
+
+clean:
+	rm -rf .venv build *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	find . -name __pycache__ -type d -not -path './.git/*' -exec rm -rf {} +

@@ -1,0 +1,1 @@
+"""YAML that a user edits, and the one loader that reads it."""

@@ -1,0 +1,46 @@
+"""What the whole pipeline does with a video: one section a stage, each defined beside its code."""
+
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass
+
+from robojackson.clips.landmarks import Size
+from robojackson.clips.stability import StabilityConfig
+from robojackson.clips.video import VideoLimits
+from robojackson.mocap.recover import MocapConfig
+from robojackson.report.video import VideoConfig
+from robojackson.retarget.motion import RetargetConfig
+from robojackson.rl.config import EvaluateConfig, TrainConfig
+
+
+@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+class PipelineConfig:
+    """One pass from a video to a robot that dances.
+
+    Attributes:
+        robot: Name of the robot description (`configs/robots/<robot>.yaml`).
+        setup: Name under which the training is recorded.
+        minutes: Wall time of the whole pass, minutes.
+        other_minutes: Share of it that the stages other than training get, minutes.
+        scoring_detector: Size of the pose model that scores candidates.
+        detector: Size of the pose model that feeds mocap.
+        video, stability, mocap, retarget, train, evaluate, show: Of the stages.
+    """
+
+    robot: str = "humanoid"
+    setup: str = "scratch"
+    minutes: float = Field(default=12.0, gt=0)
+    other_minutes: float = Field(default=3.0, ge=0)
+    scoring_detector: Size = "lite"
+    detector: Size = "full"
+    video: VideoLimits = Field(default_factory=VideoLimits)
+    stability: StabilityConfig = Field(default_factory=StabilityConfig)
+    mocap: MocapConfig = Field(default_factory=MocapConfig)
+    retarget: RetargetConfig = Field(default_factory=RetargetConfig)
+    train: TrainConfig = Field(default_factory=TrainConfig)
+    evaluate: EvaluateConfig = Field(default_factory=EvaluateConfig)
+    show: VideoConfig = Field(default_factory=VideoConfig)
+
+    @property
+    def train_minutes(self) -> float:
+        """What is left for training, at least half a minute."""
+        return max(0.5, self.minutes - self.other_minutes)

@@ -1,0 +1,243 @@
+"""The main flow: a video in, a robot that dances it out, and a page that shows it.
+
+Entry point of the deployment: `flows.dance.dance`. Which stages run and in which order stands here
+and nowhere else; how a stage works is `robojackson`'s, how it is cached is `tasks`'.
+"""
+
+import asyncio
+import json
+import logging
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from prefect import flow, unmapped
+from prefect.artifacts import acreate_table_artifact
+from prefect.logging import get_run_logger
+from prefect.task_runners import ThreadPoolTaskRunner
+
+from configs.loader import load
+from configs.pipeline import PipelineConfig
+from flows import console
+from robojackson.clips.stability import Stability
+from robojackson.clips.video import list_videos
+from robojackson.errors import NoPersonFound, RoboJacksonError
+from robojackson.retarget.robot import RobotDescription
+from storage import catalogue, tables
+from storage.artifact import Artifact
+from storage.store import Store
+from tasks.evaluate import evaluate
+from tasks.landmarks import landmarks
+from tasks.mocap import mocap
+from tasks.page import page
+from tasks.probe import SourceFile, probe
+from tasks.retarget import retarget
+from tasks.stability import stability
+from tasks.train import RunLabels, train
+from tasks.video import video
+
+Artifacts = dict[str, Artifact]
+SCORERS: ThreadPoolTaskRunner[Any] = ThreadPoolTaskRunner(max_workers=2)
+LAST_STAGES_MINUTES = 1.5
+"""What evaluation, video and page take; training ends early rather than run into it."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A clip that may be danced.
+
+    Attributes:
+        name: Of the file.
+        clip: Its video and what is known of it, as `probe` left them.
+        stability, score: Of Algorithm 1, as artifact and as value.
+    """
+
+    name: str
+    clip: Artifacts
+    stability: Artifact
+    score: Stability
+
+
+def run(
+    source: Path,
+    config: str,
+    overrides: Mapping[str, Any],
+    start_s: float | None = None,
+    end_s: float | None = None,
+) -> dict[str, Any]:
+    """The flow from the command line: no tracebacks for what is the input's fault.
+
+    Raises:
+        Interrupted: Ctrl-C; every stage that has ended is kept, and training left a checkpoint.
+    """
+    for name in ("prefect.flow_runs", "prefect.task_runs"):
+        logging.getLogger(name).addFilter(_without_traceback)
+    try:
+        return asyncio.run(dance(str(source), config, dict(overrides), start_s, end_s))
+    except (KeyboardInterrupt, asyncio.CancelledError):
+        raise console.Interrupted(f"resume: {console.same_command()}") from None
+
+
+@flow(name="dance", flow_run_name="dance-{source}", task_runner=SCORERS)  # type: ignore[arg-type]
+async def dance(
+    source: str,
+    config: str = "base",
+    overrides: dict[str, Any] | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
+) -> dict[str, Any]:
+    """From a video (or a folder of candidates) to a robot that dances it.
+
+    Args:
+        source: A video file, or a folder of them.
+        config: Name or path of the pipeline's configuration.
+        overrides: Values by key path.
+        start_s, end_s: Range of the video, seconds.
+    """
+    began = time.time()
+    settings = load(PipelineConfig, config, overrides)
+    robot = load(RobotDescription, f"robots/{settings.robot}")
+    store = Store.from_environment()
+    candidates = await score_all(list_videos(Path(source)), settings, start_s, end_s)
+    best = choose(candidates)
+    labels = RunLabels(Path(best.name).stem, settings.setup)
+    made = await perform(best, robot, settings, labels, began)
+    return await conclude(store, made, candidates, settings, labels)
+
+
+async def score_all(
+    paths: tuple[Path, ...],
+    settings: PipelineConfig,
+    start_s: float | None,
+    end_s: float | None,
+) -> list[Candidate]:
+    """Algorithm 1 over all candidates; one that cannot be read is left out, unless it is alone."""
+    sources = [SourceFile.at(path) for path in paths]
+    limits = unmapped(settings.video)
+    clips = _gathered(probe.map(sources, limits, unmapped(start_s), unmapped(end_s)))
+    named = [(p.name, c) for p, c in zip(paths, clips, strict=True) if isinstance(c, dict)]
+    if not named:
+        raise next(clip for clip in clips if isinstance(clip, BaseException))
+    tracks = landmarks.map(
+        [clip["video"] for _, clip in named],
+        [clip["info"] for _, clip in named],
+        unmapped(settings.scoring_detector),
+    )
+    scored = _gathered(stability.map(tracks, unmapped(settings.stability)))
+    store = Store.from_environment()
+    found = []
+    for (name, clip), score in zip(named, scored, strict=True):
+        if isinstance(score, BaseException):
+            raise score
+        found.append(Candidate(name, clip, score, tables.read(Stability, store, score)))
+    return found
+
+
+def choose(candidates: list[Candidate]) -> Candidate:
+    """The steadiest candidate in which there is a person.
+
+    Raises:
+        NoPersonFound: there is none.
+    """
+    danced = [candidate for candidate in candidates if candidate.score.detected]
+    if not danced:
+        frames = {candidate.name: candidate.score.frames for candidate in candidates}
+        told = (f"{name}: no person found in {n} of {n} frames" for name, n in frames.items())
+        raise NoPersonFound("; ".join(told))
+    return min(danced, key=lambda candidate: candidate.score.stability_score)
+
+
+async def perform(
+    best: Candidate,
+    robot: RobotDescription,
+    settings: PipelineConfig,
+    labels: RunLabels,
+    began: float,
+) -> Artifacts:
+    """Every stage after the choice, in order."""
+    track = landmarks(best.clip["video"], best.clip["info"], settings.detector)
+    sequence = mocap(track, settings.mocap)
+    moved = retarget(sequence, robot, settings.retarget)
+    reference = moved["reference"]
+    deadline = began + 60 * (settings.minutes - LAST_STAGES_MINUTES)
+    trained = await train(reference, robot, _budgeted(settings), labels, deadline)
+    judged = evaluate(trained["policy"], reference, robot, settings.evaluate, labels)
+    seen = (best.clip["video"], track, sequence, reference, judged["rollout"])
+    film = video(*seen, robot, settings.show)
+    made = {**best.clip, "stability": best.stability, "landmarks": track, "smpl": sequence}
+    made |= {**moved, **trained, **judged, "dance": film}
+    return {**made, **page(made, labels.move)}
+
+
+async def conclude(
+    store: Store,
+    made: Artifacts,
+    candidates: list[Candidate],
+    settings: PipelineConfig,
+    labels: RunLabels,
+) -> dict[str, Any]:
+    """Tables for Prefect's pages, a line in the catalogue, and the answer."""
+    summary = json.loads(store.read(made["evaluation"].key))
+    scorecard = json.loads(store.read(made["scorecard"].key))
+    await acreate_table_artifact(key="scorecard", table=_rows(scorecard))
+    await acreate_table_artifact(key="evaluation", table=_verdicts(summary))
+    seed = settings.train.seed
+    run_id = f"{labels.move}-{labels.setup}-s{seed}-{made['policy'].sha256[:8]}"
+    names = {"run_id": run_id, "move": labels.move, "robot": settings.robot}
+    when = datetime.now(UTC)
+    entry = catalogue.Run(
+        **names, setup=labels.setup, seed=seed, finished_at=when, artifacts=made, summary=summary
+    )
+    catalogue.record(store, entry)
+    return {
+        "page": store.address(made["page"].key),
+        "video": store.address(made["dance"].key),
+        **names,
+        "candidates": {c.name: c.score.stability_score for c in candidates},
+        "scorecard": scorecard,
+        "evaluation": summary,
+        "artifacts": {name: store.address(artifact.key) for name, artifact in made.items()},
+    }
+
+
+def _budgeted(settings: PipelineConfig) -> Any:
+    """The training's configuration with what the pass leaves it, unless it says itself."""
+    config = settings.train
+    if config.steps is not None or config.minutes is not None:
+        return config
+    return replace(config, minutes=settings.train_minutes)
+
+
+def _gathered(futures: Any) -> list[Any]:
+    """Results in order; a failure of the input is a value, another one is raised."""
+    results = [future.result(raise_on_failure=False) for future in futures]
+    for result in results:
+        if isinstance(result, BaseException) and not isinstance(result, RoboJacksonError):
+            raise result
+        if isinstance(result, RoboJacksonError):
+            get_run_logger().warning("%s", result)
+    return results
+
+
+def _rows(figures: Mapping[str, Any]) -> list[dict[str, Any]]:
+    return [{"figure": name, "value": value} for name, value in figures.items()]
+
+
+def _verdicts(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """One row a policy."""
+    shown = ("survived_s", "success", "strict_success", "skill", "site_error_m", "limb_gain")
+    policies = {"trained": summary, **summary["baselines"]}
+    return [
+        {"policy": name, **{key: figures.get(key) for key in shown}}
+        for name, figures in policies.items()
+    ]
+
+
+def _without_traceback(record: logging.LogRecord) -> bool:
+    """An error of the input is one line in the log."""
+    if record.exc_info and isinstance(record.exc_info[1], RoboJacksonError):
+        record.exc_info = None
+    return True

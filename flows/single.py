@@ -1,0 +1,194 @@
+"""One stage at a time, from files to files, with no Prefect in memory.
+
+Each function reads its inputs, calls one function of `robojackson`, writes its tables into a folder
+and returns the figures that the command answers with. Heavy libraries are imported inside.
+"""
+
+import json
+import time
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from configs.loader import load
+from flows import console
+from robojackson.errors import RejectedReference, StoreError
+from storage import tables
+from storage.store import Store
+
+if TYPE_CHECKING:
+    from robojackson.motion.reference import ReferenceMotion
+    from robojackson.motion.smpl import SmplSequence
+    from robojackson.retarget.robot import Robot
+
+Figures = dict[str, Any]
+Overrides = Mapping[str, Any]
+Value = TypeVar("Value")
+
+
+def score(videos: list[Path], config: str, overrides: Overrides) -> Figures:
+    """Algorithm 1 for every video; one without a person is an answer, not an error."""
+    from configs.pipeline import PipelineConfig
+    from robojackson.clips.landmarks import detect
+    from robojackson.clips.stability import stability
+    from robojackson.clips.video import list_videos, probe
+
+    settings = load(PipelineConfig, config, overrides)
+    found = []
+    for video in (path for source in videos for path in list_videos(source)):
+        info = probe(video, settings.video)
+        with console.bar(video.name) as progress:
+            track = detect(video, info, settings.scoring_detector, progress)
+        scored = stability(track, settings.stability)
+        found.append({"video": str(video), "fps": info.fps, **asdict(scored)})
+        if not scored.detected:
+            found[-1]["note"] = f"no person found in {len(track)} of {len(track)} frames"
+    return {"videos": found}
+
+
+def mocap(video: Path, out: Path, config: str, overrides: Overrides) -> Figures:
+    """landmarks.parquet and smpl.parquet of a video."""
+    from configs.pipeline import PipelineConfig
+    from robojackson.clips.landmarks import detect
+    from robojackson.clips.video import probe
+    from robojackson.mocap.recover import recover
+
+    began = time.monotonic()
+    settings = load(PipelineConfig, config, overrides)
+    info = probe(video, settings.video)
+    store = _folder(out)
+    with console.bar(f"landmarks of {video.name}") as progress:
+        track = detect(video, info, settings.detector, progress)
+    store.put("landmarks.parquet", tables.encode(track))
+    sequence = recover(track, settings.mocap)
+    store.put("smpl.parquet", tables.encode(sequence))
+    return {
+        "video": str(video),
+        "smpl": str(out / "smpl.parquet"),
+        "landmarks": str(out / "landmarks.parquet"),
+        "frames": len(sequence),
+        "fps": sequence.fps,
+        "detected": int(track.detected.sum()),
+        "floor": _floor(sequence),
+        "contact_share": _contact_share(sequence),
+        "notes": list(sequence.notes),
+        "seconds": time.monotonic() - began,
+    }
+
+
+def retarget(smpl: Path, out: Path, robot: str, config: str, overrides: Overrides) -> Figures:
+    """reference.parquet and scorecard.json of a motion."""
+    from configs.pipeline import PipelineConfig
+    from robojackson.motion.smpl import SmplSequence
+    from robojackson.retarget.motion import retarget as to_robot
+
+    began = time.monotonic()
+    settings = load(PipelineConfig, config, overrides)
+    machine = _robot(robot)
+    sequence = read_table(SmplSequence, smpl)
+    store = _folder(out)
+    reference = to_robot(sequence, machine, settings.retarget)
+    store.put("reference.parquet", tables.encode(reference))
+    scorecard = console.plain(dict(reference.scorecard))
+    store.put("scorecard.json", json.dumps(scorecard, indent=1).encode())
+    return {
+        "reference": str(out / "reference.parquet"),
+        "robot": reference.robot,
+        "method": settings.retarget.method,
+        "steps": len(reference),
+        "dt": reference.dt,
+        "cyclic": reference.cyclic,
+        "scorecard": scorecard,
+        "seconds": time.monotonic() - began,
+    }
+
+
+def evaluate(
+    policy: Path, reference: Path, out: Path | None, config: str, overrides: Overrides
+) -> Figures:
+    """The verdict on a policy; with a folder, also its tables and the rollout."""
+    from configs.pipeline import PipelineConfig
+    from robojackson.motion.reference import ReferenceMotion
+    from robojackson.rl.evaluate import evaluate as judge
+    from robojackson.rl.policy import load_policy
+    from storage.codecs import Rollout
+    from storage.schemas import EVALUATION_RECORD
+
+    settings = load(PipelineConfig, config, overrides)
+    motion = read_table(ReferenceMotion, reference)
+    machine = robot_of(motion)
+    trained = load_policy(policy)
+    with console.stages() as progress:
+        verdict = judge(trained, motion, machine, settings.evaluate, progress)
+    summary = console.plain(verdict.summary)
+    if out is not None:
+        seed = int(str(trained.facts.get("seed", 0)))
+        common = {"run_id": policy.parent.name, "move": reference.stem, "seed": seed}
+        rows = [{**common, "setup": settings.setup, **row} for row in verdict.rows]
+        store = _folder(out)
+        store.put("evaluations.parquet", tables.encode_rows(EVALUATION_RECORD, rows))
+        store.put("evaluation.json", json.dumps(summary, indent=1).encode())
+        store.put("rollout.parquet", tables.encode(Rollout(motion.dt, verdict.rollout_qpos)))
+    return {"policy": str(policy), "reference": str(reference), **summary}
+
+
+VERDICT = ("survived_s", "success", "strict_success", "skill", "site_error_m", "limb_gain")
+
+
+def verdict_lines(evaluation: Mapping[str, Any]) -> list[str]:
+    """The table of an evaluation: the policy, then its baselines."""
+    return console.table({"trained": evaluation, **evaluation["baselines"]}, VERDICT)
+
+
+def robot_of(reference: "ReferenceMotion") -> "Robot":
+    """The robot that a reference motion was made for.
+
+    Raises:
+        UnknownName: there is no such robot description.
+        RejectedReference: its model has changed since.
+    """
+    machine = _robot(reference.robot)
+    if machine.sha256 != reference.model_sha256:
+        raise RejectedReference(
+            f"the reference motion was made for another model of {reference.robot!r} "
+            f"(sha256 {reference.model_sha256[:12]}..., here {machine.sha256[:12]}...); "
+            "retarget the motion again"
+        )
+    return machine
+
+
+def _robot(name: str) -> "Robot":
+    from robojackson.retarget.robot import RobotDescription, load_robot
+
+    return load_robot(load(RobotDescription, f"robots/{name}"))
+
+
+def read_table(cls: type[Value], path: Path) -> Value:
+    """A table from a path that a user gave."""
+    if not path.is_file():
+        raise StoreError(f"{path}: no such file")
+    return tables.decode(cls, path.read_bytes(), str(path))
+
+
+def _folder(out: Path) -> Store:
+    """A folder for results, told at once when it cannot be written."""
+    store = Store(out)
+    store.require_writable()
+    return store
+
+
+def _contact_share(sequence: "SmplSequence") -> dict[str, float]:
+    from robojackson.motion.smpl import CONTACT_POINTS, PLANTED
+
+    shares = (sequence.contact == PLANTED).mean(0)
+    return dict(zip(CONTACT_POINTS, map(float, shares), strict=True))
+
+
+def _floor(sequence: "SmplSequence") -> Figures:
+    """Where the floor came from and how far the lowest keypoint is from it, metres."""
+    lowest = sequence.keypoints_w[:, :, 2].min(1)
+    known = {key: sequence.camera[key] for key in ("gravity", "tilt_deg") if key in sequence.camera}
+    return {"lowest_keypoint_m": lowest.min(), "median_m": np.median(lowest), **known}

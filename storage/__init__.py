@@ -1,0 +1,1 @@
+"""The tables of the project: schemas, atomic Parquet files, artifacts and the store."""

@@ -1,0 +1,65 @@
+"""The catalogue of runs: one small JSON file a run, so that two runs never write the same file."""
+
+import json
+from dataclasses import asdict
+from datetime import datetime
+from typing import Annotated, Any
+
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass
+
+from robojackson.errors import BadTable
+from storage.artifact import Artifact
+from storage.store import Store
+
+FOLDER = "runs"
+
+
+@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+class Run:
+    """One pass through the pipeline.
+
+    Attributes:
+        run_id: Unique name.
+        move: Name of the dance.
+        robot: Name of the robot description.
+        setup: Name of the training setup.
+        seed: Of the training.
+        finished_at: When, with time zone.
+        artifacts: What it made, by name.
+        summary: Its figures.
+    """
+
+    run_id: Annotated[str, Field(pattern=r"^[\w.-]+$")]
+    move: str
+    robot: str
+    setup: str
+    seed: int
+    finished_at: datetime
+    artifacts: dict[str, Artifact] = Field(default_factory=dict)
+    summary: dict[str, Any] = Field(default_factory=dict)
+
+
+def record(store: Store, run: Run) -> Artifact:
+    """Write a run down, replacing what was known of it."""
+    text = json.dumps(asdict(run), default=str, indent=1, sort_keys=True)
+    return store.put(f"{FOLDER}/{run.run_id}.json", text.encode())
+
+
+def runs(store: Store) -> list[Run]:
+    """All runs, the latest last.
+
+    Raises:
+        BadTable: a file of the catalogue is not a run.
+    """
+    found = [_read(store, key) for key in store.list(FOLDER) if key.endswith(".json")]
+    return sorted(found, key=lambda run: run.finished_at)
+
+
+def _read(store: Store, key: str) -> Run:
+    try:
+        return TypeAdapter(Run).validate_json(store.read(key))
+    except ValidationError as cause:
+        first = cause.errors()[0]
+        field = ".".join(str(part) for part in first["loc"])
+        raise BadTable(f"{store.address(key)}: {field}: {first['msg']}") from cause

@@ -1,0 +1,1 @@
+"""One thin cached Prefect task a stage."""

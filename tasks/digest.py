@@ -1,0 +1,128 @@
+"""What a stage computes, as one digest: the syntax trees of the modules that it reaches.
+
+Imports are followed statically, also those inside functions. Comments, docstrings and layout are
+not in a syntax tree, so they change nothing; a changed formula does.
+"""
+
+import ast
+import hashlib
+from collections.abc import Iterable, Iterator
+from functools import lru_cache
+from importlib.util import find_spec
+from pathlib import Path
+
+PACKAGE = "robojackson"
+NEVER_CHANGE_A_RESULT = frozenset(("robojackson.errors",))
+"""Modules whose text decides only what a person is told."""
+
+
+def digest(roots: Iterable[str], package: str = PACKAGE, folder: Path | None = None) -> str:
+    """Digest of all modules of `package` that the root modules reach.
+
+    Args:
+        roots: Dotted names of modules; those outside the package count nothing.
+        package: The package whose modules count.
+        folder: Where the package is; found by its name when not given.
+    """
+    base = folder or _folder_of(package)
+    total = hashlib.sha256()
+    for name in reached(roots, package, base):
+        if name not in NEVER_CHANGE_A_RESULT:
+            path = _file_of(name, package, base)
+            total.update(f"{name}\0{_parsed(*_version(path))[0]}\0".encode())
+    return total.hexdigest()
+
+
+def reached(roots: Iterable[str], package: str, folder: Path) -> list[str]:
+    """The modules of a package that are reached from the roots, the roots included, sorted."""
+    found: set[str] = set()
+    waiting = list(roots)
+    while waiting:
+        name = waiting.pop()
+        if name in found or not _is_module(name, package, folder):
+            continue
+        found.add(name)
+        waiting.extend(_parents(name))
+        waiting.extend(imports_of(_file_of(name, package, folder), name))
+    return sorted(found)
+
+
+def imports_of(path: Path, module: str = "") -> tuple[str, ...]:
+    """Every name that a file imports, dotted; `from a import b` gives `a` and `a.b`."""
+    names = _parsed(*_version(path))[1]
+    is_package = path.name == "__init__.py"
+    return tuple(_absolute(name, level, module, is_package) for name, level in names)
+
+
+def bare_tree(source: str) -> str:
+    """The syntax tree of a source without docstrings and version, as text."""
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        if isinstance(body, list):
+            node.body = [s for s in body if not _is_silent(s)]  # type: ignore[attr-defined]
+    return ast.dump(tree)
+
+
+def _is_silent(statement: ast.stmt) -> bool:
+    """A string that stands alone, or the version: neither is a formula."""
+    if isinstance(statement, ast.Expr):
+        return isinstance(statement.value, ast.Constant) and isinstance(statement.value.value, str)
+    if isinstance(statement, ast.Assign):
+        return any(isinstance(t, ast.Name) and t.id == "__version__" for t in statement.targets)
+    return False
+
+
+@lru_cache(maxsize=1024)
+def _parsed(path: Path, changed_ns: int, size: int) -> tuple[str, tuple[tuple[str, int], ...]]:
+    """Digest of a file's bare tree, and its imports as (name, level); read once a version."""
+    source = path.read_text(encoding="utf-8")
+    names = tuple(_imports(ast.parse(source)))
+    return hashlib.sha256(bare_tree(source).encode()).hexdigest(), names
+
+
+def _version(path: Path) -> tuple[Path, int, int]:
+    stat = path.stat()
+    return path, stat.st_mtime_ns, stat.st_size
+
+
+def _imports(tree: ast.AST) -> Iterator[tuple[str, int]]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from ((alias.name, 0) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = node.module or ""
+            yield base, node.level
+            for alias in node.names:
+                yield (f"{base}.{alias.name}" if base else alias.name), node.level
+
+
+def _absolute(name: str, level: int, module: str, is_package: bool) -> str:
+    if not level:
+        return name
+    parts = module.split(".")
+    kept = parts[: len(parts) - level + (1 if is_package else 0)]
+    return ".".join([*kept, name] if name else kept)
+
+
+def _parents(name: str) -> list[str]:
+    parts = name.split(".")
+    return [".".join(parts[:i]) for i in range(1, len(parts))]
+
+
+def _is_module(name: str, package: str, folder: Path) -> bool:
+    inside = name == package or name.startswith(f"{package}.")
+    return inside and _file_of(name, package, folder).is_file()
+
+
+def _file_of(name: str, package: str, folder: Path) -> Path:
+    inner = name.removeprefix(package).strip(".").replace(".", "/")
+    path = folder / inner if inner else folder
+    return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+
+
+def _folder_of(package: str) -> Path:
+    spec = find_spec(package)
+    if spec is None or spec.origin is None:
+        raise ModuleNotFoundError(package)
+    return Path(spec.origin).parent

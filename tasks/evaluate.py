@@ -1,0 +1,50 @@
+"""The verdict on a policy, on stock physics, beside its baselines."""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from robojackson.motion.reference import ReferenceMotion
+from robojackson.retarget.robot import RobotDescription, load_robot
+from robojackson.rl.config import EvaluateConfig
+from storage import tables
+from storage.artifact import Artifact
+from storage.codecs import Rollout
+from storage.schemas import EVALUATION_RECORD
+from storage.store import Store
+from tasks.caching import stage
+from tasks.train import RunLabels
+
+
+def _models(parameters: Mapping[str, Any]) -> list[str]:
+    return [load_robot(parameters["robot"]).sha256]
+
+
+@stage(models=_models, unkeyed=("labels",))
+def evaluate(
+    policy: Artifact,
+    reference: Artifact,
+    robot: RobotDescription,
+    config: EvaluateConfig,
+    labels: RunLabels,
+) -> dict[str, Artifact]:
+    """`evaluations`: EvaluationRecord; `evaluation`: means, as JSON; `rollout`: Rollout."""
+    from robojackson.rl.evaluate import evaluate as judge
+    from robojackson.rl.policy import load_policy
+
+    store = Store.from_environment()
+    motion = tables.read(ReferenceMotion, store, reference)
+    with store.local(policy) as path:
+        trained = load_policy(path)
+    verdict = judge(trained, motion, load_robot(robot), config)
+    seed = int(str(trained.facts.get("seed", 0)))
+    common = {"run_id": f"{labels.move}-{labels.setup}-s{seed}", "seed": seed}
+    names = {"move": labels.move, "setup": labels.setup}
+    rows = tables.encode_rows(EVALUATION_RECORD, [{**common, **names, **r} for r in verdict.rows])
+    summary = json.dumps(verdict.summary, indent=1).encode()
+    rollout = Rollout(motion.dt, verdict.rollout_qpos)
+    return {
+        "evaluations": store.keep("evaluate", "evaluations.parquet", rows),
+        "evaluation": store.keep("evaluate", "evaluation.json", summary),
+        "rollout": tables.keep(store, "evaluate", "rollout.parquet", rollout),
+    }

@@ -1,0 +1,62 @@
+"""The folder of a run that a person opens: the page, the video and every table, side by side."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from robojackson.clips.stability import Stability
+from robojackson.motion.reference import ReferenceMotion
+from robojackson.motion.smpl import SmplSequence
+from robojackson.report.page import render
+from robojackson.report.summary import Results, page_content
+from storage import tables
+from storage.artifact import Artifact
+from storage.codecs import Rollout
+from storage.schemas import EPISODE_RECORD, EVALUATION_RECORD
+from storage.store import Store
+from tasks.caching import stage
+from tasks.probe import info_of
+
+LEFT_OUT = ("video", "info")
+"""Artifacts that stay where they are: the user has the video already."""
+
+
+@stage()
+def page(made: dict[str, Artifact], move: str) -> dict[str, Artifact]:
+    """Everything under `dances/<move>-<digest>/`, and `page`, which shows it.
+
+    Args:
+        made: What the other stages made, by name.
+        move: Name of the dance.
+    """
+    store = Store.from_environment()
+    text = render(page_content(_results(store, made, move), made["dance"].name))
+    digest = hashlib.sha256("".join(a.sha256 for a in made.values()).encode()).hexdigest()
+    folder = f"dances/{move}-{digest[:8]}"
+    kept = {
+        name: store.put(f"{folder}/{artifact.name}", store.read(artifact.key))
+        for name, artifact in made.items()
+        if name not in LEFT_OUT
+    }
+    return {**kept, "page": store.put(f"{folder}/index.html", text.encode())}
+
+
+def _results(store: Store, made: Mapping[str, Artifact], move: str) -> Results:
+    return Results(
+        title=move.replace("_", " "),
+        info=info_of(store, made["info"], Path(made["video"].name)),
+        stability=tables.read(Stability, store, made["stability"]),
+        sequence=tables.read(SmplSequence, store, made["smpl"]),
+        reference=tables.read(ReferenceMotion, store, made["reference"]),
+        training=_json(store, made["training"]),
+        episodes=tables.read_rows(EPISODE_RECORD, store, made["episodes"]),
+        evaluation=_json(store, made["evaluation"]),
+        evaluations=tables.read_rows(EVALUATION_RECORD, store, made["evaluations"]),
+        rollout_qpos=tables.read(Rollout, store, made["rollout"]).qpos,
+    )
+
+
+def _json(store: Store, artifact: Artifact) -> dict[str, Any]:
+    return json.loads(store.read(artifact.key))

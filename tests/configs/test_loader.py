@@ -1,0 +1,127 @@
+"""The loader reads what YAML says and refuses what it does not know."""
+
+from pathlib import Path
+from typing import Literal
+
+import pytest
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass
+
+from configs import loader
+from robojackson.errors import BadConfiguration, UnknownName
+
+STRICT = ConfigDict(extra="forbid")
+
+
+@dataclass(frozen=True, config=STRICT)
+class Inner:
+    """A section."""
+
+    width: float = 0.5
+    cyclic: Literal["auto", "yes", "no"] = "auto"
+
+
+@dataclass(frozen=True, config=STRICT)
+class Outer:
+    """A configuration."""
+
+    seed: int = Field(0, ge=0)
+    inner: Inner = Field(default_factory=Inner)
+    maybe: Inner | None = None
+    sites: dict[str, Inner] = Field(default_factory=dict)
+
+
+@pytest.fixture
+def write(tmp_path: Path):
+    def _write(text: str) -> Path:
+        path = tmp_path / "given.yaml"
+        path.write_text(text)
+        return path
+
+    return _write
+
+
+def test_a_file_changes_only_what_it_names(write) -> None:
+    assert loader.load(Outer, write("inner: {width: 0.25}")) == Outer(inner=Inner(width=0.25))
+
+
+def test_an_empty_file_is_all_defaults(write) -> None:
+    assert loader.load(Outer, write("# nothing\n")) == Outer()
+
+
+@pytest.mark.parametrize(
+    ("text", "path", "close"),
+    [
+        ("sed: 3", "sed", "seed"),
+        ("inner: {widht: 0.1}", "inner.widht", "width"),
+        ("maybe: {cylic: no}", "maybe.cylic", "cyclic"),
+        ("sites: {hand: {wdth: 1}}", "sites.hand.wdth", ""),
+    ],
+)
+def test_an_unknown_key_is_refused_with_file_and_path(write, text, path, close) -> None:
+    given = write(text)
+    with pytest.raises(BadConfiguration) as caught:
+        loader.load(Outer, given)
+    message = str(caught.value)
+    assert str(given) in message
+    assert f"unknown key '{path}'" in message
+    assert not close or f"Did you mean '{close}'?" in message
+    assert "\n" not in message
+
+
+def test_a_wrong_value_is_refused_with_its_path_and_itself(write) -> None:
+    with pytest.raises(BadConfiguration, match=r"'inner\.width' is 'wide'"):
+        loader.load(Outer, write("inner: {width: wide}"))
+
+
+def test_a_value_out_of_its_range_is_refused(write) -> None:
+    with pytest.raises(BadConfiguration, match="greater than or equal to 0"):
+        loader.load(Outer, write("seed: -1"))
+
+
+def test_yes_and_no_are_words(write) -> None:
+    assert loader.load(Outer, write("inner: {cyclic: yes}")).inner.cyclic == "yes"
+
+
+@pytest.mark.parametrize("text", ["1e-4", "1.0e-4", "0.0001"])
+def test_a_number_may_be_written_with_an_exponent(write, text) -> None:
+    assert loader.load(Outer, write(f"inner: {{width: {text}}}")).inner.width == 1e-4
+
+
+def test_a_key_that_stands_twice_is_refused(write) -> None:
+    with pytest.raises(BadConfiguration, match="'seed' stands twice"):
+        loader.load(Outer, write("seed: 1\nseed: 2\n"))
+
+
+@pytest.mark.parametrize("text", ["- 1\n- 2\n", "just words", "inner: [", "\tseed: 1"])
+def test_what_is_not_keys_and_values_is_refused_in_one_line(write, text) -> None:
+    given = write(text)
+    with pytest.raises(BadConfiguration) as caught:
+        loader.load(Outer, given)
+    assert str(given) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_an_override_wins_over_the_file(write) -> None:
+    loaded = loader.load(Outer, write("seed: 1"), {"seed": "7", "inner.width": "0.125"})
+    assert (loaded.seed, loaded.inner.width) == (7, 0.125)
+
+
+def test_an_override_with_an_unknown_key_is_refused(write) -> None:
+    with pytest.raises(BadConfiguration, match=r"inner\.hight"):
+        loader.load(Outer, write(""), {"inner.hight": "1"})
+
+
+def test_an_unknown_name_lists_the_known_ones() -> None:
+    with pytest.raises(UnknownName, match=r"unknown robot 'c3po'.*humanoid"):
+        loader.load(Outer, "robots/c3po")
+
+
+def test_a_name_does_not_lead_out_of_the_package() -> None:
+    with pytest.raises(UnknownName):
+        loader.find("../tests/configs/given")
+
+
+def test_names_are_found_from_any_folder(monkeypatch, tmp_path) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert loader.find("robots/humanoid").is_file()

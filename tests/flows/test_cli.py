@@ -1,0 +1,197 @@
+"""Bad input gets one line and a code; the answer on stdout stands alone."""
+
+import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from flows.cli import app
+from flows.console import lines, plain
+from tests.flows.conftest import ROOT, environment, robojackson
+
+COMMANDS = ["dance", "score", "mocap", "retarget", "train", "evaluate", "doctor"]
+
+
+def invoke(*words: object) -> tuple[int, str, str]:
+    done = CliRunner().invoke(app, [str(word) for word in words])
+    return done.exit_code, done.stdout, done.stderr
+
+
+def write_video(path: Path, frames: int) -> Path:
+    """Grey frames with nobody in them."""
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", rate=10)
+        stream.width, stream.height, stream.pix_fmt = 64, 64, "yuv420p"
+        grey = np.full((64, 64, 3), 128, np.uint8)
+        for _ in range(frames):
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(grey)))
+        container.mux(stream.encode(None))
+    return path
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_explains_itself(command: str) -> None:
+    assert invoke(command, "--help")[0] == 0
+
+
+def text_as_video(folder: Path) -> list[object]:
+    (folder / "notes.mp4").write_text("this is not a video\n")
+    return ["score", folder / "notes.mp4"]
+
+
+def half_a_video(folder: Path) -> list[object]:
+    whole = (ROOT / "clips" / "hip_shake.mp4").read_bytes()
+    (folder / "half.mp4").write_bytes(whole[: len(whole) // 2])
+    return ["mocap", folder / "half.mp4", "-o", folder / "out"]
+
+
+def nobody(folder: Path) -> list[object]:
+    return ["mocap", write_video(folder / "empty.mp4", 5), "-o", folder / "out"]
+
+
+def one_frame(folder: Path) -> list[object]:
+    return ["mocap", write_video(folder / "one.mp4", 1), "-o", folder / "out"]
+
+
+def unknown_robot(folder: Path) -> list[object]:
+    return ["retarget", folder / "smpl.parquet", "-o", folder / "out", "--robot", "c3po"]
+
+
+def typo_in_yaml(folder: Path) -> list[object]:
+    (folder / "mine.yaml").write_text("mocap: {cutof_hz: 5}\n")
+    clip = ROOT / "clips" / "hip_shake.mp4"
+    return ["mocap", clip, "-o", folder / "out", "--config", folder / "mine.yaml"]
+
+
+def unwritable_folder(folder: Path) -> list[object]:
+    (folder / "file").write_text("")
+    return ["mocap", ROOT / "clips" / "hip_shake.mp4", "-o", folder / "file" / "out"]
+
+
+def foreign_table(folder: Path) -> list[object]:
+    (folder / "smpl.parquet").write_text("frame,joint\n")
+    return ["retarget", folder / "smpl.parquet", "-o", folder / "out"]
+
+
+def missing_table(folder: Path) -> list[object]:
+    return ["train", folder / "reference.parquet", "-o", folder / "out", "--steps", "10"]
+
+
+def dance_by_name(folder: Path) -> list[object]:
+    return ["dance", "moonwalk"]
+
+
+def missing_file(folder: Path) -> list[object]:
+    return ["dance", folder / "gone.mp4"]
+
+
+@pytest.mark.parametrize(
+    ("make", "told"),
+    [
+        (text_as_video, "UnreadableVideo"),
+        (half_a_video, "TruncatedVideo"),
+        (nobody, "NoPersonFound"),
+        (one_frame, "TrackTooShort"),
+        (unknown_robot, "unknown robot 'c3po'"),
+        (typo_in_yaml, "mine.yaml: unknown key 'mocap.cutof_hz'. Did you mean 'cutoff_hz'?"),
+        (unwritable_folder, "StoreError"),
+        (foreign_table, "smpl.parquet: not a Parquet file"),
+        (missing_table, "reference.parquet: no such file"),
+        (dance_by_name, "'moonwalk' is no file"),
+        (missing_file, "gone.mp4: no such file"),
+    ],
+)
+def test_bad_input_gets_one_line_and_no_answer(make, told: str, tmp_path: Path) -> None:
+    code, out, err = invoke(*make(tmp_path), "--json")
+    said = [line for line in err.splitlines() if line.startswith("robojackson: ")]
+    assert (code, out, len(said)) == (1, "", 1)
+    assert told in said[0]
+    assert "Traceback" not in err
+
+
+def test_a_clip_without_a_person_has_a_score(tmp_path: Path) -> None:
+    code, out, _ = invoke("score", write_video(tmp_path / "empty.mp4", 5), "--json")
+    scored = json.loads(out)["videos"][0]
+    assert (code, scored["missing_joints"], scored["note"]) == (
+        0,
+        33 * 5,
+        "no person found in 5 of 5 frames",
+    )
+
+
+def test_a_full_store_is_told_before_any_work(monkeypatch, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("ROBOJACKSON_STORE", str(tmp_path / "file" / "store"))
+    code, _, err = invoke("dance", ROOT / "clips" / "hip_shake.mp4")
+    assert code == 1
+    assert "cannot write the store" in err
+
+
+def test_an_override_without_a_value_is_refused() -> None:
+    assert "expected KEY=VALUE" in invoke("score", "x.mp4", "--set", "train.seed")[2]
+
+
+def test_doctor_tells_what_is_there_in_one_object() -> None:
+    said = robojackson("doctor", "--json")
+    assert {"ok", "packages", "libraries", "models", "missing", "optional"} == set(said.answer) - {
+        "python",
+        "ffmpeg",
+    }
+    assert not said.loaded_prefect
+
+
+def test_what_a_library_prints_does_not_stand_beside_the_answer(tmp_path: Path) -> None:
+    code = (
+        "import os, sys\n"
+        "from flows import console\n"
+        "@console.command\n"
+        "def noisy(as_json=False):\n"
+        "    print('chatter'); os.write(1, b'C++ chatter')\n"
+        "    return console.Answer({'x': float('nan')})\n"
+        "noisy(as_json=True)\n"
+    )
+    run = [sys.executable, "-c", code]
+    done = subprocess.run(run, capture_output=True, text=True, env=environment(), check=True)
+    assert done.stdout == '{"x": null}\n'
+
+
+def test_an_answer_for_people_has_one_line_a_figure() -> None:
+    data = plain({"skill": 0.123456, "baselines": {"statue": {"skill": None}}, "names": ["a", "b"]})
+    assert list(lines(data)) == [
+        "skill      0.1235",
+        "baselines",
+        "  statue",
+        "    skill  -",
+        "names      a, b",
+    ]
+
+
+@pytest.mark.slow
+def test_ctrl_c_in_training_is_resumed_by_the_same_command(tmp_path: Path, short_clip) -> None:
+    robojackson("mocap", short_clip, "-o", tmp_path)
+    robojackson("retarget", tmp_path / "smpl.parquet", "-o", tmp_path, "--config", "smoke")
+    words = [
+        *("train", str(tmp_path / "reference.parquet"), "-o", str(tmp_path / "run")),
+        *("--trainer=sb3", "--set=tqc.n_envs=4", "--set=tqc.warmup=100", "--set=tqc.batch=32"),
+        *("--set=progress_seconds=0.2", "--json"),
+    ]
+    command = [sys.executable, "-m", "flows.cli", *words, "--steps=1000000"]
+    with subprocess.Popen(
+        command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment()
+    ) as process:
+        assert process.stderr is not None
+        progress = process.stderr.readline()
+        process.send_signal(signal.SIGINT)
+        rest = process.stderr.read()
+    assert "steps" in progress
+    assert (process.returncode, rest.count("resume: robojackson train")) == (130, 1)
+    first = int(progress.split()[0].replace(",", ""))
+    again = robojackson(*words, f"--steps={first + 200}")
+    assert again.code == 0
+    assert "resuming at" in again.err

@@ -1,0 +1,157 @@
+"""The whole flow on a real clip, as short as it can be: it makes everything, and only once."""
+
+import asyncio
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from prefect.client.orchestration import get_client
+from prefect.settings import (
+    PREFECT_FLOWS_HEARTBEAT_FREQUENCY,
+    PREFECT_LOCAL_STORAGE_PATH,
+    PREFECT_LOGGING_LEVEL,
+    temporary_settings,
+)
+
+from flows.dance import Candidate, choose, dance
+from flows.source import resolve
+from robojackson.clips.stability import Stability
+from robojackson.errors import NoPersonFound, UnreadableVideo
+from storage import catalogue
+from storage.artifact import Artifact
+from storage.store import Store
+
+OVERRIDES = {"train.trainer": "sb3", "train.steps": 300}
+FILES = {
+    "landmarks.parquet",
+    "smpl.parquet",
+    "reference.parquet",
+    "scorecard.json",
+    "policy.safetensors",
+    "episodes.parquet",
+    "evaluations.parquet",
+    "dance.mp4",
+    "index.html",
+}
+ONCE = {"probe": 1, "stability": 1, "landmarks": 2, "mocap": 1, "retarget": 1, "train": 1}
+ONCE |= {"evaluate": 1, "video": 1, "page": 1}
+
+
+class Passes:
+    """The flow over one folder of candidates and one store, again and again."""
+
+    def __init__(self, source: Path, store: Path) -> None:
+        self.source, self.store = source, store
+        self.first = self.run()
+        self.executed_first = self.executed()
+
+    def run(self) -> dict[str, Any]:
+        return asyncio.run(dance(str(self.source), "smoke", OVERRIDES))
+
+    def executed(self) -> dict[str, int]:
+        """How often each task really ran in the last pass."""
+        with get_client(sync_client=True) as client:
+            flow_run = max(client.read_flow_runs(), key=lambda run: run.expected_start_time)
+            runs = [
+                run
+                for run in client.read_task_runs(limit=200)
+                if run.flow_run_id == flow_run.id and run.state_name == "Completed"
+            ]
+        names = [run.name.rsplit("-", 1)[0] for run in runs]
+        return {name: names.count(name) for name in names}
+
+
+@pytest.fixture(scope="module")
+def passes(
+    prefect_server: None, tmp_path_factory: pytest.TempPathFactory, short_clip: Path
+) -> Iterator[Passes]:
+    folder = tmp_path_factory.mktemp("dance")
+    (folder / "clips").mkdir()
+    shutil.copy(short_clip, folder / "clips" / "hips.mp4")
+    wanted = {
+        PREFECT_LOCAL_STORAGE_PATH: folder / "records",
+        PREFECT_FLOWS_HEARTBEAT_FREQUENCY: None,
+        PREFECT_LOGGING_LEVEL: "ERROR",
+    }
+    with pytest.MonkeyPatch.context() as patch, temporary_settings(wanted):
+        patch.setenv("ROBOJACKSON_STORE", str(folder / "store"))
+        yield Passes(folder / "clips", folder / "store")
+
+
+@pytest.mark.slow
+def test_the_flow_leaves_everything_in_one_folder(passes: Passes) -> None:
+    there = {path.name for path in Path(passes.first["page"]).parent.iterdir()}
+    assert there >= FILES
+
+
+@pytest.mark.slow
+def test_the_first_pass_runs_every_task(passes: Passes) -> None:
+    assert passes.executed_first == ONCE
+
+
+@pytest.mark.slow
+def test_a_second_pass_runs_no_task(passes: Passes) -> None:
+    passes.run()
+    assert passes.executed() == {}
+
+
+@pytest.mark.slow
+def test_a_deleted_table_runs_its_stage_alone_when_it_comes_back_the_same(passes: Passes) -> None:
+    for path in passes.store.glob("retarget/*/reference.parquet"):
+        path.unlink()
+    passes.run()
+    assert passes.executed() == {"retarget": 1}
+
+
+@pytest.mark.slow
+def test_an_altered_video_in_the_folder_is_put_back(passes: Passes) -> None:
+    film = Path(passes.first["video"])
+    before = film.read_bytes()
+    film.write_bytes(before[:-1])
+    passes.run()
+    assert (passes.executed(), film.read_bytes()) == ({"page": 1}, before)
+
+
+@pytest.mark.slow
+def test_a_renamed_copy_of_the_clip_trains_nothing(passes: Passes) -> None:
+    (passes.source / "hips.mp4").rename(passes.source / "sway.mp4")
+    passes.run()
+    assert passes.executed() == {"page": 1}
+
+
+@pytest.mark.slow
+def test_the_catalogue_knows_the_run(passes: Passes) -> None:
+    known = {run.run_id for run in catalogue.runs(Store(passes.store))}
+    assert passes.first["run_id"] in known
+
+
+def a_candidate(name: str, score: float, detected: int = 10) -> Candidate:
+    artifact = Artifact(key="k", sha256="0" * 64)
+    return Candidate(name, {}, artifact, Stability(10, detected, 0, score, score, 0.0, 0.0))
+
+
+def test_the_lowest_score_is_danced() -> None:
+    candidates = [a_candidate("a", 3.0), a_candidate("b", 1.0), a_candidate("c", 2.0)]
+    assert choose(candidates).name == "b"
+
+
+def test_a_clip_without_a_person_is_not_danced_however_steady() -> None:
+    candidates = [a_candidate("a", 3.0), a_candidate("empty", 0.0, detected=0)]
+    assert choose(candidates).name == "a"
+
+
+def test_only_clips_without_a_person_are_an_error_that_counts_frames() -> None:
+    with pytest.raises(NoPersonFound, match="empty: no person found in 10 of 10 frames"):
+        choose([a_candidate("empty", 0.0, detected=0)])
+
+
+def test_without_a_source_the_hip_shake_is_danced() -> None:
+    assert resolve(None).name == "hip_shake.mp4"
+
+
+@pytest.mark.parametrize("source", ["gone.mp4", "no/such/thing", "moonwalk"])
+def test_a_source_that_is_not_there_is_refused(source: str) -> None:
+    with pytest.raises(UnreadableVideo):
+        resolve(source)

@@ -1,0 +1,160 @@
+"""A store writes whole files or none, on a disk, in an object store, and where writing fails."""
+
+import errno
+import resource
+from collections.abc import Iterator
+from pathlib import Path
+
+import fsspec
+import pytest
+from fsspec.implementations.memory import MemoryFileSystem
+from moto.server import ThreadedMotoServer
+
+from robojackson.errors import StoreError
+from storage.artifact import Artifact
+from storage.store import Store
+
+
+class FullDisk(MemoryFileSystem):
+    """Writes half of what it gets, then the disk is full."""
+
+    protocol = "fulldisk"
+    store: dict[str, object] = {}  # noqa: RUF012
+    pseudo_dirs = [""]  # noqa: RUF012
+
+    def pipe_file(self, path: str, value: bytes, mode: str = "overwrite", **kwargs: object) -> None:
+        super().pipe_file(path, value[: len(value) // 2], mode)
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+
+fsspec.register_implementation("fulldisk", FullDisk, clobber=True)
+
+
+@pytest.fixture(scope="session")
+def s3_url() -> Iterator[str]:
+    """A bucket of a local S3 server."""
+    server = ThreadedMotoServer(port=0, verbose=False)
+    server.start()
+    host, port = server.get_host_and_port()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("AWS_ACCESS_KEY_ID", "test")
+        patch.setenv("AWS_SECRET_ACCESS_KEY", "test")
+        patch.setenv("AWS_DEFAULT_REGION", "us-east-1")
+        patch.setenv("AWS_ENDPOINT_URL", f"http://{host}:{port}")
+        fsspec.filesystem("s3").mkdir("dances")
+        yield "s3://dances/store"
+    server.stop()
+
+
+@pytest.fixture(params=["folder", "s3", "memory"])
+def store(request: pytest.FixtureRequest, tmp_path: Path) -> Store:
+    if request.param == "s3":
+        return Store(request.getfixturevalue("s3_url") + f"/{tmp_path.name}")
+    if request.param == "memory":
+        return Store(f"memory://{tmp_path.name}")
+    return Store(tmp_path / "store")
+
+
+def files_under(folder: Path) -> list[str]:
+    return sorted(p.name for p in folder.rglob("*") if p.is_file())
+
+
+def test_what_was_put_is_read(store: Store) -> None:
+    store.put("mocap/a.bin", b"pose")
+    assert store.read("mocap/a.bin") == b"pose"
+
+
+def test_a_local_file_is_put_like_bytes(store: Store, tmp_path: Path) -> None:
+    (tmp_path / "clip.mp4").write_bytes(b"frames")
+    artifact = store.keep("video", "clip.mp4", tmp_path / "clip.mp4")
+    assert artifact == store.keep("video", "clip.mp4", b"frames")
+
+
+def test_a_second_put_replaces_the_first(store: Store) -> None:
+    store.put("a", b"old")
+    store.put("a", b"new")
+    assert store.read("a") == b"new"
+
+
+def test_list_tells_the_keys_under_a_folder(store: Store) -> None:
+    for key in ("runs/b.json", "runs/a.json", "other/c.json"):
+        store.put(key, b"{}")
+    assert store.list("runs") == ["runs/a.json", "runs/b.json"]
+
+
+def test_exists_only_what_was_put(store: Store) -> None:
+    store.put("a", b"x")
+    assert (store.exists("a"), store.exists("b")) == (True, False)
+
+
+def test_an_unaltered_artifact_verifies(store: Store) -> None:
+    artifact = store.put("a", b"x")
+    assert artifact.verify(store) is artifact
+
+
+def test_an_altered_artifact_does_not_verify(store: Store) -> None:
+    artifact = store.put("a", b"x")
+    store.put("a", b"y")
+    with pytest.raises(StoreError, match="was altered"):
+        artifact.verify(store)
+
+
+def test_a_missing_artifact_does_not_verify(store: Store) -> None:
+    with pytest.raises(StoreError, match="cannot read"):
+        Artifact(key="gone", sha256="0" * 64).verify(store)
+
+
+def test_different_content_is_kept_under_different_keys(store: Store) -> None:
+    assert store.keep("s", "x", b"1").key != store.keep("s", "x", b"2").key
+
+
+def test_local_gives_a_file_with_the_content(store: Store) -> None:
+    with store.local(store.put("a/clip.mp4", b"frames")) as path:
+        assert (path.name, path.read_bytes()) == ("clip.mp4", b"frames")
+
+
+def test_a_writable_store_is_left_as_it_was(store: Store) -> None:
+    store.require_writable()
+    assert store.list() == []
+
+
+def test_a_failed_write_keeps_the_old_file_and_nothing_else(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    store.put("a/x", b"old")
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))
+    try:
+        with pytest.raises(StoreError) as caught:
+            store.put("a/x", b"n" * 5000)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert "\n" not in str(caught.value)
+    assert (store.read("a/x"), files_under(tmp_path)) == (b"old", ["x"])
+
+
+def test_a_full_remote_disk_is_one_line_and_leaves_nothing() -> None:
+    store = Store("fulldisk://dances")
+    with pytest.raises(StoreError, match=r"^cannot write fulldisk://dances/a/x: No space left"):
+        store.put("a/x", b"12345678")
+    assert FullDisk.store == {}
+
+
+def test_a_full_store_is_told_before_any_work() -> None:
+    with pytest.raises(StoreError, match=r"^cannot write the store fulldisk://dances: No space"):
+        Store("fulldisk://dances").require_writable()
+
+
+def test_an_unwritable_root_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("not a folder")
+    with pytest.raises(StoreError, match="Not a directory"):
+        Store(tmp_path / "file" / "store").require_writable()
+
+
+def test_a_root_that_nobody_can_open_is_one_line() -> None:
+    with pytest.raises(StoreError, match="cannot open the store nonsense://x"):
+        Store("nonsense://x")
+
+
+def test_the_environment_names_the_store(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("ROBOJACKSON_STORE", str(tmp_path / "elsewhere"))
+    assert Store.from_environment().root == str(tmp_path / "elsewhere")

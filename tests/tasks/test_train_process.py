@@ -1,0 +1,121 @@
+"""A training is a process of its own: it leaves no orphan, and its death has a name."""
+
+import asyncio
+import logging
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from robojackson.errors import TrainingFailed
+from tasks import train as task
+
+SLEEPER = "import time; print('started', file=__import__('sys').stderr, flush=True); time.sleep(60)"
+STUBBORN = f"import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN); {SLEEPER}"
+
+
+@pytest.fixture(autouse=True)
+def logger(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(task, "get_run_logger", lambda: logging.getLogger("train"))
+
+
+def run(code: str, folder: Path, minutes: float | None = None) -> None:
+    command = [sys.executable, "-c", code]
+    asyncio.run(task.run_process(command, "walk-scratch-s0", folder, minutes))
+
+
+def is_alive(pid: int) -> bool:
+    """Whether a process runs; one that only waits to be collected does not."""
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+    return state != "Z"
+
+
+def ends(pid: int, within_s: float = 10.0) -> bool:
+    until = time.monotonic() + within_s
+    while time.monotonic() < until:
+        if not is_alive(pid):
+            return True
+        time.sleep(0.05)
+    return False
+
+
+def test_a_process_that_is_killed_is_told_with_its_run_and_cause(tmp_path: Path) -> None:
+    with pytest.raises(TrainingFailed, match=r"run walk-scratch-s0 was killed by SIGKILL") as told:
+        run("import os; os.kill(os.getpid(), 9)", tmp_path)
+    assert str(tmp_path / "train.log") in str(told.value)
+
+
+def test_a_process_that_fails_is_told_with_its_last_line(tmp_path: Path) -> None:
+    with pytest.raises(TrainingFailed, match="exit code 3: the disk is full"):
+        run("import sys; print('the disk is full', file=sys.stderr); sys.exit(3)", tmp_path)
+
+
+def test_what_the_process_says_is_in_its_log(tmp_path: Path) -> None:
+    run("import sys; print('10 steps', file=sys.stderr)", tmp_path)
+    assert (tmp_path / "train.log").read_text() == "10 steps\n"
+
+
+def test_a_process_that_does_not_end_is_killed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(task, "OVERTIME_S", 0.5)
+    with pytest.raises(TrainingFailed, match="did not end within"):
+        run(SLEEPER, tmp_path, 0.01)
+
+
+@pytest.mark.parametrize("code", [SLEEPER, STUBBORN], ids=["willing", "stubborn"])
+def test_a_cancelled_task_leaves_no_process(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: str
+) -> None:
+    monkeypatch.setattr(task, "SECONDS_TO_SAVE", 0.5)
+    told = f"import os, sys; print(os.getpid(), file=sys.stderr, flush=True); {code}"
+
+    async def cancelled() -> None:
+        command = [sys.executable, "-c", told]
+        running = asyncio.create_task(task.run_process(command, "run", tmp_path, None))
+        while "started" not in _read(tmp_path / "train.log"):
+            await asyncio.sleep(0.02)
+        running.cancel()
+        await asyncio.gather(running, return_exceptions=True)
+
+    asyncio.run(cancelled())
+    assert ends(int(_read(tmp_path / "train.log").split()[0]), 1.0)
+
+
+def test_a_training_ends_when_its_parent_is_killed(tmp_path: Path) -> None:
+    child = (
+        "import os, sys, time\n"
+        "from flows.training import die_with\n"
+        "die_with(int(sys.argv[1]))\n"
+        "open(sys.argv[2], 'w').write(str(os.getpid()))\n"
+        "time.sleep(60)\n"
+    )
+    parent = (
+        "import os, subprocess, sys\n"
+        f"subprocess.run([sys.executable, '-c', {child!r}, str(os.getpid()), sys.argv[1]])\n"
+    )
+    mark = tmp_path / "pid"
+    command = [sys.executable, "-c", parent, str(mark)]
+    with subprocess.Popen(command, env=task.environment()) as process:
+        while not _read(mark):
+            time.sleep(0.02)
+        process.send_signal(signal.SIGKILL)
+    assert ends(int(_read(mark)))
+
+
+def test_a_training_whose_parent_is_gone_does_not_begin() -> None:
+    code = "from flows.training import die_with; die_with(1)"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, check=False, env=task.environment()
+    )
+    assert b"is gone" in done.stderr
+
+
+def _read(path: Path) -> str:
+    return path.read_text() if path.exists() else ""
