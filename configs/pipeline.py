@@ -23,6 +23,7 @@ class PipelineConfig:
         other_minutes: Share of it that the stages other than training get, minutes.
         scoring_detector: Size of the pose model that scores candidates.
         detector: Size of the pose model that feeds mocap.
+        gate: Refuse to train on a reference motion that breaks a hard bar of its score card.
         video, stability, mocap, retarget, train, evaluate, show: Of the stages.
     """
 
@@ -32,6 +33,7 @@ class PipelineConfig:
     other_minutes: float = Field(default=3.0, ge=0)
     scoring_detector: Size = "lite"
     detector: Size = "full"
+    gate: bool = True
     video: VideoLimits = Field(default_factory=VideoLimits)
     stability: StabilityConfig = Field(default_factory=StabilityConfig)
     mocap: MocapConfig = Field(default_factory=MocapConfig)

@@ -7,6 +7,7 @@ and nowhere else; how a stage works is `robojackson`'s, how it is cached is `tas
 import asyncio
 import json
 import logging
+import signal
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -22,10 +23,12 @@ from prefect.task_runners import ThreadPoolTaskRunner
 from configs.loader import load
 from configs.pipeline import PipelineConfig
 from flows import console
+from flows.orphans import none_left
 from robojackson.clips.stability import Stability
 from robojackson.clips.video import list_videos
 from robojackson.errors import NoPersonFound, RoboJacksonError
 from robojackson.retarget.robot import RobotDescription
+from robojackson.retarget.scorecard import check
 from storage import catalogue, tables
 from storage.artifact import Artifact
 from storage.store import Store
@@ -75,8 +78,10 @@ def run(
     """
     for name in ("prefect.flow_runs", "prefect.task_runs"):
         logging.getLogger(name).addFilter(_without_traceback)
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's `&` takes it away
     try:
-        return asyncio.run(dance(str(source), config, dict(overrides), start_s, end_s))
+        with none_left():
+            return asyncio.run(dance(str(source), config, dict(overrides), start_s, end_s))
     except (KeyboardInterrupt, asyncio.CancelledError):
         raise console.Interrupted(f"resume: {console.same_command()}") from None
 
@@ -162,6 +167,8 @@ async def perform(
     sequence = mocap(track, settings.mocap)
     moved = retarget(sequence, robot, settings.retarget)
     reference = moved["reference"]
+    if settings.gate:
+        check(json.loads(Store.from_environment().read(moved["scorecard"].key)))
     deadline = began + 60 * (settings.minutes - LAST_STAGES_MINUTES)
     trained = await train(reference, robot, _budgeted(settings), labels, deadline)
     judged = evaluate(trained["policy"], reference, robot, settings.evaluate, labels)

@@ -18,7 +18,7 @@ from prefect.settings import (
 from flows.dance import Candidate, choose, dance
 from flows.source import resolve
 from robojackson.clips.stability import Stability
-from robojackson.errors import NoPersonFound, UnreadableVideo
+from robojackson.errors import NoPersonFound, RejectedReference, UnreadableVideo
 from storage import catalogue
 from storage.artifact import Artifact
 from storage.store import Store
@@ -155,3 +155,10 @@ def test_without_a_source_the_hip_shake_is_danced() -> None:
 def test_a_source_that_is_not_there_is_refused(source: str) -> None:
     with pytest.raises(UnreadableVideo):
         resolve(source)
+
+
+def test_a_reference_that_breaks_a_bar_is_not_trained(passes: Passes) -> None:
+    """The paper's mapping breaks joint limits: the gate says so before a robot is trained on it."""
+    with pytest.raises(RejectedReference, match=r"reference refused: .* is allowed"):
+        asyncio.run(dance(str(passes.source), "smoke", {**OVERRIDES, "retarget.method": "paper"}))
+    assert "train" not in passes.executed()
