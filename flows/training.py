@@ -53,7 +53,8 @@ def train(
     robot = single.robot_of(motion)
     store = Store(out)
     store.require_writable()
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    for wish in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(wish, signal.default_int_handler)
     with locked(out), console.ticker() as tell:
         log = _EpisodeLog(store, _common(config, move or _move_of(reference), setup, run_id))
         try:
