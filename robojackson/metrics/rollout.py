@@ -12,6 +12,8 @@ from jaxtyping import Float
 
 from robojackson.geometry.rotations import heading
 
+FROZEN_CANDIDATES = 24
+
 
 @dataclass(frozen=True)
 class LimbResponse:
@@ -51,11 +53,12 @@ def site_error(
 
 
 def best_frozen_error(wanted: Float[np.ndarray, "T K 3"]) -> float:
-    """The lowest mean site error that a pose which never moves can have, metres.
+    """The lowest mean site error of a pose that never moves, metres.
 
-    Candidates are the mean of the points and every pose of the clip itself.
+    Candidates are the mean of the points and up to `FROZEN_CANDIDATES` poses of the clip itself.
     """
-    candidates = np.concatenate([wanted.mean(0, keepdims=True), wanted])
+    chosen = np.linspace(0, len(wanted) - 1, min(len(wanted), FROZEN_CANDIDATES)).astype(int)
+    candidates = np.concatenate([wanted.mean(0, keepdims=True), wanted[chosen]])
     return float(min(site_error(wanted, pose[None]).mean() for pose in candidates))
 
 
@@ -79,7 +82,7 @@ def limb_response(
         fast: Reference speed from which a frame counts as moving, m/s.
         max_lag: Longest delay that is tried, seconds.
     """
-    lags = range(round(max_lag / dt) + 1)
+    lags = range(int(max_lag / dt + 1e-9) + 1)
     if len(limb) < 4 * len(lags):
         return None
     speed, goal = np.diff(limb, axis=0) / dt, np.diff(wanted, axis=0) / dt

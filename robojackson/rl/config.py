@@ -136,6 +136,9 @@ class TqcConfig:
         updates_per_round: Gradient updates a round.
         buffer: Transitions kept for replay.
         warmup: Random transitions before the first update.
+        refill: Transitions of the restored policy before the first update of a run that is resumed
+            without its replay buffer.
+        critics: SBX has two, and so has the reference.
         top_quantiles_to_drop: Of each critic's quantiles, against overestimation.
     """
 
@@ -145,14 +148,15 @@ class TqcConfig:
     learning_rate: float = Field(default=5e-4, gt=0)
     buffer: int = Field(default=300_000, ge=1_000)
     warmup: int = Field(default=2_000, ge=1)
+    refill: int = Field(default=20_000, ge=1)
     batch: int = Field(default=256, ge=1)
     tau: float = Field(default=0.01, gt=0, le=1)
     gamma: float = Field(default=0.985, gt=0, lt=1)
     policy_delay: int = Field(default=2, ge=1)
-    critics: int = Field(default=2, ge=1)
+    critics: Literal[2] = 2
     quantiles: int = Field(default=25, ge=1)
     top_quantiles_to_drop: int = Field(default=2, ge=0)
-    entropy: str = "auto_0.02"
+    entropy: str = Field(default="auto_0.02", pattern=r"^auto(_\d*\.?\d+)?$")
     actor: tuple[int, ...] = (256, 256)
     critic: tuple[int, ...] = (256, 256)
 

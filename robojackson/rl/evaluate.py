@@ -15,26 +15,17 @@ from jaxtyping import Float
 from pydantic import TypeAdapter
 
 from robojackson.errors import BadPolicy
-from robojackson.metrics.rollout import (
-    best_frozen_error,
-    heading_frame,
-    limb_response,
-    site_error,
-    skill,
-)
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.retarget.robot import Robot
 from robojackson.rl.clip import Clip
 from robojackson.rl.config import ControlConfig, EvaluateConfig, ResetConfig, TerminationConfig
+from robojackson.rl.judge import Judge
 from robojackson.rl.observation import observation_size
-from robojackson.rl.physics import residual_scale
+from robojackson.rl.physics import Motors, require_same_clock, residual_scale
 from robojackson.rl.policy import Policy
 from robojackson.rl.rollouts import Controller, Rollouts, Starts, roll_out
 from robojackson.rl.starts import default_stand, noisy, stand_at
-from robojackson.rl.tracking import EXTREMITIES, FEET, PELVIS
 
-KNEES = ("left_knee", "right_knee")
-LIMB_ENDS = (*FEET, *EXTREMITIES)
 STAND = -1
 """`phase` of the row that starts in the default stand."""
 
@@ -46,7 +37,8 @@ class Evaluation:
     Attributes:
         summary: Means over the policy's rollouts, and those of the baselines by name.
         rows: One row a rollout, of the policy and of every baseline.
-        rollout_qpos: The policy's rollout from the clip's first step, for the video.
+        rollout_qpos: The policy's rollout from the clip's first step (phase 0, reset 0, whether it
+            falls or not), for the video; row s is the state at the reference's step s.
     """
 
     summary: dict[str, object]
@@ -67,10 +59,11 @@ def evaluate(
         BadPolicy: the policy's observation does not fit this robot.
     """
     control = control_of(policy, robot)
+    require_same_clock(control.substeps * robot.model.opt.timestep, reference.dt)
     clip = Clip(reference)
     starts, labels = _starts(robot, clip, config)
     horizon = _horizons(clip, starts, config)
-    judge = _Judge(robot, reference, config)
+    judge = Judge(robot, reference, config)
     rows: list[dict[str, object]] = []
     summary: dict[str, object] = {}
     baselines: dict[str, dict[str, float]] = {}
@@ -91,7 +84,7 @@ def evaluate(
         rows += judged
         if name == "trained":
             summary |= summarise(judged)
-            qpos = _shown(rollouts, labels)
+            qpos = _shown(rollouts, starts)
         else:
             baselines[name] = summarise(judged)
     return Evaluation(summary | {"baselines": baselines}, rows, qpos)
@@ -101,84 +94,35 @@ def control_of(policy: Policy, robot: Robot) -> ControlConfig:
     """The control law that a policy was trained with.
 
     Raises:
-        BadPolicy: the policy's observation does not fit this robot.
+        BadPolicy: the policy was trained for another robot, or its file says no control law.
     """
+    trained_for = policy.facts.get("robot", robot.description.name)
+    if trained_for != robot.description.name:
+        raise BadPolicy(
+            f"the policy was trained for robot {trained_for!r}, not for {robot.description.name!r}"
+        )
+    if "control" not in policy.facts:
+        raise BadPolicy("the policy's file says nothing of its control law")
     hinges, motors = robot.model.nq - 7, robot.model.nu
     size = observation_size(hinges, motors, len(robot.keypoint_names))
     if policy.observation_size != size:
         raise BadPolicy(
             f"the policy takes {policy.observation_size} observations and robot "
-            f"{robot.description.name!r} gives {size}: it was trained for "
-            f"{policy.facts.get('robot', 'another robot')!r}"
+            f"{robot.description.name!r} gives {size}: it was trained for another robot"
         )
     return TypeAdapter(ControlConfig).validate_python(policy.facts["control"])
 
 
 def summarise(rows: list[dict[str, object]]) -> dict[str, float]:
     """Means over rollouts; limb gains only over those in which the limb had to move."""
-    keys = ("survived_s", "success", "strict_success", "skill", "site_error_m", "clip_fraction")
+    keys = ("survived_s", "success", "strict_success", "skill", "site_error_m", "clip_fraction",
+            "drift_m", "heading_error_deg", "travel_ratio")  # fmt: skip
     out = {key: _mean(rows, key) for key in keys}
     limbs = [key for key in rows[0] if key.startswith(("limb_gain_", "limb_r2_", "excess_"))]
     out |= {key: _mean(rows, key) for key in limbs}
     out["limb_gain"] = _nanmean([out[key] for key in limbs if key.startswith("limb_gain_")])
     out["rollouts"] = float(len(rows))
     return out
-
-
-class _Judge:
-    """Turns one rollout into one row of the table."""
-
-    def __init__(self, robot: Robot, reference: ReferenceMotion, config: EvaluateConfig) -> None:
-        names = robot.keypoint_names
-        self._config, self._dt = config, reference.dt
-        self._pelvis = names.index(PELVIS)
-        self._knees = [names.index(name) for name in KNEES]
-        self._limbs = {name: names.index(name) for name in LIMB_ENDS}
-        self._cyclic, self._steps = reference.cyclic, len(reference)
-        wanted = heading_frame(reference.keypoints_w, reference.qpos[:, 3:7], self._pelvis)
-        self.frozen_error = best_frozen_error(wanted)
-
-    def row(
-        self, policy: str, label: tuple[int, int], rollouts: Rollouts, i: int
-    ) -> dict[str, object]:
-        length, fell = int(rollouts.length[i]), bool(rollouts.fell[i])
-        span = slice(0, max(length, 1))
-        here = heading_frame(rollouts.points[span, i], rollouts.qpos[span, i, 3:7], self._pelvis)
-        there = heading_frame(rollouts.wanted[span, i], rollouts.wanted_root[span, i], self._pelvis)
-        error = site_error(here, there)
-        knees = rollouts.points[span, i][:, self._knees, 2]
-        wanted_knees = rollouts.wanted[span, i][:, self._knees, 2]
-        low = self._config.kneel_height
-        kneels = bool(((knees < low) & (wanted_knees >= low)).any())
-        strict = not fell and not kneels and float(error.max()) <= self._config.strict_error
-        phase, reset = label
-        row: dict[str, object] = {
-            "policy": policy,
-            "phase": phase,
-            "reset": reset,
-            "survived_s": length * self._dt,
-            "clip_fraction": length / self._steps,
-            "fell": fell,
-            "success": float(not fell),
-            "strict_success": float(strict),
-            "kneels": kneels,
-            "site_error_m": float(error.mean()),
-            "skill": 0.0 if fell else skill(float(error.mean()), self.frozen_error),
-            "integrator": "RK4",
-            "tempo": 1.0,
-        }
-        return row | self._limb_figures(here, there)
-
-    def _limb_figures(self, here: np.ndarray, there: np.ndarray) -> dict[str, float]:
-        figures: dict[str, float] = {}
-        config = self._config
-        for name, k in self._limbs.items():
-            found = limb_response(here[:, k], there[:, k], self._dt, config.fast, config.max_lag)
-            moves = found is not None and found.moving_share > 0.05
-            figures[f"limb_gain_{name}"] = found.gain if found and moves else float("nan")
-            figures[f"limb_r2_{name}"] = found.r2 if found and moves else float("nan")
-            figures[f"excess_speed_{name}"] = found.excess_m_s if found else float("nan")
-        return figures
 
 
 def _controllers(
@@ -189,13 +133,18 @@ def _controllers(
     config: EvaluateConfig,
 ) -> Mapping[str, Controller]:
     """The policy and the baselines: each gives target hinge angles."""
-    order = np.argsort(robot.model.jnt_qposadr[robot.model.actuator_trnid[:, 0]])
+    hinge = Motors.of(robot.model).hinge
     scale = residual_scale(robot, control)
     rng = np.random.default_rng(config.seed)
     mean_pose = reference.qpos[:, 7:].mean(0)
 
+    def moved(following: np.ndarray, action: np.ndarray) -> np.ndarray:
+        target = following.copy()
+        target[:, hinge] += scale * action
+        return target
+
     def trained(seen: np.ndarray, following: np.ndarray, start: np.ndarray) -> np.ndarray:
-        return following + (scale * policy.act(seen))[:, order]
+        return moved(following, policy.act(seen))
 
     def statue(seen: np.ndarray, following: np.ndarray, start: np.ndarray) -> np.ndarray:
         return np.asarray(reference.qpos, float)[start % len(reference), 7:]
@@ -207,7 +156,7 @@ def _controllers(
         return following
 
     def flail(seen: np.ndarray, following: np.ndarray, start: np.ndarray) -> np.ndarray:
-        return following + scale[order] * rng.uniform(-1, 1, following.shape)
+        return moved(following, rng.uniform(-1, 1, (len(following), len(hinge))))
 
     return {
         "trained": trained,
@@ -221,8 +170,11 @@ def _controllers(
 def _starts(
     robot: Robot, clip: Clip, config: EvaluateConfig
 ) -> tuple[Starts, list[tuple[int, int]]]:
-    """Evenly spread phases with noisy resets, then the default stand at the first step."""
-    usable = clip.steps if clip.cyclic else max(1, clip.steps * 3 // 4)
+    """Evenly spread phases with noisy resets, then the default stand at the first step.
+
+    A clip that is not cyclic is started in its first quarter, so that most of it is always danced.
+    """
+    usable = clip.steps if clip.cyclic else max(1, clip.steps // 4)
     phases = np.linspace(0, usable, config.phases, endpoint=False).astype(int)
     labels = [(int(p), r) for p in phases for r in range(config.resets)] + [(STAND, 0)]
     step = np.array([max(phase, 0) for phase, _ in labels])
@@ -244,11 +196,10 @@ def _horizons(clip: Clip, starts: Starts, config: EvaluateConfig) -> np.ndarray:
     return clip.steps - 1 - starts.step
 
 
-def _shown(rollouts: Rollouts, labels: list[tuple[int, int]]) -> np.ndarray:
-    """The longest rollout among those that start at the clip's first step, with its fall."""
-    first = [i for i, (phase, _) in enumerate(labels) if phase == 0]
-    best = max(first, key=lambda i: int(rollouts.length[i]))
-    return rollouts.qpos[: int(rollouts.length[best]) + 1, best]
+def _shown(rollouts: Rollouts, starts: Starts) -> np.ndarray:
+    """The rollout from the clip's first step, its start first, with its fall if it falls."""
+    steps = min(int(rollouts.length[0]) + 1, len(rollouts.qpos))
+    return np.concatenate([starts.qpos[:1], rollouts.qpos[:steps, 0]])
 
 
 def _mean(rows: list[dict[str, object]], key: str) -> float:

@@ -16,8 +16,19 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from robojackson.errors import BadPolicy
 from robojackson.retarget.robot import Robot
 from robojackson.rl.config import ControlConfig
+
+BAD_STATE = [
+    int(kind)
+    for kind in (
+        mujoco.mjtWarning.mjWARN_BADQPOS,
+        mujoco.mjtWarning.mjWARN_BADQVEL,
+        mujoco.mjtWarning.mjWARN_BADQACC,
+    )
+]
+"""Warnings at which MuJoCo resets a state by itself."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +53,19 @@ class Motors:
             hinge=model.jnt_qposadr[model.actuator_trnid[:, 0]] - 7,
             gear=gear,
             limit=gear * model.actuator_ctrlrange[:, 1],
+        )
+
+
+def require_same_clock(simulation_dt: float, reference_dt: float) -> None:
+    """Refuse a reference motion for another control rate.
+
+    Raises:
+        BadPolicy: the control step of the policy or the robot is not the reference's.
+    """
+    if abs(simulation_dt - reference_dt) > 1e-9:
+        raise BadPolicy(
+            f"the control step is {1e3 * simulation_dt:g} ms and the reference motion's "
+            f"{1e3 * reference_dt:g} ms: retarget for this robot, or mend track.control.substeps"
         )
 
 
@@ -73,6 +97,7 @@ class Simulation:
     Attributes:
         residual: Radians that a full action moves each motor's target.
         qpos, qvel: State of every copy after the last `step` or `place`.
+        broken: Copies whose state blew up since they were placed, so that MuJoCo reset them.
         points: Positions of the keypoint sites, world, in step with `qpos`.
     """
 
@@ -99,6 +124,7 @@ class Simulation:
         self.qpos = np.zeros((n, model.nq))
         self.qvel = np.zeros((n, model.nv))
         self.points = np.zeros((n, len(robot.keypoint_names), 3))
+        self.broken = np.zeros(n, bool)
         self.dt = control.substeps * model.opt.timestep
 
     def place(
@@ -129,6 +155,8 @@ class Simulation:
             jobs = [self._pool.submit(self._advance, *c, targets, rows) for c in self._chunks]
             for job in jobs:
                 job.result()
+        warnings = np.array([data.warning.number for data in self._datas])
+        self.broken = np.any(warnings[:, BAD_STATE] > 0, axis=1)
         self._gather(np.arange(self.n))
 
     def close(self) -> None:

@@ -34,6 +34,7 @@ class Rollouts:
     Attributes:
         length: Steps each survived, at most H.
         fell: Whether each fell before the horizon.
+        horizon: Steps that each was asked for.
         qpos: States after every step.
         points: Keypoint sites, world, metres.
         wanted: The reference's sites at the same steps, world, metres.
@@ -42,6 +43,7 @@ class Rollouts:
 
     length: Int[np.ndarray, " N"]
     fell: np.ndarray
+    horizon: Int[np.ndarray, " N"]
     qpos: Float[np.ndarray, "H N nq"]
     points: Float[np.ndarray, "H N K 3"]
     wanted: Float[np.ndarray, "H N K 3"]
@@ -73,7 +75,7 @@ def roll_out(
         wish = controller(seen, target.qpos[:, 7:], starts.step)
         action = np.clip((wish - target.qpos[:, 7:])[:, hinge] / sim.residual, -1, 1)
         sim.step(wish[:, hinge], alive)
-        alive = alive & ~fallen(sim.qpos, rules) & (t < horizon)
+        alive = alive & ~fallen(sim.qpos, rules) & ~sim.broken & (t < horizon)
         length += alive
         record.append((sim.qpos.copy(), sim.points.copy(), target.points, target.qpos[:, 3:7]))
         tick(t + 1, steps)
@@ -81,4 +83,4 @@ def roll_out(
             break
     sim.close()
     qpos, points, wanted, root = (np.stack(column) for column in zip(*record, strict=True))
-    return Rollouts(length, length < horizon, qpos, points, wanted, root)
+    return Rollouts(length, length < horizon, horizon, qpos, points, wanted, root)

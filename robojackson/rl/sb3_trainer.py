@@ -11,10 +11,22 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
 from robojackson.errors import BadConfiguration
 from robojackson.rl.config import TqcConfig
+from robojackson.rl.randomness import load_random, save_random
 from robojackson.rl.replay import buffer_of, load_replay, save_replay
 from robojackson.rl.trainer import Layers
 
 FOREVER = 10**12
+
+
+class PatientTQC(TQC):
+    """TQC that does not learn from a nearly empty replay buffer after a resumption."""
+
+    refill = 0
+
+    def train(self, gradient_steps: int, batch_size: int = 64) -> None:
+        """A round of updates, unless the buffer has still to be filled."""
+        if buffer_of(self).size() * self.n_envs >= self.refill:
+            super().train(gradient_steps, batch_size)
 
 
 class Sb3Trainer:
@@ -22,7 +34,8 @@ class Sb3Trainer:
 
     def __init__(self, env: VecEnv, config: TqcConfig, seed: int) -> None:
         torch.set_num_threads(1)
-        self.model = TQC(
+        self._refill = min(config.refill, config.buffer)
+        self.model = PatientTQC(
             "MlpPolicy",
             env,
             learning_rate=config.learning_rate,
@@ -66,7 +79,9 @@ class Sb3Trainer:
 
     def save(self, folder: Path, with_replay: bool) -> None:
         state = {name: part.state_dict() for name, part in self._parts().items()}
-        torch.save(state | {"log_ent_coef": self._entropy().detach()}, folder / "networks.pt")
+        state |= {"log_ent_coef": self._entropy().detach(), "random": torch.get_rng_state()}
+        torch.save(state, folder / "networks.pt")
+        save_random(folder / "random.json", {})
         if with_replay:
             save_replay(buffer_of(self.model), folder / "replay.npz")
 
@@ -76,8 +91,12 @@ class Sb3Trainer:
             part.load_state_dict(state[name])
         self._entropy().data.copy_(state["log_ent_coef"])
         self.model.num_timesteps, self.model._n_updates = steps, updates
+        torch.set_rng_state(state["random"])
+        load_random(folder / "random.json", {})
         if (folder / "replay.npz").exists():
             load_replay(buffer_of(self.model), folder / "replay.npz")
+        else:
+            self.model.refill = self._refill
 
     def _entropy(self) -> torch.Tensor:
         if self.model.log_ent_coef is None:

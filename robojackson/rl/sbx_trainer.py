@@ -25,6 +25,7 @@ from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
 from robojackson.rl.config import TqcConfig
+from robojackson.rl.randomness import load_random, save_random
 from robojackson.rl.replay import buffer_of, load_replay, save_replay
 from robojackson.rl.trainer import Layers
 
@@ -37,7 +38,8 @@ class OverlappedTQC(TQC):
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        self._noise = np.random.default_rng(self.seed)
+        self.refill = 0
+        self.noise = np.random.default_rng(self.seed)
         self._acting = actor_layers(self.policy.actor_state.params)
 
     def predict(  # type: ignore[override]
@@ -55,12 +57,14 @@ class OverlappedTQC(TQC):
         mean = hidden @ mean_w + mean_b
         if not deterministic:
             log_std = np.clip(hidden @ std_w + std_b, *LOG_STD_RANGE)
-            noise = self._noise.standard_normal(mean.shape, np.float32)
+            noise = self.noise.standard_normal(mean.shape, np.float32)
             mean = mean + np.exp(log_std) * noise
         return np.tanh(mean), state
 
     def train(self, gradient_steps: int, batch_size: int) -> None:
         """Wait for the round before, take its actor, and dispatch the next round."""
+        if buffer_of(self).size() * self.n_envs < self.refill:
+            return
         self._acting = actor_layers(self.policy.actor_state.params)
         samples = buffer_of(self).sample(batch_size * gradient_steps)
         data = ReplayBufferSamplesNp(
@@ -102,6 +106,7 @@ class SbxTrainer:
     """The JAX trainer (`Trainer` protocol)."""
 
     def __init__(self, env: VecEnv, config: TqcConfig, seed: int) -> None:
+        self._refill = min(config.refill, config.buffer)
         self.model = OverlappedTQC(
             "MlpPolicy",
             env,
@@ -143,6 +148,7 @@ class SbxTrainer:
     def save(self, folder: Path, with_replay: bool) -> None:
         state = flax.serialization.to_bytes(self._state())
         (folder / "networks.msgpack").write_bytes(state)
+        save_random(folder / "random.json", {"noise": self.model.noise})
         if with_replay:
             save_replay(buffer_of(self.model), folder / "replay.npz")
 
@@ -155,8 +161,11 @@ class SbxTrainer:
         self.model.key = jax.numpy.asarray(state["key"])
         self.model.num_timesteps, self.model._n_updates = steps, updates
         self.model._acting = actor_layers(policy.actor_state.params)
+        load_random(folder / "random.json", {"noise": self.model.noise})
         if (folder / "replay.npz").exists():
             load_replay(buffer_of(self.model), folder / "replay.npz")
+        else:
+            self.model.refill = self._refill
 
     def _state(self) -> dict[str, Any]:
         policy = self.model.policy

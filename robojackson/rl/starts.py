@@ -14,6 +14,7 @@ from robojackson.rl.config import ResetConfig
 
 BIN_SECONDS = 0.25
 FORGET = 0.02
+EVEN = 0.5
 SETTLED_STATES = 4096
 
 
@@ -23,7 +24,7 @@ class StartPhases:
     def __init__(self, clip: Clip, failure_share: float) -> None:
         self._last = clip.steps if clip.cyclic else max(1, clip.steps - 1)
         self._bins = max(1, round(self._last * clip.dt / BIN_SECONDS))
-        self.failures = np.full(self._bins, 0.5)
+        self.failures = np.full(self._bins, EVEN)
         self._share = failure_share
 
     def draw(self, count: int, rng: np.random.Generator) -> Int[np.ndarray, " count"]:
@@ -35,6 +36,10 @@ class StartPhases:
         weak = np.minimum(inside.astype(int), self._last - 1)
         return np.where(rng.random(count) < self._share, weak, uniform)
 
+    def forget(self) -> None:
+        """Take every phase for equally hard."""
+        self.failures[:] = EVEN
+
     def record(self, start: Int[np.ndarray, " I"], failed: np.ndarray) -> None:
         """Learn from ended episodes: the step each began at and whether it fell or got lost."""
         bins = (start % self._last) * self._bins // self._last
@@ -43,7 +48,10 @@ class StartPhases:
 
 
 class SettledStates:
-    """A ring of states that the robot reached by itself and stayed up from for a second."""
+    """A ring of states in which the robot danced when the time limit came: it got there by itself.
+
+    The root's place over the floor is kept relative to its reference, with the drift that it had.
+    """
 
     def __init__(self, nq: int, nv: int) -> None:
         self._qpos = np.zeros((SETTLED_STATES, nq))
@@ -55,10 +63,14 @@ class SettledStates:
         return min(self._count, SETTLED_STATES)
 
     def add(self, qpos: np.ndarray, qvel: np.ndarray, step: int) -> None:
-        """Keep one state; the root's place is stored relative to its reference."""
+        """Keep one state whose root is relative to the reference at that step of the clip."""
         slot = self._count % SETTLED_STATES
         self._qpos[slot], self._qvel[slot], self._step[slot] = qpos, qvel, step
         self._count += 1
+
+    def forget(self) -> None:
+        """Drop all states."""
+        self._count = 0
 
     def draw(self, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, int]:
         """One of the kept states: qpos, qvel and the clip step that it belongs to."""

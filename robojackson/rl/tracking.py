@@ -3,8 +3,8 @@
 Action: residual joint angles in actuator order, -1..1, times `Simulation.residual` radians,
 added to the reference's next hinge angles and followed by the PD law of `Simulation`. Observation:
 `observation.observe`. Reward: the sum of `rewards.reward_terms`. Episodes start as `starts` says
-and end by a fall, by getting lost, by the time limit or at the end of a clip that is not cyclic;
-the last two are truncations and are bootstrapped.
+and end by a fall, by getting lost, at the end of a clip that is not cyclic, or by the time limit;
+only the last is a truncation and is bootstrapped.
 """
 
 from dataclasses import dataclass, field
@@ -17,8 +17,9 @@ from robojackson.motion.reference import ReferenceMotion
 from robojackson.retarget.robot import Robot
 from robojackson.rl.clip import Clip
 from robojackson.rl.config import TrackConfig
+from robojackson.rl.episodes import EpisodeTotals
 from robojackson.rl.observation import observation_size, observe
-from robojackson.rl.physics import Simulation
+from robojackson.rl.physics import Simulation, require_same_clock
 from robojackson.rl.rewards import (
     TrackedPoints,
     fallen,
@@ -28,7 +29,6 @@ from robojackson.rl.rewards import (
 )
 from robojackson.rl.starts import SettledStates, StartPhases, default_stand, noisy, stand_at
 
-SETTLED_SECONDS = 1.0
 SETTLED_STATES_NEEDED = 32
 PELVIS = "pelvis"
 FEET = ("left_foot", "right_foot")
@@ -43,7 +43,8 @@ class StepResult:
         observation: After resets.
         final_observation: Before resets (differs where done).
         reward, terms: Their sum and its parts.
-        terminated, truncated: Ends by failure; by time or at the clip's end.
+        terminated: Ends by failure or with the clip.
+        truncated: Ends by the time limit.
         episodes: One summary row for each episode that ended.
     """
 
@@ -73,6 +74,7 @@ class TrackingCore:
             limbs=tuple(names.index(name) for name in (*FEET, *EXTREMITIES)),
         )
         self.sim = Simulation(robot, config.control, n, config.threads)
+        require_same_clock(self.sim.dt, reference.dt)
         self.starts = StartPhases(self.clip, config.reset.failure_share)
         self._settled = SettledStates(robot.model.nq, robot.model.nv)
         self._stand = default_stand(robot.model)
@@ -81,16 +83,20 @@ class TrackingCore:
         self.step_index = np.zeros(n, int)
         self._start, self._age = np.zeros(n, int), np.zeros(n, int)
         self._last = np.zeros((n, robot.model.nu))
-        self._sums: dict[str, np.ndarray] = {}
+        self._totals = EpisodeTotals(n, self.clip.dt)
         self.observation_size = observation_size(robot.model.nq - 7, robot.model.nu, len(names))
         self.action_size = robot.model.nu
 
     def reseed(self, seed: int) -> None:
-        """Restart the random numbers; the next `reset` is then determined."""
+        """Restart the random numbers and forget what was learnt of starts: the next `reset` and all
+        that follows are then determined."""
         self.rng = np.random.default_rng(seed)
+        self.starts.forget()
+        self._settled.forget()
 
     def reset(self) -> Float[np.ndarray, "N D"]:
-        """Begin N new episodes."""
+        """Begin N new episodes; those that were under way leave no row."""
+        self._totals.clear(np.arange(self.n))
         self._begin(np.arange(self.n))
         return self._observe()
 
@@ -110,15 +116,16 @@ class TrackingCore:
         terms = reward_terms(errors, change, self.config.reward)
         reward = np.sum(list(terms.values()), 0)
         rules = self.config.termination
-        terminated = fallen(sim.qpos, rules) | lost(errors, rules)
-        ended = (self._age >= self.limit) | self.clip.ended(self.step_index)
-        result = StepResult(
-            *(2 * (self._observe(),)), reward, terms, terminated, ended & ~terminated
-        )
-        self._accumulate(reward, terms, errors.site_mean)
-        done = np.flatnonzero(terminated | ended)
+        failed = fallen(sim.qpos, rules) | lost(errors, rules) | sim.broken
+        over = failed | self.clip.ended(self.step_index)
+        late = (self._age >= self.limit) & ~over
+        result = StepResult(*(2 * (self._observe(),)), reward, terms, over, late)
+        self._totals.add(reward, terms, errors.site_mean)
+        done = np.flatnonzero(over | late)
         if len(done):
-            result.episodes = self._close(done, terminated)
+            self.starts.record(self._start[done], failed[done])
+            self._remember(np.flatnonzero(late))
+            result.episodes = self._totals.close(done, self._age)
             self._begin(done)
             result.observation = self._observe()
         return result
@@ -131,30 +138,8 @@ class TrackingCore:
         target = self.clip.at(self.step_index + 1)
         return observe(self.sim.qpos, self.sim.qvel, self.sim.points, target, self._last)
 
-    def _accumulate(
-        self, reward: np.ndarray, terms: dict[str, np.ndarray], site: np.ndarray
-    ) -> None:
-        rows = {"episode_return": reward, "site_error_m": site}
-        rows |= {f"reward_{name}": value for name, value in terms.items()}
-        for name, value in rows.items():
-            self._sums.setdefault(name, np.zeros(self.n))
-            self._sums[name] += value
-
-    def _close(self, done: Int[np.ndarray, " I"], failed: np.ndarray) -> list[dict[str, float]]:
-        self.starts.record(self._start[done], failed[done])
-        rows = []
-        for i in done:
-            row = {name: float(total[i]) for name, total in self._sums.items()}
-            age = int(self._age[i])
-            row["site_error_m"] /= age
-            rows.append(row | {"episode_length": age, "survived_s": age * self.clip.dt})
-        for total in self._sums.values():
-            total[done] = 0.0
-        return rows
-
     def _begin(self, indices: Int[np.ndarray, " I"]) -> None:
         reset, rng = self.config.reset, self.rng
-        self._remember(indices)
         phase = self.starts.draw(len(indices), rng)
         at = self.clip.at(phase)
         qpos, qvel = noisy(at.qpos, at.qvel, reset, rng)
@@ -165,20 +150,17 @@ class TrackingCore:
             chosen = (kind >= reset.stand_share) & (kind < reset.stand_share + reset.settled_share)
             for row in np.flatnonzero(chosen):
                 qpos[row], qvel[row], phase[row] = self._settled.draw(rng)
+                qpos[row, :2] += self.clip.at(phase[row : row + 1]).qpos[0, :2]
         self.sim.place(indices, qpos, qvel)
         self.step_index[indices] = self._start[indices] = phase
         self._age[indices] = 0
         self._last[indices] = 0.0
 
     def _remember(self, indices: Int[np.ndarray, " I"]) -> None:
-        """Keep how long-lived episodes ended their time limit: states worth starting from."""
+        """Keep the last states of episodes that reached the time limit of a cyclic clip."""
         if not self.clip.cyclic:
             return
         for i in indices:
-            if self._age[i] >= self.limit and self._age[i] * self.clip.dt >= SETTLED_SECONDS:
-                lap = self.step_index[i] // self.clip.steps
-                shift = self.clip.at(np.array([lap * self.clip.steps])).qpos[0, :3]
-                home = self.clip.at(np.array([0])).qpos[0, :3]
-                qpos = self.sim.qpos[i].copy()
-                qpos[:3] -= shift - home
-                self._settled.add(qpos, self.sim.qvel[i], int(self.step_index[i] % self.clip.steps))
+            qpos = self.sim.qpos[i].copy()
+            qpos[:2] -= self.clip.at(self.step_index[i : i + 1]).qpos[0, :2]
+            self._settled.add(qpos, self.sim.qvel[i], int(self.step_index[i] % self.clip.steps))

@@ -41,6 +41,10 @@ class TrackingVecEnv(VecEnv):
         self.render_mode = None
         super().__init__(core.n, *_spaces(core))
 
+    def keep_random_state(self) -> None:
+        """Let the next reset go on with the core's random numbers instead of the seed's."""
+        self._reset_seeds()
+
     def reset(self) -> np.ndarray:
         if self._seeds[0] is not None:
             self.core.reseed(self._seeds[0])

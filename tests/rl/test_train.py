@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from stable_baselines3.common.callbacks import BaseCallback
 
 from robojackson.errors import BadConfiguration, BadPolicy
 from robojackson.motion.reference import ReferenceMotion
@@ -13,13 +14,22 @@ from robojackson.retarget.robot import Robot
 from robojackson.rl.config import EvaluateConfig, TqcConfig, TrackConfig, TrainConfig
 from robojackson.rl.evaluate import STAND, evaluate
 from robojackson.rl.policy import load_policy
+from robojackson.rl.replay import buffer_of
+from robojackson.rl.sbx_trainer import SbxTrainer
 from robojackson.rl.tracking import TrackingCore
 from robojackson.rl.train import TrainResult, train
 from robojackson.rl.trainer import make_trainer
 from robojackson.rl.vec_env import TrackingVecEnv
 
 SMALL = TqcConfig(
-    n_envs=4, warmup=64, batch=32, updates_per_round=2, buffer=2000, actor=(16, 16), critic=(16, 16)
+    n_envs=4,
+    warmup=64,
+    refill=64,
+    batch=32,
+    updates_per_round=2,
+    buffer=2000,
+    actor=(16, 16),
+    critic=(16, 16),
 )
 BRIEF = EvaluateConfig(seconds=0.6, phases=3, resets=2)
 
@@ -52,6 +62,25 @@ def trained(
     return result, episodes, progress, request.param
 
 
+def test_a_resumed_run_does_not_repeat_its_starts(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first phases of the second sitting are not those of the first."""
+    firsts: list[np.ndarray] = []
+    original = TrackingCore.reset
+
+    def spy(core: TrackingCore) -> np.ndarray:
+        seen = original(core)
+        firsts.append(core.step_index.copy())
+        return seen
+
+    monkeypatch.setattr(TrackingCore, "reset", spy)
+    run(robot, sway, brief("sbx"), tmp_path)
+    run(robot, sway, brief("sbx", 324), tmp_path)
+    assert len(firsts) == 2
+    assert not np.array_equal(firsts[0], firsts[1])
+
+
 def test_both_trainers_end_at_their_budget_with_a_policy(trained: tuple) -> None:
     result, _, _, name = trained
     assert result.steps == 320
@@ -77,11 +106,33 @@ def test_progress_tells_rate_and_time_left(trained: tuple) -> None:
 def test_a_finished_run_asked_for_more_steps_goes_on(
     trained: tuple, robot: Robot, sway: ReferenceMotion
 ) -> None:
-    result, _, _, name = trained
+    """Episode numbers, steps and time go on, and so do the updates once the buffer is refilled."""
+    result, episodes, _, name = trained
     rows: list[dict[str, float]] = []
-    longer = train(sway, robot, brief(name, 480), result.policy.parent, sink=rows.extend)
-    assert longer.steps == 480
+    longer = train(sway, robot, brief(name, 640), result.policy.parent, sink=rows.extend)
+    assert longer.steps == 640
     assert longer.seconds > result.seconds
+    assert longer.updates > result.updates
+    assert rows[0]["episode"] == len(episodes) + 1
+    assert rows[0]["step"] > 320
+
+
+@pytest.mark.parametrize("name", ["sbx", "sb3"])
+def test_a_checkpoint_restores_the_networks(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path, name: str
+) -> None:
+    """Without one more update the resumed policy is the saved one, whatever the seed built."""
+    run(robot, sway, brief(name), tmp_path)
+    saved = load_policy(tmp_path / "policy.safetensors")
+    patient = dataclasses.replace(SMALL, refill=2000)
+    state = json.loads((tmp_path / "checkpoint" / "run.json").read_text())
+    state["configuration"]["tqc"]["refill"] = 2000
+    (tmp_path / "checkpoint" / "run.json").write_text(json.dumps(state))
+    run(robot, sway, dataclasses.replace(brief(name, 400), tqc=patient), tmp_path)
+    again = load_policy(tmp_path / "policy.safetensors")
+    for (weight, bias), (weight2, bias2) in zip(saved.layers, again.layers, strict=True):
+        np.testing.assert_array_equal(weight, weight2)
+        np.testing.assert_array_equal(bias, bias2)
 
 
 def test_a_checkpoint_of_another_configuration_is_refused(
@@ -91,6 +142,25 @@ def test_a_checkpoint_of_another_configuration_is_refused(
     other = dataclasses.replace(brief(name), seed=5)
     with pytest.raises(BadConfiguration, match="another configuration"):
         run(robot, sway, other, result.policy.parent)
+
+
+def test_a_checkpoint_of_another_reference_is_refused(
+    trained: tuple, robot: Robot, sway: ReferenceMotion
+) -> None:
+    result, _, _, name = trained
+    other = dataclasses.replace(sway, qpos=sway.qpos + 0.01)
+    with pytest.raises(BadConfiguration, match="reference motion"):
+        run(robot, other, brief(name, 960), result.policy.parent)
+
+
+def test_a_crash_between_two_renames_loses_nothing(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    run(robot, sway, brief("sbx"), tmp_path)
+    (tmp_path / "checkpoint").rename(tmp_path / "checkpoint.old")
+    rows: list[dict[str, float]] = []
+    train(sway, robot, brief("sbx", 480), tmp_path, sink=rows.extend)
+    assert all(row["step"] > 320 for row in rows)
 
 
 @pytest.mark.parametrize("name", ["sbx", "sb3"])
@@ -120,7 +190,7 @@ def test_training_is_determined_by_the_seed(
 
 
 def test_an_interrupted_run_keeps_its_replay_and_resumes(
-    robot: Robot, sway: ReferenceMotion, tmp_path: Path
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupt(row: dict[str, float]) -> None:
         if row["steps"] > 150:
@@ -130,8 +200,18 @@ def test_an_interrupted_run_keeps_its_replay_and_resumes(
         train(sway, robot, brief("sbx"), tmp_path, progress=interrupt)
     state = json.loads((tmp_path / "checkpoint" / "run.json").read_text())
     with np.load(tmp_path / "checkpoint" / "replay.npz") as replay:
-        assert int(replay["pos"]) * SMALL.n_envs == pytest.approx(state["steps"], abs=8)
+        kept = int(replay["pos"])
+    assert kept * SMALL.n_envs == pytest.approx(state["steps"], abs=8)
+    found: list[int] = []
+    original = SbxTrainer.learn
+
+    def spy(trainer: SbxTrainer, callback: BaseCallback) -> None:
+        found.append(buffer_of(trainer.model).pos)
+        original(trainer, callback)
+
+    monkeypatch.setattr(SbxTrainer, "learn", spy)
     assert run(robot, sway, brief("sbx"), tmp_path).steps == 320
+    assert found == [kept]
 
 
 def test_a_run_without_a_budget_is_refused(

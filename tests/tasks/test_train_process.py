@@ -85,7 +85,7 @@ def test_a_cancelled_task_leaves_no_process(
         await asyncio.gather(running, return_exceptions=True)
 
     asyncio.run(cancelled())
-    assert ends(int(_read(tmp_path / "train.log").split()[0]), 1.0)
+    assert ends(int(_read(tmp_path / "train.log").split()[0]), 10.0)
 
 
 def test_a_training_ends_when_its_parent_is_killed(tmp_path: Path) -> None:

@@ -1,0 +1,142 @@
+"""The judge: rows made by hand, so that each verdict has one known answer."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from robojackson.errors import BadPolicy
+from robojackson.motion.reference import ReferenceMotion
+from robojackson.retarget.robot import Robot
+from robojackson.rl.clip import Clip
+from robojackson.rl.config import ControlConfig, EvaluateConfig, TerminationConfig
+from robojackson.rl.evaluate import evaluate
+from robojackson.rl.judge import Judge
+from robojackson.rl.policy import Policy
+from robojackson.rl.rollouts import Rollouts, Starts, roll_out
+
+STEPS = 160
+
+
+def perfect(sway: ReferenceMotion) -> Rollouts:
+    """A rollout that is the reference itself for two laps."""
+    at = Clip(sway).at(np.arange(STEPS))
+    return Rollouts(
+        length=np.array([STEPS]),
+        fell=np.array([False]),
+        horizon=np.array([STEPS]),
+        qpos=at.qpos[:, None],
+        points=at.points[:, None],
+        wanted=at.points[:, None],
+        wanted_root=at.qpos[:, None, 3:7],
+    )
+
+
+def row(robot: Robot, sway: ReferenceMotion, rollouts: Rollouts) -> dict[str, object]:
+    return Judge(robot, sway, EvaluateConfig()).row("trained", (0, 0), rollouts, 0)
+
+
+def idle(robot: Robot, sway: ReferenceMotion, control: ControlConfig | None = None) -> Policy:
+    """A policy that adds nothing to the reference."""
+    from robojackson.rl.observation import observation_size
+
+    size = observation_size(robot.model.nq - 7, robot.model.nu, len(robot.keypoint_names))
+    nothing = (np.zeros((size, robot.model.nu)), np.zeros(robot.model.nu))
+    control = control or ControlConfig()
+    return Policy((nothing,), {"robot": "humanoid", "control": dataclasses.asdict(control)})
+
+
+def test_the_reference_itself_is_a_strict_success_of_skill_one(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    judged = row(robot, sway, perfect(sway))
+    assert (judged["success"], judged["strict_success"], judged["clip_fraction"]) == (1, 1, 1)
+    assert judged["skill"] == pytest.approx(1)
+    assert judged["limb_gain_left_hand"] == pytest.approx(1)
+
+
+def test_a_fall_has_no_skill_and_no_success(robot: Robot, sway: ReferenceMotion) -> None:
+    fall = dataclasses.replace(perfect(sway), length=np.array([40]), fell=np.array([True]))
+    judged = row(robot, sway, fall)
+    assert (judged["success"], judged["strict_success"], judged["skill"]) == (0, 0, 0)
+    assert judged["survived_s"] == pytest.approx(40 * sway.dt)
+    assert judged["clip_fraction"] == pytest.approx(0.25)
+
+
+def test_kneeling_for_one_step_is_no_strict_success(robot: Robot, sway: ReferenceMotion) -> None:
+    kneeling = perfect(sway)
+    points = kneeling.points.copy()
+    points[70, 0, robot.keypoint_names.index("left_knee"), 2] = 0.1
+    judged = row(robot, sway, dataclasses.replace(kneeling, points=points))
+    assert judged["kneels"]
+    assert (judged["success"], judged["strict_success"]) == (1, 0)
+
+
+def test_one_step_far_from_the_reference_is_no_strict_success(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    off = perfect(sway)
+    points = off.points.copy()
+    points[70, 0, 1:, 0] += 0.4
+    assert row(robot, sway, dataclasses.replace(off, points=points))["strict_success"] == 0
+
+
+def test_marching_on_the_spot_shows_in_drift_and_travel(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    """The pelvis-heading frame cannot see it, so the table has columns of its own for it."""
+    still = perfect(sway)
+    walked = still.wanted + np.linspace(0, 2, STEPS)[:, None, None, None] * [1.0, 0, 0]
+    judged = row(robot, sway, dataclasses.replace(still, wanted=walked))
+    assert judged["drift_m"] == pytest.approx(2.0, abs=0.05)
+    assert judged["travel_ratio"] == pytest.approx(0.0, abs=0.05)
+
+
+def test_a_robot_that_lies_down_has_fallen(robot: Robot, sway: ReferenceMotion) -> None:
+    """A controller that lets go of every joint does not stay up."""
+    starts = Starts(np.zeros(2, int), sway.qpos[[0, 0]], sway.qvel[[0, 0]])
+    limp = roll_out(
+        robot,
+        Clip(sway),
+        ControlConfig(stiffness=1e-6),
+        lambda seen, following, start: following,
+        starts,
+        np.full(2, 200),
+        1,
+        TerminationConfig(),
+    )
+    assert limp.fell.all()
+    assert (limp.length < 200).all()
+
+
+def test_the_shown_rollout_begins_with_its_start(robot: Robot, sway: ReferenceMotion) -> None:
+    brief = EvaluateConfig(
+        seconds=0.15, phases=2, resets=1, joint_noise=0, joint_speed_noise=0, root_speed_noise=0
+    )
+    shown = evaluate(idle(robot, sway), sway, robot, brief).rollout_qpos
+    np.testing.assert_allclose(shown[0], sway.qpos[0])
+    assert len(shown) == 11
+
+
+def test_a_clip_that_is_not_cyclic_is_danced_to_its_end(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    open_clip = dataclasses.replace(sway, cyclic=False)
+    verdict = evaluate(idle(robot, sway), open_clip, robot, EvaluateConfig(phases=4, resets=1))
+    phases = [int(r["phase"]) for r in verdict.rows if r["policy"] == "trained"]  # type: ignore[call-overload]
+    assert max(phases) < len(sway) // 4
+    assert all(0 <= float(r["clip_fraction"]) <= 1 for r in verdict.rows)  # type: ignore[arg-type]
+
+
+def test_a_policy_with_another_control_rate_is_refused(robot: Robot, sway: ReferenceMotion) -> None:
+    hurried = idle(robot, sway, ControlConfig(substeps=1))
+    with pytest.raises(BadPolicy, match="control step"):
+        evaluate(hurried, sway, robot, EvaluateConfig())
+
+
+def test_a_policy_for_a_robot_of_another_name_is_refused(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    stranger = dataclasses.replace(idle(robot, sway), facts={"robot": "humanoid_strong"})
+    with pytest.raises(BadPolicy, match="humanoid_strong"):
+        evaluate(stranger, sway, robot, EvaluateConfig())
