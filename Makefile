@@ -2,7 +2,7 @@
 #
 #   make dance    the hip-shake clip, from video to a dancing robot (ARGS="--minutes 5" and others)
 #   make test     all tests (ARGS="tests/mocap -x")
-#   make bench    accuracy of the mocap stage against ground truth
+#   make bench    accuracy of the mocap stage against ground truth, cost of judging a clip
 #   make lint     ruff and mypy
 #   make doctor   what is installed and what is missing
 #   make clean    remove the environment and all caches; the store stays
@@ -28,6 +28,7 @@ test: setup
 
 bench: setup
 	@$(PY) -m benchmarks.mocap $(ARGS)
+	@$(PY) -m benchmarks.search
 
 lint: setup
 	@$(PY) -m ruff check .

@@ -40,7 +40,8 @@ Minutes = Annotated[float | None, typer.Option(min=0.01, help="Wall time, minute
 @command
 def dance(
     source: Annotated[
-        str | None, typer.Argument(help="A video, or a folder of candidates; else our hip shake.")
+        str | None,
+        typer.Argument(help="A video, a folder of candidates, or the name of a dance to look for."),
     ] = None,
     minutes: Minutes = None,
     robot: Annotated[str | None, typer.Option("--robot", help="Name of a robot.")] = None,
@@ -55,19 +56,98 @@ def dance(
     """A video in, a robot that dances it out: every stage, cached, and a page at the end."""
     from flows.environment import prepare
     from flows.single import verdict_lines
-    from flows.source import resolve
+    from flows.source import is_name, resolve
     from storage.store import Store
 
-    found = resolve(source)
+    found = None if is_name(source) else resolve(source)
     store = Store.from_environment()
     store.require_writable()
     prepare(store)
     from flows.dance import run
 
+    if found is None:
+        from flows.find import clip_of
+
+        found = clip_of(str(source))
+
     given = {"minutes": minutes, "robot": robot, "train.trainer": trainer, "train.seed": seed}
     made = run(found, config, _overrides(set_, given), start, end)
     text = [*verdict_lines(made["evaluation"]), f"page   {made['page']}", f"video  {made['video']}"]
     return Answer(made, text=text)
+
+
+@app.command()
+@command
+def find(
+    query: Annotated[str, typer.Argument(help="A dance; or the folder, or list, of the source.")],
+    top: Annotated[int | None, typer.Option(min=1, help="How many videos to judge.")] = None,
+    source: Annotated[str, typer.Option(help="youtube, folder, urls, site or server.")] = "youtube",
+    address: Annotated[
+        str, typer.Option(help="Of the folder, list, site ({query} stands for it) or server.")
+    ] = "",
+    config: Annotated[str, typer.Option(help="Name or path of a configuration.")] = "finding",
+    set_: Set = None,
+    as_json: Json = False,
+) -> Answer:
+    """The videos of a dance, ranked: Algorithm 1, and why others are rejected."""
+    from flows import ranking
+    from flows.environment import prepare
+    from storage.store import Store
+
+    store = Store.from_environment()
+    store.require_writable()
+    prepare(store)
+    from flows.find import look_for
+
+    found = look_for(query, source, address, top, config, _overrides(set_))
+    return Answer(found, text=[*ranking.lines(found["candidates"]), found["summary"]])
+
+
+@app.command()
+@command
+def refresh(
+    dances: Annotated[
+        list[str] | None, typer.Argument(help="Names in configs/dances.yaml; else all that are due")
+    ] = None,
+    config: Annotated[str, typer.Option(help="Configuration of the search.")] = "finding",
+    set_: Set = None,
+    as_json: Json = False,
+) -> Answer:
+    """The nightly run, now: for every dance the best new video, up to the robot's motion."""
+    from flows.environment import prepare
+    from storage.store import Store
+
+    store = Store.from_environment()
+    store.require_writable()
+    prepare(store)
+    from flows.refresh import run
+
+    done = run(dances or None, config, _overrides(set_))
+    return Answer(done, code=1 if done["failed"] and not done["dances"] else 0)
+
+
+@app.command()
+@command
+def catalogue(
+    dance: Annotated[str | None, typer.Option(help="Only this dance.")] = None,
+    sql: Annotated[
+        str | None, typer.Option(help="A question to DuckDB about the table `candidates`.")
+    ] = None,
+    as_json: Json = False,
+) -> Answer:
+    """Every video that was ever judged, and why it was danced or not."""
+    from flows import console, ranking
+    from storage import candidates
+    from storage.store import Store
+
+    log_to_stderr()
+    store = Store.from_environment()
+    if sql is not None:
+        found = candidates.query(store, sql)
+        named = {str(number): row for number, row in enumerate(found, 1)}
+        return Answer({"rows": found}, text=console.table(named, list(found[0]) if found else []))
+    rows = candidates.records(store, dance)
+    return Answer({"candidates": rows}, text=ranking.lines(rows))
 
 
 @app.command()

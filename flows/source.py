@@ -25,9 +25,15 @@ def resolve(source: str | None) -> Path:
     if os.sep in source or path.suffix.lower() in SUFFIXES:
         raise UnreadableVideo(f"{source}: no such file or folder")
     raise UnreadableVideo(
-        f"{source!r} is no file; searching the web for a dance by its name comes with a later "
-        "release: give a video file or a folder of them"
+        f"{source!r} is no file but the name of a dance: `robojackson find` looks for its videos"
     )
+
+
+def is_name(source: str | None) -> bool:
+    """Whether a SOURCE is the name of a dance: no path, and nothing that looks like one."""
+    if source is None or Path(source).exists():
+        return False
+    return os.sep not in source and Path(source).suffix.lower() not in SUFFIXES
 
 
 def _bundled(name: str) -> Path:

@@ -65,3 +65,11 @@ class TrainingFailed(RoboJacksonError):
 
 class MissingDependency(RoboJacksonError):
     """Something that has to be installed first; the message is the line that brings it."""
+
+
+class SearchFailed(RoboJacksonError):
+    """A source cannot be searched, or has nothing to offer; the message has the source and why."""
+
+
+class DownloadFailed(RoboJacksonError):
+    """A video of the web cannot be had; the message is the reason that its table row gets."""

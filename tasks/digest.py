@@ -6,12 +6,15 @@ not in a syntax tree, so they change nothing; a changed formula does.
 
 import ast
 import hashlib
+import threading
 from collections.abc import Iterable, Iterator
 from functools import lru_cache
 from importlib.util import find_spec
 from pathlib import Path
 
 PACKAGE = "robojackson"
+ONE_PARSER = threading.Lock()
+"""CPython 3.11 counts the depth of its parser wrongly when several threads parse at once."""
 NEVER_CHANGE_A_RESULT = frozenset(("robojackson.errors",))
 """Modules whose text decides only what a person is told."""
 
@@ -77,8 +80,9 @@ def _is_silent(statement: ast.stmt) -> bool:
 def _parsed(path: Path, changed_ns: int, size: int) -> tuple[str, tuple[tuple[str, int], ...]]:
     """Digest of a file's bare tree, and its imports as (name, level); read once a version."""
     source = path.read_text(encoding="utf-8")
-    names = tuple(_imports(ast.parse(source)))
-    return hashlib.sha256(bare_tree(source).encode()).hexdigest(), names
+    with ONE_PARSER:
+        names = tuple(_imports(ast.parse(source)))
+        return hashlib.sha256(bare_tree(source).encode()).hexdigest(), names
 
 
 def _version(path: Path) -> tuple[Path, int, int]:

@@ -20,6 +20,9 @@ from robojackson.clips.video import VideoInfo, read_frames
 from robojackson.errors import MissingDependency, UnknownName
 
 Size = Literal["lite", "full", "heavy"]
+Watcher = Callable[[int, np.ndarray, np.ndarray], None]
+"""Called with the number of a frame, its RGB image and its row (33, 7): image xyz, world xyz,
+visibility; NaN when nobody was found."""
 SIZES: tuple[str, ...] = ("lite", "full", "heavy")
 ASSETS = Path(__file__).parent.parent / "assets"
 GRAPHICS_LIBRARIES = ("libEGL.so.1", "libGLESv2.so.2")
@@ -58,6 +61,7 @@ def detect(
     info: VideoInfo,
     size: str = "full",
     progress: Callable[[int, int], None] | None = None,
+    watch: Watcher | None = None,
 ) -> LandmarkTrack:
     """Landmarks of the most prominent person, NaN rows where nobody is found.
 
@@ -66,6 +70,7 @@ def detect(
         info: What `probe` found in it.
         size: lite, full or heavy.
         progress: Called with (frames done, frames in all) after every frame.
+        watch: Sees every frame too, so that a clip is decoded once.
     Raises:
         MissingDependency: no model bundle, or no EGL and GLES libraries.
     """
@@ -76,6 +81,8 @@ def detect(
         rows = []
         for index, image in enumerate(read_frames(path)):
             rows.append(_detect_one(landmarker, image, round(index * 1000.0 / info.fps), index))
+            if watch:
+                watch(index, image, rows[-1])
             if progress:
                 progress(index + 1, info.frames)
     table = np.array(rows).reshape(-1, LANDMARKS, 7)
@@ -87,6 +94,13 @@ def detect(
         world_landmarks=table[..., 3:6],
         visibility=table[..., 6],
     )
+
+
+@contextmanager
+def still_landmarker(size: str) -> Iterator[Any]:
+    """An open PoseLandmarker for single pictures, which remembers nothing of the one before."""
+    with _landmarker(model_path(size), still=True) as landmarker:
+        yield landmarker
 
 
 def _detect_one(landmarker: Any, image: np.ndarray, time_ms: int, index: int) -> np.ndarray:
@@ -104,7 +118,7 @@ def _detect_one(landmarker: Any, image: np.ndarray, time_ms: int, index: int) ->
 
 
 @contextmanager
-def _landmarker(model: Path) -> Iterator[Any]:
+def _landmarker(model: Path, still: bool = False) -> Iterator[Any]:
     """An open PoseLandmarker; MediaPipe is imported here because it takes seconds."""
     with _quiet_stderr():
         from mediapipe.tasks import python as tasks
@@ -112,7 +126,7 @@ def _landmarker(model: Path) -> Iterator[Any]:
 
         options = vision.PoseLandmarkerOptions(
             base_options=tasks.BaseOptions(model_asset_path=str(model)),
-            running_mode=vision.RunningMode.VIDEO,
+            running_mode=vision.RunningMode.IMAGE if still else vision.RunningMode.VIDEO,
             num_poses=1,
         )
         landmarker = vision.PoseLandmarker.create_from_options(options)

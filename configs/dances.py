@@ -1,0 +1,80 @@
+"""The dances that are looked for every night."""
+
+from collections.abc import Sequence
+from typing import Annotated
+
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass
+
+from robojackson.errors import BadConfiguration, UnknownName
+
+
+@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+class Dance:
+    """One dance.
+
+    Attributes:
+        name: What it is called here and in the catalogue.
+        query: What is searched for.
+        words: Added to the query.
+        language: Two letters in which titles are asked for; empty is the site's own choice.
+        top: How many videos are judged; None is the usual number.
+        every_days: Days between two searches.
+        source: A file of robojackson/clips/sources.
+        address: Of the folder, list, site or server; empty is the source's usual one.
+    """
+
+    name: Annotated[str, Field(min_length=1, max_length=60)]
+    query: Annotated[str, Field(min_length=1)]
+    words: tuple[str, ...] = ()
+    language: Annotated[str, Field(pattern="^([a-z]{2}(-[A-Za-z]{2,4})?)?$")] = ""
+    top: Annotated[int, Field(ge=1)] | None = None
+    every_days: Annotated[float, Field(ge=0)] = 1.0
+    source: str = "youtube"
+    address: str = ""
+
+    @property
+    def asked(self) -> str:
+        """The whole query."""
+        return " ".join((self.query, *self.words))
+
+
+@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+class DanceBook:
+    """All dances.
+
+    Attributes:
+        dances: In the order in which they are searched.
+    """
+
+    dances: tuple[Dance, ...]
+
+    def __post_init__(self) -> None:
+        names = [dance.name.casefold() for dance in self.dances]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise BadConfiguration(f"dances: {', '.join(twice)} stands twice")
+
+    def pick(self, names: Sequence[str] | None) -> tuple[Dance, ...]:
+        """The dances of these names in their order; all of them when no names are given.
+
+        Raises:
+            UnknownName: one is not in the book; the message lists those that are.
+        """
+        if names is None:
+            return self.dances
+        return tuple(self._of(name) for name in names)
+
+    def recall(self, words: str) -> Dance:
+        """The dance that a person means by its name or query, or one that is made of the words."""
+        for dance in self.dances:
+            if words.casefold() in (dance.name.casefold(), dance.query.casefold()):
+                return dance
+        return Dance(name=words[:60], query=words)
+
+    def _of(self, name: str) -> Dance:
+        for dance in self.dances:
+            if dance.name.casefold() == name.casefold():
+                return dance
+        known = (dance.name for dance in self.dances)
+        raise UnknownName("dance", name, "configs/dances.yaml", known)

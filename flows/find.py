@@ -1,0 +1,200 @@
+"""Find the best video of a dance: search, download, judge and rank, nothing after that.
+
+Entry point of the deployment: `flows.find.find`.
+"""
+
+import asyncio
+import logging
+import uuid
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from prefect import flow
+from prefect.task_runners import ThreadPoolTaskRunner
+
+from configs.dances import Dance, DanceBook
+from configs.finding import FindConfig
+from configs.loader import build, load
+from flows.entries import Entry, Hunt, rows, summary
+from flows.gallery import show
+from flows.hunt import bring, hunt
+from robojackson.clips.candidate import VideoCandidate
+from robojackson.clips.sources import folder
+from robojackson.clips.sources import source as source_of
+from robojackson.clips.titles import clean_text
+from robojackson.errors import NoPersonFound, RoboJacksonError, SearchFailed
+from storage import candidates
+from storage.artifact import Artifact
+from storage.store import Store
+from tasks.workers import cores
+
+ALL = 10_000
+"""Files of a folder are all judged: nobody counted who watched them."""
+HUNTERS: ThreadPoolTaskRunner[Any] = ThreadPoolTaskRunner(max_workers=2 * cores())
+"""Downloads wait for servers and judges for their processes: more threads than cores."""
+
+
+@flow(name="find", flow_run_name="find-{name}", task_runner=HUNTERS)  # type: ignore[arg-type]
+async def find(
+    name: str,
+    dance: dict[str, Any],
+    config: str = "finding",
+    overrides: dict[str, Any] | None = None,
+) -> dict[str, Any]:
+    """The ranked videos of one dance.
+
+    Args:
+        name: Shown as the name of the run.
+        dance: A `Dance`, as a mapping.
+        config: Name or path of the configuration of the search.
+        overrides: Values by key path.
+    """
+    settings = load(FindConfig, config, overrides)
+    found = hunt(build(Dance, dance, "dance"), settings, run_id("find"))
+    told = rows(found)
+    await show(found.dance.name, told, told[0] if found.chosen else None)
+    return answer(found)
+
+
+def look_for(
+    query: str,
+    source: str,
+    address: str,
+    top: int | None,
+    config: str,
+    overrides: Mapping[str, Any],
+) -> dict[str, Any]:
+    """The flow from the command line; a query that `configs/dances.yaml` knows means that dance.
+
+    Raises:
+        UnknownName: there is no such source.
+        SearchFailed: it does not answer.
+    """
+    source_of(source)
+    known = load(DanceBook, "dances").recall(query) if source == "youtube" else None
+    dance = known or Dance(name=clean_text(query, 60) or source, query=query)
+    every = ALL if source == folder.NAME else None
+    wanted = replace(dance, source=source, address=address, top=top or every)
+    without_tracebacks()
+    return asyncio.run(find(wanted.name, asdict(wanted), config, dict(overrides)))
+
+
+def clip_of(words: str, config: str = "finding", book: str = "dances") -> Path:
+    """The best video of a dance in good quality, as a local file.
+
+    When the search fails, the video that an earlier one chose is taken.
+
+    Raises:
+        SearchFailed: no answer, and none was chosen before.
+        NoPersonFound: no video of the search may be danced; the message has the reasons.
+    """
+    dance = load(DanceBook, book).recall(words)
+    store = Store.from_environment()
+    without_tracebacks()
+    chosen = asyncio.run(best(dance.name, asdict(dance), config))
+    artifact = Artifact(**chosen)
+    with store.local(artifact) as path:
+        kept = store.work("dances") / f"{run_name(dance.name)}{path.suffix}"
+        kept.write_bytes(path.read_bytes())
+    return kept
+
+
+@flow(name="best", flow_run_name="best-{name}", task_runner=HUNTERS)  # type: ignore[arg-type]
+async def best(
+    name: str,
+    dance: dict[str, Any],
+    config: str = "finding",
+    overrides: dict[str, Any] | None = None,
+) -> dict[str, str]:
+    """Search, and bring the chosen video in good quality: its artifact."""
+    settings = load(FindConfig, config, overrides)
+    wanted = build(Dance, dance, "dance")
+    store = Store.from_environment()
+    try:
+        found = hunt(wanted, settings, run_id("dance"))
+    except SearchFailed:
+        reigning = candidates.champion(store, wanted.name)
+        if reigning is None:
+            raise
+        return {"key": reigning["video_key"], "sha256": reigning["video_sha256"]}
+    told = rows(found)
+    await show(wanted.name, told, told[0] if found.chosen else None)
+    if found.chosen is None:
+        raise NoPersonFound(nothing(found))
+    return asdict(in_good_quality(found.chosen, settings))
+
+
+def in_good_quality(chosen: Entry, settings: FindConfig) -> Artifact:
+    """The file that is danced: the best format, or the scored one when that cannot be had."""
+    return of_candidate(chosen.candidate, chosen.video, settings)
+
+
+def of_candidate(
+    candidate: VideoCandidate, scored: Artifact | None, settings: FindConfig
+) -> Artifact:
+    """The best format of a video, or its scored file when that cannot be had.
+
+    Raises:
+        SearchFailed: neither is there.
+    """
+    ((_, video),) = bring([candidate], "dance", settings)
+    if isinstance(video, Artifact):
+        return video
+    if scored is None:
+        raise SearchFailed(f"{candidate.title or candidate.video_id}: {video}")
+    return scored
+
+
+def nothing(found: Hunt) -> str:
+    """Why no video of a search may be danced, in one line."""
+    if not found.entries:
+        return f"{found.dance.name}: no video is left of the search"
+    told = (f"{e.candidate.title or e.candidate.video_id}: {e.reason}" for e in found.entries)
+    return (
+        f"{found.dance.name}: none of {len(found.entries)} videos may be danced: {'; '.join(told)}"
+    )
+
+
+def answer(found: Hunt) -> dict[str, Any]:
+    """What the command says."""
+    told = rows(found)
+    every = [*found.selection.kept, *(c for c, _ in found.selection.dropped)]
+    return {
+        "dance": found.dance.name,
+        "query": found.dance.asked,
+        "source": found.dance.source,
+        "run_id": found.run_id,
+        "chosen": told[0] if found.chosen else None,
+        "candidates": told,
+        "dropped": [
+            {"title": c.title, "url": c.url, "reason": r} for c, r in found.selection.dropped
+        ],
+        "summary": summary(every, found.selection),
+    }
+
+
+def without_tracebacks() -> None:
+    """What is the input's fault is one line in Prefect's log."""
+    for name in ("prefect.flow_runs", "prefect.task_runs"):
+        logging.getLogger(name).addFilter(_one_line)
+
+
+def _one_line(record: logging.LogRecord) -> bool:
+    if record.exc_info and isinstance(record.exc_info[1], RoboJacksonError):
+        record.exc_info = None
+    return True
+
+
+def run_id(kind: str) -> str:
+    """A name that no other run has."""
+    return f"{kind}-{datetime.now(UTC):%Y%m%d-%H%M%S}-{uuid.uuid4().hex[:6]}"
+
+
+def run_name(name: str) -> str:
+    """A name as a file's."""
+    from flows.gallery import slug_of
+
+    return slug_of(name)

@@ -1,0 +1,199 @@
+"""The nightly flow: for every dance the best new video, as a motion that is ready to train.
+
+Entry point of the deployments: `flows.refresh.refresh`. A dance whose search fails does not stop
+the others; the result says which failed and why.
+"""
+
+import asyncio
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+from prefect import flow
+from prefect.artifacts import acreate_table_artifact
+from prefect.logging import get_run_logger
+
+from configs.dances import Dance, DanceBook
+from configs.finding import FindConfig
+from configs.loader import build, load
+from configs.pipeline import PipelineConfig
+from flows.entries import Hunt, reason_of, rows
+from flows.find import (
+    HUNTERS,
+    in_good_quality,
+    nothing,
+    of_candidate,
+    run_id,
+    run_name,
+    without_tracebacks,
+)
+from flows.gallery import show
+from flows.hunt import hunt
+from robojackson.clips.candidate import VideoCandidate
+from robojackson.clips.titles import clean_text
+from robojackson.errors import NoPersonFound, SearchFailed
+from robojackson.retarget.robot import RobotDescription
+from storage import candidates
+from storage.artifact import Artifact
+from storage.store import Store
+from tasks.landmarks import landmarks
+from tasks.mocap import mocap
+from tasks.probe import SourceFile, probe
+from tasks.retarget import retarget
+
+FOLDER = "refresh"
+SLACK = 0.1
+"""Share of the days between two searches that a nightly run may come early."""
+Facts = dict[str, Any]
+
+
+@flow(name="refresh", task_runner=HUNTERS)  # type: ignore[arg-type]
+async def refresh(
+    dances: list[str] | None = None,
+    book: str = "dances",
+    config: str = "finding",
+    overrides: Facts | None = None,
+    pipeline: str = "base",
+    pipeline_overrides: Facts | None = None,
+) -> Facts:
+    """Search, score, choose, mocap and retarget, for every dance that is due.
+
+    Args:
+        dances: Names in the book, searched whether they are due or not; all that are due if absent.
+        book: Name or path of the list of dances.
+        config: Name or path of the configuration of the search.
+        overrides: Of that, values by key path.
+        pipeline: Name or path of the configuration of the stages after it.
+        pipeline_overrides: Of that, values by key path.
+    Raises:
+        SearchFailed: every dance failed; the message has the reasons.
+    """
+    settings = asdict(load(FindConfig, config, overrides))
+    stages = [pipeline, pipeline_overrides or {}]
+    done: dict[str, Facts] = {}
+    failed: dict[str, str] = {}
+    picked = load(DanceBook, book).pick(dances)
+    due = [dance for dance in picked if dances is not None or _is_due(dance)]
+    for dance in due:
+        state = await refresh_dance(dance.name, asdict(dance), settings, *stages, return_state=True)
+        result = await state.aresult(raise_on_failure=False)
+        if isinstance(result, BaseException):
+            failed[dance.name] = reason_of(result)
+        else:
+            done[dance.name] = result
+            _note(dance, result)
+    candidates.compact(Store.from_environment())
+    await _tell(done, failed)
+    if failed and not done:
+        raise SearchFailed("; ".join(f"{name}: {reason}" for name, reason in failed.items()))
+    waiting = [dance.name for dance in picked if dance not in due]
+    return {"dances": done, "failed": failed, "not_due": waiting}
+
+
+def run(dances: list[str] | None, config: str, overrides: Mapping[str, Any]) -> Facts:
+    """The flow from the command line."""
+    without_tracebacks()
+    return asyncio.run(refresh(dances, config=config, overrides=dict(overrides)))
+
+
+@flow(name="refresh-dance", flow_run_name="{name}", task_runner=HUNTERS)  # type: ignore[arg-type]
+async def refresh_dance(
+    name: str, dance: Facts, config: Facts, pipeline: str, pipeline_overrides: Facts
+) -> Facts:
+    """One dance, from its name to a reference motion.
+
+    Raises:
+        SearchFailed: the source does not answer, or has no new video and none was chosen before.
+        NoPersonFound: no video may be danced; the message has the reasons.
+    """
+    wanted = build(Dance, dance, "dance")
+    settings = build(FindConfig, config, "config")
+    store = Store.from_environment()
+    reigning = candidates.champion(store, wanted.name)
+    seen = candidates.known(store, wanted.name)
+    found = hunt(wanted, settings, run_id("refresh"), seen, reigning)
+    told = rows(found)
+    chosen = told[0] if found.chosen else reigning
+    await show(wanted.name, told, chosen)
+    if chosen is None:
+        raise NoPersonFound(nothing(found))
+    video = _video(found, reigning, settings)
+    stages = load(PipelineConfig, pipeline, pipeline_overrides)
+    return {
+        "run_id": found.run_id,
+        "judged": len(told),
+        "is_new": found.chosen is not None,
+        "chosen": {key: chosen[key] for key in ("video_id", "url", "title", "stability_score")},
+        **motion(store, video, stages),
+    }
+
+
+def motion(store: Store, video: Artifact, settings: PipelineConfig) -> Facts:
+    """Mocap and retargeting of a video: what a training starts from."""
+    with store.local(video) as path:
+        clip = probe(SourceFile(path, video.sha256), settings.video, None, None)
+    track = landmarks(clip["video"], clip["info"], settings.detector)
+    sequence = mocap(track, settings.mocap)
+    robot = load(RobotDescription, f"robots/{settings.robot}")
+    moved = retarget(sequence, robot, settings.retarget)
+    return {
+        "video": store.address(clip["video"].key),
+        "smpl": store.address(sequence.key),
+        "reference": store.address(moved["reference"].key),
+        "scorecard": json.loads(store.read(moved["scorecard"].key)),
+    }
+
+
+def _video(found: Hunt, reigning: Facts | None, settings: FindConfig) -> Artifact:
+    """The file to dance: of the new choice, or of the video that still reigns."""
+    if found.chosen:
+        return in_good_quality(found.chosen, settings)
+    assert reigning
+    candidate = VideoCandidate(
+        video_id=reigning["video_id"],
+        url=reigning["url"],
+        title=reigning["title"] or "",
+        query=reigning["query"] or "",
+        source=reigning["source"],
+    )
+    scored = Artifact(key=reigning["video_key"], sha256=reigning["video_sha256"])
+    return of_candidate(candidate, scored, settings)
+
+
+def _is_due(dance: Dance) -> bool:
+    """Whether it was last searched long enough ago."""
+    store, key = Store.from_environment(), _key(dance)
+    if not store.exists(key):
+        return True
+    last = datetime.fromisoformat(json.loads(store.read(key))["finished_at"])
+    return datetime.now(UTC) - last >= timedelta(days=dance.every_days * (1 - SLACK))
+
+
+def _note(dance: Dance, result: Facts) -> None:
+    """Keep what was found, and when."""
+    facts = {"finished_at": datetime.now(UTC).isoformat(), "dance": dance.name, **result}
+    text = json.dumps(facts, indent=1, default=str)
+    Store.from_environment().put(_key(dance), text.encode())
+
+
+def _key(dance: Dance) -> str:
+    return f"{FOLDER}/{run_name(dance.name)}.json"
+
+
+async def _tell(done: dict[str, Facts], failed: dict[str, str]) -> None:
+    """One table of all dances."""
+    table = [
+        {"dance": name, "result": "new" if facts["is_new"] else "as before",
+         "video": clean_text(facts["chosen"]["title"]), "reason": ""}
+        for name, facts in done.items()
+    ]  # fmt: skip
+    table += [
+        {"dance": name, "result": "failed", "video": "", "reason": reason}
+        for name, reason in failed.items()
+    ]
+    for name, reason in failed.items():
+        get_run_logger().warning("%s: %s", name, reason)
+    if table:
+        await acreate_table_artifact(key="refresh", table=table, description="Dances refreshed")

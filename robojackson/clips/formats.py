@@ -1,0 +1,69 @@
+"""Which format of a video is downloaded: a small one to score, a good one to dance.
+
+Robots do not listen, so a format without sound is as good as one with it, and nothing is ever
+merged. The short side of the image counts: shorts stand upright.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass
+
+Purpose = Literal["score", "dance"]
+Format = Mapping[str, Any]
+PLAIN = ("http", "https")
+"""Protocols that fetch one file, which can be resumed."""
+
+
+@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+class FormatConfig:
+    """Attributes:
+    score_short_side: Fewest pixels of the short side of the image that is scored.
+    dance_short_side: Most pixels of the short side of the image that is danced.
+    """
+
+    score_short_side: int = Field(default=360, ge=16)
+    dance_short_side: int = Field(default=1080, ge=16)
+
+
+def choose(formats: Sequence[Format], purpose: Purpose, config: FormatConfig) -> Format | None:
+    """The format to download, None when none has an image.
+
+    To score: the smallest of at least `score_short_side`, or the largest there is. To dance: the
+    largest of at most `dance_short_side`, or the smallest there is. A format whose size is unknown
+    (a link to a file) is taken only when there is no other.
+    """
+    seen = [f for f in formats if f.get("vcodec") != "none" and not f.get("has_drm")]
+    sized = [f for f in seen if short_side(f)]
+    if not sized:
+        return seen[-1] if seen else None
+    if purpose == "score":
+        enough = [f for f in sized if short_side(f) >= config.score_short_side]
+        return min(enough, key=_cost) if enough else max(sized, key=_quality)
+    fitting = [f for f in sized if short_side(f) <= config.dance_short_side]
+    return max(fitting, key=_quality) if fitting else min(sized, key=_cost)
+
+
+def short_side(format_: Format) -> int:
+    """Pixels of the shorter side of the image; 0 when the format does not tell."""
+    width, height = format_.get("width"), format_.get("height")
+    sides = [int(side) for side in (width, height) if side]
+    return min(sides) if sides else 0
+
+
+def _cost(format_: Format) -> tuple[int, bool, float]:
+    """Least first: the smaller image, one file rather than pieces, fewer bytes."""
+    return short_side(format_), format_.get("protocol") not in PLAIN, _bytes(format_)
+
+
+def _quality(format_: Format) -> tuple[int, bool, float]:
+    """Greatest first: the larger image, one file rather than pieces, more frames, more bits."""
+    rate = float(format_.get("fps") or 0) + 1e-6 * float(format_.get("tbr") or 0)
+    return short_side(format_), format_.get("protocol") in PLAIN, rate
+
+
+def _bytes(format_: Format) -> float:
+    """Size of the file, or its bit rate, which orders formats of one video alike."""
+    size = format_.get("filesize") or format_.get("filesize_approx")
+    return float(size or format_.get("tbr") or float("inf"))

@@ -1,0 +1,48 @@
+"""Where videos are looked for. A new source is one new file beside this one.
+
+The file defines `search`, and its name is the name of the source.
+"""
+
+from datetime import datetime
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import Protocol, cast
+
+from robojackson.clips.candidate import VideoCandidate
+from robojackson.clips.web import WebConfig
+from robojackson.errors import UnknownName
+
+
+class Source(Protocol):
+    """What a file of this folder offers."""
+
+    def search(
+        self, query: str, address: str, count: int, config: WebConfig, now: datetime
+    ) -> list[VideoCandidate]:
+        """Videos for a query, in the source's own order, nothing downloaded.
+
+        Args:
+            query: Words to look for; a source that cannot look for words offers all it has.
+            address: Of the folder, the list, the site or the server; empty for the usual one.
+            count: How many at most.
+            config: Manners on the web.
+            now: Noted in the candidates.
+        Raises:
+            SearchFailed: the message has the source and the reason.
+        """
+
+
+def names() -> tuple[str, ...]:
+    """All sources."""
+    return tuple(sorted(module.name for module in iter_modules(__path__)))
+
+
+def source(name: str) -> Source:
+    """The source of a name.
+
+    Raises:
+        UnknownName: there is no such file; the message lists those that are.
+    """
+    if name not in names():
+        raise UnknownName("source", name, "robojackson/clips/sources", names())
+    return cast(Source, import_module(f"{__name__}.{name}"))

@@ -1,0 +1,30 @@
+"""A folder of video files; each is its own candidate, wherever a copy of it stands."""
+
+from datetime import datetime
+from pathlib import Path
+
+from robojackson.clips.candidate import VideoCandidate
+from robojackson.clips.titles import clean_text, safe_name
+from robojackson.clips.video import list_videos
+from robojackson.clips.web import WebConfig
+from robojackson.errors import SearchFailed, UnreadableVideo
+
+NAME = "folder"
+
+
+def search(
+    query: str, address: str, count: int, config: WebConfig, now: datetime
+) -> list[VideoCandidate]:
+    """The videos directly inside a folder, by name; all of them, whatever count and words are."""
+    folder = Path(address or query)
+    try:
+        paths = list_videos(folder)
+    except (UnreadableVideo, OSError) as cause:
+        raise SearchFailed(f"{NAME}: {clean_text(cause)}") from cause
+    words = query if address else ""
+    return [_candidate(path.absolute(), words, now) for path in paths]
+
+
+def _candidate(path: Path, query: str, now: datetime) -> VideoCandidate:
+    name = safe_name(path.stem, str(path))
+    return VideoCandidate(name, str(path), clean_text(path.name), query, NAME, retrieved_at=now)

@@ -1,0 +1,47 @@
+"""A list of addresses, one a line: in a file, or given with blanks between them."""
+
+import logging
+from datetime import datetime
+from pathlib import Path
+
+from robojackson.clips.candidate import GENERIC, VideoCandidate
+from robojackson.clips.titles import clean_text, safe_name, web_address
+from robojackson.clips.web import WebConfig
+from robojackson.errors import SearchFailed
+
+COMMENT = "#"
+log = logging.getLogger(__name__)
+
+
+def search(
+    query: str, address: str, count: int, config: WebConfig, now: datetime
+) -> list[VideoCandidate]:
+    """One candidate an address, unopened; what is no http address is left out with a warning."""
+    lines = _lines(address or query)
+    found = [(line, web_address(line)) for line in lines]
+    for line, url in found:
+        if not url:
+            log.warning("urls: %s is no http or https address", clean_text(line))
+    named = query if address else ""
+    made = [_candidate(url, named, now) for _, url in found if url]
+    if not made:
+        raise SearchFailed(f"urls: {clean_text(address or query)} holds no address")
+    return made[:count]
+
+
+def _candidate(url: str, query: str, now: datetime) -> VideoCandidate:
+    last = url.split("?")[0].rstrip("/").rsplit("/", 1)[-1]
+    name = safe_name(last.rsplit(".", 1)[0], url)
+    return VideoCandidate(name, url, clean_text(last), query, GENERIC, retrieved_at=now)
+
+
+def _lines(text: str) -> list[str]:
+    """The lines of a file, or the words of a text."""
+    if "://" not in text:
+        path = Path(text)
+        try:
+            listed = path.read_text(encoding="utf-8").splitlines()
+        except (OSError, ValueError) as cause:
+            raise SearchFailed(f"urls: {clean_text(text)}: cannot be read") from cause
+        return [line.strip() for line in listed if line.strip() and line[0] != COMMENT]
+    return text.split()

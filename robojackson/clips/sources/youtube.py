@@ -1,0 +1,15 @@
+"""YouTube's own search, by yt-dlp's `ytsearchN:`."""
+
+from datetime import datetime
+
+from robojackson.clips.candidate import VideoCandidate
+from robojackson.clips.sources.site import candidates
+from robojackson.clips.web import WebConfig, listing
+
+
+def search(
+    query: str, address: str, count: int, config: WebConfig, now: datetime
+) -> list[VideoCandidate]:
+    """The first videos of a search; `address` may be another search prefix of yt-dlp."""
+    prefix = address or "ytsearch"
+    return candidates(listing(f"{prefix}{count}:{query}", config), query, now)[:count]

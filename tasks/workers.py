@@ -1,0 +1,87 @@
+"""Processes that take work off the flow: decoding strangers' videos uses all cores and may crash.
+
+They are kept for the whole flow, because loading the pose model takes seconds. A clip that kills
+its process harms no other: whatever was under way is done again, each in a process of its own.
+"""
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context
+from typing import ParamSpec, TypeVar
+
+from robojackson.errors import UnreadableVideo
+
+P = ParamSpec("P")
+R = TypeVar("R")
+WATCH_S = 2.0
+"""How often a process looks whether its parent is still there, seconds."""
+
+_lock = threading.Lock()
+_pool: ProcessPoolExecutor | None = None
+
+
+def cores() -> int:
+    """The cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def in_worker(function: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
+    """Call a function of a module in another process.
+
+    Raises:
+        UnreadableVideo: the process died of it, twice.
+    """
+    try:
+        return _shared().submit(function, *args, **kwargs).result()
+    except BrokenProcessPool:
+        _forget()
+    with _processes(1) as alone:
+        try:
+            return alone.submit(function, *args, **kwargs).result()
+        except BrokenProcessPool as cause:
+            raise UnreadableVideo("decoding it killed the process") from cause
+
+
+def _shared() -> ProcessPoolExecutor:
+    global _pool
+    with _lock:
+        _pool = _pool or _processes(cores())
+        return _pool
+
+
+def _forget() -> None:
+    """Drop the pool if it is broken; another thread may have replaced it already."""
+    global _pool
+    with _lock:
+        if _pool is not None and getattr(_pool, "_broken", True):
+            _pool.shutdown(wait=False, cancel_futures=True)
+            _pool = None
+
+
+def _processes(count: int) -> ProcessPoolExecutor:
+    context = get_context("spawn")
+    return ProcessPoolExecutor(
+        count, mp_context=context, initializer=_begin, initargs=(os.getpid(),)
+    )
+
+
+def _begin(parent: int) -> None:
+    """One thread a library, Ctrl-C left to the parent, and no life after its death."""
+    os.environ["OMP_NUM_THREADS"] = "1"
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_watch, args=(parent,), daemon=True).start()
+    import cv2
+
+    cv2.setNumThreads(1)
+
+
+def _watch(parent: int) -> None:
+    """End with the parent. (The kernel's own signal comes when the spawning thread ends.)"""
+    while os.getppid() == parent:
+        time.sleep(WATCH_S)
+    os._exit(1)

@@ -1,0 +1,69 @@
+"""`find` and `catalogue` from the command line, on two clips."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from flows.source import is_name
+from tests.flows.conftest import Said, robojackson
+from tools.difficult_clips import black, write
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("found") / "store"
+
+
+@pytest.fixture(scope="module")
+def found(short_clip: Path, store: Path) -> Said:
+    folder = store.parent / "clips"
+    folder.mkdir()
+    shutil.copy(short_clip, folder / "hips.mp4")
+    write(folder / "night.mp4", list(black())[:35])
+    (folder / "words.mp4").write_text("no video")
+    return robojackson("find", folder, "--source", "folder", "--json", ROBOJACKSON_STORE=str(store))
+
+
+def test_find_answers_with_the_chosen_video(found: Said) -> None:
+    assert found.code == 0, found.err
+    assert found.answer["chosen"]["title"] == "hips.mp4"
+
+
+def test_find_gives_every_video_its_reason(found: Said) -> None:
+    told = {row["title"]: (row["decision"], row["reason"]) for row in found.answer["candidates"]}
+    assert told == {
+        "hips.mp4": ("chosen", ""),
+        "night.mp4": ("rejected", "no person found in 35 of 35 frames"),
+        "words.mp4": ("failed", "not a video that FFmpeg can read"),
+    }
+
+
+def test_the_catalogue_has_the_same_rows_and_needs_no_prefect(found: Said, store: Path) -> None:
+    said = robojackson("catalogue", "--json", ROBOJACKSON_STORE=str(store))
+    rows = said.answer["candidates"]
+    assert {r["title"]: r["decision"] for r in rows} == {
+        r["title"]: r["decision"] for r in found.answer["candidates"]
+    }
+    assert not said.loaded_prefect
+
+
+def test_the_catalogue_answers_sql(found: Said, store: Path) -> None:
+    sql = "SELECT count(*) AS n FROM candidates WHERE decision = 'chosen'"
+    said = robojackson("catalogue", "--sql", sql, "--json", ROBOJACKSON_STORE=str(store))
+    assert said.answer == {"rows": [{"n": 1}]}
+
+
+def test_an_unknown_source_is_one_line(store: Path) -> None:
+    said = robojackson("find", "x", "--source", "myspace", ROBOJACKSON_STORE=str(store))
+    assert said.code == 1
+    assert "unknown source 'myspace'" in said.err
+    assert "youtube" in said.err
+
+
+@pytest.mark.parametrize(
+    ("source", "name"),
+    [("APT dance", True), ("moonwalk", True), ("a.mp4", False), ("x/y", False), (None, False)],
+)
+def test_what_is_no_path_is_the_name_of_a_dance(source: str | None, name: bool) -> None:
+    assert is_name(source) is name

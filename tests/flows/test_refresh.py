@@ -1,0 +1,166 @@
+"""A night: dances from a server of our own, one of which fails, and the night after."""
+
+import asyncio
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from prefect.client.orchestration import get_client
+from prefect.client.schemas.filters import ArtifactFilter, ArtifactFilterKey
+from prefect.settings import (
+    PREFECT_FLOWS_HEARTBEAT_FREQUENCY,
+    PREFECT_LOCAL_STORAGE_PATH,
+    PREFECT_LOGGING_LEVEL,
+    temporary_settings,
+)
+
+from flows.refresh import refresh
+from robojackson.errors import SearchFailed
+from storage import candidates
+from storage.store import Store
+from tests.search.server import Web, serving
+
+OVERRIDES = {"web.retries": 1, "web.backoff_s": 0.01, "web.timeout_s": 1, "web.request_pause_s": 0}
+FAILURES = {
+    "missing": "HTTP 404 not found",
+    "busy": "HTTP 429 too many requests (2 attempts)",
+    "half": "the server cut the file short (2 attempts)",
+    "wrong_length": "cut off before its index",
+}
+HOSTILE = "..%2f..%2f..%2fescape%1b%5b31m"
+
+
+@dataclass
+class Nights:
+    """Refreshes over one store and one server."""
+
+    web: Web
+    book: Path
+    folder: Path
+    first: dict[str, Any]
+
+    @property
+    def store(self) -> Store:
+        return Store(self.folder / "store")
+
+    def again(self, dances: list[str] | None = None) -> dict[str, Any]:
+        return night(self.book, dances)
+
+    def row(self, word: str) -> dict[str, Any]:
+        """What the catalogue says of the first video whose address has the word."""
+        return next(row for row in candidates.records(self.store) if f"/{word}/" in row["url"])
+
+
+def night(book: Path, dances: list[str] | None = None) -> dict[str, Any]:
+    return asyncio.run(refresh(dances, str(book), "finding", OVERRIDES, "smoke"))
+
+
+def artifact(key: str) -> Any:
+    """The data of the newest artifact of a key."""
+    wanted = ArtifactFilter(key=ArtifactFilterKey(any_=[key]))
+    with get_client(sync_client=True) as client:
+        found = client.read_artifacts(artifact_filter=wanted)
+    return max(found, key=lambda each: each.created).data
+
+
+def write_book(folder: Path, web: Web) -> Path:
+    addresses = [f"{web.url}/{kind}/clip.mp4" for kind in ("good", *FAILURES)]
+    (folder / "urls.txt").write_text("\n".join([*addresses, f"{web.url}/good/{HOSTILE}.mp4", ""]))
+    listed = {"source": "urls", "address": str(folder / "urls.txt"), "top": 9}
+    dances = [
+        {"name": "Nowhere", "query": "x", "source": "site", "address": f"{web.url}/missing/"},
+        {"name": "Good One", "query": "good", **listed},
+    ]
+    path = folder / "dances.yaml"
+    path.write_text(yaml.safe_dump({"dances": dances}))
+    return path
+
+
+@pytest.fixture(scope="module")
+def nights(
+    prefect_server: None, tmp_path_factory: pytest.TempPathFactory, short_clip: Path
+) -> Iterator[Nights]:
+    folder = tmp_path_factory.mktemp("refresh")
+    wanted = {
+        PREFECT_LOCAL_STORAGE_PATH: folder / "records",
+        PREFECT_FLOWS_HEARTBEAT_FREQUENCY: None,
+        PREFECT_LOGGING_LEVEL: "ERROR",
+    }
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        temporary_settings(wanted),
+        serving(short_clip.read_bytes()) as web,
+    ):
+        patch.setenv("ROBOJACKSON_STORE", str(folder / "store"))
+        book = write_book(folder, web)
+        yield Nights(web, book, folder, night(book))
+
+
+def test_a_dance_whose_search_fails_does_not_stop_the_others(nights: Nights) -> None:
+    assert list(nights.first["dances"]) == ["Good One"]
+    assert list(nights.first["failed"]) == ["Nowhere"]
+    assert "HTTP 404 not found" in nights.first["failed"]["Nowhere"]
+
+
+def test_the_chosen_video_is_ready_to_train(nights: Nights) -> None:
+    done = nights.first["dances"]["Good One"]
+    assert done["is_new"]
+    assert Path(done["reference"]).is_file()
+    assert done["scorecard"]
+
+
+def test_every_candidate_is_in_the_catalogue(nights: Nights) -> None:
+    decisions = [row["decision"] for row in candidates.records(nights.store, "good one")]
+    assert sorted(decisions[:6]) == ["chosen", *["failed"] * 4, "rejected"]
+
+
+@pytest.mark.parametrize("kind", FAILURES)
+def test_a_failure_of_the_server_is_the_reason_in_the_table(nights: Nights, kind: str) -> None:
+    row = nights.row(kind)
+    assert row["decision"] == "failed"
+    assert row["reason"].startswith(FAILURES[kind])
+
+
+def test_the_same_video_under_another_name_is_a_copy(nights: Nights) -> None:
+    found = [row for row in candidates.records(nights.store) if row["decision"] == "rejected"]
+    assert found[0]["reason"].startswith("a copy of")
+
+
+def test_a_hostile_name_leaves_nothing_outside_the_store(nights: Nights) -> None:
+    outside = {path.name for path in nights.folder.iterdir()}
+    assert outside == {"store", "records", "urls.txt", "dances.yaml"}
+
+
+def test_prefect_shows_the_table_with_the_reasons(nights: Nights) -> None:
+    rows = json.loads(artifact("candidates-good-one"))
+    assert {row["decision"] for row in rows} <= {"chosen", "accepted", "rejected", "failed"}
+    assert "\x1b" not in artifact("pictures-good-one")
+
+
+def test_prefect_links_to_the_chosen_video(nights: Nights) -> None:
+    assert f"{nights.web.url}/good/" in artifact("chosen-good-one")
+
+
+def test_the_next_night_downloads_only_what_is_missing(nights: Nights) -> None:
+    before = list(nights.web.asked)
+    result = nights.again(["Good One"])
+    asked = {path.split("/")[1] for path, _ in nights.web.asked[len(before) :]}
+    assert asked == set(FAILURES)
+    done = result["dances"]["Good One"]
+    assert not done["is_new"]
+    assert done["reference"] == nights.first["dances"]["Good One"]["reference"]
+
+
+def test_a_dance_that_is_not_due_waits(nights: Nights) -> None:
+    """Only the dance that failed is searched again, and fails again."""
+    with pytest.raises(SearchFailed, match=r"^Nowhere: [^;]*$"):
+        nights.again()
+
+
+def test_every_dance_failing_is_a_failed_run(nights: Nights) -> None:
+    with pytest.raises(SearchFailed, match=r"Nowhere: .*404"):
+        nights.again(["Nowhere"])

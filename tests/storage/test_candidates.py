@@ -1,0 +1,175 @@
+"""The catalogue of candidates: nothing is lost, nothing counted twice, whoever writes beside."""
+
+import threading
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from robojackson.errors import BadTable
+from storage import candidates
+from storage.store import Store
+
+NOW = datetime(2026, 11, 21, 3, 0, tzinfo=UTC)
+
+
+def row(video_id: str = "v1", **more: Any) -> dict[str, Any]:
+    return {
+        "run_id": "r1",
+        "dance": "APT",
+        "source": "youtube",
+        "video_id": video_id,
+        "url": f"https://host/{video_id}",
+        "retrieved_at": NOW,
+        "decision": "accepted",
+        "decided_at": NOW,
+        **more,
+    }
+
+
+@pytest.fixture(params=["folder", "memory"])
+def store(request: pytest.FixtureRequest, tmp_path: Path) -> Store:
+    """A folder, and an object store that fsspec keeps in memory."""
+    return Store(tmp_path if request.param == "folder" else f"memory://c-{tmp_path.name}")
+
+
+def ids(store: Store) -> list[str]:
+    return sorted(found["video_id"] for found in candidates.records(store))
+
+
+def test_an_empty_catalogue_is_empty(store: Store) -> None:
+    assert candidates.records(store) == []
+
+
+def test_rows_come_back_as_they_were(store: Store) -> None:
+    given = row(title="APT 아파트", view_count=7, stability_score=0.25, reason="")
+    candidates.append(store, [given])
+    (found,) = candidates.records(store)
+    assert {key: found[key] for key in given} == given
+
+
+def test_nothing_is_written_for_nothing(store: Store) -> None:
+    assert (candidates.append(store, []), store.list("candidates")) == (None, [])
+
+
+def test_a_row_that_is_none_leaves_nothing_behind(store: Store) -> None:
+    with pytest.raises(BadTable, match="run_id"):
+        candidates.append(store, [row(), {"video_id": "x"}])
+    assert store.list("candidates") == []
+
+
+def test_the_oldest_stands_first(store: Store) -> None:
+    for day, name in ((2, "late"), (0, "early"), (1, "middle")):
+        candidates.append(store, [row(name, decided_at=NOW + timedelta(days=day))])
+    assert [r["video_id"] for r in candidates.records(store)] == ["early", "middle", "late"]
+
+
+def test_compaction_keeps_every_row_in_one_file(store: Store) -> None:
+    for number in range(7):
+        candidates.append(store, [row(f"v{number}")])
+    before = candidates.records(store)
+    candidates.compact(store, least=2)
+    assert len(store.list("candidates")) == 1
+    assert candidates.records(store) == before
+
+
+def test_few_files_are_left_alone(store: Store) -> None:
+    candidates.append(store, [row()])
+    assert candidates.compact(store) is None
+
+
+def test_a_compaction_that_dies_before_it_tidies_up_doubles_no_row(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for number in range(3):
+        candidates.append(store, [row(f"v{number}")])
+    monkeypatch.setattr(Store, "remove", lambda self, key: None)
+    candidates.compact(store, least=2)
+    assert len(store.list("candidates")) == 4
+    assert ids(store) == ["v0", "v1", "v2"]
+
+
+def test_refreshes_and_compactions_at_once_lose_nothing(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    errors: list[BaseException] = []
+
+    def refresh(number: int) -> None:
+        try:
+            for night in range(6):
+                candidates.append(store, [row(f"{number}-{night}")])
+                if night % 2:
+                    candidates.compact(store, least=3)
+        except BaseException as cause:
+            errors.append(cause)
+
+    threads = [threading.Thread(target=refresh, args=(number,)) for number in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert errors == []
+    assert ids(store) == sorted(f"{n}-{night}" for n in range(4) for night in range(6))
+
+
+def test_a_reader_beside_a_compaction_sees_every_row(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    candidates.append(store, [row(f"v{number}") for number in range(5)])
+    done = threading.Event()
+    seen: list[int] = []
+
+    def read() -> None:
+        while not done.is_set():
+            seen.append(len(candidates.records(store)))
+
+    reader = threading.Thread(target=read)
+    reader.start()
+    for number in range(10):
+        candidates.append(store, [row(f"later{number}")])
+        candidates.compact(store, least=2)
+    done.set()
+    reader.join()
+    assert min(seen) >= 5
+    assert seen == sorted(seen)
+
+
+def test_one_dance_is_told_from_the_others(store: Store) -> None:
+    candidates.append(store, [row("a"), row("b", dance='O\'Hara "x"')])
+    found = [[r["video_id"] for r in candidates.records(store, d)] for d in ("apt", 'O\'Hara "x"')]
+    assert found == [["a"], ["b"]]
+
+
+def test_a_question_in_sql_is_answered(store: Store) -> None:
+    candidates.append(store, [row("a", stability_score=3.0), row("b", stability_score=1.0)])
+    sql = "SELECT dance, min(stability_score) AS best, count(*) AS n FROM candidates GROUP BY dance"
+    assert candidates.query(store, sql) == [{"dance": "APT", "best": 1.0, "n": 2}]
+
+
+@pytest.mark.parametrize(
+    "sql", ["SELEC 1", "SELECT nothing FROM candidates", "SELECT * FROM read_text('/etc/passwd')"]
+)
+def test_a_question_that_is_none_is_one_line(store: Store, sql: str) -> None:
+    with pytest.raises(BadTable, match=r"^catalogue: [^\n]*$"):
+        candidates.query(store, sql)
+
+
+def test_the_video_that_was_chosen_last_reigns(store: Store) -> None:
+    kept = store.keep("video", "clip.mp4", b"x")
+    chosen = {"decision": "chosen", "video_key": kept.key, "video_sha256": kept.sha256}
+    for day, name in enumerate(("first", "second")):
+        candidates.append(store, [row(name, decided_at=NOW + timedelta(days=day), **chosen)])
+    candidates.append(store, [row("third", decided_at=NOW + timedelta(days=2))])
+    reigning = candidates.champion(store, "APT")
+    assert reigning is not None
+    assert reigning["video_id"] == "second"
+
+
+def test_a_video_whose_file_is_gone_does_not_reign(store: Store) -> None:
+    lost = {"decision": "chosen", "video_key": "video/gone/clip.mp4", "video_sha256": "0" * 64}
+    candidates.append(store, [row(**lost)])
+    assert candidates.champion(store, "APT") is None
+
+
+def test_a_video_that_failed_may_be_tried_again(store: Store) -> None:
+    candidates.append(store, [row("bad", decision="failed"), row("seen", decision="rejected")])
+    assert candidates.known(store, "APT") == {("youtube", "seen")}
