@@ -3,6 +3,7 @@
 World frame: x forward, y left, z up, metres, the floor at z = 0; quaternions wxyz.
 """
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -54,3 +55,9 @@ class ReferenceMotion:
 
     def __len__(self) -> int:
         return len(self.qpos)
+
+
+def poses_sha256(reference: ReferenceMotion) -> str:
+    """Digest of what a robot is asked to do: the poses, and whether they go on for ever."""
+    poses = np.ascontiguousarray(reference.qpos, float).tobytes()
+    return hashlib.sha256(poses + bytes([reference.cyclic])).hexdigest()

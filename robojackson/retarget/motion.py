@@ -37,29 +37,34 @@ def retarget(sequence: SmplSequence, robot: Robot, config: RetargetConfig) -> Re
     dt = robot.description.control_dt
     cyclic = config.cyclic if config.method == "optimise" else "no"
     clip, lap = human_clip(sequence, dt, cyclic, config.tempo, config.cycle)
-    aims = targets(clip, robot)
+    upright = aims = targets(clip, robot)
     extra = _notes(sequence, clip, lap, config)
     if config.method == "optimise":
         found, floor_mm = optimise(aims, robot, config)
         hovering = hovers(robot, found.qpos, aims.dt)
         if hovering.mean() > BARS["unsupported_share"] / 2 and aims.airborne.any():
             _log.info("a flight that does not fall is taken back: solving again")
-            found, floor_mm = optimise(targets(clip, robot, hovering), robot, config)
+            upright = targets(clip, robot, hovering)
+            found, floor_mm = optimise(upright, robot, config)
         qpos, aims = found.qpos, found.aims
         extra |= {"keypoint_floor_mm": floor_mm, "lean_deg": found.lean_deg}
     else:
         qpos = paper.mapped(sequence, robot, clip.time_s, corrected=config.method == "framefix")
-    return assemble(qpos, clip, aims, robot, extra)
+    return assemble(qpos, clip, aims, upright, robot, extra)
 
 
 def assemble(
     qpos: Float[np.ndarray, "S nq"],
     clip: HumanClip,
     aims: Targets,
+    upright: Targets,
     robot: Robot,
     extra: dict[str, float],
 ) -> ReferenceMotion:
-    """Everything that follows from the poses, and the score card."""
+    """Everything that follows from the poses, and the score card.
+
+    `aims` are what the solver followed, perhaps leaned; `upright` is the dancer's own motion.
+    """
     posed = pose(tree(robot), qpos)
     loads = effort(robot, qpos, aims.contact, aims.dt, aims.lap)
     parts = {
@@ -80,7 +85,7 @@ def assemble(
         "keypoint_names": robot.keypoint_names,
         "contact_names": robot.contact_names,
     }
-    card = score(ReferenceMotion(**parts), robot, aims)  # type: ignore[arg-type]
+    card = score(ReferenceMotion(**parts), robot, aims, upright)  # type: ignore[arg-type]
     card["root_residual_bw"] = float(np.median(loads.residual_bw))
     return ReferenceMotion(**parts, scorecard={**extra, **card})  # type: ignore[arg-type]
 

@@ -43,15 +43,23 @@ _MENDING = {
 }
 
 
-def score(motion: ReferenceMotion, robot: Robot, aims: Targets) -> dict[str, float]:
-    """All figures of a motion; `passed` is 1 when every bar holds."""
+def score(
+    motion: ReferenceMotion, robot: Robot, aims: Targets, upright: Targets | None = None
+) -> dict[str, float]:
+    """All figures of a motion; `passed` is 1 when every bar holds.
+
+    Args:
+        aims: What the solver followed: contacts, and keypoints that may be leaned over the feet.
+        upright: The dancer's own keypoints, which fidelity is told against; `aims` when None.
+    """
     card = {
         "steps": float(len(motion)),
         "seconds": len(motion) * motion.dt,
         **_validity(motion, robot),
         **_collision(motion, robot),
         **_contact(motion, robot, aims),
-        **_fidelity(motion, robot, aims),
+        **_fidelity(motion, robot, upright or aims),
+        "keypoint_leaned_mm": _keypoint_error(motion, robot, aims),
         **_posture(motion),
     }
     lap = motion.lap_offset if motion.cyclic else None
@@ -147,14 +155,25 @@ def _fidelity(motion: ReferenceMotion, robot: Robot, aims: Targets) -> dict[str,
     error = metric.keypoint_error_mm(motion.keypoints_w, aims.keypoints_w, weighted)
     bones = [(KEYPOINTS.index(a), KEYPOINTS.index(b)) for a, b in BONES]
     angles = metric.bone_angles_deg(motion.keypoints_w, aims.keypoints_w, bones)
+    hips = metric.keypoint_error_mm(
+        motion.keypoints_w - motion.keypoints_w[:, :1],
+        aims.keypoints_w - aims.keypoints_w[:, :1],
+        weighted,
+    )
     return {
         "keypoint_mm": float(error.mean()),
+        "keypoint_pelvis_mm": float(hips.mean()),
         "keypoint_p95_mm": float(np.quantile(error, 0.95)),
         "bone_deg": float(angles.mean()),
         "bone_p95_deg": float(np.quantile(angles, 0.95)),
         "keypoint_jerk_m_s3": metric.jerk(motion.keypoints_w[:, weighted], motion.dt),
         "source_jerk_m_s3": metric.jerk(aims.keypoints_w[:, weighted], motion.dt),
     }
+
+
+def _keypoint_error(motion: ReferenceMotion, robot: Robot, aims: Targets) -> float:
+    weighted = robot.keypoint_weights > 0
+    return float(metric.keypoint_error_mm(motion.keypoints_w, aims.keypoints_w, weighted).mean())
 
 
 def _posture(motion: ReferenceMotion) -> dict[str, float]:

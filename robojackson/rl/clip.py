@@ -9,7 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from robojackson.errors import RejectedReference, TrackTooShort
 from robojackson.motion.reference import ReferenceMotion
+
+LEAST_STEPS = 8
 
 
 @dataclass(frozen=True)
@@ -24,9 +27,19 @@ class ClipStep:
 
 
 class Clip:
-    """Random access to a reference motion by step."""
+    """Random access to a reference motion by step.
+
+    Raises:
+        TrackTooShort, RejectedReference: too few steps, or values that are no numbers.
+    """
 
     def __init__(self, reference: ReferenceMotion) -> None:
+        if len(reference) < LEAST_STEPS:
+            raise TrackTooShort(
+                f"the reference motion has {len(reference)} steps, {LEAST_STEPS} are the least"
+            )
+        if not np.isfinite(reference.qpos).all() or not np.isfinite(reference.qvel).all():
+            raise RejectedReference("the reference motion holds values that are no numbers")
         self.steps, self.cyclic, self.dt = len(reference), reference.cyclic, reference.dt
         self.names = reference.keypoint_names
         self._qpos = np.asarray(reference.qpos, float)

@@ -6,6 +6,7 @@ kneeling and a mean site error above 0.30 m at any step. Skill is told against t
 over 14 sites with hands and head; a fall counts 0.
 """
 
+import logging
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -15,7 +16,7 @@ from jaxtyping import Float
 from pydantic import TypeAdapter
 
 from robojackson.errors import BadPolicy
-from robojackson.motion.reference import ReferenceMotion
+from robojackson.motion.reference import ReferenceMotion, poses_sha256
 from robojackson.retarget.robot import Robot
 from robojackson.rl.clip import Clip
 from robojackson.rl.config import ControlConfig, EvaluateConfig, ResetConfig, TerminationConfig
@@ -25,6 +26,8 @@ from robojackson.rl.physics import Motors, require_same_clock, residual_scale
 from robojackson.rl.policy import Policy
 from robojackson.rl.rollouts import Controller, Rollouts, Starts, roll_out
 from robojackson.rl.starts import default_stand, noisy, stand_at
+
+log = logging.getLogger(__name__)
 
 STAND = -1
 """`phase` of the row that starts in the default stand."""
@@ -61,6 +64,7 @@ def evaluate(
     control = control_of(policy, robot)
     require_same_clock(control.substeps * robot.model.opt.timestep, reference.dt)
     clip = Clip(reference)
+    _tell_strangers(policy, reference)
     starts, labels = _starts(robot, clip, config)
     horizon = _horizons(clip, starts, config)
     judge = Judge(robot, reference, config)
@@ -111,6 +115,15 @@ def control_of(policy: Policy, robot: Robot) -> ControlConfig:
             f"{robot.description.name!r} gives {size}: it was trained for another robot"
         )
     return TypeAdapter(ControlConfig).validate_python(policy.facts["control"])
+
+
+def _tell_strangers(policy: Policy, reference: ReferenceMotion) -> None:
+    """A policy may be judged on another motion than it learnt, but not without a word."""
+    learnt = policy.facts.get("reference_sha256")
+    if learnt is not None and learnt != poses_sha256(reference):
+        log.warning(
+            "the policy was trained on another reference motion than the one it is judged on"
+        )
 
 
 def summarise(rows: list[dict[str, object]]) -> dict[str, float]:

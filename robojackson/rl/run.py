@@ -1,6 +1,5 @@
 """The bookkeeping of one training run: what is learnt, budget, checkpoints, episodes, progress."""
 
-import hashlib
 import json
 import logging
 import os
@@ -14,8 +13,8 @@ from pathlib import Path
 import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 
-from robojackson.errors import BadConfiguration
-from robojackson.motion.reference import ReferenceMotion
+from robojackson.errors import BadConfiguration, StoreError
+from robojackson.motion.reference import ReferenceMotion, poses_sha256
 from robojackson.retarget.robot import Robot
 from robojackson.rl.config import TrainConfig
 from robojackson.rl.policy import Policy
@@ -45,9 +44,7 @@ class Task:
     @staticmethod
     def of(reference: ReferenceMotion, robot: Robot) -> "Task":
         """The task of following a reference with a robot."""
-        poses = np.ascontiguousarray(reference.qpos, float).tobytes()
-        digest = hashlib.sha256(poses + bytes([reference.cyclic])).hexdigest()
-        return Task(robot.description.name, robot.sha256, digest)
+        return Task(robot.description.name, robot.sha256, poses_sha256(reference))
 
 
 @dataclass(frozen=True)
@@ -141,18 +138,23 @@ class Run:
     def checkpoint(self, with_replay: bool) -> None:
         """Write the policy and everything needed to go on, whole or not at all."""
         fresh, final = self.out / "checkpoint.new", self.out / "checkpoint"
+        part = self.out / "policy.safetensors.part"
         shutil.rmtree(fresh, ignore_errors=True)
-        fresh.mkdir()
-        self.trainer.save(fresh, with_replay)
-        (fresh / "run.json").write_text(json.dumps(self._state()))
+        try:
+            fresh.mkdir()
+            self.trainer.save(fresh, with_replay)
+            (fresh / "run.json").write_text(json.dumps(self._state()))
+            part.write_bytes(self._policy().to_bytes())
+        except OSError as error:
+            shutil.rmtree(fresh, ignore_errors=True)
+            part.unlink(missing_ok=True)
+            raise StoreError(f"{self.out}: the checkpoint cannot be written ({error})") from error
         old = self.out / "checkpoint.old"
         shutil.rmtree(old, ignore_errors=True)
         if final.exists():
             final.rename(old)
         fresh.rename(final)
         shutil.rmtree(old, ignore_errors=True)
-        part = self.out / "policy.safetensors.part"
-        part.write_bytes(self._policy().to_bytes())
         os.replace(part, self.out / "policy.safetensors")
 
     def _newest(self) -> Path | None:
@@ -208,7 +210,7 @@ class Run:
         if self.config.steps:
             left.append((self.config.steps - steps) / max(rate, 1e-9))
         recent = list(self._recent)
-        mean = lambda key: float(np.mean([row[key] for row in recent])) if recent else 0.0  # noqa: E731
+        mean = lambda key: float(np.mean([row[key] for row in recent])) if recent else np.nan  # noqa: E731
         return {
             "steps": steps,
             "updates": self.trainer.updates(),

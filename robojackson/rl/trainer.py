@@ -55,7 +55,7 @@ def make_trainer(name: str, env: "VecEnv", config: TqcConfig, seed: int) -> Trai
         from robojackson.rl.sbx_trainer import SbxTrainer
     except ImportError as error:
         raise MissingDependency(
-            f"trainer 'sbx' needs JAX ({error}): pip install 'robojackson[fast]', "
+            f"trainer 'sbx' needs JAX ({error}): .venv/bin/pip install -e '.[fast]', "
             "or choose --trainer sb3"
         ) from error
     return SbxTrainer(env, config, seed)

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from robojackson.errors import BadPolicy
+from robojackson.errors import BadPolicy, RejectedReference, TrackTooShort
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.retarget.robot import Robot
 from robojackson.rl.clip import Clip
@@ -140,3 +140,29 @@ def test_a_policy_for_a_robot_of_another_name_is_refused(
     stranger = dataclasses.replace(idle(robot, sway), facts={"robot": "humanoid_strong"})
     with pytest.raises(BadPolicy, match="humanoid_strong"):
         evaluate(stranger, sway, robot, EvaluateConfig())
+
+
+def test_a_policy_that_learnt_another_dance_is_judged_with_a_word(
+    robot: Robot, sway: ReferenceMotion, caplog: pytest.LogCaptureFixture
+) -> None:
+    policy = idle(robot, sway)
+    stranger = dataclasses.replace(policy, facts={**policy.facts, "reference_sha256": "other"})
+    evaluate(stranger, sway, robot, EvaluateConfig(seconds=0.15, phases=1, resets=1))
+    assert "another reference motion" in caplog.text
+
+
+@pytest.mark.parametrize("steps", [0, 1])
+def test_a_reference_without_motion_is_refused(sway: ReferenceMotion, steps: int) -> None:
+    cut = {
+        name: getattr(sway, name)[:steps]
+        for name in ("qpos", "qvel", "keypoints_w", "body_pos_w", "contact", "source_time_s")
+    }
+    with pytest.raises(TrackTooShort, match=f"has {steps} steps"):
+        Clip(dataclasses.replace(sway, **cut))
+
+
+def test_a_reference_that_is_not_a_number_is_refused(sway: ReferenceMotion) -> None:
+    qpos = sway.qpos.copy()
+    qpos[3, 9] = np.nan
+    with pytest.raises(RejectedReference, match="no numbers"):
+        Clip(dataclasses.replace(sway, qpos=qpos))
