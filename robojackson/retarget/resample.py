@@ -85,6 +85,14 @@ def accelerations(
 
 def seam_angle(qpos: Float[np.ndarray, "S nq"], dt: float, lap: np.ndarray) -> float:
     """Largest angle by which the step over the seam differs from its neighbours' mean, degrees."""
+    return float(np.degrees(np.abs(_seam_miss(qpos, dt, lap)[3:]).max()))
+
+
+def seam_shift(qpos: Float[np.ndarray, "S nq"], dt: float, lap: np.ndarray) -> float:
+    """How far the root's step over the seam differs from its neighbours' mean, metres."""
+    return float(np.linalg.norm(_seam_miss(qpos, dt, lap)[:3]))
+
+
+def _seam_miss(qpos: np.ndarray, dt: float, lap: np.ndarray) -> Float[np.ndarray, " nv"]:
     ahead = forward_velocities(qpos, dt, lap)
-    miss = ahead[-1] - (ahead[-2] + ahead[0]) / 2
-    return float(np.degrees(np.abs(miss[3:]).max() * dt))
+    return np.asarray((ahead[-1] - (ahead[-2] + ahead[0]) / 2) * dt)

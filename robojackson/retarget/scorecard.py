@@ -15,7 +15,7 @@ from robojackson.motion.reference import ReferenceMotion
 from robojackson.motion.smpl import AIR, PLANTED
 from robojackson.retarget.collision import Detector
 from robojackson.retarget.kinematics import centre_of_mass, pose, sole_velocities, tree
-from robojackson.retarget.resample import forward_velocities, seam_angle
+from robojackson.retarget.resample import forward_velocities, seam_angle, seam_shift
 from robojackson.retarget.robot import KEYPOINTS, Robot
 from robojackson.retarget.targets import BONES, Targets
 
@@ -31,11 +31,13 @@ BARS: Mapping[str, float] = {
     "contact_gap_mm": 5.0,
     "unsupported_share": 0.05,
     "seam_deg": 5.0,
+    "seam_mm": 5.0,
 }
 """Largest allowed value of each gated figure (issue 2, stage 4)."""
 
 _MENDING = {
     "seam_deg": "cyclic: no",
+    "seam_mm": "cyclic: no",
     "speed_over_limit": "a slower tempo",
     "planted_slip_cm_s": "method: optimise, or better contact labels",
     "contact_gap_mm": "method: optimise, or better contact labels",
@@ -64,6 +66,7 @@ def score(
     }
     lap = motion.lap_offset if motion.cyclic else None
     card["seam_deg"] = 0.0 if lap is None else seam_angle(motion.qpos, motion.dt, lap)
+    card["seam_mm"] = 0.0 if lap is None else 1e3 * seam_shift(motion.qpos, motion.dt, lap)
     card["torque_ratio_p95"] = float(np.quantile(motion.torque_ratio, 0.95))
     card["torque_over_share"] = float((motion.torque_ratio > 1).any(axis=1).mean())
     card["passed"] = float(not failures(card))

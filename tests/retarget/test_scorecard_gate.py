@@ -72,6 +72,10 @@ def _tear(qpos: np.ndarray) -> None:
     qpos[:, 7] += np.radians(20.0) * ramp
 
 
+def _hop_at_the_seam(qpos: np.ndarray) -> None:
+    qpos[:, 2] += 0.03 * np.linspace(0, 1, len(qpos))
+
+
 @pytest.mark.parametrize(
     ("change", "figure"),
     [
@@ -83,6 +87,7 @@ def _tear(qpos: np.ndarray) -> None:
         (_shrink, "quat_error"),
         (_lose, "nan_count"),
         (_tear, "seam_deg"),
+        (_hop_at_the_seam, "seam_mm"),
     ],
 )
 def test_a_spoilt_motion_is_refused_by_name(change, figure: str, robot: Robot):
