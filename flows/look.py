@@ -1,0 +1,43 @@
+"""Pictures of a retargeting, from files to files: a video, the contacts and the torques."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from configs.loader import load
+from flows import console, single
+from storage.store import Store
+
+VIDEO, CONTACTS, TORQUES = "retarget.mp4", "contacts.png", "torques.png"
+
+
+def look(smpl: Path, out: Path, config: str, overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """Draw what `single.retarget` wrote into a folder, beside the person it was made from.
+
+    Raises:
+        MissingDependency: no way to draw without a screen.
+    """
+    from configs.pipeline import PipelineConfig
+    from robojackson.motion.reference import ReferenceMotion
+    from robojackson.motion.smpl import SmplSequence
+    from robojackson.report import plots
+    from robojackson.report.pair import human_beside_robot
+
+    settings = load(PipelineConfig, config, overrides)
+    sequence = single.read_table(SmplSequence, smpl)
+    reference = single.read_table(ReferenceMotion, out / "reference.parquet")
+    robot = single.robot_of(reference)
+    motors = [name for name, moved in zip(robot.joint_names, robot.actuated, strict=True) if moved]
+    store = Store(out)
+    store.put(CONTACTS, plots.png(plots.contact_strip(sequence, reference)))
+    store.put(TORQUES, plots.png(plots.torque_heat_map(reference, motors)))
+    with console.bar("video") as progress:
+        human_beside_robot(
+            sequence, reference, out / VIDEO, model=robot.model, config=settings.show,
+            progress=progress,
+        )  # fmt: skip
+    return {
+        "video": str(out / VIDEO),
+        "contacts": str(out / CONTACTS),
+        "torques": str(out / TORQUES),
+    }

@@ -1,0 +1,87 @@
+"""`flows.export`: a reference of the real pipeline, written for others from file to file."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import get_args, get_type_hints
+
+import numpy as np
+import pytest
+
+from flows import cli
+from flows.export import FORMATS, export
+from robojackson.errors import RejectedReference, StoreError, UnknownName
+from robojackson.motion import beyondmimic, gmr, keyframes, locomujoco, omniretarget, unitree
+from storage import tables
+from tests.flows.conftest import Said, robojackson
+from tests.retarget.conftest import robot_motion
+
+READERS = {
+    "gmr": gmr.read,
+    "csv": unitree.read,
+    "beyondmimic": beyondmimic.read,
+    "locomujoco": locomujoco.read,
+    "omniretarget": omniretarget.read,
+    "keyframes": keyframes.read,
+}
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The hip shake, as `robojackson retarget` leaves it."""
+    path = tmp_path_factory.mktemp("export") / "reference.parquet"
+    path.write_bytes(tables.encode(robot_motion("hip_shake")))
+    return path
+
+
+@pytest.mark.parametrize("to", FORMATS)
+def test_every_format_starts_with_the_first_pose(to: str, reference: Path, tmp_path: Path) -> None:
+    out = tmp_path / "motion"
+    export(reference, to, out)
+    first = READERS[to](out.read_bytes()).qpos[0]
+    wanted = robot_motion("hip_shake").qpos[0]
+    sign = np.sign(first[3:7] @ wanted[3:7])
+    np.testing.assert_allclose(first, [*wanted[:3], *sign * wanted[3:7], *wanted[7:]], atol=1e-5)
+
+
+def test_the_answer_tells_what_was_written(reference: Path, tmp_path: Path) -> None:
+    out = tmp_path / "motion.csv"
+    told = export(reference, "csv", out)
+    assert (told["file"], told["bytes"]) == (str(out), out.stat().st_size)
+
+
+def test_an_unknown_format_lists_those_there_are(reference: Path, tmp_path: Path) -> None:
+    with pytest.raises(UnknownName, match="Known: beyondmimic, csv, gmr, keyframes, locomujoco"):
+        export(reference, "bvh", tmp_path / "motion.bvh")
+
+
+def test_a_reference_of_another_model_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "reference.parquet"
+    path.write_bytes(tables.encode(replace(robot_motion("hip_shake"), model_sha256="0" * 64)))
+    with pytest.raises(RejectedReference):
+        export(path, "csv", tmp_path / "motion.csv")
+
+
+def test_a_missing_reference_is_told(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match="no such file"):
+        export(tmp_path / "reference.parquet", "csv", tmp_path / "motion.csv")
+
+
+@pytest.fixture(scope="module")
+def said(reference: Path) -> Said:
+    """The command, in a process of its own."""
+    out = reference.parent / "motion.pkl"
+    return robojackson("export", reference, "--to", "gmr", "-o", out, "--json")
+
+
+def test_the_command_writes_the_file_it_names(said: Said) -> None:
+    assert said.code == 0, said.err
+    assert len(gmr.read(Path(said.answer["file"]).read_bytes())) > 1
+
+
+def test_the_command_loads_no_prefect(said: Said) -> None:
+    assert not said.loaded_prefect
+
+
+def test_the_command_offers_every_format() -> None:
+    offered = get_args(get_args(get_type_hints(cli.export, include_extras=True)["to"])[0])
+    assert set(offered) == set(FORMATS)
