@@ -37,9 +37,20 @@ def load(
     """
     path = None if name_or_path is None else find(name_or_path)
     values = _read(path) if path else {}
-    for key_path, value in (overrides or {}).items():
-        _set(values, key_path.split("."), _parsed(value, f"--set {key_path}"))
-    return build(cls, values, _told(path) if path else "--set")
+    given = {
+        key_path: _parsed(value, f"--set {key_path}")
+        for key_path, value in (overrides or {}).items()
+    }
+    for key_path, value in given.items():
+        _set(values, key_path.split("."), value)
+    where = _told(path) if path else "--set"
+    try:
+        return TypeAdapter(cls).validate_python(values)
+    except ValidationError as cause:
+        key = ".".join([*_keys(cause), ""])
+        blamed = [g for g in given if key.startswith(f"{g}.") or f"{g}.".startswith(key)]
+        where = f"--set {blamed[0]}" if blamed else where
+        raise BadConfiguration(f"{where}: {_explain(cls, cause)}") from cause
 
 
 def build(cls: type[Config], values: Mapping[str, Any], where: str) -> Config:
@@ -147,7 +158,7 @@ def _set(values: dict[str, Any], keys: list[str], value: Any) -> None:
 def _explain(cls: type, cause: ValidationError) -> str:
     """The first error in one line."""
     error = cause.errors()[0]
-    path = [str(part) for part in error["loc"] if not _is_branch(part)]
+    path = _keys(cause)
     where = ".".join(path) or cls.__name__
     if error["type"] in ("unexpected_keyword_argument", "extra_forbidden"):
         known = _keys_at(cls, path[:-1])
@@ -157,6 +168,11 @@ def _explain(cls: type, cause: ValidationError) -> str:
     if error["type"] in ("missing", "missing_argument"):
         return f"key {where!r} is missing"
     return f"{where!r} is {error['input']!r}: {error['msg']}"
+
+
+def _keys(cause: ValidationError) -> list[str]:
+    """The path of the key of the first error."""
+    return [str(part) for part in cause.errors()[0]["loc"] if not _is_branch(part)]
 
 
 def _is_branch(part: int | str) -> bool:

@@ -4,14 +4,32 @@ Every command imports what it needs inside itself, so that the one-stage command
 Prefect in memory and `--help` answers at once.
 """
 
+if __name__ == "__main__":  # Ctrl-C while the lines below are imported is told in one line, too
+    from flows.start import main as start
+
+    start()
+
 import os
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import typer
 
-from flows.console import Answer, command, log_to_stderr
-from robojackson.errors import BadConfiguration
+from flows.console import USAGE_ERROR, Answer, command, complain, log_to_stderr, misused
+from flows.options import (
+    Config,
+    Folder,
+    Json,
+    Minutes,
+    Robot,
+    Seed,
+    Set,
+    SetTrain,
+    Trainer,
+    TrainMinutes,
+    chosen,
+)
+from flows.search import catalogue, find, refresh
 
 app = typer.Typer(
     name="robojackson",
@@ -21,19 +39,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
-Config = Annotated[str, typer.Option("--config", help="Name or path of a configuration.")]
-Set = Annotated[
-    list[str] | None, typer.Option("--set", help="Change one value: --set train.seed=3.")
-]
-Folder = Annotated[Path, typer.Option("-o", "--out", help="Folder for the results.")]
-Robot = Annotated[str, typer.Option("--robot", help="Name of a robot of configs/robots.")]
-Trainer = Annotated[
-    Literal["sbx", "sb3"] | None, typer.Option(help="sbx (JAX, fast) or sb3 (the reference).")
-]
-Seed = Annotated[int | None, typer.Option(min=0, help="Seed of the training.")]
-Minutes = Annotated[float | None, typer.Option(min=0.01, help="Wall time, minutes.")]
 
 
 @app.command()
@@ -56,13 +61,16 @@ def dance(
     """A video in, a robot that dances it out: every stage, cached, and a page at the end."""
     from flows.environment import prepare
     from flows.single import verdict_lines
-    from flows.source import is_name, resolve
+    from flows.source import is_name, look_at, resolve, settle
     from storage.store import Store
 
     found = None if is_name(source) else resolve(source)
-    store = Store.from_environment()
-    store.require_writable()
-    prepare(store)
+    given = {"minutes": minutes, "robot": robot, "train.trainer": trainer, "train.seed": seed}
+    overrides = chosen(set_, given)
+    settings = settle(config, overrides)
+    if found is not None:
+        look_at(found, settings, start, end)
+    prepare(Store.from_environment())
     from flows.dance import run
 
     if found is None:
@@ -70,84 +78,13 @@ def dance(
 
         found = clip_of(str(source))
 
-    given = {"minutes": minutes, "robot": robot, "train.trainer": trainer, "train.seed": seed}
-    made = run(found, config, _overrides(set_, given), start, end)
+    made = run(found, config, overrides, start, end)
     text = [*verdict_lines(made["evaluation"]), f"page   {made['page']}", f"video  {made['video']}"]
     return Answer(made, text=text)
 
 
-@app.command()
-@command
-def find(
-    query: Annotated[str, typer.Argument(help="A dance; or the folder, or list, of the source.")],
-    top: Annotated[int | None, typer.Option(min=1, help="How many videos to judge.")] = None,
-    source: Annotated[str, typer.Option(help="youtube, folder, urls, site or server.")] = "youtube",
-    address: Annotated[
-        str, typer.Option(help="Of the folder, list, site ({query} stands for it) or server.")
-    ] = "",
-    config: Annotated[str, typer.Option(help="Name or path of a configuration.")] = "finding",
-    set_: Set = None,
-    as_json: Json = False,
-) -> Answer:
-    """The videos of a dance, ranked: Algorithm 1, and why others are rejected."""
-    from flows import ranking
-    from flows.environment import prepare
-    from storage.store import Store
-
-    store = Store.from_environment()
-    store.require_writable()
-    prepare(store)
-    from flows.find import look_for
-
-    found = look_for(query, source, address, top, config, _overrides(set_))
-    return Answer(found, text=[*ranking.lines(found["candidates"]), found["summary"]])
-
-
-@app.command()
-@command
-def refresh(
-    dances: Annotated[
-        list[str] | None, typer.Argument(help="Names in configs/dances.yaml; else all that are due")
-    ] = None,
-    config: Annotated[str, typer.Option(help="Configuration of the search.")] = "finding",
-    set_: Set = None,
-    as_json: Json = False,
-) -> Answer:
-    """The nightly run, now: for every dance the best new video, up to the robot's motion."""
-    from flows.environment import prepare
-    from storage.store import Store
-
-    store = Store.from_environment()
-    store.require_writable()
-    prepare(store)
-    from flows.refresh import run
-
-    done = run(dances or None, config, _overrides(set_))
-    return Answer(done, code=1 if done["failed"] and not done["dances"] else 0)
-
-
-@app.command()
-@command
-def catalogue(
-    dance: Annotated[str | None, typer.Option(help="Only this dance.")] = None,
-    sql: Annotated[
-        str | None, typer.Option(help="A question to DuckDB about the table `candidates`.")
-    ] = None,
-    as_json: Json = False,
-) -> Answer:
-    """Every video that was ever judged, and why it was danced or not."""
-    from flows import console, ranking
-    from storage import candidates
-    from storage.store import Store
-
-    log_to_stderr()
-    store = Store.from_environment()
-    if sql is not None:
-        found = candidates.query(store, sql)
-        named = {str(number): row for number, row in enumerate(found, 1)}
-        return Answer({"rows": found}, text=console.table(named, list(found[0]) if found else []))
-    rows = candidates.records(store, dance)
-    return Answer({"candidates": rows}, text=ranking.lines(rows))
+for searching in (find, refresh, catalogue):
+    app.command()(searching)
 
 
 @app.command()
@@ -162,7 +99,7 @@ def score(
     from flows import single
 
     log_to_stderr()
-    return Answer(single.score(video, config, _overrides(set_)))
+    return Answer(single.score(video, config, chosen(set_)))
 
 
 @app.command()
@@ -178,7 +115,7 @@ def mocap(
     from flows import single
 
     log_to_stderr()
-    return Answer(single.mocap(video, out, config, _overrides(set_)))
+    return Answer(single.mocap(video, out, config, chosen(set_)))
 
 
 @app.command()
@@ -190,6 +127,9 @@ def retarget(
     method: Annotated[
         Literal["optimise", "paper"] | None, typer.Option(help="Ours, or the paper's Table I.")
     ] = None,
+    video: Annotated[
+        bool, typer.Option("--video", help="Also draw it: a video, the contacts, the torques.")
+    ] = False,
     config: Config = "base",
     set_: Set = None,
     as_json: Json = False,
@@ -198,8 +138,31 @@ def retarget(
     from flows import single
 
     log_to_stderr()
-    overrides = _overrides(set_, {"retarget.method": method})
-    return Answer(single.retarget(smpl, out, robot, config, overrides))
+    overrides = chosen(set_, {"retarget.method": method})
+    made = single.retarget(smpl, out, robot, config, overrides)
+    if video:
+        from flows.look import look
+
+        made |= look(smpl, out, config, overrides)
+    return Answer(made)
+
+
+@app.command()
+@command
+def export(
+    reference: Annotated[Path, typer.Argument(help="reference.parquet of `robojackson retarget`.")],
+    to: Annotated[
+        Literal["gmr", "csv", "beyondmimic", "locomujoco", "omniretarget", "keyframes"],
+        typer.Option(help="The format; docs/formats.md says who reads it."),
+    ],
+    out: Annotated[Path, typer.Option("-o", "--out", help="File for the result.")],
+    as_json: Json = False,
+) -> Answer:
+    """The robot's motion in the file format of another project."""
+    from flows import export as exporting
+
+    log_to_stderr()
+    return Answer(exporting.export(reference, to, out))
 
 
 @app.command()
@@ -209,7 +172,7 @@ def train(
     out: Folder,
     trainer: Trainer = None,
     steps: Annotated[int | None, typer.Option(min=1, help="Control steps in all.")] = None,
-    minutes: Minutes = None,
+    minutes: TrainMinutes = None,
     seed: Seed = None,
     setup: Annotated[
         str | None, typer.Option(help="Path of a training configuration, or setups/NAME.")
@@ -217,7 +180,7 @@ def train(
     run_id: Annotated[str, typer.Option(help="Name of the run in the tables.")] = "",
     move: Annotated[str, typer.Option(help="Name of the dance in the tables.")] = "",
     parent: Annotated[int, typer.Option(hidden=True, help="End with this process.")] = 0,
-    set_: Set = None,
+    set_: SetTrain = None,
     as_json: Json = False,
 ) -> Answer:
     """Teach the robot the motion: policy.safetensors and episodes.parquet; resumes by itself."""
@@ -228,7 +191,7 @@ def train(
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     log_to_stderr()
     given = {"trainer": trainer, "steps": steps, "minutes": minutes, "seed": seed}
-    return Answer(training.train(reference, out, setup, _overrides(set_, given), run_id, move))
+    return Answer(training.train(reference, out, setup, chosen(set_, given), run_id, move))
 
 
 @app.command()
@@ -247,7 +210,7 @@ def evaluate(
 
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     log_to_stderr()
-    overrides = _overrides(set_, {"evaluate.seconds": seconds})
+    overrides = chosen(set_, {"evaluate.seconds": seconds})
     judged = single.evaluate(policy, reference, out, config, overrides)
     return Answer(judged, text=single.verdict_lines(judged))
 
@@ -262,21 +225,13 @@ def doctor(as_json: Json = False) -> Answer:
     return Answer(report, code=0 if report["ok"] else 1)
 
 
-def main() -> None:
-    """Entry point of the console script."""
-    app()
-
-
-def _overrides(pairs: list[str] | None, given: dict[str, Any] | None = None) -> dict[str, Any]:
-    """`--set key=value` pairs and options that were given, as one mapping."""
-    overrides = {key: value for key, value in (given or {}).items() if value is not None}
-    for pair in pairs or []:
-        key, equals, value = pair.partition("=")
-        if not equals or not key:
-            raise BadConfiguration(f"--set {pair}: expected KEY=VALUE, such as train.seed=3")
-        overrides[key] = value
-    return overrides
-
-
-if __name__ == "__main__":
-    main()
+def main() -> int:
+    """Run the command that the words of the process ask for; its exit code."""
+    try:
+        return app(standalone_mode=False) or 0
+    except USAGE_ERROR as cause:
+        if type(cause).__name__ == "NoArgsIsHelpError":
+            cause.show()
+        else:
+            complain(misused(cause))
+        return 2

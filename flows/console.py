@@ -15,6 +15,7 @@ from typing import Any, ParamSpec
 
 import numpy as np
 import typer
+from pydantic import ValidationError
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -22,6 +23,8 @@ from robojackson.errors import RoboJacksonError
 
 P = ParamSpec("P")
 INTERRUPTED = 130
+USAGE_ERROR: Any = typer.BadParameter.__bases__[0]
+"""What typer raises for words that it does not understand; it has no public name there."""
 STEPS_WITHOUT_TERMINAL = 4
 """Progress lines of a bar that goes to a file instead of a terminal."""
 
@@ -207,8 +210,22 @@ def _plain_bar(label: str) -> Callable[[int, int], None]:
     return advance
 
 
-def _leave(code: int, line: str) -> None:
+def complain(line: str) -> None:
+    """One line of cause on stderr."""
     sys.stderr.write(f"robojackson: {' '.join(line.split())}\n")
+
+
+def misused(cause: Any) -> str:
+    """What typer does not understand of the words that were given, with the value in question."""
+    message = cause.format_message().rstrip(".")
+    if isinstance(cause.__cause__, ValidationError):
+        given = repr(cause.__cause__.errors()[0]["input"])
+        message += "" if given in message else f", given {given}"
+    return f"{message} (see --help)"
+
+
+def _leave(code: int, line: str) -> None:
+    complain(line)
     raise typer.Exit(code)
 
 

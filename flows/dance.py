@@ -108,7 +108,7 @@ async def dance(
     store = Store.from_environment()
     candidates = await score_all(list_videos(Path(source)), settings, start_s, end_s)
     best = choose(candidates)
-    labels = RunLabels(Path(best.name).stem, settings.setup)
+    labels = RunLabels(*map(catalogue.safe_name, (Path(best.name).stem, settings.setup)))
     made = await perform(best, robot, settings, labels, began)
     return await conclude(store, made, candidates, settings, labels)
 
@@ -176,7 +176,7 @@ async def perform(
     film = video(*seen, robot, settings.show)
     made = {**best.clip, "stability": best.stability, "landmarks": track, "smpl": sequence}
     made |= {**moved, **trained, **judged, "dance": film}
-    return {**made, **page(made, labels.move)}
+    return {**made, **page(made, labels.move, Path(best.name).stem)}
 
 
 async def conclude(

@@ -26,12 +26,14 @@ REQUIRED = (
     "pydantic",
     "opencv-python-headless",
     "av",
+    "yt-dlp",
+    "duckdb",
 )
 OPTIONAL = {
-    "sbx-rl": "pip install 'robojackson[fast]'",
-    "s3fs": "pip install 'robojackson[s3]'",
-    "prefect-dask": "pip install 'robojackson[dask]'",
-    "prefect-ray": "pip install 'robojackson[ray]'",
+    "sbx-rl": ".venv/bin/pip install -e '.[fast]'",
+    "s3fs": ".venv/bin/pip install -e '.[s3]'",
+    "prefect-dask": ".venv/bin/pip install -e '.[dask]'",
+    "prefect-ray": ".venv/bin/pip install -e '.[ray]'",
 }
 OTHER_OPENCV = ("opencv-python", "opencv-contrib-python", "opencv-contrib-python-headless")
 MODELS = ("lite", "full", "heavy")

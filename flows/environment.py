@@ -10,6 +10,8 @@ from storage.store import Store
 
 HOME = "prefect"
 RECORDS = "records"
+ROOM_MB = 200
+"""Free disk that a flow needs: its records, its server's database, the tables and the video."""
 FIXED = {
     "PREFECT_SERVER_EPHEMERAL_STARTUP_TIMEOUT_SECONDS": "120",
     "PREFECT_SERVER_ANALYTICS_ENABLED": "false",
@@ -19,7 +21,12 @@ FIXED = {
 
 
 def prepare(store: Store) -> None:
-    """Set what the user has not set, for this process and its children."""
+    """Set what the user has not set, for this process and its children.
+
+    Raises:
+        StoreError: too little room on the disk of the store; Prefect's server would hang on it.
+    """
+    store.require_writable(ROOM_MB)
     home = store.here / HOME
     home.mkdir(parents=True, exist_ok=True)  # without it the server's database cannot be opened
     wanted = {

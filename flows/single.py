@@ -6,7 +6,8 @@ and returns the figures that the command answers with. Heavy libraries are impor
 
 import json
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -15,11 +16,18 @@ import numpy as np
 
 from configs.loader import load
 from flows import console
-from robojackson.errors import RejectedReference, StoreError
+from robojackson.errors import (
+    NoPersonFound,
+    RejectedReference,
+    RoboJacksonError,
+    StoreError,
+    TrackTooShort,
+)
 from storage import tables
 from storage.store import Store
 
 if TYPE_CHECKING:
+    from robojackson.clips.video import VideoInfo, VideoLimits
     from robojackson.motion.reference import ReferenceMotion
     from robojackson.motion.smpl import SmplSequence
     from robojackson.retarget.robot import Robot
@@ -30,16 +38,18 @@ Value = TypeVar("Value")
 
 
 def score(videos: list[Path], config: str, overrides: Overrides) -> Figures:
-    """Algorithm 1 for every video; one without a person is an answer, not an error."""
+    """Algorithm 1 for every video; one without a person is an answer, not an error.
+
+    One that cannot be read is told beside the others' scores, and is an error where it is alone.
+    """
     from configs.pipeline import PipelineConfig
     from robojackson.clips.landmarks import detect
     from robojackson.clips.stability import stability
-    from robojackson.clips.video import list_videos, probe
 
     settings = load(PipelineConfig, config, overrides)
-    found = []
-    for video in (path for source in videos for path in list_videos(source)):
-        info = probe(video, settings.video)
+    infos, found = _readable(videos, settings.video)
+    for info in infos:
+        video = info.path
         with console.bar(video.name) as progress:
             track = detect(video, info, settings.scoring_detector, progress)
         scored = stability(track, settings.stability)
@@ -59,12 +69,15 @@ def mocap(video: Path, out: Path, config: str, overrides: Overrides) -> Figures:
     began = time.monotonic()
     settings = load(PipelineConfig, config, overrides)
     info = probe(video, settings.video)
-    store = _folder(out)
-    with console.bar(f"landmarks of {video.name}") as progress:
-        track = detect(video, info, settings.detector, progress)
-    store.put("landmarks.parquet", tables.encode(track))
-    sequence = recover(track, settings.mocap)
-    store.put("smpl.parquet", tables.encode(sequence))
+    with results_in(out) as store:
+        with console.bar(f"landmarks of {video.name}") as progress:
+            track = detect(video, info, settings.detector, progress)
+        try:
+            sequence = recover(track, settings.mocap)
+        except (NoPersonFound, TrackTooShort) as cause:
+            raise type(cause)(f"{video}: {cause}") from cause
+        store.put("landmarks.parquet", tables.encode(track))
+        store.put("smpl.parquet", tables.encode(sequence))
     return {
         "video": str(video),
         "smpl": str(out / "smpl.parquet"),
@@ -89,11 +102,11 @@ def retarget(smpl: Path, out: Path, robot: str, config: str, overrides: Override
     settings = load(PipelineConfig, config, overrides)
     machine = _robot(robot)
     sequence = read_table(SmplSequence, smpl)
-    store = _folder(out)
-    reference = to_robot(sequence, machine, settings.retarget)
-    store.put("reference.parquet", tables.encode(reference))
-    scorecard = console.plain(dict(reference.scorecard))
-    store.put("scorecard.json", json.dumps(scorecard, indent=1).encode())
+    with results_in(out) as store:
+        reference = to_robot(sequence, machine, settings.retarget)
+        store.put("reference.parquet", tables.encode(reference))
+        scorecard = console.plain(dict(reference.scorecard))
+        store.put("scorecard.json", json.dumps(scorecard, indent=1).encode())
     return {
         "reference": str(out / "reference.parquet"),
         "robot": reference.robot,
@@ -128,10 +141,10 @@ def evaluate(
         seed = int(str(trained.facts.get("seed", 0)))
         common = {"run_id": policy.parent.name, "move": reference.stem, "seed": seed}
         rows = [{**common, "setup": settings.setup, **row} for row in verdict.rows]
-        store = _folder(out)
-        store.put("evaluations.parquet", tables.encode_rows(EVALUATION_RECORD, rows))
-        store.put("evaluation.json", json.dumps(summary, indent=1).encode())
-        store.put("rollout.parquet", tables.encode(Rollout(motion.dt, verdict.rollout_qpos)))
+        with results_in(out) as store:
+            store.put("evaluations.parquet", tables.encode_rows(EVALUATION_RECORD, rows))
+            store.put("evaluation.json", json.dumps(summary, indent=1).encode())
+            store.put("rollout.parquet", tables.encode(Rollout(motion.dt, verdict.rollout_qpos)))
     return {"policy": str(policy), "reference": str(reference), **summary}
 
 
@@ -173,11 +186,22 @@ def read_table(cls: type[Value], path: Path) -> Value:
     return tables.decode(cls, path.read_bytes(), str(path))
 
 
-def _folder(out: Path) -> Store:
-    """A folder for results, told at once when it cannot be written."""
-    store = Store(out)
-    store.require_writable()
-    return store
+@contextmanager
+def results_in(out: Path) -> Iterator[Store]:
+    """A folder for results, told at once when it cannot be written.
+
+    After a failure the folders that were made for it and are empty go away again.
+    """
+    made = [path for path in (out, *out.parents) if not path.exists()]
+    try:
+        store = Store(out)
+        store.require_writable()
+        yield store
+    except BaseException:
+        with suppress(OSError):
+            for path in made:
+                path.rmdir()
+        raise
 
 
 def _contact_share(sequence: "SmplSequence") -> dict[str, float]:
@@ -185,6 +209,35 @@ def _contact_share(sequence: "SmplSequence") -> dict[str, float]:
 
     shares = (sequence.contact == PLANTED).mean(0)
     return dict(zip(CONTACT_POINTS, map(float, shares), strict=True))
+
+
+def _readable(
+    sources: list[Path], limits: "VideoLimits"
+) -> tuple[list["VideoInfo"], list[Figures]]:
+    """The videos that can be scored, folders expanded, and what is wrong with the others.
+
+    Raises:
+        RoboJacksonError: the first cause, when there is no video left.
+    """
+    from robojackson.clips.video import list_videos, probe
+
+    infos: list[VideoInfo] = []
+    told: list[Figures] = []
+    causes: list[RoboJacksonError] = []
+    waiting = list(sources)
+    while waiting:
+        video = waiting.pop(0)
+        try:
+            if video.is_dir():
+                waiting[:0] = list_videos(video)
+            else:
+                infos.append(probe(video, limits))
+        except RoboJacksonError as cause:
+            causes.append(cause)
+            told.append({"video": str(video), "error": str(cause)})
+    if causes and not infos:
+        raise causes[0]
+    return infos, told
 
 
 def _floor(sequence: "SmplSequence") -> Figures:

@@ -1,11 +1,18 @@
 """What the SOURCE of a dance means: a file, a folder, or the name of a dance."""
 
+import math
 import os
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from robojackson.errors import MissingDependency, UnreadableVideo
+from robojackson.clips.video import SUFFIXES
+from robojackson.errors import MissingDependency, RoboJacksonError, UnreadableVideo
 
-SUFFIXES = (".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi", ".gif")
+if TYPE_CHECKING:
+    from configs.pipeline import PipelineConfig
+
 BUNDLED = Path(__file__).parent.parent / "clips"
 DEFAULT = "hip_shake.mp4"
 
@@ -34,6 +41,41 @@ def is_name(source: str | None) -> bool:
     if source is None or Path(source).exists():
         return False
     return os.sep not in source and Path(source).suffix.lower() not in SUFFIXES
+
+
+def settle(config: str, overrides: Mapping[str, Any]) -> "PipelineConfig":
+    """The configuration, checked with its robot before anything costly starts.
+
+    Raises:
+        BadConfiguration, UnknownName: it cannot be used.
+    """
+    from configs.loader import load
+    from configs.pipeline import PipelineConfig
+    from robojackson.retarget.robot import RobotDescription, load_robot
+
+    settings = load(PipelineConfig, config, overrides)
+    load_robot(load(RobotDescription, f"robots/{settings.robot}"))
+    return settings
+
+
+def look_at(
+    source: Path, settings: "PipelineConfig", start_s: float | None, end_s: float | None
+) -> None:
+    """Raise what the flow would raise much later: no video of the source can be danced."""
+    from robojackson.clips.span import span
+    from robojackson.clips.video import list_videos, probe
+
+    limits = settings.video
+    trims = start_s is not None or end_s is not None
+    allowed = replace(limits, max_duration_s=math.inf) if trims else limits
+    causes = []
+    for path in list_videos(source):
+        try:
+            span(probe(path, allowed), limits, start_s, end_s)
+            return
+        except RoboJacksonError as cause:
+            causes.append(cause)
+    raise causes[0]
 
 
 def _bundled(name: str) -> Path:

@@ -5,19 +5,20 @@ it, and it holds a lock on its folder, so that no two trainings share a checkpoi
 """
 
 import ctypes
-import fcntl
+import math
 import os
 import signal
 import sys
 import time
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from configs.loader import load
 from flows import console, single
-from robojackson.errors import StoreError
+from storage.catalogue import safe_name
+from storage.lock import locked
 from storage.records import RecordLog
 from storage.schemas import EPISODE_RECORD
 from storage.store import Store
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 
 DIE_WITH_PARENT = 1
 """PR_SET_PDEATHSIG of prctl(2)."""
+USUAL_MINUTES = 9.0
+"""Wall time of a training for which no budget is given."""
 SAVE_SECONDS = 20.0
 """Between two writes of the table of episodes."""
 
@@ -48,14 +51,12 @@ def train(
     from robojackson.rl.config import TrainConfig
     from robojackson.rl.train import train as learn
 
-    config = load(TrainConfig, setup, overrides)
+    config = _budgeted(load(TrainConfig, setup, overrides))
     motion = single.read_table(ReferenceMotion, reference)
     robot = single.robot_of(motion)
-    store = Store(out)
-    store.require_writable()
     for wish in (signal.SIGINT, signal.SIGTERM):
         signal.signal(wish, signal.default_int_handler)
-    with locked(out), console.ticker() as tell:
+    with single.results_in(out) as store, locked(out), console.ticker() as tell:
         log = _EpisodeLog(store, _common(config, move or _move_of(reference), setup, run_id))
         try:
             result = learn(
@@ -66,6 +67,9 @@ def train(
                 f"the checkpoint is in {out}; resume: {console.same_command()}"
             ) from None
         finally:
+            if len(log):
+                log.save()
+        if not len(log):
             log.save()
     return {
         "policy": str(result.policy),
@@ -83,11 +87,17 @@ def train(
 def status(row: Mapping[str, float]) -> str:
     """A progress row as one line."""
     minutes, seconds = divmod(int(row["seconds_left"]), 60)
+    survived, error = _number(row["survived_s"], 2), _number(100 * row["site_error_m"], 1)
     return (
         f"{int(row['steps']):>9,} steps  {row['steps_per_s']:,.0f}/s  "
-        f"survived {row['survived_s']:.2f} s  error {100 * row['site_error_m']:.1f} cm  "
-        f"return {row['episode_return']:.1f}  {minutes}:{seconds:02d} left"
+        f"survived {survived} s  error {error} cm  "
+        f"return {_number(row['episode_return'], 1)}  {minutes}:{seconds:02d} left"
     )
+
+
+def _number(value: float, digits: int) -> str:
+    """A dash before there is a figure."""
+    return f"{value:.{digits}f}" if math.isfinite(value) else "-"
 
 
 def die_with(parent: int) -> None:
@@ -96,21 +106,6 @@ def die_with(parent: int) -> None:
         ctypes.CDLL(None).prctl(DIE_WITH_PARENT, signal.SIGKILL, 0, 0, 0)
     if os.getppid() != parent:
         raise console.Interrupted("the process that started this training is gone")
-
-
-@contextmanager
-def locked(folder: Path) -> Iterator[None]:
-    """Hold a folder for this process.
-
-    Raises:
-        StoreError: another process holds it.
-    """
-    with (folder / "lock").open("w") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise StoreError(f"{folder}: another training is running there") from None
-        yield
 
 
 class _EpisodeLog:
@@ -133,8 +128,15 @@ class _EpisodeLog:
         self._saved = time.monotonic()
 
 
+def _budgeted(config: "TrainConfig") -> "TrainConfig":
+    """With the usual wall time where nothing ends the training."""
+    given = config.steps is not None or config.minutes is not None
+    return config if given else replace(config, minutes=USUAL_MINUTES)
+
+
 def _common(config: "TrainConfig", move: str, setup: str | None, run_id: str) -> dict[str, Any]:
     name = Path(setup).stem if setup else "scratch"
+    move, name = safe_name(move), safe_name(name)
     labels = {"run_id": run_id or f"{move}-{name}-s{config.seed}", "move": move, "setup": name}
     return {**labels, "seed": config.seed}
 

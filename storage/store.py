@@ -118,12 +118,28 @@ class Store:
         cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
         return cache / "robojackson" / hashlib.sha256(self.root.encode()).hexdigest()[:12]
 
-    def require_writable(self) -> None:
-        """Raise the one line of a store that is full or refuses a write, before any work."""
+    def require_writable(self, room_mb: int = 0) -> None:
+        """Raise the one line of a store that is full or refuses a write, before any work.
+
+        Args:
+            room_mb: What must be free on the disk of `here`, millions of bytes.
+        """
+        if room_mb:
+            self._require_room(room_mb)
         key = f"{TEMPORARY}{os.getpid()}"
         with _one_line(f"cannot write the store {self.root}"):
             self._place.put(key, b"robojackson " * 1024)
             self._place.remove(key)
+
+    def _require_room(self, room_mb: int) -> None:
+        there = next(path for path in (self.here, *self.here.parents) if path.exists())
+        with _one_line(f"cannot look at the disk of {self.here}"):
+            free_mb = shutil.disk_usage(there).free / 1e6
+        if free_mb < room_mb:
+            raise StoreError(
+                f"the disk of {self.here} has {free_mb:.1f} MB free, {room_mb} MB are needed: "
+                f"make room, or let {VARIABLE} name another folder"
+            )
 
 
 def _digest(content: bytes | Path) -> str:

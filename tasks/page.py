@@ -24,15 +24,16 @@ LEFT_OUT = ("video", "info")
 
 
 @stage()
-def page(made: dict[str, Artifact], move: str) -> dict[str, Artifact]:
+def page(made: dict[str, Artifact], move: str, title: str) -> dict[str, Artifact]:
     """Everything under `dances/<move>-<digest>/`, and `page`, which shows it.
 
     Args:
         made: What the other stages made, by name.
-        move: Name of the dance.
+        move: Name of the dance, for the folder.
+        title: The same for people.
     """
     store = Store.from_environment()
-    text = render(page_content(_results(store, made, move), made["dance"].name))
+    text = render(page_content(_results(store, made, title), made["dance"].name))
     digest = hashlib.sha256("".join(a.sha256 for a in made.values()).encode()).hexdigest()
     folder = f"dances/{move}-{digest[:8]}"
     kept = {
@@ -43,9 +44,9 @@ def page(made: dict[str, Artifact], move: str) -> dict[str, Artifact]:
     return {**kept, "page": store.put(f"{folder}/index.html", text.encode())}
 
 
-def _results(store: Store, made: Mapping[str, Artifact], move: str) -> Results:
+def _results(store: Store, made: Mapping[str, Artifact], title: str) -> Results:
     return Results(
-        title=move.replace("_", " "),
+        title=title.replace("_", " "),
         info=info_of(store, made["info"], Path(made["video"].name)),
         stability=tables.read(Stability, store, made["stability"]),
         sequence=tables.read(SmplSequence, store, made["smpl"]),

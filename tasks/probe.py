@@ -5,10 +5,10 @@ import math
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
+from robojackson.clips.span import span
 from robojackson.clips.video import VideoInfo, VideoLimits
 from robojackson.clips.video import probe as probe_file
 from robojackson.clips.video import trim as trim_file
-from robojackson.errors import BadConfiguration
 from storage.artifact import Artifact, sha256_of_file
 from storage.store import Store
 from tasks.caching import stage
@@ -41,11 +41,7 @@ def probe(
     if start_s is None and end_s is None:
         return _keep(store, source.path, probe_file(source.path, limits))
     whole = probe_file(source.path, replace(limits, max_duration_s=math.inf))
-    begin, end = start_s or 0.0, min(end_s or math.inf, whole.duration_s)
-    if begin >= end:
-        raise BadConfiguration(
-            f"{source.path}: no range from {begin:g} s to {end:g} s in {whole.duration_s:.2f} s"
-        )
+    begin, end = span(whole, limits, start_s, end_s)
     with store.scratch() as folder:
         clip = trim_file(source.path, begin, end, folder / f"{source.path.stem}.mp4")
         return _keep(store, clip, probe_file(clip, limits))

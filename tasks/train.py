@@ -26,6 +26,7 @@ from robojackson.errors import TrainingFailed
 from robojackson.retarget.robot import RobotDescription
 from robojackson.rl.config import TrainConfig
 from storage.artifact import Artifact
+from storage.lock import locked
 from storage.store import Store
 from tasks.caching import identity, stage
 
@@ -61,6 +62,8 @@ async def train(
 
     Args:
         deadline: Unix time at which the budget ends in any case, seconds.
+    Raises:
+        StoreError: the same training is running already.
     """
     store = Store.from_environment()
     facts = json.dumps(identity([reference, robot, config]), sort_keys=True)
@@ -68,15 +71,15 @@ async def train(
     run_id = f"{labels.move}-{labels.setup}-s{config.seed}-{digest}"
     work = store.work(f"train-{digest}")
     minutes = _minutes(config, deadline)
-    with store.local(reference) as path:
+    with locked(work, "task.lock"), store.local(reference) as path:
         command = _command(path, work, config, labels, run_id, minutes)
         answer = await run_process(command, run_id, work, minutes)
-    kept = {
-        "training": store.keep("train", "training.json", _facts(answer, labels)),
-        "policy": store.keep("train", "policy.safetensors", work / "policy.safetensors"),
-        "episodes": store.keep("train", "episodes.parquet", work / "episodes.parquet"),
-    }
-    shutil.rmtree(work, ignore_errors=True)
+        kept = {
+            "training": store.keep("train", "training.json", _facts(answer, labels)),
+            "policy": store.keep("train", "policy.safetensors", work / "policy.safetensors"),
+            "episodes": store.keep("train", "episodes.parquet", work / "episodes.parquet"),
+        }
+        shutil.rmtree(work, ignore_errors=True)
     return kept
 
 

@@ -17,9 +17,14 @@ from av.video.stream import VideoStream
 from pydantic import ConfigDict
 from pydantic.dataclasses import dataclass
 
-from robojackson.errors import TrackTooShort, TruncatedVideo, UnreadableVideo, VideoTooLong
+from robojackson.errors import (
+    TrackTooShort,
+    TruncatedVideo,
+    UnreadableVideo,
+    VideoTooLong,
+)
 
-SUFFIXES = (".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi")
+SUFFIXES = (".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi", ".gif")
 ISO_MEDIA_MARK = b"ftyp"
 TIME_TOLERANCE_S = 1e-6
 MISSING_FRAMES_ALLOWED = 2
@@ -98,7 +103,7 @@ def probe(path: Path, limits: VideoLimits) -> VideoInfo:
     fps = float(rate)
     upright = (first.height, first.width) if rotation % 180 else (first.width, first.height)
     info = VideoInfo(path, *upright, fps, frames, frames / fps, rotation)
-    _require_within(info, limits)
+    require_within(info, limits)
     return info
 
 
@@ -174,6 +179,8 @@ def _upright(frame: VideoFrame) -> np.ndarray:
 
 
 def _open(path: Path) -> av.container.InputContainer:
+    if path.is_dir():
+        raise UnreadableVideo(f"{path}: a folder, expected one video")
     if not path.is_file():
         raise UnreadableVideo(f"{path}: no such file")
     if path.stat().st_size == 0:
@@ -220,7 +227,8 @@ def _require_whole(path: Path, frames: int, promised: int) -> None:
         )
 
 
-def _require_within(info: VideoInfo, limits: VideoLimits) -> None:
+def require_within(info: VideoInfo, limits: VideoLimits) -> None:
+    """Raise `VideoTooLong` or `TrackTooShort` where a video is outside the limits."""
     if info.duration_s > limits.max_duration_s:
         raise VideoTooLong(
             f"{info.path}: {info.duration_s:.1f} s is longer than the limit of "

@@ -49,7 +49,13 @@ _FORMS: Mapping[str, _Form] = {
     "seconds": _Form("length", "s", 2),
     "steps": _Form("control steps"),
     "cyclic": _Form("cyclic"),
-    "keypoint_mm": _Form("keypoint error", "mm", 1, meaning="robot against its targets"),
+    "keypoint_mm": _Form(
+        "keypoint error", "mm", 1, meaning="robot against the dancer's own motion"
+    ),
+    "keypoint_leaned_mm": _Form(
+        "keypoint error, leaned", "mm", 1, meaning="against leaned targets"
+    ),
+    "lean_deg": _Form("lean of the targets", "deg", 1, meaning="to bring the body over the feet"),
     "keypoint_p95_mm": _Form("keypoint error, 95th percentile", "mm", 1),
     "bone_deg": _Form("bone direction error", "deg", 1),
     "limit_violations": _Form("joint limit violations", meaning="must be 0"),
@@ -69,6 +75,8 @@ _FORMS: Mapping[str, _Form] = {
     "skill": _Form("skill", "", 2),
     "site_error_m": _Form("site error", "mm", 0, 1000.0),
     "limb_gain": _Form("limb gain", "", 2),
+    "drift_m": _Form("drift", "m", 2),
+    "heading_error_deg": _Form("heading error", "deg", 1),
     "rollouts": _Form("rollouts"),
 }
 _FLAGS = ("cyclic",)
@@ -89,9 +97,17 @@ def written(key: str, value: Any) -> str:
         return "–"
     if not isinstance(value, int | float):
         return str(value)
-    number = f"{value * form.factor:,.{form.digits}f}" if key in _FORMS else f"{value:,.4g}"
+    number = decimal(value * form.factor, form.digits) if key in _FORMS else f"{value:,.4g}"
     space = "" if form.unit == "%" else " "
     return f"{number}{space}{form.unit}".strip()
+
+
+def decimal(value: float, digits: int) -> str:
+    """A number with a real minus sign, and none before a zero."""
+    text = f"{value:,.{digits}f}"
+    if not text.startswith("-"):
+        return text
+    return f"\N{MINUS SIGN}{text[1:]}" if text.strip("-0.,") else text[1:]
 
 
 def facts(values: Mapping[str, Any], only: tuple[str, ...] = ()) -> list[Fact]:

@@ -16,7 +16,8 @@ import jinja2
 from robojackson.report.facts import Fact, facts, written
 
 VERDICT_COLUMNS = (
-    "survived_s", "success", "strict_success", "skill", "site_error_m", "limb_gain",
+    "survived_s", "success", "strict_success", "skill", "site_error_m", "limb_gain", "drift_m",
+    "heading_error_deg",
 )  # fmt: skip
 POLICY_TITLES: Mapping[str, tuple[str, str]] = {
     "trained": ("trained robot", ""),
@@ -26,7 +27,8 @@ POLICY_TITLES: Mapping[str, tuple[str, str]] = {
     "random": ("random", "random corrections to the reference's angles"),
 }
 SCORECARD_LINES = (
-    "seconds", "cyclic", "keypoint_mm", "keypoint_p95_mm", "bone_deg", "limit_violations",
+    "seconds", "cyclic", "keypoint_mm", "keypoint_p95_mm", "keypoint_leaned_mm", "lean_deg",
+    "bone_deg", "limit_violations",
     "nan_count", "floor_penetration_mm", "self_penetration_mm", "planted_slip_cm_s",
     "contact_share", "joint_speed_max_rad_s", "torque_ratio_p95", "torque_over_share", "seam_deg",
 )  # fmt: skip
@@ -132,14 +134,20 @@ def _headline(evaluation: Mapping[str, Any]) -> str:
         return f"{said}."
     name = max(baselines, key=lambda key: baselines[key]["success"])
     best = POLICY_TITLES.get(name, (name, ""))[0]
-    return f"{said}; the best baseline ({best}) {written('success', baselines[name]['success'])}."
+    theirs, ours = baselines[name]["success"], evaluation["success"]
+    if theirs < ours:
+        return f"{said}; the best baseline ({best}) {written('success', theirs)}."
+    how = "as well" if theirs == ours else "better"
+    return (
+        f"{said}; a baseline that learnt nothing ({best}) does {how}: {written('success', theirs)}."
+    )
 
 
 def _tiles(evaluation: Mapping[str, Any]) -> list[Fact]:
     meanings = {
         "success": "no fall in a whole rollout",
         "survived_s": "mean time before a fall",
-        "skill": "1 is perfect, 0 is a statue",
+        "skill": "1 is perfect, 0 is the best frozen pose",
         "site_error_m": "mean distance of 14 points",
         "limb_gain": "1 is the whole amplitude",
     }

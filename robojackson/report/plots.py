@@ -1,4 +1,4 @@
-"""Plots of one run: training, evaluation, contacts and tracking, as matplotlib figures.
+"""Plots of one run: training, evaluation, contacts, torques and tracking, as matplotlib figures.
 
 Colours and texts are readable on white and on black: the page shows them on either. Rows are
 dictionaries with the columns of EpisodeRecord and EvaluationRecord (architecture page).
@@ -12,10 +12,13 @@ import numpy as np
 from jaxtyping import Float, Int
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.motion.smpl import CONTACT_POINTS, SmplSequence
+from robojackson.report.facts import decimal
 
 Row = Mapping[str, Any]
 INK = "#8a919c"
@@ -26,6 +29,9 @@ BASELINE_COLOURS = {
 TRAINED = "trained"
 BINS = 60
 TRACKED_JOINTS = 6
+TORQUE_SHOWN = 2.0
+"""Torques beyond this many limits have the colour of this many."""
+TORQUE_COLOURS = ((0.0, "#8080801a"), (0.5, ACCENT), (0.5, SECOND), (1.0, "#b3123a"))
 STATE_COLOURS = {0: (0.5, 0.5, 0.5, 0.15), 1: (0.25, 0.68, 0.42, 0.95), 2: (0.96, 0.62, 0.26, 0.95)}
 """Air, planted, sliding."""
 
@@ -54,7 +60,8 @@ def survival_by_phase(rows: Sequence[Row], dt: float) -> Figure:
         mean = [np.mean([r["survived_s"] for r in chosen if r["phase"] == p]) for p in phases]
         if policy == TRAINED:
             width = 0.8 * dt * float(np.diff(phases).min()) if len(phases) > 1 else 0.1
-            axes.bar(phases * dt, mean, width=width, color=ACCENT, label="trained robot")
+            place = phases * dt
+            axes.bar(place, mean, width, align="edge", color=ACCENT, label="trained robot")
         else:
             colour = BASELINE_COLOURS.get(policy, INK)
             axes.plot(phases * dt, mean, ".-", lw=1, color=colour, label=policy.replace("_", " "))
@@ -71,9 +78,9 @@ def limb_gains(summary: Mapping[str, Any]) -> Figure:
     gains = {k.removeprefix(prefix): float(v) for k, v in summary.items() if k.startswith(prefix)}
     names = [name.replace("_", " ") for name in gains]
     values = np.nan_to_num(np.array(list(gains.values())))
-    axes.barh(names, values, color=[SECOND if "right" in name else ACCENT for name in gains])
+    axes.barh(names, values, color=[_side_colour(name) for name in gains])
     for index, value in enumerate(gains.values()):
-        text = f"{value:.2f}" if np.isfinite(value) else "does not move in the reference"
+        text = decimal(value, 2) if np.isfinite(value) else "does not move in the reference"
         axes.text(max(value, 0.0) if np.isfinite(value) else 0.0, index, f" {text}", va="center",
                   color=INK, fontsize=8)  # fmt: skip
     axes.axvline(1.0, color=INK, lw=1, ls="--")
@@ -93,6 +100,32 @@ def contact_strip(sequence: SmplSequence, reference: ReferenceMotion) -> Figure:
     human.set_title("person", loc="left", fontsize=9, color=INK)
     robot.set_title("reference robot", loc="left", fontsize=9, color=INK)
     robot.set_xlabel("s      green: planted, orange: sliding, grey: in the air")
+    return figure
+
+
+def torque_heat_map(reference: ReferenceMotion, motors: Sequence[str]) -> Figure:
+    """|torque| over its limit, a row a motor: blue within the limit, orange to red beyond.
+
+    Args:
+        motors: Names of the hinges that have a motor, as the columns of `torque_ratio`.
+    """
+    ratio = np.asarray(reference.torque_ratio).T
+    figure, (axes,) = _figure(7.0, 0.8 + 0.2 * len(motors))
+    colours = LinearSegmentedColormap.from_list("torque", list(TORQUE_COLOURS))
+    extent = (0.0, len(reference) * reference.dt, len(motors) - 0.5, -0.5)
+    picture = axes.imshow(ratio, aspect="auto", interpolation="nearest", extent=extent,
+                          cmap=colours, vmin=0.0, vmax=TORQUE_SHOWN)  # fmt: skip
+    over = 100.0 * (ratio > 1.0).mean(axis=1)
+    axes.set_yticks(
+        range(len(motors)),
+        [
+            f"{name.replace('_', ' ')}  {share:.0f} %"
+            for name, share in zip(motors, over, strict=True)
+        ],
+    )
+    axes.set_xlabel("s      names: share of the time over the limit")
+    axes.grid(visible=False)
+    _torque_bar(figure, picture, bool((ratio > TORQUE_SHOWN).any()))
     return figure
 
 
@@ -163,6 +196,19 @@ def _strip(axes: Axes, contact: Int[np.ndarray, "T C"], names: Iterable[str], en
     axes.imshow(picture, aspect="auto", interpolation="nearest", extent=extent)
     axes.set_yticks(range(len(labels)), labels)
     axes.grid(visible=False)
+
+
+def _torque_bar(figure: Figure, picture: AxesImage, cut: bool) -> None:
+    bar = figure.colorbar(picture, extend="max" if cut else "neither", pad=0.02)
+    bar.set_label("|torque| / limit", color=INK, fontsize=8)
+    bar.ax.tick_params(colors=INK, labelsize=8)
+
+
+def _side_colour(name: str) -> str:
+    """Left blue, right orange, the head neither."""
+    if "right" in name:
+        return SECOND
+    return ACCENT if "left" in name else GOOD
 
 
 def _legend(axes: Axes) -> None:

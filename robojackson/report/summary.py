@@ -110,7 +110,10 @@ def _plots(results: Results) -> list[Plot]:
         made.append(_plot("Survival by start phase", caption, figure))
     if any(key.startswith("limb_gain_") for key in results.evaluation):
         figure = plots.limb_gains(results.evaluation)
-        caption = "Velocity of hands and feet along the reference's, pelvis frame."
+        caption = (
+            "Velocity of head, hands and feet along the reference's, pelvis frame: "
+            "left blue, right orange, head green."
+        )
         made.append(_plot("How lively the limbs are", caption, figure))
     if results.rollout_qpos is not None and len(results.rollout_qpos):
         figure = plots.joint_tracking(reference, results.rollout_qpos)

@@ -79,6 +79,20 @@ def test_a_value_out_of_its_range_is_refused(write) -> None:
         loader.load(Outer, write("seed: -1"))
 
 
+@pytest.mark.parametrize("key", ["sed", "inner.widht", "inner.widht.more"])
+def test_a_bad_override_is_blamed_on_itself_and_not_on_the_file(write, key: str) -> None:
+    with pytest.raises(BadConfiguration) as caught:
+        loader.load(Outer, write("seed: 1"), {"inner.cyclic": "no", key: "3"})
+    assert str(caught.value).startswith(f"--set {key}: unknown key")
+
+
+def test_a_bad_file_is_blamed_though_an_override_was_given(write) -> None:
+    given = write("sed: 1")
+    with pytest.raises(BadConfiguration) as caught:
+        loader.load(Outer, given, {"inner.cyclic": "no"})
+    assert str(caught.value).startswith(f"{given}: ")
+
+
 def test_yes_and_no_are_words(write) -> None:
     assert loader.load(Outer, write("inner: {cyclic: yes}")).inner.cyclic == "yes"
 

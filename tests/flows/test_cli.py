@@ -15,6 +15,7 @@ from flows.cli import app
 from flows.console import lines, plain
 from tests.flows.conftest import ROOT, environment, robojackson
 
+HIPS = ROOT / "clips" / "hip_shake.mp4"
 COMMANDS = ["dance", "score", "mocap", "retarget", "train", "evaluate", "doctor"]
 
 
@@ -83,10 +84,6 @@ def missing_table(folder: Path) -> list[object]:
     return ["train", folder / "reference.parquet", "-o", folder / "out", "--steps", "10"]
 
 
-def dance_by_name(folder: Path) -> list[object]:
-    return ["dance", "moonwalk"]
-
-
 def missing_file(folder: Path) -> list[object]:
     return ["dance", folder / "gone.mp4"]
 
@@ -103,7 +100,6 @@ def missing_file(folder: Path) -> list[object]:
         (unwritable_folder, "StoreError"),
         (foreign_table, "smpl.parquet: not a Parquet file"),
         (missing_table, "reference.parquet: no such file"),
-        (dance_by_name, "'moonwalk' is no file"),
         (missing_file, "gone.mp4: no such file"),
     ],
 )
@@ -123,6 +119,50 @@ def test_a_clip_without_a_person_has_a_score(tmp_path: Path) -> None:
         33 * 5,
         "no person found in 5 of 5 frames",
     )
+
+
+def test_a_readable_video_is_scored_beside_one_that_is_not(tmp_path: Path) -> None:
+    (tmp_path / "more").mkdir()
+    write_video(tmp_path / "more" / "empty.mp4", 5)
+    (tmp_path / "notes.mp4").write_text("this is not a video")
+    code, out, _ = invoke("score", tmp_path / "notes.mp4", tmp_path / "more", "--json")
+    told = [set(video) & {"error", "stability_score"} for video in json.loads(out)["videos"]]
+    assert (code, told) == (0, [{"error"}, {"stability_score"}])
+
+
+@pytest.mark.parametrize("make", [nobody, one_frame, unknown_robot])
+def test_a_command_that_failed_leaves_no_folder(make, tmp_path: Path) -> None:
+    invoke(*make(tmp_path))
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_is_said_of_a_clip_without_a_person_names_it(tmp_path: Path) -> None:
+    assert f"{tmp_path / 'empty.mp4'}: no person found" in invoke(*nobody(tmp_path))[2]
+
+
+def test_a_folder_is_not_one_video(tmp_path: Path) -> None:
+    assert "a folder, expected one video" in invoke("mocap", tmp_path, "-o", tmp_path / "out")[2]
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["notes.mp4"], "notes.mp4: not a video"),
+        (["."], "notes.mp4: not a video"),
+        ([HIPS, "--robot", "nao"], "unknown robot 'nao'"),
+        ([HIPS, "--set", "train.sede=3"], "--set train.sede: unknown key"),
+        ([HIPS, "--start", "1", "--end", "0"], "no range from 1 s to 0 s"),
+    ],
+)
+def test_dance_refuses_bad_input_before_prefect_starts(
+    words: list[object], told: str, monkeypatch, tmp_path: Path
+) -> None:
+    (tmp_path / "notes.mp4").write_text("this is not a video")
+    monkeypatch.chdir(tmp_path)
+    code, _, err = invoke("dance", *words)
+    assert (code, len(err.splitlines())) == (1, 1)
+    assert told in err
+    assert not (tmp_path / "store").exists()
 
 
 def test_a_full_store_is_told_before_any_work(monkeypatch, tmp_path: Path) -> None:

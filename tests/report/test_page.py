@@ -78,11 +78,35 @@ def test_headline_names_the_best_baseline() -> None:
     assert "finished 62% of 73 rollouts without a fall; the best baseline (statue) 3%." in html
 
 
+@pytest.mark.parametrize(
+    ("success", "told"),
+    [(0.62, "(statue) does as well: 62%."), (0.9, "(statue) does better: 90%.")],
+)
+def test_headline_says_when_learning_gained_nothing(success: float, told: str) -> None:
+    baselines = {"statue": {**SUMMARY["baselines"]["statue"], "success": success}}
+    html = render(PageContent(title="x", evaluation={**SUMMARY, "baselines": baselines}))
+    assert told in html
+
+
+@pytest.mark.parametrize("figure", ["lean_deg", "keypoint_leaned_mm"])
+def test_the_lean_of_the_targets_is_shown(figure: str) -> None:
+    html = render(PageContent(title="x", scorecard={figure: 4.25}))
+    assert f"<dd>{written(figure, 4.25)}</dd>" in html
+
+
+@pytest.mark.parametrize(
+    ("figure", "told"), [("drift_m", "0.25 m"), ("heading_error_deg", "0.2 deg")]
+)
+def test_where_the_robot_ends_up_is_shown(figure: str, told: str) -> None:
+    html = render(PageContent(title="x", evaluation={**SUMMARY, figure: 0.249}))
+    assert f"<td>{told}</td>" in html
+
+
 def test_missing_figure_is_a_dash() -> None:
     html = render(PageContent(title="x", evaluation=SUMMARY))
     row = re.search(r"statue.*?</tr>", html[html.index("<tbody>") :], re.S)
     assert row is not None
-    assert row.group().count("<td>–</td>") == 4
+    assert row.group().count("<td>–</td>") == 6
 
 
 def test_page_before_training_has_no_verdict() -> None:
@@ -109,6 +133,8 @@ def test_written_page_is_whole(results: Results, tmp_path: Path) -> None:
         ("skill", float("nan"), "–"),
         ("cyclic", 1.0, "yes"),
         ("trainer", "sbx", "sbx"),
+        ("skill", -0.001, "0.00"),
+        ("skill", -0.25, "\N{MINUS SIGN}0.25"),
     ],
 )
 def test_figures_are_written_with_their_units(key: str, value: object, text: str) -> None:
@@ -127,6 +153,12 @@ def test_versions_leave_out_what_is_not_installed() -> None:
 def test_survival_bars_are_means_over_resets(results: Results) -> None:
     axes = plots.survival_by_phase(results.evaluations, 0.015).axes[0]
     assert [bar.get_height() for bar in axes.patches] == [6.0, 6.0, 6.0]
+
+
+def test_survival_bars_begin_at_their_phase(results: Results) -> None:
+    rows = [row for row in results.evaluations if row["phase"] in (0, 18)]
+    axes = plots.survival_by_phase(rows, 0.015).axes[0]
+    np.testing.assert_allclose([bar.get_x() for bar in axes.patches], [0.0, 0.27])
 
 
 def test_default_stand_is_no_phase(results: Results) -> None:

@@ -2,6 +2,7 @@
 
 import errno
 import resource
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -142,6 +143,16 @@ def test_a_full_remote_disk_is_one_line_and_leaves_nothing() -> None:
 def test_a_full_store_is_told_before_any_work() -> None:
     with pytest.raises(StoreError, match=r"^cannot write the store fulldisk://dances: No space"):
         Store("fulldisk://dances").require_writable()
+
+
+def test_a_disk_with_too_little_room_is_told_with_both_figures(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    usage = shutil.disk_usage(tmp_path)._replace(free=12_300_000)
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: usage)
+    with pytest.raises(StoreError, match=r"has 12\.3 MB free, 200 MB are needed"):
+        Store(tmp_path / "store").require_writable(room_mb=200)
+    assert files_under(tmp_path) == []
 
 
 def test_an_unwritable_root_is_one_line(tmp_path: Path) -> None:

@@ -1,0 +1,39 @@
+"""Options that several commands of `robojackson` share, and how they override a configuration."""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import typer
+
+from robojackson.errors import BadConfiguration
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+Config = Annotated[str, typer.Option("--config", help="Name or path of a configuration.")]
+Set = Annotated[
+    list[str] | None, typer.Option("--set", help="Change one value: --set train.seed=3.")
+]
+SetTrain = Annotated[
+    list[str] | None, typer.Option("--set", help="Change one value: --set seed=3.")
+]
+Folder = Annotated[Path, typer.Option("-o", "--out", help="Folder for the results.")]
+Robot = Annotated[str, typer.Option("--robot", help="Name of a robot of configs/robots.")]
+Trainer = Annotated[
+    Literal["sbx", "sb3"] | None, typer.Option(help="sbx (JAX, fast) or sb3 (the reference).")
+]
+Seed = Annotated[int | None, typer.Option(min=0, help="Seed of the training.")]
+Minutes = Annotated[float | None, typer.Option(min=0.01, help="Wall time, minutes.")]
+TrainMinutes = Annotated[
+    float | None,
+    typer.Option(min=0.01, help="Wall time, minutes; 9 where neither it nor --steps is given."),
+]
+
+
+def chosen(pairs: list[str] | None, given: dict[str, Any] | None = None) -> dict[str, Any]:
+    """`--set key=value` pairs and options that were given, as one mapping."""
+    overrides = {key: value for key, value in (given or {}).items() if value is not None}
+    for pair in pairs or []:
+        key, equals, value = pair.partition("=")
+        if not equals or not key:
+            raise BadConfiguration(f"--set {pair}: expected KEY=VALUE; --help has an example")
+        overrides[key] = value
+    return overrides

@@ -1,0 +1,78 @@
+"""The commands that look for dances: find, refresh and catalogue.
+
+Like `flows.cli`, each imports what it needs inside itself.
+"""
+
+from typing import Annotated
+
+import typer
+
+from flows.console import Answer, command, log_to_stderr
+from flows.options import Json, Set, chosen
+
+
+@command
+def find(
+    query: Annotated[str, typer.Argument(help="A dance; or the folder, or list, of the source.")],
+    top: Annotated[int | None, typer.Option(min=1, help="How many videos to judge.")] = None,
+    source: Annotated[str, typer.Option(help="youtube, folder, urls, site or server.")] = "youtube",
+    address: Annotated[
+        str, typer.Option(help="Of the folder, list, site ({query} stands for it) or server.")
+    ] = "",
+    config: Annotated[str, typer.Option(help="Name or path of a configuration.")] = "finding",
+    set_: Set = None,
+    as_json: Json = False,
+) -> Answer:
+    """The videos of a dance, ranked: Algorithm 1, and why others are rejected."""
+    from flows import ranking
+    from flows.environment import prepare
+    from storage.store import Store
+
+    prepare(Store.from_environment())
+    from flows.find import look_for
+
+    found = look_for(query, source, address, top, config, chosen(set_))
+    return Answer(found, text=[*ranking.lines(found["candidates"]), found["summary"]])
+
+
+@command
+def refresh(
+    dances: Annotated[
+        list[str] | None, typer.Argument(help="Names in configs/dances.yaml; else all that are due")
+    ] = None,
+    config: Annotated[str, typer.Option(help="Configuration of the search.")] = "finding",
+    set_: Set = None,
+    as_json: Json = False,
+) -> Answer:
+    """The nightly run, now: for every dance the best new video, up to the robot's motion."""
+    from flows.environment import prepare
+    from storage.store import Store
+
+    prepare(Store.from_environment())
+    from flows.refresh import run
+
+    done = run(dances or None, config, chosen(set_))
+    return Answer(done, code=1 if done["failed"] and not done["dances"] else 0)
+
+
+@command
+def catalogue(
+    dance: Annotated[str | None, typer.Option(help="Only this dance.")] = None,
+    sql: Annotated[
+        str | None, typer.Option(help="A question to DuckDB about the table `candidates`.")
+    ] = None,
+    as_json: Json = False,
+) -> Answer:
+    """Every video that was ever judged, and why it was danced or not."""
+    from flows import console, ranking
+    from storage import candidates
+    from storage.store import Store
+
+    log_to_stderr()
+    store = Store.from_environment()
+    if sql is not None:
+        found = candidates.query(store, sql)
+        named = {str(number): row for number, row in enumerate(found, 1)}
+        return Answer({"rows": found}, text=console.table(named, list(found[0]) if found else []))
+    rows = candidates.records(store, dance)
+    return Answer({"candidates": rows}, text=ranking.lines(rows))

@@ -1,0 +1,25 @@
+"""The range of a video that a user means."""
+
+from dataclasses import replace
+
+from robojackson.clips.video import VideoInfo, VideoLimits, require_within
+from robojackson.errors import BadConfiguration
+
+
+def span(
+    info: VideoInfo, limits: VideoLimits, start_s: float | None, end_s: float | None
+) -> tuple[float, float]:
+    """The range of a video that is meant, seconds; an end beyond the video is the video's.
+
+    Raises:
+        BadConfiguration: nothing is in it.
+        VideoTooLong: it is longer than the limit.
+    """
+    begin = start_s or 0.0
+    end = info.duration_s if end_s is None else min(end_s, info.duration_s)
+    if begin >= end:
+        raise BadConfiguration(
+            f"{info.path}: no range from {begin:g} s to {end:g} s in {info.duration_s:.2f} s"
+        )
+    require_within(replace(info, duration_s=end - begin), limits)
+    return begin, end

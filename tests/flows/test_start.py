@@ -1,0 +1,51 @@
+"""Words that are not understood, and Ctrl-C before anything began, get one line."""
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.flows.conftest import environment
+
+COMMAND = (sys.executable, "-m", "flows.cli")
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (["danse"], "danse"),
+        (["dance", "--minutes", "soon"], "'soon'"),
+        (["dance", "--seed=-1"], "'-1'"),
+        (["dance", "--trainer", "sbxx"], "'sbxx'"),
+        (["dance", "--sed", "3"], "--sed"),
+        (["train", "reference.parquet"], "--out"),
+    ],
+)
+def test_a_wrong_word_is_named_in_one_line(words: list[str], named: str, tmp_path: Path) -> None:
+    done = subprocess.run(
+        [*COMMAND, *words], capture_output=True, text=True, env=environment(), check=False,
+        cwd=tmp_path,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout) == (2, "")
+    assert len(done.stderr.splitlines()) == 1
+    assert named in done.stderr
+
+
+def test_ctrl_c_while_the_command_is_imported_is_one_line() -> None:
+    code = (
+        "import signal, sys\n"
+        "class Struck:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name == 'typer':\n"
+        "            signal.raise_signal(signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Struck())\n"
+        "import runpy\n"
+        "runpy.run_module('flows.cli', run_name='__main__')\n"
+    )
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env=environment(), check=False
+    )
+    assert (done.returncode, done.stderr) == (130, "robojackson: interrupted\n")

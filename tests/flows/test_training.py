@@ -1,0 +1,53 @@
+"""What the training process says, takes for granted and leaves behind."""
+
+from pathlib import Path
+
+import pytest
+
+from flows import single, training
+from robojackson.errors import RejectedReference
+from robojackson.rl import train as learning
+from robojackson.rl.config import TrainConfig
+
+NAN = float("nan")
+ROW = {"steps": 1000, "steps_per_s": 500.0, "survived_s": NAN, "site_error_m": NAN}
+ROW |= {"episode_return": NAN, "seconds_left": 65.0}
+
+
+@pytest.fixture
+def budgets(monkeypatch: pytest.MonkeyPatch) -> list[TrainConfig]:
+    """The configurations of trainings that are all refused."""
+    seen: list[TrainConfig] = []
+
+    def refuse(motion, robot, config: TrainConfig, *rest, **more) -> None:
+        seen.append(config)
+        raise RejectedReference("no")
+
+    monkeypatch.setattr(single, "read_table", lambda cls, path: None)
+    monkeypatch.setattr(single, "robot_of", lambda motion: None)
+    monkeypatch.setattr(learning, "train", refuse)
+    monkeypatch.setattr(training.signal, "signal", lambda *wish: None)
+    return seen
+
+
+def test_before_the_first_episode_there_are_dashes() -> None:
+    said = "    1,000 steps  500/s  survived - s  error - cm  return -  1:05 left"
+    assert training.status(ROW) == said
+
+
+def test_a_refused_training_leaves_nothing(budgets: list, tmp_path: Path) -> None:
+    with pytest.raises(RejectedReference):
+        training.train(tmp_path / "reference.parquet", tmp_path / "a" / "b", None, {})
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("given", "budget"),
+    [({}, (None, 9.0)), ({"steps": 10}, (10, None)), ({"minutes": 2.0}, (None, 2.0))],
+)
+def test_a_training_without_a_budget_gets_the_usual_one(
+    given: dict, budget: tuple, budgets: list[TrainConfig], tmp_path: Path
+) -> None:
+    with pytest.raises(RejectedReference):
+        training.train(tmp_path / "reference.parquet", tmp_path, None, given)
+    assert [(config.steps, config.minutes) for config in budgets] == [budget]
