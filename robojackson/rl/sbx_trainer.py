@@ -21,16 +21,14 @@ import numpy as np
 from sbx import TQC
 from sbx.common.type_aliases import ReplayBufferSamplesNp
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
 from robojackson.rl.config import TqcConfig
-from robojackson.rl.randomness import load_random, save_random
-from robojackson.rl.replay import buffer_of, load_replay, save_replay
+from robojackson.rl.off_policy import OffPolicyTrainer, arguments, filled
+from robojackson.rl.replay import buffer_of
 from robojackson.rl.trainer import Layers
 
 LOG_STD_RANGE = (-20.0, 2.0)
-FOREVER = 10**12
 
 
 class OverlappedTQC(TQC):
@@ -63,7 +61,7 @@ class OverlappedTQC(TQC):
 
     def train(self, gradient_steps: int, batch_size: int) -> None:
         """Wait for the round before, take its actor, and dispatch the next round."""
-        if buffer_of(self).size() * self.n_envs < self.refill:
+        if not filled(self, self.refill):
             return
         self._acting = actor_layers(self.policy.actor_state.params)
         samples = buffer_of(self).sample(batch_size * gradient_steps)
@@ -102,55 +100,27 @@ def actor_layers(params: Any) -> Layers:
     return tuple((np.asarray(tree[n]["kernel"]), np.asarray(tree[n]["bias"])) for n in names)
 
 
-class SbxTrainer:
+class SbxTrainer(OffPolicyTrainer):
     """The JAX trainer (`Trainer` protocol)."""
 
     def __init__(self, env: VecEnv, config: TqcConfig, seed: int) -> None:
-        self._refill = min(config.refill, config.buffer)
-        self.model = OverlappedTQC(
-            "MlpPolicy",
-            env,
-            learning_rate=config.learning_rate,
-            buffer_size=config.buffer,
-            learning_starts=config.warmup,
-            batch_size=config.batch,
-            tau=config.tau,
-            gamma=config.gamma,
-            train_freq=config.steps_per_round,
-            gradient_steps=config.updates_per_round,
-            policy_delay=config.policy_delay,
-            ent_coef=config.entropy,
-            top_quantiles_to_drop_per_net=config.top_quantiles_to_drop,
-            policy_kwargs={
-                "n_critics": config.critics,
-                "n_quantiles": config.quantiles,
-                "net_arch": {"pi": list(config.actor), "qf": list(config.critic)},
-            },
-            seed=seed,
-        )
-        self.model.set_logger(Logger(folder=None, output_formats=[]))
+        model = OverlappedTQC(env=env, policy_delay=config.policy_delay, **arguments(config, seed))
+        super().__init__(model, config, {"noise": model.noise})
 
     def learn(self, callback: BaseCallback) -> None:
-        self.model.learn(
-            FOREVER, callback=callback, log_interval=FOREVER, reset_num_timesteps=False
-        )
+        try:
+            super().learn(callback)
+        finally:  # a round that XLA still computes when Python ends would crash it
+            jax.block_until_ready(self._state())
 
     def layers(self) -> Layers:
         layers = actor_layers(self.model.policy.actor_state.params)
         return layers[:-1]
 
-    def steps(self) -> int:
-        return self.model.num_timesteps
-
-    def updates(self) -> int:
-        return self.model._n_updates
-
     def save(self, folder: Path, with_replay: bool) -> None:
         state = flax.serialization.to_bytes(self._state())
         (folder / "networks.msgpack").write_bytes(state)
-        save_random(folder / "random.json", {"noise": self.model.noise})
-        if with_replay:
-            save_replay(buffer_of(self.model), folder / "replay.npz")
+        self._save_rest(folder, with_replay)
 
     def load(self, folder: Path, steps: int, updates: int) -> None:
         saved = (folder / "networks.msgpack").read_bytes()
@@ -159,17 +129,12 @@ class SbxTrainer:
         policy.actor_state, policy.qf1_state = state["actor"], state["critic1"]
         policy.qf2_state, self.model.ent_coef_state = state["critic2"], state["entropy"]
         self.model.key = jax.numpy.asarray(state["key"])
-        self.model.num_timesteps, self.model._n_updates = steps, updates
         self.model._acting = actor_layers(policy.actor_state.params)
-        load_random(folder / "random.json", {"noise": self.model.noise})
-        if (folder / "replay.npz").exists():
-            load_replay(buffer_of(self.model), folder / "replay.npz")
-        else:
-            self.model.refill = self._refill
+        self._load_rest(folder, steps, updates)
 
     def _state(self) -> dict[str, Any]:
         policy = self.model.policy
-        return {
+        return {  # everything that a round of updates computes
             "actor": policy.actor_state,
             "critic1": policy.qf1_state,
             "critic2": policy.qf2_state,

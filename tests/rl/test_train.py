@@ -4,6 +4,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import jax
 import numpy as np
 import pytest
 from stable_baselines3.common.callbacks import BaseCallback
@@ -15,6 +16,7 @@ from robojackson.rl.config import EvaluateConfig, TqcConfig, TrackConfig, TrainC
 from robojackson.rl.evaluate import STAND, evaluate
 from robojackson.rl.policy import load_policy
 from robojackson.rl.replay import buffer_of
+from robojackson.rl.run import Run
 from robojackson.rl.sbx_trainer import SbxTrainer
 from robojackson.rl.tracking import TrackingCore
 from robojackson.rl.train import TrainResult, train
@@ -212,6 +214,31 @@ def test_an_interrupted_run_keeps_its_replay_and_resumes(
     monkeypatch.setattr(SbxTrainer, "learn", spy)
     assert run(robot, sway, brief("sbx"), tmp_path).steps == 320
     assert found == [kept]
+
+
+def test_an_interrupted_run_leaves_no_round_computing(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """XLA computes in a thread of its own; Python crashes when it ends before that thread."""
+    states: list[SbxTrainer] = []
+    original = SbxTrainer.__init__
+
+    def spy(trainer: SbxTrainer, *args: object) -> None:
+        original(trainer, *args)  # type: ignore[arg-type]
+        states.append(trainer)
+
+    def interrupt(row: dict[str, float]) -> None:
+        if row["updates"] > 0:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(SbxTrainer, "__init__", spy)
+    monkeypatch.setattr(Run, "checkpoint", lambda run, with_replay: None)
+    slow = dataclasses.replace(SMALL, updates_per_round=2000, batch=256)
+    config = dataclasses.replace(brief("sbx"), tqc=slow, progress_seconds=1e-9)
+    with pytest.raises(KeyboardInterrupt):
+        train(sway, robot, config, tmp_path, progress=interrupt)
+    arrays = jax.tree_util.tree_leaves(states[0]._state())
+    assert all(array.is_ready() for array in arrays if isinstance(array, jax.Array))
 
 
 def test_a_run_without_a_budget_is_refused(
