@@ -6,7 +6,6 @@ and nowhere else; how a stage works is `robojackson`'s, how it is cached is `tas
 
 import asyncio
 import json
-import logging
 import signal
 import time
 from collections.abc import Mapping
@@ -24,6 +23,8 @@ from configs.loader import load
 from configs.pipeline import PipelineConfig
 from flows import console
 from flows.orphans import none_left
+from flows.single import VERDICT
+from flows.tracebacks import without_tracebacks
 from robojackson.clips.stability import Stability
 from robojackson.clips.video import list_videos
 from robojackson.errors import NoPersonFound, RoboJacksonError
@@ -76,8 +77,7 @@ def run(
     Raises:
         Interrupted: Ctrl-C; every stage that has ended is kept, and training left a checkpoint.
     """
-    for name in ("prefect.flow_runs", "prefect.task_runs"):
-        logging.getLogger(name).addFilter(_without_traceback)
+    without_tracebacks()
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's `&` takes it away
     try:
         with none_left():
@@ -235,16 +235,8 @@ def _rows(figures: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 def _verdicts(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
     """One row a policy."""
-    shown = ("survived_s", "success", "strict_success", "skill", "site_error_m", "limb_gain")
     policies = {"trained": summary, **summary["baselines"]}
     return [
-        {"policy": name, **{key: figures.get(key) for key in shown}}
+        {"policy": name, **{key: figures.get(key) for key in VERDICT}}
         for name, figures in policies.items()
     ]
-
-
-def _without_traceback(record: logging.LogRecord) -> bool:
-    """An error of the input is one line in the log."""
-    if record.exc_info and isinstance(record.exc_info[1], RoboJacksonError):
-        record.exc_info = None
-    return True

@@ -4,7 +4,6 @@ Entry point of the deployment: `flows.find.find`.
 """
 
 import asyncio
-import logging
 import uuid
 from collections.abc import Mapping
 from dataclasses import asdict, replace
@@ -19,13 +18,14 @@ from configs.dances import Dance, DanceBook
 from configs.finding import FindConfig
 from configs.loader import build, load
 from flows.entries import Entry, Hunt, rows, summary
-from flows.gallery import show
+from flows.gallery import show, slug_of
 from flows.hunt import bring, hunt
+from flows.tracebacks import without_tracebacks
 from robojackson.clips.candidate import VideoCandidate
 from robojackson.clips.sources import folder
 from robojackson.clips.sources import source as source_of
 from robojackson.clips.titles import clean_text
-from robojackson.errors import NoPersonFound, RoboJacksonError, SearchFailed
+from robojackson.errors import NoPersonFound, SearchFailed
 from storage import candidates
 from storage.artifact import Artifact
 from storage.store import Store
@@ -97,7 +97,7 @@ def clip_of(words: str, config: str = "finding", book: str = "dances") -> Path:
     chosen = asyncio.run(best(dance.name, asdict(dance), config))
     artifact = Artifact(**chosen)
     with store.local(artifact) as path:
-        kept = store.work("dances") / f"{run_name(dance.name)}{path.suffix}"
+        kept = store.work("dances") / f"{slug_of(dance.name)}{path.suffix}"
         kept.write_bytes(path.read_bytes())
     return kept
 
@@ -176,25 +176,6 @@ def answer(found: Hunt) -> dict[str, Any]:
     }
 
 
-def without_tracebacks() -> None:
-    """What is the input's fault is one line in Prefect's log."""
-    for name in ("prefect.flow_runs", "prefect.task_runs"):
-        logging.getLogger(name).addFilter(_one_line)
-
-
-def _one_line(record: logging.LogRecord) -> bool:
-    if record.exc_info and isinstance(record.exc_info[1], RoboJacksonError):
-        record.exc_info = None
-    return True
-
-
 def run_id(kind: str) -> str:
     """A name that no other run has."""
     return f"{kind}-{datetime.now(UTC):%Y%m%d-%H%M%S}-{uuid.uuid4().hex[:6]}"
-
-
-def run_name(name: str) -> str:
-    """A name as a file's."""
-    from flows.gallery import slug_of
-
-    return slug_of(name)

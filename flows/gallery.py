@@ -11,6 +11,7 @@ from prefect.artifacts import (
 
 from flows import ranking
 from robojackson.clips.titles import clean_text, in_markdown, web_address
+from storage.catalogue import safe_name
 
 
 async def show(name: str, rows: list[dict[str, Any]], chosen: dict[str, Any] | None) -> None:
@@ -29,4 +30,4 @@ async def show(name: str, rows: list[dict[str, Any]], chosen: dict[str, Any] | N
 
 def slug_of(name: str) -> str:
     """A name in the letters that a key of Prefect may have."""
-    return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-") or "dance"
+    return re.sub(r"[^a-z0-9]+", "-", safe_name(name).lower()).strip("-")

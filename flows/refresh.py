@@ -26,11 +26,10 @@ from flows.find import (
     nothing,
     of_candidate,
     run_id,
-    run_name,
-    without_tracebacks,
 )
-from flows.gallery import show
+from flows.gallery import show, slug_of
 from flows.hunt import hunt
+from flows.tracebacks import without_tracebacks
 from robojackson.clips.candidate import VideoCandidate
 from robojackson.clips.titles import clean_text
 from robojackson.errors import NoPersonFound, SearchFailed
@@ -179,7 +178,7 @@ def _note(dance: Dance, result: Facts) -> None:
 
 
 def _key(dance: Dance) -> str:
-    return f"{FOLDER}/{run_name(dance.name)}.json"
+    return f"{FOLDER}/{slug_of(dance.name)}.json"
 
 
 async def _tell(done: dict[str, Facts], failed: dict[str, str]) -> None:

@@ -69,3 +69,8 @@ def heading(q: Float[np.ndarray, "*B 4"]) -> np.ndarray:
     """Angle of the body's x axis about z, radians (yaw of the z-y-x decomposition)."""
     w, x, y, z = np.moveaxis(q, -1, 0)
     return np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+
+def wrapped(angle: np.ndarray) -> np.ndarray:
+    """The same angles in [-pi, pi), radians."""
+    return np.asarray((angle + np.pi) % (2 * np.pi) - np.pi)

@@ -16,6 +16,7 @@ from pydantic.dataclasses import dataclass as config_dataclass
 from scipy.ndimage import gaussian_filter1d
 
 from robojackson.errors import TrackTooShort
+from robojackson.geometry.rotations import wrapped
 from robojackson.mocap.skeleton import KEYPOINT_NAMES
 from robojackson.motion.smpl import SmplSequence
 from robojackson.retarget.human import HumanClip, at_steps, labels_at
@@ -126,7 +127,7 @@ def _seams(
     """Seam, metres, and heading change, radians, of the laps from one start."""
     seam = np.linalg.norm(pose[ends] - pose[start], axis=-1).mean(axis=1)
     seam += _SECONDS * np.linalg.norm(speed[ends] - speed[start], axis=-1).mean(axis=1)
-    return seam, np.abs(_wrapped(yaw[ends] - yaw[start]))
+    return seam, np.abs(wrapped(yaw[ends] - yaw[start]))
 
 
 def _limb_angle(a: Float[np.ndarray, "L 3"], b: Float[np.ndarray, "L 3"]) -> float:
@@ -168,10 +169,6 @@ def _turned(vectors: np.ndarray, angle: np.ndarray) -> np.ndarray:
     cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
     x, y, z = np.moveaxis(vectors, -1, 0)
     return np.stack([cosine * x - sine * y, sine * x + cosine * y, z], axis=-1)
-
-
-def _wrapped(angle: np.ndarray) -> np.ndarray:
-    return np.asarray((angle + np.pi) % (2 * np.pi) - np.pi)
 
 
 def _open_clip(sequence: SmplSequence, dt: float, tempo: float) -> HumanClip:
@@ -218,7 +215,7 @@ def close(
     """
     share = np.linspace(0.0, 1.0, len(points))
     yaw, ground = heading(points), _ground_point(points)
-    turn = _wrapped(yaw[-1] - yaw[0])
+    turn = wrapped(yaw[-1] - yaw[0])
     limbs = _turned(points - ground[:, None], -turn * share)
     limbs -= (share - 0.5)[:, None, None] * (limbs[-1] - limbs[0])
     travel = ground[-1] - ground[0]

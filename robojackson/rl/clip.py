@@ -41,7 +41,6 @@ class Clip:
         if not np.isfinite(reference.qpos).all() or not np.isfinite(reference.qvel).all():
             raise RejectedReference("the reference motion holds values that are no numbers")
         self.steps, self.cyclic, self.dt = len(reference), reference.cyclic, reference.dt
-        self.names = reference.keypoint_names
         self._qpos = np.asarray(reference.qpos, float)
         self._qvel = np.asarray(reference.qvel, float)
         self._points = np.asarray(reference.keypoints_w, float)
@@ -61,9 +60,11 @@ class Clip:
         """Whether a clip that is not cyclic has been danced to its end."""
         return np.zeros(len(step), bool) if self.cyclic else step >= self.steps - 1
 
-    def horizon(self, seconds: float) -> int:
-        """Steps of a rollout: the given time when cyclic, the whole clip otherwise."""
-        return round(seconds / self.dt) if self.cyclic else self.steps - 1
+    def horizon(self, start: Int[np.ndarray, " N"], seconds: float) -> Int[np.ndarray, " N"]:
+        """Steps of rollouts: the given time when cyclic, else from each start to the clip's end."""
+        if self.cyclic:
+            return np.full(len(start), round(seconds / self.dt))
+        return self.steps - 1 - start
 
     def _velocities(self) -> Float[np.ndarray, "S K 3"]:
         """Backward differences, as a simulation that is read once a step sees them."""

@@ -66,7 +66,7 @@ def evaluate(
     clip = Clip(reference)
     _tell_strangers(policy, reference)
     starts, labels = _starts(robot, clip, config)
-    horizon = _horizons(clip, starts, config)
+    horizon = clip.horizon(starts.step, config.seconds)
     judge = Judge(robot, reference, config)
     rows: list[dict[str, object]] = []
     summary: dict[str, object] = {}
@@ -200,13 +200,6 @@ def _starts(
     qpos, qvel = noisy(at.qpos, at.qvel, noise, np.random.default_rng(config.seed))
     qpos[-1], qvel[-1] = stand_at(default_stand(robot.model), at.qpos[-1, :7]), 0.0
     return Starts(step, qpos, qvel), labels
-
-
-def _horizons(clip: Clip, starts: Starts, config: EvaluateConfig) -> np.ndarray:
-    """Steps of each rollout: the given time when cyclic, else from the start to the clip's end."""
-    if clip.cyclic:
-        return np.full(len(starts.step), clip.horizon(config.seconds))
-    return clip.steps - 1 - starts.step
 
 
 def _shown(rollouts: Rollouts, starts: Starts) -> np.ndarray:

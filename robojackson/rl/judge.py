@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from robojackson.geometry.rotations import heading
+from robojackson.geometry.rotations import heading, wrapped
 from robojackson.metrics.rollout import (
     best_frozen_error,
     heading_frame,
@@ -19,6 +19,8 @@ from robojackson.rl.tracking import EXTREMITIES, FEET, PELVIS
 
 KNEES = ("left_knee", "right_knee")
 LIMB_ENDS = (*FEET, *EXTREMITIES)
+LEAST_MOVING_SHARE = 0.05
+"""Of the frames, below which no gain of a limb is told."""
 LEAST_TRAVEL_M = 0.5
 """Of the reference, below which no travel ratio is told, metres."""
 
@@ -79,7 +81,7 @@ class Judge:
         forward = float((went[1] - went[0]) @ (wanted[1] - wanted[0]))
         return {
             "drift_m": float(np.linalg.norm(went[1] - wanted[1])),
-            "heading_error_deg": float(np.degrees(abs((turn + np.pi) % (2 * np.pi) - np.pi))),
+            "heading_error_deg": float(np.degrees(np.abs(wrapped(turn)))),
             "travel_ratio": forward / path**2 if path > LEAST_TRAVEL_M else float("nan"),
         }
 
@@ -88,7 +90,7 @@ class Judge:
         config = self._config
         for name, k in self._limbs.items():
             found = limb_response(here[:, k], there[:, k], self._dt, config.fast, config.max_lag)
-            moves = found is not None and found.moving_share > 0.05
+            moves = found is not None and found.moving_share > LEAST_MOVING_SHARE
             figures[f"limb_gain_{name}"] = found.gain if found and moves else float("nan")
             figures[f"limb_r2_{name}"] = found.r2 if found and moves else float("nan")
             figures[f"excess_speed_{name}"] = found.excess_m_s if found else float("nan")

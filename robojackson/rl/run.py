@@ -73,7 +73,7 @@ class Run:
         out: Path,
         config: TrainConfig,
         core: TrackingCore,
-        task: "Task",
+        task: Task,
         progress: Callable[[Row], None],
         sink: Callable[[list[Row]], None],
     ) -> None:

@@ -13,12 +13,13 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.retarget.robot import Robot
 from robojackson.rl.config import TrackConfig
+from robojackson.rl.observation import CLIP
 from robojackson.rl.tracking import TrackingCore
 
 
 def _spaces(core: TrackingCore) -> tuple[gym.spaces.Box, gym.spaces.Box]:
     return (
-        gym.spaces.Box(-10.0, 10.0, (core.observation_size,), np.float32),
+        gym.spaces.Box(-CLIP, CLIP, (core.observation_size,), np.float32),
         gym.spaces.Box(-1.0, 1.0, (core.action_size,), np.float32),
     )
 
