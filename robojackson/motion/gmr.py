@@ -3,8 +3,7 @@
 A dictionary: fps, root_pos (metres, world), root_rot (xyzw), dof_pos (radians), local_body_pos (of
 the bodies, root at the origin and not turned, metres, float32), link_body_list (their names). 30
 fps. NumPy 1 and 2 call their inner functions differently; what is written asks for `numpy.ndarray`
-and `numpy.dtype` alone, so that TWIST's NumPy 1.23 reads it too. A pickle can run code when it is
-read; `read` lets through nothing but arrays of plain numbers (protocol 3 and later, as GMR writes).
+and `numpy.dtype` alone, so that TWIST's NumPy 1.23 reads it too. `read` runs nothing (`unpickle`).
 """
 
 import io
@@ -15,6 +14,7 @@ import mujoco
 import numpy as np
 
 from robojackson.errors import BadTable
+from robojackson.motion import unpickle
 from robojackson.motion.bodies import body_states, names, require_same_joints
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.motion.sampling import WXYZ, XYZW, SampledMotion, sampled
@@ -23,18 +23,6 @@ FPS = 30
 _UPRIGHT = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
 """Root at the origin, not turned."""
 _PROTOCOL = 4
-NUMBERS = "biuf"
-"""Kinds of dtypes that may be in a file: an array of objects could hold anything."""
-ALLOWED = {
-    ("numpy", "ndarray"),
-    ("numpy.core.multiarray", "_reconstruct"),
-    ("numpy._core.multiarray", "_reconstruct"),
-    ("numpy.core.multiarray", "scalar"),
-    ("numpy._core.multiarray", "scalar"),
-    ("numpy.core.numeric", "_frombuffer"),
-    ("numpy._core.numeric", "_frombuffer"),
-}
-"""What a pickle of arrays calls, beside `numpy.dtype`, in NumPy 1 and 2."""
 
 
 def write(reference: ReferenceMotion, model: mujoco.MjModel) -> bytes:
@@ -66,37 +54,12 @@ def read(data: bytes) -> SampledMotion:
     Raises:
         BadTable: not such a file, or one that asks for anything but arrays of numbers.
     """
-    content = load(data)
+    content = unpickle.load(data, "GMR pickle")
     try:
         parts = content["root_pos"], content["root_rot"][:, WXYZ], content["dof_pos"]
         return SampledMotion(float(content["fps"]), np.concatenate(parts, axis=1))
     except (KeyError, TypeError, IndexError, ValueError) as cause:
         raise BadTable(f"GMR pickle: {type(cause).__name__}: {cause}") from cause
-
-
-def load(data: bytes) -> dict[str, Any]:
-    """The dictionary of a pickle, nothing executed.
-
-    Raises:
-        BadTable: not a pickled dictionary, or one that asks for anything but arrays of numbers.
-    """
-    try:
-        content = _ArraysOnly(io.BytesIO(data)).load()
-    except BadTable:
-        raise
-    except Exception as cause:  # a damaged pickle can fail in any way
-        raise BadTable(f"GMR pickle: damaged ({type(cause).__name__}: {cause})") from cause
-    if not isinstance(content, dict):
-        raise BadTable(f"GMR pickle: holds a {type(content).__name__}, not a dictionary")
-    return content
-
-
-def _number_type(*arguments: Any) -> np.dtype:
-    """`numpy.dtype` for numbers alone."""
-    made = np.dtype(*arguments)
-    if made.kind not in NUMBERS:
-        raise BadTable(f"GMR pickle: refused, it asks for an array of {made}")
-    return made
 
 
 class _Portable(pickle.Pickler):
@@ -106,14 +69,3 @@ class _Portable(pickle.Pickler):
         if type(value) is not np.ndarray:
             return NotImplemented
         return np.ndarray, ((0,),), value.__reduce__()[2]
-
-
-class _ArraysOnly(pickle.Unpickler):
-    """An unpickler that knows NumPy's arrays and nothing else."""
-
-    def find_class(self, module: str, name: str) -> Any:
-        if (module, name) == ("numpy", "dtype"):
-            return _number_type
-        if (module, name) not in ALLOWED:
-            raise BadTable(f"GMR pickle: refused, it asks for {module}.{name}")
-        return super().find_class(module, name)

@@ -10,6 +10,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float, Int
 
+from robojackson.motion.certificate import Certificate
+
 
 @dataclass(frozen=True)
 class ReferenceMotion:
@@ -33,6 +35,7 @@ class ReferenceMotion:
         source_time_s: Time in the source clip that each step shows, seconds.
         joint_names, body_names, keypoint_names, contact_names: What the columns are.
         scorecard: Figures that say how good the motion is.
+        certificate: What the robot cannot do in it; None where nobody has looked.
     """
 
     robot: str
@@ -52,6 +55,7 @@ class ReferenceMotion:
     keypoint_names: tuple[str, ...]
     contact_names: tuple[str, ...]
     scorecard: Mapping[str, float] = field(default_factory=dict)
+    certificate: Certificate | None = None
 
     def __len__(self) -> int:
         return len(self.qpos)

@@ -7,8 +7,8 @@ from typing import get_args, get_type_hints
 import numpy as np
 import pytest
 
-from flows import cli
-from flows.export import FORMATS, export
+from flows import formats
+from flows.export import FORMATS, HUMAN_FORMATS, export
 from robojackson.errors import RejectedReference, StoreError, UnknownName
 from robojackson.motion import beyondmimic, gmr, keyframes, locomujoco, omniretarget, unitree
 from storage import tables
@@ -51,7 +51,13 @@ def test_the_answer_tells_what_was_written(reference: Path, tmp_path: Path) -> N
 
 def test_an_unknown_format_lists_those_there_are(reference: Path, tmp_path: Path) -> None:
     with pytest.raises(UnknownName, match="Known: beyondmimic, csv, gmr, keyframes, locomujoco"):
+        export(reference, "fbx", tmp_path / "motion.fbx")
+
+
+def test_a_format_for_persons_does_not_fit_a_robot(reference: Path, tmp_path: Path) -> None:
+    with pytest.raises(UnknownName, match=r"holds a robot's motion.*Known: beyondmimic, csv, gmr"):
         export(reference, "bvh", tmp_path / "motion.bvh")
+    assert not (tmp_path / "motion.bvh").exists()
 
 
 def test_a_reference_of_another_model_is_refused(tmp_path: Path) -> None:
@@ -83,5 +89,5 @@ def test_the_command_loads_no_prefect(said: Said) -> None:
 
 
 def test_the_command_offers_every_format() -> None:
-    offered = get_args(get_args(get_type_hints(cli.export, include_extras=True)["to"])[0])
-    assert set(offered) == set(FORMATS)
+    offered = get_args(get_args(get_type_hints(formats.export, include_extras=True)["to"])[0])
+    assert set(offered) == {*FORMATS, *HUMAN_FORMATS, "onnx"}

@@ -1,0 +1,115 @@
+"""The words that a pickle of arrays may use, and what stands for each of them in our reader.
+
+NumPy's types and functions become classes of our own, holding a shape and bytes; nothing of NumPy's
+or joblib's is called, and an array is made only when as many bytes are there as its shape says.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from robojackson.errors import BadTable
+
+PLAIN = "biufUS"
+"""Kinds of dtypes that may be in a file, numbers and text: an array of objects holds anything."""
+
+
+class Refused(BadTable):
+    """A file that asks for something else than arrays, numbers and text."""
+
+
+@dataclass
+class NumberType:
+    """`numpy.dtype` of a number."""
+
+    name: str
+    order: str = "="
+
+    def __setstate__(self, state: Any) -> None:
+        self.order = str(state[1])
+
+    @property
+    def dtype(self) -> np.dtype:
+        """The type, its byte order set."""
+        made = np.dtype(self.name)
+        if made.kind not in PLAIN:
+            raise Refused(f"refused, it asks for an array of {made}")
+        return made.newbyteorder({"|": "="}.get(self.order, self.order))  # type: ignore[arg-type]
+
+
+@dataclass
+class Holder:
+    """What becomes an array when all of it has been read."""
+
+    value: np.ndarray | None = None
+
+    def __setstate__(self, state: Any) -> None:
+        _, shape, kind, fortran, data = state
+        self.value = from_bytes(data, kind, shape, "F" if fortran else "C")
+
+
+@dataclass
+class Wrapper:
+    """joblib's mark that an array's bytes follow in the file."""
+
+    state: dict[str, Any] = field(default_factory=dict)
+
+    def __setstate__(self, state: Any) -> None:
+        self.state = dict(state)
+
+
+def from_bytes(data: Any, kind: Any, shape: Any, order: str) -> np.ndarray:
+    """An array of plain numbers; the bytes must be as many as the shape says."""
+    if not isinstance(kind, NumberType):
+        raise Refused("refused, it asks for an array of objects")
+    if not isinstance(data, bytes | bytearray):
+        raise Refused("refused, it asks for an array of objects")
+    array = np.frombuffer(bytes(data), kind.dtype)
+    return array.reshape(tuple(int(size) for size in shape), order=order)  # type: ignore[call-overload]
+
+
+def _number(kind: NumberType, data: Any) -> float:
+    value: float = from_bytes(data, kind, (1,), "C")[0].item()
+    return value
+
+
+def _text_bytes(text: str, encoding: str = "latin1") -> bytes:
+    """Protocol 2 writes bytes as text in Latin-1."""
+    if encoding != "latin1":
+        raise Refused(f"refused, it asks for the encoding {encoding!r}")
+    return text.encode("latin1")
+
+
+def _no_bytes() -> bytes:
+    """What protocol 2 calls for bytes of length zero."""
+    return b""
+
+
+def _array(*_: Any) -> Holder:
+    return Holder()
+
+
+def _type(name: Any, *_: Any) -> NumberType:
+    made = NumberType(str(name))
+    assert made.dtype
+    return made
+
+
+def _from_buffer(data: Any, kind: Any, shape: Any, order: str, *_: Any) -> np.ndarray:
+    return from_bytes(data, kind, shape, order)
+
+
+_CORES = ("numpy.core", "numpy._core")
+WORDS: Mapping[tuple[str, str], Any] = {
+    ("numpy", "ndarray"): _array,
+    ("numpy", "dtype"): _type,
+    ("_codecs", "encode"): _text_bytes,
+    ("__builtin__", "bytes"): _no_bytes,
+    **{(f"{core}.multiarray", "_reconstruct"): _array for core in _CORES},
+    **{(f"{core}.multiarray", "scalar"): _number for core in _CORES},
+    **{(f"{core}.numeric", "_frombuffer"): _from_buffer for core in _CORES},
+}
+"""What a file may name, and what stands for it here."""
+JOBLIB = {**WORDS, ("joblib.numpy_pickle", "NumpyArrayWrapper"): Wrapper}
