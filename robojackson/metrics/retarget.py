@@ -6,6 +6,8 @@ Metres, radians and seconds in; each name says its own unit out (mm, deg, cm/s).
 import numpy as np
 from jaxtyping import Bool, Float
 
+from robojackson.metrics import motion
+
 
 def keypoint_error_mm(
     actual: Float[np.ndarray, "S K 3"], wanted: Float[np.ndarray, "S K 3"], weighted: np.ndarray
@@ -28,7 +30,7 @@ def bone_angles_deg(
 
 def jerk(points: Float[np.ndarray, "S K 3"], dt: float) -> float:
     """Mean length of the third difference, m/s3."""
-    return float(np.linalg.norm(np.diff(points, 3, axis=0), axis=-1).mean() / dt**3)
+    return motion.jerk(points, 1.0 / dt)
 
 
 def hinge_jerk_rms(hinges: Float[np.ndarray, "S J"], dt: float) -> float:

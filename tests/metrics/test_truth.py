@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from benchmarks.truth import HIPS, JOINTS, REAL, RENDERED, load_truth, video_path
+from benchmarks.truth import HELD_OUT, HIPS, JOINTS, REAL, RENDERED, load_truth, video_path
 from robojackson.clips.video import VideoLimits, probe
 
 
-@pytest.mark.parametrize("clip", [*RENDERED, *REAL])
+@pytest.mark.parametrize("clip", [*RENDERED, *HELD_OUT, *REAL])
 def test_every_frame_of_the_video_has_a_truth(clip: str) -> None:
     truth = load_truth(clip)
     assert truth.joints.shape == (probe(video_path(clip), VideoLimits()).frames, 12, 3)
 
 
-@pytest.mark.parametrize("clip", [*RENDERED, *REAL])
+@pytest.mark.parametrize("clip", [*RENDERED, *HELD_OUT, *REAL])
 def test_the_person_of_the_truth_is_upright_and_human(clip: str) -> None:
     joints = load_truth(clip).joints
     shoulders = joints[:, [JOINTS.index("left_shoulder"), JOINTS.index("right_shoulder")]].mean(1)
@@ -24,7 +24,7 @@ def test_the_person_of_the_truth_is_upright_and_human(clip: str) -> None:
     assert 0.1 < width.mean() < 0.35
 
 
-@pytest.mark.parametrize("clip", [*RENDERED, *REAL])
+@pytest.mark.parametrize("clip", [*RENDERED, *HELD_OUT, *REAL])
 def test_vertical_of_the_camera_is_a_direction_that_points_up_in_the_image(clip: str) -> None:
     up = load_truth(clip).up_c
     assert np.linalg.norm(up) == pytest.approx(1.0, abs=1e-4)
