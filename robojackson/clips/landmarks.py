@@ -14,9 +14,11 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from jaxtyping import Float
 
-from robojackson.clips.track import LANDMARKS, LandmarkTrack
-from robojackson.clips.video import VideoInfo, read_frames
+from robojackson.clips.crowd import best_of
+from robojackson.clips.track import LANDMARKS, LandmarkTrack, uneven
+from robojackson.clips.video import VideoInfo, timed_frames
 from robojackson.errors import MissingDependency, UnknownName
 
 Size = Literal["lite", "full", "heavy"]
@@ -29,6 +31,9 @@ GRAPHICS_LIBRARIES = ("libEGL.so.1", "libGLESv2.so.2")
 GRAPHICS_INSTALL = (
     "apt-get install --no-install-recommends libegl1 libgles2 libopengl0 libgl1-mesa-dri"
 )
+
+SHORT_SIDE = 1080
+"""Pixels: larger pictures are made smaller, the detector looks at 256 of them."""
 
 log = logging.getLogger(__name__)
 
@@ -63,7 +68,7 @@ def detect(
     progress: Callable[[int, int], None] | None = None,
     watch: Watcher | None = None,
 ) -> LandmarkTrack:
-    """Landmarks of the most prominent person, NaN rows where nobody is found.
+    """Landmarks of whom the detector takes for the most prominent, NaN rows where nobody is found.
 
     Args:
         path: Video file.
@@ -74,18 +79,32 @@ def detect(
     Raises:
         MissingDependency: no model bundle, or no EGL and GLES libraries.
     """
-    missing = missing_graphics_libraries()
-    if missing:
-        raise MissingDependency(f"MediaPipe needs {' and '.join(missing)}: {GRAPHICS_INSTALL}")
-    with _landmarker(model_path(size)) as landmarker:
-        rows = []
-        for index, image in enumerate(read_frames(path)):
-            rows.append(_detect_one(landmarker, image, round(index * 1000.0 / info.fps), index))
+    with video_landmarker(size) as look:
+        rows, times = [], []
+        for index, (time_s, image) in enumerate(timed_frames(path, short_side=SHORT_SIDE)):
+            rows.append(look(image, time_s if info.uneven else index / info.fps))
+            times.append(time_s)
             if watch:
                 watch(index, image, rows[-1])
             if progress:
                 progress(index + 1, info.frames)
-    table = np.array(rows).reshape(-1, LANDMARKS, 7)
+    return track_of(np.array(rows), np.array(times), info)
+
+
+def track_of(
+    rows: Float[np.ndarray, "T 33 7"],
+    time_s: Float[np.ndarray, " T"],
+    info: VideoInfo,
+    person: int = 0,
+    notes: tuple[str, ...] = (),
+) -> LandmarkTrack:
+    """The rows of all frames as a track."""
+    table = rows.reshape(-1, LANDMARKS, 7)
+    lost = max(info.frames - len(table), 0)
+    if lost:
+        notes = (*notes, f"{lost} of {info.frames} frames are damaged and were left out")
+    if info.uneven:
+        notes = (*notes, "the frame rate varies: the motion is resampled to its mean")
     return LandmarkTrack(
         fps=info.fps,
         width=info.width,
@@ -93,28 +112,63 @@ def detect(
         landmarks=table[..., 0:3],
         world_landmarks=table[..., 3:6],
         visibility=table[..., 6],
+        time_s=time_s if uneven(time_s, info.fps) else None,
+        person=person,
+        notes=notes,
     )
+
+
+@contextmanager
+def video_landmarker(size: str) -> Iterator[Callable[[np.ndarray, float], np.ndarray]]:
+    """A detector that follows one person from frame to frame: look(image, seconds) -> (33, 7).
+
+    Raises:
+        MissingDependency: no model bundle, or no EGL and GLES libraries.
+    """
+    require_graphics()
+    with _landmarker(model_path(size)) as landmarker:
+        quiet_first = [True]
+
+        def look(image: np.ndarray, time_s: float) -> np.ndarray:
+            import mediapipe
+
+            with _quiet_stderr(enabled=quiet_first.pop() if quiet_first else False):
+                rows = np.ascontiguousarray(image)  # padded rows would be read askew, silently
+                picture = mediapipe.Image(image_format=mediapipe.ImageFormat.SRGB, data=rows)
+                result = landmarker.detect_for_video(picture, round(time_s * 1000.0))
+            row = best_of(result)
+            return np.full((LANDMARKS, 7), np.nan) if row is None else row
+
+        yield look
+
+
+class _QuietAtFirst:
+    """A landmarker that writes nothing to stderr for the first person it finds."""
+
+    def __init__(self, landmarker: Any) -> None:
+        self._landmarker, self._found = landmarker, False
+
+    def detect(self, picture: Any) -> Any:
+        """As the landmarker's."""
+        with _quiet_stderr(enabled=not self._found):
+            result = self._landmarker.detect(picture)
+        self._found = self._found or bool(result.pose_landmarks)
+        return result
+
+
+def require_graphics() -> None:
+    """Raise `MissingDependency` where MediaPipe cannot be loaded."""
+    missing = missing_graphics_libraries()
+    if missing:
+        raise MissingDependency(f"MediaPipe needs {' and '.join(missing)}: {GRAPHICS_INSTALL}")
 
 
 @contextmanager
 def still_landmarker(size: str) -> Iterator[Any]:
     """An open PoseLandmarker for single pictures, which remembers nothing of the one before."""
+    require_graphics()
     with _landmarker(model_path(size), still=True) as landmarker:
-        yield landmarker
-
-
-def _detect_one(landmarker: Any, image: np.ndarray, time_ms: int, index: int) -> np.ndarray:
-    """One row (33, 7): image xyz, world xyz, visibility; NaN when nobody is found."""
-    import mediapipe
-
-    with _quiet_stderr(enabled=index == 0):
-        rows = np.ascontiguousarray(image)  # padded rows would be read askew, without an error
-        picture = mediapipe.Image(image_format=mediapipe.ImageFormat.SRGB, data=rows)
-        result = landmarker.detect_for_video(picture, time_ms)
-    if not result.pose_landmarks:
-        return np.full((LANDMARKS, 7), np.nan)
-    pairs = zip(result.pose_landmarks[0], result.pose_world_landmarks[0], strict=True)
-    return np.array([[p.x, p.y, p.z, w.x, w.y, w.z, p.visibility] for p, w in pairs])
+        yield _QuietAtFirst(landmarker)
 
 
 @contextmanager

@@ -38,6 +38,11 @@ def indices(names: Sequence[str]) -> list[int]:
     return [POINTS[name] for name in names]
 
 
+def trunk() -> list[int]:
+    """Numbers of the trunk's corners."""
+    return indices(("left_shoulder", "right_shoulder", "left_hip", "right_hip"))
+
+
 def full_body(track: LandmarkTrack, visibility: float) -> Bool[np.ndarray, " T"]:
     """Frames in which head, trunk and legs are inside the image and seen."""
     chosen = indices(BODY)
@@ -50,6 +55,26 @@ def heights_px(track: LandmarkTrack) -> Float[np.ndarray, " T"]:
     """From the highest to the lowest landmark, pixels, NaN where nobody was found."""
     rows = track.landmarks[..., 1] * track.height
     return rows.max(1) - rows.min(1)
+
+
+def stature(points: Float[np.ndarray, "*T 33 2"]) -> Float[np.ndarray, "*T"]:
+    """Nose to neck to hips to the foot of the longer leg: a size that no pose changes much.
+
+    Args:
+        points: Landmarks in pixels.
+    """
+
+    def middle(name: str) -> np.ndarray:
+        return points[..., indices((f"left_{name}", f"right_{name}")), :].mean(-2)
+
+    def leg(side: str) -> np.ndarray:
+        chain = points[..., indices(tuple(f"{side}_{n}" for n in ("hip", "knee", "ankle"))), :]
+        return np.linalg.norm(np.diff(chain, axis=-2), axis=-1).sum(-1)
+
+    neck, hips = middle("shoulder"), middle("hip")
+    head = np.linalg.norm(points[..., POINTS["nose"], :] - neck, axis=-1)
+    legs = np.maximum(leg("left"), leg("right"))
+    return np.asarray(head + np.linalg.norm(neck - hips, axis=-1) + legs)
 
 
 def box(

@@ -4,19 +4,17 @@ PyAV reads the container itself, so a rotation tag is honoured and a file that e
 says so is told apart from one that never was a video. Times in seconds, sizes in upright pixels.
 """
 
-import os
-import tempfile
 from collections.abc import Iterator
-from fractions import Fraction
 from pathlib import Path
 
 import av
 import numpy as np
 from av.video.frame import VideoFrame
-from av.video.stream import VideoStream
 from pydantic import ConfigDict
 from pydantic.dataclasses import dataclass
 
+from robojackson.clips.container import first_frame, opened, packet_times, rate, video_stream
+from robojackson.clips.track import uneven
 from robojackson.errors import (
     TrackTooShort,
     TruncatedVideo,
@@ -25,10 +23,11 @@ from robojackson.errors import (
 )
 
 SUFFIXES = (".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi", ".gif")
-ISO_MEDIA_MARK = b"ftyp"
 TIME_TOLERANCE_S = 1e-6
 MISSING_FRAMES_ALLOWED = 2
 """Frames that an index may promise beyond those in the file: some writers count one too many."""
+DAMAGE_ALLOWED = 0.2
+"""Share of the frames that may be damaged; they are left out."""
 
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid"))
@@ -52,6 +51,7 @@ class VideoInfo:
         path: The file.
         width, height: Size of the upright image, pixels.
         fps: Mean frames a second.
+        uneven: Whether the frames are not evenly spaced, as a phone writes them.
         frames: Number of frames in the file.
         duration_s: frames / fps, seconds.
         rotation: Clockwise degrees that turn a stored image upright: 0, 90, 180 or 270.
@@ -64,6 +64,7 @@ class VideoInfo:
     frames: int
     duration_s: float
     rotation: int
+    uneven: bool = False
 
 
 def list_videos(source: Path) -> tuple[Path, ...]:
@@ -90,19 +91,20 @@ def probe(path: Path, limits: VideoLimits) -> VideoInfo:
         TruncatedVideo: the file ends before its index or its last frame.
         VideoTooLong, TrackTooShort: outside the limits.
     """
-    with _open(path) as container:
-        stream = _video_stream(container, path)
-        rate = stream.average_rate or stream.guessed_rate
+    with opened(path) as container:
+        stream = video_stream(container, path)
+        told = float(stream.average_rate or stream.guessed_rate or 0)
         promised = stream.frames
-        first = _first_frame(container, path)
-    rotation = -first.rotation % 360
-    frames = _count_frames(path)
-    _require_whole(path, frames, promised)
-    if not rate:
+        first = first_frame(container, path)
+    stamps = packet_times(path)
+    _require_whole(path, len(stamps), promised)
+    fps = rate(stamps, told)
+    if not fps:
         raise UnreadableVideo(f"{path}: the file tells no frame rate")
-    fps = float(rate)
-    upright = (first.height, first.width) if rotation % 180 else (first.width, first.height)
-    info = VideoInfo(path, *upright, fps, frames, frames / fps, rotation)
+    rotation = -first.rotation % 360
+    size = (first.height, first.width) if rotation % 180 else (first.width, first.height)
+    frames = len(stamps)
+    info = VideoInfo(path, *size, fps, frames, frames / fps, rotation, uneven(stamps, fps))
     require_within(info, limits)
     return info
 
@@ -115,108 +117,68 @@ def read_frames(
     Raises:
         UnreadableVideo, TruncatedVideo: the file cannot be decoded to its end.
     """
-    with _open(path) as container:
-        stream = _video_stream(container, path)
-        stream.thread_type = "NONE"
-        origin, time_s = None, 0.0
-        try:
-            for frame in container.decode(stream):
-                stamp = float(frame.time or 0.0)
-                origin = stamp if origin is None else origin
-                time_s = stamp - origin
-                if end_s is not None and time_s >= end_s - TIME_TOLERANCE_S:
-                    return
-                if start_s is None or time_s >= start_s - TIME_TOLERANCE_S:
-                    yield _upright(frame)
-        except av.FFmpegError as cause:
-            raise TruncatedVideo(f"{path}: damaged after {time_s:.2f} s ({cause})") from cause
+    return (image for _, image in timed_frames(path, start_s, end_s))
 
 
-def trim(path: Path, start_s: float, end_s: float, out: Path) -> Path:
-    """Re-encode a range of a video (H.264, upright, same rate); `out` is whole or absent.
+def timed_frames(
+    path: Path,
+    start_s: float | None = None,
+    end_s: float | None = None,
+    short_side: int | None = None,
+) -> Iterator[tuple[float, np.ndarray]]:
+    """The same with the time of each since the first frame; damaged frames are left out.
 
-    A copy of packets would start at the key frame before `start_s`; a re-encoding starts where it
-    was told to.
-
-    Raises:
-        TrackTooShort: the range holds no frame.
+    Args:
+        path: Video file.
+        start_s, end_s: Range, seconds.
+        short_side: Larger images are made smaller until their short side has so many pixels.
     """
-    with _open(path) as container:
-        stream = _video_stream(container, path)
-        rate = stream.average_rate or Fraction(30)
-    handle, name = tempfile.mkstemp(suffix=".mp4", dir=out.parent)
-    os.close(handle)
-    written = Path(name)
-    try:
-        if not _encode(read_frames(path, start_s, end_s), rate, written):
-            raise TrackTooShort(f"{path}: no frame between {start_s:g} s and {end_s:g} s")
-        written.replace(out)
-    finally:
-        written.unlink(missing_ok=True)
-    return out
+    origin = None
+    for stamp, frame in _decoded(path):
+        origin = stamp if origin is None else origin
+        time_s = stamp - origin
+        if end_s is not None and time_s >= end_s - TIME_TOLERANCE_S:
+            return
+        if start_s is None or time_s >= start_s - TIME_TOLERANCE_S:
+            yield time_s, _upright(frame, short_side)
 
 
-def _encode(images: Iterator[np.ndarray], rate: Fraction, out: Path) -> int:
-    """Write images as H.264; returns how many there were."""
-    count = 0
-    with av.open(str(out), "w", format="mp4") as container:
-        stream = container.add_stream("libx264", rate=rate, options={"crf": "17"})
-        stream.pix_fmt = "yuv420p"
-        for image in images:
-            even = image[: image.shape[0] // 2 * 2, : image.shape[1] // 2 * 2]
-            if count == 0:
-                stream.height, stream.width = even.shape[:2]
-            count += 1
-            container.mux(stream.encode(VideoFrame.from_ndarray(np.ascontiguousarray(even))))
-        if count:
-            container.mux(stream.encode(None))
-    return count
+def _decoded(path: Path) -> Iterator[tuple[float, VideoFrame]]:
+    """Frames and their timestamps."""
+    with opened(path) as container:
+        stream = video_stream(container, path)
+        stream.thread_type = "NONE"
+        time_s, good, bad = 0.0, 0, 0
+        packets = container.demux(stream)
+        while True:
+            try:
+                packet = next(packets, None)
+                frames = packet.decode() if packet is not None else []
+            except av.FFmpegError as cause:
+                bad += 1
+                if bad > max(1.0, DAMAGE_ALLOWED * max(good + bad, stream.frames)):
+                    raise TruncatedVideo(
+                        f"{path}: damaged after {time_s:.2f} s ({cause})"
+                    ) from cause
+                continue
+            if packet is None:
+                return
+            for frame in frames:
+                good += 1
+                time_s = float(frame.time or 0.0)
+                yield time_s, frame
 
 
-def _upright(frame: VideoFrame) -> np.ndarray:
-    image = frame.to_ndarray(format="rgb24")
+def _upright(frame: VideoFrame, short_side: int | None) -> np.ndarray:
+    shortest = min(frame.width, frame.height)
+    if short_side is not None and shortest > short_side:
+        factor = short_side / shortest
+        width, height = round(frame.width * factor), round(frame.height * factor)
+        small = frame.reformat(width, height, format="rgb24", interpolation="AREA")
+        image = small.to_ndarray()
+    else:
+        image = frame.to_ndarray(format="rgb24")
     return np.ascontiguousarray(np.rot90(image, round(frame.rotation / 90) % 4))
-
-
-def _open(path: Path) -> av.container.InputContainer:
-    if path.is_dir():
-        raise UnreadableVideo(f"{path}: a folder, expected one video")
-    if not path.is_file():
-        raise UnreadableVideo(f"{path}: no such file")
-    if path.stat().st_size == 0:
-        raise UnreadableVideo(f"{path}: the file is empty (0 bytes)")
-    try:
-        return av.open(str(path))
-    except av.FFmpegError as cause:
-        with path.open("rb") as file:
-            is_media = ISO_MEDIA_MARK in file.read(32)
-        if is_media:
-            message = f"{path}: cut off before its index; copy or download the file again"
-            raise TruncatedVideo(message) from cause
-        raise UnreadableVideo(f"{path}: not a video that FFmpeg can read") from cause
-
-
-def _video_stream(container: av.container.InputContainer, path: Path) -> VideoStream:
-    if not container.streams.video:
-        raise UnreadableVideo(f"{path}: the file holds no video stream")
-    return container.streams.video[0]
-
-
-def _first_frame(container: av.container.InputContainer, path: Path) -> VideoFrame:
-    try:
-        return next(iter(container.decode(video=0)))
-    except (StopIteration, av.FFmpegError) as cause:
-        raise UnreadableVideo(f"{path}: the file holds no frame that can be decoded") from cause
-
-
-def _count_frames(path: Path) -> int:
-    """Packets of the video stream: nothing is decoded, so a minute takes milliseconds."""
-    with _open(path) as container:
-        try:
-            packets = container.demux(_video_stream(container, path))
-            return sum(1 for p in packets if p.size > 0 and not p.is_discard and not p.is_corrupt)
-        except av.FFmpegError as cause:
-            raise TruncatedVideo(f"{path}: damaged ({cause})") from cause
 
 
 def _require_whole(path: Path, frames: int, promised: int) -> None:

@@ -17,13 +17,12 @@ from pydantic.dataclasses import dataclass as configuration
 
 from robojackson.clips.failures import REASON_LENGTH, explain
 from robojackson.clips.formats import FormatConfig, Purpose, choose
+from robojackson.clips.javascript import runtimes
 from robojackson.clips.titles import clean_text, safe_name
 from robojackson.errors import DownloadFailed, SearchFailed
 
 Progress = Callable[[int, int | None], None]
 Result = TypeVar("Result")
-JAVASCRIPT = ("deno", "node", "bun", "quickjs")
-"""Programs that yt-dlp may run to read YouTube's player, those of them that are installed."""
 BYTES_A_MEGABYTE = 1_000_000
 
 log = logging.getLogger(__name__)
@@ -131,8 +130,6 @@ def entries(info: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 
 
 def _options(config: WebConfig) -> dict[str, Any]:
-    import shutil
-
     import imageio_ffmpeg
 
     options = {
@@ -150,7 +147,7 @@ def _options(config: WebConfig) -> dict[str, Any]:
         "fragment_retries": config.retries,
         "continuedl": True,
         "ffmpeg_location": imageio_ffmpeg.get_ffmpeg_exe(),
-        "js_runtimes": {name: {} for name in JAVASCRIPT if shutil.which(name)},
+        "js_runtimes": {name: {"path": place} for name, place in runtimes().items()},
     }
     if config.proxy:
         options["proxy"] = config.proxy

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from robojackson.clips import landmarks
-from robojackson.clips.video import VideoLimits, probe, trim
+from robojackson.clips.trim import trim
+from robojackson.clips.video import VideoLimits, probe
 from robojackson.errors import MissingDependency, UnknownName
 
 CLIPS = Path(__file__).parents[2] / "clips"

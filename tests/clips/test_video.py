@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robojackson.clips.video import VideoLimits, list_videos, probe, read_frames, trim
+from robojackson.clips.trim import trim
+from robojackson.clips.video import VideoLimits, list_videos, probe, read_frames, timed_frames
 from robojackson.errors import (
     RoboJacksonError,
     TrackTooShort,
@@ -13,7 +14,9 @@ from robojackson.errors import (
     UnreadableVideo,
     VideoTooLong,
 )
+from tools.bad_clips import damage, write_timed
 
+CLIPS = Path(__file__).parents[2] / "clips"
 LIMITS = VideoLimits()
 QUARTER_TURN_CLOCKWISE = (0, 1 << 16, 0, -(1 << 16), 0, 0)
 
@@ -133,3 +136,50 @@ def test_folder_lists_its_videos_by_name(write_video, tmp_path: Path) -> None:
 def test_folder_without_videos_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UnreadableVideo, match="holds no video"):
         list_videos(tmp_path)
+
+
+def write_at(path: Path, times: np.ndarray) -> Path:
+    """Frame k is grey of level 8 k, shown from times[k] on."""
+    pictures = ((t, np.full((48, 64, 3), 8 * k, np.uint8)) for k, t in enumerate(times))
+    write_timed(path, pictures)
+    return path
+
+
+UNEVEN_S = np.array([0.0, 0.04, 0.08, 0.12, 0.32, 0.52, 0.72, 0.76, 0.8])
+
+
+def test_a_varying_rate_is_told_and_its_mean_is_right(tmp_path: Path) -> None:
+    info = probe(write_at(tmp_path / "phone.mp4", UNEVEN_S), LIMITS)
+    assert info.uneven
+    assert info.fps == pytest.approx(8 / 0.8)
+
+
+def test_frames_come_at_the_times_at_which_they_were_taken(tmp_path: Path) -> None:
+    path = write_at(tmp_path / "phone.mp4", UNEVEN_S)
+    assert [t for t, _ in timed_frames(path)] == pytest.approx(UNEVEN_S, abs=1e-4)
+
+
+def test_a_trimmed_range_keeps_its_varying_rate(tmp_path: Path) -> None:
+    path = write_at(tmp_path / "phone.mp4", UNEVEN_S)
+    out = trim(path, 0.12, 0.77, tmp_path / "part.mp4")
+    assert [t for t, _ in timed_frames(out)] == pytest.approx(UNEVEN_S[3:8] - 0.12, abs=1e-4)
+
+
+def test_an_even_clip_is_told_as_even(write_video) -> None:
+    assert not probe(write_video(frames=30, fps=24), LIMITS).uneven
+
+
+def test_large_pictures_are_made_smaller_on_request(write_video) -> None:
+    path = write_video(size=(320, 240))
+    shapes = [next(timed_frames(path, short_side=side))[1].shape for side in (120, 999)]
+    assert shapes == [(120, 160, 3), (240, 320, 3)]
+
+
+def test_a_few_damaged_frames_are_left_out_and_the_others_keep_their_times(tmp_path: Path) -> None:
+    path = tmp_path / "copy.mp4"
+    path.write_bytes((CLIPS / "dance_a.mp4").read_bytes())
+    damage(path)
+    times = [t for t, _ in timed_frames(path)]
+    assert 90 < len(times) < 98
+    assert np.array(times) * 30 == pytest.approx(np.round(np.array(times) * 30))
+    assert times[-1] == pytest.approx(97 / 30)

@@ -1,0 +1,83 @@
+"""Video containers, opened with one clear error, and what their packets tell without decoding."""
+
+from pathlib import Path
+
+import av
+import numpy as np
+from av.video.frame import VideoFrame
+from av.video.stream import VideoStream
+from jaxtyping import Float
+
+from robojackson.errors import TruncatedVideo, UnreadableVideo
+
+ISO_MEDIA_MARK = b"ftyp"
+RATE_TOLERANCE = 0.002
+"""A rate that is off the timestamps by more is not believed."""
+
+
+def opened(path: Path) -> av.container.InputContainer:
+    """An open container.
+
+    Raises:
+        UnreadableVideo: missing, empty, or not a video.
+        TruncatedVideo: the file ends before its index.
+    """
+    if path.is_dir():
+        raise UnreadableVideo(f"{path}: a folder, expected one video")
+    if not path.is_file():
+        raise UnreadableVideo(f"{path}: no such file")
+    if path.stat().st_size == 0:
+        raise UnreadableVideo(f"{path}: the file is empty (0 bytes)")
+    try:
+        return av.open(str(path))
+    except av.FFmpegError as cause:
+        with path.open("rb") as file:
+            is_media = ISO_MEDIA_MARK in file.read(32)
+        if is_media:
+            message = f"{path}: cut off before its index; copy or download the file again"
+            raise TruncatedVideo(message) from cause
+        raise UnreadableVideo(f"{path}: not a video that FFmpeg can read") from cause
+
+
+def video_stream(container: av.container.InputContainer, path: Path) -> VideoStream:
+    """The first video stream of a container."""
+    if not container.streams.video:
+        raise UnreadableVideo(f"{path}: the file holds no video stream")
+    return container.streams.video[0]
+
+
+def first_frame(container: av.container.InputContainer, path: Path) -> VideoFrame:
+    """The first frame that can be decoded."""
+    try:
+        return next(iter(container.decode(video=0)))
+    except (StopIteration, av.FFmpegError) as cause:
+        raise UnreadableVideo(f"{path}: the file holds no frame that can be decoded") from cause
+
+
+def packet_times(path: Path) -> Float[np.ndarray, " T"]:
+    """When each frame is shown, seconds since the first, in order; nothing is decoded for it.
+
+    Raises:
+        TruncatedVideo: the file cannot be read to its end.
+    """
+    with opened(path) as container:
+        stream = video_stream(container, path)
+        try:
+            found = [
+                np.nan if packet.pts is None else float(packet.pts * packet.time_base)
+                for packet in container.demux(stream)
+                if packet.size > 0 and not packet.is_discard and not packet.is_corrupt
+            ]
+        except av.FFmpegError as cause:
+            raise TruncatedVideo(f"{path}: damaged ({cause})") from cause
+    stamps = np.sort(np.array(found))
+    return stamps - stamps[:1] if len(stamps) else stamps
+
+
+def rate(stamps: np.ndarray, told: float) -> float:
+    """Frames a second: what the file tells, unless its timestamps contradict it."""
+    span_s = stamps[-1] if len(stamps) > 1 else 0.0
+    if not span_s > 0.0:
+        return told
+    measured = float((len(stamps) - 1) / span_s)
+    return told if abs(told / measured - 1.0) <= RATE_TOLERANCE else measured

@@ -1,0 +1,71 @@
+"""A range of a video as a file of its own."""
+
+import math
+import os
+import tempfile
+from collections.abc import Iterator
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+from av.video.frame import VideoFrame
+
+from robojackson.clips.video import VideoLimits, probe, timed_frames
+from robojackson.errors import TrackTooShort
+
+ANY = VideoLimits(max_duration_s=math.inf, min_frames=1)
+CLOCK = 90_000
+"""Ticks a second of a file whose frames are not evenly spaced."""
+
+
+def trim(path: Path, start_s: float, end_s: float, out: Path) -> Path:
+    """Re-encode a range of a video (H.264, upright, same times); `out` is whole or absent.
+
+    A copy of packets would start at the key frame before `start_s`; a re-encoding starts where it
+    was told to.
+
+    Raises:
+        TrackTooShort: the range holds no frame.
+    """
+    info = probe(path, ANY)
+    handle, name = tempfile.mkstemp(suffix=".mp4", dir=out.parent)
+    os.close(handle)
+    written = Path(name)
+    try:
+        frames = timed_frames(path, start_s, end_s)
+        rate = Fraction(info.fps).limit_denominator(1001)
+        if not _encode(frames, rate, info.uneven, written):
+            raise TrackTooShort(f"{path}: no frame between {start_s:g} s and {end_s:g} s")
+        written.replace(out)
+    finally:
+        written.unlink(missing_ok=True)
+    return out
+
+
+def _encode(
+    frames: Iterator[tuple[float, np.ndarray]], rate: Fraction, timed: bool, out: Path
+) -> int:
+    """Write images as H.264, at their times or at an even rate; returns how many there were."""
+    count, start_s = 0, 0.0
+    with av.open(str(out), "w", format="mp4") as container:
+        stream = container.add_stream("libx264", rate=rate, options={"crf": "17"})
+        stream.pix_fmt = "yuv420p"
+        if timed:
+            stream.time_base = stream.codec_context.time_base = Fraction(1, CLOCK)
+        for time_s, image in frames:
+            even = image[: image.shape[0] // 2 * 2, : image.shape[1] // 2 * 2]
+            if count == 0:
+                stream.height, stream.width = even.shape[:2]
+                start_s = time_s
+            picture = VideoFrame.from_ndarray(np.ascontiguousarray(even))
+            if timed:
+                picture.pts, picture.time_base = (
+                    round((time_s - start_s) * CLOCK),
+                    Fraction(1, CLOCK),
+                )
+            count += 1
+            container.mux(stream.encode(picture))
+        if count:
+            container.mux(stream.encode(None))
+    return count
