@@ -2,15 +2,16 @@
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from robojackson.clips.stability import Stability
-from robojackson.clips.track import LandmarkTrack
+from robojackson.clips.track import LandmarkTrack, uneven
 from robojackson.errors import UnknownName
+from robojackson.motion.certificate import Certificate, Finding
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.motion.smpl import SmplSequence
 from storage import schemas
@@ -60,10 +61,13 @@ def codec_of(cls: type) -> Codec:
 
 
 def _track_apart(track: LandmarkTrack) -> tuple[Columns, Facts]:
-    columns = _numbered("frame", len(track), 1.0 / track.fps)
+    columns = _numbered("frame", len(track), 1.0 / track.fps) | {"time_s": track.times}
     for name in ("landmarks", "world_landmarks", "visibility"):
         columns[name] = getattr(track, name)
-    return columns, {"fps": track.fps, "width": track.width, "height": track.height}
+    facts = {name: getattr(track, name) for name in ("fps", "width", "height", "person", "notes")}
+    if track.to_first is not None:
+        facts["to_first"] = track.to_first.tolist()
+    return columns, facts
 
 
 def _track(columns: Columns, facts: Facts) -> LandmarkTrack:
@@ -74,6 +78,10 @@ def _track(columns: Columns, facts: Facts) -> LandmarkTrack:
         landmarks=columns["landmarks"].reshape(-1, 33, 3),
         world_landmarks=columns["world_landmarks"].reshape(-1, 33, 3),
         visibility=columns["visibility"],
+        time_s=columns["time_s"] if uneven(columns["time_s"], float(facts["fps"])) else None,
+        person=int(facts.get("person", 0)),
+        notes=tuple(facts.get("notes", ())),
+        to_first=np.array(facts["to_first"]) if "to_first" in facts else None,
     )
 
 
@@ -129,7 +137,17 @@ def _reference_apart(reference: ReferenceMotion) -> tuple[Columns, Facts]:
     for name in (*REFERENCE_ARRAYS, "source_time_s"):
         columns[name] = np.asarray(getattr(reference, name))
     facts = {name: getattr(reference, name) for name in schemas.REFERENCE_MOTION.metadata}
+    if reference.certificate is not None:
+        facts["certificate"] = asdict(reference.certificate)
     return columns, _plain(facts)
+
+
+def _certificate(facts: Facts) -> Certificate | None:
+    found = facts.get("certificate")
+    if found is None:
+        return None
+    findings = tuple(Finding(**finding) for finding in found["findings"])
+    return Certificate(np.array(found["slack"]), np.array(found["tempo"]), findings)
 
 
 def _reference(columns: Columns, facts: Facts) -> ReferenceMotion:
@@ -145,6 +163,7 @@ def _reference(columns: Columns, facts: Facts) -> ReferenceMotion:
         lap_offset=np.array(facts["lap_offset"], float),
         source_time_s=columns["source_time_s"],
         scorecard=dict(facts["scorecard"]),
+        certificate=_certificate(facts),
         **(arrays | {name: tuple(facts[name]) for name in REFERENCE_NAMES}),
     )
 

@@ -28,6 +28,7 @@ def locked(folder: Path, name: str = "lock") -> Iterator[None]:
 def _held(path: Path) -> IO[str]:
     """The locked file; one that was taken away between opening and locking is made anew."""
     while True:
+        path.parent.mkdir(parents=True, exist_ok=True)
         file = path.open("w")
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

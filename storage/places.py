@@ -4,6 +4,7 @@ Every write is whole or absent: on a disk a temporary name, fsync, then rename; 
 one PUT; elsewhere a temporary name, then a move. Errors are those of the place; `Store` words them.
 """
 
+import fcntl
 import os
 import shutil
 import tempfile
@@ -22,6 +23,9 @@ PUT_IS_ATOMIC = frozenset(("s3", "s3a", "gs", "gcs", "abfs", "az", "memory"))
 
 class Place(Protocol):
     """What a store needs of a place; keys are relative, `/` between their parts."""
+
+    def create(self) -> None:
+        """Make the place itself (a folder, a bucket), if it is not there."""
 
     def put(self, key: str, source: Path | bytes) -> None:
         """Write a whole file or none."""
@@ -58,17 +62,21 @@ class Folder:
     def __init__(self, root: Path) -> None:
         self.root = root.absolute()
 
+    def create(self) -> None:
+        self.root.mkdir(parents=True, exist_ok=True)
+
     def put(self, key: str, source: Path | bytes) -> None:
         target = self.root / key
         target.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(prefix=TEMPORARY, dir=target.parent)
         try:
             with os.fdopen(handle, "wb") as file:
+                fcntl.flock(file, fcntl.LOCK_EX)  # what nobody holds is a dead process's
                 _fill(file, source)
                 file.flush()
                 os.fsync(file.fileno())
-            os.chmod(name, 0o644)
-            os.replace(name, target)
+                os.chmod(name, 0o644)
+                os.replace(name, target)
             _sync_folder(target.parent)
         finally:
             Path(name).unlink(missing_ok=True)
@@ -102,6 +110,9 @@ class Remote:
         spoken = self._system.protocol
         protocols = {spoken} if isinstance(spoken, str) else set(spoken)
         self._put_is_atomic = bool(protocols & PUT_IS_ATOMIC)
+
+    def create(self) -> None:
+        self._system.makedirs(self._base, exist_ok=True)
 
     def put(self, key: str, source: Path | bytes) -> None:
         data = source if isinstance(source, bytes) else source.read_bytes()

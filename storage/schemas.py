@@ -230,6 +230,9 @@ EVALUATION_RECORD = TableSchema(
     dynamic={
         "limb_gain_": "1",
         "limb_r2_": "1",
+        "limb_lag_": "s",
+        "usage_": "1",
+        "return_": "1",
         "excess_speed_": "m/s",
         "reward_": "1",
         "error_": "",

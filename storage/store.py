@@ -13,24 +13,38 @@ from pathlib import Path
 
 from robojackson.errors import StoreError
 from storage.artifact import Artifact, sha256_of, sha256_of_file
+from storage.lock import locked
 from storage.places import TEMPORARY, Folder, Place, place_at
 
 VARIABLE = "ROBOJACKSON_STORE"
 DEFAULT_ROOT = "store"
+SCRATCH, HELD = "scratch", ".held"
+"""The folder of folders that go away, and the file in each that its process has locked."""
 
 
 class Store:
-    """Files by key, under one root."""
+    """Files by key, under one root.
+
+    Attributes:
+        root: Path or URL, as given.
+        place: The folder or whatever else keeps the files.
+    """
 
     def __init__(self, root: str | Path, place: Place | None = None) -> None:
         self.root = str(root)
         with _one_line(f"cannot open the store {self.root}"):
-            self._place: Place = place or place_at(self.root)
+            self.place: Place = place or place_at(self.root)
 
     @classmethod
     def from_environment(cls) -> "Store":
         """The store that `ROBOJACKSON_STORE` names, `./store` without it."""
         return cls(os.environ.get(VARIABLE) or DEFAULT_ROOT)
+
+    def create(self) -> "Store":
+        """The store itself, its folder or bucket made if it is not there."""
+        with _one_line(f"cannot make the store {self.root}"):
+            self.place.create()
+        return self
 
     def put(self, key: str, content: bytes | Path) -> Artifact:
         """Write bytes, or copy a local file, under a key; replaces what was there.
@@ -40,7 +54,7 @@ class Store:
         """
         with _one_line(f"cannot write {self.address(key)}"):
             digest = _digest(content)
-            self._place.put(key, content)
+            self.place.put(key, content)
         return Artifact(key=key, sha256=digest)
 
     def keep(self, stage: str, name: str, content: bytes | Path) -> Artifact:
@@ -52,40 +66,40 @@ class Store:
     def read(self, key: str) -> bytes:
         """The content of a file."""
         with _one_line(f"cannot read {self.address(key)}"):
-            return self._place.read(key)
+            return self.place.read(key)
 
     def sha256(self, key: str) -> str:
         """Digest of a file's content."""
         with _one_line(f"cannot read {self.address(key)}"):
-            return self._place.sha256(key)
+            return self.place.sha256(key)
 
     def exists(self, key: str) -> bool:
         """Whether there is a file under that key."""
         with _one_line(f"cannot look at {self.address(key)}"):
-            return self._place.exists(key)
+            return self.place.exists(key)
 
     def remove(self, key: str) -> None:
         """Take a file away; one that is gone already is no error."""
         with _one_line(f"cannot remove {self.address(key)}"):
             try:
-                self._place.remove(key)
+                self.place.remove(key)
             except FileNotFoundError:
                 return
 
     def list(self, prefix: str = "") -> list[str]:
         """Keys under a folder, sorted."""
         with _one_line(f"cannot list {self.address(prefix)}"):
-            return sorted(self._place.list(prefix))
+            return sorted(self.place.list(prefix))
 
     def address(self, key: str) -> str:
         """The path or URL of a key, for people."""
-        return self._place.address(key)
+        return self.place.address(key)
 
     @contextmanager
     def local(self, artifact: Artifact) -> Iterator[Path]:
         """A local file with the content: the file itself on a disk, else a copy that goes away."""
-        if isinstance(self._place, Folder):
-            yield self._place.root / artifact.key
+        if isinstance(self.place, Folder):
+            yield self.place.root / artifact.key
             return
         with self.scratch() as folder:
             path = folder / artifact.name
@@ -95,11 +109,12 @@ class Store:
     @contextmanager
     def scratch(self) -> Iterator[Path]:
         """A folder that goes away, for results on their way into the store."""
-        base = self.work("scratch")
+        base = self.work(SCRATCH)
         with _one_line(f"cannot write {base}"):
-            folder = tempfile.mkdtemp(dir=base)
+            folder = Path(tempfile.mkdtemp(dir=base))
         try:
-            yield Path(folder)
+            with locked(folder, HELD):
+                yield folder
         finally:
             shutil.rmtree(folder, ignore_errors=True)
 
@@ -113,8 +128,8 @@ class Store:
     @property
     def here(self) -> Path:
         """What belongs to this machine alone: the root itself on a disk, else a folder in cache."""
-        if isinstance(self._place, Folder):
-            return self._place.root
+        if isinstance(self.place, Folder):
+            return self.place.root
         cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
         return cache / "robojackson" / hashlib.sha256(self.root.encode()).hexdigest()[:12]
 
@@ -128,8 +143,8 @@ class Store:
             self._require_room(room_mb)
         key = f"{TEMPORARY}{os.getpid()}"
         with _one_line(f"cannot write the store {self.root}"):
-            self._place.put(key, b"robojackson " * 1024)
-            self._place.remove(key)
+            self.place.put(key, b"robojackson " * 1024)
+            self.place.remove(key)
 
     def _require_room(self, room_mb: int) -> None:
         there = next(path for path in (self.here, *self.here.parents) if path.exists())

@@ -16,11 +16,12 @@ from tasks.caching import stage
 from tasks.train import RunLabels
 
 
-def _models(parameters: Mapping[str, Any]) -> list[str]:
+def models(parameters: Mapping[str, Any]) -> list[str]:
+    """Digests of the models that a judgement loads."""
     return [load_robot(parameters["robot"]).sha256]
 
 
-@stage(models=_models, unkeyed=("labels",))
+@stage(models=models, unkeyed=("labels",))
 def evaluate(
     policy: Artifact,
     reference: Artifact,

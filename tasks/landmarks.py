@@ -4,7 +4,10 @@ import threading
 from collections.abc import Mapping
 from typing import Any
 
+from robojackson.clips.cast import SCOUT
+from robojackson.clips.dancer import DancerConfig
 from robojackson.clips.landmarks import detect, model_path
+from robojackson.mocap.seen import models_of, see
 from storage import tables
 from storage.artifact import Artifact, sha256_of_file
 from storage.store import Store
@@ -16,13 +19,17 @@ ONE_AT_A_TIME = threading.Lock()
 
 
 def _models(parameters: Mapping[str, Any]) -> list[str]:
-    return [sha256_of_file(model_path(parameters["size"]))]
+    sizes = [*models_of(parameters["size"]), *([SCOUT] if parameters.get("dancer") else [])]
+    return [sha256_of_file(model_path(size)) for size in sizes]
 
 
 @stage(models=_models)
-def landmarks(video: Artifact, info: Artifact, size: str) -> Artifact:
-    """LandmarkTrack."""
+def landmarks(
+    video: Artifact, info: Artifact, size: str, dancer: DancerConfig | None = None
+) -> Artifact:
+    """LandmarkTrack of one person, or, as Algorithm 1 has it, of whom the detector prefers."""
     store = Store.from_environment()
     with store.local(video) as path, ONE_AT_A_TIME:
-        track = detect(path, info_of(store, info, path), size)
+        known = info_of(store, info, path)
+        track = see(path, known, size, dancer) if dancer else detect(path, known, size)
     return tables.keep(store, "landmarks", "landmarks.parquet", track)

@@ -6,9 +6,9 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 from robojackson.clips.span import span
+from robojackson.clips.trim import trim as trim_file
 from robojackson.clips.video import VideoInfo, VideoLimits
 from robojackson.clips.video import probe as probe_file
-from robojackson.clips.video import trim as trim_file
 from storage.artifact import Artifact, sha256_of_file
 from storage.store import Store
 from tasks.caching import stage

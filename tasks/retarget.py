@@ -8,6 +8,7 @@ from robojackson.motion.smpl import SmplSequence
 from robojackson.retarget.motion import RetargetConfig
 from robojackson.retarget.motion import retarget as to_robot
 from robojackson.retarget.robot import RobotDescription, load_robot
+from robojackson.retarget.scorecard import told
 from storage import tables
 from storage.artifact import Artifact
 from storage.store import Store
@@ -26,7 +27,7 @@ def retarget(
     store = Store.from_environment()
     motion = tables.read(SmplSequence, store, sequence)
     reference = to_robot(motion, load_robot(robot), config)
-    scorecard = json.dumps(dict(reference.scorecard), indent=1).encode()
+    scorecard = json.dumps(told(reference), indent=1).encode()
     return {
         "reference": tables.keep(store, "retarget", "reference.parquet", reference),
         "scorecard": store.keep("retarget", "scorecard.json", scorecard),

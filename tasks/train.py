@@ -1,40 +1,36 @@
 """Training as an operating-system process of its own, which never imports Prefect.
 
-It dies with the task: by SIGTERM and then SIGKILL to its process group when the task is cancelled,
-by the kernel when this process is killed. Its folder stays until it has succeeded, so that the same
-call goes on from the last checkpoint.
+Its folder stays until it has succeeded, so that the same call goes on from the last checkpoint.
 """
 
-import asyncio
 import hashlib
 import json
+import math
 import os
 import shutil
-import signal
 import sys
 import time
-from asyncio.subprocess import PIPE, Process
-from collections import deque
-from collections.abc import AsyncIterator
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import yaml
-from prefect.logging import get_run_logger
 
-from robojackson.errors import TrainingFailed
 from robojackson.retarget.robot import RobotDescription
 from robojackson.rl.config import TrainConfig
-from storage.artifact import Artifact
+from robojackson.rl.pretrained import start_file
+from storage.artifact import Artifact, sha256_of_file
 from storage.lock import locked
 from storage.store import Store
 from tasks.caching import identity, stage
+from tasks.process import run_process
+from tasks.progress import shown
 
-SECONDS_TO_SAVE = 30.0
-"""What a training gets to write its checkpoint before it is killed."""
+DIGITS = 12
+"""Of the digest in a run id."""
 OVERTIME_S = 300.0
 """What a training may take beyond its budget: start, compilation, last checkpoint."""
-CHECKOUT = Path(__file__).parent.parent
 
 
 @dataclass(frozen=True)
@@ -50,30 +46,37 @@ class RunLabels:
     setup: str
 
 
-@stage(reaches=("robojackson.rl.train",), unkeyed=("labels", "deadline"))
+def _models(parameters: Mapping[str, Any]) -> list[str]:
+    return _start(parameters["config"])
+
+
+@stage(models=_models, reaches=("robojackson.rl.train",), unkeyed=("labels", "deadline", "limit_s"))
 async def train(
     reference: Artifact,
     robot: RobotDescription,
     config: TrainConfig,
     labels: RunLabels,
     deadline: float | None = None,
+    limit_s: float | None = None,
 ) -> dict[str, Artifact]:
     """`policy`: safetensors; `episodes`: EpisodeRecord; `training`: steps, seconds, as JSON.
 
     Args:
         deadline: Unix time at which the budget ends in any case, seconds.
+        limit_s: Time after which it has failed, seconds; a budget in minutes sets one by itself.
     Raises:
         StoreError: the same training is running already.
     """
     store = Store.from_environment()
-    facts = json.dumps(identity([reference, robot, config]), sort_keys=True)
-    digest = hashlib.sha256(facts.encode()).hexdigest()[:12]
-    run_id = f"{labels.move}-{labels.setup}-s{config.seed}-{digest}"
-    work = store.work(f"train-{digest}")
+    run_id = run_id_of(reference, robot, config, labels)
+    work = store.work(f"train-{run_id[-DIGITS:]}")
     minutes = _minutes(config, deadline)
+    if minutes is not None:
+        limit_s = min(limit_s or math.inf, 60 * minutes + OVERTIME_S)
     with locked(work, "task.lock"), store.local(reference) as path:
         command = _command(path, work, config, labels, run_id, minutes)
-        answer = await run_process(command, run_id, work, minutes)
+        async with shown(work, f"{labels.setup}-{labels.move}-s{config.seed}"):
+            answer = await run_process(command, run_id, work, limit_s)
         kept = {
             "training": store.keep("train", "training.json", _facts(answer, labels)),
             "policy": store.keep("train", "policy.safetensors", work / "policy.safetensors"),
@@ -81,6 +84,21 @@ async def train(
         }
         shutil.rmtree(work, ignore_errors=True)
     return kept
+
+
+def run_id_of(
+    reference: Artifact, robot: RobotDescription, config: TrainConfig, labels: RunLabels
+) -> str:
+    """Names and a digest of all that makes the training what it is; no clock, no machine."""
+    facts = json.dumps([identity([reference, robot, config]), _start(config)], sort_keys=True)
+    digest = hashlib.sha256(facts.encode()).hexdigest()[:DIGITS]
+    return f"{labels.move}-{labels.setup}-s{config.seed}-{digest}"
+
+
+def _start(config: TrainConfig) -> list[str]:
+    """The digest of the networks that it starts from, if it does."""
+    path = start_file(config.start, config.mode)
+    return [] if path is None else [sha256_of_file(path)]
 
 
 def _minutes(config: TrainConfig, deadline: float | None) -> float | None:
@@ -109,77 +127,7 @@ def _command(
     if minutes is not None:
         options["--minutes"] = f"{minutes:.3f}"
     words = [str(word) for pair in options.items() for word in pair]
-    return [sys.executable, "-m", "flows.cli", "train", str(reference), *words, "--json"]
-
-
-async def run_process(command: list[str], run_id: str, work: Path, minutes: float | None) -> bytes:
-    """Run the process to its end, its words in our log; no way out leaves it alive.
-
-    Returns:
-        What it wrote to stdout.
-    Raises:
-        TrainingFailed: it died, or did not end.
-    """
-    process = await asyncio.create_subprocess_exec(
-        *command, stdout=PIPE, stderr=PIPE, start_new_session=True, env=environment()
-    )
-    limit = None if minutes is None else 60 * minutes + OVERTIME_S
-    last: deque[str] = deque(maxlen=5)
-    try:
-        async with asyncio.timeout(limit):
-            forward = _forward(process, work / "train.log", last)
-            answer, _ = await asyncio.gather(_read(process), forward)
-            await process.wait()
-    except TimeoutError:
-        raise TrainingFailed(f"run {run_id} did not end within {limit:.0f} s") from None
-    finally:
-        await _end(process)
-    if process.returncode:
-        raise TrainingFailed(_cause(run_id, process.returncode, work, last))
-    return answer
-
-
-def environment() -> dict[str, str]:
-    """Ours, with one OpenMP thread and this checkout importable."""
-    found = os.environ.get("PYTHONPATH")
-    path = os.pathsep.join([str(CHECKOUT), *([found] if found else [])])
-    return {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": path, "PYTHONUNBUFFERED": "1"}
-
-
-async def _forward(process: Process, log_file: Path, last: deque[str]) -> None:
-    logger = get_run_logger()
-    with log_file.open("a") as file:
-        async for line in _lines(process):
-            file.write(f"{line}\n")
-            file.flush()
-            last.append(line)
-            logger.info(line)
-
-
-async def _lines(process: Process) -> AsyncIterator[str]:
-    assert process.stderr is not None
-    async for raw in process.stderr:
-        line = raw.decode(errors="replace").rstrip()
-        if line:
-            yield line
-
-
-async def _read(process: Process) -> bytes:
-    assert process.stdout is not None
-    return await process.stdout.read()
-
-
-async def _end(process: Process) -> None:
-    """Leave nothing of the process group: ask, wait, kill."""
-    if process.returncode is not None:
-        return
-    os.killpg(process.pid, signal.SIGTERM)
-    try:
-        async with asyncio.timeout(SECONDS_TO_SAVE):
-            await process.wait()
-    except TimeoutError:
-        os.killpg(process.pid, signal.SIGKILL)
-        await process.wait()
+    return [sys.executable, "-m", "flows.cli", "train", str(reference), *words, "--force", "--json"]
 
 
 def _facts(answer: bytes, labels: RunLabels) -> bytes:
@@ -188,14 +136,3 @@ def _facts(answer: bytes, labels: RunLabels) -> bytes:
     told = ("trainer", "seed", "steps", "updates", "stopped", "episodes")
     facts = {key: said[key] for key in told} | {"training_s": said["seconds"]}
     return json.dumps({"setup": labels.setup, **facts}, indent=1).encode()
-
-
-def _cause(run_id: str, code: int, work: Path, last: deque[str]) -> str:
-    """Which run died, why, where its log is."""
-    if code < 0:
-        how = f"was killed by {signal.Signals(-code).name}"
-        if -code == signal.SIGKILL:
-            how += " (by hand, or out of memory)"
-    else:
-        how = f"ended with exit code {code}: {last[-1] if last else 'it said nothing'}"
-    return f"run {run_id} {how}; log: {work / 'train.log'}; the same command resumes it"

@@ -31,6 +31,7 @@ SCORECARD_LINES = (
     "bone_deg", "limit_violations",
     "nan_count", "floor_penetration_mm", "self_penetration_mm", "planted_slip_cm_s",
     "contact_share", "joint_speed_max_rad_s", "torque_ratio_p95", "torque_over_share", "seam_deg",
+    "infeasible_share", "fallen_share", "tempo_mean", "tempo_min",
 )  # fmt: skip
 
 

@@ -38,7 +38,7 @@ STATE_COLOURS = {0: (0.5, 0.5, 0.5, 0.15), 1: (0.25, 0.68, 0.42, 0.95), 2: (0.96
 
 def training_curve(episodes: Sequence[Row], dt: float) -> Figure:
     """Length and return of the training episodes against control steps: median and quartiles."""
-    figure, (top, bottom) = _figure(7.0, 4.2, rows=2, sharex=True)
+    figure, (top, bottom) = figure_of(7.0, 4.2, rows=2, sharex=True)
     steps = np.array([row["step"] for row in episodes], float)
     lengths = np.array([row["episode_length"] for row in episodes], float) * dt
     returns = np.array([row["episode_return"] for row in episodes], float)
@@ -53,7 +53,7 @@ def training_curve(episodes: Sequence[Row], dt: float) -> Figure:
 
 def survival_by_phase(rows: Sequence[Row], dt: float) -> Figure:
     """Mean survival from each start phase, of the trained robot and of its baselines."""
-    figure, (axes,) = _figure(7.0, 2.8)
+    figure, (axes,) = figure_of(7.0, 2.8)
     for policy in dict.fromkeys(str(row["policy"]) for row in rows):
         chosen = [row for row in rows if row["policy"] == policy and row["phase"] >= 0]
         phases = np.array(sorted({int(row["phase"]) for row in chosen}))
@@ -67,13 +67,13 @@ def survival_by_phase(rows: Sequence[Row], dt: float) -> Figure:
             axes.plot(phases * dt, mean, ".-", lw=1, color=colour, label=policy.replace("_", " "))
     axes.set_xlabel("start phase, s into the dance")
     axes.set_ylabel("survival, s")
-    _legend(axes)
+    legend(axes)
     return figure
 
 
 def limb_gains(summary: Mapping[str, Any]) -> Figure:
     """How far each limb end moves beside its reference; 1 is the whole amplitude."""
-    figure, (axes,) = _figure(7.0, 2.4)
+    figure, (axes,) = figure_of(7.0, 2.4)
     prefix = "limb_gain_"
     gains = {k.removeprefix(prefix): float(v) for k, v in summary.items() if k.startswith(prefix)}
     names = [name.replace("_", " ") for name in gains]
@@ -91,10 +91,15 @@ def limb_gains(summary: Mapping[str, Any]) -> Figure:
 
 
 def contact_strip(sequence: SmplSequence, reference: ReferenceMotion) -> Figure:
-    """When the person's heels and toes, and the robot's feet, stand, slide or are in the air."""
-    figure, (human, robot) = _figure(7.0, 2.8, rows=2)
+    """When the person's heels and toes, and the robot's feet, stand, slide or are in the air.
+
+    Both on the robot's clock: a motion that was slowed down shows each moment under itself.
+    """
+    figure, (human, robot) = figure_of(7.0, 2.8, rows=2)
     names = [name.replace("_", " ") for name in CONTACT_POINTS]
-    _strip(human, sequence.contact, names, len(sequence) / sequence.fps)
+    shown = np.round(np.asarray(reference.source_time_s) * sequence.fps).astype(int)
+    shown = np.clip(shown, 0, len(sequence) - 1)
+    _strip(human, sequence.contact[shown], names, len(reference) * reference.dt)
     contacts = [name.replace("_", " ") for name in reference.contact_names]
     _strip(robot, reference.contact, contacts, len(reference) * reference.dt)
     human.set_title("person", loc="left", fontsize=9, color=INK)
@@ -110,7 +115,7 @@ def torque_heat_map(reference: ReferenceMotion, motors: Sequence[str]) -> Figure
         motors: Names of the hinges that have a motor, as the columns of `torque_ratio`.
     """
     ratio = np.asarray(reference.torque_ratio).T
-    figure, (axes,) = _figure(7.0, 0.8 + 0.2 * len(motors))
+    figure, (axes,) = figure_of(7.0, 0.8 + 0.2 * len(motors))
     colours = LinearSegmentedColormap.from_list("torque", list(TORQUE_COLOURS))
     extent = (0.0, len(reference) * reference.dt, len(motors) - 0.5, -0.5)
     picture = axes.imshow(ratio, aspect="auto", interpolation="nearest", extent=extent,
@@ -137,7 +142,7 @@ def joint_tracking(
     wanted = np.degrees(reference.qpos[np.arange(shown) % len(reference), 7:])
     done = np.degrees(rollout_qpos[:shown, 7:])
     busiest = np.argsort(-np.ptp(wanted, axis=0))[:TRACKED_JOINTS]
-    figure, axes = _figure(7.0, 3.6, rows=3, columns=2, sharex=True)
+    figure, axes = figure_of(7.0, 3.6, rows=3, columns=2, sharex=True)
     time_s = np.arange(shown) * reference.dt
     for joint, panel in zip(busiest, axes, strict=False):
         panel.plot(time_s, wanted[:, joint], color=INK, lw=2.4, alpha=0.6)
@@ -157,9 +162,10 @@ def png(figure: Figure, dpi: int = 160) -> bytes:
     return buffer.getvalue()
 
 
-def _figure(
+def figure_of(
     width: float, height: float, rows: int = 1, columns: int = 1, sharex: bool = False
 ) -> tuple[Figure, list[Axes]]:
+    """An empty figure of panels in our style; sizes in inches."""
     figure = Figure(figsize=(width, height), layout="constrained")
     grid = figure.subplots(rows, columns, sharex=sharex, squeeze=False)
     axes = list(grid.ravel())
@@ -211,6 +217,7 @@ def _side_colour(name: str) -> str:
     return ACCENT if "left" in name else GOOD
 
 
-def _legend(axes: Axes) -> None:
+def legend(axes: Axes) -> None:
+    """The names of the lines, above the panel."""
     axes.legend(fontsize=7, labelcolor=INK, frameon=False, ncols=5, loc="lower center",
                 bbox_to_anchor=(0.5, 1.0))  # fmt: skip

@@ -28,10 +28,11 @@ _FAINT = 0.5
 def source_panels(
     source: Path, track: LandmarkTrack, frames: Int[np.ndarray, " N"], width: int, height: int
 ) -> dict[int, canvas.Picture]:
-    """The panel of every frame that is named, by frame."""
+    """The panel of every frame that is named, by frame: of the picture nearest to its time."""
     pixels = track.landmarks[..., :2] * [track.width, track.height]
     box = canvas.crop_box(pixels.reshape(-1, 2), (track.width, track.height), width / height)
-    wanted, last = set(frames.tolist()), int(frames.max())
+    shown = {int(frame): track.nearest(frame / track.fps) for frame in frames}
+    wanted, last = set(shown.values()), max(shown.values())
     panels: dict[int, canvas.Picture] = {}
     for index, image in enumerate(read_frames(source)):
         if index in wanted:
@@ -40,7 +41,7 @@ def source_panels(
             panels[index] = panel
         if index >= last:
             break
-    return panels
+    return {frame: panels[index] for frame, index in shown.items() if index in panels}
 
 
 def _inside(

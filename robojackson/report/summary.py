@@ -13,10 +13,13 @@ from robojackson.clips.video import VideoInfo
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.motion.smpl import AIR, PLANTED, SmplSequence
 from robojackson.report import plots
+from robojackson.report.feasibility_plot import feasibility_strip
 from robojackson.report.page import PageContent, Plot
 
 PROGRAMS = ("robojackson", "mujoco", "gymnasium", "mediapipe", "torch", "jax", "sbx-rl",
             "sb3-contrib", "prefect", "numpy")  # fmt: skip
+
+SHOWN_FINDINGS = 3
 
 
 @dataclass(frozen=True)
@@ -121,6 +124,24 @@ def _plots(results: Results) -> list[Plot]:
         made.append(_plot("Joint tracking", caption, figure))
     figure = plots.contact_strip(results.sequence, reference)
     made.append(_plot("Contacts", "Feet on the floor, of the person and of the robot.", figure))
+    return made + _dynamics(reference)
+
+
+def _dynamics(reference: ReferenceMotion) -> list[Plot]:
+    """What the motion asks of the robot's motors and feet."""
+    made = []
+    if reference.certificate is not None:
+        caption = (
+            "What neither the feet's pushes nor the motors can give, in tolerances: feasible up to "
+            "the dashed line. Below, the tempo beside the clip."
+        )
+        findings = reference.certificate.findings
+        if findings:
+            caption += " " + "; ".join(str(finding) for finding in findings[:SHOWN_FINDINGS]) + "."
+        made.append(_plot("Can the robot do it?", caption, feasibility_strip(reference)))
+    if reference.torque_ratio.shape[1] == len(reference.joint_names):
+        figure = plots.torque_heat_map(reference, reference.joint_names)
+        made.append(_plot("Torques", "What each motor has to give, over its limit.", figure))
     return made
 
 

@@ -74,7 +74,7 @@ def side_by_side(
     steps = 0 if rollout_qpos is None else len(rollout_qpos)
     when = timeline(reference, track.fps, len(track), steps, float(config.fps), config.max_seconds)
     with ExitStack() as stack:
-        film = _Film(stack, source, track, sequence, config, when)
+        film = Film(stack, source, track, sequence, config, when)
         film.add_robot("reference", reference_qpos(reference, when), model, REFERENCE_TINT)
         if rollout_qpos is not None and steps:
             film.add_robot("trained", rollout_qpos[when.rollout], model, TRAINED_TINT)
@@ -82,7 +82,7 @@ def side_by_side(
         return write_video(pictures, config.fps, out, config.quality)
 
 
-class _Film:
+class Film:
     """The panels of one video; robots are added one by one."""
 
     def __init__(

@@ -1,7 +1,7 @@
 """What is written is read back, and a file that violates its schema is refused by column."""
 
 import io
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -189,6 +189,15 @@ def test_another_table_is_refused() -> None:
 def test_a_class_without_a_table_is_refused() -> None:
     with pytest.raises(UnknownName, match="unknown table 'int'"):
         tables.encode(3)
+
+
+@pytest.mark.parametrize("moved", [False, True])
+def test_the_path_of_a_camera_survives_with_its_track(moved: bool) -> None:
+    rng = np.random.default_rng(2)
+    to_first = rng.normal(size=(5, 3, 3)) if moved else None
+    track = replace(a_track(rng), to_first=to_first)
+    found = tables.decode(LandmarkTrack, tables.encode(track), "here").to_first
+    assert (found is None) if to_first is None else np.array_equal(found, to_first)
 
 
 def test_an_artifact_leads_to_its_value(tmp_path: Path) -> None:

@@ -1,0 +1,22 @@
+# The worker's image: flows, trainings and the `robojackson` command, as a user without rights.
+#   docker build -t robojackson:0.1.0 [--build-arg TORCH_INDEX=...] .
+FROM python:3.11-slim-bookworm
+
+ENV DEBIAN_FRONTEND=noninteractive PIP_NO_CACHE_DIR=1 PYTHONUNBUFFERED=1
+WORKDIR /app
+
+RUN useradd --create-home --uid 10001 jackson && chown jackson:jackson /app
+
+# System libraries first: they change least. bootstrap.sh knows which are missing.
+COPY tools/bootstrap.sh tools/bootstrap.sh
+RUN apt-get update -qq \
+    && apt-get install -y -qq --no-install-recommends $(sh tools/bootstrap.sh missing) \
+    && rm -rf /var/lib/apt/lists/*
+
+USER jackson
+ARG TORCH_INDEX=""
+COPY --chown=jackson:jackson . .
+RUN TORCH_INDEX="$TORCH_INDEX" sh tools/bootstrap.sh install
+
+ENV PATH=/app/.venv/bin:$PATH ROBOJACKSON_STORE=/app/store
+CMD ["robojackson", "doctor"]

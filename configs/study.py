@@ -1,0 +1,77 @@
+"""What an ablation trains: moves x setups x seeds, as data that a person edits or fills in.
+
+One experiment is one `Study`; `configs/studies/*.yaml` are those that ship, and the parameters of
+the deployments `ablation/paper` and `ablation/smoke` are the same text.
+"""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass
+
+ROOT = Path(__file__).parent.parent
+STRICT = ConfigDict(extra="forbid")
+Setup = Literal["scratch", "pretrain", "curiosity", "scratch-curiosity"]
+Executor = Literal["local", "work-pool"]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][\w.-]*$", max_length=60)]
+Seed = Annotated[int, Field(ge=0)]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Move:
+    """A dance that robots are taught.
+
+    Attributes:
+        clip: Path of its video, from the checkout.
+        paper: What the paper calls it, if it stands for a move of the paper.
+        walking: Whether it is walking rather than dancing (the paper's third claim).
+        overrides: Values of the pipeline's configuration by key path.
+    """
+
+    clip: str
+    paper: str = ""
+    walking: bool = False
+    overrides: dict[str, Any] = Field(default_factory=dict)
+
+    @property
+    def path(self) -> Path:
+        """The video of this checkout."""
+        return ROOT / self.clip
+
+
+@dataclass(frozen=True, config=STRICT)
+class Study:
+    """One ablation.
+
+    Attributes:
+        name: Of the study, in the tables and on the page.
+        moves: Names of `configs/moves/*.yaml`.
+        setups: Names of `configs/setups/*.yaml`.
+        seeds: Of the trainings; a seed is the same for all setups, so that they are paired.
+        mode: `paper`: its reward, observation and torques; `track`: the method that dances.
+        steps: Control steps of each training. No clock ends one: the tables are repeatable.
+        trainer: `sbx` (JAX, fast) or `sb3` (the reference).
+        robot: Name of `configs/robots/*.yaml`.
+        pipeline: Name of the configuration that makes the reference motions and judges.
+        train: Values of the training's configuration by key path, for all cells.
+        executor: `local`: processes of this machine; `work-pool`: runs that workers take.
+        slots: Trainings at once on this machine; the number of its cores if absent.
+        timeout_minutes: Wall time after which a cell has failed.
+        retries: How often a cell whose process was killed is started again.
+    """
+
+    name: Name = "paper"
+    moves: Annotated[tuple[Name, ...], Field(min_length=1)] = ("hip_shake", "dance_b", "walk")
+    setups: Annotated[tuple[Setup, ...], Field(min_length=1)] = ("scratch", "pretrain", "curiosity")
+    seeds: Annotated[tuple[Seed, ...], Field(min_length=1)] = (0, 1, 2)
+    mode: Literal["paper", "track"] = "paper"
+    steps: Annotated[int, Field(ge=1)] = 50_000
+    trainer: Literal["sbx", "sb3"] = "sbx"
+    robot: str = "humanoid"
+    pipeline: str = "base"
+    train: dict[str, Any] = Field(default_factory=dict)
+    executor: Executor = "local"
+    slots: Annotated[int, Field(ge=1)] | None = None
+    timeout_minutes: Annotated[float, Field(gt=0)] = 240.0
+    retries: Annotated[int, Field(ge=0)] = 2

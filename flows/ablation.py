@@ -1,0 +1,165 @@
+"""The paper's experiment: moves x setups x seeds, each a subflow that leaves rows in the tables.
+
+Entry point of the deployments `ablation/paper` and `ablation/smoke`: `flows.ablation.ablation`. One
+cell that fails leaves the others and the tables whole; the run then ends Failed and names it. The
+same run again computes only what is missing.
+"""
+
+import asyncio
+import os
+from collections.abc import Mapping
+from dataclasses import replace
+from textwrap import shorten
+from typing import Any
+
+from prefect import flow
+from prefect.logging import get_run_logger
+
+from configs.loader import load
+from configs.pipeline import PipelineConfig
+from configs.study import Move, Study
+from flows.board import Board
+from flows.cells import EXECUTORS
+from flows.orphans import none_left
+from flows.tracebacks import without_tracebacks
+from robojackson.errors import StudyFailed
+from robojackson.retarget.robot import RobotDescription
+from robojackson.rl.config import TrainConfig
+from storage.artifact import Artifact
+from storage.leftovers import sweep
+from storage.store import Store
+from tasks.cell import Cell
+from tasks.landmarks import landmarks
+from tasks.mocap import mocap
+from tasks.probe import SourceFile, probe
+from tasks.retarget import retarget
+from tasks.still import still
+from tasks.study import report
+
+Facts = dict[str, Any]
+REASON = 200
+"""Characters of why a cell failed."""
+
+
+def run(name: str, overrides: Mapping[str, Any]) -> Facts:
+    """The flow from the command line; Ctrl-C leaves what has ended cached and no process."""
+    study = load(Study, f"studies/{name}" if "." not in name else name, overrides)
+    without_tracebacks()
+    with none_left():
+        return asyncio.run(ablation(study))
+
+
+@flow(name="ablation", flow_run_name="{study.name}")
+async def ablation(study: Study) -> Facts:
+    """Train and judge every cell, then write the page of the study.
+
+    Args:
+        study: What is compared with what.
+    Raises:
+        UnknownName, BadConfiguration: a move or setup does not exist; no cell was started.
+        StudyFailed: cells failed; the message names each.
+    """
+    without_tracebacks()
+    sweep(Store.from_environment())
+    moves = {name: load(Move, f"moves/{name}") for name in study.moves}
+    trainings: dict[str, TrainConfig] = {s: training(study, s) for s in study.setups}
+    motions = {name: motion(move, study) for name, move in moves.items()}
+    cells = cells_of(study, {n: made["reference"] for n, made in motions.items()}, trainings)
+    board = Board(study, cells)
+    await board.show()
+    slots = asyncio.Semaphore(study.slots or _slots(study))
+    execute = EXECUTORS[study.executor]
+
+    async def one(wanted: Cell) -> Any:
+        async with slots:
+            board.running(wanted)
+            try:
+                made = await execute(wanted)
+                await board.done(wanted, made)
+            except Exception as cause:
+                await board.failed(wanted, _line(cause))
+                raise
+
+    results = await asyncio.gather(*(one(c) for c in cells), return_exceptions=True)
+    outcomes = dict(zip((c.name for c in cells), results, strict=True))
+    return await conclude(study, outcomes, {n: made["still"] for n, made in motions.items()})
+
+
+def training(study: Study, setup: str) -> TrainConfig:
+    """How the cells of a setup are trained; seeds come later."""
+    given = {"mode": study.mode, "steps": study.steps, "trainer": study.trainer, **study.train}
+    return load(TrainConfig, f"setups/{setup}", given)
+
+
+def motion(move: Move, study: Study) -> dict[str, Artifact]:
+    """`reference`, the motion of a move, and `still`, its picture; every stage cached."""
+    settings = load(PipelineConfig, study.pipeline, move.overrides)
+    robot = load(RobotDescription, f"robots/{study.robot}")
+    clip = probe(SourceFile.at(move.path), settings.video, None, None)
+    track = landmarks(clip["video"], clip["info"], settings.detector)
+    sequence = mocap(track, settings.mocap)
+    reference = retarget(sequence, robot, settings.retarget)["reference"]
+    picture = still(clip["video"], track, sequence, reference, robot)
+    return {"reference": reference, "still": picture}
+
+
+def cells_of(
+    study: Study, references: Mapping[str, Artifact], trainings: Mapping[str, TrainConfig]
+) -> list[Cell]:
+    """Every move x setup x seed, seed by seed, so that an early look compares like with like."""
+    evaluate = load(PipelineConfig, study.pipeline).evaluate
+    return [
+        Cell(
+            study=study.name,
+            move=name,
+            setup=setup,
+            seed=seed,
+            reference=references[name],
+            robot=study.robot,
+            train=replace(trainings[setup], seed=seed),
+            evaluate=evaluate,
+            timeout_minutes=study.timeout_minutes,
+            retries=study.retries,
+        )
+        for seed in study.seeds
+        for name in study.moves
+        for setup in study.setups
+    ]
+
+
+async def conclude(
+    study: Study, outcomes: Mapping[str, Any], stills: Mapping[str, Artifact]
+) -> Facts:
+    """The page over whatever ended well, and one sentence for what did not.
+
+    Raises:
+        StudyFailed: a cell failed.
+    """
+    failed = {n: _line(r) for n, r in outcomes.items() if isinstance(r, BaseException)}
+    store = Store.from_environment()
+    pictures = {name: store.read(picture.key) for name, picture in stills.items()}
+    made = {} if len(failed) == len(outcomes) else report(study, pictures)
+    if failed:
+        named = "; ".join(f"{name}: {reason}" for name, reason in failed.items())
+        raise StudyFailed(
+            f"{len(failed)} of {len(outcomes)} cells failed ({named}). "
+            "The others are in the tables; the same run again does only what is missing"
+        )
+    get_run_logger().info("study %s: %s", study.name, store.address(made["page"].key))
+    return {
+        "study": study.name,
+        "cells": len(outcomes),
+        "page": store.address(made["page"].key),
+        "tables": store.address(f"metrics/episodes/study={study.name}"),
+    }
+
+
+def _slots(study: Study) -> int:
+    """Cores of this machine; a pool's workers set their own limits."""
+    if study.executor == "work-pool":
+        return 10_000
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _line(cause: BaseException) -> str:
+    return shorten(str(cause), REASON, placeholder=" ...") or type(cause).__name__

@@ -1,0 +1,88 @@
+"""One cell of an ablation: a training, its judgement, its rows. Here or on any other machine.
+
+Entry point of the deployment `cell/pool`: `flows.cells.cell`.
+"""
+
+from typing import Any
+
+from prefect import flow
+from prefect.deployments import arun_deployment
+from pydantic import TypeAdapter
+
+from configs.loader import load
+from flows.tracebacks import without_tracebacks
+from robojackson.errors import TrainingCrashed
+from robojackson.retarget.robot import RobotDescription
+from storage.artifact import Artifact
+from storage.leftovers import sweep
+from storage.store import Store
+from tasks.cell import Cell
+from tasks.judgement import judge
+from tasks.metrics import publish
+from tasks.process import was_killed
+from tasks.train import RunLabels, run_id_of, train
+
+DEPLOYMENT = "cell/pool"
+SECONDS_BEFORE_RETRY = 2
+Result = dict[str, Artifact]
+
+
+@flow(name="cell", flow_run_name="{cell.name}")
+async def cell(cell: Cell) -> Result:
+    """Train, judge, publish; what was done before is cached.
+
+    Args:
+        cell: What to train, on which motion.
+    """
+    without_tracebacks()
+    store = Store.from_environment()
+    sweep(store, parts=False)
+    robot = load(RobotDescription, f"robots/{cell.robot}")
+    labels = RunLabels(cell.move, cell.setup)
+    again: dict[str, Any] = {
+        "retries": cell.retries,
+        "retry_delay_seconds": SECONDS_BEFORE_RETRY,
+        "retry_condition_fn": was_killed,
+    }
+    limit_s = 60 * cell.timeout_minutes
+    trained = await train.with_options(**again)(
+        cell.reference, robot, cell.train, labels, limit_s=limit_s
+    )
+    judged = await judge.with_options(**again)(
+        trained["policy"], cell.reference, robot, cell.evaluate, limit_s=limit_s
+    )
+    run_id = run_id_of(cell.reference, robot, cell.train, labels)
+    written = publish(cell, run_id, {**trained, **judged})
+    sweep(store, parts=False)
+    return {**trained, **judged, **written}
+
+
+async def here(wanted: Cell) -> Result:
+    """The cell as a subflow of the flow that calls.
+
+    Raises:
+        Exception: whatever the cell failed of.
+    """
+    return await cell(wanted)
+
+
+async def anywhere(wanted: Cell) -> Result:
+    """The cell as a run that a worker of the pool takes; another one, if the worker dies with it.
+
+    Raises:
+        TrainingCrashed: it did not end well; a failed child does not raise by itself.
+    """
+    plain = TypeAdapter(Cell).dump_python(wanted, mode="json")
+    for _ in range(1 + wanted.retries):
+        run = await arun_deployment(
+            DEPLOYMENT, parameters={"cell": plain}, flow_run_name=wanted.name, as_subflow=True
+        )
+        if run.state is None or not run.state.is_crashed():
+            break
+    if run.state is None or not run.state.is_completed():
+        said = "has no state" if run.state is None else f"{run.state.name}: {run.state.message}"
+        raise TrainingCrashed(f"{wanted.name} on a worker: {said}")
+    return TypeAdapter(Result).validate_python(await run.state.aresult())
+
+
+EXECUTORS: dict[str, Any] = {"local": here, "work-pool": anywhere}

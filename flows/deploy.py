@@ -1,0 +1,121 @@
+"""What a Prefect server must know of us: pools, deployments, automations, where results are kept.
+
+Everything is told by name and may be told again: a second run changes nothing but what changed.
+"""
+
+import asyncio
+import os
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+from prefect.automations import Automation
+from prefect.client.orchestration import PrefectClient, get_client
+from prefect.client.schemas.actions import WorkPoolCreate
+from prefect.exceptions import ObjectNotFound
+from prefect.filesystems import RemoteFileSystem
+from prefect.settings import PREFECT_API_URL
+from prefect.workers.process import ProcessWorker
+
+from robojackson.errors import DeploymentFailed
+from storage.store import Store
+
+ROOT = Path(__file__).parent.parent
+AUTOMATIONS = ROOT / "configs" / "automations.yaml"
+POOLS = {
+    "flows": "Parents: refresh, dance, ablation. They wait more than they work.",
+    "training": "Cells of an ablation and trainings: one at a time and core.",
+}
+"""Parents and cells apart: parents that wait would hold every slot of a common pool."""
+RESULTS = "robojackson"
+"""Name of the block that keeps Prefect's records in the store."""
+RECORDS = "prefect/records"
+
+
+def deploy() -> dict[str, Any]:
+    """Register everything with the server of PREFECT_API_URL.
+
+    Raises:
+        DeploymentFailed: no server is named or answers, or it refuses something.
+    """
+    if not PREFECT_API_URL.value():
+        raise DeploymentFailed(
+            "PREFECT_API_URL names no server; start one (`prefect server start`) and set "
+            "PREFECT_API_URL=http://127.0.0.1:4200/api"
+        )
+    store = Store.from_environment().create()
+    store.require_writable()
+    made = asyncio.run(_prepare(store))
+    return {**made, "deployments": _register()}
+
+
+async def _prepare(store: Store) -> dict[str, Any]:
+    async with get_client() as client:
+        reason = await client.api_healthcheck()
+        if reason is not None:
+            raise DeploymentFailed(f"{client.api_url}: does not answer: {reason}")
+        for name, told in POOLS.items():
+            await _pool(client, name, told)
+    block = await _results(store)
+    return {
+        "pools": list(POOLS),
+        "results": block,
+        "automations": [await _automation(facts) for facts in automations()],
+    }
+
+
+def automations() -> list[dict[str, Any]]:
+    """The automations that are shipped."""
+    return list(yaml.safe_load(AUTOMATIONS.read_text()))
+
+
+async def _pool(client: PrefectClient, name: str, description: str) -> None:
+    try:
+        await client.read_work_pool(name)
+    except ObjectNotFound:
+        template = ProcessWorker.get_default_base_job_template()
+        wanted = WorkPoolCreate(
+            name=name, type="process", description=description, base_job_template=template
+        )
+        await client.create_work_pool(wanted)
+
+
+async def _results(store: Store) -> str | None:
+    """Records of tasks beside the store, when it is one that all machines reach."""
+    if "://" not in store.root:
+        return None
+    block = RemoteFileSystem(basepath=f"{store.root}/{RECORDS}", settings=_access())
+    await block.save(RESULTS, overwrite=True)
+    return f"remote-file-system/{RESULTS}"
+
+
+def _access() -> dict[str, Any]:
+    """How the object store is reached; its secrets stay in the environment."""
+    endpoint = os.environ.get("AWS_ENDPOINT_URL")
+    return {"client_kwargs": {"endpoint_url": endpoint}} if endpoint else {}
+
+
+async def _automation(facts: Mapping[str, Any]) -> str:
+    wanted = Automation(**facts)
+    try:
+        known = await Automation.aread(name=wanted.name)
+    except ValueError:
+        await wanted.acreate()
+    else:
+        wanted.id = known.id
+        await wanted.aupdate()
+    return wanted.name
+
+
+def _register() -> list[str]:
+    """prefect.yaml by Prefect's own command, from the folder it stands in."""
+    command = [sys.executable, "-m", "prefect", "--no-prompt", "deploy", "--all"]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    if run.returncode:
+        said = (run.stdout + run.stderr).strip().splitlines()
+        raise DeploymentFailed(f"prefect deploy failed: {said[-1] if said else 'without a word'}")
+    entries = yaml.safe_load((ROOT / "prefect.yaml").read_text())["deployments"]
+    return [f"{entry['entrypoint'].rsplit('.', 1)[1]}/{entry['name']}" for entry in entries]

@@ -1,0 +1,66 @@
+"""The commands about experiments: `ablation`, `metrics` and `deploy`."""
+
+from typing import Annotated, Any, Literal
+
+import typer
+
+from flows.console import Answer, command, table
+from flows.options import Json, Set, chosen
+
+
+@command
+def ablation(
+    study: Annotated[
+        str, typer.Argument(help="Name of configs/studies/*.yaml, or a path.")
+    ] = "paper",
+    moves: Annotated[list[str] | None, typer.Option("--move", help="Only this move.")] = None,
+    setups: Annotated[list[str] | None, typer.Option("--setup", help="Only this setup.")] = None,
+    seeds: Annotated[list[int] | None, typer.Option("--seed", help="Only this seed.")] = None,
+    steps: Annotated[int | None, typer.Option(min=1, help="Control steps of a training.")] = None,
+    executor: Annotated[
+        Literal["local", "work-pool"] | None,
+        typer.Option(help="Processes of this machine, or runs that workers take."),
+    ] = None,
+    slots: Annotated[int | None, typer.Option(min=1, help="Trainings at once.")] = None,
+    set_: Set = None,
+    as_json: Json = False,
+) -> Answer:
+    """Moves x setups x seeds, each trained and judged, and a page that compares them."""
+    from flows.environment import prepare
+    from storage.store import Store
+
+    given: dict[str, Any] = {"moves": moves, "setups": setups, "seeds": seeds}
+    given |= {"steps": steps, "executor": executor, "slots": slots}
+    prepare(Store.from_environment())
+    from flows.ablation import run
+
+    made = run(study, chosen(set_, given))
+    return Answer(made, text=[f"page    {made['page']}", f"tables  {made['tables']}"])
+
+
+@command
+def metrics(
+    sql: Annotated[
+        str | None,
+        typer.Option(help="A question in SQL about `episodes`, `evaluations` and `runs`."),
+    ] = None,
+    as_json: Json = False,
+) -> Answer:
+    """The tables of all studies; without a question, a line a cell."""
+    from storage import metrics as kept
+    from storage.store import Store
+
+    rows = kept.query(Store.from_environment(), sql or kept.OVERVIEW)
+    if not rows:
+        return Answer({"rows": []}, text=["no rows; `robojackson ablation` makes some"])
+    return Answer(
+        {"rows": rows}, text=table({str(n): row for n, row in enumerate(rows, 1)}, tuple(rows[0]))
+    )
+
+
+@command
+def deploy(as_json: Json = False) -> Answer:
+    """Register pools, deployments and automations with the server of PREFECT_API_URL."""
+    from flows.deploy import deploy as register
+
+    return Answer(register())

@@ -1,0 +1,54 @@
+"""A picture of a move: video frame, recovered body and robot, at a few moments (Figures 2-4)."""
+
+from contextlib import ExitStack
+from pathlib import Path
+
+import cv2
+import mujoco
+import numpy as np
+
+from robojackson.clips.track import LandmarkTrack
+from robojackson.motion.reference import ReferenceMotion
+from robojackson.motion.smpl import SmplSequence
+from robojackson.report.robot_panel import REFERENCE_TINT
+from robojackson.report.timeline import Timeline, reference_qpos
+from robojackson.report.video import Film, VideoConfig
+
+MOMENTS = (0.2, 0.5, 0.8)
+"""Shares of the motion that are shown."""
+
+
+def still(
+    source: Path,
+    track: LandmarkTrack,
+    sequence: SmplSequence,
+    reference: ReferenceMotion,
+    model: mujoco.MjModel,
+    config: VideoConfig | None = None,
+) -> bytes:
+    """The picture as PNG, three panels a moment, in one row.
+
+    Raises:
+        MissingDependency: no way to draw without a screen.
+    """
+    config = config or VideoConfig(panel_width=240, panel_height=360)
+    when = _moments(reference, track)
+    with ExitStack() as stack:
+        film = Film(stack, source, track, sequence, config, when)
+        film.add_robot("reference", reference_qpos(reference, when), model, REFERENCE_TINT)
+        row = np.concatenate(list(film.pictures()), axis=1)
+    return bytes(cv2.imencode(".png", row[..., ::-1])[1])
+
+
+def _moments(reference: ReferenceMotion, track: LandmarkTrack) -> Timeline:
+    step = np.array([int(share * (len(reference) - 1)) for share in MOMENTS])
+    frame = np.round(np.asarray(reference.source_time_s)[step] * track.fps).astype(int)
+    still_there = np.zeros(len(step), bool)
+    return Timeline(
+        time_s=step * reference.dt,
+        step=step,
+        lap=np.zeros(len(step), int),
+        frame=np.clip(frame, 0, len(track) - 1),
+        rollout=np.zeros(len(step), int),
+        ended=still_there,
+    )

@@ -1,0 +1,135 @@
+"""The page of a study: what the paper claims, Table II in numbers, curves, and what it all means.
+
+Table II of the paper has adjectives; here each is a mean over seeds with its 95 % interval. Beside
+the return with all bonuses in, as the paper shows it, stands what every policy is worth under one
+yardstick: curiosity off, lambda fixed, stock physics.
+"""
+
+import base64
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import resources
+from typing import Any
+
+import jinja2
+
+from robojackson.metrics.study import Claim, Estimate
+from robojackson.report.page import Plot
+
+FIGURES: Mapping[str, tuple[str, int, float]] = {
+    "final_return": ("return at the end, bonuses in", 1, 1.0),
+    "area": ("mean return while learning", 1, 1.0),
+    "steps_to": ("steps to the threshold", 0, 1.0),
+    "return_own": ("return by the yardstick", 1, 1.0),
+    "survived_s": ("survival, s", 2, 1.0),
+    "strict_success": ("strict success, %", 0, 100.0),
+    "skill": ("skill", 2, 1.0),
+    "limb_gain": ("limb gain", 2, 1.0),
+}
+"""Columns of the table: title, digits, factor."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """One row of the table.
+
+    Attributes:
+        move, setup: What was trained, or the name of a baseline.
+        seeds: How many.
+        values: Estimates by name of the figure.
+        baseline: Whether nothing was learnt.
+    """
+
+    move: str
+    setup: str
+    seeds: int
+    values: Mapping[str, Estimate]
+    baseline: bool = False
+
+
+@dataclass(frozen=True)
+class StudyContent:
+    """What the page shows.
+
+    Attributes:
+        title: Of the study.
+        facts: How it was done, by name.
+        claims: What the paper says, and what was found.
+        lines: The table.
+        moves: For each move a picture: frame, recovered body, robot (Figures 2-4).
+        curves: Learning curves (Figures 5-13).
+        judged: Pictures of the judgement.
+        notes: Warnings for the reader.
+    """
+
+    title: str
+    facts: Mapping[str, Any] = field(default_factory=dict)
+    claims: Sequence[Claim] = ()
+    lines: Sequence[Line] = ()
+    moves: Sequence[Plot] = ()
+    curves: Sequence[Plot] = ()
+    judged: Sequence[Plot] = ()
+    notes: Sequence[str] = ()
+
+
+def render(content: StudyContent) -> str:
+    """The page as HTML, one file with everything in it."""
+    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
+    here = resources.files("robojackson.report")
+    template = environment.from_string(here.joinpath("study.html").read_text("utf-8"))
+    return template.render(
+        content=content,
+        style=here.joinpath("page.css").read_text("utf-8"),
+        columns=[title for title, _, _ in FIGURES.values()],
+        rows=[
+            (line, [cell(line.values.get(key), key) for key in FIGURES]) for line in content.lines
+        ],
+        claims=[(claim, sentence(claim)) for claim in content.claims],
+        groups=[
+            ("The moves", _encoded(content.moves)),
+            ("While learning", _encoded(content.curves)),
+            ("Judged alike", _encoded(content.judged)),
+        ],
+    )
+
+
+def cell(value: Estimate | None, key: str) -> str:
+    """A mean with its interval, a dash where there is none."""
+    if value is None or math.isnan(value.mean):
+        return "–"
+    _, digits, factor = FIGURES[key]
+    if math.isinf(value.mean):
+        return "never"
+    told = f"{factor * value.mean:,.{digits}f}"
+    if not math.isfinite(value.low + value.high):
+        return told
+    return f"{told} [{factor * value.low:,.{digits}f}, {factor * value.high:,.{digits}f}]"
+
+
+def sentence(claim: Claim) -> str:
+    """What was found of a claim, in words and numbers."""
+    if claim.effect is None:
+        return f"Not measured here: {claim.treated} or {claim.control} was not trained."
+    found = claim.effect.difference
+    how = {
+        "holds": "Holds here",
+        "reversed": "The opposite holds here",
+        "not shown": "Not shown here",
+    }[claim.verdict]
+    told = f"{how}: {claim.treated} minus {claim.control} is {found.mean:+.3g}"
+    if math.isfinite(found.low):
+        told += f" [{found.low:+.3g}, {found.high:+.3g}]"
+    told += f" over {found.count} paired seed{'s' if found.count != 1 else ''}"
+    if math.isfinite(claim.effect.p):
+        least = claim.effect.smallest_p
+        told += f", p = {claim.effect.p:.2g} (no smaller than {least:.2g} with so few)"
+    return f"{told}; {100 * claim.effect.improvement:.0f} % chance that one run of it is better."
+
+
+def _cells(line: Line) -> list[str]:
+    return [cell(line.values.get(key), key) for key in FIGURES]
+
+
+def _encoded(plots: Sequence[Plot]) -> list[tuple[Plot, str]]:
+    return [(plot, base64.b64encode(plot.png).decode()) for plot in plots]

@@ -1,0 +1,103 @@
+"""What processes that were killed left on this machine, and taking it away.
+
+Half-written files (`.part-`), scratch folders, and folders of work. A process holds a lock on what
+it is writing and the kernel lets go when it dies, so whatever nobody holds is nobody's. A training
+that was killed is the exception: its checkpoint is worth going on from, until the same training has
+been finished elsewhere.
+"""
+
+import fcntl
+import logging
+import shutil
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from robojackson.errors import StoreError
+from storage import metrics
+from storage.lock import locked
+from storage.places import TEMPORARY, Folder
+from storage.store import HELD, SCRATCH, Store
+
+log = logging.getLogger(__name__)
+TASK, PROCESS = "task.lock", "lock"
+"""What the flow and the training hold of a folder of work."""
+TRAINING, JUDGEMENT = "train-", "judge-"
+YOUNG_S = 60.0
+"""A folder may be younger than the lock in it."""
+
+
+def sweep(store: Store, parts: bool = True) -> list[Path]:
+    """Take away what is nobody's; what a living process works on stays.
+
+    Args:
+        parts: Look for half-written files, too: in all folders of the store, if it is on a disk.
+    """
+    gone = [*(_parts(store) if parts else ()), *_scratch(store), *_work(store)]
+    for path in gone:
+        log.info("left by a process that is dead, taken away: %s", path)
+    return gone
+
+
+def _parts(store: Store) -> Iterator[Path]:
+    """Files whose writing was not finished."""
+    if isinstance(store.place, Folder):
+        for path in store.place.root.rglob(f"{TEMPORARY}*"):
+            if path.is_file() and not _is_held(path):
+                path.unlink(missing_ok=True)
+                yield path
+
+
+def _scratch(store: Store) -> Iterator[Path]:
+    for folder in _folders(store, f"{SCRATCH}/*"):
+        held = folder / HELD
+        if not _is_held(held) if held.exists() else _age_s(folder) > YOUNG_S:
+            shutil.rmtree(folder, ignore_errors=True)
+            yield folder
+
+
+def _work(store: Store) -> Iterator[Path]:
+    """Folders of judgements, which begin anew, and of trainings that were finished elsewhere."""
+    left = [f for f in _folders(store, f"{TRAINING}*") if not _is_held(f / TASK)]
+    finished = _finished(store) if left else set()
+    unneeded = [folder for folder in left if folder.name.removeprefix(TRAINING) in finished]
+    for folder in [*_folders(store, f"{JUDGEMENT}*"), *unneeded]:
+        try:
+            with locked(folder, TASK), locked(folder, PROCESS):
+                shutil.rmtree(folder, ignore_errors=True)
+        except (StoreError, FileNotFoundError):
+            continue
+        yield folder
+
+
+def _finished(store: Store) -> set[str]:
+    """Digests of the trainings whose cells are in the tables."""
+    tables = [{_digest(key) for key in store.list(f"{metrics.FOLDER}/{t}")} for t in metrics.TABLES]
+    return set.intersection(*tables)
+
+
+def _digest(key: str) -> str:
+    return Path(key).stem.rpartition("-")[2]
+
+
+def _folders(store: Store, pattern: str) -> list[Path]:
+    return [path for path in (store.here / "work").glob(pattern) if path.is_dir()]
+
+
+def _age_s(path: Path) -> float:
+    try:
+        return time.time() - path.stat().st_mtime
+    except FileNotFoundError:
+        return 0.0
+
+
+def _is_held(path: Path) -> bool:
+    """Whether a living process has locked the file."""
+    try:
+        with path.open("rb") as file:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    return False

@@ -1,0 +1,168 @@
+"""The tables of the studies: episodes and evaluations of every cell, one file a cell and table.
+
+    metrics/episodes/study=S/move=M/setup=P/seed=N/<run_id>.parquet
+    metrics/evaluations/study=S/move=M/setup=P/seed=N/<run_id>.parquet
+    metrics/runs/<run_id>-<study>.json           where the numbers come from
+
+The run id is a digest of the configuration and the inputs, so a cell that is done again writes the
+same bytes under the same key, two writers never touch one file, and no clock stands in a table;
+when and where a cell ran is in the file beside it. DuckDB answers questions about all of them.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import pyarrow as pa
+
+from robojackson.errors import BadTable, StoreError
+from storage import tables
+from storage.artifact import Artifact
+from storage.schemas import EPISODE_RECORD, EVALUATION_RECORD, TableSchema
+from storage.store import Store
+
+FOLDER = "metrics"
+TABLES: Mapping[str, TableSchema] = {"episodes": EPISODE_RECORD, "evaluations": EVALUATION_RECORD}
+RUNS = f"{FOLDER}/runs"
+OVERVIEW = """
+SELECT study, move, setup, seed, count(*) AS rollouts, round(avg(survived_s), 2) AS survived_s,
+       round(avg(strict_success), 3) AS strict_success, round(avg(skill), 3) AS skill
+FROM evaluations WHERE policy = 'trained' GROUP BY ALL ORDER BY ALL
+"""
+"""A line a cell."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the rows of a cell stand.
+
+    Attributes:
+        study, move, setup, seed: The partition.
+        run_id: Of the training.
+    """
+
+    study: str
+    move: str
+    setup: str
+    seed: int
+    run_id: str
+
+    def key(self, table: str) -> str:
+        """The key of one of its tables."""
+        partition = f"study={self.study}/move={self.move}/setup={self.setup}/seed={self.seed}"
+        return f"{FOLDER}/{table}/{partition}/{self.run_id}.parquet"
+
+
+def write(store: Store, place: Place, given: Mapping[str, Artifact]) -> dict[str, Artifact]:
+    """Put the tables of a cell where questions find them; another run of that cell makes room.
+
+    Args:
+        given: `episodes` and `evaluations`, as the stages left them.
+    Raises:
+        BadTable: one is not what its schema says.
+        StoreError: the store refuses it; nothing half-written is left.
+    """
+    made = {}
+    for table, schema in TABLES.items():
+        key = given[table].key
+        rows = tables.decode_rows(schema, store.read(key), store.address(key))
+        made[table] = store.put(place.key(table), tables.encode_rows(schema, _named(place, rows)))
+    for key in _outdated(store, place):
+        store.remove(key)
+    return made
+
+
+def note_key(place: Place) -> str:
+    """The key of what is known of a cell's origin."""
+    return f"{RUNS}/{place.run_id}-{place.study}.json"
+
+
+def note(store: Store, place: Place, facts: Mapping[str, Any]) -> Artifact:
+    """Keep where the numbers of a cell come from."""
+    text = json.dumps(facts, indent=1, sort_keys=True, default=str)
+    return store.put(note_key(place), text.encode())
+
+
+def query(store: Store, sql: str, given: Mapping[str, Any] | None = None) -> list[dict[str, Any]]:
+    """Rows of a question in DuckDB's SQL about `episodes`, `evaluations` and `runs`.
+
+    It reaches no other file.
+
+    Raises:
+        BadTable: the question is not SQL, or names what is not there.
+    """
+    import duckdb
+
+    with duckdb.connect(":memory:") as connection:
+        for table in TABLES:
+            connection.register("given", read(store, table))
+            connection.execute(f"CREATE TABLE {table} AS SELECT * FROM given")
+            connection.unregister("given")
+        connection.register("given", _runs(store))
+        connection.execute("CREATE TABLE runs AS SELECT * FROM given")
+        connection.execute("SET enable_external_access = false")
+        try:
+            connection.execute(sql, dict(given or {}))
+            names = [column[0] for column in connection.description or ()]
+            return [dict(zip(names, row, strict=True)) for row in connection.fetchall()]
+        except duckdb.Error as cause:
+            raise BadTable(f"metrics: {' '.join(str(cause).split())}") from cause
+
+
+def read(store: Store, table: str, study: str | None = None) -> pa.Table:
+    """All rows of a table, with the column `study`, or those of one study."""
+    schema = TABLES[table]
+    prefix = f"{FOLDER}/{table}" + (f"/study={study}" if study else "")
+    parts = [
+        _with_study(tables.decode_table(schema, store.read(key), store.address(key)), key)
+        for key in store.list(prefix)
+        if key.endswith(".parquet")
+    ]
+    return pa.concat_tables([_empty(schema), *parts], promote_options="default")
+
+
+def _named(place: Place, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Rows under the names of this cell: a cached table may have been made under others."""
+    names = {"run_id": place.run_id, "move": place.move, "setup": place.setup, "seed": place.seed}
+    return [{**row, **names} for row in rows]
+
+
+def _with_study(table: pa.Table, key: str) -> pa.Table:
+    study = key.split("study=", 1)[1].split("/", 1)[0]
+    bare = table.replace_schema_metadata(None)
+    return bare.add_column(0, "study", pa.array([study] * len(table), pa.string()))
+
+
+def _empty(schema: TableSchema) -> pa.Table:
+    whole = tables.decode_table(schema, tables.encode_rows(schema, []), "")
+    bare = whole.replace_schema_metadata(None)
+    return bare.add_column(0, "study", pa.array([], pa.string()))
+
+
+def _runs(store: Store) -> pa.Table:
+    """Provenance, a row a cell: what is not a plain value stands as JSON."""
+    rows = []
+    for key in store.list(RUNS):
+        try:
+            facts = json.loads(store.read(key))
+        except (StoreError, ValueError) as cause:
+            raise BadTable(f"{store.address(key)}: not JSON: {cause}") from cause
+        rows.append({name: _plain(value) for name, value in facts.items()})
+    names = dict.fromkeys(["run_id", "study", "move", "setup", *(n for row in rows for n in row)])
+    return pa.table({n: pa.array([row.get(n) for row in rows], pa.string()) for n in names})
+
+
+def _plain(value: Any) -> str | None:
+    if value is None or isinstance(value, str):
+        return value
+    return json.dumps(value, sort_keys=True, default=str)
+
+
+def _outdated(store: Store, place: Place) -> list[str]:
+    """Files of the same cell under another run id: an earlier configuration or code."""
+    found = []
+    for table in TABLES:
+        folder = place.key(table).rsplit("/", 1)[0]
+        found += [key for key in store.list(folder) if key != place.key(table)]
+    return found

@@ -1,0 +1,70 @@
+"""A training's progress on Prefect's pages: a bar with survival, speed and the time left."""
+
+import asyncio
+import json
+import re
+from collections.abc import AsyncIterator, Mapping
+from contextlib import asynccontextmanager, suppress
+from pathlib import Path
+from typing import Any
+from uuid import UUID
+
+from prefect.artifacts import acreate_progress_artifact, aupdate_progress_artifact
+
+FILE = "progress.json"
+"""What a training keeps writing into its folder."""
+EVERY_S = 5.0
+
+
+@asynccontextmanager
+async def shown(work: Path, name: str) -> AsyncIterator[None]:
+    """Show what a training in `work` says of itself for the time of a block, and where it ended."""
+    bar = _Bar(work / FILE, name)
+    watcher = asyncio.create_task(bar.watch())
+    try:
+        yield
+    finally:
+        watcher.cancel()
+        with suppress(asyncio.CancelledError):
+            await watcher
+    await bar.tell()
+
+
+class _Bar:
+    """A training's bar: no server and no file are reasons to show nothing, never to stop it."""
+
+    def __init__(self, path: Path, name: str) -> None:
+        self._path, self._name = path, name
+        self._artifact: UUID | None = None
+
+    async def watch(self) -> None:
+        key = re.sub(r"[^a-z0-9]+", "-", self._name.lower()).strip("-")
+        told = f"{self._name}: starting"
+        with suppress(Exception):
+            self._artifact = await acreate_progress_artifact(0.0, key=key, description=told)
+        while self._artifact is not None:
+            await asyncio.sleep(EVERY_S)
+            await self.tell()
+
+    async def tell(self) -> None:
+        """What the file says now."""
+        with suppress(Exception):
+            row = json.loads(self._path.read_text())
+            if self._artifact is not None:
+                said = told(self._name, row)
+                await aupdate_progress_artifact(self._artifact, done(row), description=said)
+
+
+def done(row: Mapping[str, Any]) -> float:
+    """Percent of the budget that is used up."""
+    used, left = float(row["seconds"]), float(row["seconds_left"])
+    return round(100.0 * used / max(used + left, 1e-9), 1)
+
+
+def told(name: str, row: Mapping[str, Any]) -> str:
+    """A row of progress for a person."""
+    minutes, seconds = divmod(int(row["seconds_left"]), 60)
+    survived = row.get("survived_s")
+    lived = "no episode has ended" if survived is None else f"survives {survived:.2f} s"
+    rate = f"{row['steps_per_s']:,.0f} steps/s"
+    return f"{name}: {lived}, {int(row['steps']):,} steps, {rate}, {minutes}:{seconds:02d} left"

@@ -1,0 +1,192 @@
+"""The results of a study out of its tables: numbers, figures, and a page that says what they show.
+
+Not cached: it reads whatever rows there are now, which takes seconds.
+"""
+
+import csv
+import io
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from configs.loader import load
+from configs.study import Move, Study
+from robojackson.metrics import study as statistics
+from robojackson.report import study as page
+from robojackson.report.page import Plot
+from robojackson.report.plots import png
+from robojackson.report.study_plots import Curves, judged, learning_curves
+from storage import metrics
+from storage.artifact import Artifact
+from storage.store import Store
+from tasks.results import (
+    JUDGED,
+    Figures,
+    Key,
+    Seeds,
+    grid_of,
+    learning,
+    of_baselines,
+    of_judgement,
+    of_learning,
+)
+
+FOLDER = "studies"
+PRIMARY = "return_own"
+"""The figure that the claims are about, chosen before any run (docs/ablation.md)."""
+
+
+def report(study: Study, pictures: Mapping[str, bytes] | None = None) -> dict[str, Artifact]:
+    """Write `studies/<name>/` anew: `page`, `table` (CSV), `results` (JSON) and the figures.
+
+    Args:
+        pictures: By move, its video frame, recovered body and robot side by side, as PNG.
+    """
+    store, rng = Store.from_environment(), np.random.default_rng(0)
+    curves = learning(store, study)
+    figures = {**of_learning(curves, study), **of_judgement(store, study)}
+    baselines = of_baselines(store, study)
+    moves = {name: load(Move, f"moves/{name}") for name in study.moves}
+    walking = {name: move.walking for name, move in moves.items()}
+    claims = statistics.claims(figures[PRIMARY], walking, rng)
+    lines = table(figures, baselines, study, rng)
+    plots = _plots(curves, figures, baselines, study)
+    content = page.StudyContent(
+        title=study.name,
+        facts=_facts(store, study),
+        claims=claims,
+        lines=lines,
+        moves=[_picture(name, moves[name], png) for name, png in (pictures or {}).items()],
+        curves=plots["curves"],
+        judged=plots["judged"],
+        notes=_notes(study),
+    )
+    folder = f"{FOLDER}/{study.name}"
+    made = {
+        "page": store.put(f"{folder}/index.html", page.render(content).encode()),
+        "table": store.put(f"{folder}/table.csv", _csv(lines)),
+        "results": store.put(f"{folder}/results.json", _json(claims, lines)),
+    }
+    for plot in (*content.curves, *content.judged, *content.moves):
+        made[plot.title] = store.put(f"{folder}/{_file(plot.title)}.png", plot.png)
+    return made
+
+
+def table(
+    figures: Figures,
+    baselines: Mapping[str, Mapping[str, Mapping[str, float]]],
+    study: Study,
+    rng: np.random.Generator,
+) -> list[page.Line]:
+    """Table II: a line a setup and move, then what the baselines do."""
+    lines = []
+    for move in study.moves:
+        for setup in study.setups:
+            seeds = {name: by_key.get((move, setup), {}) for name, by_key in figures.items()}
+            values = {
+                name: statistics.estimate(list(by_seed.values()), rng)
+                for name, by_seed in seeds.items()
+            }
+            count = max((len(by_seed) for by_seed in seeds.values()), default=0)
+            lines.append(page.Line(move, setup, count, values))
+        for policy, known in baselines.get(move, {}).items():
+            values = {n: statistics.Estimate(v, np.nan, np.nan, 1) for n, v in known.items()}
+            lines.append(page.Line(move, policy, 0, values, baseline=True))
+    return lines
+
+
+def _plots(
+    curves: Mapping[Key, Seeds],
+    figures: Figures,
+    baselines: Mapping[str, Mapping[str, Mapping[str, float]]],
+    study: Study,
+) -> dict[str, list[Plot]]:
+    grid = grid_of(study)
+    middle = (grid[1:] + grid[:-1]) / 2
+    made: dict[str, list[Plot]] = {"curves": [], "judged": []}
+    for move in study.moves:
+        drawn: dict[str, Curves] = {
+            setup: Curves(
+                middle,
+                np.array([seed["episode_return"] for seed in curves[move, setup].values()]),
+                np.array([seed["episode_length"] for seed in curves[move, setup].values()]),
+            )
+            for setup in study.setups
+            if (move, setup) in curves
+        }
+        if drawn:
+            told = "Training episodes: return, bonuses in, and length. Mean and range over seeds."
+            made["curves"].append(Plot(f"Learning {move}", told, png(learning_curves(drawn))))
+    for name in JUDGED:
+        by_move: dict[str, dict[str, list[float]]] = {
+            move: {
+                setup: list(figures[name].get((move, setup), {}).values()) for setup in study.setups
+            }
+            for move in study.moves
+        }
+        lines = {
+            move: {p: known[name] for p, known in found.items() if name in known}
+            for move, found in baselines.items()
+        }
+        if any(values for setups in by_move.values() for values in setups.values()):
+            title, _, _ = page.FIGURES[name]
+            told = "A dot a seed, the bar their mean; lines are policies that learnt nothing."
+            made["judged"].append(Plot(title, told, png(judged(by_move, lines, title))))
+    return made
+
+
+def _facts(store: Store, study: Study) -> dict[str, Any]:
+    sql = "SELECT DISTINCT git_commit FROM runs WHERE study = $study"
+    commits = [row["git_commit"] or "?" for row in metrics.query(store, sql, {"study": study.name})]
+    return {
+        "mode": study.mode,
+        "trainer": study.trainer,
+        "steps": f"{study.steps:,}",
+        "seeds": ", ".join(map(str, study.seeds)),
+        "code": ", ".join(sorted(commit[:10] for commit in commits)),
+    }
+
+
+def _notes(study: Study) -> list[str]:
+    pairs = len(study.seeds)
+    if pairs >= 6:
+        return []
+    least = 2.0 ** (1 - pairs)
+    return [
+        f"{pairs} seed{'s' if pairs != 1 else ''}: no difference can have a p below {least:.2g}, "
+        "so nothing here is a statement; ten seeds are."
+    ]
+
+
+def _picture(name: str, move: Move, png: bytes) -> Plot:
+    stands = f" (for the paper's {move.paper})" if move.paper else ""
+    told = "The video, the body recovered from it, and the same moment on the robot."
+    return Plot(f"{name}{stands}", told, png)
+
+
+def _csv(lines: Sequence[page.Line]) -> bytes:
+    out = io.StringIO()
+    rows = csv.writer(out)
+    parts = [f"{name}{part}" for name in page.FIGURES for part in ("", "_low", "_high")]
+    rows.writerow(["move", "setup", "seeds", *parts])
+    for line in lines:
+        found = [line.values.get(name) for name in page.FIGURES]
+        flat = [v for e in found for v in ((e.mean, e.low, e.high) if e else ("", "", ""))]
+        rows.writerow([line.move, line.setup, line.seeds, *flat])
+    return out.getvalue().encode()
+
+
+def _json(claims: Sequence[statistics.Claim], lines: Sequence[page.Line]) -> bytes:
+    told = {
+        "primary": PRIMARY,
+        "claims": [{**asdict(claim), "words": page.sentence(claim)} for claim in claims],
+        "lines": [asdict(line) for line in lines],
+    }
+    return json.dumps(told, indent=1).encode()
+
+
+def _file(title: str) -> str:
+    return "".join(c if c.isalnum() else "-" for c in title.lower()).strip("-")

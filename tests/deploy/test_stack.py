@@ -1,0 +1,135 @@
+"""The whole stack as processes: the ablation by `prefect deployment run`, then again from cache."""
+
+import json
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from tools.processes import Found, under
+from tools.stack import Stack, running
+from tools.trials import STUDY
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(1800)]
+AGAIN_S = 120.0
+"""Nine cached cells on two workers: ten starts of Python with all that it imports."""
+WORK = "flows.cli train"
+
+
+@pytest.fixture(scope="module")
+def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stack]:
+    with running(tmp_path_factory.mktemp("stack"), scale={"trainer": 2}) as found:
+        yield found
+
+
+def command(stack: Stack, *words: str, **more: str) -> subprocess.CompletedProcess[str]:
+    """A command beside the stack."""
+    environment = {**stack.client(), **more}
+    run = [sys.executable, "-m", *words]
+    return subprocess.run(
+        run, env=environment, capture_output=True, text=True, timeout=1500, check=False
+    )
+
+
+def prefect(stack: Stack, *words: str, **more: str) -> subprocess.CompletedProcess[str]:
+    return command(stack, "prefect", *words, **more)
+
+
+def ask(stack: Stack, sql: str) -> list[dict[str, Any]]:
+    run = command(stack, "flows.cli", "metrics", "--sql", sql, "--json")
+    assert run.returncode == 0, run.stderr
+    return list(json.loads(run.stdout)["rows"])
+
+
+def begin(stack: Stack, **given: Any) -> str:
+    """Start a small study on the workers; the id of its run."""
+    study = json.dumps({**STUDY, "executor": "work-pool", **given})
+    said = prefect(stack, "deployment", "run", "ablation/smoke", "-p", f"study={study}").stdout
+    found = re.search(r"UUID: ([0-9a-f-]{36})", said)
+    assert found, said
+    return found[1]
+
+
+def inspect(stack: Stack, run: str) -> dict[str, Any]:
+    said = prefect(stack, "flow-run", "inspect", run, "--output", "json")
+    return dict(json.loads(said.stdout)) if said.returncode == 0 else {}
+
+
+def until(question: Callable[[], Any], seconds: float = 600.0) -> Any:
+    """The first answer that is not empty."""
+    end = time.monotonic() + seconds
+    while not (answer := question()) and time.monotonic() < end:
+        time.sleep(0.5)
+    assert answer
+    return answer
+
+
+def ended(stack: Stack, run: str) -> dict[str, Any]:
+    state = inspect(stack, run).get("state") or {}
+    return state if state.get("type") in ("COMPLETED", "FAILED", "CRASHED", "CANCELLED") else {}
+
+
+def trainings(stack: Stack) -> list[Found]:
+    return [found for found in under(stack.folder / "home") if WORK in found.command]
+
+
+def test_nine_cells_leave_nine_tables_and_a_second_run_finds_them(stack: Stack) -> None:
+    first = prefect(stack, "deployment", "run", "ablation/smoke", "--watch")
+    assert first.returncode == 0, first.stdout[-2000:]
+    cells = "SELECT DISTINCT move, setup, seed FROM {} ORDER BY ALL"
+    trained = ask(stack, cells.format("episodes"))
+    assert len(trained) == 9
+    assert ask(stack, cells.format("evaluations")) == trained
+    began = time.monotonic()
+    again = prefect(stack, "deployment", "run", "ablation/smoke", "--watch")
+    assert again.returncode == 0, again.stdout[-2000:]
+    assert time.monotonic() - began < AGAIN_S
+    assert ask(stack, "SELECT count(*) AS n FROM runs") == [{"n": 9}]
+
+
+def test_a_killed_cell_is_named_and_its_neighbours_are_in_the_tables(stack: Stack) -> None:
+    run = begin(stack, name="killed", retries=0, steps=800)
+    victim = until(lambda: trainings(stack))[0]
+    victim.kill()
+    state = until(lambda: ended(stack, run))
+    assert state["type"] == "FAILED"
+    name = re.search(r"1 of 3 cells failed \((\w+)-hip_shake-s0", state["message"])
+    assert name, state["message"]
+    rows = ask(stack, "SELECT DISTINCT setup FROM episodes WHERE study = 'killed' ORDER BY ALL")
+    assert {row["setup"] for row in rows} == set(STUDY["setups"]) - {name[1]}
+
+
+def test_a_cancelled_run_leaves_no_process(stack: Stack) -> None:
+    run = begin(stack, name="cancelled", steps=200_000)
+    until(lambda: len(trainings(stack)) == 2)
+    assert prefect(stack, "flow-run", "cancel", run).returncode == 0
+    services = {service.process.pid for service in stack.services.values() if service.process}
+
+    def others() -> list[Found]:
+        return [f for f in under(stack.folder / "home") if f.pid not in services]
+
+    assert until(lambda: not others(), 180.0)
+    assert until(lambda: ended(stack, run), 60.0)["type"] == "CANCELLED"
+
+
+def test_nonsense_is_refused_before_a_run_starts(stack: Stack) -> None:
+    wrong = json.dumps({"name": "x", "setups": ["bogus"]})
+    said = prefect(stack, "deployment", "run", "ablation/smoke", "-p", f"study={wrong}")
+    assert said.returncode != 0
+    assert "bogus" in said.stdout + said.stderr
+
+
+def test_the_nightly_refresh_is_planned_by_the_server(stack: Stack) -> None:
+    def planned() -> bool:
+        return "refresh" in prefect(stack, "flow-run", "ls", "--state", "Scheduled").stdout
+
+    assert until(planned, 120.0)
+
+
+def test_the_server_refuses_strangers(stack: Stack) -> None:
+    run = prefect(stack, "deployment", "ls", PREFECT_API_AUTH_STRING="robojackson:wrong")
+    assert run.returncode != 0

@@ -1,0 +1,91 @@
+"""The tables of the studies: one file a cell, the same bytes each time, questions in SQL."""
+
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from robojackson.errors import BadTable
+from storage import metrics, tables
+from storage.artifact import Artifact
+from storage.schemas import EPISODE_RECORD, EVALUATION_RECORD
+from storage.store import Store
+
+NAMES = {"run_id": "other", "move": "other", "setup": "other", "seed": 9}
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Store:
+    return Store(tmp_path)
+
+
+def cell(seed: int = 0, run_id: str = "r1", setup: str = "scratch") -> metrics.Place:
+    return metrics.Place("smoke", "walk", setup, seed, run_id)
+
+
+def made(store: Store, survived: float = 1.0) -> dict[str, Artifact]:
+    """What the stages of a cell leave, under the names of another cell."""
+    episode = {"step": 10, "episode": 0, "episode_return": 2.5, "episode_length": 10}
+    rollout = {"policy": "trained", "phase": 0, "reset": 0, "survived_s": survived, "fell": False}
+    rollout |= {"clip_fraction": 1.0, "success": 1.0, "strict_success": 0.0}
+    rows = {"episodes": (EPISODE_RECORD, episode), "evaluations": (EVALUATION_RECORD, rollout)}
+    return {
+        name: store.keep("stage", f"{name}.parquet", tables.encode_rows(schema, [{**NAMES, **row}]))
+        for name, (schema, row) in rows.items()
+    }
+
+
+def test_rows_get_the_names_of_the_cell_they_are_published_for(store: Store) -> None:
+    metrics.write(store, cell(seed=3), made(store))
+    (row,) = metrics.query(store, "SELECT study, move, setup, seed, run_id FROM episodes")
+    assert row == {"study": "smoke", "move": "walk", "setup": "scratch", "seed": 3, "run_id": "r1"}
+
+
+def test_the_same_cell_again_writes_the_same_bytes_under_the_same_key(store: Store) -> None:
+    first = metrics.write(store, cell(), made(store))
+    assert metrics.write(store, cell(), made(store)) == first
+
+
+def test_a_cell_that_was_trained_anew_replaces_its_rows(store: Store) -> None:
+    metrics.write(store, cell(run_id="r1"), made(store, 1.0))
+    metrics.write(store, cell(run_id="r2"), made(store, 2.0))
+    rows = metrics.query(store, "SELECT run_id, survived_s FROM evaluations")
+    assert rows == [{"run_id": "r2", "survived_s": 2.0}]
+
+
+def test_writers_of_different_cells_lose_nothing(store: Store) -> None:
+    given = made(store)
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(lambda n: metrics.write(store, cell(n, f"r{n}"), given), range(24)))
+    assert metrics.query(store, "SELECT count(*) AS n FROM episodes") == [{"n": 24}]
+
+
+def test_provenance_is_a_table_beside_the_rows(store: Store) -> None:
+    metrics.note(store, cell(), {"run_id": "r1", "git_commit": "abc", "config": {"steps": 5}})
+    metrics.write(store, cell(), made(store))
+    sql = "SELECT git_commit FROM runs JOIN evaluations USING (run_id)"
+    assert metrics.query(store, sql) == [{"git_commit": "abc"}]
+
+
+def test_an_empty_store_answers_with_no_rows(store: Store) -> None:
+    assert metrics.query(store, metrics.OVERVIEW) == []
+
+
+def test_a_question_cannot_read_other_files(store: Store, tmp_path: Path) -> None:
+    (tmp_path / "secret.csv").write_text("a\n1\n")
+    with pytest.raises(BadTable, match="metrics"):
+        metrics.query(store, f"SELECT * FROM '{tmp_path}/secret.csv'")
+
+
+def test_a_question_that_is_no_sql_is_one_line(store: Store) -> None:
+    with pytest.raises(BadTable) as told:
+        metrics.query(store, "SELEC")
+    assert "\n" not in str(told.value)
+
+
+def test_a_table_that_is_not_one_is_refused_before_anything_is_written(store: Store) -> None:
+    given: dict[str, Any] = {**made(store), "episodes": store.put("x.parquet", b"no table")}
+    with pytest.raises(BadTable):
+        metrics.write(store, cell(), given)
+    assert not store.list(metrics.FOLDER)

@@ -1,0 +1,96 @@
+"""The page of a study, from tables whose answer is known."""
+
+import csv
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from configs.study import Study
+from storage import metrics, tables
+from storage.schemas import EPISODE_RECORD, EVALUATION_RECORD
+from storage.store import Store
+from tasks.study import report
+
+STUDY = Study(
+    name="known", moves=("hip_shake", "walk"), setups=("scratch", "pretrain"), seeds=(0, 1, 2, 3)
+)
+WORTH = {"scratch": 1.0, "pretrain": 3.0}
+
+
+def publish(store: Store, move: str, setup: str, seed: int) -> None:
+    """A cell that learns from nothing to what its setup is worth."""
+    place = metrics.Place("known", move, setup, seed, f"{setup}-{move}-s{seed}")
+    names = {"run_id": place.run_id, "move": move, "setup": setup, "seed": seed}
+    share = np.linspace(0.0, 1.0, 50)
+    episodes = [
+        {**names, "step": int(50_000 * s), "episode": i, "episode_length": int(10 + 90 * s),
+         "episode_return": float(s * WORTH[setup])}
+        for i, s in enumerate(share)
+    ]  # fmt: skip
+    rows = [rollout(names, "trained", WORTH[setup] + 0.01 * seed), rollout(names, "statue", 0.5)]
+    given = {
+        "episodes": store.keep("t", "e.parquet", tables.encode_rows(EPISODE_RECORD, episodes)),
+        "evaluations": store.keep("t", "v.parquet", tables.encode_rows(EVALUATION_RECORD, rows)),
+    }
+    metrics.write(store, place, given)
+    metrics.note(store, place, {**names, "study": "known", "git_commit": "0123456789abcdef"})
+
+
+def rollout(names: dict[str, Any], policy: str, worth: float) -> dict[str, Any]:
+    return {
+        **names, "policy": policy, "phase": 0, "reset": 0, "survived_s": worth, "fell": False,
+        "clip_fraction": 1.0, "success": 1.0, "strict_success": 0.5, "return_own": worth, "limb_gain_head": 0.5, "limb_gain_left_hand": 0.7,
+    }  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("store")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ROBOJACKSON_STORE", str(root))
+        for move in STUDY.moves:
+            for setup in STUDY.setups:
+                for seed in STUDY.seeds:
+                    publish(Store(root), move, setup, seed)
+        report(STUDY)
+    return root / "studies" / "known"
+
+
+def results(folder: Path) -> dict[str, Any]:
+    return json.loads((folder / "results.json").read_text())
+
+
+def test_the_claims_are_about_the_yardstick_and_have_its_sign(folder: Path) -> None:
+    said = {claim["text"]: claim for claim in results(folder)["claims"]}
+    assert said["Pretraining helps"]["verdict"] == "holds"
+    assert said["Pretraining helps"]["effect"]["difference"]["mean"] == pytest.approx(2.0)
+    assert said["Curiosity helps on dances"]["verdict"] == "not measured"
+
+
+def test_the_table_has_a_line_a_move_and_setup_and_what_the_statue_does(folder: Path) -> None:
+    rows = list(csv.DictReader(io.StringIO((folder / "table.csv").read_text())))
+    found = {(row["move"], row["setup"]): row for row in rows}
+    assert set(found) == {(m, s) for m in STUDY.moves for s in ("scratch", "pretrain", "statue")}
+    assert float(found["walk", "pretrain"]["return_own"]) == pytest.approx(3.015)
+    assert float(found["walk", "statue"]["return_own"]) == pytest.approx(0.5)
+
+
+def test_steps_to_the_threshold_are_those_of_the_curve(folder: Path) -> None:
+    line = next(line for line in results(folder)["lines"] if line["setup"] == "scratch")
+    # Lengths grow from 10 to 100: 80 % of the last interval's mean comes at 0.77 of the budget.
+    assert line["values"]["steps_to"]["mean"] == pytest.approx(0.77 * 50_000, rel=0.05)
+
+
+def test_the_page_stands_alone_and_says_how_few_seeds_there_are(folder: Path) -> None:
+    page = (folder / "index.html").read_text()
+    assert "no difference can have a p below 0.12" in page
+    assert "http" not in page.replace("http-equiv", "")
+    assert page.count("data:image/png;base64,") == 2 + 4
+
+
+def test_the_code_that_made_the_rows_is_named(folder: Path) -> None:
+    assert "0123456789" in (folder / "index.html").read_text()

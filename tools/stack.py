@@ -1,0 +1,189 @@
+"""The services of docker-compose.yml as processes of this machine, for tests where no Docker is.
+
+    python -m tools.stack                        start all, print how to reach them, stop at Ctrl-C
+    python -m tools.stack --scale trainer=4
+
+Every service of our own image runs the very command, environment and health check of the file; host
+names and ports become 127.0.0.1 and free ports. Two stand-ins: PostgreSQL is Debian's, and the S3
+store is moto's server.
+"""
+
+import argparse
+import os
+import re
+import secrets
+import signal
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from tools import postgres
+from tools.service import ROOT, Service, free_port, interpolate
+
+COMPOSE = ROOT / "docker-compose.yml"
+PASSWORDS = ("POSTGRES_PASSWORD", "S3_PASSWORD")
+PORTS = {"postgres": 5432, "prefect-server": 4200, "s3": 9000, "flow-worker": 8080, "trainer": 8080}
+CLIENT = "flow-worker"
+"""The service whose environment a command beside the stack gets."""
+
+
+def passwords() -> dict[str, str]:
+    """What a user writes into .env: new secrets."""
+    made = {name: secrets.token_hex(16) for name in PASSWORDS}
+    return {**made, "PREFECT_AUTH": f"robojackson:{secrets.token_hex(16)}"}
+
+
+@dataclass
+class Stack:
+    """All services of the compose file.
+
+    Attributes:
+        folder: For logs, data and homes.
+        given: Values of the variables, as in .env.
+        scale: How many of a service.
+        more: Environment for all services besides the file's.
+        services: Those that were started, by name.
+    """
+
+    folder: Path
+    given: dict[str, str] = field(default_factory=passwords)
+    scale: dict[str, int] = field(default_factory=dict)
+    more: dict[str, str] = field(default_factory=dict)
+    services: dict[str, Service] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self.file = interpolate(yaml.safe_load(COMPOSE.read_text()), self.given)["services"]
+        self.ports = {name: free_port() for name in PORTS}
+
+    def up(self) -> "Stack":
+        """Start every service after those it depends on, and wait until all are healthy."""
+        needed = {n for s in self.file.values() for n in s.get("depends_on", {})}
+        for name in self._order():
+            started = [self._service(name, number) for number in range(self.scale.get(name, 1))]
+            for service in started:
+                self.services[service.name] = service
+                service.start()
+                if name in needed:
+                    service.wait()
+        for service in self.services.values():
+            if service.check is not None:
+                service.wait()
+        return self
+
+    def down(self) -> None:
+        """End all, the last one first."""
+        for service in reversed(self.services.values()):
+            service.stop()
+
+    def client(self) -> dict[str, str]:
+        """The environment of a command beside the stack: what a worker has."""
+        return self._environment(CLIENT, "client")
+
+    def _order(self) -> list[str]:
+        ordered: list[str] = []
+
+        def add(name: str) -> None:
+            for before in self.file[name].get("depends_on", {}):
+                add(before)
+            if name not in ordered:
+                ordered.append(name)
+
+        for name in self.file:
+            add(name)
+        return ordered
+
+    def _service(self, name: str, number: int) -> Service:
+        full = name if not number else f"{name}-{number + 1}"
+        log = self.folder / f"{full}.log"
+        if name == "postgres":
+            test = self.file[name]["healthcheck"]["test"][1]
+            wanted = self.file[name]["environment"]
+            return postgres.service(wanted, test, self.ports[name], self.folder, log)
+        if name == "s3":
+            return self._s3(log)
+        environment = self._environment(name, full)
+        if number:
+            environment["PREFECT_WORKER_WEBSERVER_PORT"] = str(free_port())
+        test = self.file[name].get("healthcheck", {}).get("test")
+        check = test and [_here(word, environment, name) for word in test[1:]]
+        words = self.file[name]["command"]
+        return Service(full, _found(words), environment, check and _found(check), log)
+
+    def _environment(self, name: str, full: str) -> dict[str, str]:
+        """The file's, with the addresses of this machine, and a home as in a container."""
+        home = self.folder / "home" / full
+        home.mkdir(parents=True, exist_ok=True)
+        ours = {k: self._there(str(v)) for k, v in self.file[name]["environment"].items()}
+        host = {k: os.environ[k] for k in ("LANG", "LD_LIBRARY_PATH") if k in os.environ}
+        fixed = {
+            "HOME": str(home),
+            "PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]),
+            "PREFECT_HOME": str(home / "prefect"),
+            "PYTHONPATH": str(ROOT),
+            "PREFECT_SERVER_API_PORT": str(self.ports["prefect-server"]),
+            "PREFECT_WORKER_WEBSERVER_PORT": str(self.ports.get(name, 0)),
+        }
+        return {**host, **fixed, **ours, **self.more}
+
+    def _there(self, text: str) -> str:
+        """Names of other services as addresses of this machine."""
+        for name, port in PORTS.items():
+            text = re.sub(rf"(?<=[/@]){name}:{port}\b", f"127.0.0.1:{self.ports[name]}", text)
+        return text
+
+    def _s3(self, log: Path) -> Service:
+        port = str(self.ports["s3"])
+        command = [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", port]
+        probe = f"import urllib.request as u; u.urlopen('http://127.0.0.1:{port}/', timeout=4)"
+        return Service("s3", command, dict(os.environ), [sys.executable, "-c", probe], log)
+
+
+def _here(text: str, environment: dict[str, str], name: str) -> str:
+    """A health check's address with the port that the service has on this machine."""
+    kind = "SERVER_API" if name == "prefect-server" else "WORKER_WEBSERVER"
+    return re.sub(r"localhost:\d+", f"127.0.0.1:{environment[f'PREFECT_{kind}_PORT']}", text)
+
+
+def _found(words: list[str]) -> list[str]:
+    """A command whose program is that of our environment, as the image has it on its PATH."""
+    path = Path(sys.executable).parent / words[0]
+    return [str(path) if path.exists() else words[0], *words[1:]]
+
+
+@contextmanager
+def running(folder: Path, **options: Any) -> Iterator[Stack]:
+    """A stack for the time of a block; nothing is left of its processes, nor of its database."""
+    stack = Stack(folder, **options)
+    try:
+        yield stack.up()
+    finally:
+        stack.down()
+        postgres.remove(folder)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument("--folder", type=Path, default=None)
+    parser.add_argument("--scale", action="append", default=[], metavar="SERVICE=N")
+    wanted = parser.parse_args()
+    scale = {name: int(count) for name, count in (text.split("=") for text in wanted.scale)}
+    folder = wanted.folder or Path(tempfile.mkdtemp(prefix="robojackson-"))
+    with suppress(KeyboardInterrupt), running(folder, scale=scale) as stack:
+        for name, value in stack.client().items():
+            if name.startswith(("PREFECT_", "ROBOJACKSON_", "AWS_")):
+                print(f"export {name}={value}")
+        print(f"# logs: {folder}; Ctrl-C stops", flush=True)
+        signal.pause()
+
+
+if __name__ == "__main__":
+    main()
