@@ -7,6 +7,7 @@ neck share the bend between their ends.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import anny
 import numpy as np
@@ -78,8 +79,8 @@ class PosedBody:
 class Body:
     """One person: Anny's model with a phenotype."""
 
-    def __init__(self, phenotype: Mapping[str, float] = DANCER) -> None:
-        self.model = anny.Anny().to(torch.float32)
+    def __init__(self, phenotype: Mapping[str, float] = DANCER, model: Any = None) -> None:
+        self.model: Any = model or anny.Anny().to(torch.float32)
         self.phenotype = dict(phenotype)
         self.bone_names: list[str] = [str(name) for name in self.model.bone_labels]
         rest = self.model(phenotype_kwargs=self.phenotype)

@@ -6,6 +6,7 @@ fixed order quaternions of ball joints and angles of hinges, each relative to it
 quaternions wxyz.
 """
 
+import gzip
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -65,7 +66,8 @@ class Motion:
 
 def read(path: Path, fps: float, loops: int = 1) -> Motion:
     """A clip resampled to `fps`; every further loop continues where the last one ended."""
-    frames = np.array(json.loads(path.read_text())["Frames"], dtype=float)
+    text = gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()
+    frames = np.array(json.loads(text)["Frames"], dtype=float)
     if frames.ndim != 2 or frames.shape[1] != FRAME_NUMBERS:
         raise ValueError(f"{path}: {frames.shape} numbers, expected (T, {FRAME_NUMBERS})")
     return repeated(resampled(_from_frames(frames), fps), loops)

@@ -1,0 +1,1 @@
+"""Our own NIKI through time: what the detector gets wrong in depth, and how sure that is."""

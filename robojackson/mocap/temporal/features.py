@@ -1,0 +1,161 @@
+"""What the network sees of a clip, and what its answer means: axes along the ray to the person.
+
+In each frame the axes are those of a camera that looks straight at the middle of the hips (x right,
+y down, z away), the origin is there, metres of the detector. `flat` is the image brought to the
+person's distance: what an orthographic camera would see if depth did nothing.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from robojackson.mocap.blazepose import BODY, LANDMARK_NAMES, MIRROR, landmark
+from robojackson.mocap.camera import DOWN, METRES_PER_METRE
+from robojackson.mocap.kinematics import apply, unit
+
+HIPS = (landmark("left_hip"), landmark("right_hip"))
+FPS = 30.0
+"""Frames a second that the network works at."""
+CHAINS: Mapping[str, tuple[str, str]] = {
+    "thigh": ("hip", "knee"), "shin": ("knee", "ankle"), "upper_arm": ("shoulder", "elbow"),
+    "forearm": ("elbow", "wrist"), "flank": ("shoulder", "hip"),
+}  # fmt: skip
+WIDTHS = ("hip", "shoulder")
+LONGEST = 95.0
+"""Percentile of a bone's length in the image that stands for its true length."""
+SEEN = np.array(
+    [landmark("nose"), landmark("left_ear"), landmark("right_ear"), *BODY]
+    + [landmark(f"{s}_{n}") for n in ("index", "pinky", "heel", "foot_index")
+       for s in ("left", "right")]
+)  # fmt: skip
+"""The landmarks that the network reads."""
+COUNT = len(SEEN) * 6 + 2 * (len(CHAINS) + len(WIDTHS)) + 1
+"""Numbers a frame."""
+
+
+@dataclass(frozen=True)
+class Sight:
+    """A clip along the rays to the person.
+
+    Attributes:
+        flat: Image landmarks at the person's distance from the middle of the hips, metres.
+        local: The detector's landmarks, its metres made ours.
+        visibility: 0..1.
+        axes: Rotations from these axes to the camera's.
+        root: The middle of the hips before the camera, metres.
+    """
+
+    flat: Float[np.ndarray, "T 33 2"]
+    local: Float[np.ndarray, "T 33 3"]
+    visibility: Float[np.ndarray, "T 33"]
+    axes: Float[np.ndarray, "T 3 3"]
+    root: Float[np.ndarray, "T 3"]
+
+
+def look(
+    placed: Float[np.ndarray, "T 33 3"],
+    local: Float[np.ndarray, "T 33 3"],
+    visibility: Float[np.ndarray, "T 33"],
+) -> Sight:
+    """From landmarks that the camera stage has placed, and the detector's own."""
+    rays = placed / placed[..., 2:]
+    root = placed[:, HIPS].mean(1)
+    axes = axes_along(root)
+    seen = apply(np.swapaxes(axes, -1, -2)[:, None], rays)
+    flat = seen[..., :2] / seen[..., 2:] * np.linalg.norm(root, axis=-1)[:, None, None]
+    return Sight(flat, local * METRES_PER_METRE, visibility, axes, root)
+
+
+def axes_along(ray: Float[np.ndarray, "T 3"]) -> Float[np.ndarray, "T 3 3"]:
+    """Rotations whose z is along the rays, x level."""
+    forward = unit(ray)
+    right = unit(np.cross(DOWN, forward))
+    return np.stack([right, np.cross(forward, right), forward], -1)
+
+
+def numbers(sight: Sight) -> Float[np.ndarray, "T F"]:
+    """The network's input."""
+    count = len(sight.flat)
+    return np.concatenate(
+        [
+            sight.flat[:, SEEN].reshape(count, -1),
+            sight.local[:, SEEN].reshape(count, -1),
+            sight.visibility[:, SEEN],
+            np.tile(constants(sight), (count, 1)),
+        ],
+        1,
+    )
+
+
+def constants(sight: Sight) -> Float[np.ndarray, " C"]:
+    """What is one for the whole clip: proportions of the person, and how near he is."""
+    return np.concatenate([proportions(sight), [1.0 / max(sight.root[:, 2].mean(), 0.5)]])
+
+
+def proportions(sight: Sight) -> Float[np.ndarray, " P"]:
+    """Bones of the clip: longest in the image, which depth cannot shorten, and the detector's."""
+    pairs = [[(f"{s}_{a}", f"{s}_{b}") for s in ("left", "right")] for a, b in CHAINS.values()]
+    pairs += [[(f"left_{name}", f"right_{name}")] for name in WIDTHS]
+    in_image, in_space = [], []
+    for ends in pairs:
+        starts, stops = (np.array([landmark(pair[k]) for pair in ends]) for k in (0, 1))
+        lengths = np.linalg.norm(sight.flat[:, starts] - sight.flat[:, stops], axis=-1)
+        in_image.append(np.percentile(lengths, LONGEST))
+        lengths = np.linalg.norm(sight.local[:, starts] - sight.local[:, stops], axis=-1)
+        in_space.append(np.median(lengths))
+    return np.array(in_image + in_space)
+
+
+def base(sight: Sight) -> Float[np.ndarray, "T 12 3"]:
+    """The body as the detector has it: depth of its own, the image at that depth."""
+    depth = sight.local[:, BODY, 2]
+    return np.concatenate([at_depth(sight, depth), depth[..., None]], -1)
+
+
+def at_depth(sight: Sight, depth: Float[np.ndarray, "T 12"]) -> Float[np.ndarray, "T 12 2"]:
+    """Where the body is across the image if it is that far behind the hips."""
+    distance = np.linalg.norm(sight.root, axis=-1)[:, None]
+    return sight.flat[:, BODY] * ((distance + depth) / distance)[..., None]
+
+
+def to_camera(sight: Sight, points: Float[np.ndarray, "T N 3"]) -> Float[np.ndarray, "T N 3"]:
+    """From the axes along the ray to the camera's."""
+    return apply(sight.axes[:, None], points) + sight.root[:, None]
+
+
+def mirror(sight: Sight) -> Sight:
+    """The clip in a mirror: left becomes right, x changes its sign."""
+    flip = np.array([-1.0, 1.0, 1.0])
+    return Sight(
+        flat=sight.flat[:, MIRROR] * flip[:2],
+        local=sight.local[:, MIRROR] * flip,
+        visibility=sight.visibility[:, MIRROR],
+        axes=sight.axes * flip[:, None] * flip,
+        root=sight.root * flip,
+    )
+
+
+def mirror_body(values: Float[np.ndarray, "T 12 *D"]) -> Float[np.ndarray, "T 12 *D"]:
+    """Left and right of the twelve exchanged."""
+    order = [list(BODY).index(MIRROR[index]) for index in BODY]
+    return values[:, order]
+
+
+def time_grid(count: int, fps: float) -> Float[np.ndarray, " S"]:
+    """Where the network's frames lie in the clip's, as fractions of frames."""
+    return np.arange(0.0, count - 1 + 1e-6, fps / FPS) if count > 1 else np.zeros(1)
+
+
+def resample(values: np.ndarray, places: Float[np.ndarray, " S"]) -> np.ndarray:
+    """Linear in time along axis 0 at fractions of frames; held beyond the ends."""
+    places = np.clip(places, 0.0, len(values) - 1.0)
+    low = np.minimum(np.floor(places).astype(int), max(len(values) - 2, 0))
+    part = (places - low).reshape(-1, *[1] * (values.ndim - 1))
+    high = np.minimum(low + 1, len(values) - 1)
+    return values[low] * (1.0 - part) + values[high] * part
+
+
+NAMES: tuple[str, ...] = tuple(LANDMARK_NAMES[index] for index in BODY)
+"""Of the twelve."""

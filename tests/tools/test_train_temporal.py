@@ -1,0 +1,176 @@
+"""Laws of the training: torch and numpy are one network, batches keep what they must."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from robojackson.mocap.temporal import features, flow, network
+from robojackson.mocap.temporal.features import Sight
+from tools import train_temporal
+from tools.pairs.sources import RefusedMotion
+from tools.temporal import batches
+from tools.temporal.batches import Batch, Change
+from tools.temporal.examples import Example, flattened
+from tools.temporal.fit_flow import discrepancy
+from tools.temporal.net import Flow, Lifter
+
+
+@pytest.fixture(scope="module")
+def twins(tmp_path_factory: pytest.TempPathFactory) -> tuple[Lifter, Flow, flow.Weights]:
+    torch.manual_seed(1)
+    lifter, coupled = Lifter().eval(), Flow()
+    for part in (lifter, coupled):
+        for value in part.parameters():
+            torch.nn.init.normal_(value, std=0.05)
+    path = tmp_path_factory.mktemp("weights") / "random.safetensors"
+    train_temporal.save(lifter.half().float(), coupled.half().float(), path)
+    return lifter, coupled, network.load(path)
+
+
+def person(frames: int = 60, motion: str = "jump") -> Example:
+    rng = np.random.default_rng(9)
+    truth = rng.normal(0.0, 0.4, (1, 33, 3)) + 0.05 * rng.normal(size=(frames, 33, 3))
+    truth[:, features.HIPS] -= truth[:, features.HIPS].mean(1, keepdims=True)
+    distance = np.full(frames, 4.0)
+    sight = Sight(
+        flat=flattened(truth, distance),
+        local=truth,
+        visibility=np.ones((frames, 33)),
+        axes=np.tile(np.eye(3), (frames, 1, 1)),
+        root=np.outer(distance, [0.0, 0.0, 1.0]),
+    )
+    return Example(sight, truth, np.ones(frames, bool), distance, motion)
+
+
+def batch_of(example: Example) -> Batch:
+    whole = batches.table([example])
+    return batches.windows(whole, np.zeros(4, int), 40, np.random.default_rng(2))
+
+
+def test_torch_and_numpy_are_the_same_lifter(
+    twins: tuple[Lifter, Flow, flow.Weights],
+) -> None:
+    lifter, _, weights = twins
+    sight = person().sight
+    change, spread, _ = network.run(sight, weights)
+    numbers = torch.from_numpy(features.numbers(sight)[None].astype(np.float32))
+    with torch.no_grad():
+        correction, log_spread = lifter(numbers)
+    assert np.abs(correction[0].numpy() - change).max() < 1e-3
+    assert np.abs(log_spread[0].numpy() - np.log(spread)).max() < 1e-3
+
+
+def test_torch_and_numpy_are_the_same_flow(twins: tuple[Lifter, Flow, flow.Weights]) -> None:
+    _, coupled, weights = twins
+    rng = np.random.default_rng(3)
+    error, seen = rng.normal(size=(5, 36)), rng.normal(size=(5, 160))
+    with torch.no_grad():
+        z, _ = coupled(torch.from_numpy(error).float(), torch.from_numpy(seen).float())
+    assert np.abs(z.numpy() - flow.to_embedding(error, seen, weights)).max() < 1e-4
+
+
+def test_the_flow_in_torch_can_be_inverted(twins: tuple[Lifter, Flow, flow.Weights]) -> None:
+    _, coupled, _ = twins
+    error, seen = torch.randn(5, 36), torch.randn(5, 160)
+    assert (coupled.inverse(coupled(error, seen)[0], seen) - error).abs().max() < 1e-5
+
+
+def test_the_volume_is_the_determinant(twins: tuple[Lifter, Flow, flow.Weights]) -> None:
+    _, coupled, _ = twins
+    error, seen = torch.randn(36), torch.randn(160)
+    jacobian = torch.autograd.functional.jacobian(lambda x: coupled(x, seen)[0], error)
+    assert torch.allclose(torch.logdet(jacobian), coupled(error, seen)[1], atol=1e-4)
+
+
+def test_batches_give_the_numbers_that_the_stage_gives() -> None:
+    example = person(batches.LONGEST)
+    rows = batches.table([example]).numbers()[0]
+    assert np.allclose(rows, features.numbers(example.sight), atol=1e-5)
+
+
+def test_changed_windows_are_still_seen_as_they_are() -> None:
+    how = Change(
+        40, shift_m=0.0, tilt_deg=(0.0, 0.0), depth=0.0, depth_shift_m=0.0, shake_m=0.0,
+        hidden=0.0, metre=0.0,
+    )  # fmt: skip
+    changed = batches.change(batch_of(person()), how, np.random.default_rng(4))
+    away = changed.distance[..., None, None]
+    ideal = changed.truth[..., :2] * away / (away + changed.truth[..., 2:])
+    assert np.allclose(changed.flat, ideal, atol=1e-4)
+    assert np.allclose(changed.local, changed.truth, atol=1e-4)
+
+
+def test_hidden_limbs_are_not_visible() -> None:
+    how = Change(frames=40, hidden=1.0)
+    changed = batches.change(batch_of(person()), how, np.random.default_rng(5))
+    assert (changed.visibility.min((1, 2)) == 0.0).all()
+
+
+def test_the_truth_of_a_hidden_limb_stays() -> None:
+    how = Change(40, roll_deg=0.0, size=0.0, metre=0.0, shift_m=0.0, shake_m=0.0, hidden=1.0)
+    whole = batch_of(person())
+    changed = batches.change(whole, how, np.random.default_rng(6))
+    same = np.abs(changed.truth - whole.truth).max((1, 2, 3)) < 1e-6
+    mirrored = np.abs(changed.truth[:, :, batches.SWAP] * [-1, 1, 1] - whole.truth)
+    assert (same | (mirrored.max((1, 2, 3)) < 1e-6)).all()
+
+
+def test_pairs_of_a_reported_motion_are_refused() -> None:
+    with pytest.raises(RefusedMotion, match="dance_a"):
+        train_temporal.check_motions([person(motion="dance_a+gestures")])
+
+
+def test_invented_pairs_are_not_refused() -> None:
+    train_temporal.check_motions([person(motion="invented"), person(motion="jump")])
+
+
+def test_discrepancy_tells_another_distribution() -> None:
+    torch.manual_seed(7)
+    a, b = torch.randn(200, 4), torch.randn(200, 4)
+    assert discrepancy(a, b + 1.0) > 5.0 * discrepancy(a, b).abs()
+
+
+def test_a_kept_state_goes_on_where_it_was(tmp_path: Path) -> None:
+    from tools.temporal import fit
+
+    config = fit.FitConfig(steps=4, batch=2, change=Change(frames=20))
+    where = fit.source([person()], [], 1)
+
+    def nothing(now: fit.Progress, step_s: float) -> None:
+        pass
+
+    straight = fit.begin([person()], config, 1)
+    for part in straight.net.modules():
+        if isinstance(part, torch.nn.Dropout):
+            part.p = 0.0
+    fit.fit(straight, where, config, 1, nothing)
+    halved = fit.begin([person()], config, 1)
+    resumed = fit.begin([person()], config, 2)
+    for progress in (halved, resumed):
+        for part in progress.net.modules():
+            if isinstance(part, torch.nn.Dropout):
+                part.p = 0.0
+    stop_early(halved, where, config, nothing)
+    train_temporal.keep(halved, tmp_path / "state.pt")
+    train_temporal.resume(resumed, tmp_path / "state.pt")
+    fit.fit(resumed, where, config, 1, nothing)
+    pairs = zip(straight.mean.values(), resumed.mean.values(), strict=True)
+    assert all(torch.allclose(a, b, atol=1e-6) for a, b in pairs)
+
+
+def stop_early(progress: object, where: object, config: object, watch: object) -> None:
+    """Two of four steps of the same schedule."""
+    from tools.temporal import fit
+
+    assert isinstance(progress, fit.Progress)
+    assert isinstance(where, fit.Source)
+    assert isinstance(config, fit.FitConfig)
+    for step in range(2):
+        rng = np.random.default_rng([1, 2, step])
+        share = float(np.interp(step, [0, config.steps], config.invented))
+        for group in progress.optimiser.param_groups:
+            group["lr"] = config.rate * fit._schedule(step, config.steps)
+        fit._learn(progress, where.draw(config, share, rng), config)
+        progress.step = step + 1

@@ -1,0 +1,1 @@
+"""Pairs of detector output and truth: rendered people of many kinds, seen by BlazePose."""

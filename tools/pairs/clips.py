@@ -1,0 +1,102 @@
+"""One clip of pairs: a motion, a person, a camera, things in the way; BlazePose looks at it all."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from robojackson.clips.landmarks import video_landmarker
+from robojackson.mocap.blazepose import LANDMARK_NAMES, landmark
+from tools import deepmimic
+from tools.anny_body import Body
+from tools.pairs import gestures, people, scenery, sources
+
+FPS = 30.0
+FRAMES = (90, 150)
+LIMBS = [
+    [landmark(f"{side}_{name}") for name in names]
+    for side in ("left", "right")
+    for names in (("elbow", "wrist", "index"), ("shoulder", "elbow", "wrist"),
+                  ("knee", "ankle", "foot_index"))
+]  # fmt: skip
+ON_THE_FLOOR = (
+    "roll",
+    "crawl",
+    "getup_facedown",
+    "getup_faceup",
+    "backflip",
+    "sideflip",
+    "cartwheel",
+)
+"""Motions that come a third as often: the detector loses half of their frames."""
+REACH = 1.5
+"""Metres that a person travels at most before the camera."""
+
+
+def choose_motion(
+    files: list[Path], cache: dict[Path, deepmimic.Motion], rng: np.random.Generator
+) -> tuple[str, deepmimic.Motion]:
+    """An invented dance, or a captured motion changed."""
+    count = int(rng.integers(*FRAMES))
+    if rng.uniform() < 0.6 or not files:
+        motion, name = gestures.invent(rng, count, FPS), "invented"
+    else:
+        weights = np.array([1.0 if sources.motion_name(f) in ON_THE_FLOOR else 3.0 for f in files])
+        path = files[rng.choice(len(files), p=weights / weights.sum())]
+        if path not in cache:
+            cache[path] = sources.read(path, 120.0)
+        name, whole = sources.motion_name(path), cache[path]
+        warped = deepmimic.resampled(replace(whole, fps=120.0 * rng.uniform(0.75, 1.3)), FPS)
+        motion = sources.window(warped, int(rng.integers(0, len(warped))), count)
+        motion = sources.gathered(motion, REACH)
+        if rng.uniform() < 0.35:
+            motion, name = gestures.with_gestures(motion, rng), name + "+gestures"
+    if rng.uniform() < 0.5:
+        motion = sources.mirrored(motion)
+    return name, facing(motion, rng)
+
+
+def facing(motion: deepmimic.Motion, rng: np.random.Generator) -> deepmimic.Motion:
+    """Turned so that the middle frame faces the camera, more or less."""
+    middle = motion.rotations["root"][len(motion) // 2].apply([1.0, 0.0, 0.0])
+    angle = -np.arctan2(-middle[2], middle[0]) + np.radians(rng.normal(0.0, 12.0))
+    turn = Rotation.from_rotvec([0.0, angle, 0.0])
+    return replace(
+        motion,
+        root_position=turn.apply(motion.root_position),
+        rotations={name: turn * rotation for name, rotation in motion.rotations.items()},
+    )
+
+
+def make_clip(
+    number: int, seed: int, body: Body, studio: scenery.Studio, files: list[Path],
+    cache: dict[Path, deepmimic.Motion],
+) -> dict[str, Any]:  # fmt: skip
+    """One clip: what BlazePose sees and what is true."""
+    rng = np.random.default_rng([seed, number])
+    name, motion = choose_motion(files, cache, rng)
+    person = people.draw_person(body, rng)
+    posed = person.posed(motion)
+    low = posed.heads[..., 2].min(1)
+    drop = low if name == "invented" else np.full(len(low), np.percentile(low, 5))
+    posed = replace(posed, heads=posed.heads - np.outer(drop - 0.03, [0, 0, 1])[:, None])
+    posed = replace(posed, heads=posed.heads.astype(np.float32))
+    view = scenery.film(posed, rng)
+    truth = view.see(person.landmarks(posed, LANDMARK_NAMES))
+    boxes = scenery.occluders(truth, LIMBS, view, FPS, rng)
+    with video_landmarker("full") as look:
+        pictures = studio.frames(person, posed, view, boxes, rng)
+        rows = [look(picture, index / FPS) for index, picture in enumerate(pictures)]
+    return {
+        "seen": np.array(rows, np.float32),
+        "truth": truth.astype(np.float32),
+        "bones": view.see(posed.heads).astype(np.float32),
+        "bone_names": np.array(person.body.bone_names),
+        "focal": np.array(view.focal),
+        "size": np.array([view.width, view.height]),
+        "up": view.rotation @ np.array([0.0, 0.0, 1.0]),
+        "fps": np.array(FPS),
+        "motion": np.array(name),
+    }

@@ -1,0 +1,98 @@
+"""Motions that the training pairs may be made of, and no others.
+
+A file that is not on the list is refused, those that accuracy is reported on by name: a figure on a
+motion that the network has seen would be worth nothing. Frame of all motions: DeepMimic's.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from tools import deepmimic
+from tools.pairs import bvh
+
+DEEPMIMIC = (
+    "jump", "run", "punch", "roll", "cartwheel", "crawl", "getup_facedown", "getup_faceup",
+    "backflip", "spinkick",
+)  # fmt: skip
+LONG = (
+    "jog", "long_walk1", "long_walk2", "long_walk3", "long_zombie", "sideflip", "stealthy_walk0",
+    "stealthy_walk1",
+)  # fmt: skip
+CMU = ("01_01", "01_03")
+ALLOWED = (*DEEPMIMIC, *LONG, *CMU)
+REPORTED = ("dance_a", "dance_b", "walk", "kick", "spin")
+"""Motions of the clips that figures are reported on."""
+SWAP = {"left": "right", "right": "left"}
+
+
+class RefusedMotion(ValueError):
+    """A motion that may not be trained on."""
+
+
+def motion_name(path: Path) -> str:
+    """`humanoid3d_jump.txt.gz` is jump, `01_03.bvh` is 01_03."""
+    return path.name.split(".")[0].removeprefix("humanoid3d_")
+
+
+def check_allowed(path: Path) -> None:
+    """Refuse a motion outside the list.
+
+    Raises:
+        RefusedMotion: it is reported on, or unknown.
+    """
+    name = motion_name(path)
+    if name in REPORTED:
+        raise RefusedMotion(f"{path}: accuracy is reported on {name}: it may not be trained on")
+    if name not in ALLOWED:
+        raise RefusedMotion(f"{path}: not a training motion; those are {', '.join(ALLOWED)}")
+
+
+def find(folders: list[Path]) -> list[Path]:
+    """The training motions in folders; other files there are passed over."""
+    files = sorted(path for folder in folders for path in folder.iterdir() if path.is_file())
+    return [path for path in files if motion_name(path) in ALLOWED]
+
+
+def read(path: Path, fps: float) -> deepmimic.Motion:
+    """A motion of the list at a frame rate."""
+    check_allowed(path)
+    if path.suffix == ".bvh":
+        return deepmimic.resampled(bvh.read(path), fps)
+    return deepmimic.read(path, fps)
+
+
+def window(motion: deepmimic.Motion, start: int, count: int) -> deepmimic.Motion:
+    """Frames from `start`; a motion that is too short is played to and fro."""
+    index = np.arange(start, start + count) % max(2 * len(motion) - 2, 1)
+    index = np.where(index < len(motion), index, 2 * len(motion) - 2 - index)
+    return replace(
+        motion,
+        root_position=motion.root_position[index],
+        rotations={name: rotation[index] for name, rotation in motion.rotations.items()},
+    )
+
+
+def mirrored(motion: deepmimic.Motion) -> deepmimic.Motion:
+    """The motion in a mirror: z, the right, changes its sign."""
+    rotations = {}
+    for name, rotation in motion.rotations.items():
+        vectors = rotation.as_rotvec() * np.array([-1.0, -1.0, 1.0])
+        rotations["_".join(SWAP.get(p, p) for p in name.split("_"))] = Rotation.from_rotvec(vectors)
+    return replace(
+        motion, root_position=motion.root_position * [1.0, 1.0, -1.0], rotations=rotations
+    )
+
+
+def gathered(motion: deepmimic.Motion, reach: float) -> deepmimic.Motion:
+    """The motion without its travel if it goes farther over the floor than `reach`, metres."""
+    position = np.array(motion.root_position)
+    flat = position[:, [0, 2]]
+    if np.ptp(flat, axis=0).max() <= reach:
+        return motion
+    time = np.linspace(0.0, 1.0, len(position))
+    trend = np.stack([np.polyval(np.polyfit(time, axis, 4), time) for axis in flat.T], -1)
+    position[:, [0, 2]] = flat - trend
+    return replace(motion, root_position=position)

@@ -1,0 +1,1 @@
+"""Training of the temporal network (`python -m tools.temporal`)."""

@@ -1,0 +1,213 @@
+"""Examples as tables, and the batches that are drawn from them: windows mirrored, rolled, scaled,
+shifted, shaken, and with whole limbs hidden for 0.2 to 1 s.
+
+Axes: B windows, L frames, N landmarks (`features.SEEN`), N's truth beside what was seen.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from robojackson.mocap.blazepose import BODY, MIRROR, landmark
+from robojackson.mocap.temporal import features
+from robojackson.mocap.temporal.features import FPS, SEEN
+from tools.temporal.examples import Example
+
+ORDER = [int(index) for index in SEEN]
+SWAP = [ORDER.index(int(MIRROR[index])) for index in SEEN]
+TWELVE = [ORDER.index(int(index)) for index in BODY]
+LIMBS = [
+    [ORDER.index(landmark(f"{side}_{name}")) for name in names]
+    for side in ("left", "right")
+    for names in (("elbow", "wrist", "index", "pinky"), ("knee", "ankle", "heel", "foot_index"))
+]
+LONGEST = 150
+"""Frames of the longest example that are kept."""
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Windows, or whole examples.
+
+    Attributes:
+        flat, local, visibility: As in `features.Sight`, of the landmarks that are read.
+        constant: What the network is told of the clip.
+        distance: Of the hips as placed, metres.
+        truth: Of the same landmarks, NaN-free, metres.
+        good: 1 in the frames that count, else 0.
+    """
+
+    flat: np.ndarray
+    local: np.ndarray
+    visibility: np.ndarray
+    constant: np.ndarray
+    distance: np.ndarray
+    truth: np.ndarray
+    good: np.ndarray
+
+    def numbers(self) -> np.ndarray:
+        """The network's input (B, L, F), as `features.numbers` orders it."""
+        shape = self.flat.shape[:2]
+        constant = np.broadcast_to(self.constant[:, None], (*shape, self.constant.shape[1]))
+        parts = (self.flat.reshape(*shape, -1), self.local.reshape(*shape, -1), self.visibility)
+        return np.concatenate([*parts, constant], -1).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Change:
+    """How much windows are changed.
+
+    Attributes:
+        frames: Length of a window.
+        roll_deg: Of the camera, standard deviation.
+        size: Of the person, standard deviation of the logarithm.
+        metre: Of the detector's metre, likewise.
+        shift_m: Of each landmark for the whole window, across the image: joints are not defined
+            alike everywhere.
+        tilt_deg: Of the detector's body about the image's x and y axes, and
+        depth: the logarithm of its depth, and
+        depth_shift_m: the depth of each landmark, for the whole window, standard deviations:
+            the detector errs in other ways on pictures of real people than on rendered ones.
+        shake_m: Of each landmark in each frame.
+        hidden: Chance of hidden limbs.
+        hidden_s: How long they are hidden.
+    """
+
+    frames: int = 81
+    roll_deg: float = 12.0
+    size: float = 0.07
+    metre: float = 0.04
+    shift_m: float = 0.012
+    tilt_deg: tuple[float, float] = (8.0, 6.0)
+    depth: float = 0.15
+    depth_shift_m: float = 0.03
+    shake_m: float = 0.003
+    hidden: float = 0.5
+    hidden_s: tuple[float, float] = (0.2, 1.0)
+
+
+def table(examples: Sequence[Example]) -> Batch:
+    """Whole examples, the last frame held to a common length with no weight."""
+
+    def stack(values: Sequence[np.ndarray]) -> np.ndarray:
+        index = [np.minimum(np.arange(LONGEST), len(v) - 1) for v in values]
+        return np.stack([v[i] for v, i in zip(values, index, strict=True)]).astype(np.float32)
+
+    sights = [e.sight for e in examples]
+    good = [np.append(e.good, False)[: LONGEST + 1].astype(np.float32) for e in examples]
+    return Batch(
+        flat=stack([s.flat[:, SEEN] for s in sights]),
+        local=stack([s.local[:, SEEN] for s in sights]),
+        visibility=stack([s.visibility[:, SEEN] for s in sights]),
+        constant=np.stack([features.constants(s) for s in sights]).astype(np.float32),
+        distance=stack([np.linalg.norm(s.root, axis=-1) for s in sights]),
+        truth=stack([np.nan_to_num(e.truth[:, SEEN]) for e in examples]),
+        good=stack(good),
+    )
+
+
+def lengths(good: np.ndarray) -> np.ndarray:
+    """Frames of each row up to the last that counts."""
+    return LONGEST - np.argmax(good[:, ::-1] > 0, axis=1)
+
+
+def windows(whole: Batch, rows: np.ndarray, frames: int, rng: np.random.Generator) -> Batch:
+    """A window of each row, anywhere in it."""
+    latest = np.maximum(lengths(whole.good[rows]) - frames, 0)
+    starts = rng.integers(0, latest + 1)
+    index = (rows[:, None], np.minimum(starts[:, None] + np.arange(frames), LONGEST - 1))
+    cut = {f.name: getattr(whole, f.name)[index] for f in fields(whole) if f.name != "constant"}
+    return Batch(**cut, constant=whole.constant[rows])
+
+
+def joined(first: Batch, second: Batch) -> Batch:
+    """Both."""
+    return Batch(
+        **{
+            f.name: np.concatenate([getattr(first, f.name), getattr(second, f.name)])
+            for f in fields(first)
+        }
+    )
+
+
+def change(batch: Batch, how: Change, rng: np.random.Generator) -> Batch:
+    """The windows, changed."""
+    count = len(batch.flat)
+    batch = _mirrored(batch, rng.uniform(size=count) < 0.5)
+    angle = np.radians(rng.normal(0.0, how.roll_deg, count))
+    roll = np.zeros((count, 1, 3, 3), np.float32)
+    roll[:, 0, 0, 0] = roll[:, 0, 1, 1] = np.cos(angle)
+    roll[:, 0, 0, 1], roll[:, 0, 1, 0] = np.sin(angle), -np.sin(angle)
+    roll[:, 0, 2, 2] = 1.0
+    size = np.exp(rng.normal(0.0, how.size, count)).astype(np.float32)
+    metre = np.exp(rng.normal(0.0, how.metre, count)).astype(np.float32)
+    grown = size[:, None, None, None]
+    flat = _disturbed(batch.flat @ roll[..., :2, :2] * grown, how, rng)
+    local = batch.local @ roll * grown * metre[:, None, None, None]
+    local = _disturbed(_misjudged(local, how, rng), how, rng)
+    visibility = np.array(batch.visibility)
+    for row in np.flatnonzero(rng.uniform(size=count) < how.hidden):
+        for _ in range(rng.integers(1, 3)):
+            hide((flat[row], local[row]), visibility[row], how.hidden_s, rng)
+    half = (batch.constant.shape[1] - 1) // 2
+    factors = np.stack([size] * half + [size * metre] * half + [1.0 / size], -1)
+    return replace(
+        batch,
+        flat=flat,
+        local=local,
+        visibility=visibility,
+        constant=batch.constant * factors,
+        distance=batch.distance * size[:, None],
+        truth=batch.truth @ roll * grown,
+    )
+
+
+def hide(
+    seen: Sequence[np.ndarray], visibility: np.ndarray, hidden_s: tuple[float, float],
+    rng: np.random.Generator,
+) -> None:  # fmt: skip
+    """Take a limb away: interpolated between the frames around, held at the ends."""
+    count, limb = len(visibility), LIMBS[rng.integers(len(LIMBS))]
+    onset = int(rng.integers(-3, count - 3))
+    start, end = max(onset, 0), min(onset + int(FPS * rng.uniform(*hidden_s)), count)
+    if end <= start:
+        return
+    share = ((np.arange(start, end) - start + 1) / (end - start + 1))[:, None, None]
+    for values in seen:
+        before, after = values[max(start - 1, 0), limb], values[min(end, count - 1), limb]
+        before = after if start == 0 else before
+        after = before if end == count else after
+        values[start:end, limb] = before * (1.0 - share) + after * share
+    visibility[start:end, limb] = 0.0
+
+
+def _mirrored(batch: Batch, which: np.ndarray) -> Batch:
+    flip = np.array([-1.0, 1.0, 1.0], np.float32)
+    pick = which[:, None, None, None]
+    return replace(
+        batch,
+        flat=np.where(pick, batch.flat[:, :, SWAP] * flip[:2], batch.flat),
+        local=np.where(pick, batch.local[:, :, SWAP] * flip, batch.local),
+        truth=np.where(pick, batch.truth[:, :, SWAP] * flip, batch.truth),
+        visibility=np.where(pick[..., 0], batch.visibility[:, :, SWAP], batch.visibility),
+    )
+
+
+def _misjudged(local: np.ndarray, how: Change, rng: np.random.Generator) -> np.ndarray:
+    """The detector's body tilted, flattened or deepened, each landmark's depth shifted."""
+    count, landmarks = len(local), local.shape[2]
+    angles = np.radians(rng.normal(0.0, 1.0, (count, 2)) * how.tilt_deg)
+    turns = Rotation.from_euler("xy", angles).as_matrix().astype(np.float32)
+    turned = local @ turns[:, None]
+    deep = np.exp(rng.normal(0.0, how.depth, (count, 1, 1))).astype(np.float32)
+    shift = rng.standard_normal((count, 1, landmarks), np.float32) * how.depth_shift_m
+    turned[..., 2] = turned[..., 2] * deep + shift
+    return np.asarray(turned)
+
+
+def _disturbed(values: np.ndarray, how: Change, rng: np.random.Generator) -> np.ndarray:
+    count, _, *rest = values.shape
+    shift = rng.standard_normal((count, 1, *rest), np.float32) * how.shift_m
+    return np.asarray(values + shift + rng.standard_normal(values.shape, np.float32) * how.shake_m)

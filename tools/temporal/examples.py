@@ -1,0 +1,116 @@
+"""Training examples: what was seen of a clip, and where the body truly was along the rays.
+
+Truth is scaled to the detector's metre, clip by clip, so that only its shape counts; frames in
+which the detector followed something else are left out of the loss.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from robojackson.clips.evidence import weighed
+from robojackson.clips.track import LandmarkTrack
+from robojackson.errors import NoPersonFound
+from robojackson.mocap import camera
+from robojackson.mocap.blazepose import BODY, landmark, repair
+from robojackson.mocap.kinematics import apply
+from robojackson.mocap.recover import MocapConfig
+from robojackson.mocap.temporal import features
+from robojackson.mocap.temporal.features import Sight
+
+FOLLOWED_M = 0.25
+"""Mean distance across the image over which the detector is not on the person."""
+LEAST_FOUND, LEAST_FOLLOWED = 0.85, 0.6
+VALIDATION_MOTIONS = ("long_walk2", "punch", "stealthy_walk1", "01_03")
+VALIDATION_EACH = 12
+"""Besides these motions, every clip whose number divides by this is kept for validation."""
+BONES = [
+    (landmark(f"{side}_{a}"), landmark(f"{side}_{b}"))
+    for side in ("left", "right")
+    for a, b in features.CHAINS.values()
+]
+Truth = tuple[np.ndarray, np.ndarray, float]
+"""A clip without pictures: landmarks along the rays, distance, guessed focal length over true."""
+
+
+@dataclass(frozen=True)
+class Example:
+    """One clip.
+
+    Attributes:
+        sight: What was seen.
+        truth: All landmarks along the rays, NaN where there is none, metres.
+        good: Frames that count.
+        distance: Of the hips from the camera, metres.
+        motion: Its name.
+    """
+
+    sight: Sight
+    truth: np.ndarray
+    good: np.ndarray
+    distance: np.ndarray
+    motion: str
+
+
+def along_rays(truth_c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Landmarks before the camera (T, 33, 3) along the ray to the hips, and the hips' distance."""
+    root = truth_c[:, features.HIPS].mean(1)
+    axes = np.swapaxes(features.axes_along(root), -1, -2)
+    return apply(axes[:, None], truth_c - root[:, None]), np.linalg.norm(root, axis=-1)
+
+
+def flattened(truth: np.ndarray, distance: np.ndarray) -> np.ndarray:
+    """What `Sight.flat` would be without an error."""
+    away = distance[:, None, None]
+    return truth[..., :2] * away / (away + truth[..., 2:])
+
+
+def body_size(truth: np.ndarray) -> float:
+    """Sum of the lengths of trunk and limbs, metres: median over the clip."""
+    lengths = [np.linalg.norm(truth[:, a] - truth[:, b], axis=-1) for a, b in BONES]
+    return float(np.median(np.sum(lengths, axis=0)))
+
+
+def read(path: Path) -> Example | None:
+    """The example of a pair file; None if the detector lost the person too often."""
+    with np.load(path) as pair:
+        seen, (width, height) = pair["seen"].astype(float), pair["size"].tolist()
+        truth_c, motion, fps = pair["truth"].astype(float), str(pair["motion"]), float(pair["fps"])
+    track = LandmarkTrack(fps, width, height, seen[..., :3], seen[..., 3:6], seen[..., 6])
+    if track.detected.mean() < LEAST_FOUND:
+        return None
+    try:
+        sight = sight_of(weighed(track))
+    except NoPersonFound:
+        return None
+    truth, distance = along_rays(truth_c)
+    flat, ideal = sight.flat[:, BODY], flattened(truth[:, BODY], distance)
+    good = track.detected & (np.linalg.norm(flat - ideal, axis=-1).mean(1) < FOLLOWED_M)
+    if good.mean() < LEAST_FOLLOWED:
+        return None
+    scale = (flat[good] * ideal[good]).sum() / (ideal[good] ** 2).sum()
+    return Example(sight, truth * scale, good, distance * scale, motion)
+
+
+def sight_of(track: LandmarkTrack) -> Sight:
+    """As in `recover`, up to the network."""
+    config, landmarks = MocapConfig(), repair(track)
+    focal = camera.guess_focal(track.width, track.height)
+    lens = camera.Pinhole(focal, track.width, track.height)
+    placed = camera.place(landmarks, lens, track.fps, config.depth_cutoff_hz)
+    return features.look(placed, landmarks.local, landmarks.visibility)
+
+
+def load(folder: Path) -> tuple[list[Example], list[Example]]:
+    """Training and validation examples of a folder of pairs."""
+    training: list[Example] = []
+    validation: list[Example] = []
+    for path in sorted(folder.glob("[0-9]*_[0-9]*.npz")):
+        number, example = path.stem.split("_")[-1].split(".")[0], read(path)
+        if example is None:
+            continue
+        held = example.motion.split("+")[0] in VALIDATION_MOTIONS
+        keep = validation if held or int(number) % VALIDATION_EACH == 0 else training
+        keep.append(example)
+    return training, validation

@@ -1,0 +1,115 @@
+"""Fitting the flow on the lifter's errors, with NIKI's losses (Li et al., CVPR 2023).
+
+Inverse: the error's z is likely under an AR(1) process of standard normals. Forward: z = 0 is the
+lifter's own answer. Boundary: a clean clip has z = 0. Independence: z tells nothing of the pose
+(maximum mean discrepancy between (pose, z) and (pose, noise)).
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import torch
+
+from tools.temporal.batches import TWELVE, Batch
+from tools.temporal.fit import FitConfig, Source, losses_of
+from tools.temporal.net import Flow, Lifter
+
+WEIGHTS = {"inverse": 1.0, "forward": 1.0, "boundary": 0.1, "independence": 1.0}
+BANDWIDTHS = (0.05, 0.2, 0.9)
+"""Of the discrepancy's kernels, in shares of the mean squared distance."""
+SAMPLE = 128
+
+
+def fit_flow(
+    lifter: Lifter,
+    pairs: Source,
+    steps: int,
+    seed: int,
+    watch: Callable[[int, dict[str, float]], None],
+) -> Flow:
+    """A flow for a trained lifter, which stays as it is; fitted to the real pairs alone."""
+    torch.manual_seed(seed)
+    lifter.eval()
+    flow = Flow()
+    optimiser = torch.optim.Adam(flow.parameters(), lr=1e-3)
+    config = FitConfig(batch=24)
+    for step in range(steps):
+        rng = np.random.default_rng([seed, 3, step])
+        losses = flow_losses(flow, lifter, pairs.draw(config, 0.0, rng), rng)
+        total = torch.stack([WEIGHTS[name] * value for name, value in losses.items()]).sum()
+        optimiser.zero_grad()
+        total.backward()
+        torch.nn.utils.clip_grad_norm_(flow.parameters(), 1.0)
+        optimiser.step()
+        if (step + 1) % 50 == 0:
+            watch(step + 1, {name: float(value.detach()) for name, value in losses.items()})
+    return flow
+
+
+def flow_losses(
+    flow: Flow, lifter: Lifter, batch: Batch, rng: np.random.Generator
+) -> dict[str, torch.Tensor]:
+    """The four losses."""
+    error, h = _errors(lifter, batch)
+    good = torch.from_numpy(batch.good)
+    body = torch.from_numpy(np.ascontiguousarray(batch.truth[:, :, TWELVE], np.float32))
+    z, volume = flow(error, h)
+    clean_z, _ = flow(*_errors(lifter, cleaned(batch)))
+    return {
+        "inverse": -(_log_likelihood(flow, z, good) + (volume * good).sum() / good.sum()) / 36.0,
+        "forward": (flow.inverse(torch.zeros_like(error), h) ** 2).mean(),
+        "boundary": (clean_z**2).mean(),
+        "independence": independence(body[good > 0], z[good > 0], rng),
+    }
+
+
+def cleaned(batch: Batch) -> Batch:
+    """The windows as a perfect detector would see the person."""
+    away = batch.distance[..., None, None]
+    flat = batch.truth[..., :2] * away / (away + batch.truth[..., 2:])
+    seen = np.ones_like(batch.visibility)
+    return replace(batch, flat=flat, local=batch.truth, visibility=seen)
+
+
+def independence(body: torch.Tensor, z: torch.Tensor, rng: np.random.Generator) -> torch.Tensor:
+    """Discrepancy between pose with z and pose with noise, on some frames."""
+    chosen = torch.from_numpy(rng.permutation(len(z))[:SAMPLE])
+    pose = body[chosen].flatten(1)
+    pose = pose / (pose.std() + 1e-6)
+    other = torch.from_numpy(rng.permutation(len(z))[:SAMPLE])
+    noise = torch.from_numpy(rng.normal(size=(len(other), z.shape[-1])).astype(np.float32))
+    elsewhere = body[other].flatten(1)
+    elsewhere = elsewhere / (elsewhere.std() + 1e-6)
+    return discrepancy(torch.cat([pose, z[chosen]], 1), torch.cat([elsewhere, noise], 1))
+
+
+def discrepancy(x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
+    """Maximum mean discrepancy with inverse multiquadric kernels (Gretton et al. 2012)."""
+    joined = torch.cat([x, y])
+    squares = torch.cdist(joined, joined) ** 2
+    size = squares.mean().detach()
+    kernel = torch.stack([s * size / (s * size + squares) for s in BANDWIDTHS]).sum(0)
+    n = len(x)
+    return kernel[:n, :n].mean() + kernel[n:, n:].mean() - 2.0 * kernel[:n, n:].mean()
+
+
+def _errors(lifter: Lifter, batch: Batch) -> tuple[torch.Tensor, torch.Tensor]:
+    """Error over spread (B, T, 36), and features."""
+    with torch.no_grad():
+        h = lifter.features(torch.from_numpy(batch.numbers()))
+        correction, log_spread = lifter.head(h)
+        error = -losses_of(correction, log_spread, batch)[3]
+        scaled = error * torch.exp(-log_spread[..., [0, 0, 1]])
+    return scaled.flatten(2).clamp(-6.0, 6.0), h
+
+
+def _log_likelihood(flow: Flow, z: torch.Tensor, good: torch.Tensor) -> torch.Tensor:
+    """Of a course of z under the AR(1) prior, nats a frame."""
+    memory = torch.sigmoid(flow.memory)
+    fresh = 1.0 - memory**2
+    step = z[:, 1:] - memory * z[:, :-1]
+    later = -0.5 * (step**2 / fresh + torch.log(fresh)).sum(-1)
+    first = -0.5 * (z[:, :1] ** 2).sum(-1)
+    together = torch.cat([first, later], 1)
+    return (together * good).sum() / good.sum()
