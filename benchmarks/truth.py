@@ -15,6 +15,10 @@ from jaxtyping import Float
 CLIPS = Path(__file__).parent.parent / "clips"
 RENDERED = ("hip_shake", "dance_a", "dance_b", "walk")
 REAL = ("person_cam1", "person_cam2", "person_cam3", "person_cam4")
+HELD_OUT = ("kick", "spin", "dance_a_aside", "dance_b_aside", "walk_aside")
+"""Never tuned on: other motions, sides and bodies, in `clips/heldout`."""
+SEAMS = {"dance_a": (49,), "dance_a_aside": (49,), "walk": (39,), "walk_aside": (39,)}
+"""First frames of the second lap of the clips that loop with a jump."""
 JOINTS = tuple(
     f"{side}_{name}"
     for name in ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
@@ -24,6 +28,8 @@ HIPS = (0, 1)
 SOLE_BONES = ("foot.L", "toe1-2.L", "foot.R", "toe1-2.R")
 SOLE_BELOW_BONE = np.array([0.08, 0.03, 0.08, 0.03])
 """Least height of these bones of the drawn body when it stands, metres."""
+SOLE_LENGTH = 0.198
+"""From heel bone to toe bone of the same body, metres; others have feet in proportion."""
 TRC_TO_Z_UP = (2, 0, 1)
 OPENGL_TO_CAMERA = np.array([1.0, -1.0, -1.0])
 
@@ -35,17 +41,19 @@ class Truth:
     joints: `JOINTS`, metres, world.
     up_c: Direction against gravity in the camera frame.
     feet: Soles under heels and toes, metres; None where the truth has no toes.
+    seams: First frame of every further lap.
     """
 
     clip: str
     joints: Float[np.ndarray, "T 12 3"]
     up_c: Float[np.ndarray, "3"]
     feet: Float[np.ndarray, "T 4 3"] | None = None
+    seams: tuple[int, ...] = ()
 
 
 def video_path(clip: str) -> Path:
     """The video of a clip."""
-    return CLIPS / f"{clip}.mp4"
+    return _folder(clip) / f"{clip}.mp4"
 
 
 def load_truth(clip: str) -> Truth:
@@ -54,13 +62,19 @@ def load_truth(clip: str) -> Truth:
 
 
 def _rendered(clip: str) -> Truth:
-    with np.load(CLIPS / f"{clip}_gt.npz") as data:
+    with np.load(_folder(clip) / f"{clip}_gt.npz") as data:
         names = [_own_name(name) for name in data["names"].tolist()]
         joints = data["joints"].astype(float)[:, [names.index(name) for name in JOINTS]]
         bones = data["bone_names"].tolist()
         soles = data["all_bones"].astype(float)[:, [bones.index(name) for name in SOLE_BONES]]
-        soles[..., 2] -= SOLE_BELOW_BONE
-        return Truth(clip, joints, data["view"][:3, 2] * OPENGL_TO_CAMERA, soles)
+        length = np.linalg.norm(soles[0, 1] - soles[0, 0])
+        soles[..., 2] -= SOLE_BELOW_BONE * length / SOLE_LENGTH
+        up = data["view"][:3, 2] * OPENGL_TO_CAMERA
+        return Truth(clip, joints, up, soles, SEAMS.get(clip, ()))
+
+
+def _folder(clip: str) -> Path:
+    return CLIPS / "heldout" if clip in HELD_OUT else CLIPS
 
 
 def _real(clip: str) -> Truth:

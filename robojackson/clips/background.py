@@ -2,28 +2,42 @@
 
 Corners outside the person's box are followed by Lucas-Kanade from frame to frame; what most of them
 did together (RANSAC) is the camera's motion as a homography, exact for a camera that turns or zooms
-in place. A link of the chain lasts until too few of its corners are left. A frame whose background
-cannot be laid onto the one before (a cut, a violent shake, a bare wall) breaks the chain and is
-told.
+in place. A link of the chain lasts until too few of its corners are left. The camera stands until
+shown to move: where a fair share of the corners has kept its place, it did not (the rest are
+people), and a motion is believed only of corners spread over the image. What cannot be laid onto
+the frame before is a jump if much of the picture changed (a cut, a violent shake); else it shows
+nothing (a bare wall), and the camera is left where it was.
 """
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import cv2
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Float, Float32, UInt8
 
 from robojackson.clips.camera import CORNER_DISTANCE, CORNER_QUALITY, LEAST_TEXTURE, PERSON_MARGIN
 from robojackson.clips.person import box
 
 CORNERS, FEWEST = 160, 12
+CELLS = 3, 4
+"""Rows and columns of the image that share the corners evenly."""
 RENEW = 0.6
 """Corners are found anew when fewer than this share of them is left."""
 INLIER = 1.5
 """Pixels of the small picture; a corner further off did not move with the background."""
 AGREED = 0.5
 """Least share of the corners that must move together."""
+KEPT = 0.75
+"""Pixels of the small picture; a corner nearer to where its link began has kept its place."""
+STANDS, FEWEST_STANDING = 0.4, 6
+"""Least share and number of corners that keep their place while the camera stands."""
+SPREAD = 0.25
+"""Least share of the image inside the hull of the corners by which a motion is believed."""
+CHANGED, CHANGED_SHARE = 6.0, 20
+"""A frame is another picture if more than so many percent of the background's pixels changed by
+more than this, of 255."""
 STILL = 0.01
 """A camera whose background strays less than this from the first frame stands, image diagonals."""
 BLIND_SHARE = 0.3
@@ -128,46 +142,92 @@ class _Chain:
     def see(self, grey: UInt8[np.ndarray, "H W"], xy: Float[np.ndarray, "33 2"]) -> None:
         """The next frame."""
         self.size = (grey.shape[1], grey.shape[0])
-        followed = self._before is not None and len(self._at) >= FEWEST
-        step = self._followed(grey) if followed else None
+        step = self._followed(grey)
         last = self.to_first[-1] if self.to_first else np.eye(3)
         self.to_first.append(last if step is None else self._start @ step)
-        self.jumps.append(followed and step is None)
+        self.jumps.append(step is None and self._changed(grey, xy))
+        self.blind.append(step is None and self._before is not None and not self.jumps[-1])
         if step is None or len(self._at) < max(FEWEST, RENEW * self._found):
             self._start = self.to_first[-1]
             self._from = self._at = _corners(grey, xy)
             self._found = len(self._at)
-        self.blind.append(len(self._at) < FEWEST)
         self._before = grey
 
     def _followed(self, grey: np.ndarray) -> np.ndarray | None:
         """From this frame to the start of the link; None where the background was lost."""
-        if self._before is None or self._before.shape != grey.shape:
+        before = self._before
+        if before is None or before.shape != grey.shape or len(self._at) < FEWEST_STANDING:
             return None
         moved, found, _ = cv2.calcOpticalFlowPyrLK(
-            self._before, grey, self._at, self._at.copy(), minEigThreshold=LEAST_TEXTURE
+            before, grey, self._at, self._at.copy(), minEigThreshold=LEAST_TEXTURE
         )
         kept = found.ravel() == 1
         steps = np.linalg.norm((moved - self._at)[:, 0], axis=-1) / np.hypot(*self.size)
         start, now = self._from[kept], moved[kept]
-        if kept.sum() < FEWEST or np.median(steps[kept]) > JERK:
-            return None
+        fit, agreed = _standing(now, start), np.ones(len(now), bool)
+        if fit is None and kept.sum() >= FEWEST and np.median(steps[kept]) <= JERK:
+            fit, agreed = self._moving(now, start)
+        if fit is not None:
+            self._from, self._at = start[agreed], now[agreed]
+        return fit
+
+    def _moving(self, now: np.ndarray, start: np.ndarray) -> tuple[np.ndarray | None, np.ndarray]:
+        """What most corners did together, if they are spread over the image; and which did."""
         fit, inlier = cv2.findHomography(now, start, cv2.RANSAC, INLIER)
-        if fit is None or inlier.mean() < AGREED:
-            return None
+        if fit is None:
+            return None, np.zeros(len(now), bool)
         agreed = inlier.ravel() == 1
-        self._from, self._at = start[agreed], now[agreed]
-        return np.asarray(fit)
+        if agreed.mean() < AGREED or agreed.sum() < FEWEST:
+            return None, agreed
+        hull = cv2.contourArea(cv2.convexHull(now[agreed]))
+        return (np.asarray(fit) if hull >= SPREAD * np.prod(self.size) else None), agreed
+
+    def _changed(self, grey: np.ndarray, xy: np.ndarray) -> bool:
+        """Whether the background is another picture than before; blurred, so that noise is none."""
+        if self._before is None:
+            return False
+        if self._before.shape != grey.shape:
+            return True
+        before, after = (cv2.GaussianBlur(image, (5, 5), 0) for image in (self._before, grey))
+        change = cv2.absdiff(before, after)[_mask(grey, xy) > 0]
+        return bool(len(change) and np.percentile(change, 100 - CHANGED_SHARE) > CHANGED)
 
 
-def _corners(grey: np.ndarray, xy: np.ndarray) -> np.ndarray:
+def _standing(now: np.ndarray, start: np.ndarray) -> np.ndarray | None:
+    """No motion at all, if enough corners have kept their place."""
+    near = np.linalg.norm((now - start)[:, 0], axis=-1) < KEPT
+    stands = near.sum() >= max(FEWEST_STANDING, STANDS * len(near))
+    return np.eye(3) if stands else None
+
+
+def _mask(grey: np.ndarray, xy: np.ndarray) -> np.ndarray:
+    """255 outside the person's box."""
     mask = np.full_like(grey, 255)
     person = box(xy, PERSON_MARGIN, grey.shape[1], grey.shape[0])
     if person:
         x0, y0, x1, y1 = person
         mask[y0:y1, x0:x1] = 0
-    found = cv2.goodFeaturesToTrack(grey, CORNERS, CORNER_QUALITY, CORNER_DISTANCE, mask=mask)
-    return np.zeros((0, 1, 2), np.float32) if found is None else found
+    return mask
+
+
+def _corners(grey: np.ndarray, xy: np.ndarray) -> Float32[np.ndarray, "N 1 2"]:
+    """The best corners of each cell of the image: one striking thing has no more votes than others.
+
+    What is no corner but noise is lost at once by Lucas-Kanade (`LEAST_TEXTURE`).
+    """
+    mask, found = _mask(grey, xy), list[np.ndarray]([np.zeros((0, 1, 2), np.float32)])
+    rows, columns = (
+        np.linspace(0, n, m + 1).astype(int) for n, m in zip(grey.shape, CELLS, strict=True)
+    )
+    each = CORNERS // (CELLS[0] * CELLS[1])
+    for y0, y1 in pairwise(rows):
+        for x0, x1 in pairwise(columns):
+            best = cv2.goodFeaturesToTrack(
+                grey[y0:y1, x0:x1], each, CORNER_QUALITY, CORNER_DISTANCE, mask=mask[y0:y1, x0:x1]
+            )
+            if best is not None:
+                found.append(best + np.array([x0, y0], np.float32))
+    return np.concatenate(found)
 
 
 def _stray(to_first: np.ndarray, width: int, height: int) -> float:

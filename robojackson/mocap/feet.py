@@ -56,8 +56,12 @@ def pitch_bias(feet: Float[np.ndarray, "T 4 3"], fps: float) -> float:
 
 
 def standing(feet: Float[np.ndarray, "T 4 3"], planted: np.ndarray) -> np.ndarray:
-    """Frames in which each foot stands on its whole sole, shape (T, 2)."""
-    return planted.reshape(-1, 2, 2).any(2) & (np.abs(pitch(feet)) < FLAT)
+    """Frames in which each foot stands on its whole sole, shape (T, 2).
+
+    Heel and toe both stand, or one of them does and the foot is about level.
+    """
+    ends = planted.reshape(-1, 2, 2)
+    return ends.all(2) | (ends.any(2) & (np.abs(pitch(feet)) < FLAT))
 
 
 def hold_flat(

@@ -21,6 +21,8 @@ from robojackson.mocap.smooth import lowpass
 GRAVITY = 9.81
 FALL_CUTOFF_HZ = 6.0
 SHORTEST_FALL_S = 0.1
+FALL_SHARE = 0.35
+"""Least mean acceleration of a whole flight, of gravity."""
 FLIGHT_EDGE_S = 0.15
 """Smoothing hides so much of the beginning and of the end of a free fall, seconds."""
 CAMERA_UP = np.array([0.0, -1.0, 0.0])
@@ -38,7 +40,8 @@ class GravityConfig:
         support_height_m: A foot point this much above the lowest carries 1/e of its weight, metres.
         support_speed_mps: A point this fast carries 1/e of its weight, m/s.
         floor_sd_m: Spread of the height difference of two feet that both carry, metres.
-        roll_sd_deg, pitch_sd_deg: Spread of how people hold a camera, degrees.
+        roll_sd_deg, pitch_sd_deg: Spread of how people hold a camera, degrees; with the tails of a
+            Cauchy distribution, so that a camera that balance sees far off level is left there.
         least_sd_deg: Balance is never believed more closely than this, degrees.
         samples_per_s: Independent samples of balance a second.
         max_tilt_deg: Largest believed angle between gravity and the camera's vertical, degrees.
@@ -47,9 +50,9 @@ class GravityConfig:
     support_height_m: float = 0.1
     support_speed_mps: float = 1.0
     floor_sd_m: float = 0.05
-    roll_sd_deg: float = 10.0
-    pitch_sd_deg: float = 20.0
-    least_sd_deg: float = 0.6
+    roll_sd_deg: float = 2.5
+    pitch_sd_deg: float = 10.0
+    least_sd_deg: float = 1.5
     samples_per_s: float = 1.0
     max_tilt_deg: float = 45.0
 
@@ -111,8 +114,7 @@ def _refined(
     spread = max(float(spread), np.radians(config.least_sd_deg))
     information = (np.eye(3) - np.outer(mean, mean) / length**2) / spread**2
     information += _between_feet(weight, feet) / total.sum() / config.floor_sd_m**2
-    roll, pitch = np.radians([config.roll_sd_deg, config.pitch_sd_deg])
-    information += np.diag([1.0 / roll**2, 0.0, 1.0 / pitch**2])
+    information += np.diag(_held_level(up, config))
     least = np.linalg.eigh(information)[1][:, 0]
     return least * np.sign(least @ mean)
 
@@ -126,6 +128,14 @@ def _carrying(
     above = height - height.min(1, keepdims=True)
     still = np.exp(-((speed / config.support_speed_mps) ** 2))
     return still * np.exp(-above / config.support_height_m) + LEAST_WEIGHT
+
+
+def _held_level(up: np.ndarray, config: GravityConfig) -> Float[np.ndarray, "3"]:
+    """Information of a camera held about level; the weight of a Cauchy prior where `up` is now."""
+    spread = np.radians([config.roll_sd_deg, config.pitch_sd_deg])
+    angle = np.arctan2(up[[0, 2]], -up[1])
+    roll, pitch = 1.0 / (spread**2 + angle**2)
+    return np.array([roll, 0.0, pitch])
 
 
 def _between_feet(weight: np.ndarray, feet: np.ndarray) -> Float[np.ndarray, "3 3"]:
@@ -181,21 +191,36 @@ def free_fall(height: Float[np.ndarray, " T"], fps: float) -> np.ndarray:
     return falling
 
 
-def flight(lowest: Float[np.ndarray, " T"], falling: np.ndarray, fps: float) -> np.ndarray:
+def flight(
+    lowest: Float[np.ndarray, " T"],
+    height: Float[np.ndarray, " T"],
+    falling: np.ndarray,
+    fps: float,
+) -> np.ndarray:
     """Free fall and the frames around it in which the feet still rise or have not yet landed.
+
+    Smoothing spreads the push and the landing into the fall, so that only its middle is seen. What
+    it cannot change is the mean: a flight grows only while its mean acceleration is that of a fall.
 
     Args:
         lowest: Height of the lowest foot point, metres; any level.
+        height: Of the centre of mass, metres; any level.
         falling: Frames of free fall.
         fps: Frames a second.
     """
     most = round(FLIGHT_EDGE_S * fps)
+    speed = np.gradient(height) * fps
     flying = np.array(falling, bool)
+
+    def falls(start: int, end: int) -> bool:
+        duration = (end - 1 - start) / fps
+        return bool(speed[end - 1] - speed[start] < -FALL_SHARE * GRAVITY * duration)
+
     for start, end in stretches(flying):
         first, last = max(start - most, 0), min(end + most, len(lowest))
-        while start > first and lowest[start - 1] < lowest[start]:
+        while start > first and lowest[start - 1] < lowest[start] and falls(start - 1, end):
             start -= 1
-        while end < last and lowest[end] < lowest[end - 1]:
+        while end < last and lowest[end] < lowest[end - 1] and falls(start, end + 1):
             end += 1
         flying[start + 1 : end - 1] = True
     return flying

@@ -17,8 +17,21 @@ from robojackson.mocap.skeleton import AIM_CHILD, JOINT_NAMES, PARENTS, keypoint
 Method = Literal["adaptive", "naive"]
 TwistRule = Callable[[int, np.ndarray], np.ndarray]
 """(joint, global rotation with its swing and without its twist) -> (T, 2) cos and sin."""
+
+
+def _levels() -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Joints 1..23 in groups that do not hang on one another."""
+    depth = [0]
+    for parent in PARENTS[1 : len(JOINT_NAMES)]:
+        depth.append(depth[parent] + 1)
+    groups = [np.flatnonzero(np.array(depth) == level) for level in range(1, max(depth) + 1)]
+    return [(g, np.array(PARENTS)[g], np.array(AIM_CHILD)[g]) for g in groups]
+
+
 CARRY_OVER_LIMIT = 0.015
 """Metres; an adaptive bone that differs more from the predicted one is not corrected (HybrIK)."""
+LEVELS = _levels()
+"""(joints, their parents, the children that they aim at) by distance from the pelvis."""
 ROOT_CHILDREN = (keypoint("spine1"), keypoint("left_hip"), keypoint("right_hip"))
 
 
@@ -55,31 +68,39 @@ def solve_with(
     position = np.empty((count, 24, 3))
     local[:, 0] = world[:, 0] = _root(goal, rest, method)
     position[:, 0] = goal[:, 0]
-    for joint in range(1, len(JOINT_NAMES)):
-        parent = PARENTS[joint]
-        above = world[:, parent]
-        offset = rest[:, joint] - rest[:, parent]
-        position[:, joint] = position[:, parent] + apply(above, offset)
-        bone = rest[:, AIM_CHILD[joint]] - rest[:, joint]
-        wanted = _wanted(goal, joint, position[:, joint], bone, method)
+    for joints, parents, children in LEVELS:
+        above = world[:, parents]
+        ends = position[:, parents] + apply(above, rest[:, joints] - rest[:, parents])
+        bone = rest[:, children] - rest[:, joints]
+        wanted = _wanted(goal[:, children], goal[:, joints], ends, bone, method)
         swung = swing(bone, apply(np.swapaxes(above, -1, -2), wanted))
-        turn = twist(bone, twist_rule(joint, above @ swung))
-        local[:, joint] = swung @ turn
-        world[:, joint] = above @ local[:, joint]
+        ahead = above @ swung
+        turns = [twist_rule(int(joint), ahead[:, k]) for k, joint in enumerate(joints)]
+        turn = twist(bone, np.stack(turns, 1))
+        position[:, joints] = ends
+        local[:, joints] = swung @ turn
+        world[:, joints] = ahead @ turn
     return local
 
 
 def _wanted(
-    goal: np.ndarray, joint: int, position: np.ndarray, bone: np.ndarray, method: Method
+    child: np.ndarray, start: np.ndarray, end: np.ndarray, bone: np.ndarray, method: Method
 ) -> np.ndarray:
-    """The direction along which the joint's bone shall lie."""
-    child = goal[:, AIM_CHILD[joint]]
-    predicted = child - goal[:, joint]
+    """The direction along which the bones of some joints shall lie.
+
+    Args:
+        child: Where the bones should end.
+        start: Where they should begin.
+        end: Where their parents really end.
+        bone: In the rest pose.
+        method: naive or adaptive.
+    """
+    predicted = child - start
     if method == "naive":
         return predicted
     length = np.linalg.norm(predicted, axis=-1, keepdims=True)
     rescaled = predicted * np.linalg.norm(bone, axis=-1, keepdims=True) / np.maximum(length, TINY)
-    corrected = child - position
+    corrected = child - end
     far = np.linalg.norm(corrected - rescaled, axis=-1, keepdims=True) > CARRY_OVER_LIMIT
     return np.where(far, rescaled, corrected)
 

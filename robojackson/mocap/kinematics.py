@@ -57,10 +57,15 @@ def rotate_about(
 ) -> Float[np.ndarray, "*T 3 3"]:
     """Rodrigues' formula: rotation about a unit axis by an angle given as (cos, sin)."""
     x, y, z = np.moveaxis(axis, -1, 0)
-    zero = np.zeros_like(x)
-    cross = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).reshape(*x.shape, 3, 3)
-    turn = sine[..., None, None] * cross + (1.0 - cosine)[..., None, None] * (cross @ cross)
-    return np.eye(3) + turn
+    versine = 1.0 - cosine
+    diagonal = cosine + versine * (1.0 - x * x - y * y - z * z)
+    xs, ys, zs = x * sine, y * sine, z * sine
+    xv, yv, zv = x * versine, y * versine, z * versine
+    turn = np.empty((*np.broadcast_shapes(x.shape, np.shape(sine)), 3, 3))
+    turn[..., 0, 0], turn[..., 0, 1], turn[..., 0, 2] = diagonal + x * xv, x * yv - zs, x * zv + ys
+    turn[..., 1, 0], turn[..., 1, 1], turn[..., 1, 2] = x * yv + zs, diagonal + y * yv, y * zv - xs
+    turn[..., 2, 0], turn[..., 2, 1], turn[..., 2, 2] = x * zv - ys, y * zv + xs, diagonal + z * zv
+    return turn
 
 
 def swing(

@@ -4,24 +4,29 @@ landmarks -> repair -> before the camera -> 29 keypoints -> person's skeleton ->
 floor -> contacts -> root lock -> feet pinned -> solve -> SmplSequence in the world frame.
 """
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Float
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 from scipy.spatial.transform import Rotation
 
-from robojackson.clips.track import LandmarkTrack
+from robojackson.clips.evidence import weighed
+from robojackson.clips.track import LandmarkTrack, evenly
 from robojackson.mocap import camera as cameras
-from robojackson.mocap import contacts as contact_states
-from robojackson.mocap import feet, ground, hybrik
-from robojackson.mocap import lock as locks
-from robojackson.mocap.blazepose import Landmarks, repair
+from robojackson.mocap import ground, hybrik
+from robojackson.mocap.blazepose import BODY, Landmarks, repair
 from robojackson.mocap.body import Body, pose_landmarks
 from robojackson.mocap.bones import fit_skeleton
+from robojackson.mocap.certainty import certainty
 from robojackson.mocap.kinematics import apply
-from robojackson.mocap.refine import RefineConfig, refine
+from robojackson.mocap.refine import RefineConfig, gather, refine
 from robojackson.mocap.smooth import lowpass
-from robojackson.motion.smpl import PLANTED, SLIDING, SmplSequence
+from robojackson.mocap.stand import StandConfig, stand
+from robojackson.mocap.temporal.lift import TemporalConfig, lift
+from robojackson.motion.smpl import SmplSequence
 
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid"))
@@ -33,22 +38,22 @@ class MocapConfig:
         focal_px: Focal length of the camera, pixels; None guesses from the image size.
         cutoff_hz: Zero-phase low-pass of the landmarks, hertz.
         depth_cutoff_hz: The same for the distance of the body from the camera, hertz.
-        floor_cutoff_hz: The same for the height of the floor under the feet, hertz.
         bone_trust: 0 takes the proportions of the rest skeleton, 1 the medians of the clip.
+        temporal: Of the network that corrects the detector.
         refine: Of the whole-clip refinement.
-        gravity, contact, lock: Of the ground and the feet.
+        gravity: Of the direction of up.
+        stand: Of the floor and the feet.
     """
 
     method: hybrik.Method = "adaptive"
     focal_px: float | None = None
     cutoff_hz: float = 4.0
     depth_cutoff_hz: float = 1.5
-    floor_cutoff_hz: float = 3.0
-    bone_trust: float = 0.5
+    bone_trust: float = 0.6
+    temporal: TemporalConfig = Field(default_factory=TemporalConfig)
     refine: RefineConfig = Field(default_factory=RefineConfig)
     gravity: ground.GravityConfig = Field(default_factory=ground.GravityConfig)
-    contact: contact_states.ContactConfig = Field(default_factory=contact_states.ContactConfig)
-    lock: locks.LockConfig = Field(default_factory=locks.LockConfig)
+    stand: StandConfig = Field(default_factory=StandConfig)
 
 
 def recover(track: LandmarkTrack, config: MocapConfig) -> SmplSequence:
@@ -57,60 +62,60 @@ def recover(track: LandmarkTrack, config: MocapConfig) -> SmplSequence:
     Raises:
         TrackTooShort, NoPersonFound: nothing to recover.
     """
+    track = evenly(weighed(track))
     landmarks = repair(track)
     pinhole = cameras.Pinhole(
         config.focal_px or cameras.guess_focal(track.width, track.height), track.width, track.height
     )
     seen = cameras.place(landmarks, pinhole, track.fps, config.depth_cutoff_hz)
+    depth_m = None
+    if config.temporal.enabled:
+        found = lift(seen, landmarks.local, landmarks.visibility, track.fps, config.temporal)
+        seen, depth_m = found.points, found.depth_sd(config.temporal.depth_floor_m)
     rest = fit_skeleton(seen, config.bone_trust)
+    sure = landmarks.visibility
     if config.refine.enabled:
-        seen = refine(seen, landmarks.visibility, rest, track.fps, config.refine)
+        evidence = gather(seen, landmarks.visibility, rest, track.fps, config.refine, depth_m)
+        seen = refine(seen, landmarks.visibility, rest, track.fps, config.refine, depth_m)
+        sure = certainty(seen[:, BODY], evidence, landmarks.visibility, config.refine)
     seen = lowpass(seen, track.fps, config.cutoff_hz)
-    body = pose_landmarks(seen, landmarks.visibility, rest, config.method)
-    gravity = ground.find_up(body.pose.points, body.feet, track.fps, config.gravity)
+
+    def posed(marks: np.ndarray) -> Body:
+        return pose_landmarks(marks, sure, rest, config.method)
+
+    sequence = recover_points(seen, posed, landmarks.valid, pinhole, track.fps, config)
+    notes = (*track.notes, *sequence.notes, *_swaps(landmarks))
+    return replace(sequence, person=track.person, notes=notes)
+
+
+def recover_points(
+    points: Float[np.ndarray, "T N 3"],
+    posed: Callable[[np.ndarray], Body],
+    valid: np.ndarray,
+    pinhole: cameras.Pinhole,
+    fps: float,
+    config: MocapConfig,
+) -> SmplSequence:
+    """The motion of points before the camera, from whatever detector.
+
+    Args:
+        points: Metres, camera axes, no gaps.
+        posed: Solves them.
+        valid: Whether the frame was detected.
+        pinhole: The camera.
+        fps: Frames a second.
+        config: Of the floor and the feet.
+    """
+    body = posed(points)
+    gravity = ground.find_up(body.pose.points, body.feet, fps, config.gravity)
     to_world = ground.camera_to_world(gravity.up)
-    body = pose_landmarks(apply(to_world, seen), landmarks.visibility, rest, config.method)
+    body = posed(apply(to_world, points))
     start = body.pose.points.mean((0, 1))
-    body, states = stand(body, track.fps, config)
+    stance = stand(body, fps, config.stand)
+    body = stance.body
     start = body.pose.points.mean((0, 1)) - start
     camera = _camera(pinhole, gravity, to_world, start)
-    return _sequence(track.fps, body, landmarks, states, camera)
-
-
-def stand(body: Body, fps: float, config: MocapConfig) -> tuple[Body, Int[np.ndarray, "T 4"]]:
-    """The body on the floor, its feet level and pinned where they stand, and the contacts."""
-    falling = ground.free_fall(body.pose.points[:, 0, 2], fps)
-    flying = ground.flight(body.feet[..., 2].min(1), falling, fps)
-
-    def touching(person: Body) -> np.ndarray:
-        return contact_states.contacts(person.feet, flying, fps, config.contact)
-
-    def dropped(person: Body) -> Body:
-        lowest = person.feet[..., 2].min(1)
-        floor = ground.floor_height(lowest, flying, fps, config.floor_cutoff_hz)
-        return person.shifted(np.outer(-floor, [0.0, 0.0, 1.0]))
-
-    bias = feet.pitch_bias(body.feet, fps)
-    body = dropped(body.aimed(feet.turn_feet(body.pose.points, np.full((len(falling), 2), bias))))
-    planted = touching(body) == PLANTED
-    for _ in range(config.lock.rounds):
-        flat = feet.standing(body.feet, planted)
-        held, share = feet.hold_flat(
-            body.pose.points, body.rest, body.feet, flat, config.lock.ramp_s * fps
-        )
-        body = dropped(body.aimed(held, share))
-        body = body.shifted(locks.root_correction(body.feet, planted, fps, config.lock))
-        pins = locks.pin_offsets(body.feet, planted)
-        settled = lowpass(locks.shared_height(pins, planted), fps, config.floor_cutoff_hz)
-        body, pins = body.shifted(settled), pins - settled[:, None]
-        body = body.aimed(locks.move_feet(body.pose.points, pins), share)
-        pinned, planted = planted, planted | (touching(body) == PLANTED)
-    body = dropped(body)
-    body = body.aimed(locks.move_feet(body.pose.points, locks.lift_offsets(body.feet)), share)
-    body = body.shifted(-body.pose.points[0, 0] * [1.0, 1.0, 0.0])
-    states = touching(body)
-    loose = (states == PLANTED) & ~pinned
-    return body, np.where(pinned, PLANTED, np.where(loose, SLIDING, states)).astype(np.int8)
+    return _sequence(fps, body, valid, stance.contact, camera)
 
 
 def _camera(
@@ -134,7 +139,7 @@ def _camera(
 def _sequence(
     fps: float,
     body: Body,
-    landmarks: Landmarks,
+    valid: np.ndarray,
     states: np.ndarray,
     camera: dict[str, object],
 ) -> SmplSequence:
@@ -147,22 +152,26 @@ def _sequence(
         transl=points[:, 0] - body.rest[0],
         joints=points[:, :24],
         keypoints_w=points,
-        confidence=np.where(landmarks.valid[:, None], body.targets.confidence, 0.0),
+        confidence=np.where(valid[:, None], body.targets.confidence, 0.0),
         contact=states,
-        valid=landmarks.valid,
+        valid=valid,
         betas=np.zeros(10),
         rest_joints=body.rest,
         camera=camera,
-        notes=_notes(landmarks, camera),
+        notes=_notes(valid, camera),
     )
 
 
-def _notes(landmarks: Landmarks, camera: dict[str, object]) -> tuple[str, ...]:
+def _notes(valid: np.ndarray, camera: dict[str, object]) -> tuple[str, ...]:
     notes = []
-    if missed := int((~landmarks.valid).sum()):
-        notes.append(f"no person in {missed} of {len(landmarks.valid)} frames: interpolated")
-    if landmarks.swapped:
-        notes.append(f"left and right exchanged in {landmarks.swapped} frames: put back")
+    if missed := int((~valid).sum()):
+        notes.append(f"no person in {missed} of {len(valid)} frames: interpolated")
     if camera["gravity"] == "camera":
         notes.append("gravity taken from the camera: the feet contradict it too much")
     return tuple(notes)
+
+
+def _swaps(landmarks: Landmarks) -> tuple[str, ...]:
+    if not landmarks.swapped:
+        return ()
+    return (f"left and right exchanged in {landmarks.swapped} frames: put back",)

@@ -52,7 +52,7 @@ class RefineConfig:
     enabled: bool = True
     image_m: float = 0.03
     depth_m: float = 0.07
-    bone_m: float = 0.01
+    bone_m: float = 0.02
     acceleration_mps2: float = 30.0
     rounds: int = 12
 
@@ -67,6 +67,7 @@ class Evidence:
         trust: 0..1 a landmark, from its visibility.
         lengths: Of `BONES`, metres.
         fps: Frames a second.
+        depth_m: Standard deviation of `depth`, metres.
     """
 
     rays: Float[np.ndarray, "T 12 2"]
@@ -74,6 +75,7 @@ class Evidence:
     trust: Float[np.ndarray, "T 12"]
     lengths: Float[np.ndarray, " B"]
     fps: float
+    depth_m: Float[np.ndarray, "T 12"]
 
 
 def refine(
@@ -82,19 +84,37 @@ def refine(
     rest_joints: Float[np.ndarray, "29 3"],
     fps: float,
     config: RefineConfig,
+    depth_m: Float[np.ndarray, "T 12"] | None = None,
 ) -> Float[np.ndarray, "T 33 3"]:
-    """Landmarks with the body refined; face, hands and feet follow what they hang on."""
+    """Landmarks with the body refined; face, hands and feet follow what they hang on.
+
+    `depth_m` is how far off each depth may be; without it the configuration's one figure counts.
+    """
     body = placed[:, BODY]
-    evidence = Evidence(
+    evidence = gather(placed, visibility, rest_joints, fps, config, depth_m)
+    for _ in range(config.rounds):
+        body = body + _step(body, evidence, config)
+    return carry_along(placed, body)
+
+
+def gather(
+    placed: Float[np.ndarray, "T 33 3"],
+    visibility: Float[np.ndarray, "T 33"],
+    rest_joints: Float[np.ndarray, "29 3"],
+    fps: float,
+    config: RefineConfig,
+    depth_m: Float[np.ndarray, "T 12"] | None = None,
+) -> Evidence:
+    """What landmarks before the camera say about the body."""
+    body = placed[:, BODY]
+    return Evidence(
         rays=body[..., :2] / body[..., 2:],
         depth=body[..., 2] - body[:, HIPS, 2].mean(1, keepdims=True),
         trust=np.clip(visibility[:, BODY], LEAST_VISIBILITY, 1.0),
         lengths=bone_lengths(rest_joints),
         fps=fps,
+        depth_m=np.full(body.shape[:2], config.depth_m) if depth_m is None else depth_m,
     )
-    for _ in range(config.rounds):
-        body = body + _step(body, evidence, config)
-    return carry_along(placed, body)
 
 
 def bone_lengths(rest_joints: Float[np.ndarray, "29 3"]) -> Float[np.ndarray, " B"]:
@@ -128,11 +148,11 @@ def _step(
 ) -> Float[np.ndarray, "T 12 3"]:
     """One Gauss-Newton step."""
     count = len(body)
-    jacobian, residual = _residuals(body, evidence, config)
+    jacobian, residual = residuals(body, evidence, config)
     normal = np.einsum("tri,trj->tij", jacobian, jacobian)
     moment = np.einsum("tri,tr->ti", jacobian, residual)
     bands = _to_bands(normal)
-    stiff = (evidence.fps**2 / config.acceleration_mps2) ** 2 * 30.0 / evidence.fps
+    stiff = stiffness(evidence.fps, config)
     second = np.diff(body.reshape(count, SIZE), 2, axis=0) * stiff
     for offset, factor in enumerate((1.0, -2.0, 1.0)):
         moment[offset : count - 2 + offset] += factor * second
@@ -142,13 +162,18 @@ def _step(
     return step.reshape(count, *SHAPE)
 
 
-def _residuals(
+def stiffness(fps: float, config: RefineConfig) -> float:
+    """Weight of the squared second difference of a coordinate, 1/m^2; the same at any rate."""
+    return (fps**2 / config.acceleration_mps2) ** 2 * 30.0 / fps
+
+
+def residuals(
     body: np.ndarray, evidence: Evidence, config: RefineConfig
 ) -> tuple[Float[np.ndarray, "T R 36"], Float[np.ndarray, "T R"]]:
     """Robustly weighted residuals of image, depth and bones, and their derivatives."""
     parts = (
         _image(body, evidence, config.image_m),
-        _depth(body, evidence, config.depth_m),
+        _depth(body, evidence),
         _bones(body, evidence, config.bone_m),
     )
     jacobian = np.concatenate([part[0] for part in parts], 1)
@@ -172,9 +197,10 @@ def _image(body: np.ndarray, evidence: Evidence, spread: float) -> tuple[np.ndar
     )
 
 
-def _depth(body: np.ndarray, evidence: Evidence, spread: float) -> tuple[np.ndarray, np.ndarray]:
+def _depth(body: np.ndarray, evidence: Evidence) -> tuple[np.ndarray, np.ndarray]:
     """Depth relative to the middle of the hips against the detector's, pseudo-Huber."""
     count, points = body.shape[:2]
+    spread = evidence.depth_m
     relative = body[..., 2] - body[:, HIPS, 2].mean(1, keepdims=True)
     residual = (relative - evidence.depth) / spread
     robust = (1.0 + residual**2) ** -0.25 * np.sqrt(evidence.trust)

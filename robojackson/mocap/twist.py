@@ -86,7 +86,8 @@ def rule(found: Mapping[str, Cue], rest_joints: Float[np.ndarray, "29 3"]) -> Tw
         angle = np.full(len(swung), PRIOR[joint])
         if name in found:
             bone = rest_joints[AIM_CHILD[joint]] - rest_joints[joint]
-            angle = _blend(name, PRIOR[joint], _angle(found[name], bone, swung), found[name].weight)
+            cue = found[name]
+            angle = _blend(name, PRIOR[joint], cue_angle(cue, bone, swung), cue.weight)
         return np.stack([np.cos(angle), np.sin(angle)], -1)
 
     return decide
@@ -131,7 +132,7 @@ def _between(first: np.ndarray, second: np.ndarray, share: float) -> Float[np.nd
     return unit((1.0 - share) * apply(first, LEFT) + share * apply(second, LEFT))
 
 
-def _angle(cue: Cue, bone: np.ndarray, swung: np.ndarray) -> Float[np.ndarray, " T"]:
+def cue_angle(cue: Cue, bone: np.ndarray, swung: np.ndarray) -> Float[np.ndarray, " T"]:
     """Signed turn about the bone that brings the rest direction onto the measured one."""
     axis = unit(bone)
     measured = apply(np.swapaxes(swung, -1, -2), cue.seen)

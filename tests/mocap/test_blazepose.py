@@ -7,7 +7,16 @@ import pytest
 
 from robojackson.clips.track import LandmarkTrack
 from robojackson.errors import NoPersonFound, TrackTooShort, UnknownName
-from robojackson.mocap.blazepose import LANDMARK_NAMES, MIRROR, fill_gaps, landmark, repair
+from robojackson.mocap.blazepose import (
+    HIPS,
+    LANDMARK_NAMES,
+    MIRROR,
+    SHOULDERS,
+    fill_gaps,
+    landmark,
+    repair,
+    track_landmarks,
+)
 
 
 def without(track: LandmarkTrack, frames: list[int]) -> LandmarkTrack:
@@ -47,7 +56,8 @@ def test_mirror_pairs_left_with_right() -> None:
 def test_a_clean_track_is_left_alone(hip_shake: LandmarkTrack) -> None:
     repaired = repair(hip_shake)
     assert repaired.swapped == 0
-    assert np.array_equal(repaired.local, hip_shake.world_landmarks)
+    others = [i for i in range(33) if i not in HIPS]
+    assert np.array_equal(repaired.local[:, others], hip_shake.world_landmarks[:, others])
 
 
 @pytest.mark.parametrize("frames", [[50], list(range(30, 60)), [10, 11, 12, 90]])
@@ -83,3 +93,32 @@ def test_one_frame_is_too_short(hip_shake: LandmarkTrack) -> None:
 def test_unknown_landmark_names_the_known_ones() -> None:
     with pytest.raises(UnknownName, match="left_shoulder"):
         landmark("left_sholder")
+
+
+def test_hip_joints_lie_on_the_trunk_above_the_detectors_hips(hip_shake: LandmarkTrack) -> None:
+    before, after = track_landmarks(hip_shake), repair(hip_shake)
+    for was, now in ((before.image, after.image), (before.local, after.local)):
+        trunk = was[:, SHOULDERS].mean(1) - was[:, HIPS].mean(1)
+        step = now[:, HIPS] - was[:, HIPS]
+        assert np.allclose(step, 0.06 * trunk[:, None], atol=1e-9)
+
+
+def test_landmarks_of_a_moved_camera_are_laid_onto_the_first_frame(
+    hip_shake: LandmarkTrack,
+) -> None:
+    to_first = np.tile(np.eye(3), (len(hip_shake), 1, 1))
+    to_first[:, 0, 2] = np.arange(len(hip_shake))
+    moved = track_landmarks(replace(hip_shake, to_first=to_first)).image
+    shift = moved - track_landmarks(hip_shake).image
+    assert np.allclose(shift[..., 0], np.arange(len(hip_shake))[:, None])
+    assert np.allclose(shift[..., 1], 0.0)
+
+
+def test_a_turn_at_eight_frames_a_second_is_not_taken_for_an_exchange(
+    hip_shake: LandmarkTrack,
+) -> None:
+    mirrored = hip_shake.landmarks.copy()
+    mirrored[60:] = mirrored[60:, MIRROR]
+    slow = replace(hip_shake, fps=8.0, landmarks=mirrored)
+    assert repair(slow).swapped == 0
+    assert repair(replace(slow, fps=30.0)).swapped > 0

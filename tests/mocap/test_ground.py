@@ -89,7 +89,16 @@ def test_flight_reaches_from_the_last_to_the_first_touch() -> None:
     lowest = np.array([0.0, 0.0, 0.1, 0.3, 0.4, 0.3, 0.1, 0.0, 0.0])
     falling = np.zeros(9, bool)
     falling[3:6] = True
-    assert np.flatnonzero(ground.flight(lowest, falling, 30.0)).tolist() == [2, 3, 4, 5, 6]
+    height = -4.905 * ((np.arange(9) - 4) / 30.0) ** 2
+    assert np.flatnonzero(ground.flight(lowest, height, falling, 30.0)).tolist() == [2, 3, 4, 5, 6]
+
+
+def test_feet_that_rise_while_the_body_does_not_fall_are_no_flight() -> None:
+    lowest = np.array([0.0, 0.0, 0.1, 0.3, 0.4, 0.3, 0.1, 0.0, 0.0])
+    falling = np.zeros(9, bool)
+    falling[4] = True
+    found = ground.flight(lowest, np.zeros(9), falling, 30.0)
+    assert np.flatnonzero(found).tolist() == [4]
 
 
 def test_lowpass_keeps_lines_and_slow_waves_and_removes_fast_ones() -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from robojackson.mocap.hybrik import solve
+from robojackson.mocap.hybrik import solve, solve_with
 from robojackson.mocap.kinematics import forward, split
 from robojackson.mocap.skeleton import AIM_CHILD, PARENTS, REST_JOINTS
 
@@ -121,3 +121,35 @@ def test_a_shin_folded_onto_the_thigh_is_reached(bend: float) -> None:
 
 def test_the_tree_lists_parents_before_children() -> None:
     assert all(parent < child for child, parent in enumerate(PARENTS))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_joint_is_visited_once_however_many_frames_there_are(method: str) -> None:
+    visits: list[int] = []
+
+    def no_twist(joint: int, swung: np.ndarray) -> np.ndarray:
+        visits.append(joint)
+        return np.broadcast_to([1.0, 0.0], (len(swung), 2))
+
+    points = np.broadcast_to(REST_JOINTS, (500, 29, 3))
+    solve_with(points, REST_JOINTS[None], no_twist, method)
+    assert sorted(visits) == list(range(1, 24))
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("angle", [1e-9, 1e-4, np.pi - 1e-4, np.pi - 1e-9])
+def test_bones_near_their_own_and_near_the_opposite_direction_are_reached(
+    angle: float, method: str
+) -> None:
+    """Every limb joint swung by nearly nothing or nearly half a turn about a random axis."""
+    rng = np.random.default_rng(8)
+    local = np.broadcast_to(np.eye(3), (FRAMES, 24, 3, 3)).copy()
+    for joint in (1, 4, 7, 16, 18, 20):
+        bone = REST_JOINTS[AIM_CHILD[joint]] - REST_JOINTS[joint]
+        axis = np.cross(bone, rng.normal(size=(FRAMES, 3)))
+        axis /= np.linalg.norm(axis, axis=-1, keepdims=True)
+        local[:, joint] = Rotation.from_rotvec(angle * axis).as_matrix()
+    points = forward(local, REST_JOINTS[None], np.zeros((FRAMES, 3))).points
+    solved = solve(points, REST_JOINTS[None], NO_TWIST, method)
+    reached = forward(solved, REST_JOINTS[None], points[:, 0]).points
+    assert np.abs(reached - points).max() < 1e-5

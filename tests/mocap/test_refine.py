@@ -70,8 +70,9 @@ def test_one_step_is_that_of_a_dense_solver() -> None:
         trust=np.ones((8, 12)),
         lengths=bone_lengths(REST_JOINTS),
         fps=FPS,
+        depth_m=np.full((8, 12), CONFIG.depth_m),
     )
-    jacobian, residual = refinement._residuals(body, evidence, CONFIG)
+    jacobian, residual = refinement.residuals(body, evidence, CONFIG)
     dense = np.zeros((8 * 36, 8 * 36))
     moment = np.zeros(8 * 36)
     for frame in range(8):
@@ -89,7 +90,12 @@ def test_derivatives_are_those_of_finite_differences() -> None:
     body = with_noisy_depth(true_clip(), 0.05, 5)[:1, BODY]
     lengths = bone_lengths(REST_JOINTS)
     evidence = refinement.Evidence(
-        body[..., :2] / body[..., 2:], body[..., 2] - 4.0, np.ones((1, 12)), lengths, FPS
+        body[..., :2] / body[..., 2:],
+        body[..., 2] - 4.0,
+        np.ones((1, 12)),
+        lengths,
+        FPS,
+        np.full((1, 12), CONFIG.depth_m),
     )
     analytic = refinement._bones(body, evidence, 0.01)[0].reshape(len(BONES), 36)
     numeric = np.empty_like(analytic)
