@@ -19,6 +19,7 @@ LEAST_STEPS = 8
 class ClipStep:
     """The reference at one step for each of N environments; `moved` in m/s."""
 
+    step: Int[np.ndarray, " N"]
     qpos: Float[np.ndarray, "N nq"]
     qvel: Float[np.ndarray, "N nv"]
     points: Float[np.ndarray, "N K 3"]
@@ -54,7 +55,15 @@ class Clip:
         qpos = self._qpos[index].copy()
         qpos[:, :3] += offset
         points = self._points[index] + offset[:, None]
-        return ClipStep(qpos, self._qvel[index], points, self._moved[index], index / self.steps)
+        phase = index / self.steps
+        return ClipStep(step, qpos, self._qvel[index], points, self._moved[index], phase)
+
+    def take(
+        self, values: Float[np.ndarray, "S P 3"], step: Int[np.ndarray, " N"]
+    ) -> Float[np.ndarray, "N P 3"]:
+        """Other points of the clip's steps, world, at each environment's step."""
+        lap, index = self._split(step)
+        return np.asarray(values[index] + (lap[:, None] * self._offset)[:, None])
 
     def ended(self, step: Int[np.ndarray, " N"]) -> np.ndarray:
         """Whether a clip that is not cyclic has been danced to its end."""

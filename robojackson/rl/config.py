@@ -1,18 +1,40 @@
 """Every number of training and evaluation, with its unit. A setup file holds only what differs."""
 
-from typing import Literal
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass
+from pydantic_core import ArgsKwargs
+
+from robojackson.rl.evaluate_config import EvaluateConfig
+from robojackson.rl.paper_config import Curiosity, PaperConfig
+from robojackson.rl.tqc_config import TqcConfig
+
+__all__ = [
+    "ControlConfig",
+    "EvaluateConfig",
+    "PaperConfig",
+    "RandomConfig",
+    "ResetConfig",
+    "RewardConfig",
+    "TerminationConfig",
+    "TqcConfig",
+    "TrackConfig",
+    "TrainConfig",
+]
 
 STRICT = ConfigDict(extra="forbid")
 
 
 @dataclass(frozen=True, config=STRICT)
 class ControlConfig:
-    """The PD law outside the model, evaluated once a substep (stock physics).
+    """The law of control outside the model (stock physics).
 
     Attributes:
+        law: `pd`: a PD law evaluated once a substep. `hold`: the same evaluated once a control
+            step, its torque held, as a plain `env.step` does. `torque`: the action is the torque.
         substeps: Physics substeps a control step (Humanoid-v5: 5 of 3 ms).
         stiffness: Proportional gain, multiples of the stock torque limit, 1/rad.
         damping: Derivative gain, multiples of the proportional one, seconds.
@@ -21,6 +43,7 @@ class ControlConfig:
             flailing.
     """
 
+    law: Literal["pd", "hold", "torque"] = "pd"
     substeps: int = Field(default=5, ge=1)
     stiffness: float = Field(default=4.0, gt=0)
     damping: float = Field(default=0.1, ge=0)
@@ -65,6 +88,7 @@ class RewardConfig:
         height, height_width: Root height, m.
         drift, drift_width: Root position, m.
         action_rate: Penalty on the mean squared change of the action.
+        curiosity: As the paper's; scaled so that a perfect step earns the same share of it.
     """
 
     joints: float = 0.20
@@ -86,6 +110,7 @@ class RewardConfig:
     drift: float = 0.05
     drift_width: float = 0.5
     action_rate: float = 0.02
+    curiosity: Curiosity = "off"
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -110,6 +135,21 @@ class TerminationConfig:
 
 
 @dataclass(frozen=True, config=STRICT)
+class RandomConfig:
+    """Physics that differ a little from robot to robot while training; zero is the stock robot.
+
+    Attributes:
+        friction: Half-width of a uniform factor on the friction of all geoms.
+        gains: The same on stiffness and damping of the PD law.
+        integrators: Robot i gets the i-th, over and over.
+    """
+
+    friction: float = Field(default=0.0, ge=0, lt=1)
+    gains: float = Field(default=0.0, ge=0, lt=1)
+    integrators: tuple[Literal["RK4", "Euler", "implicitfast"], ...] = ("RK4",)
+
+
+@dataclass(frozen=True, config=STRICT)
 class TrackConfig:
     """The tracking environment.
 
@@ -122,93 +162,69 @@ class TrackConfig:
     reset: ResetConfig = Field(default_factory=ResetConfig)
     reward: RewardConfig = Field(default_factory=RewardConfig)
     termination: TerminationConfig = Field(default_factory=TerminationConfig)
+    random: RandomConfig = Field(default_factory=RandomConfig)
     episode_seconds: float = Field(default=6.0, gt=0)
     threads: int = Field(default=2, ge=1)
 
 
 @dataclass(frozen=True, config=STRICT)
-class TqcConfig:
-    """TQC (Kuznetsov et al., 2020) and how often it learns.
-
-    Attributes:
-        n_envs: Simulations stepped together.
-        steps_per_round: Control steps of every simulation between two rounds of updates.
-        updates_per_round: Gradient updates a round.
-        buffer: Transitions kept for replay.
-        warmup: Random transitions before the first update.
-        refill: Transitions of the restored policy before the first update of a run that is resumed
-            without its replay buffer.
-        critics: SBX has two, and so has the reference.
-        top_quantiles_to_drop: Of each critic's quantiles, against overestimation.
-    """
-
-    n_envs: int = Field(default=32, ge=1)
-    steps_per_round: int = Field(default=8, ge=1)
-    updates_per_round: int = Field(default=24, ge=1)
-    learning_rate: float = Field(default=5e-4, gt=0)
-    buffer: int = Field(default=300_000, ge=1_000)
-    warmup: int = Field(default=2_000, ge=1)
-    refill: int = Field(default=20_000, ge=1)
-    batch: int = Field(default=256, ge=1)
-    tau: float = Field(default=0.01, gt=0, le=1)
-    gamma: float = Field(default=0.985, gt=0, lt=1)
-    policy_delay: int = Field(default=2, ge=1)
-    critics: Literal[2] = 2
-    quantiles: int = Field(default=25, ge=1)
-    top_quantiles_to_drop: int = Field(default=2, ge=0)
-    entropy: str = Field(default="auto_0.02", pattern=r"^auto(_\d*\.?\d+)?$")
-    actor: tuple[int, ...] = (256, 256)
-    critic: tuple[int, ...] = (256, 256)
-
-
-@dataclass(frozen=True, config=STRICT)
 class TrainConfig:
-    """One training run. It ends at the first of `steps` and `minutes` that is reached.
+    """One training run. It ends at the first of its budgets that is reached.
 
     Attributes:
+        mode: `track`, the method that dances, or `paper`, the paper's own.
         trainer: `sbx` (JAX, fast) or `sb3` (sb3-contrib, the reference).
         seed: Of networks, environments and replay.
-        steps: Control steps over all simulations.
+        steps: Policy steps over all simulations, rounded up to a round of updates.
         minutes: Wall time, minutes.
+        cpu_minutes: Time of the processor, all threads together, minutes.
+        start: Where the networks come from: `scratch`, our `walker` of the mode, a
+            networks.safetensors, an SB3 zip, or a repository of the hub (`owner/name`).
+        start_critics: Whether the critics come from there, too.
+        curiosity: Which of the paper's three weights the curiosity bonus gets.
         checkpoint_seconds: Time between two checkpoints, s.
         progress_seconds: Time between two progress rows, s.
+        tensorboard: Whether to log for TensorBoard.
     """
 
+    mode: Literal["track", "paper"] = "track"
     trainer: Literal["sbx", "sb3"] = "sbx"
     seed: int = Field(default=0, ge=0)
     steps: int | None = Field(default=None, ge=1)
     minutes: float | None = Field(default=None, gt=0)
+    cpu_minutes: float | None = Field(default=None, gt=0)
+    start: str = Field(default="scratch", min_length=1)
+    start_critics: bool = True
+    curiosity: Curiosity = "off"
     checkpoint_seconds: float = Field(default=60.0, gt=0)
     progress_seconds: float = Field(default=5.0, gt=0)
+    tensorboard: bool = False
     track: TrackConfig = Field(default_factory=TrackConfig)
+    paper: PaperConfig = Field(default_factory=PaperConfig)
     tqc: TqcConfig = Field(default_factory=TqcConfig)
 
+    @model_validator(mode="before")
+    @classmethod
+    def _tqc_of_mode(cls, given: Any) -> Any:
+        """Paper mode learns with the paper's TQC unless another preset is named."""
+        said: Any = given.kwargs if isinstance(given, ArgsKwargs) else given
+        if not isinstance(said, Mapping) or said.get("mode") != "paper":
+            return given
+        tqc = said.get("tqc", {})
+        if not isinstance(tqc, Mapping) or "preset" in tqc:
+            return given
+        said = {**said, "tqc": {"preset": "paper", **tqc}}
+        return ArgsKwargs(given.args, said) if isinstance(given, ArgsKwargs) else said
 
-@dataclass(frozen=True, config=STRICT)
-class EvaluateConfig:
-    """How a policy is judged on stock physics.
+    @property
+    def has_budget(self) -> bool:
+        """Whether anything ends it."""
+        return any(b is not None for b in (self.steps, self.minutes, self.cpu_minutes))
 
-    Attributes:
-        seconds: Length of a rollout on a cyclic clip, s; others run to their end.
-        phases: Start phases, spread evenly over the clip.
-        resets: Noisy starts a phase.
-        seed: Of the noise.
-        joint_noise, joint_speed_noise, root_speed_noise: Reset noise, rad, rad/s, m/s.
-        strict_error: Largest mean site error of a strict success, m.
-        kneel_height: A knee lower than this is kneeling, m.
-        fast: Reference speed from which a limb's gain is measured, m/s.
-        max_lag: Longest lag tried for a limb's gain, s.
-    """
-
-    seconds: float = Field(default=10.0, gt=0)
-    phases: int = Field(default=24, ge=1)
-    resets: int = Field(default=3, ge=1)
-    seed: int = 0
-    joint_noise: float = 0.02
-    joint_speed_noise: float = 0.1
-    root_speed_noise: float = 0.02
-    strict_error: float = 0.30
-    kneel_height: float = 0.15
-    fast: float = 0.15
-    max_lag: float = 0.1
-    threads: int = 2
+    @property
+    def environment(self) -> TrackConfig | PaperConfig:
+        """The environment of the mode, with the curiosity of the setup."""
+        if self.mode == "paper":
+            return replace(self.paper, curiosity=self.curiosity)
+        reward = replace(self.track.reward, curiosity=self.curiosity)
+        return replace(self.track, reward=reward)

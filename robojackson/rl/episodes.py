@@ -10,30 +10,32 @@ class EpisodeTotals:
     def __init__(self, n: int, dt: float) -> None:
         self._n, self._dt = n, dt
         self._sums: dict[str, Float[np.ndarray, " N"]] = {}
+        self._means: tuple[str, ...] = ()
 
     def add(
         self,
         reward: Float[np.ndarray, " N"],
         terms: dict[str, Float[np.ndarray, " N"]],
-        site_error: Float[np.ndarray, " N"],
+        errors: dict[str, Float[np.ndarray, " N"]],
     ) -> None:
-        """Count one step of every environment."""
-        rows = {"episode_return": reward, "site_error_m": site_error}
+        """Count one step of every environment; errors are averaged, the others are summed."""
+        self._means = tuple(errors)
+        rows = {"episode_return": reward, **errors}
         rows |= {f"reward_{name}": value for name, value in terms.items()}
         for name, value in rows.items():
             self._sums.setdefault(name, np.zeros(self._n))
             self._sums[name] += value
 
     def close(
-        self, done: Int[np.ndarray, " I"], age: Int[np.ndarray, " N"]
+        self, done: Int[np.ndarray, " I"], age: Int[np.ndarray, " N"], repeats: int = 1
     ) -> list[dict[str, float]]:
-        """Rows of the episodes that ended after `age` steps; their totals start anew."""
+        """Rows of the episodes that ended after `age` control steps; their totals start anew."""
         rows = []
         for i in done:
             row = {name: float(total[i]) for name, total in self._sums.items()}
-            steps = int(age[i])
-            row["site_error_m"] /= steps
-            rows.append(row | {"episode_length": steps, "survived_s": steps * self._dt})
+            actions = int(age[i]) // repeats
+            row |= {name: row[name] / actions for name in self._means}
+            rows.append(row | {"episode_length": actions, "survived_s": int(age[i]) * self._dt})
         self.clear(done)
         return rows
 
@@ -41,3 +43,13 @@ class EpisodeTotals:
         """Forget the running totals of some environments."""
         for total in self._sums.values():
             total[which] = 0.0
+
+    def state(self) -> dict[str, np.ndarray]:
+        """The running totals, as arrays."""
+        return {f"sum_{name}": total.copy() for name, total in self._sums.items()}
+
+    def restore(self, state: dict[str, np.ndarray]) -> None:
+        """Go on from what `state` gave."""
+        for name, total in state.items():
+            if name.startswith("sum_"):
+                self._sums[name.removeprefix("sum_")] = np.array(total)

@@ -15,20 +15,33 @@ import numpy as np
 from jaxtyping import Float
 from pydantic import TypeAdapter
 
-from robojackson.errors import BadPolicy
 from robojackson.motion.reference import ReferenceMotion, poses_sha256
 from robojackson.retarget.robot import Robot
 from robojackson.rl.clip import Clip
-from robojackson.rl.config import ControlConfig, EvaluateConfig, ResetConfig, TerminationConfig
+from robojackson.rl.config import (
+    ControlConfig,
+    EvaluateConfig,
+    PaperConfig,
+    ResetConfig,
+    TerminationConfig,
+    TrackConfig,
+)
+from robojackson.rl.drivers import control_of, drivers, mode_of
 from robojackson.rl.judge import Judge
-from robojackson.rl.observation import observation_size
-from robojackson.rl.physics import Motors, require_same_clock, residual_scale
+from robojackson.rl.meter import Meter, yardstick
+from robojackson.rl.paper_mode import facing_ahead
+from robojackson.rl.physics import require_same_clock
 from robojackson.rl.policy import Policy
-from robojackson.rl.rollouts import Controller, Rollouts, Starts, roll_out
+from robojackson.rl.rollouts import Rollouts, Starts, roll_out
+from robojackson.rl.shares import Shares, both_readings, told
 from robojackson.rl.starts import default_stand, noisy, stand_at
 
 log = logging.getLogger(__name__)
 
+STATUE_SHARE = 0.9
+"""Of a run's own return, above which what a statue earns raises a flag."""
+MEANT = ("limb_", "excess_", "usage_", "reward_", "return_", "error_")
+"""Beginnings of further columns that are averaged over the rollouts."""
 STAND = -1
 """`phase` of the row that starts in the default stand."""
 
@@ -63,58 +76,69 @@ def evaluate(
     """
     control = control_of(policy, robot)
     require_same_clock(control.substeps * robot.model.opt.timestep, reference.dt)
-    clip = Clip(reference)
     _tell_strangers(policy, reference)
+    environment = environment_of(policy, control)
+    if isinstance(environment, PaperConfig):
+        reference = facing_ahead(reference)
+    clip = Clip(reference)
     starts, labels = _starts(robot, clip, config)
     horizon = clip.horizon(starts.step, config.seconds)
-    judge = Judge(robot, reference, config)
+    judge, meter = Judge(robot, reference, config), Meter(robot, reference, clip, environment)
     rows: list[dict[str, object]] = []
-    summary: dict[str, object] = {}
-    baselines: dict[str, dict[str, float]] = {}
+    summaries: dict[str, dict[str, float]] = {}
     qpos = np.zeros((0, robot.model.nq))
-    for name, controller in _controllers(policy, reference, robot, control, config).items():
-        rollouts = roll_out(
-            robot,
-            clip,
-            control,
-            controller,
-            starts,
-            horizon,
-            config.threads,
-            TerminationConfig(),
-            partial(progress, name),
-        )
-        judged = [judge.row(name, label, rollouts, i) for i, label in enumerate(labels)]
+    for name, driver in drivers(policy, reference, robot, config.seed).items():
+        tick = partial(progress, name)
+        rules = TerminationConfig()
+        done = roll_out(robot, clip, driver, starts, horizon, config.threads, rules, meter, tick)
+        judged = [judge.row(name, label, done, i) for i, label in enumerate(labels)]
         rows += judged
+        summaries[name] = summarise(judged)
         if name == "trained":
-            summary |= summarise(judged)
-            qpos = _shown(rollouts, starts)
-        else:
-            baselines[name] = summarise(judged)
-    return Evaluation(summary | {"baselines": baselines}, rows, qpos)
+            qpos = _shown(done, starts)
+    own = summaries.pop("trained")
+    variants = {"hold": summaries.pop("hold")} if "hold" in summaries else {}
+    reward = reward_report(robot, reference, environment, own, float(horizon.mean()))
+    told = {"variants": variants, "baselines": summaries, "reward": reward}
+    return Evaluation({**own, **told}, rows, qpos)
 
 
-def control_of(policy: Policy, robot: Robot) -> ControlConfig:
-    """The control law that a policy was trained with.
+def environment_of(policy: Policy, control: ControlConfig) -> TrackConfig | PaperConfig:
+    """The environment whose reward a policy is measured with: its own, without curiosity."""
+    held = policy.facts.get("environment")
+    paper = mode_of(policy) == "paper"
+    if not isinstance(held, Mapping):
+        return PaperConfig() if paper else TrackConfig(control=control)
+    known = TypeAdapter(PaperConfig if paper else TrackConfig).validate_python(held)
+    return yardstick(known)
 
-    Raises:
-        BadPolicy: the policy was trained for another robot, or its file says no control law.
+
+def reward_report(
+    robot: Robot,
+    reference: ReferenceMotion,
+    environment: TrackConfig | PaperConfig,
+    own: Mapping[str, float],
+    steps: float,
+) -> dict[str, object]:
+    """Shortcuts made visible: what every term gave, and what bodies get that do not dance.
+
+    `flagged` says that a statue carried along would earn over 90 % of the policy's return.
     """
-    trained_for = policy.facts.get("robot", robot.description.name)
-    if trained_for != robot.description.name:
-        raise BadPolicy(
-            f"the policy was trained for robot {trained_for!r}, not for {robot.description.name!r}"
-        )
-    if "control" not in policy.facts:
-        raise BadPolicy("the policy's file says nothing of its control law")
-    hinges, motors = robot.model.nq - 7, robot.model.nu
-    size = observation_size(hinges, motors, len(robot.keypoint_names))
-    if policy.observation_size != size:
-        raise BadPolicy(
-            f"the policy takes {policy.observation_size} observations and robot "
-            f"{robot.description.name!r} gives {size}: it was trained for another robot"
-        )
-    return TypeAdapter(ControlConfig).validate_python(policy.facts["control"])
+    asked = both_readings(robot, reference, environment)
+    reading = environment.relative if isinstance(environment, PaperConfig) else "track"
+    nothing = Shares(float("nan"), {"statue": float("nan")})  # a reward that asks for no motion
+    known = asked.get(reading, nothing)
+    statue = known.statue * steps
+    terms = {k.removeprefix("reward_"): v for k, v in own.items() if k.startswith("reward_")}
+    total = sum(abs(value) for value in terms.values()) or 1.0
+    return {
+        "of_terms": {name: value / total for name, value in terms.items()},
+        "asks": told(asked),
+        "perfect_return": known.perfect * steps,
+        "statue_return": statue,
+        "own_return": own["return_own"],
+        "flagged": bool(statue > STATUE_SHARE * own["return_own"]),
+    }
 
 
 def _tell_strangers(policy: Policy, reference: ReferenceMotion) -> None:
@@ -131,53 +155,11 @@ def summarise(rows: list[dict[str, object]]) -> dict[str, float]:
     keys = ("survived_s", "success", "strict_success", "skill", "site_error_m", "clip_fraction",
             "drift_m", "heading_error_deg", "travel_ratio")  # fmt: skip
     out = {key: _mean(rows, key) for key in keys}
-    limbs = [key for key in rows[0] if key.startswith(("limb_gain_", "limb_r2_", "excess_"))]
+    limbs = [key for key in rows[0] if key.startswith(MEANT)]
     out |= {key: _mean(rows, key) for key in limbs}
     out["limb_gain"] = _nanmean([out[key] for key in limbs if key.startswith("limb_gain_")])
     out["rollouts"] = float(len(rows))
     return out
-
-
-def _controllers(
-    policy: Policy,
-    reference: ReferenceMotion,
-    robot: Robot,
-    control: ControlConfig,
-    config: EvaluateConfig,
-) -> Mapping[str, Controller]:
-    """The policy and the baselines: each gives target hinge angles."""
-    hinge = Motors.of(robot.model).hinge
-    scale = residual_scale(robot, control)
-    rng = np.random.default_rng(config.seed)
-    mean_pose = reference.qpos[:, 7:].mean(0)
-
-    def moved(following: np.ndarray, action: np.ndarray) -> np.ndarray:
-        target = following.copy()
-        target[:, hinge] += scale * action
-        return target
-
-    def trained(seen: np.ndarray, following: np.ndarray, start: np.ndarray) -> np.ndarray:
-        return moved(following, policy.act(seen))
-
-    def statue(seen: np.ndarray, following: np.ndarray, start: np.ndarray) -> np.ndarray:
-        return np.asarray(reference.qpos, float)[start % len(reference), 7:]
-
-    def frozen_mean(seen: np.ndarray, following: np.ndarray, start: np.ndarray) -> np.ndarray:
-        return np.broadcast_to(mean_pose, following.shape)
-
-    def zero_residual(seen: np.ndarray, following: np.ndarray, start: np.ndarray) -> np.ndarray:
-        return following
-
-    def flail(seen: np.ndarray, following: np.ndarray, start: np.ndarray) -> np.ndarray:
-        return moved(following, rng.uniform(-1, 1, (len(following), len(hinge))))
-
-    return {
-        "trained": trained,
-        "statue": statue,
-        "mean_pose": frozen_mean,
-        "zero_residual": zero_residual,
-        "random": flail,
-    }
 
 
 def _starts(

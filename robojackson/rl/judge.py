@@ -15,12 +15,14 @@ from robojackson.motion.reference import ReferenceMotion
 from robojackson.retarget.robot import Robot
 from robojackson.rl.config import EvaluateConfig
 from robojackson.rl.rollouts import Rollouts
-from robojackson.rl.tracking import EXTREMITIES, FEET, PELVIS
+from robojackson.rl.track_mode import EXTREMITIES, FEET, PELVIS
 
 KNEES = ("left_knee", "right_knee")
 LIMB_ENDS = (*FEET, *EXTREMITIES)
 LEAST_MOVING_SHARE = 0.05
 """Of the frames, below which no gain of a limb is told."""
+LEAST_SPREAD_RAD = 0.02
+"""Of a hinge of the reference, below which no usage is told, radians."""
 LEAST_TRAVEL_M = 0.5
 """Of the reference, below which no travel ratio is told, metres."""
 
@@ -34,7 +36,7 @@ class Judge:
         self._pelvis = names.index(PELVIS)
         self._knees = [names.index(name) for name in KNEES]
         self._limbs = {name: names.index(name) for name in LIMB_ENDS}
-        self._model = robot.model
+        self._model, self._joints = robot.model, robot.joint_names
         self._tempo = float(reference.scorecard.get("tempo", 1.0))
 
     def row(
@@ -44,7 +46,9 @@ class Judge:
         length, fell = int(rollouts.length[i]), bool(rollouts.fell[i])
         span = slice(0, max(length, 1))
         here = heading_frame(rollouts.points[span, i], rollouts.qpos[span, i, 3:7], self._pelvis)
-        there = heading_frame(rollouts.wanted[span, i], rollouts.wanted_root[span, i], self._pelvis)
+        there = heading_frame(
+            rollouts.wanted[span, i], rollouts.wanted_qpos[span, i, 3:7], self._pelvis
+        )
         error = site_error(here, there)
         knees = rollouts.points[span, i][:, self._knees, 2]
         wanted_knees = rollouts.wanted[span, i][:, self._knees, 2]
@@ -69,14 +73,32 @@ class Judge:
             ),
             "tempo": self._tempo,
         }
-        return row | self._whereabouts(rollouts, i, span) | self._limb_figures(here, there)
+        row |= {name: float(total[i]) for name, total in self._means(rollouts).items()}
+        row |= self._whereabouts(rollouts, i, span) | self._limb_figures(here, there)
+        return row | self._usage(rollouts, i, span)
+
+    def _means(self, rollouts: Rollouts) -> dict[str, np.ndarray]:
+        """Returns and their terms summed over the rollout, errors as means."""
+        steps = np.maximum(np.minimum(rollouts.length + 1, rollouts.horizon), 1)
+        return {
+            name: total / steps if name.startswith("error_") else total
+            for name, total in rollouts.totals.items()
+        }
+
+    def _usage(self, rollouts: Rollouts, i: int, span: slice) -> dict[str, float]:
+        """Every hinge's spread over the rollout, as a multiple of the reference's."""
+        own = rollouts.qpos[span, i, 7:].std(0)
+        wanted = rollouts.wanted_qpos[span, i, 7:].std(0)
+        moves = wanted > LEAST_SPREAD_RAD
+        ratio = np.where(moves, own / np.where(moves, wanted, 1.0), np.nan)
+        return {f"usage_{name}": float(r) for name, r in zip(self._joints, ratio, strict=True)}
 
     def _whereabouts(self, rollouts: Rollouts, i: int, span: slice) -> dict[str, float]:
         """What the pelvis-heading frame does not see: where the robot went and which way."""
         end = span.stop - 1
         went = rollouts.points[[0, end], i, self._pelvis, :2]
         wanted = rollouts.wanted[[0, end], i, self._pelvis, :2]
-        turn = heading(rollouts.qpos[end, i, 3:7]) - heading(rollouts.wanted_root[end, i])
+        turn = heading(rollouts.qpos[end, i, 3:7]) - heading(rollouts.wanted_qpos[end, i, 3:7])
         path = float(np.linalg.norm(wanted[1] - wanted[0]))
         forward = float((went[1] - went[0]) @ (wanted[1] - wanted[0]))
         return {
@@ -93,5 +115,6 @@ class Judge:
             moves = found is not None and found.moving_share > LEAST_MOVING_SHARE
             figures[f"limb_gain_{name}"] = found.gain if found and moves else float("nan")
             figures[f"limb_r2_{name}"] = found.r2 if found and moves else float("nan")
+            figures[f"limb_lag_{name}"] = found.lag_s if found and moves else float("nan")
             figures[f"excess_speed_{name}"] = found.excess_m_s if found else float("nan")
         return figures

@@ -10,7 +10,7 @@ from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 
 from robojackson.rl.config import TqcConfig
 from robojackson.rl.randomness import load_random, save_random
-from robojackson.rl.replay import buffer_of, load_replay, save_replay
+from robojackson.rl.replay import ReplayFiles, buffer_of
 
 FOREVER = 10**12
 
@@ -32,31 +32,30 @@ def arguments(config: TqcConfig, seed: int) -> dict[str, Any]:
         "policy_kwargs": {
             "n_critics": config.critics,
             "n_quantiles": config.quantiles,
+            "log_std_init": config.log_std_init,
             "net_arch": {"pi": list(config.actor), "qf": list(config.critic)},
         },
         "seed": seed,
     }
 
 
-def filled(model: OffPolicyAlgorithm, refill: int) -> bool:
-    """Whether the replay buffer holds enough to learn from after a resumption."""
-    return buffer_of(model).size() * model.n_envs >= refill
+def patient(model: OffPolicyAlgorithm, warmup: int) -> bool:
+    """Whether the replay buffer holds too little to learn from."""
+    return buffer_of(model).size() * model.n_envs < warmup
 
 
 class OffPolicyTrainer:
     """The part of the `Trainer` protocol that does not depend on how networks are computed.
 
-    The model has an attribute `refill`: transitions that it waits for before it learns.
+    The model has an attribute `warmup`: transitions that it waits for before it learns.
     """
 
     model: Any
 
-    def __init__(
-        self, model: Any, config: TqcConfig, generators: dict[str, np.random.Generator]
-    ) -> None:
+    def __init__(self, model: Any, generators: dict[str, np.random.Generator]) -> None:
         self.model = model
-        self._refill = min(config.refill, config.buffer)
-        self._generators = generators
+        self._generators = generators | {"warmup": model.action_space.np_random}
+        self._files: ReplayFiles | None = None
         model.set_logger(Logger(folder=None, output_formats=[]))
 
     def learn(self, callback: BaseCallback) -> None:
@@ -70,15 +69,27 @@ class OffPolicyTrainer:
     def updates(self) -> int:
         return self.model._n_updates
 
-    def _save_rest(self, folder: Path, with_replay: bool) -> None:
-        save_random(folder / "random.json", self._generators)
-        if with_replay:
-            save_replay(buffer_of(self.model), folder / "replay.npz")
+    def saved(self) -> None:
+        assert self._files is not None
+        self._files.prune(buffer_of(self.model), self._rows())
 
-    def _load_rest(self, folder: Path, steps: int, updates: int) -> None:
+    def _act_at_once(self) -> None:
+        """No random actions: what was learnt elsewhere fills the replay buffer."""
+        self.model.learning_starts = 0
+
+    def _rows(self) -> int:
+        return self.model.num_timesteps // self.model.n_envs
+
+    def _save_rest(self, folder: Path, replay: Path) -> None:
+        save_random(folder / "random.json", self._generators)
+        np.save(folder / "observation.npy", self.model._last_obs)
+        self._files = self._files or ReplayFiles(replay)
+        self._files.save(buffer_of(self.model), self._rows())
+
+    def _load_rest(self, folder: Path, replay: Path, steps: int, updates: int) -> None:
         self.model.num_timesteps, self.model._n_updates = steps, updates
         load_random(folder / "random.json", self._generators)
-        if (folder / "replay.npz").exists():
-            load_replay(buffer_of(self.model), folder / "replay.npz")
-        else:
-            self.model.refill = self._refill
+        self.model._last_obs = np.load(folder / "observation.npy", allow_pickle=False)
+        self.model._last_episode_starts = np.zeros(self.model.n_envs, bool)
+        self._files = ReplayFiles(replay)
+        self._files.load(buffer_of(self.model), self._rows())

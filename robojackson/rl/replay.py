@@ -1,5 +1,11 @@
-"""The replay buffer of Stable-Baselines3 as plain arrays on disk (nothing is pickled)."""
+"""The replay buffer of Stable-Baselines3 on disk: every transition is written once.
 
+A checkpoint adds one file with the transitions since the last one, so it costs what is new and not
+what is kept. A crash while it is written leaves the files of the checkpoint before untouched; files
+that the buffer has wrapped past are removed after the next checkpoint. Nothing is pickled.
+"""
+
+import os
 from pathlib import Path
 
 import numpy as np
@@ -16,17 +22,45 @@ def buffer_of(model: OffPolicyAlgorithm) -> ReplayBuffer:
     return model.replay_buffer
 
 
-def save_replay(buffer: ReplayBuffer, path: Path) -> None:
-    """Write the filled part of a replay buffer."""
-    count = buffer.buffer_size if buffer.full else buffer.pos
-    arrays = {name: getattr(buffer, name)[:count] for name in ARRAYS}
-    with path.open("wb") as file:
-        np.savez(file, pos=buffer.pos, full=buffer.full, **arrays)
+class ReplayFiles:
+    """The files of one run; a row is one step of all its simulations."""
 
+    def __init__(self, folder: Path) -> None:
+        self._folder, self._kept = folder, 0
 
-def load_replay(buffer: ReplayBuffer, path: Path) -> None:
-    """Fill a replay buffer from what `save_replay` wrote."""
-    with np.load(path, allow_pickle=False) as arrays:
-        for name in ARRAYS:
-            getattr(buffer, name)[: len(arrays[name])] = arrays[name]
-        buffer.pos, buffer.full = int(arrays["pos"]), bool(arrays["full"])
+    def save(self, buffer: ReplayBuffer, rows: int) -> None:
+        """Write the rows since the last call; `rows` were added to the buffer in all."""
+        first = max(self._kept, rows - buffer.buffer_size)
+        if first < rows:
+            self._folder.mkdir(exist_ok=True)
+            slots = np.arange(first, rows) % buffer.buffer_size
+            part = self._folder / "new.part"
+            with part.open("wb") as file:
+                np.savez(file, **{name: getattr(buffer, name)[slots] for name in ARRAYS})
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(part, self._folder / f"{first:012d}-{rows:012d}.npz")
+        self._kept = rows
+
+    def load(self, buffer: ReplayBuffer, rows: int) -> None:
+        """Fill the buffer as it was when it had got `rows`; later files are removed."""
+        for path, first, last in self._files():
+            if first >= rows:
+                path.unlink()
+                continue
+            slots = np.arange(first, last) % buffer.buffer_size
+            with np.load(path, allow_pickle=False) as arrays:
+                for name in ARRAYS:
+                    getattr(buffer, name)[slots] = arrays[name]
+        buffer.pos, buffer.full = rows % buffer.buffer_size, rows >= buffer.buffer_size
+        self._kept = rows
+
+    def prune(self, buffer: ReplayBuffer, rows: int) -> None:
+        """Remove the files that hold nothing the buffer still has."""
+        for path, _, last in self._files():
+            if last <= rows - buffer.buffer_size:
+                path.unlink()
+
+    def _files(self) -> list[tuple[Path, int, int]]:
+        found = sorted(self._folder.glob("*-*.npz"))
+        return [(path, *map(int, path.stem.split("-"))) for path in found]  # type: ignore[misc]

@@ -7,15 +7,28 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from robojackson.retarget.robot import Robot
-from robojackson.rl.clip import Clip
+from robojackson.rl.clip import Clip, ClipStep
 from robojackson.rl.config import ControlConfig, TerminationConfig
-from robojackson.rl.observation import observe
 from robojackson.rl.physics import Simulation
 from robojackson.rl.rewards import fallen
 
-Controller = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
-"""(observation (N, D), hinge angles of the next reference step (N, J), start step (N,)) -> target
-hinge angles (N, J), radians."""
+Reading = dict[str, Float[np.ndarray, " N"]]
+
+
+@dataclass(frozen=True)
+class Driver:
+    """How robots are driven.
+
+    Attributes:
+        control: The law of control.
+        command: (simulation, next step of the reference, start steps, last action) -> what
+            `Simulation.step` gets.
+        repeats: Control steps for which a command is held.
+    """
+
+    control: ControlConfig
+    command: Callable[[Simulation, ClipStep, np.ndarray, np.ndarray], np.ndarray]
+    repeats: int = 1
 
 
 @dataclass(frozen=True)
@@ -25,6 +38,25 @@ class Starts:
     step: Int[np.ndarray, " N"]
     qpos: Float[np.ndarray, "N nq"]
     qvel: Float[np.ndarray, "N nv"]
+
+
+@dataclass(frozen=True)
+class Moment:
+    """What a meter sees after every control step.
+
+    Attributes:
+        sim: The simulation.
+        at: The reference now.
+        before: The sites one control step ago, world, m.
+        change: Mean squared change of the action: of the residual, in units of a full one.
+        fell: Robots that fell in this very step.
+    """
+
+    sim: Simulation
+    at: ClipStep
+    before: Float[np.ndarray, "N K 3"]
+    change: Float[np.ndarray, " N"]
+    fell: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -38,7 +70,8 @@ class Rollouts:
         qpos: States after every step.
         points: Keypoint sites, world, metres.
         wanted: The reference's sites at the same steps, world, metres.
-        wanted_root: The reference's root orientation, quaternion wxyz.
+        wanted_qpos: The reference's state.
+        totals: Sums of what the meter read, up to the end or the fall, which counts itself.
     """
 
     length: Int[np.ndarray, " N"]
@@ -47,40 +80,47 @@ class Rollouts:
     qpos: Float[np.ndarray, "H N nq"]
     points: Float[np.ndarray, "H N K 3"]
     wanted: Float[np.ndarray, "H N K 3"]
-    wanted_root: Float[np.ndarray, "H N 4"]
+    wanted_qpos: Float[np.ndarray, "H N nq"]
+    totals: Reading
 
 
 def roll_out(
     robot: Robot,
     clip: Clip,
-    control: ControlConfig,
-    controller: Controller,
+    driver: Driver,
     starts: Starts,
     horizon: Int[np.ndarray, " N"],
     threads: int,
     rules: TerminationConfig,
+    meter: Callable[[Moment], Reading] = lambda moment: {},
     tick: Callable[[int, int], None] = lambda step, total: None,
 ) -> Rollouts:
-    """Run a controller from every start, each to its own horizon or its fall."""
+    """Drive a robot from every start, each to its own horizon or its fall."""
     n, steps = len(starts.step), int(horizon.max())
-    sim = Simulation(robot, control, n, threads)
+    sim = Simulation(robot, driver.control, n, threads)
     sim.place(np.arange(n), starts.qpos, starts.qvel)
-    hinge = sim.motors.hinge
-    action = np.zeros((n, len(hinge)))
+    action = command = np.zeros((n, robot.model.nu))
     alive, length = np.ones(n, bool), np.zeros(n, int)
+    totals: Reading = {}
     record: list[tuple[np.ndarray, ...]] = []
     for t in range(steps):
-        target = clip.at(starts.step + t + 1)
-        seen = observe(sim.qpos, sim.qvel, sim.points, target, action)
-        wish = controller(seen, target.qpos[:, 7:], starts.step)
-        action = np.clip((wish - target.qpos[:, 7:])[:, hinge] / sim.residual, -1, 1)
-        sim.step(wish[:, hinge], alive)
-        alive = alive & ~fallen(sim.qpos, rules) & ~sim.broken & (t < horizon)
+        target, before, change = clip.at(starts.step + t + 1), sim.points.copy(), np.zeros(n)
+        if t % driver.repeats == 0:
+            command = driver.command(sim, target, starts.step, action)
+            residual = command - target.qpos[:, 7:][:, sim.motors.hinge]
+            last, action = action, np.clip(residual / sim.residual, -1, 1)
+            change = np.mean((action - last) ** 2, -1)
+        sim.step(command, alive)
+        still = alive & ~fallen(sim.qpos, rules) & ~sim.broken & (t < horizon)
+        reading = meter(Moment(sim, target, before, change, alive & ~still & (t < horizon)))
+        for name, value in reading.items():
+            totals[name] = totals.get(name, 0.0) + np.where(alive & (t < horizon), value, 0.0)
+        alive = still
         length += alive
-        record.append((sim.qpos.copy(), sim.points.copy(), target.points, target.qpos[:, 3:7]))
+        record.append((sim.qpos.copy(), sim.points.copy(), target.points, target.qpos))
         tick(t + 1, steps)
         if not (alive & (t + 1 < horizon)).any():
             break
     sim.close()
-    qpos, points, wanted, root = (np.stack(column) for column in zip(*record, strict=True))
-    return Rollouts(length, length < horizon, horizon, qpos, points, wanted, root)
+    qpos, points, wanted, wanted_qpos = (np.stack(column) for column in zip(*record, strict=True))
+    return Rollouts(length, length < horizon, horizon, qpos, points, wanted, wanted_qpos, totals)

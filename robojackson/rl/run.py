@@ -1,4 +1,7 @@
-"""The bookkeeping of one training run: what is learnt, budget, checkpoints, episodes, progress."""
+"""The bookkeeping of one training run: what is learnt, budget, checkpoints, episodes, progress.
+
+No clock stands in the rows of episodes: a run in steps that is repeated gives the same table.
+"""
 
 import json
 import logging
@@ -6,107 +9,75 @@ import os
 import shutil
 import time
 from collections import deque
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 
 from robojackson.errors import BadConfiguration, StoreError
-from robojackson.motion.reference import ReferenceMotion, poses_sha256
-from robojackson.retarget.robot import Robot
 from robojackson.rl.config import TrainConfig
+from robojackson.rl.hooks import Enough, Hooks, Row
+from robojackson.rl.networks import Networks
 from robojackson.rl.policy import Policy
+from robojackson.rl.task import Task, TrainResult
+from robojackson.rl.tensorboard import ScalarLog
 from robojackson.rl.tracking import TrackingCore
 from robojackson.rl.trainer import Trainer
 
 log = logging.getLogger(__name__)
 
-Row = dict[str, float]
 RECENT_EPISODES = 100
-
-
-@dataclass(frozen=True)
-class Task:
-    """What is being learnt: a checkpoint of another one cannot be continued.
-
-    Attributes:
-        robot: Name of the robot.
-        model_sha256: Digest of its MJCF.
-        reference_sha256: Digest of the reference's poses.
-    """
-
-    robot: str
-    model_sha256: str
-    reference_sha256: str
-
-    @staticmethod
-    def of(reference: ReferenceMotion, robot: Robot) -> "Task":
-        """The task of following a reference with a robot."""
-        return Task(robot.description.name, robot.sha256, poses_sha256(reference))
-
-
-@dataclass(frozen=True)
-class TrainResult:
-    """How a training run ended.
-
-    Attributes:
-        policy: The policy's file.
-        steps, updates: Control steps and gradient updates in all.
-        seconds: Wall time in all, resumptions included.
-        stopped: `steps` or `minutes`: the budget that ended the run.
-    """
-
-    policy: Path
-    steps: int
-    updates: int
-    seconds: float
-    stopped: str
+NOT_OF_THE_RUN = (
+    *("steps", "minutes", "cpu_minutes", "checkpoint_seconds", "progress_seconds", "tensorboard"),
+)
+"""What may differ between two sittings."""
 
 
 class Run:
-    """The bookkeeping of one training run: budget, checkpoints, episodes, progress."""
+    """The bookkeeping of one training run: budget, checkpoints, episodes, progress.
+
+    Everything happens between two rounds of updates, where the state of the trainer and of the
+    environment is whole: a run that is killed and resumed ends as one that was not.
+    """
 
     def __init__(
-        self,
-        out: Path,
-        config: TrainConfig,
-        core: TrackingCore,
-        task: Task,
-        progress: Callable[[Row], None],
-        sink: Callable[[list[Row]], None],
+        self, out: Path, config: TrainConfig, core: TrackingCore, task: Task, hooks: Hooks
     ) -> None:
         self.out, self.config, self.core, self.task = out, config, core, task
-        self._progress, self._sink = progress, sink
+        self._hooks = hooks
         self._recent: deque[Row] = deque(maxlen=RECENT_EPISODES)
-        self._episode, self._before = 0, 0.0
+        self._before = 0.0
         self._began = self._saved = self._told = time.monotonic()
+        self._cpu_before, self._cpu_began = 0.0, time.process_time()
+        self._board = ScalarLog(out / "tensorboard") if config.tensorboard else None
         self.callback = _Callback(self)
 
-    def bind(self, trainer: Trainer) -> bool:
-        """Attach the trainer; continue from a checkpoint and say so when there is one."""
-        self.trainer = trainer
+    def bind(self, trainer: Trainer) -> None:
+        """Attach the trainer; continue from a checkpoint when there is one."""
+        self.trainer, self._first_step = trainer, 0
         folder = self._newest()
         if folder is None:
-            self._first_step = 0
-            return False
+            return
         state = json.loads((folder / "run.json").read_text())
         if state["configuration"] != self._identity():
             raise BadConfiguration(
                 f"{folder} belongs to another configuration, reference motion or robot; "
                 "remove it or choose another folder"
             )
-        trainer.load(folder, state["steps"], state["updates"])
-        self._before, self._episode = state["seconds"], state["episode"]
+        trainer.load(folder, self.out / "replay", state["steps"], state["updates"])
+        with np.load(folder / "environment.npz", allow_pickle=False) as arrays:
+            self.core.restore(dict(arrays))
         self.core.rng.bit_generator.state = state["random"]
-        self.core.starts.failures = np.array(state["failures"])
-        self._first_step = state["steps"]
+        self._before, self._first_step = state["seconds"], state["steps"]
+        self._cpu_before = state["cpu_seconds"]
         log.info("resuming at %d steps", state["steps"])
-        return True
 
     def seconds(self) -> float:
         return self._before + time.monotonic() - self._began
+
+    def cpu_seconds(self) -> float:
+        return self._cpu_before + time.process_time() - self._cpu_began
 
     def finished(self) -> str:
         """The budget that is used up, or an empty string."""
@@ -114,40 +85,57 @@ class Run:
             return "steps"
         if self.config.minutes is not None and self.seconds() >= 60 * self.config.minutes:
             return "minutes"
+        if self.config.cpu_minutes and self.cpu_seconds() >= 60 * self.config.cpu_minutes:
+            return "cpu_minutes"
         return ""
 
     def episodes(self, rows: list[Row]) -> None:
-        steps, seconds = self.trainer.steps(), self.seconds()
-        for row in rows:
-            self._episode += 1
-            row |= {"step": steps, "episode": self._episode, "seconds": seconds}
+        steps, first = self.trainer.steps() + self.core.n, self.core.episode - len(rows) + 1
+        for number, row in enumerate(rows, first):
+            row |= {"step": steps, "episode": number}
         self._recent.extend(rows)
-        self._sink(rows)
+        self._hooks.sink(rows)
 
-    def tick(self) -> bool:
-        """Called every step; False when the budget is used up."""
+    def tick(self) -> None:
+        """Called between two rounds.
+
+        Raises:
+            Enough: the budget is used up.
+            KeyboardInterrupt: the caller wants to stop; a checkpoint was written.
+        """
         now = time.monotonic()
-        if now - self._told >= self.config.progress_seconds:
-            self._told = now
-            self._progress(self._status())
+        try:
+            started = self.trainer.steps() > self._first_step
+            if started and now - self._told >= self.config.progress_seconds:
+                self._told = now
+                self._tell()
+            if self._hooks.stop():
+                raise KeyboardInterrupt
+        except KeyboardInterrupt:
+            self.checkpoint()
+            raise
+        if self.finished():
+            raise Enough
         if now - self._saved >= self.config.checkpoint_seconds:
-            self._saved = now
-            self.checkpoint(with_replay=False)
-        return not self.finished()
+            self.checkpoint()
+            self._saved = time.monotonic()
 
-    def checkpoint(self, with_replay: bool) -> None:
+    def checkpoint(self) -> None:
         """Write the policy and everything needed to go on, whole or not at all."""
         fresh, final = self.out / "checkpoint.new", self.out / "checkpoint"
-        part = self.out / "policy.safetensors.part"
         shutil.rmtree(fresh, ignore_errors=True)
+        self._hooks.saving()
         try:
             fresh.mkdir()
-            self.trainer.save(fresh, with_replay)
+            self.trainer.save(fresh, self.out / "replay")
+            np.savez(fresh / "environment.npz", **self.core.state())
             (fresh / "run.json").write_text(json.dumps(self._state()))
-            part.write_bytes(self._policy().to_bytes())
+            for name, content in self._results().items():
+                (self.out / f"{name}.part").write_bytes(content)
         except OSError as error:
             shutil.rmtree(fresh, ignore_errors=True)
-            part.unlink(missing_ok=True)
+            for part in self.out.glob("*.safetensors.part"):
+                part.unlink(missing_ok=True)
             raise StoreError(f"{self.out}: the checkpoint cannot be written ({error})") from error
         old = self.out / "checkpoint.old"
         shutil.rmtree(old, ignore_errors=True)
@@ -155,7 +143,9 @@ class Run:
             final.rename(old)
         fresh.rename(final)
         shutil.rmtree(old, ignore_errors=True)
-        os.replace(part, self.out / "policy.safetensors")
+        for name in ("policy.safetensors", "networks.safetensors"):
+            os.replace(self.out / f"{name}.part", self.out / name)
+        self.trainer.saved()
 
     def _newest(self) -> Path | None:
         """The last whole checkpoint: the one before when a crash came between two renames."""
@@ -176,8 +166,8 @@ class Run:
     def _identity(self) -> dict[str, object]:
         """The configuration without the budget: what a checkpoint must share to be continued."""
         fields = asdict(self.config)
-        for budget in ("steps", "minutes", "checkpoint_seconds", "progress_seconds"):
-            del fields[budget]
+        for free in NOT_OF_THE_RUN:
+            del fields[free]
         return json.loads(json.dumps(fields | {"task": asdict(self.task)}))
 
     def _state(self) -> dict[str, object]:
@@ -186,27 +176,54 @@ class Run:
             "steps": self.trainer.steps(),
             "updates": self.trainer.updates(),
             "seconds": self.seconds(),
-            "episode": self._episode,
+            "cpu_seconds": self.cpu_seconds(),
             "random": self.core.rng.bit_generator.state,
-            "failures": self.core.starts.failures.tolist(),
         }
 
-    def _policy(self) -> Policy:
-        facts = {
+    def _results(self) -> dict[str, bytes]:
+        """What a run leaves beside its tables: the policy, and networks to start others from."""
+        facts = self._facts()
+        networks = Networks(self.trainer.networks(), facts)
+        policy = Policy(self.trainer.layers(), facts)
+        return {
+            "policy.safetensors": policy.to_bytes(),
+            "networks.safetensors": networks.to_bytes(),
+        }
+
+    def _facts(self) -> dict[str, object]:
+        """What the policy was trained for."""
+        config = self.config
+        return {
             "robot": self.task.robot,
             "model_sha256": self.task.model_sha256,
             "reference_sha256": self.task.reference_sha256,
-            "trainer": self.config.trainer,
-            "seed": self.config.seed,
+            "mode": config.mode,
+            "trainer": config.trainer,
+            "seed": config.seed,
+            "start": Path(config.start).name,
+            "curiosity": config.curiosity,
             "steps": self.trainer.steps(),
-            "control": asdict(self.config.track.control),
+            "control": asdict(self.core.sim.control),
+            "repeats": self.core.mode.repeats,
+            "environment": json.loads(json.dumps(asdict(config.environment))),
         }
-        return Policy(self.trainer.layers(), facts)
+
+    def _tell(self) -> None:
+        status = self._status()
+        if self._board is not None:
+            rewards = {
+                k for row in self._recent for k in row if k.startswith(("reward_", "train_"))
+            }
+            means = {key: float(np.mean([r[key] for r in self._recent])) for key in sorted(rewards)}
+            self._board.add(int(status["steps"]), status | means)
+        self._hooks.progress(status)
 
     def _status(self) -> Row:
         steps, seconds = self.trainer.steps(), self.seconds()
         rate = (steps - self._first_step) / max(seconds - self._before, 1e-9)
-        left = [(60 * self.config.minutes) - seconds] if self.config.minutes else []
+        left = [60 * self.config.minutes - seconds] if self.config.minutes else []
+        if self.config.cpu_minutes:
+            left.append(60 * self.config.cpu_minutes - self.cpu_seconds())
         if self.config.steps:
             left.append((self.config.steps - steps) / max(rate, 1e-9))
         recent = list(self._recent)
@@ -224,11 +241,14 @@ class Run:
 
 
 class _Callback(BaseCallback):
-    """Stable-Baselines3's hook: one call a step of all simulations."""
+    """Stable-Baselines3's hook: one call a round."""
 
     def __init__(self, run: Run) -> None:
         super().__init__()
         self._run = run
 
+    def _on_rollout_start(self) -> None:
+        self._run.tick()
+
     def _on_step(self) -> bool:
-        return self._run.tick()
+        return True

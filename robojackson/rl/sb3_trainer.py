@@ -1,25 +1,28 @@
 """TQC of sb3-contrib (torch): the reference that the fast trainer is compared with."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 from sb3_contrib import TQC
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
 from robojackson.rl.config import TqcConfig
-from robojackson.rl.off_policy import OffPolicyTrainer, arguments, filled
+from robojackson.rl.networks import CRITICS, TARGETS, Tensors
+from robojackson.rl.off_policy import OffPolicyTrainer, arguments, patient
 from robojackson.rl.trainer import Layers
 
 
 class PatientTQC(TQC):
-    """TQC that does not learn from a nearly empty replay buffer after a resumption."""
+    """TQC that does not learn from a nearly empty replay buffer."""
 
-    refill = 0
+    warmup = 0
 
     def train(self, gradient_steps: int, batch_size: int = 64) -> None:
         """A round of updates, unless the buffer has still to be filled."""
-        if filled(self, self.refill):
+        if not patient(self, self.warmup):
             super().train(gradient_steps, batch_size)
 
 
@@ -28,9 +31,13 @@ class Sb3Trainer(OffPolicyTrainer):
 
     def __init__(self, env: VecEnv, config: TqcConfig, seed: int) -> None:
         torch.set_num_threads(1)
-        super().__init__(
-            PatientTQC(env=env, device="cpu", **arguments(config, seed)), config, generators={}
-        )
+        given = arguments(config, seed)
+        if config.gsde:
+            given["use_sde"] = True
+            given["policy_kwargs"] |= {"clip_mean": 0.0}  # the policy file knows no clipped mean
+        model = PatientTQC(env=env, device="cpu", **given)
+        model.warmup = config.warmup
+        super().__init__(model, generators={})
 
     def layers(self) -> Layers:
         actor = self.model.actor
@@ -40,19 +47,50 @@ class Sb3Trainer(OffPolicyTrainer):
             (m.weight.detach().numpy().T.copy(), m.bias.detach().numpy().copy()) for m in linear
         )
 
-    def save(self, folder: Path, with_replay: bool) -> None:
+    def networks(self) -> Tensors:
+        tensors: Tensors = {}
+        for name, layer in self._named().items():
+            tensors[f"{name}.weight"] = layer.weight.detach().numpy().T.copy()
+            tensors[f"{name}.bias"] = layer.bias.detach().numpy().copy()
+        return tensors | {"log_alpha": self.model.log_ent_coef.detach().numpy().reshape(()).copy()}
+
+    def start_from(self, tensors: Mapping[str, np.ndarray]) -> None:
+        with torch.no_grad():
+            for name, layer in self._named().items():
+                if f"{name}.weight" in tensors:
+                    layer.weight.copy_(torch.from_numpy(np.array(tensors[f"{name}.weight"].T)))
+                    layer.bias.copy_(torch.from_numpy(np.array(tensors[f"{name}.bias"])))
+            if "log_alpha" in tensors:
+                self.model.log_ent_coef.fill_(float(np.reshape(tensors["log_alpha"], ())))
+        self._act_at_once()
+
+    def save(self, folder: Path, replay: Path) -> None:
         state = {name: part.state_dict() for name, part in self._parts().items()}
         state |= {"log_ent_coef": self.model.log_ent_coef.detach(), "random": torch.get_rng_state()}
         torch.save(state, folder / "networks.pt")
-        self._save_rest(folder, with_replay)
+        self._save_rest(folder, replay)
 
-    def load(self, folder: Path, steps: int, updates: int) -> None:
+    def load(self, folder: Path, replay: Path, steps: int, updates: int) -> None:
         state = torch.load(folder / "networks.pt", weights_only=True)
         for name, part in self._parts().items():
             part.load_state_dict(state[name])
         self.model.log_ent_coef.data.copy_(state["log_ent_coef"])
         torch.set_rng_state(state["random"])
-        self._load_rest(folder, steps, updates)
+        self._load_rest(folder, replay, steps, updates)
+
+    def _named(self) -> dict[str, torch.nn.Linear]:
+        """The linear layers by our names."""
+        policy = self.model.policy
+        chains = {"actor": policy.actor.latent_pi}
+        chains |= {c: policy.critic.q_networks[i] for i, c in enumerate(CRITICS)}
+        chains |= {t: policy.critic_target.q_networks[i] for i, t in enumerate(TARGETS)}
+        named = {
+            f"{name}.{i}": layer
+            for name, chain in chains.items()
+            for i, layer in enumerate(m for m in chain if isinstance(m, torch.nn.Linear))
+        }
+        heads = {"mean": policy.actor.mu, "log_std": policy.actor.log_std}
+        return named | {n: m for n, m in heads.items() if isinstance(m, torch.nn.Linear)}
 
     def _parts(self) -> dict[str, Any]:
         return {

@@ -12,6 +12,8 @@ os.environ.setdefault(
     "XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1"
 )
 
+import logging
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +26,12 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
 from robojackson.rl.config import TqcConfig
-from robojackson.rl.off_policy import OffPolicyTrainer, arguments, filled
+from robojackson.rl.networks import CRITICS, TARGETS, Tensors
+from robojackson.rl.off_policy import OffPolicyTrainer, arguments, patient
 from robojackson.rl.replay import buffer_of
 from robojackson.rl.trainer import Layers
+
+log = logging.getLogger(__name__)
 
 LOG_STD_RANGE = (-20.0, 2.0)
 
@@ -36,7 +41,7 @@ class OverlappedTQC(TQC):
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        self.refill = 0
+        self.warmup = 0
         self.noise = np.random.default_rng(self.seed)
         self._acting = actor_layers(self.policy.actor_state.params)
 
@@ -61,7 +66,7 @@ class OverlappedTQC(TQC):
 
     def train(self, gradient_steps: int, batch_size: int) -> None:
         """Wait for the round before, take its actor, and dispatch the next round."""
-        if not filled(self, self.refill):
+        if patient(self, self.warmup):
             return
         self._acting = actor_layers(self.policy.actor_state.params)
         samples = buffer_of(self).sample(batch_size * gradient_steps)
@@ -104,8 +109,15 @@ class SbxTrainer(OffPolicyTrainer):
     """The JAX trainer (`Trainer` protocol)."""
 
     def __init__(self, env: VecEnv, config: TqcConfig, seed: int) -> None:
-        model = OverlappedTQC(env=env, policy_delay=config.policy_delay, **arguments(config, seed))
-        super().__init__(model, config, {"noise": model.noise})
+        given = arguments(config, seed)
+        given["policy_kwargs"] |= {"layer_norm": config.layer_norm}
+        model = OverlappedTQC(env=env, policy_delay=config.policy_delay, **given)
+        model.warmup = config.warmup
+        if config.gsde:
+            log.warning("trainer sbx has no gSDE: it explores with plain Gaussian noise")
+        if config.log_std_init:
+            _raise_noise(model, config.log_std_init)
+        super().__init__(model, {"noise": model.noise})
 
     def learn(self, callback: BaseCallback) -> None:
         try:
@@ -117,20 +129,61 @@ class SbxTrainer(OffPolicyTrainer):
         layers = actor_layers(self.model.policy.actor_state.params)
         return layers[:-1]
 
-    def save(self, folder: Path, with_replay: bool) -> None:
+    def networks(self) -> Tensors:
+        policy = self.model.policy
+        *hidden, mean, log_std = actor_layers(policy.actor_state.params)
+        tensors = {
+            **_named("actor", hidden),
+            **_single("mean", mean),
+            **_single("log_std", log_std),
+        }
+        if not policy.layer_norm:
+            for name, params in self._critics().items():
+                tensors |= _named(name, actor_layers(params))
+        alpha = self.model.ent_coef_state.params["log_ent_coef"]
+        return tensors | {"log_alpha": np.array(jax.device_get(alpha)).reshape(())}
+
+    def start_from(self, tensors: Mapping[str, np.ndarray]) -> None:
+        policy = self.model.policy
+        heads = _heads(policy.actor_state.params)
+        policy.actor_state = policy.actor_state.replace(
+            params=_filled(policy.actor_state.params, tensors, "actor", heads)
+        )
+        for i, (critic, target) in enumerate(zip(CRITICS, TARGETS, strict=True), 1):
+            state = getattr(policy, f"qf{i}_state")
+            params = _filled(state.params, tensors, critic)
+            aimed = _filled(state.target_params, tensors, target)
+            setattr(policy, f"qf{i}_state", state.replace(params=params, target_params=aimed))
+        if "log_alpha" in tensors:
+            alpha = jax.numpy.asarray(tensors["log_alpha"], jax.numpy.float32).reshape(())
+            state = self.model.ent_coef_state
+            self.model.ent_coef_state = state.replace(params={"log_ent_coef": alpha})
+        self.model._acting = actor_layers(policy.actor_state.params)
+        self._act_at_once()
+
+    def save(self, folder: Path, replay: Path) -> None:
         state = flax.serialization.to_bytes(self._state())
         (folder / "networks.msgpack").write_bytes(state)
-        self._save_rest(folder, with_replay)
+        self._save_rest(folder, replay)
 
-    def load(self, folder: Path, steps: int, updates: int) -> None:
+    def load(self, folder: Path, replay: Path, steps: int, updates: int) -> None:
         saved = (folder / "networks.msgpack").read_bytes()
         state = flax.serialization.from_bytes(self._state(), saved)
         policy = self.model.policy
         policy.actor_state, policy.qf1_state = state["actor"], state["critic1"]
         policy.qf2_state, self.model.ent_coef_state = state["critic2"], state["entropy"]
         self.model.key = jax.numpy.asarray(state["key"])
-        self.model._acting = actor_layers(policy.actor_state.params)
-        self._load_rest(folder, steps, updates)
+        acting = state["acting"]
+        self.model._acting = tuple(
+            (acting[f"{i}w"], acting[f"{i}b"]) for i in range(len(acting) // 2)
+        )
+        self._load_rest(folder, replay, steps, updates)
+
+    def _critics(self) -> dict[str, Any]:
+        policy = self.model.policy
+        states = (policy.qf1_state, policy.qf2_state)
+        learnt = {name: state.params for name, state in zip(CRITICS, states, strict=True)}
+        return learnt | {n: s.target_params for n, s in zip(TARGETS, states, strict=True)}
 
     def _state(self) -> dict[str, Any]:
         policy = self.model.policy
@@ -140,4 +193,54 @@ class SbxTrainer(OffPolicyTrainer):
             "critic2": policy.qf2_state,
             "entropy": self.model.ent_coef_state,
             "key": self.model.key,
+            "acting": {
+                f"{i}{kind}": array
+                for i, layer in enumerate(self.model._acting)
+                for kind, array in zip("wb", layer, strict=True)
+            },
         }
+
+
+def _named(part: str, layers: Sequence[tuple[np.ndarray, np.ndarray]]) -> Tensors:
+    named: Tensors = {}
+    for i, layer in enumerate(layers):
+        named |= _single(f"{part}.{i}", layer)
+    return named
+
+
+def _single(name: str, layer: tuple[np.ndarray, np.ndarray]) -> Tensors:
+    return {f"{name}.weight": layer[0].copy(), f"{name}.bias": layer[1].copy()}
+
+
+def _heads(params: Any) -> dict[int, str]:
+    """The actor's last two layers are its heads."""
+    count = len(params["params"])
+    return {count - 2: "mean", count - 1: "log_std"}
+
+
+def _filled(
+    params: Any,
+    tensors: Mapping[str, np.ndarray],
+    part: str,
+    heads: Mapping[int, str] | None = None,
+) -> Any:
+    """The parameters with named arrays in the places where there are any."""
+    tree = jax.tree_util.tree_map(lambda leaf: leaf, params)
+    for i in range(len(tree["params"])):
+        name = (heads or {}).get(i, f"{part}.{i}")
+        if f"{name}.weight" in tensors:
+            tree["params"][f"Dense_{i}"] = {
+                "kernel": jax.numpy.asarray(tensors[f"{name}.weight"], jax.numpy.float32),
+                "bias": jax.numpy.asarray(tensors[f"{name}.bias"], jax.numpy.float32),
+            }
+    return tree
+
+
+def _raise_noise(model: OverlappedTQC, log_std: float) -> None:
+    """Begin with another exploration noise: the bias of the head that tells it."""
+    state = model.policy.actor_state
+    head = f"Dense_{len(state.params['params']) - 1}"
+    tree = jax.tree_util.tree_map(lambda leaf: leaf, state.params)
+    tree["params"][head]["bias"] = jax.numpy.full_like(tree["params"][head]["bias"], log_std)
+    model.policy.actor_state = state.replace(params=tree)
+    model._acting = actor_layers(tree)

@@ -72,6 +72,19 @@ class SettledStates:
         """Drop all states."""
         self._count = 0
 
+    def state(self) -> dict[str, np.ndarray]:
+        """Everything, as arrays."""
+        kept = len(self)
+        named = {"qpos": self._qpos, "qvel": self._qvel, "step": self._step}
+        held = {f"settled_{name}": array[:kept].copy() for name, array in named.items()}
+        return held | {"settled_count": np.array(self._count)}
+
+    def restore(self, state: dict[str, np.ndarray]) -> None:
+        """Go on from what `state` gave."""
+        kept = len(state["settled_step"])
+        self._qpos[:kept], self._qvel[:kept] = state["settled_qpos"], state["settled_qvel"]
+        self._step[:kept], self._count = state["settled_step"], int(state["settled_count"])
+
     def draw(self, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, int]:
         """One of the kept states: qpos, qvel and the clip step that it belongs to."""
         slot = int(rng.integers(len(self)))

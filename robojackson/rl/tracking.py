@@ -1,38 +1,28 @@
-"""The tracking environment: N robots that follow one reference motion, as array code.
+"""The environment: N robots that follow one reference motion, as array code, in either mode.
 
-Action: residual joint angles in actuator order, -1..1, times `Simulation.residual` radians,
-added to the reference's next hinge angles and followed by the PD law of `Simulation`. Observation:
-`observation.observe`. Reward: the sum of `rewards.reward_terms`. Episodes start as `starts` says
-and end by a fall, by getting lost, at the end of a clip that is not cyclic, or by the time limit;
-only the last is a truncation and is bootstrapped.
+A `Mode` says what differs (`track_mode`, `paper_mode`): what an action does, what is seen, what a
+step is worth, how an episode begins. Episodes end by a fall, by getting lost, at the end of a clip
+that is not cyclic, or by the time limit; only the last is a truncation and is bootstrapped.
 """
 
 from dataclasses import dataclass, field
+from typing import Any
 
+import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
 from robojackson.errors import UnknownName
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.retarget.robot import Robot
-from robojackson.rl.clip import Clip
-from robojackson.rl.config import TrackConfig
+from robojackson.rl.config import PaperConfig, TrackConfig
 from robojackson.rl.episodes import EpisodeTotals
-from robojackson.rl.observation import observation_size, observe
-from robojackson.rl.physics import Simulation, require_same_clock
-from robojackson.rl.rewards import (
-    TrackedPoints,
-    fallen,
-    lost,
-    reward_terms,
-    tracking_errors,
-)
-from robojackson.rl.starts import SettledStates, StartPhases, default_stand, noisy, stand_at
+from robojackson.rl.mode import Mode, Score
+from robojackson.rl.paper_mode import PaperMode
+from robojackson.rl.physics import require_same_clock
+from robojackson.rl.track_mode import TrackMode
 
-SETTLED_STATES_NEEDED = 32
-PELVIS = "pelvis"
-FEET = ("left_foot", "right_foot")
-EXTREMITIES = ("left_hand", "right_hand", "head")
+PHYSICS = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 
 
 @dataclass
@@ -58,41 +48,43 @@ class StepResult:
 
 
 class TrackingCore:
-    """N robots that follow one reference motion."""
+    """N robots that follow one reference motion.
+
+    Attributes:
+        episode: Episodes that ended so far; the paper's curriculum goes by it.
+        step_index: Step of the reference that each robot is at.
+    """
 
     def __init__(
-        self, robot: Robot, reference: ReferenceMotion, config: TrackConfig, n: int, seed: int
+        self,
+        robot: Robot,
+        reference: ReferenceMotion,
+        config: TrackConfig | PaperConfig,
+        n: int,
+        seed: int,
     ) -> None:
-        self.config, self.n, self.clip = config, n, Clip(reference)
         names = robot.keypoint_names
         if names != reference.keypoint_names:
             unknown = sorted(set(reference.keypoint_names) ^ set(names))
             raise UnknownName("keypoint", ", ".join(unknown), "reference motion", names)
-        self._which = TrackedPoints(
-            pelvis=names.index(PELVIS),
-            hands=tuple(names.index(name) for name in EXTREMITIES),
-            limbs=tuple(names.index(name) for name in (*FEET, *EXTREMITIES)),
-        )
-        self.sim = Simulation(robot, config.control, n, config.threads)
+        self.config, self.n = config, n
+        self.mode = mode_of(robot, reference, config, n, seed)
+        self.sim, self.clip, self.limit = self.mode.sim, self.mode.clip, self.mode.limit
         require_same_clock(self.sim.dt, reference.dt)
-        self.starts = StartPhases(self.clip, config.reset.failure_share)
-        self._settled = SettledStates(robot.model.nq, robot.model.nv)
-        self._stand = default_stand(robot.model)
         self.rng = np.random.default_rng(seed)
-        self.limit = round(config.episode_seconds / self.clip.dt)
+        self.episode = 0
         self.step_index = np.zeros(n, int)
         self._start, self._age = np.zeros(n, int), np.zeros(n, int)
         self._last = np.zeros((n, robot.model.nu))
         self._totals = EpisodeTotals(n, self.clip.dt)
-        self.observation_size = observation_size(robot.model.nq - 7, robot.model.nu, len(names))
+        self.observation_size = self.mode.observation_size
         self.action_size = robot.model.nu
 
     def reseed(self, seed: int) -> None:
         """Restart the random numbers and forget what was learnt of starts: the next `reset` and all
         that follows are then determined."""
         self.rng = np.random.default_rng(seed)
-        self.starts.forget()
-        self._settled.forget()
+        self.mode.forget()
 
     def reset(self) -> Float[np.ndarray, "N D"]:
         """Begin N new episodes; those that were under way leave no row."""
@@ -101,66 +93,90 @@ class TrackingCore:
         return self._observe()
 
     def step(self, action: Float[np.ndarray, "N nu"]) -> StepResult:
-        """One control step of all robots; those whose episode ended begin a new one."""
+        """One action of all robots; those whose episode ended begin a new one."""
         action = np.clip(np.asarray(action, float), -1, 1)
-        following = self.clip.at(self.step_index + 1)
-        hinge = self.sim.motors.hinge
         before = self.sim.points.copy()
-        self.sim.step(following.qpos[:, 7:][:, hinge] + self.sim.residual * action)
-        self.step_index += 1
-        self._age += 1
-        sim, moved = self.sim, (self.sim.points - before) / self.clip.dt
-        errors = tracking_errors(sim.qpos, sim.qvel, sim.points, moved, following, self._which)
+        self._act(action)
         change = np.mean((action - self._last) ** 2, -1)
         self._last = action
-        terms = reward_terms(errors, change, self.config.reward)
-        reward = np.sum(list(terms.values()), 0)
-        rules = self.config.termination
-        failed = fallen(sim.qpos, rules) | lost(errors, rules) | sim.broken
-        over = failed | self.clip.ended(self.step_index)
+        score = self.mode.score(self.clip.at(self.step_index), before, change, self.episode)
+        reward = np.sum(list(score.terms.values()), 0)
+        over = score.failed | self.clip.ended(self.step_index)
         late = (self._age >= self.limit) & ~over
-        result = StepResult(*(2 * (self._observe(),)), reward, terms, over, late)
-        self._totals.add(reward, terms, errors.site_mean)
-        done = np.flatnonzero(over | late)
-        if len(done):
-            self.starts.record(self._start[done], failed[done])
-            self._remember(np.flatnonzero(late))
-            result.episodes = self._totals.close(done, self._age)
-            self._begin(done)
+        self._totals.add(reward, score.terms, {"site_error_m": score.site_error, **score.errors})
+        result = StepResult(*(2 * (self._observe(),)), reward, score.terms, over, late)
+        if (over | late).any():
+            result.episodes = self._end(score, over | late, late)
             result.observation = self._observe()
         return result
+
+    def state(self) -> dict[str, Any]:
+        """Everything that the next step depends on, as arrays."""
+        size = mujoco.mj_stateSize(self.sim.model, PHYSICS)
+        physics = np.zeros((self.n, size))
+        for row, data in zip(physics, self.sim.datas, strict=True):
+            mujoco.mj_getState(self.sim.model, data, row, PHYSICS)
+        own = {
+            name: getattr(self, name).copy() for name in ("step_index", "_start", "_age", "_last")
+        }
+        seen = {f"sim_{name}": getattr(self.sim, name).copy() for name in SEEN}
+        counted = {"episode": np.array(self.episode), "physics": physics}
+        return {**own, **seen, **counted, **self._totals.state(), **self.mode.state()}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from what `state` gave."""
+        for row, data in zip(state["physics"], self.sim.datas, strict=True):
+            mujoco.mj_setState(self.sim.model, data, row, PHYSICS)
+        for name in ("step_index", "_start", "_age", "_last"):
+            setattr(self, name, np.array(state[name]))
+        for name in SEEN:
+            getattr(self.sim, name)[:] = state[f"sim_{name}"]
+        self.episode = int(state["episode"])
+        self._totals.restore(state)
+        self.mode.restore(state)
 
     def close(self) -> None:
         """Stop the threads of the simulation."""
         self.sim.close()
 
+    def _act(self, action: np.ndarray) -> None:
+        for _ in range(self.mode.repeats):
+            command = self.mode.command(self.clip.at(self.step_index + 1), action)
+            self.sim.step(command)
+            self.step_index += 1
+            self._age += 1
+            self.mode.after(command)
+
+    def _end(self, score: Score, done: np.ndarray, late: np.ndarray) -> list[dict[str, float]]:
+        """Rows of the episodes that ended, after which their robots begin anew."""
+        which = np.flatnonzero(done)
+        told = self.mode.ended(self._start[which], score.failed[which], self._age[which])
+        reached = np.flatnonzero(late)
+        self.mode.keep(reached, self.step_index[reached])
+        rows = self._totals.close(which, self._age, self.mode.repeats)
+        self.episode += len(which)
+        self._begin(which)
+        return [row | told for row in rows]
+
     def _observe(self) -> np.ndarray:
-        target = self.clip.at(self.step_index + 1)
-        return observe(self.sim.qpos, self.sim.qvel, self.sim.points, target, self._last)
+        return self.mode.observe(self.clip.at(self.step_index + 1), self._last)
 
     def _begin(self, indices: Int[np.ndarray, " I"]) -> None:
-        reset, rng = self.config.reset, self.rng
-        phase = self.starts.draw(len(indices), rng)
-        at = self.clip.at(phase)
-        qpos, qvel = noisy(at.qpos, at.qvel, reset, rng)
-        kind = rng.random(len(indices))
-        for row in np.flatnonzero(kind < reset.stand_share):
-            qpos[row], qvel[row] = stand_at(self._stand, at.qpos[row, :7]), 0.0
-        if len(self._settled) >= SETTLED_STATES_NEEDED:
-            chosen = (kind >= reset.stand_share) & (kind < reset.stand_share + reset.settled_share)
-            for row in np.flatnonzero(chosen):
-                qpos[row], qvel[row], phase[row] = self._settled.draw(rng)
-                qpos[row, :2] += self.clip.at(phase[row : row + 1]).qpos[0, :2]
-        self.sim.place(indices, qpos, qvel)
-        self.step_index[indices] = self._start[indices] = phase
+        begun = self.mode.begin(len(indices), self.rng)
+        self.sim.place(indices, begun.qpos, begun.qvel)
+        self.step_index[indices] = self._start[indices] = begun.step
         self._age[indices] = 0
         self._last[indices] = 0.0
 
-    def _remember(self, indices: Int[np.ndarray, " I"]) -> None:
-        """Keep the last states of episodes that reached the time limit of a cyclic clip."""
-        if not self.clip.cyclic:
-            return
-        for i in indices:
-            qpos = self.sim.qpos[i].copy()
-            qpos[:2] -= self.clip.at(self.step_index[i : i + 1]).qpos[0, :2]
-            self._settled.add(qpos, self.sim.qvel[i], int(self.step_index[i] % self.clip.steps))
+
+SEEN = ("qpos", "qvel", "points", "com", "broken")
+"""What a simulation shows of its copies."""
+
+
+def mode_of(
+    robot: Robot, reference: ReferenceMotion, config: TrackConfig | PaperConfig, n: int, seed: int
+) -> Mode:
+    """The mode that a configuration belongs to."""
+    if isinstance(config, PaperConfig):
+        return PaperMode(robot, reference, config, n, seed)
+    return TrackMode(robot, reference, config, n, seed)

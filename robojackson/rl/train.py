@@ -1,23 +1,30 @@
-"""Training: one function for every trainer, resumable at any moment.
+"""Training: one function for both modes and every trainer, resumable at any moment.
 
-`out/checkpoint/` is the only state; the same call with the same configuration continues from it.
-`out/policy.safetensors` is always the newest whole policy. What happens during training reaches
-the caller as rows (episodes) and progress dictionaries; writing tables is the caller's affair.
+`out/checkpoint/` and `out/replay/` are the only state; the same call with the same configuration
+continues from it, and ends as if it had never stopped. `out/policy.safetensors` is always the
+newest whole policy. What happens during training reaches the caller as rows (episodes) and progress
+dictionaries; writing tables is the caller's affair.
 """
 
-from collections.abc import Callable
+import logging
 from pathlib import Path
 
-from robojackson.errors import BadConfiguration
+from robojackson.errors import BadConfiguration, BadPolicy
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.retarget.robot import Robot
-from robojackson.rl.config import TrainConfig
-from robojackson.rl.run import Row, Run, Task, TrainResult
+from robojackson.rl.config import TqcConfig, TrainConfig
+from robojackson.rl.hooks import Enough, Hooks
+from robojackson.rl.networks import Networks, chosen, fitted
+from robojackson.rl.pretrained import pretrained
+from robojackson.rl.run import Run
+from robojackson.rl.task import Task, TrainResult
 from robojackson.rl.tracking import TrackingCore
 from robojackson.rl.trainer import make_trainer
 from robojackson.rl.vec_env import TrackingVecEnv
 
-__all__ = ["TrainResult", "train"]
+__all__ = ["Hooks", "TrainResult", "train"]
+
+log = logging.getLogger(__name__)
 
 
 def train(
@@ -25,36 +32,47 @@ def train(
     robot: Robot,
     config: TrainConfig,
     out: Path,
-    *,
-    progress: Callable[[Row], None] = lambda row: None,
-    sink: Callable[[list[Row]], None] = lambda rows: None,
+    hooks: Hooks | None = None,
 ) -> TrainResult:
     """Teach the robot to follow a reference motion.
 
-    Args:
-        progress: Called every few seconds with steps, rate, survival and the time left.
-        sink: Called with one row for each episode that ended.
     Raises:
-        BadConfiguration: neither `steps` nor `minutes` is given.
-        KeyboardInterrupt: after a checkpoint with the replay buffer was written.
+        BadConfiguration: it has no budget.
+        BadPolicy: the networks to start from do not fit.
+        KeyboardInterrupt: after a checkpoint was written.
     """
-    if config.steps is None and config.minutes is None:
-        raise BadConfiguration("training needs a budget: steps, minutes or both")
+    if not config.has_budget:
+        raise BadConfiguration("training needs a budget: steps, minutes or cpu_minutes")
+    networks = pretrained(config.start, config.mode)
     out.mkdir(parents=True, exist_ok=True)
-    core = TrackingCore(robot, reference, config.track, config.tqc.n_envs, config.seed)
-    task = Task.of(reference, robot)
-    run = Run(out, config, core, task, progress, sink)
+    core = TrackingCore(robot, reference, config.environment, config.tqc.n_envs, config.seed)
+    run = Run(out, config, core, Task.of(reference, robot), hooks or Hooks())
     env = TrackingVecEnv(core, run.episodes)
-    trainer = make_trainer(config.trainer, env, config.tqc, config.seed)
-    if run.bind(trainer):
-        env.keep_random_state()
+    tqc = config.tqc if networks is None else _shaped(networks, core, config)
+    trainer = make_trainer(config.trainer, env, tqc, config.seed)
+    if networks is not None:
+        trainer.start_from(chosen(networks, config.start_critics).tensors)
+    run.bind(trainer)
     try:
         if not run.finished():
             trainer.learn(run.callback)
-        run.checkpoint(with_replay=False)
-    except KeyboardInterrupt:
-        run.checkpoint(with_replay=True)
-        raise
+    except Enough:
+        run.checkpoint()
     finally:
         env.close()
     return run.result()
+
+
+def _shaped(networks: Networks, core: TrackingCore, config: TrainConfig) -> TqcConfig:
+    """TQC with the layers of the networks, which must be for the same observation and action."""
+    found = (networks.observation_size, networks.action_size)
+    needed = (core.observation_size, core.action_size)
+    if found != needed:
+        raise BadPolicy(
+            f"start {config.start!r} takes {found[0]} observations and gives {found[1]} actions; "
+            f"mode {config.mode} has {needed[0]} and {needed[1]}"
+        )
+    tqc = fitted(config.tqc, networks, config.start_critics)
+    if tqc != config.tqc:
+        log.info("layers as in %s: actor %s, critics %s", config.start, tqc.actor, tqc.critic)
+    return tqc

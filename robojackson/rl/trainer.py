@@ -4,6 +4,7 @@ Two of them exist, `sbx_trainer` (JAX) and `sb3_trainer` (torch); configuration,
 policy file are the same. Importing this module imports neither.
 """
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from robojackson.errors import MissingDependency
 from robojackson.rl.config import TqcConfig
+from robojackson.rl.networks import Tensors
 
 if TYPE_CHECKING:
     from stable_baselines3.common.callbacks import BaseCallback
@@ -34,10 +36,19 @@ class Trainer(Protocol):
     def updates(self) -> int:
         """Gradient updates so far."""
 
-    def save(self, folder: Path, with_replay: bool) -> None:
-        """Write networks, optimizers and random state, and the replay buffer when asked."""
+    def networks(self) -> Tensors:
+        """Actor and critics by name (`networks`)."""
 
-    def load(self, folder: Path, steps: int, updates: int) -> None:
+    def start_from(self, tensors: Mapping[str, np.ndarray]) -> None:
+        """Put named arrays in the place of the networks; act by them from the first step on."""
+
+    def save(self, folder: Path, replay: Path) -> None:
+        """Write networks, optimizers, random state, and what is new in the replay buffer."""
+
+    def saved(self) -> None:
+        """Called when what `save` wrote is the checkpoint: what is older may go."""
+
+    def load(self, folder: Path, replay: Path, steps: int, updates: int) -> None:
         """Continue from what `save` wrote."""
 
 

@@ -12,14 +12,15 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.retarget.robot import Robot
-from robojackson.rl.config import TrackConfig
+from robojackson.rl.config import PaperConfig, TrackConfig
 from robojackson.rl.observation import CLIP
 from robojackson.rl.tracking import TrackingCore
 
 
 def _spaces(core: TrackingCore) -> tuple[gym.spaces.Box, gym.spaces.Box]:
+    bound = np.inf if isinstance(core.config, PaperConfig) else CLIP
     return (
-        gym.spaces.Box(-CLIP, CLIP, (core.observation_size,), np.float32),
+        gym.spaces.Box(-bound, bound, (core.observation_size,), np.float32),
         gym.spaces.Box(-1.0, 1.0, (core.action_size,), np.float32),
     )
 
@@ -41,10 +42,6 @@ class TrackingVecEnv(VecEnv):
         self._action = np.zeros((core.n, core.action_size))
         self.render_mode = None
         super().__init__(core.n, *_spaces(core))
-
-    def keep_random_state(self) -> None:
-        """Let the next reset go on with the core's random numbers instead of the seed's."""
-        self._reset_seeds()
 
     def reset(self) -> np.ndarray:
         if self._seeds[0] is not None:
@@ -92,7 +89,9 @@ class TrackingVecEnv(VecEnv):
 class TrackingEnv(gym.Env[np.ndarray, np.ndarray]):
     """One robot for Gymnasium; `info["reward_terms"]` has the parts of the reward by name."""
 
-    def __init__(self, robot: Robot, reference: ReferenceMotion, config: TrackConfig) -> None:
+    def __init__(
+        self, robot: Robot, reference: ReferenceMotion, config: TrackConfig | PaperConfig
+    ) -> None:
         self._make = lambda seed: TrackingCore(robot, reference, config, n=1, seed=seed)
         self.core = self._make(0)
         self.observation_space, self.action_space = _spaces(self.core)

@@ -67,7 +67,7 @@ def make_reference(
         lap_offset=np.zeros(3),
         qpos=qpos,
         qvel=qvel,
-        body_pos_w=bodies,
+        body_pos_w=bodies[:, 1:],
         keypoints_w=points,
         contact=np.ones((steps, 2), np.int8),
         torque_ratio=np.zeros((steps, model.nu)),

@@ -13,7 +13,7 @@ from robojackson.rl.config import ControlConfig, EvaluateConfig, TerminationConf
 from robojackson.rl.evaluate import evaluate
 from robojackson.rl.judge import Judge
 from robojackson.rl.policy import Policy
-from robojackson.rl.rollouts import Rollouts, Starts, roll_out
+from robojackson.rl.rollouts import Driver, Rollouts, Starts, roll_out
 
 STEPS = 160
 
@@ -28,7 +28,8 @@ def perfect(sway: ReferenceMotion) -> Rollouts:
         qpos=at.qpos[:, None],
         points=at.points[:, None],
         wanted=at.points[:, None],
-        wanted_root=at.qpos[:, None, 3:7],
+        wanted_qpos=at.qpos[:, None],
+        totals={},
     )
 
 
@@ -98,8 +99,7 @@ def test_a_robot_that_lies_down_has_fallen(robot: Robot, sway: ReferenceMotion) 
     limp = roll_out(
         robot,
         Clip(sway),
-        ControlConfig(stiffness=1e-6),
-        lambda seen, following, start: following,
+        Driver(ControlConfig(stiffness=1e-6), lambda sim, *rest: np.zeros((sim.n, 17))),
         starts,
         np.full(2, 200),
         1,
@@ -166,3 +166,51 @@ def test_a_reference_that_is_not_a_number_is_refused(sway: ReferenceMotion) -> N
     qpos[3, 9] = np.nan
     with pytest.raises(RejectedReference, match="no numbers"):
         Clip(dataclasses.replace(sway, qpos=qpos))
+
+
+def test_a_statue_that_earns_more_than_the_policy_raises_a_flag(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    """A policy that falls at once earns less than a body that is carried along."""
+    verdict = evaluate(idle(robot, sway), sway, robot, EvaluateConfig(phases=2, resets=1))
+    reward = verdict.summary["reward"]
+    assert reward["flagged"] is True  # type: ignore[index]
+    assert reward["statue_return"] > reward["own_return"]  # type: ignore[index]
+    terms = [abs(share) for share in reward["of_terms"].values()]  # type: ignore[index]
+    assert sum(terms) == pytest.approx(1)
+
+
+def test_every_rollout_is_measured_by_the_papers_reward_too(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    brief = EvaluateConfig(seconds=0.15, phases=1, resets=1)
+    rows = evaluate(idle(robot, sway), sway, robot, brief).rows
+    assert {row["policy"] for row in rows} >= {"trained", "hold", "statue", "zero_residual"}
+    for row in rows:
+        terms = [value for key, value in row.items() if key.startswith("reward_")]
+        assert row["return_own"] == pytest.approx(sum(terms))  # type: ignore[arg-type]
+        assert 0 < row["return_paper"] < 10 * 5.2  # type: ignore[operator]
+
+
+def test_the_usage_of_a_joint_is_its_spread_over_the_references(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    lively = perfect(sway)
+    qpos = lively.qpos.copy()
+    knee = 7 + robot.joint_names.index("left_knee")
+    qpos[:, 0, knee] = 3 * qpos[:, 0, knee]
+    judged = row(robot, sway, dataclasses.replace(lively, qpos=qpos))
+    assert judged["usage_left_knee"] == pytest.approx(3)
+    assert judged["usage_right_knee"] == pytest.approx(1)
+
+
+def test_a_policy_of_paper_mode_is_judged_on_348_observations(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    nothing = (np.zeros((348, 17)), np.zeros(17))
+    control = dataclasses.asdict(ControlConfig(law="torque"))
+    facts = {"robot": "humanoid", "mode": "paper", "control": control, "repeats": 4}
+    brief = EvaluateConfig(seconds=0.6, phases=1, resets=1)
+    summary = evaluate(Policy((nothing,), facts), sway, robot, brief).summary
+    assert summary["variants"] == {}
+    assert set(summary["reward"]["asks"]) == {"root", "world"}  # type: ignore[index]

@@ -4,7 +4,7 @@ import numpy as np
 
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.retarget.robot import Robot
-from robojackson.rl.config import ControlConfig
+from robojackson.rl.config import ControlConfig, RandomConfig
 from robojackson.rl.physics import Motors, Simulation, residual_scale
 
 
@@ -54,7 +54,7 @@ def test_threads_do_not_change_the_result(robot: Robot, sway: ReferenceMotion) -
 def test_the_torque_never_exceeds_the_stock_limit(robot: Robot, sway: ReferenceMotion) -> None:
     sim = placed(robot, sway, 2, 1)
     sim.step(np.full((2, robot.model.nu), 50.0))
-    for data in sim._datas:
+    for data in sim.datas:
         assert np.abs(data.ctrl).max() <= 0.4 + 1e-12
 
 
@@ -83,3 +83,35 @@ def test_only_the_arms_get_the_small_residual(robot: Robot) -> None:
     arms = {robot.model.actuator(i).name for i in np.flatnonzero(scale == 0.2)}
     assert arms == {f"{side}_{joint}" for side in ("left", "right")
                     for joint in ("shoulder1", "shoulder2", "elbow")}  # fmt: skip
+
+
+def test_a_held_torque_is_the_pd_law_at_the_first_substep(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    """As a plain `env.step` holds it for 15 ms."""
+    stock = gymnasium.make("Humanoid-v5").unwrapped
+    stock.reset(seed=0)
+    stock.set_state(sway.qpos[0], sway.qvel[0])
+    stock.data.qacc_warmstart[:] = 0
+    sim = Simulation(robot, ControlConfig(law="hold"), 1)
+    sim.place(np.arange(1), sway.qpos[:1], sway.qvel[:1])
+    hinge, limit, target = sim.motors.hinge, sim.motors.limit, sway.qpos[5, 7:]
+    torque = sim.kp * (target - sway.qpos[0, 7:])[hinge] - sim.kd * sway.qvel[0, 6:][hinge]
+    stock.step(np.clip(torque, -limit, limit) / sim.motors.gear)
+    sim.step(target[None, hinge])
+    np.testing.assert_allclose(sim.qpos[0], stock.data.qpos, atol=1e-12)
+
+
+def test_randomised_robots_differ_and_leave_the_stock_one_alone(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    stock = robot.model.geom_friction.copy()
+    random = RandomConfig(friction=0.2, gains=0.1, integrators=("RK4", "implicitfast"))
+    sim = Simulation(robot, ControlConfig(), 4, random=random, seed=1)
+    sim.place(np.arange(4), sway.qpos[[0] * 4], sway.qvel[[0] * 4])
+    for _ in range(4):
+        sim.step(np.repeat(sway.qpos[:1, 7:][:, sim.motors.hinge], 4, 0))
+    spread = np.ptp(sim.qpos, axis=0).max()
+    assert 1e-6 < spread < 0.2
+    np.testing.assert_array_equal(robot.model.geom_friction, stock)
+    assert robot.model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4

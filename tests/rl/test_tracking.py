@@ -14,7 +14,8 @@ from robojackson.rl.clip import Clip
 from robojackson.rl.config import ResetConfig, RewardConfig, TerminationConfig, TrackConfig
 from robojackson.rl.rewards import TrackedPoints, fallen, reward_terms, tracking_errors
 from robojackson.rl.starts import StartPhases, default_stand, stand_at
-from robojackson.rl.tracking import SETTLED_STATES_NEEDED, TrackingCore
+from robojackson.rl.track_mode import SETTLED_STATES_NEEDED
+from robojackson.rl.tracking import TrackingCore
 from robojackson.rl.vec_env import TrackingEnv, TrackingVecEnv
 
 WHICH = TrackedPoints(pelvis=0, hands=(11, 12, 13), limbs=(5, 6, 11, 12, 13))

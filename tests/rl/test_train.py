@@ -7,7 +7,6 @@ from pathlib import Path
 import jax
 import numpy as np
 import pytest
-from stable_baselines3.common.callbacks import BaseCallback
 
 from robojackson.errors import BadConfiguration, BadPolicy
 from robojackson.motion.reference import ReferenceMotion
@@ -15,18 +14,16 @@ from robojackson.retarget.robot import Robot
 from robojackson.rl.config import EvaluateConfig, TqcConfig, TrackConfig, TrainConfig
 from robojackson.rl.evaluate import STAND, evaluate
 from robojackson.rl.policy import load_policy
-from robojackson.rl.replay import buffer_of
 from robojackson.rl.run import Run
 from robojackson.rl.sbx_trainer import SbxTrainer
 from robojackson.rl.tracking import TrackingCore
-from robojackson.rl.train import TrainResult, train
+from robojackson.rl.train import Hooks, TrainResult, train
 from robojackson.rl.trainer import make_trainer
 from robojackson.rl.vec_env import TrackingVecEnv
 
 SMALL = TqcConfig(
     n_envs=4,
     warmup=64,
-    refill=64,
     batch=32,
     updates_per_round=2,
     buffer=2000,
@@ -58,29 +55,21 @@ def trained(
         robot,
         brief(request.param),
         tmp_path_factory.mktemp(request.param),
-        progress=progress.append,
-        sink=episodes.extend,
+        Hooks(progress=progress.append, sink=episodes.extend),
     )
     return result, episodes, progress, request.param
 
 
-def test_a_resumed_run_does_not_repeat_its_starts(
-    robot: Robot, sway: ReferenceMotion, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_run_in_two_sittings_ends_as_one_that_was_never_stopped(
+    trained: tuple, robot: Robot, sway: ReferenceMotion, tmp_path: Path
 ) -> None:
-    """The first phases of the second sitting are not those of the first."""
-    firsts: list[np.ndarray] = []
-    original = TrackingCore.reset
-
-    def spy(core: TrackingCore) -> np.ndarray:
-        seen = original(core)
-        firsts.append(core.step_index.copy())
-        return seen
-
-    monkeypatch.setattr(TrackingCore, "reset", spy)
-    run(robot, sway, brief("sbx"), tmp_path)
-    run(robot, sway, brief("sbx", 324), tmp_path)
-    assert len(firsts) == 2
-    assert not np.array_equal(firsts[0], firsts[1])
+    """Networks, optimizers, replay, random numbers and every simulation go on to the bit."""
+    whole, episodes, _, name = trained
+    rows: list[dict[str, float]] = []
+    for steps in (160, 320):
+        result = train(sway, robot, brief(name, steps), tmp_path, Hooks(sink=rows.extend))
+    assert result.policy.read_bytes() == whole.policy.read_bytes()
+    assert rows == episodes
 
 
 def test_both_trainers_end_at_their_budget_with_a_policy(trained: tuple) -> None:
@@ -108,33 +97,15 @@ def test_progress_tells_rate_and_time_left(trained: tuple) -> None:
 def test_a_finished_run_asked_for_more_steps_goes_on(
     trained: tuple, robot: Robot, sway: ReferenceMotion
 ) -> None:
-    """Episode numbers, steps and time go on, and so do the updates once the buffer is refilled."""
+    """Episode numbers, steps and time go on, and so do the updates."""
     result, episodes, _, name = trained
     rows: list[dict[str, float]] = []
-    longer = train(sway, robot, brief(name, 640), result.policy.parent, sink=rows.extend)
+    longer = train(sway, robot, brief(name, 640), result.policy.parent, Hooks(sink=rows.extend))
     assert longer.steps == 640
     assert longer.seconds > result.seconds
     assert longer.updates > result.updates
     assert rows[0]["episode"] == len(episodes) + 1
     assert rows[0]["step"] > 320
-
-
-@pytest.mark.parametrize("name", ["sbx", "sb3"])
-def test_a_checkpoint_restores_the_networks(
-    robot: Robot, sway: ReferenceMotion, tmp_path: Path, name: str
-) -> None:
-    """Without one more update the resumed policy is the saved one, whatever the seed built."""
-    run(robot, sway, brief(name), tmp_path)
-    saved = load_policy(tmp_path / "policy.safetensors")
-    patient = dataclasses.replace(SMALL, refill=2000)
-    state = json.loads((tmp_path / "checkpoint" / "run.json").read_text())
-    state["configuration"]["tqc"]["refill"] = 2000
-    (tmp_path / "checkpoint" / "run.json").write_text(json.dumps(state))
-    run(robot, sway, dataclasses.replace(brief(name, 400), tqc=patient), tmp_path)
-    again = load_policy(tmp_path / "policy.safetensors")
-    for (weight, bias), (weight2, bias2) in zip(saved.layers, again.layers, strict=True):
-        np.testing.assert_array_equal(weight, weight2)
-        np.testing.assert_array_equal(bias, bias2)
 
 
 def test_a_checkpoint_of_another_configuration_is_refused(
@@ -158,10 +129,10 @@ def test_a_checkpoint_of_another_reference_is_refused(
 def test_a_crash_between_two_renames_loses_nothing(
     robot: Robot, sway: ReferenceMotion, tmp_path: Path
 ) -> None:
-    run(robot, sway, brief("sbx"), tmp_path)
+    run(robot, sway, brief("sb3"), tmp_path)
     (tmp_path / "checkpoint").rename(tmp_path / "checkpoint.old")
     rows: list[dict[str, float]] = []
-    train(sway, robot, brief("sbx", 480), tmp_path, sink=rows.extend)
+    train(sway, robot, brief("sb3", 480), tmp_path, Hooks(sink=rows.extend))
     assert all(row["step"] > 320 for row in rows)
 
 
@@ -184,38 +155,31 @@ def test_the_policy_file_acts_as_the_trainers_own_actor(
     np.testing.assert_allclose(np.tanh(hidden @ weight + bias), np.asarray(mean), atol=1e-5)
 
 
-def test_training_is_determined_by_the_seed(
+def test_an_interrupted_run_keeps_its_replay(
     robot: Robot, sway: ReferenceMotion, tmp_path: Path
 ) -> None:
-    files = [run(robot, sway, brief("sbx"), tmp_path / str(i)).policy for i in range(2)]
-    assert files[0].read_bytes() == files[1].read_bytes()
-
-
-def test_an_interrupted_run_keeps_its_replay_and_resumes(
-    robot: Robot, sway: ReferenceMotion, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def interrupt(row: dict[str, float]) -> None:
-        if row["steps"] > 150:
-            raise KeyboardInterrupt
-
     with pytest.raises(KeyboardInterrupt):
-        train(sway, robot, brief("sbx"), tmp_path, progress=interrupt)
+        train(sway, robot, brief("sb3"), tmp_path, Hooks(stop=iter([False, False, True]).__next__))
     state = json.loads((tmp_path / "checkpoint" / "run.json").read_text())
-    with np.load(tmp_path / "checkpoint" / "replay.npz") as replay:
-        kept = int(replay["pos"])
-    assert kept * SMALL.n_envs == pytest.approx(state["steps"], abs=8)
-    found: list[int] = []
-    original = SbxTrainer.learn
-
-    def spy(trainer: SbxTrainer, callback: BaseCallback) -> None:
-        found.append(buffer_of(trainer.model).pos)
-        original(trainer, callback)
-
-    monkeypatch.setattr(SbxTrainer, "learn", spy)
-    assert run(robot, sway, brief("sbx"), tmp_path).steps == 320
-    assert found == [kept]
+    files = [path.name for path in (tmp_path / "replay").iterdir()]
+    assert state["steps"] == 64
+    assert files == ["000000000000-000000000016.npz"]
 
 
+def test_rows_are_safe_before_the_checkpoint_that_follows_them(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    told: list[str] = []
+    hooks = Hooks(
+        sink=lambda rows: told.append("row"),
+        saving=lambda: told.append("checkpoint" if (tmp_path / "checkpoint").exists() else "safe"),
+    )
+    train(sway, robot, brief("sb3"), tmp_path, hooks)
+    assert told[-1] == "safe"
+    assert "row" in told
+
+
+@pytest.mark.slow
 def test_an_interrupted_run_leaves_no_round_computing(
     robot: Robot, sway: ReferenceMotion, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -232,11 +196,11 @@ def test_an_interrupted_run_leaves_no_round_computing(
             raise KeyboardInterrupt
 
     monkeypatch.setattr(SbxTrainer, "__init__", spy)
-    monkeypatch.setattr(Run, "checkpoint", lambda run, with_replay: None)
+    monkeypatch.setattr(Run, "checkpoint", lambda run: None)
     slow = dataclasses.replace(SMALL, updates_per_round=2000, batch=256)
     config = dataclasses.replace(brief("sbx"), tqc=slow, progress_seconds=1e-9)
     with pytest.raises(KeyboardInterrupt):
-        train(sway, robot, config, tmp_path, progress=interrupt)
+        train(sway, robot, config, tmp_path, Hooks(progress=interrupt))
     arrays = jax.tree_util.tree_leaves(states[0]._state())
     assert all(array.is_ready() for array in arrays if isinstance(array, jax.Array))
 
@@ -254,12 +218,12 @@ def test_the_table_of_an_evaluation_has_every_start_and_baseline(
     result, _, _, _ = trained
     verdict = evaluate(load_policy(result.policy), sway, robot, BRIEF)
     policies = {row["policy"] for row in verdict.rows}
-    assert policies == {"trained", "statue", "mean_pose", "zero_residual", "random"}
+    assert policies == {"trained", "hold", "statue", "mean_pose", "zero_residual", "random"}
     own = [row for row in verdict.rows if row["policy"] == "trained"]
     assert len(own) == 3 * 2 + 1
     assert own[-1]["phase"] == STAND
     assert 0 <= verdict.summary["success"] <= 1  # type: ignore[operator]
-    assert set(verdict.summary["baselines"]) == policies - {"trained"}  # type: ignore[call-overload]
+    assert set(verdict.summary["baselines"]) == policies - {"trained", "hold"}  # type: ignore[call-overload]
 
 
 def test_an_evaluation_is_repeatable(trained: tuple, robot: Robot, sway: ReferenceMotion) -> None:
@@ -288,3 +252,45 @@ def test_evaluation_needs_neither_jax_nor_torch_nor_prefect() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_tensorboard_gets_the_terms_of_the_reward(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+    config = dataclasses.replace(brief("sb3"), tensorboard=True)
+    train(sway, robot, config, tmp_path)
+    events = EventAccumulator(str(tmp_path / "tensorboard")).Reload()
+    assert {"survived_s", "reward_joints", "steps_per_s"} <= set(events.Tags()["scalars"])
+
+
+def test_logging_for_tensorboard_needs_no_torch() -> None:
+    code = (
+        "import sys, pathlib, tempfile\n"
+        "from robojackson.rl.tensorboard import ScalarLog\n"
+        "ScalarLog(pathlib.Path(tempfile.mkdtemp())).add(1, {'a': 1.0})\n"
+        "assert 'torch' not in sys.modules and 'tensorflow' not in sys.modules\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("name", ["sb3"])
+def test_paper_mode_trains_from_the_shipped_walker(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path, name: str
+) -> None:
+    """Ends at its budget in steps, with the walker's layers and every term in its rows."""
+    config = TrainConfig(
+        mode="paper",
+        trainer=name,  # type: ignore[arg-type]
+        steps=160,
+        start="walker",
+        curiosity="formula",
+        tqc=TqcConfig(preset="paper", warmup=150, batch=8),
+    )
+    rows: list[dict[str, float]] = []
+    result = train(sway, robot, config, tmp_path, Hooks(sink=rows.extend))
+    assert result.steps == 160
+    assert load_policy(result.policy).observation_size == 348
+    assert {"reward_imitation", "reward_curiosity", "error_world_m2"} <= set(rows[0])

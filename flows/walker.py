@@ -1,0 +1,107 @@
+"""The walkers that trainings start from, made from files to files with no Prefect.
+
+`paper` learns Humanoid-v5's own reward from the first 45 of its observations; the file that is kept
+takes all 348, the others with weight zero. `track` imitates the bundled walk.
+"""
+
+import json
+import shlex
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from configs.loader import load
+from flows import single, training
+from storage import tables
+
+if TYPE_CHECKING:
+    from robojackson.retarget.robot import Robot
+
+Figures = dict[str, Any]
+WALK = Path("clips/walk.mp4")
+CURVE_POINTS = 20
+
+
+def pretrain(kind: str, out: Path, reference: Path | None, overrides: Mapping[str, Any]) -> Figures:
+    """Train a walker: walker_<kind>.safetensors and walker.json with command, curve, evaluation."""
+    from robojackson.retarget.robot import RobotDescription, load_robot
+    from robojackson.rl.networks import load_networks, widened
+    from robojackson.rl.policy import load_policy
+    from robojackson.rl.stock import stock_observation_size
+
+    robot = load_robot(load(RobotDescription, "robots/humanoid"))
+    motion = reference or _reference(kind, out, robot)
+    stands = kind == "paper"  # a motion that only stands has no score card
+    trained = training.train(motion, out, f"walker-{kind}", overrides, move="walk", force=stands)
+    networks = load_networks(out / "networks.safetensors")
+    policy = load_policy(out / "policy.safetensors")
+    if kind == "paper":
+        model = robot.model
+        size = stock_observation_size(model.nq, model.nv, model.nbody)
+        networks = widened(networks, size)
+        judged = _walked(policy, robot)
+    else:
+        judged = single.evaluate(out / "policy.safetensors", motion, out, "base", {})
+    made = out / f"walker_{kind}.safetensors"
+    made.write_bytes(networks.to_bytes())
+    facts = {
+        "command": shlex.join(["robojackson", "pretrain", "--kind", kind, *_words(overrides)]),
+        "seed": trained["seed"],
+        "steps": trained["steps"],
+        "updates": trained["updates"],
+        "curve": curve(out),
+        "evaluation": judged,
+    }
+    (out / "walker.json").write_text(json.dumps(facts, indent=1, default=float))
+    return {"walker": str(made), **facts}
+
+
+def curve(out: Path) -> list[dict[str, float]]:
+    """Mean return and survival of the episodes in equal parts of the training."""
+    from storage.schemas import EPISODE_RECORD
+
+    path = out / "episodes.parquet"
+    rows = tables.decode_rows(EPISODE_RECORD, path.read_bytes(), str(path))
+    parts = np.array_split(np.arange(len(rows)), min(CURVE_POINTS, max(1, len(rows))))
+    mean = lambda part, key: float(np.mean([rows[i][key] for i in part]))  # noqa: E731
+    return [
+        {
+            "step": float(rows[part[-1]]["step"]),
+            "episode_return": mean(part, "episode_return"),
+            "survived_s": mean(part, "survived_s"),
+        }
+        for part in parts
+        if len(part)
+    ]
+
+
+def _reference(kind: str, out: Path, robot: "Robot") -> Path:
+    """The motion that a walker is trained on: none for `paper`, the bundled walk for `track`."""
+    from robojackson.rl.standing import standing
+
+    made = out / "reference.parquet"
+    if kind == "paper":
+        with single.results_in(out) as store:
+            store.put(made.name, tables.encode(standing(robot)))
+    elif not made.exists():
+        single.mocap(WALK, out, "base", {})
+        single.retarget(out / "smpl.parquet", out, "humanoid", "base", {})
+    return made
+
+
+def _walked(policy: Any, robot: "Robot") -> Figures:
+    from robojackson.rl.walking import walk
+
+    return asdict(walk(policy, robot))
+
+
+def _words(overrides: Mapping[str, Any]) -> list[str]:
+    """The options of a command that override what the setup says."""
+    options = {"steps": "--steps", "minutes": "--minutes", "seed": "--seed", "trainer": "--trainer"}
+    words: list[str] = []
+    for key, value in overrides.items():
+        words += [options[key], str(value)] if key in options else ["--set", f"{key}={value}"]
+    return words

@@ -1,0 +1,109 @@
+"""Who drives a robot when a policy is judged: the policy, and those that do not dance beside it."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from pydantic import TypeAdapter
+
+from robojackson.errors import BadPolicy
+from robojackson.motion.reference import ReferenceMotion
+from robojackson.retarget.robot import Robot
+from robojackson.rl.clip import ClipStep
+from robojackson.rl.config import ControlConfig
+from robojackson.rl.observation import observation_size, observe
+from robojackson.rl.physics import Motors, Simulation, residual_scale
+from robojackson.rl.policy import Policy
+from robojackson.rl.rollouts import Driver
+from robojackson.rl.stock import stock_observation, stock_observation_size
+
+Command = Callable[[Simulation, ClipStep, np.ndarray, np.ndarray], np.ndarray]
+
+
+def mode_of(policy: Policy) -> str:
+    """`track` or `paper`."""
+    return str(policy.facts.get("mode", "track"))
+
+
+def control_of(policy: Policy, robot: Robot) -> ControlConfig:
+    """The control law that a policy was trained with.
+
+    Raises:
+        BadPolicy: the policy was trained for another robot, or its file says no control law.
+    """
+    trained_for = policy.facts.get("robot", robot.description.name)
+    if trained_for != robot.description.name:
+        raise BadPolicy(
+            f"the policy was trained for robot {trained_for!r}, not for {robot.description.name!r}"
+        )
+    if "control" not in policy.facts:
+        raise BadPolicy("the policy's file says nothing of its control law")
+    sizes = _observation_sizes(robot, mode_of(policy))
+    if policy.observation_size not in sizes:
+        raise BadPolicy(
+            f"the policy takes {policy.observation_size} observations and robot "
+            f"{robot.description.name!r} gives {sizes[0]}: it was trained for another robot"
+        )
+    return TypeAdapter(ControlConfig).validate_python(policy.facts["control"])
+
+
+def drivers(
+    policy: Policy, reference: ReferenceMotion, robot: Robot, seed: int
+) -> dict[str, Driver]:
+    """The policy, its variants and the baselines by name; each baseline follows the PD law."""
+    control = control_of(policy, robot)
+    found = {"trained": _trained(policy, robot, control)}
+    if control.law == "pd":
+        found["hold"] = replace(found["trained"], control=replace(control, law="hold"))
+    usual = control if control.law == "pd" else ControlConfig(substeps=control.substeps)
+    return found | _baselines(reference, robot, usual, seed)
+
+
+def _trained(policy: Policy, robot: Robot, control: ControlConfig) -> Driver:
+    if control.law == "torque":
+        most = robot.model.actuator_ctrlrange[:, 1]
+
+        def torque(
+            sim: Simulation, following: ClipStep, start: np.ndarray, last: np.ndarray
+        ) -> np.ndarray:
+            return most * policy.act(stock_observation(sim)[:, : policy.observation_size])
+
+        return Driver(control, torque, int(str(policy.facts.get("repeats", 1))))
+    hinge = Motors.of(robot.model).hinge
+
+    def target(
+        sim: Simulation, following: ClipStep, start: np.ndarray, last: np.ndarray
+    ) -> np.ndarray:
+        seen = observe(sim.qpos, sim.qvel, sim.points, following, last)
+        return following.qpos[:, 7:][:, hinge] + sim.residual * policy.act(seen)
+
+    return Driver(control, target)
+
+
+def _baselines(
+    reference: ReferenceMotion, robot: Robot, control: ControlConfig, seed: int
+) -> dict[str, Driver]:
+    hinge = Motors.of(robot.model).hinge
+    scale = residual_scale(robot, control)
+    rng = np.random.default_rng(seed)
+    poses = np.asarray(reference.qpos, float)[:, 7:][:, hinge]
+    commands: dict[str, Command] = {
+        "statue": lambda sim, following, start, last: poses[start % len(poses)],
+        "mean_pose": lambda sim, following, start, last: np.repeat(
+            poses.mean(0, keepdims=True), sim.n, 0
+        ),
+        "zero_residual": lambda sim, following, start, last: following.qpos[:, 7:][:, hinge],
+        "random": lambda sim, following, start, last: (
+            following.qpos[:, 7:][:, hinge] + scale * rng.uniform(-1, 1, (sim.n, len(hinge)))
+        ),
+    }
+    return {name: Driver(control, command) for name, command in commands.items()}
+
+
+def _observation_sizes(robot: Robot, mode: str) -> tuple[int, ...]:
+    """Lengths of the observations that a policy of a mode may take."""
+    model = robot.model
+    if mode == "paper":
+        joints = model.nq - 2 + model.nv
+        return stock_observation_size(model.nq, model.nv, model.nbody), joints
+    return (observation_size(model.nq - 7, model.nu, len(robot.keypoint_names)),)

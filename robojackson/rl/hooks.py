@@ -1,0 +1,27 @@
+"""What a caller of a training is told while it runs, and how it stops one."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+Row = dict[str, float]
+
+
+class Enough(Exception):
+    """The budget of a training is used up."""
+
+
+@dataclass(frozen=True)
+class Hooks:
+    """What a caller of a training is told, and how it stops one.
+
+    Attributes:
+        progress: Called every few seconds with steps, rate, survival and the time left.
+        sink: Called with one row for each episode that ended.
+        saving: Called before a checkpoint is written: the rows so far should then be safe.
+        stop: Asked between two rounds; True ends the run with a checkpoint.
+    """
+
+    progress: Callable[[Row], None] = lambda row: None
+    sink: Callable[[list[Row]], None] = lambda rows: None
+    saving: Callable[[], None] = lambda: None
+    stop: Callable[[], bool] = lambda: False

@@ -1,0 +1,81 @@
+"""What every step would earn, whoever drives: the yardstick that all runs are measured with.
+
+Setups are trained with their own reward but measured with the same: curiosity off, lambda fixed at
+its largest value, Humanoid-v5's own reward left out. `reward_*` are the terms of the policy's mode,
+`return_own` their sum, `return_paper` what the paper's reward would have paid.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from robojackson.motion.reference import ReferenceMotion
+from robojackson.retarget.robot import Robot
+from robojackson.rl.clip import Clip
+from robojackson.rl.config import PaperConfig, RewardConfig, TrackConfig
+from robojackson.rl.paper_config import BETA
+from robojackson.rl.paper_mode import PaperPoints
+from robojackson.rl.paper_reward import Miss, miss, paper_terms
+from robojackson.rl.rewards import reward_terms, tracking_errors
+from robojackson.rl.rollouts import Moment, Reading
+from robojackson.rl.track_mode import PERFECT_OF_THE_PAPER, tracked_points
+
+
+class Meter:
+    """Reads the rewards of a moment.
+
+    Args:
+        environment: Whose reward is the policy's own.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        reference: ReferenceMotion,
+        clip: Clip,
+        environment: TrackConfig | PaperConfig,
+    ) -> None:
+        self._environment, self._clip = environment, clip
+        self._paper = environment if isinstance(environment, PaperConfig) else PaperConfig()
+        self._points = PaperPoints(robot, reference, self._paper)
+        self._which = tracked_points(robot.keypoint_names)
+
+    def __call__(self, moment: Moment) -> Reading:
+        """Terms, errors and returns of every robot at one control step."""
+        state = self._points.of(moment.sim)
+        wanted = self._points.wanted(self._clip, moment.at.step)
+        apart = miss(state, *wanted, self._points.weights)
+        paper = paper_terms(state, apart, moment.fell, self._paper.lambda_max, self._paper)
+        own = paper if isinstance(self._environment, PaperConfig) else self._track(moment)
+        return {
+            **{f"reward_{name}": value for name, value in own.items()},
+            **_errors(apart),
+            "return_own": np.sum(list(own.values()), 0),
+            "return_paper": np.sum(list(paper.values()), 0),
+        }
+
+    def _track(self, moment: Moment) -> Reading:
+        sim, reward = moment.sim, _reward_of(self._environment)
+        moved = (sim.points - moment.before) / self._clip.dt
+        errors = tracking_errors(sim.qpos, sim.qvel, sim.points, moved, moment.at, self._which)
+        terms = reward_terms(errors, moment.change, reward)
+        if reward.curiosity != "off":
+            beta = BETA[reward.curiosity] / PERFECT_OF_THE_PAPER
+            terms["curiosity"] = beta * np.abs(sim.qvel[:, 6:]).sum(-1)
+        return {name: np.where(moment.fell, 0.0, term) for name, term in terms.items()}
+
+
+def yardstick(environment: TrackConfig | PaperConfig) -> TrackConfig | PaperConfig:
+    """The same environment without the bonus for curiosity."""
+    if isinstance(environment, PaperConfig):
+        return replace(environment, curiosity="off")
+    return replace(environment, reward=replace(environment.reward, curiosity="off"))
+
+
+def _reward_of(environment: TrackConfig | PaperConfig) -> RewardConfig:
+    assert isinstance(environment, TrackConfig)
+    return environment.reward
+
+
+def _errors(apart: Miss) -> Reading:
+    return {"error_root_m2": apart.root, "error_world_m2": apart.world}

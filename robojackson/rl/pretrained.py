@@ -1,0 +1,145 @@
+"""Where a training may start from: our walkers, a run of ours, or anybody's SB3 zip of TQC.
+
+An SB3 zip holds pickled objects beside its weights. Only `policy.pth` is read, by torch's
+weights-only reader, and the JSON beside it as text; nothing is unpickled.
+"""
+
+import io
+import json
+import logging
+import re
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from robojackson.errors import BadPolicy, MissingDependency
+from robojackson.rl.networks import CRITICS, TARGETS, Networks, Tensors, load_networks
+
+log = logging.getLogger(__name__)
+
+ASSETS = Path(__file__).parent.parent / "assets"
+WALKERS = {"track": "walker_track.safetensors", "paper": "walker_paper.safetensors"}
+HUB = re.compile(r"^[\w.-]+/[\w.-]+$")
+
+
+def pretrained(start: str, mode: str) -> Networks | None:
+    """The networks that a start names; None for `scratch`.
+
+    Raises:
+        BadPolicy: nothing of that name, or a file that does not hold an actor of TQC.
+        MissingDependency: the hub cannot be reached or its client is not installed.
+    """
+    path = start_file(start, mode)
+    if path is None:
+        return None
+    return from_sb3_zip(path) if zipfile.is_zipfile(path) else load_networks(path)
+
+
+def start_file(start: str, mode: str) -> Path | None:
+    """The file of a start, fetched where it is of the hub; None for `scratch`."""
+    if start == "scratch":
+        return None
+    path = ASSETS / WALKERS[mode] if start == "walker" else Path(start)
+    if path.is_file():
+        return path
+    if start == "walker" or not HUB.match(start):
+        raise BadPolicy(
+            f"start {start!r}: no such file; use scratch, walker, a networks.safetensors, "
+            "an SB3 zip, or owner/name of the hub"
+        )
+    return from_hub(start)
+
+
+def from_hub(repository: str) -> Path:
+    """The zip of a repository of the hub, from its cache or the network.
+
+    Raises:
+        MissingDependency: no client, no network, or no such repository.
+    """
+    try:
+        from huggingface_sb3 import load_from_hub
+    except ImportError as error:
+        raise MissingDependency(
+            f"start {repository!r} needs the hub's client: .venv/bin/pip install huggingface_sb3"
+        ) from error
+    name = repository.split("/")[1]
+    try:
+        return Path(load_from_hub(repository, f"{name[:1].lower()}{name[1:]}.zip"))
+    except Exception as error:  # the client raises what its HTTP library raises
+        raise MissingDependency(
+            f"start {repository!r} cannot be fetched from the hub ({type(error).__name__}); "
+            "download its zip elsewhere and give its path"
+        ) from error
+
+
+def from_sb3_zip(path: Path) -> Networks:
+    """The actor and critics of TQC in an SB3 zip.
+
+    Raises:
+        BadPolicy: no zip of SB3, or not of TQC with ReLU layers.
+    """
+    import torch
+
+    try:
+        with zipfile.ZipFile(path) as archive:
+            told = json.loads(archive.read("data"))
+            raw = torch.load(
+                io.BytesIO(archive.read("policy.pth")), weights_only=True, map_location="cpu"
+            )
+            state = {name: np.asarray(value.float()) for name, value in raw.items()}
+            alpha = _alpha(archive, torch)
+    except Exception as error:  # torch raises UnpicklingError and others at what it refuses
+        raise BadPolicy(f"{path} is no SB3 zip that can be read safely ({error})") from error
+    _require_relu(path, told)
+    try:
+        tensors = _renamed(state)
+    except (KeyError, ValueError) as error:
+        raise BadPolicy(f"{path} does not hold an actor and critics of TQC ({error})") from error
+    return Networks(tensors | alpha, {"from": path.name, "steps": told.get("num_timesteps")})
+
+
+def _alpha(archive: zipfile.ZipFile, torch: object) -> Tensors:
+    if "pytorch_variables.pth" not in archive.namelist():
+        return {}
+    held = torch.load(  # type: ignore[attr-defined]
+        io.BytesIO(archive.read("pytorch_variables.pth")), weights_only=True, map_location="cpu"
+    )
+    found = held.get("log_ent_coef") if isinstance(held, Mapping) else None
+    return {} if found is None else {"log_alpha": found.detach().numpy().reshape(()).copy()}
+
+
+def _require_relu(path: Path, told: Mapping[str, object]) -> None:
+    """SB3 writes the policy's arguments as text beside the pickle."""
+    arguments = told.get("policy_kwargs")
+    activation = str(arguments.get("activation_fn", "ReLU")) if isinstance(arguments, dict) else ""
+    if activation and "ReLU" not in activation:
+        raise BadPolicy(f"{path} has {activation} layers; only ReLU is known")
+
+
+def _renamed(state: Tensors) -> Tensors:
+    """SB3's names in ours; weights turned to (in, out)."""
+    tensors = _chain(state, "actor.latent_pi", "actor")
+    head = "actor.mu" if "actor.mu.weight" in state else "actor.mu.0"
+    tensors |= _layer(state, head, "mean")
+    if "actor.log_std.weight" in state:
+        tensors |= _layer(state, "actor.log_std", "log_std")
+    for i, (critic, target) in enumerate(zip(CRITICS, TARGETS, strict=True)):
+        tensors |= _chain(state, f"critic.qf{i}", critic)
+        tensors |= _chain(state, f"critic_target.qf{i}", target)
+    return tensors
+
+
+def _chain(state: Tensors, prefix: str, ours: str) -> Tensors:
+    found = [re.fullmatch(rf"{re.escape(prefix)}\.(\d+)\.weight", name) for name in state]
+    numbers = sorted(int(match.group(1)) for match in found if match)
+    tensors: Tensors = {}
+    for i, number in enumerate(numbers):
+        tensors |= _layer(state, f"{prefix}.{number}", f"{ours}.{i}")
+    return tensors
+
+
+def _layer(state: Tensors, theirs: str, ours: str) -> Tensors:
+    weight, bias = state[f"{theirs}.weight"], state[f"{theirs}.bias"]
+    return {f"{ours}.weight": weight.T.copy(), f"{ours}.bias": bias.copy()}
