@@ -3,10 +3,13 @@
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
+from robojackson.clips.dancer import DancerConfig
 from robojackson.clips.landmarks import Size
 from robojackson.clips.stability import StabilityConfig
 from robojackson.clips.video import VideoLimits
+from robojackson.mocap.networks.config import NetworkConfig
 from robojackson.mocap.recover import MocapConfig
+from robojackson.mocap.seen import Quality
 from robojackson.report.video import VideoConfig
 from robojackson.retarget.motion import RetargetConfig
 from robojackson.rl.config import EvaluateConfig, TrainConfig
@@ -22,8 +25,10 @@ class PipelineConfig:
         minutes: Wall time of the whole pass, minutes.
         other_minutes: Share of it that the stages other than training get, minutes.
         scoring_detector: Size of the pose model that scores candidates.
-        detector: Size of the pose model that feeds mocap.
+        detector: Pose model that feeds mocap; best lets two vote.
+        dancer: Who of several people is danced.
         gate: Refuse to train on a reference motion that breaks a hard bar of its score card.
+        network: Published networks whose weights the user brings; none by default.
         video, stability, mocap, retarget, train, evaluate, show: Of the stages.
     """
 
@@ -32,10 +37,12 @@ class PipelineConfig:
     minutes: float = Field(default=12.0, gt=0)
     other_minutes: float = Field(default=3.0, ge=0)
     scoring_detector: Size = "lite"
-    detector: Size = "full"
+    detector: Quality = "full"
+    dancer: DancerConfig = Field(default_factory=DancerConfig)
     gate: bool = True
     video: VideoLimits = Field(default_factory=VideoLimits)
     stability: StabilityConfig = Field(default_factory=StabilityConfig)
+    network: NetworkConfig = Field(default_factory=NetworkConfig)
     mocap: MocapConfig = Field(default_factory=MocapConfig)
     retarget: RetargetConfig = Field(default_factory=RetargetConfig)
     train: TrainConfig = Field(default_factory=TrainConfig)

@@ -51,6 +51,10 @@ class StoreError(RoboJacksonError):
     """The store cannot be written or read (full disk, no permission, connection cut)."""
 
 
+class BadWeights(RoboJacksonError):
+    """A file of network weights that is damaged, unsafe to load, or of another network."""
+
+
 class BadPolicy(RoboJacksonError):
     """A policy file that cannot be loaded or does not fit the reference motion."""
 
@@ -63,6 +67,10 @@ class TrainingFailed(RoboJacksonError):
     """The training process died; the message says which run, how and where its log is."""
 
 
+class TrainingCrashed(TrainingFailed):
+    """A training process was killed; the same again may succeed."""
+
+
 class MissingDependency(RoboJacksonError):
     """Something that has to be installed first; the message is the line that brings it."""
 
@@ -73,3 +81,11 @@ class SearchFailed(RoboJacksonError):
 
 class DownloadFailed(RoboJacksonError):
     """A video of the web cannot be had; the message is the reason that its table row gets."""
+
+
+class DeploymentFailed(RoboJacksonError):
+    """Prefect's server is not there, or refuses what we register with it."""
+
+
+class StudyFailed(RoboJacksonError):
+    """Cells of an ablation did not end well; the message names each and why."""

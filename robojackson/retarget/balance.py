@@ -6,7 +6,7 @@ moment point to the support, in the frame of the heading, is taken out by leanin
 point moves along the floor in proportion to its height. Metres.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -32,10 +32,10 @@ def moment_points(problem: Problem, posed: Posed) -> Float[np.ndarray, "N 2"]:
 def lean(problem: Problem, qpos: Float[np.ndarray, "N nq"]) -> Float[np.ndarray, "2"]:
     """Forward and left shift at one metre of height that puts the body over its support."""
     posed = pose(problem.tree, qpos)
-    feet = posed.site_pos[:, problem.robot.contact_keypoints, :2]
+    feet = posed.ball_pos[..., :2]
     touching = problem.targets.contact != AIR
     point = moment_points(problem, posed)
-    away = np.einsum("nc,nci->ni", support_shares(point, feet, touching), feet) - point
+    away = support(point, feet, touching).nearest - point
     carried = touching.any(axis=1)
     if not carried.any():
         return np.zeros(2)
@@ -54,24 +54,47 @@ def leaned(aims: Targets, shift: Float[np.ndarray, "2"]) -> Targets:
     return replace(aims, keypoints_w=keypoints)
 
 
-def support_shares(
+@dataclass(frozen=True)
+class Support:
+    """Where the soles in contact can carry.
+
+    Attributes:
+        nearest: The point of their convex hull next to a given point, which itself may be in it.
+        shares: Shares of the contacts in the nearest point of the hull's border, zero in the air.
+    """
+
+    nearest: Float[np.ndarray, "N 2"]
+    shares: Float[np.ndarray, "N C"]
+
+
+def support(
     point: Float[np.ndarray, "N 2"],
     feet: Float[np.ndarray, "N C 2"],
     touching: Bool[np.ndarray, "N C"],
-) -> Float[np.ndarray, "N C"]:
-    """Shares of the contacts in the nearest point of the segment between the outermost two."""
-    out = np.zeros(touching.shape)
-    frames = np.flatnonzero(touching.any(axis=1))
-    if not len(frames):
-        return out
-    first = touching[frames].argmax(axis=1)
-    last = touching.shape[1] - 1 - touching[frames, ::-1].argmax(axis=1)
-    start, end = feet[frames, first], feet[frames, last]
-    span = np.maximum(np.sum((end - start) ** 2, axis=1), 1e-6)
-    along = np.clip(np.sum((point[frames] - start) * (end - start), axis=1) / span, 0.0, 1.0)
-    np.add.at(out, (frames, first), 1 - along)
-    np.add.at(out, (frames, last), along)
-    return out
+) -> Support:
+    """The hull of the contacts; of two it is a segment, of one a point, of none nothing.
+
+    The border is made of segments between contacts, and no segment between contacts leaves the
+    hull: the nearest point of all segments is the nearest of the hull, unless the point is inside.
+    """
+    count = touching.shape[1]
+    first, second = np.array([(i, j) for i in range(count) for j in range(i, count)]).T
+    start, end = feet[:, first], feet[:, second]
+    span = np.maximum(np.sum((end - start) ** 2, axis=2), 1e-6)
+    along = np.sum((point[:, None] - start) * (end - start), axis=2) / span
+    along = np.clip(along, 0.0, 1.0)
+    border = start + along[..., None] * (end - start)
+    far = np.sum((point[:, None] - border) ** 2, axis=2)
+    far[~(touching[:, first] & touching[:, second])] = np.inf
+    pick, row = far.argmin(axis=1), np.arange(len(point))
+    carried = np.asarray(touching.any(axis=1))
+    shares = np.zeros(touching.shape)
+    np.add.at(shares, (row, first[pick]), (1 - along[row, pick]) * carried)
+    np.add.at(shares, (row, second[pick]), along[row, pick] * carried)
+    nearest = np.where(carried[:, None], border[row, pick], 0.0)
+    beyond = np.einsum("nci,ni->nc", feet - nearest[:, None], point - nearest)
+    inside = (touching & (beyond > 1e-9)).any(axis=1, keepdims=True)
+    return Support(np.where(inside, point, nearest), shares)
 
 
 def _axes(aims: Targets) -> tuple[np.ndarray, np.ndarray]:

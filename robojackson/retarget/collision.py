@@ -10,7 +10,10 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from robojackson.retarget.kinematics import Posed, Tree, placed
 from robojackson.retarget.robot import Robot
+
+_FLOOR_BIT = 1 << 30
 
 
 @dataclass(frozen=True)
@@ -35,39 +38,90 @@ class Touches:
 
 
 class Detector:
-    """Finds contacts of poses; the only state is MuJoCo's scratch data."""
+    """Finds contacts of poses; the only state is MuJoCo's scratch data.
 
-    def __init__(self, robot: Robot, clearance: float) -> None:
+    Args:
+        clearance: Distance below which geoms touch, metres.
+        feet: Whether the floor under the feet counts; they stand on it in nearly every frame.
+    """
+
+    def __init__(self, robot: Robot, clearance: float, feet: bool = True) -> None:
         self.model = copy.copy(robot.model)
         self.model.geom_margin[:] = clearance
+        if not feet:
+            _lift_feet(self.model, robot.contact_bodies)
         self.data = mujoco.MjData(self.model)
 
     def touches(self, qpos: Float[np.ndarray, "N nq"]) -> Touches:
         """All contacts nearer than the clearance."""
-        frames, distance, position, normal, geoms = [], [], [], [], []
-        data, model = self.data, self.model
+        found = _Found([], [], [], [], [])
         for index, row in enumerate(qpos):
-            data.qpos[:] = row
+            self.data.qpos[:] = row
+            mujoco.mj_kinematics(self.model, self.data)
+            self._collide(index, found)
+        return found.joined(self.model)
+
+    def look(self, tree: Tree, qpos: Float[np.ndarray, "N nq"]) -> tuple[Posed, Touches]:
+        """The same, with the forward kinematics that it takes anyway (`kinematics.pose`)."""
+        data, model, found, count = self.data, self.model, _Found([], [], [], [], []), len(qpos)
+        now, sources = data.qpos, (data.xpos, data.xmat, data.xanchor, data.xaxis)
+        kept = [np.empty((count, *source.shape)) for source in sources]
+        pairs = list(zip(kept, sources, strict=True))
+        for index, row in enumerate(qpos):
+            now[:] = row
             mujoco.mj_kinematics(model, data)
-            mujoco.mj_collision(model, data)
-            if data.ncon:
-                contact = data.contact
-                frames.append(np.full(data.ncon, index))
-                distance.append(contact.dist.copy())
-                position.append(contact.pos.copy())
-                normal.append(contact.frame[:, :3].copy())
-                geoms.append(contact.geom.copy())
-        if not frames:
+            for target, source in pairs:
+                target[index] = source
+            self._collide(index, found)
+        body_pos, body_rot, anchor, axis = kept
+        body_rot = body_rot.reshape(count, model.nbody, 3, 3)
+        return placed(tree, body_pos, body_rot, anchor[:, 1:], axis[:, 1:]), found.joined(model)
+
+    def _collide(self, index: int, found: "_Found") -> None:
+        data = self.data
+        mujoco.mj_collision(self.model, data)
+        if data.ncon:
+            contact = data.contact
+            found.frames.append(np.full(data.ncon, index))
+            found.distance.append(contact.dist.copy())
+            found.position.append(contact.pos.copy())
+            found.normal.append(contact.frame[:, :3].copy())
+            found.geoms.append(contact.geom.copy())
+
+
+@dataclass(frozen=True)
+class _Found:
+    """Contacts of the frames that have some."""
+
+    frames: list[np.ndarray]
+    distance: list[np.ndarray]
+    position: list[np.ndarray]
+    normal: list[np.ndarray]
+    geoms: list[np.ndarray]
+
+    def joined(self, model: mujoco.MjModel) -> Touches:
+        if not self.frames:
             return _none()
-        bodies = model.geom_bodyid[np.concatenate(geoms)]
+        bodies = model.geom_bodyid[np.concatenate(self.geoms)]
         return Touches(
-            frame=np.concatenate(frames),
-            distance=np.concatenate(distance),
-            position=np.concatenate(position),
-            normal=np.concatenate(normal),
+            frame=np.concatenate(self.frames),
+            distance=np.concatenate(self.distance),
+            position=np.concatenate(self.position),
+            normal=np.concatenate(self.normal),
             bodies=bodies,
             floor=(bodies == 0).any(axis=1),
         )
+
+
+def _lift_feet(model: mujoco.MjModel, feet: Int[np.ndarray, " C"]) -> None:
+    """Put the floor on a bit of its own that the geoms of the feet do not have."""
+    world = model.geom_bodyid == 0
+    foot = np.isin(model.geom_bodyid, feet)
+    kind, affinity = model.geom_contype, model.geom_conaffinity
+    meets = (kind[world][:, None] & affinity) | (kind & affinity[world][:, None])
+    floored = (meets != 0).any(axis=0) & ~foot & ~world
+    model.geom_contype[world], model.geom_conaffinity[world] = 0, _FLOOR_BIT
+    model.geom_contype[floored] |= _FLOOR_BIT
 
 
 def _none() -> Touches:

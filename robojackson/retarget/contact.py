@@ -1,4 +1,4 @@
-"""The floor under a human motion: free fall, the states of the robot's ball feet, the ground refit.
+"""The floor under a human motion: free fall, the states of the robot's soles, the ground refit.
 
 Metres, seconds, world frame (z up, floor at z = 0).
 """
@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter1d, median_filter
 
 from robojackson.motion.smpl import AIR, CONTACT_POINTS, PLANTED, SLIDING
 from robojackson.retarget.human import HumanClip
-from robojackson.retarget.robot import Robot
+from robojackson.retarget.robot import ContactPoint, Robot
 
 GRAVITY = 9.81
 _SLOW_FOOT = 0.40  # m/s: above it a foot on the floor is pivoting or sliding on purpose
@@ -51,21 +51,20 @@ def runs(flags: Bool[np.ndarray, " N"]) -> list[tuple[int, int]]:
 
 
 def ball_contact(
-    clip: HumanClip, robot: Robot, keypoints: np.ndarray, airborne: np.ndarray
+    clip: HumanClip, robot: Robot, balls: Float[np.ndarray, "N C 3"], airborne: np.ndarray
 ) -> Int[np.ndarray, "N C"]:
-    """States of the robot's balls: heel and toe joined, planted where they are slow.
+    """States of the robot's balls: those of the human points they follow, planted where slow.
 
     A foot that stands still near the floor is planted whatever its label; a body that touches
     nothing and does not fall stands on its lowest foot.
     """
     mode = clip.edges
-    balls = keypoints[:, robot.contact_keypoints]
     above = balls[..., 2] - balls[..., 2].min(axis=1, keepdims=True)
     bare = (clip.contact == AIR).all(axis=1) & ~airborne
     window = 2 * round(0.045 / clip.dt) + 1
     out = np.zeros(balls.shape[:2], int)
     for column, point in enumerate(robot.description.contacts.values()):
-        own = [i for i, name in enumerate(CONTACT_POINTS) if name.startswith(point.side)]
+        own = [i for i, name in enumerate(CONTACT_POINTS) if follows(point, name)]
         speed = _speed(balls[:, column], clip)
         stands = (above[:, column] < _NEAR_FLOOR) & (speed < _STILL_FOOT) & ~airborne
         stands |= bare & (above[:, column] < 0.01)
@@ -80,6 +79,12 @@ def ball_contact(
     return out
 
 
+def follows(point: ContactPoint, human: str) -> bool:
+    """Whether a ball follows a human contact point, such as `left_heel`."""
+    side, _, part = human.partition("_")
+    return point.side == side and point.label in (part, "either")
+
+
 def _standing_runs(
     still: Bool[np.ndarray, " N"], path: Float[np.ndarray, "N 3"]
 ) -> Bool[np.ndarray, " N"]:
@@ -92,11 +97,10 @@ def _standing_runs(
     return out
 
 
-def refit_ground(
-    keypoints: np.ndarray, contact: np.ndarray, robot: Robot, clip: HumanClip
-) -> Float[np.ndarray, "N K 3"]:
-    """Shift each step so that the lowest carrying sole is at z = 0; interpolated in the air."""
-    soles = keypoints[:, robot.contact_keypoints, 2] - robot.contact_radii
+def ground_shift(
+    soles: Float[np.ndarray, "N C"], contact: Int[np.ndarray, "N C"], clip: HumanClip
+) -> Float[np.ndarray, " N"]:
+    """What lifts the lowest carrying sole of each step to z = 0; interpolated in the air."""
     carried = (contact != AIR).any(axis=1)
     if not carried.any():
         shift = np.full(len(soles), -soles.min())
@@ -107,9 +111,7 @@ def refit_ground(
         shift = np.interp(steps, steps[carried], -lowest[carried], **period)
         mode = clip.edges
         shift = gaussian_filter1d(shift, 0.05 / clip.dt, mode=mode)
-    out = keypoints.copy()
-    out[..., 2] += shift[:, None]
-    return out
+    return np.asarray(shift)
 
 
 def _speed(path: Float[np.ndarray, "N 3"], clip: HumanClip) -> Float[np.ndarray, " N"]:

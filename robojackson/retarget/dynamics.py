@@ -1,7 +1,7 @@
-"""Inverse dynamics of a motion: which torques it would take, and what no contact can explain.
+"""Inverse dynamics of a motion: what it asks for in free space, and what soles and motors can give.
 
-Contact forces at the soles are the non-negative mix of friction-pyramid edges that best explains
-the wrench on the root; torques are what is left at the hinges. Newtons, newton-metres.
+The force of a motion at another tempo k follows from two evaluations: gravity and springs do not
+change, damping goes with k, inertia and Coriolis with k^2. Newtons, newton-metres.
 """
 
 import copy
@@ -9,68 +9,66 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from jaxtyping import Float
-from scipy.optimize import nnls
+from jaxtyping import Bool, Float
 
-from robojackson.motion.smpl import AIR
 from robojackson.retarget.contact import GRAVITY
-from robojackson.retarget.kinematics import point_jacobian, pose, tree
+from robojackson.retarget.kinematics import Posed, point_jacobian, pose, tree
 from robojackson.retarget.resample import accelerations, velocities
 from robojackson.retarget.robot import Robot
+from robojackson.retarget.wrench import Demand, Tolerance
 
 _EDGES = 8
 _FRICTION = 1.0
-_NEAR_M = 0.01  # a sole so near the floor may push even where it has no label
-_TORQUE_WEIGHT = 1e-3
+NEAR_M = 0.02
+"""A sole below this height may push, metres."""
+_STOP_RAD = 0.01  # so near to a limit of its range a hinge rests on its stop
 
 
 @dataclass(frozen=True)
-class Effort:
-    """Torques of the motors over their limits, and the root force that nothing explains."""
+class FreeSpace:
+    """Generalised force that produces a motion without contacts and stops, by its parts."""
 
-    torque_ratio: Float[np.ndarray, "S A"]
-    residual_bw: Float[np.ndarray, " S"]
+    still: Float[np.ndarray, "S nv"]
+    damped: Float[np.ndarray, "S nv"]
+    inertial: Float[np.ndarray, "S nv"]
 
-
-def effort(
-    robot: Robot,
-    qpos: Float[np.ndarray, "S nq"],
-    contact: np.ndarray,
-    dt: float,
-    lap: np.ndarray | None,
-) -> Effort:
-    """Torque ratio of each actuated hinge (order of qpos) in each step."""
-    forces = _free_space(robot, qpos, dt, lap)
-    edges, active = _friction_edges(robot, qpos, contact)
-    limit = np.where(robot.actuated, robot.torque_limit, 1.0)
-    weight = float(robot.model.body_mass.sum()) * GRAVITY
-    ratio = np.zeros((len(qpos), len(limit)))
-    residual = np.zeros(len(qpos))
-    for step, force in enumerate(forces):
-        columns = edges[step, :, np.repeat(active[step], _EDGES)].T
-        left = force - columns @ _pushes(columns, force, limit)
-        ratio[step] = np.abs(left[6:]) / limit
-        residual[step] = np.linalg.norm(left[:3]) / weight
-    return Effort(ratio[:, robot.actuated], residual)
+    def at(self, tempo: float | Float[np.ndarray, " S"]) -> Float[np.ndarray, "S nv"]:
+        """The force at a tempo beside the motion's own, one for all steps or one a step."""
+        k = np.broadcast_to(np.asarray(tempo, float), len(self.still))[:, None]
+        return np.asarray(self.still + k * self.damped + k**2 * self.inertial)
 
 
-def _pushes(columns: np.ndarray, force: np.ndarray, limit: np.ndarray) -> np.ndarray:
-    if not columns.shape[1]:
-        return np.zeros(0)
-    scale = np.concatenate([[1.0, 1, 1, 2, 2, 2], _TORQUE_WEIGHT / limit])
-    pushes, _ = nnls(scale[:, None] * columns, scale * force)
-    return np.asarray(pushes)
+def body_weight(robot: Robot) -> float:
+    """Newtons."""
+    return float(robot.model.body_mass.sum()) * GRAVITY
 
 
-def _free_space(
-    robot: Robot, qpos: np.ndarray, dt: float, lap: np.ndarray | None
-) -> Float[np.ndarray, "S nv"]:
-    """Generalised force that produces the motion with neither contacts nor limits."""
+def free_space(
+    robot: Robot, qpos: Float[np.ndarray, "S nq"], dt: float, lap: np.ndarray | None
+) -> FreeSpace:
+    """The force of a motion, by its parts."""
+    model = unconstrained(robot)
+    speed, acceleration = velocities(qpos, dt, lap), accelerations(qpos, dt, lap)
+    whole = inverse(model, qpos, speed, acceleration)
+    still = inverse(model, qpos, np.zeros_like(speed), np.zeros_like(speed))
+    damped = model.dof_damping * speed
+    return FreeSpace(still, damped, whole - still - damped)
+
+
+def unconstrained(robot: Robot) -> mujoco.MjModel:
+    """The robot's model without contacts and stops."""
     model = copy.copy(robot.model)
     off = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT
     model.opt.disableflags |= int(off)
+    model.opt.integrator = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)  # RK4 has no derivatives
+    return model
+
+
+def inverse(
+    model: mujoco.MjModel, qpos: np.ndarray, speed: np.ndarray, acceleration: np.ndarray
+) -> Float[np.ndarray, "S nv"]:
+    """`mj_inverse` of every step."""
     data = mujoco.MjData(model)
-    speed, acceleration = velocities(qpos, dt, lap), accelerations(qpos, dt, lap)
     out = np.empty_like(speed)
     for step in range(len(qpos)):
         data.qpos[:], data.qvel[:], data.qacc[:] = qpos[step], speed[step], acceleration[step]
@@ -79,17 +77,50 @@ def _free_space(
     return out
 
 
-def _friction_edges(
-    robot: Robot, qpos: np.ndarray, contact: np.ndarray
-) -> tuple[Float[np.ndarray, "S nv E"], np.ndarray]:
+def demand(
+    robot: Robot,
+    qpos: Float[np.ndarray, "S nq"],
+    force: Float[np.ndarray, "S nv"],
+    touching: Bool[np.ndarray, "S C"],
+    tolerance: Tolerance,
+) -> Demand:
+    """What a motion asks for beside what the touching soles and the motors may give."""
+    posed = pose(tree(robot), qpos)
+    limit = np.where(robot.actuated, robot.torque_limit, np.inf)
+    lower, upper = np.tile(-limit, (len(qpos), 1)), np.tile(limit, (len(qpos), 1))
+    upper[qpos[:, 7:] < robot.lower + _STOP_RAD] = np.inf
+    lower[qpos[:, 7:] > robot.upper - _STOP_RAD] = -np.inf
+    weight = body_weight(robot)
+    scale = np.ones(force.shape[1])
+    scale[:3] = 1.0 / (tolerance.force_bw * weight)
+    scale[3:6] = 1.0 / (tolerance.lever_m * weight)
+    ease = np.where(robot.actuated, 1.0 / np.where(robot.actuated, robot.torque_limit, 1.0), 0.0)
+    scale[6:] = ease / tolerance.torque
+    usable = np.repeat(touching, _EDGES, axis=1)
+    return Demand(force, weight * edges(robot, posed), usable, lower, upper, scale, ease)
+
+
+def soles(robot: Robot, posed: Posed) -> Float[np.ndarray, "S C 3"]:
+    """Lowest points of the balls under the feet."""
+    ground = posed.ball_pos.copy()
+    ground[..., 2] -= robot.contact_radii
+    return np.asarray(ground)
+
+
+def touching(robot: Robot, qpos: Float[np.ndarray, "S nq"]) -> Bool[np.ndarray, "S C"]:
+    """Soles near the floor, whatever their labels."""
+    return np.asarray(soles(robot, pose(tree(robot), qpos))[..., 2] < NEAR_M)
+
+
+def edges(robot: Robot, posed: Posed) -> Float[np.ndarray, "S nv E"]:
     """Generalised force of a unit push along each edge of each sole's friction pyramid."""
     shape = tree(robot)
-    posed = pose(shape, qpos)
-    ground = posed.site_pos[:, robot.contact_keypoints].copy()
-    ground[..., 2] -= robot.contact_radii
-    active = (contact != AIR) | (ground[..., 2] < _NEAR_M)
+    jacobian = point_jacobian(shape, posed, soles(robot, posed), robot.contact_bodies)
+    force = jacobian.swapaxes(2, 3) @ directions()
+    return np.asarray(force.swapaxes(1, 2).reshape(len(force), force.shape[2], -1))
+
+
+def directions() -> Float[np.ndarray, "3 E"]:
+    """The edges of a friction pyramid, upward part 1."""
     angle = np.arange(_EDGES) * 2 * np.pi / _EDGES
-    edges = np.stack([_FRICTION * np.cos(angle), _FRICTION * np.sin(angle), np.ones(_EDGES)])
-    jacobian = point_jacobian(shape, posed, ground, robot.contact_bodies)
-    force = jacobian.swapaxes(2, 3) @ edges
-    return force.swapaxes(1, 2).reshape(len(qpos), force.shape[2], -1), active
+    return np.stack([_FRICTION * np.cos(angle), _FRICTION * np.sin(angle), np.ones(_EDGES)])

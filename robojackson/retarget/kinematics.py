@@ -4,10 +4,11 @@ The same results as `mj_kinematics` and `mj_jac`, without a Python loop over fra
 of MuJoCo: root linear in the world, root angular in the body, hinges. World, metres, radians.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from scipy.spatial.transform import Rotation
 
 from robojackson.geometry.rotations import (
@@ -18,75 +19,40 @@ from robojackson.geometry.rotations import (
     sign_continuous,
     to_rotation,
 )
+from robojackson.retarget.linkage import Tree as Tree
+from robojackson.retarget.linkage import tree as tree
 from robojackson.retarget.robot import Robot
 
 
 @dataclass(frozen=True)
-class Tree:
-    """The constants of the kinematic tree; bodies in MuJoCo's order, the world among them.
-
-    Attributes:
-        parent: Parent body.
-        position, rotation: Pose of each body in its parent at zero angles.
-        body_hinges: Hinge indices (order of qpos) of each body.
-        anchor, axis: Hinge anchors and axes in their bodies.
-        zero: Angle of each hinge in the zero pose (`qpos0`).
-        moves: Whether hinge j moves body b.
-        site_body, site_position: The keypoint sites.
-        com, mass: Centres of mass in the bodies, metres; kilograms.
-    """
-
-    parent: Int[np.ndarray, " B"]
-    position: Float[np.ndarray, "B 3"]
-    rotation: Float[np.ndarray, "B 3 3"]
-    body_hinges: tuple[tuple[int, ...], ...]
-    anchor: Float[np.ndarray, "J 3"]
-    axis: Float[np.ndarray, "J 3"]
-    zero: Float[np.ndarray, " J"]
-    moves: Bool[np.ndarray, "B J"]
-    site_body: Int[np.ndarray, " K"]
-    site_position: Float[np.ndarray, "K 3"]
-    com: Float[np.ndarray, "B 3"]
-    mass: Float[np.ndarray, " B"]
-    root: int
-
-
-@dataclass(frozen=True)
 class Posed:
-    """The tree in T poses: body poses, hinge axes and anchors, keypoint sites, world frame."""
+    """The tree in T poses: bodies, hinge axes and anchors, keypoints, centres of balls; world."""
 
     body_pos: Float[np.ndarray, "T B 3"]
     body_rot: Float[np.ndarray, "T B 3 3"]
     anchor: Float[np.ndarray, "T J 3"]
     axis: Float[np.ndarray, "T J 3"]
     site_pos: Float[np.ndarray, "T K 3"]
+    ball_pos: Float[np.ndarray, "T C 3"]
+    root: int
 
+    def __getitem__(self, frames: Int[np.ndarray, " M"]) -> "Posed":
+        """Some of the poses."""
+        arrays = ("body_pos", "body_rot", "anchor", "axis", "site_pos", "ball_pos")
+        return replace(self, **{name: getattr(self, name)[frames] for name in arrays})
 
-def tree(robot: Robot) -> Tree:
-    """Read the constants of the tree from the model."""
-    model = robot.model
-    hinges: list[list[int]] = [[] for _ in range(model.nbody)]
-    for joint in range(1, model.njnt):
-        hinges[model.jnt_bodyid[joint]].append(joint - 1)
-    moves = np.zeros((model.nbody, model.njnt - 1), bool)
-    for body in range(1, model.nbody):
-        moves[body] = moves[model.body_parentid[body]]
-        moves[body, hinges[body]] = True
-    return Tree(
-        parent=model.body_parentid.copy(),
-        position=model.body_pos.copy(),
-        rotation=quat_to_matrix(model.body_quat / np.linalg.norm(model.body_quat, axis=1)[:, None]),
-        body_hinges=tuple(tuple(h) for h in hinges),
-        anchor=model.jnt_pos[1:].copy(),
-        axis=model.jnt_axis[1:].copy(),
-        zero=model.qpos0[7:].copy(),
-        moves=moves,
-        site_body=model.site_bodyid[robot.keypoint_sites].copy(),
-        site_position=model.site_pos[robot.keypoint_sites].copy(),
-        com=model.body_ipos.copy(),
-        mass=model.body_mass.copy(),
-        root=int(model.jnt_bodyid[0]),
-    )
+    @cached_property
+    def screws(self) -> tuple[np.ndarray, np.ndarray]:
+        """Axes and moments about the origin of all degrees of freedom, (T, 3, nv) each."""
+        frames, count = self.axis.shape[:2]
+        axis, moment = np.zeros((2, frames, 3, 6 + count))
+        axis[:, :, 3:6] = self.body_rot[:, self.root]
+        axis[:, :, 6:] = self.axis.swapaxes(1, 2)
+        moment[:, [0, 1, 2], [0, 1, 2]] = 1.0
+        at = self.body_pos[:, self.root, :, None]
+        moment[:, :, 3:6] = _cross(at, axis[:, :, 3:6])
+        moment[:, :, 6:] = _cross(self.anchor.swapaxes(1, 2), axis[:, :, 6:])
+        return axis, moment
 
 
 def pose(tree: Tree, qpos: Float[np.ndarray, "T nq"]) -> Posed:
@@ -109,8 +75,23 @@ def pose(tree: Tree, qpos: Float[np.ndarray, "T nq"]) -> Posed:
             rot = rot @ _about(tree.axis[hinge], angle[:, hinge])
             pos = anchor[:, hinge] - rot @ tree.anchor[hinge]
         body_pos[:, body], body_rot[:, body] = pos, rot
-    local = (body_rot[:, tree.site_body] @ tree.site_position[..., None])[..., 0]
-    return Posed(body_pos, body_rot, anchor, axis, body_pos[:, tree.site_body] + local)
+    return placed(tree, body_pos, body_rot, anchor, axis)
+
+
+def placed(
+    tree: Tree, body_pos: np.ndarray, body_rot: np.ndarray, anchor: np.ndarray, axis: np.ndarray
+) -> Posed:
+    """Keypoints and balls on bodies that are placed already."""
+    sites = _fixed(body_pos, body_rot, tree.site_body, tree.site_position)
+    balls = _fixed(body_pos, body_rot, tree.ball_body, tree.ball_position)
+    return Posed(body_pos, body_rot, anchor, axis, sites, balls, tree.root)
+
+
+def _fixed(
+    body_pos: np.ndarray, body_rot: np.ndarray, bodies: np.ndarray, at: np.ndarray
+) -> np.ndarray:
+    """World positions of points fixed to bodies."""
+    return np.asarray(body_pos[:, bodies] + (body_rot[:, bodies] @ at[..., None])[..., 0])
 
 
 def point_jacobian(
@@ -121,24 +102,34 @@ def point_jacobian(
     One matrix product a frame: axis x p - axis x anchor = -[p]x axis + anchor x axis.
     """
     frames, count = points.shape[:2]
-    axis, moment = _screws(tree, posed)
+    axis, moment = posed.screws
     out = (_minus_skew(points).reshape(frames, 3 * count, 3) @ axis).reshape(frames, count, 3, -1)
     out += moment[:, None]
-    out *= _moved_by(tree)[bodies][..., None, :]
+    out *= tree.moved_by[bodies][..., None, :]
     return np.asarray(out)
 
 
 def centre_of_mass(tree: Tree, posed: Posed) -> Float[np.ndarray, "T 3"]:
     """Centre of mass of the robot."""
-    coms = posed.body_pos + (posed.body_rot @ tree.com[..., None])[..., 0]
-    return np.asarray(tree.mass @ coms / tree.mass.sum())
+    return np.asarray(tree.mass @ _body_coms(tree, posed) / tree.mass.sum())
 
 
 def com_jacobian(tree: Tree, posed: Posed) -> Float[np.ndarray, "T 3 nv"]:
-    """Jacobian of the centre of mass."""
-    coms = posed.body_pos + (posed.body_rot @ tree.com[..., None])[..., 0]
-    rows = point_jacobian(tree, posed, coms, np.arange(len(tree.parent)))
-    return np.asarray(np.einsum("b,tbij->tij", tree.mass / tree.mass.sum(), rows))
+    """Jacobian of the centre of mass: each axis turns the mass that hangs on it."""
+    share = tree.mass[:, None] / tree.mass.sum() * tree.moved_by
+    arms = _body_coms(tree, posed).swapaxes(1, 2) @ share
+    axis, moment = posed.screws
+    return np.asarray(_cross(axis, arms) + moment * share.sum(axis=0))
+
+
+def _body_coms(tree: Tree, posed: Posed) -> Float[np.ndarray, "T B 3"]:
+    return np.asarray(posed.body_pos + (posed.body_rot @ tree.com[..., None])[..., 0])
+
+
+def _cross(a: Float[np.ndarray, "T 3 N"], b: Float[np.ndarray, "T 3 N"]) -> np.ndarray:
+    """Cross product along the middle axis."""
+    (ax, ay, az), (bx, by, bz) = np.moveaxis(a, 1, 0), np.moveaxis(b, 1, 0)
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
 
 
 def sole_velocities(
@@ -149,7 +140,7 @@ def sole_velocities(
     (c_next - c) / dt - r (w_y, -w_x), with w from the turn of the foot between the steps: a ball
     that rolls without slip has none. A lap has one more than an open motion.
     """
-    centre = posed.site_pos[:, robot.contact_keypoints]
+    centre = posed.ball_pos
     move = np.roll(centre, -1, axis=0) - centre
     if lap is not None:
         move[-1] += lap
@@ -203,28 +194,9 @@ def _about(axis: Float[np.ndarray, "3"], angle: Float[np.ndarray, " T"]) -> np.n
     return np.eye(3) + sine * skew + (1 - cosine) * (skew @ skew)
 
 
-def _screws(tree: Tree, posed: Posed) -> tuple[np.ndarray, np.ndarray]:
-    """Axes and moments about the origin of all degrees of freedom, (T, 3, nv) each."""
-    frames, root = len(posed.axis), tree.root
-    turn, at = posed.body_rot[:, root], posed.body_pos[:, root]
-    axes = np.concatenate([turn.swapaxes(1, 2), posed.axis], axis=1)
-    arms = np.concatenate([np.repeat(at[:, None], 3, axis=1), posed.anchor], axis=1)
-    linear = np.broadcast_to(np.eye(3), (frames, 3, 3))
-    axis = np.concatenate([np.zeros((frames, 3, 3)), axes.swapaxes(1, 2)], axis=2)
-    moment = np.concatenate([linear, np.cross(arms, axes).swapaxes(1, 2)], axis=2)
-    return axis, moment
-
-
-def _moved_by(tree: Tree) -> Float[np.ndarray, "B nv"]:
-    """1 where a degree of freedom moves a body."""
-    root = np.ones((len(tree.parent), 6))
-    root[0] = 0.0
-    return np.concatenate([root, tree.moves], axis=1)
-
-
 def _minus_skew(v: Float[np.ndarray, "T P 3"]) -> Float[np.ndarray, "T P 3 3"]:
     """Minus the cross product matrices: the matrix of w -> w x v."""
-    x, y, z = np.moveaxis(v, -1, 0)
-    o = np.zeros_like(x)
-    rows = [np.stack(row, -1) for row in ((o, z, -y), (-z, o, x), (y, -x, o))]
-    return np.stack(rows, -2)
+    out = np.zeros((*v.shape, 3))
+    out[..., 0, 1], out[..., 1, 2], out[..., 2, 0] = v[..., 2], v[..., 0], v[..., 1]
+    out[..., 1, 0], out[..., 2, 1], out[..., 0, 2] = -v[..., 2], -v[..., 0], -v[..., 1]
+    return out

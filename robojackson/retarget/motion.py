@@ -10,19 +10,23 @@ import logging
 import numpy as np
 from jaxtyping import Float
 
+from robojackson.metrics.retarget import jerk
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.motion.smpl import SmplSequence
 from robojackson.retarget import paper
+from robojackson.retarget.certificate import certify
 from robojackson.retarget.config import RetargetConfig
 from robojackson.retarget.cycle import Lap, human_clip
-from robojackson.retarget.dynamics import effort
+from robojackson.retarget.feasible import Feasible, make_feasible
 from robojackson.retarget.human import HumanClip
 from robojackson.retarget.kinematics import pose, tree
-from robojackson.retarget.optimise import optimise
+from robojackson.retarget.optimise import optimise, polished
 from robojackson.retarget.resample import velocities
 from robojackson.retarget.robot import Robot
 from robojackson.retarget.scorecard import BARS, hovers, score
 from robojackson.retarget.targets import Targets, targets
+from robojackson.retarget.tempo import times_at, warped
+from robojackson.retarget.wrench import Tolerance
 
 _log = logging.getLogger(__name__)
 __all__ = ["RetargetConfig", "assemble", "retarget"]
@@ -36,7 +40,7 @@ def retarget(sequence: SmplSequence, robot: Robot, config: RetargetConfig) -> Re
     """
     dt = robot.description.control_dt
     cyclic = config.cyclic if config.method == "optimise" else "no"
-    clip, lap = human_clip(sequence, dt, cyclic, config.tempo, config.cycle)
+    clip, lap = human_clip(sequence, dt, cyclic, config.fixed_tempo, config.cycle)
     upright = aims = targets(clip, robot)
     extra = _notes(sequence, clip, lap, config)
     if config.method == "optimise":
@@ -45,28 +49,33 @@ def retarget(sequence: SmplSequence, robot: Robot, config: RetargetConfig) -> Re
         if hovering.mean() > BARS["unsupported_share"] / 2 and aims.airborne.any():
             _log.info("a flight that does not fall is taken back: solving again")
             upright = targets(clip, robot, hovering)
-            found, floor_mm = optimise(upright, robot, config)
-        qpos, aims = found.qpos, found.aims
+            found = polished(upright, found.qpos, found.shift, robot, config)
+        able = make_feasible(robot, found.qpos, found.aims, config)
         extra |= {"keypoint_floor_mm": floor_mm, "lean_deg": found.lean_deg}
+        extra |= _slowing(able, upright, robot)
+        qpos, aims, upright = able.qpos, able.aims, warped(upright, able.steps)
+        time_s = times_at(clip.time_s, able.steps)
     else:
         qpos = paper.mapped(sequence, robot, clip.time_s, corrected=config.method == "framefix")
-    return assemble(qpos, clip, aims, upright, robot, extra)
+        time_s = clip.time_s
+    return assemble(qpos, time_s, aims, upright, robot, extra, config.weights.tolerance)
 
 
 def assemble(
     qpos: Float[np.ndarray, "S nq"],
-    clip: HumanClip,
+    time_s: Float[np.ndarray, " S"],
     aims: Targets,
     upright: Targets,
     robot: Robot,
     extra: dict[str, float],
+    tolerance: Tolerance,
 ) -> ReferenceMotion:
     """Everything that follows from the poses, and the score card.
 
     `aims` are what the solver followed, perhaps leaned; `upright` is the dancer's own motion.
     """
     posed = pose(tree(robot), qpos)
-    loads = effort(robot, qpos, aims.contact, aims.dt, aims.lap)
+    certified = certify(robot, qpos, aims.dt, aims.lap, tolerance)
     parts = {
         "robot": robot.description.name,
         "model_sha256": robot.sha256,
@@ -78,16 +87,27 @@ def assemble(
         "body_pos_w": posed.body_pos[:, 1:],
         "keypoints_w": posed.site_pos,
         "contact": aims.contact,
-        "torque_ratio": loads.torque_ratio,
-        "source_time_s": clip.time_s,
+        "torque_ratio": certified.torque_ratio,
+        "source_time_s": time_s,
+        "certificate": certified.certificate,
         "joint_names": robot.joint_names,
         "body_names": robot.body_names,
         "keypoint_names": robot.keypoint_names,
         "contact_names": robot.contact_names,
     }
     card = score(ReferenceMotion(**parts), robot, aims, upright)  # type: ignore[arg-type]
-    card["root_residual_bw"] = float(np.median(loads.residual_bw))
-    return ReferenceMotion(**parts, scorecard={**extra, **card})  # type: ignore[arg-type]
+    card["root_residual_bw"] = float(np.median(certified.missing_bw))
+    return ReferenceMotion(**parts, scorecard={**card, **extra})  # type: ignore[arg-type]
+
+
+def _slowing(able: Feasible, upright: Targets, robot: Robot) -> dict[str, float]:
+    """How much slower than the clip the motion is by its own choice, and the clip's own jerk."""
+    source = upright.keypoints_w[:, robot.keypoint_weights > 0]
+    return {
+        "tempo_mean": len(upright) / len(able.steps),
+        "tempo_min": float(np.gradient(able.steps).min()),
+        "source_jerk_m_s3": jerk(source, upright.dt),
+    }
 
 
 def _notes(
@@ -97,11 +117,11 @@ def _notes(
     frames = len(sequence) if lap is None else lap.end - lap.start
     stretch = 1.0
     if lap is not None:
-        stretch = len(clip.time_s) * clip.dt * config.tempo * sequence.fps / frames
+        stretch = len(clip.time_s) * clip.dt * config.fixed_tempo * sequence.fps / frames
     return {
         "source_frames": float(len(sequence)),
         "source_fps": float(sequence.fps),
-        "tempo": config.tempo,
+        "tempo": config.fixed_tempo,
         "cyclic": float(lap is not None),
         "trimmed_s": max(0.0, (len(sequence) - frames) / sequence.fps),
         "time_scale": stretch,

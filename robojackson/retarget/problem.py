@@ -12,6 +12,7 @@ from robojackson.retarget.kinematics import Tree, tree
 from robojackson.retarget.resample import forward_velocities
 from robojackson.retarget.robot import Robot
 from robojackson.retarget.targets import Targets
+from robojackson.retarget.wrench import Tolerance
 
 
 @config_dataclass(frozen=True, config=ConfigDict(extra="forbid"))
@@ -29,20 +30,30 @@ class Weights:
         posture: Of the distance to the rest pose, 1/rad2.
         speed: Of hinge speed over the limit, s2/rad2.
         speed_share: Share of the speed limit from which it costs.
+        dynamics: Of what neither soles nor motors can give, in tolerances; only the last solution.
+        dynamics_reach: Slack from which that term loses its grip (Cauchy's loss), tolerances.
+        dynamics_margin: Slack from which it costs, tolerances.
+        dynamics_barrier: How softly that term keeps off every limit, squared tolerances.
+        tolerance: What may be left over in a feasible step.
         clearance: Distance from which geoms repel each other, metres.
     """
 
-    height: float = Field(default=300.0, ge=0)
+    height: float = Field(default=60.0, ge=0)
     penetration: float = Field(default=1000.0, ge=0)
     self_penetration: float = Field(default=60.0, ge=0)
     slip: float = Field(default=4.0, ge=0)
-    balance: float = Field(default=0.5, ge=0)
+    balance: float = Field(default=0.2, ge=0)
     balance_reach: float = Field(default=0.15, gt=0)
-    acceleration: float = Field(default=3e-6, ge=0)
+    acceleration: float = Field(default=2e-6, ge=0)
     posture: float = Field(default=1e-4, ge=0)
     speed: float = Field(default=0.5, ge=0)
     speed_share: float = Field(default=0.95, gt=0, le=1)
     clearance: float = Field(default=0.002, ge=0)
+    dynamics: float = Field(default=0.0, ge=0)
+    dynamics_reach: float = Field(default=5.0, gt=0)
+    dynamics_margin: float = Field(default=0.8, ge=0)
+    dynamics_barrier: float = Field(default=0.05, gt=0)
+    tolerance: Tolerance = Field(default_factory=Tolerance)
 
 
 @dataclass(frozen=True)
@@ -58,7 +69,8 @@ class Problem:
     @classmethod
     def of(cls, robot: Robot, targets: Targets, weights: Weights) -> "Problem":
         """Bind the parts."""
-        return cls(robot, tree(robot), targets, weights, Detector(robot, weights.clearance))
+        detector = Detector(robot, weights.clearance, feet=False)
+        return cls(robot, tree(robot), targets, weights, detector)
 
     @property
     def ring(self) -> bool:

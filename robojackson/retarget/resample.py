@@ -88,6 +88,11 @@ def seam_angle(qpos: Float[np.ndarray, "S nq"], dt: float, lap: np.ndarray) -> f
     return float(np.degrees(np.abs(_seam_miss(qpos, dt, lap)[3:]).max()))
 
 
+def seam_speed(qpos: Float[np.ndarray, "S nq"], dt: float, lap: np.ndarray) -> float:
+    """Largest jump of an angular velocity over the seam, rad/s."""
+    return float(np.abs(_seam_miss(qpos, dt, lap)[3:]).max() / dt)
+
+
 def seam_shift(qpos: Float[np.ndarray, "S nq"], dt: float, lap: np.ndarray) -> float:
     """How far the root's step over the seam differs from its neighbours' mean, metres."""
     return float(np.linalg.norm(_seam_miss(qpos, dt, lap)[:3]))

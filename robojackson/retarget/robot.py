@@ -1,27 +1,35 @@
 """The robot: the MuJoCo model that a description is bound to by name.
 
 Every body, joint and site of the description must resolve or `UnknownName` lists the known ones
-(`mj_name2id` gives -1 for an unknown name, and `xpos[-1]` is the left forearm). Keypoints are sites
-without mass, so the dynamics of the MJCF stay untouched. Metres, radians, seconds.
+(`mj_name2id` gives -1 for an unknown name, and `xpos[-1]` is the left forearm). Metres, radians,
+seconds.
 """
 
 import hashlib
-import importlib.util
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 
 import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from robojackson.errors import BadConfiguration, UnknownName
-from robojackson.retarget.description import KEYPOINTS, ContactPoint, RobotDescription
+from robojackson.retarget.actuation import torque_limits
+from robojackson.retarget.checks import check_joints, check_names, check_soles, check_symmetry
+from robojackson.retarget.description import (
+    KEYPOINTS,
+    TOES,
+    ContactPoint,
+    RobotDescription,
+    RobotSource,
+)
+from robojackson.retarget.model import compiled, mjcf_path, site_of
+from robojackson.retarget.names import known, matching, where
 
-__all__ = ["KEYPOINTS", "ContactPoint", "Robot", "RobotDescription", "known", "load_robot", "where"]
-
-_SYMMETRY_M = 1e-3
+__all__ = [
+    "KEYPOINTS", "TOES", "ContactPoint", "Robot", "RobotDescription", "RobotSource", "known",
+    "load_robot", "where",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -35,12 +43,16 @@ class Robot:
         joint_names, body_names, keypoint_names, contact_names: World body left out.
         keypoint_sites: Site index a keypoint.
         keypoint_weights: Weight a keypoint.
-        contact_keypoints: Column of the keypoint at the centre of each contact ball.
+        contact_keypoints: Column of the keypoint that each contact ball belongs to.
+        contact_offsets: Centre of each ball beside that keypoint, in the frame of its body, metres.
         contact_radii: Metres.
         contact_bodies: Body index of each contact ball.
+        contact_arms: Centre of each ball beside its keypoint in the rest pose, world, metres.
+        toe_arms: The same of the toe keypoints beside the feet's; empty where it has none.
         lower, upper: Hinge limits, radians.
         rest: Hinge rest angles, radians.
         torque_limit: Torque limit a hinge, Nm; infinite without a motor.
+        lengths: Distance of every pair of keypoints in the zero pose, metres.
     """
 
     description: RobotDescription
@@ -53,8 +65,11 @@ class Robot:
     keypoint_sites: Int[np.ndarray, " K"]
     keypoint_weights: Float[np.ndarray, " K"]
     contact_keypoints: Int[np.ndarray, " C"]
+    contact_offsets: Float[np.ndarray, "C 3"]
     contact_radii: Float[np.ndarray, " C"]
     contact_bodies: Int[np.ndarray, " C"]
+    contact_arms: Float[np.ndarray, "C 3"]
+    toe_arms: Mapping[str, Float[np.ndarray, "3"]]
     lower: Float[np.ndarray, " J"]
     upper: Float[np.ndarray, " J"]
     rest: Float[np.ndarray, " J"]
@@ -73,120 +88,58 @@ class Robot:
         qpos[7:] = np.clip(self.rest, self.lower, self.upper)
         return qpos
 
+    @cached_property
+    def sole_depth(self) -> float:
+        """How far the soles are below the feet's keypoints in the rest pose, metres."""
+        return float((self.contact_radii - self.contact_arms[:, 2]).mean())
+
 
 def load_robot(description: RobotDescription) -> Robot:
     """Compile the MJCF with the keypoint sites and bind every name.
 
     Raises:
         UnknownName: A body, joint or keypoint that does not exist.
-        BadConfiguration: A file that MuJoCo cannot load or a robot that is not a free root with
-            hinges and mirrored sides.
+        BadConfiguration: A file that MuJoCo cannot load, or a robot that is not a free root with
+            hinges, mirrored sides and level soles.
     """
-    path = _mjcf_path(description)
-    spec = _read_spec(path, description)
-    bodies = [body.name for body in spec.bodies if body.name != "world"]
-    _add_sites(spec, description, bodies)
-    model = spec.compile()
-    model.actuator_gear[:] *= description.gear_scale
-    _check_joints(model, description)
-    robot = _bind(model, description, hashlib.sha256(path.read_bytes()).hexdigest())
-    _check_symmetry(robot)
-    return robot
-
-
-def where(description: RobotDescription, key: str) -> str:
-    """The place in the configuration that an error message names."""
-    return f"configs/robots/{description.name}.yaml: {key}"
-
-
-def known(kind: str, name: str, names: Iterable[str], place: str) -> str:
-    """The name itself, or UnknownName."""
-    names = list(names)
-    if name not in names:
-        raise UnknownName(kind, name, place, names)
-    return name
-
-
-def _mjcf_path(description: RobotDescription) -> Path:
-    package, colon, inside = description.mjcf.partition(":")
-    if colon and len(package) > 1:
-        found = importlib.util.find_spec(package)
-        if found is None or found.origin is None:
-            raise BadConfiguration(
-                f"{where(description, 'mjcf')}: package {package!r} is not installed"
-            )
-        return Path(found.origin).parent / inside
-    return Path(description.mjcf)
-
-
-def _read_spec(path: Path, description: RobotDescription) -> mujoco.MjSpec:
-    if not path.is_file():
-        raise BadConfiguration(f"{where(description, 'mjcf')}: no such file: {path}")
-    try:
-        return mujoco.MjSpec.from_file(str(path))
-    except ValueError as error:
-        raise BadConfiguration(
-            f"{where(description, 'mjcf')}: {str(error).splitlines()[0]}"
-        ) from error
-
-
-def _add_sites(spec: mujoco.MjSpec, description: RobotDescription, bodies: list[str]) -> None:
-    missing = [key for key in KEYPOINTS if key not in description.sites]
-    if missing:
-        raise BadConfiguration(f"{where(description, 'sites')}: missing {', '.join(missing)}")
-    taken = {site.name for site in spec.sites}
-    for key, (body, position) in description.sites.items():
-        known("keypoint", key, KEYPOINTS, where(description, "sites"))
-        known("body", body, bodies, where(description, f"sites.{key}"))
-        if key in taken:
-            raise BadConfiguration(f"{where(description, 'sites')}: the MJCF has a site {key!r}")
-        spec.body(body).add_site(name=key, pos=list(position), size=[0.02, 0.02, 0.02])
-
-
-def _check_joints(model: mujoco.MjModel, description: RobotDescription) -> None:
-    """One free joint, first, on the root body; every other joint a limited hinge."""
-    bodies = _names(model.nbody, model.body)
-    root = known("body", description.root_body, bodies, where(description, "root_body"))
-    free = int(mujoco.mjtJoint.mjJNT_FREE)
-    hinge = int(mujoco.mjtJoint.mjJNT_HINGE)
-    if model.jnt_type[0] != free or model.jnt_bodyid[0] != model.body(root).id:
-        raise BadConfiguration(f"{where(description, 'root_body')}: {root!r} has no free joint")
-    for index in range(1, model.njnt):
-        if model.jnt_type[index] != hinge or not model.jnt_limited[index]:
-            name = model.joint(index).name
-            raise BadConfiguration(f"{where(description, 'mjcf')}: {name!r} is no limited hinge")
+    path = mjcf_path(description)
+    model = compiled(description, path)
+    check_joints(model, description)
+    return _bind(model, description, hashlib.sha256(path.read_bytes()).hexdigest())
 
 
 def _bind(model: mujoco.MjModel, description: RobotDescription, sha256: str) -> Robot:
     joints = _names(model.njnt, model.joint)[1:]
     bodies = _names(model.nbody, model.body)[1:]
+    check_names(description, bodies, joints)
+    keys = KEYPOINTS + tuple(toe for toe in TOES if toe in description.sites)
+    rest = _rest(description, joints)
+    lengths = _lengths(_posed(model, np.zeros_like(rest)), keys)
+    check_symmetry(description, lengths)
     contacts = description.contacts
-    for name, point in contacts.items():
-        known("body", point.body, bodies, where(description, f"contacts.{name}.body"))
-        known("keypoint", point.site, KEYPOINTS, where(description, f"contacts.{name}.site"))
-        known("side", point.side, ("left", "right"), where(description, f"contacts.{name}.side"))
-    for key in description.weights:
-        known("keypoint", key, KEYPOINTS, where(description, "weights"))
-    for joint in description.rest_pose:
-        known("joint", joint, joints, where(description, "rest_pose"))
+    balls = list(contacts.values())
+    arms = _contact_arms(model, description, rest)
     return Robot(
         description=description,
         model=model,
         sha256=sha256,
         joint_names=joints,
         body_names=bodies,
-        keypoint_names=KEYPOINTS,
+        keypoint_names=keys,
         contact_names=tuple(contacts),
-        keypoint_sites=np.array([model.site(key).id for key in KEYPOINTS]),
-        keypoint_weights=np.array([description.weights.get(key, 0.0) for key in KEYPOINTS]),
-        contact_keypoints=np.array([KEYPOINTS.index(c.site) for c in contacts.values()]),
-        contact_radii=np.array([c.radius for c in contacts.values()]),
-        contact_bodies=np.array([model.body(c.body).id for c in contacts.values()]),
+        keypoint_sites=np.array([site_of(model, key) for key in keys]),
+        keypoint_weights=np.array([description.weights.get(key, 0.0) for key in keys]),
+        contact_keypoints=np.array([keys.index(ball.site) for ball in balls]),
+        contact_offsets=np.array([ball.offset for ball in balls], float),
+        contact_radii=np.array([ball.radius for ball in balls]),
+        contact_bodies=np.array([model.body(ball.body).id for ball in balls]),
+        contact_arms=arms,
+        toe_arms=_toe_arms(_posed(model, rest), keys),
         lower=model.jnt_range[1:, 0].copy(),
         upper=model.jnt_range[1:, 1].copy(),
-        rest=np.array([description.rest_pose.get(joint, 0.0) for joint in joints]),
-        torque_limit=_torque_limits(model),
-        lengths=_lengths(model),
+        rest=rest,
+        torque_limit=torque_limits(model, description, joints),
+        lengths=lengths,
     )
 
 
@@ -194,40 +147,43 @@ def _names(count: int, accessor: object) -> tuple[str, ...]:
     return tuple(accessor(index).name for index in range(count))  # type: ignore[operator]
 
 
-def _torque_limits(model: mujoco.MjModel) -> Float[np.ndarray, " J"]:
-    """Gear times control range; the smaller force range where one is set."""
-    limit = np.full(model.njnt - 1, np.inf)
-    for index in range(model.nu):
-        if model.actuator_trntype[index] != int(mujoco.mjtTrn.mjTRN_JOINT):
-            continue
-        force = (
-            np.abs(model.actuator_gear[index, 0]) * np.abs(model.actuator_ctrlrange[index]).max()
-        )
-        if model.actuator_forcelimited[index]:
-            force = min(force, np.abs(model.actuator_forcerange[index]).max())
-        limit[model.actuator_trnid[index, 0] - 1] = force
-    return limit
+def _rest(description: RobotDescription, joints: tuple[str, ...]) -> Float[np.ndarray, " J"]:
+    rest = np.zeros(len(joints))
+    for pattern, angle in description.rest_pose.items():
+        for name in matching("joint", pattern, joints, where(description, "rest_pose")):
+            rest[joints.index(name)] = angle
+    return rest
 
 
-def _lengths(model: mujoco.MjModel) -> dict[tuple[str, str], float]:
-    """Distances between all pairs of keypoints in the zero pose, metres."""
+def _posed(model: mujoco.MjModel, hinges: Float[np.ndarray, " J"]) -> mujoco.MjData:
     data = mujoco.MjData(model)
+    data.qpos[7:] = hinges
     mujoco.mj_kinematics(model, data)
-    at = {key: data.site(key).xpos.copy() for key in KEYPOINTS}
-    return {(a, b): float(np.linalg.norm(at[a] - at[b])) for a in KEYPOINTS for b in KEYPOINTS}
+    return data
 
 
-def _check_symmetry(robot: Robot) -> None:
-    def mirrored(key: str) -> str:
-        swap = {"left": "right", "right": "left"}
-        side, _, rest = key.partition("_")
-        return f"{swap[side]}_{rest}" if side in swap else key
+def _lengths(data: mujoco.MjData, keys: tuple[str, ...]) -> dict[tuple[str, str], float]:
+    """Distances between all pairs of keypoints, metres."""
+    at = {key: data.site_xpos[site_of(data.model, key)].copy() for key in keys}
+    return {(a, b): float(np.linalg.norm(at[a] - at[b])) for a in keys for b in keys}
 
-    bones = (("hip", "knee"), ("knee", "foot"), ("shoulder", "elbow"), ("elbow", "hand"))
-    for a, b in ((f"left_{a}", f"left_{b}") for a, b in bones):
-        left, right = robot.lengths[a, b], robot.lengths[mirrored(a), mirrored(b)]
-        if abs(left - right) > _SYMMETRY_M:
-            raise BadConfiguration(
-                f"{where(robot.description, 'sites')}: {a} to {b} is {left:.4f} m on the left and "
-                f"{right:.4f} m on the right; they must be mirrored"
-            )
+
+def _contact_arms(
+    model: mujoco.MjModel, description: RobotDescription, rest: np.ndarray
+) -> Float[np.ndarray, "C 3"]:
+    """Centres of the balls beside their keypoints in the rest pose; the soles must be level."""
+    data = _posed(model, rest)
+    balls = list(description.contacts.values())
+    turns = [data.body(ball.body).xmat.reshape(3, 3) for ball in balls]
+    arms = np.array([turn @ ball.offset for turn, ball in zip(turns, balls, strict=True)])
+    at = data.site_xpos[[site_of(model, ball.site) for ball in balls]] + arms
+    check_soles(description, at[:, 2] - [ball.radius for ball in balls])
+    return arms
+
+
+def _toe_arms(data: mujoco.MjData, keys: tuple[str, ...]) -> dict[str, Float[np.ndarray, "3"]]:
+    return {
+        toe: data.site_xpos[site_of(data.model, toe)]
+        - data.site_xpos[site_of(data.model, toe.replace("toe", "foot"))]
+        for toe in keys[len(KEYPOINTS) :]
+    }

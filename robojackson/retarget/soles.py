@@ -4,10 +4,11 @@ Each adds squared residuals to the normal equations of a clip. Metres, radians, 
 """
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
+from scipy.ndimage import distance_transform_edt
 
 from robojackson.motion.smpl import AIR, PLANTED
-from robojackson.retarget.balance import support_shares
+from robojackson.retarget.balance import support
 from robojackson.retarget.banded import Normal
 from robojackson.retarget.collision import Touches
 from robojackson.retarget.contact import GRAVITY
@@ -20,11 +21,13 @@ from robojackson.retarget.kinematics import (
 )
 from robojackson.retarget.problem import Problem
 
+_SETTLING_S = 0.15  # seconds
+
 
 def add_soles(problem: Problem, posed: Posed, out: Normal) -> None:
     """Contact height, floor under feet in the air, and no slip of planted soles."""
     robot, weights, contact = problem.robot, problem.weights, problem.targets.contact
-    ground = posed.site_pos[:, robot.contact_keypoints].copy()
+    ground = posed.ball_pos.copy()
     ground[..., 2] -= robot.contact_radii
     jacobian = point_jacobian(problem.tree, posed, ground, robot.contact_bodies)
     height = ground[..., 2]
@@ -45,16 +48,23 @@ def _no_slip(problem: Problem, posed: Posed, rows: np.ndarray, out: Normal) -> N
     own.
     """
     planted, dt = problem.targets.contact == PLANTED, problem.targets.dt
+    both = planted & np.roll(planted, -1, axis=0)
     count = len(planted) if problem.ring else len(planted) - 1
-    now = np.arange(count)
+    now = np.flatnonzero(both[:count].any(axis=1))
+    if not len(now):
+        return
     following = (now + 1) % len(planted)
-    factor = np.sqrt(problem.weights.slip) * (planted[now] & planted[following])
-    speed = sole_velocities(problem.robot, posed, dt, problem.targets.lap)
+    factor = np.sqrt(problem.weights.slip) * both[now]
+    speed = sole_velocities(problem.robot, posed, dt, problem.targets.lap)[now]
     residual = factor[..., None] * speed
     before = factor[..., None, None] * rows[now] / -dt
     after = factor[..., None, None] * rows[following] / dt
-    flat = (count, -1, rows.shape[-1])
-    residual, before, after = residual.reshape(count, -1), before.reshape(flat), after.reshape(flat)
+    flat = (len(now), -1, rows.shape[-1])
+    residual, before, after = (
+        residual.reshape(len(now), -1),
+        before.reshape(flat),
+        after.reshape(flat),
+    )
     out.add_chained(residual, (before, after), now)
 
 
@@ -67,7 +77,7 @@ def add_collisions(problem: Problem, posed: Posed, touches: Touches, out: Normal
     frame, bodies, floor = touches.frame[keep], touches.bodies[keep], touches.floor[keep]
     weights = problem.weights
     factor = np.sqrt(np.where(floor, weights.penetration, weights.self_penetration))
-    at = Posed(*(getattr(posed, name)[frame] for name in Posed.__dataclass_fields__))
+    at = posed[frame]
     points = np.repeat(touches.position[keep][:, None], 2, axis=1)
     jacobian = point_jacobian(problem.tree, at, points, bodies)
     apart = jacobian[:, 1] - jacobian[:, 0]
@@ -79,10 +89,11 @@ def add_collisions(problem: Problem, posed: Posed, touches: Touches, out: Normal
 
 
 def add_balance(problem: Problem, posed: Posed, out: Normal) -> None:
-    """The zero moment point of the centre of mass stays on the line between the soles in contact.
+    """The zero moment point of the centre of mass stays in the hull of the soles in contact.
 
     zmp = c - h/g c'' (linear inverted pendulum); residual = zmp - nearest point of the support.
-    A ball foot cannot take a moment: on one foot the support is a point, on two a segment.
+    A ball foot cannot take a moment: on one foot the support is a point, on two a segment. While
+    the weight goes from foot to foot the support jumps, and the term fades out and in again.
     """
     robot, dt = problem.robot, problem.targets.dt
     inner, before, after = _neighbours(len(posed.axis), problem.ring)
@@ -95,15 +106,28 @@ def add_balance(problem: Problem, posed: Posed, out: Normal) -> None:
         ahead[-1] += problem.targets.lap[:2]
         behind[0] -= problem.targets.lap[:2]
     zmp = flat[inner] - pull * (ahead - 2 * flat[inner] + behind)
-    feet = posed.site_pos[:, robot.contact_keypoints]
-    share = support_shares(zmp, feet[inner, :, :2], problem.targets.contact[inner] != AIR)
-    away = zmp - np.einsum("nc,nci->ni", share, feet[inner, :, :2])
-    weight = _robust_weight(problem, away, share.sum(axis=1) > 0, out)
+    feet = posed.ball_pos
+    touching = problem.targets.contact != AIR
+    found = support(zmp, feet[inner, :, :2], touching[inner])
+    share, away = found.shares, zmp - found.nearest
+    settled = _settled(touching, dt, problem.ring)[inner]
+    weight = _robust_weight(problem, away, settled, out) * (away != 0).any(axis=1)
     feet_rows = point_jacobian(problem.tree, posed, feet, robot.contact_bodies)[inner, :, :2]
     here = (1 + 2 * pull) * com_rows[inner] - np.einsum("nc,ncij->nij", share, feet_rows)
     scale = weight[:, None, None]
     rows = (-pull * scale * com_rows[before], scale * here, -pull * scale * com_rows[after])
     out.add_chained(weight[:, None] * away, rows, before)
+
+
+def _settled(touching: Bool[np.ndarray, "N C"], dt: float, ring: bool) -> Float[np.ndarray, " N"]:
+    """0 where nothing touches or the contacts change, 1 from some time before and after."""
+    changes = (touching != np.roll(touching, 1, axis=0)).any(axis=1)
+    changes[0] &= ring
+    still = ~(changes | np.roll(changes, -1))
+    joined = np.tile(still, 3) if ring else still
+    steps = distance_transform_edt(joined) if not joined.all() else np.full(len(joined), np.inf)
+    steps = steps[len(still) : 2 * len(still)] if ring else steps
+    return np.asarray(np.clip(steps * dt / _SETTLING_S, 0, 1) ** 2 * touching.any(axis=1))
 
 
 def _robust_weight(

@@ -11,12 +11,12 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from robojackson.mocap.skeleton import KEYPOINT_NAMES
-from robojackson.retarget.contact import ball_contact, free_fall, refit_ground, without
+from robojackson.retarget.contact import ball_contact, free_fall, ground_shift, without
+from robojackson.retarget.feet import foot_frames
 from robojackson.retarget.human import HumanClip
-from robojackson.retarget.robot import KEYPOINTS, Robot
+from robojackson.retarget.robot import Robot
 
 _HUMAN = {name: index for index, name in enumerate(KEYPOINT_NAMES)}
-_KEY = {name: index for index, name in enumerate(KEYPOINTS)}
 _LIMBS = (  # human bone -> robot bone; the hand follows the wrist: the robot has none
     (("hip", "knee"), ("hip", "knee")),
     (("knee", "ankle"), ("knee", "foot")),
@@ -33,7 +33,7 @@ class Targets:
     """What the solver aims at.
 
     Attributes:
-        keypoints_w: Targets of `robot.KEYPOINTS`, metres.
+        keypoints_w: Targets of the robot's keypoints, metres.
         weights: Weight of each target in each step.
         contact: AIR, PLANTED or SLIDING for the robot's contact points.
         heading: Rotation matrices of the trunk: x forward, y left, z up along the trunk.
@@ -57,7 +57,7 @@ class Targets:
 def targets(
     clip: HumanClip, robot: Robot, hovering: Bool[np.ndarray, " N"] | None = None
 ) -> Targets:
-    """Bone-direction targets, contact states of the ball feet and the ground refit.
+    """Bone-direction targets, contact states of the soles and the ground refit.
 
     Args:
         clip: The human.
@@ -68,12 +68,20 @@ def targets(
     human = {name: clip.keypoints_w[:, index] for name, index in _HUMAN.items()}
     scale = leg_ratio(human, robot)
     points = _chain(human, robot, scale)
-    keypoints = np.stack([points[key] for key in KEYPOINTS], axis=1)
+    feet = foot_frames(human, clip)
+    for toe, arm in robot.toe_arms.items():
+        side = toe.partition("_")[0]
+        points[toe] = points[f"{side}_foot"] + feet[side] @ arm
+    keypoints = np.stack([points[key] for key in robot.keypoint_names], axis=1)
+    turns = [feet[point.side] for point in robot.description.contacts.values()]
+    arms = np.stack([turn @ arm for turn, arm in zip(turns, robot.contact_arms, strict=True)], 1)
+    balls = keypoints[:, robot.contact_keypoints] + arms
     airborne = free_fall(human, clip)
     if hovering is not None:
         airborne = without(airborne, hovering)
-    contact = ball_contact(clip, robot, keypoints, airborne)
-    keypoints = refit_ground(keypoints, contact, robot, clip)
+    contact = ball_contact(clip, robot, balls, airborne)
+    soles = balls[..., 2] - robot.contact_radii
+    keypoints[..., 2] += ground_shift(soles, contact, clip)[:, None]
     trust = np.where(clip.valid, 1.0, 0.2)[:, None]
     return Targets(
         keypoints_w=keypoints,
@@ -98,7 +106,7 @@ def leg_ratio(human: Mapping[str, np.ndarray], robot: Robot) -> float:
         for side in ("left", "right")
         for a, b in bones
     )
-    return float((robot_leg + robot.contact_radii.mean()) / (human_leg / 2 + ankle_height))
+    return float((robot_leg + robot.sole_depth) / (human_leg / 2 + ankle_height))
 
 
 def _chain(
@@ -147,14 +155,18 @@ def _trunk_frame(human: Mapping[str, np.ndarray]) -> Float[np.ndarray, "N 3 3"]:
 
 def every_second(wanted: Targets) -> Targets:
     """The same targets at half the rate."""
+    return replace(taken(wanted, slice(None, None, 2)), dt=2 * wanted.dt)
+
+
+def taken(wanted: Targets, steps: slice) -> Targets:
+    """Some of the steps."""
     return replace(
         wanted,
-        keypoints_w=wanted.keypoints_w[::2],
-        weights=wanted.weights[::2],
-        contact=wanted.contact[::2],
-        heading=wanted.heading[::2],
-        airborne=wanted.airborne[::2],
-        dt=2 * wanted.dt,
+        keypoints_w=wanted.keypoints_w[steps],
+        weights=wanted.weights[steps],
+        contact=wanted.contact[steps],
+        heading=wanted.heading[steps],
+        airborne=wanted.airborne[steps],
     )
 
 

@@ -8,11 +8,12 @@ Metres, radians, seconds; every sum has one term a frame, so that weights hold a
 """
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from robojackson.retarget.banded import Normal
-from robojackson.retarget.kinematics import Posed, point_jacobian, pose
+from robojackson.retarget.kinematics import Posed, point_jacobian
 from robojackson.retarget.problem import Problem
+from robojackson.retarget.repair import add_dynamics
 from robojackson.retarget.soles import add_balance, add_collisions, add_soles
 
 _ROOT_ACCELERATION = np.array([8.0] * 3 + [3.0] * 3)  # m/s2 and rad/s2 beside the hinges' rad/s2
@@ -21,26 +22,34 @@ _ROOT_ACCELERATION = np.array([8.0] * 3 + [3.0] * 3)  # m/s2 and rad/s2 beside t
 def linearise(problem: Problem, qpos: Float[np.ndarray, "N nq"]) -> Normal:
     """Cost, gradient and Gauss-Newton blocks at a motion."""
     out = Normal.empty(len(qpos), qpos.shape[1] - 1)
-    posed = pose(problem.tree, qpos)
+    posed, touches = problem.detector.look(problem.tree, qpos)
     velocity = problem.velocity(qpos)
     keypoint_normal(problem, posed, out)
     add_soles(problem, posed, out)
     add_balance(problem, posed, out)
-    add_collisions(problem, posed, problem.detector.touches(qpos), out)
+    add_dynamics(problem, qpos, posed, out)
+    add_collisions(problem, posed, touches, out)
     _posture(problem, qpos, out)
     _acceleration(problem, velocity, out)
     _speed(problem, velocity, out)
     return out
 
 
-def keypoint_normal(problem: Problem, posed: Posed, out: Normal) -> Float[np.ndarray, " N"]:
-    """Add the keypoint term; returns its cost a frame."""
-    weight = np.sqrt(problem.targets.weights)
-    residual = (posed.site_pos - problem.targets.keypoints_w) * weight[..., None]
+def keypoint_normal(
+    problem: Problem, posed: Posed, out: Normal, frames: Int[np.ndarray, " N"] | None = None
+) -> Float[np.ndarray, " N"]:
+    """Add the keypoint term; returns its cost a frame.
+
+    Args:
+        frames: Whose targets the poses have; those of the clip in order when None.
+    """
+    which = slice(None) if frames is None else frames
+    weight = np.sqrt(problem.targets.weights[which])
+    residual = (posed.site_pos - problem.targets.keypoints_w[which]) * weight[..., None]
     jacobian = point_jacobian(problem.tree, posed, posed.site_pos, problem.tree.site_body)
     jacobian *= weight[..., None, None]
-    frames, unknowns = out.gradient.shape
-    out.add_rows(residual.reshape(frames, -1), jacobian.reshape(frames, -1, unknowns))
+    count, unknowns = out.gradient.shape
+    out.add_rows(residual.reshape(count, -1), jacobian.reshape(count, -1, unknowns))
     return np.asarray(0.5 * np.sum(residual**2, axis=(1, 2)))
 
 

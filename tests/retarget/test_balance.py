@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import nnls
 
 from robojackson.retarget import RetargetConfig, Robot, retarget
-from robojackson.retarget.balance import moment_points, support_shares
+from robojackson.retarget.balance import moment_points, support
 from robojackson.retarget.kinematics import centre_of_mass, pose, tree
 from robojackson.retarget.problem import Problem, Weights
 from robojackson.retarget.targets import Targets
@@ -23,13 +24,26 @@ BOTH, LEFT = np.array([[True, True]]), np.array([[True, False]])
     ],
 )
 def test_the_nearest_support_is_on_the_line_between_the_feet(point, touching, nearest):
-    shares = support_shares(np.array([point]), FEET, touching)
-    np.testing.assert_allclose(np.einsum("nc,nci->ni", shares, FEET)[0], nearest, atol=1e-12)
+    found = support(np.array([point]), FEET, touching)
+    np.testing.assert_allclose(found.nearest[0], nearest, atol=1e-12)
+    shared = np.einsum("nc,nci->ni", found.shares, FEET)[0]
+    np.testing.assert_allclose(shared, nearest, atol=1e-12)
+
+
+def test_the_nearest_point_of_four_soles_is_that_of_their_convex_hull(rng):
+    """Against a quadratic programme over the shares, solved by scipy."""
+    feet = rng.normal(size=(20, 4, 2))
+    points = 2 * rng.normal(size=(20, 2))
+    found = support(points, feet, np.ones((20, 4), bool))
+    for corners, point, nearest in zip(feet, points, found.nearest, strict=True):
+        matrix = np.vstack([corners.T, 1e4 * np.ones(4)])
+        shares, _ = nnls(matrix, np.append(point, 1e4))
+        np.testing.assert_allclose(nearest, corners.T @ shares, atol=1e-5)
 
 
 def test_a_body_in_the_air_has_no_support():
-    shares = support_shares(np.zeros((1, 2)), FEET, np.array([[False, False]]))
-    np.testing.assert_array_equal(shares, 0.0)
+    found = support(np.zeros((1, 2)), FEET, np.array([[False, False]]))
+    np.testing.assert_array_equal(found.shares, 0.0)
 
 
 def _distance_mm(motion, robot: Robot) -> float:

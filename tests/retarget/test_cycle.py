@@ -4,13 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from robojackson.errors import TrackTooShort
+from robojackson.mocap.skeleton import KEYPOINT_NAMES
 from robojackson.motion.smpl import SmplSequence
 from robojackson.retarget.cycle import CycleConfig, close, find_lap, heading, human_clip
 from tests.retarget.conftest import human
 
 CONFIG = CycleConfig()
+STRICT = CycleConfig(keep_share=0.95)
+"""Nearly the whole clip or nothing: no shorter lap inside it is looked for."""
 
 
 def _swaying(frames: int, period: int, drift: float = 0.0, yaw: float = 0.0) -> SmplSequence:
@@ -67,6 +71,35 @@ def test_cyclic_no_keeps_the_whole_clip():
 def test_a_body_that_turns_away_is_not_cyclic():
     _, lap = human_clip(_swaying(60, 30, yaw=np.pi / 60), 0.015, "auto", 1.0, CONFIG)
     assert lap is None
+
+
+def _with_an_arm_that_rises(degrees: float) -> SmplSequence:
+    """A sway of whole periods through which the left forearm turns by an angle."""
+    base = _swaying(60, 30)
+    elbow, wrist = (KEYPOINT_NAMES.index(f"left_{name}") for name in ("elbow", "wrist"))
+    points = base.keypoints_w.copy()
+    angle = np.radians(degrees) * np.linspace(0, 1, 60)
+    arm = points[:, wrist] - points[:, elbow]
+    turn = Rotation.from_rotvec(np.outer(angle, [1.0, 0.0, 0.0]))
+    points[:, wrist] = points[:, elbow] + turn.apply(arm)
+    return replace(base, keypoints_w=points)
+
+
+@pytest.mark.parametrize("degrees", [54.0, 108.0])
+def test_a_limb_that_does_not_come_back_makes_no_lap(degrees: float):
+    """APT1 and APT2 of the paper: such a jump was once looped and trained on."""
+    clip, lap = human_clip(_with_an_arm_that_rises(degrees), 0.015, "auto", 1.0, STRICT)
+    assert (clip.lap, lap) == (None, None)
+
+
+def test_a_limb_that_nearly_comes_back_is_closed():
+    clip, lap = human_clip(_with_an_arm_that_rises(8.0), 0.015, "auto", 1.0, STRICT)
+    assert lap is not None
+    elbow, wrist = (KEYPOINT_NAMES.index(f"left_{name}") for name in ("elbow", "wrist"))
+    arm = clip.keypoints_w[:, wrist] - clip.keypoints_w[:, elbow]
+    step = np.linalg.norm(np.diff(arm, axis=0), axis=1)
+    seam = np.linalg.norm(arm[0] - arm[-1])
+    assert seam <= 2.0 * step.max()
 
 
 def test_a_slow_drift_is_closed_on_the_spot_and_travel_is_kept():

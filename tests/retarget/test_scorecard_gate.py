@@ -111,7 +111,7 @@ def test_levitation_without_contact_labels_is_refused_too(robot: Robot):
 
 
 def test_a_card_without_figures_is_refused():
-    with pytest.raises(RejectedReference, match="nan_count"):
+    with pytest.raises(RejectedReference, match="no score card"):
         check({})
 
 

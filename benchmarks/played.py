@@ -1,0 +1,66 @@
+"""Cells that play: the flow, its tasks, processes, store and tables are real, the learning is not.
+
+A training burns or sleeps a number of seconds in a process of its own and leaves tables of one row.
+"""
+
+import json
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+from prefect import flow
+
+from storage import tables
+from storage.schemas import EPISODE_RECORD, EVALUATION_RECORD
+from tasks import judgement, train
+from tasks.judgement import ROLLOUT, SUMMARY, TABLE
+
+NAMES = {"run_id": "played", "move": "played", "setup": "played", "seed": 0}
+EPISODE = {**NAMES, "step": 1, "episode": 0, "episode_return": 1.0, "episode_length": 1}
+VERDICT = {"phase": 0, "reset": 0, "survived_s": 1.0, "fell": False, "clip_fraction": 1.0}
+ROLLOUTS = {**NAMES, **VERDICT, "policy": "trained", "success": 1.0, "strict_success": 0.0}
+BURN = "import time\nwhile time.process_time() < {seconds}: pass"
+SLEEP = "import time\ntime.sleep({seconds})"
+SAID = {"trainer": "none", "seed": 0, "steps": 1, "updates": 0, "stopped": "", "episodes": 1}
+MARK = "played-work"
+"""By which its processes are found."""
+
+
+@contextmanager
+def played(seconds: float, burn: bool) -> Iterator[None]:
+    """Let every training and judgement of this process be played.
+
+    Args:
+        seconds: That a training takes, of processor time if it burns; a judgement takes none.
+    """
+    code = (BURN if burn else SLEEP).format(seconds=seconds)
+
+    def command(*given: Any) -> list[str]:
+        work = Path(given[1])
+        (work / "policy.safetensors").write_bytes(given[4].encode())
+        rows = tables.encode_rows(EPISODE_RECORD, [EPISODE])
+        (work / "episodes.parquet").write_bytes(rows)
+        answer = json.dumps({**SAID, "seconds": seconds})
+        return [sys.executable, "-S", "-E", "-c", f"{code}\nprint({answer!r})", MARK]
+
+    async def judged(command: list[str], name: str, work: Path, limit_s: float | None) -> bytes:
+        (work / TABLE).write_bytes(tables.encode_rows(EVALUATION_RECORD, [ROLLOUTS]))
+        (work / SUMMARY).write_text(json.dumps({"survived_s": 1.0, "skill": 0.0}))
+        (work / ROLLOUT).write_bytes(name.encode())
+        return b""
+
+    with patch.object(train, "_command", command), patch.object(judgement, "run_process", judged):
+        yield
+
+
+@flow(name="nap")
+async def nap(seconds: float) -> None:
+    """A run on a worker that loads what a cell loads, and sleeps."""
+    import asyncio
+
+    import flows.cells  # noqa: F401
+
+    await asyncio.sleep(seconds)

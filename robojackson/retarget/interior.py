@@ -1,0 +1,165 @@
+"""Least squares in a box for many small problems at once: a primal-dual interior-point method.
+
+min |A x - b|^2 / 2 + prices x^2 / 2  with  lower <= x <= upper  (Nocedal and Wright, chapter 16.6).
+The unknowns are pushes, which are in all rows, and torques, each in one row of its own and taken
+out first. With `relax` the logarithmic barrier stays: mu sum(-log distance) belongs to the cost.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+_ITERATIONS = 40
+_CENTRING = 0.1
+_TO_THE_WALL = 0.98
+_ARRIVED = 1e-8  # mean product of a distance to a bound and its multiplier
+_STILL = 1e-5  # largest change of an unknown on the relaxed problem
+_FAR = 1e9  # a bound that is none
+
+
+@dataclass(frozen=True)
+class Box:
+    """Many problems, one a row.
+
+    Attributes:
+        columns: A of the pushes.
+        stiff: A of the torques, a diagonal under the six rows of the root.
+        target: b.
+        lower, upper: Bounds of pushes, then torques; infinite where there is none.
+        price: Of the squares of pushes, then torques.
+        relax: Weight of the barrier, mu.
+    """
+
+    columns: Float[np.ndarray, "S nv E"]
+    stiff: Float[np.ndarray, " J"]
+    target: Float[np.ndarray, "S nv"]
+    lower: Float[np.ndarray, "S n"]
+    upper: Float[np.ndarray, "S n"]
+    price: Float[np.ndarray, " n"]
+    relax: float = 0.0
+
+    @property
+    def edges(self) -> int:
+        """Number of pushes."""
+        return self.columns.shape[2]
+
+
+@dataclass(frozen=True)
+class Point:
+    """Unknowns and the multipliers of their bounds."""
+
+    x: Float[np.ndarray, "S n"]
+    low: Float[np.ndarray, "S n"]
+    high: Float[np.ndarray, "S n"]
+
+    def above(self, box: Box) -> np.ndarray:
+        """Distance to the lower bounds."""
+        return np.where(np.isfinite(box.lower), self.x - box.lower, _FAR)
+
+    def below(self, box: Box) -> np.ndarray:
+        """Distance to the upper bounds."""
+        return np.where(np.isfinite(box.upper), box.upper - self.x, _FAR)
+
+    def barrier(self, box: Box) -> Float[np.ndarray, "S n"]:
+        """Curvature of the bounds."""
+        return self.low / self.above(box) + self.high / self.below(box)
+
+
+def solve_box(box: Box) -> Point:
+    """The best unknowns of every row."""
+    x = np.zeros(box.lower.shape)
+    x[:, : box.edges] = 0.1
+    low, high = np.isfinite(box.lower) * 1.0, np.isfinite(box.upper) * 1.0
+    open_rows = np.arange(len(x))
+    for _ in range(_ITERATIONS):
+        part, here = _rows(box, open_rows), Point(x[open_rows], low[open_rows], high[open_rows])
+        gaps = _gaps(here, part)
+        there, moved = _advanced(here, part, gaps)
+        x[open_rows], low[open_rows], high[open_rows] = there.x, there.low, there.high
+        arrived = moved < _STILL if box.relax > 0.0 else gaps < _ARRIVED
+        arrived &= gaps < max(_ARRIVED, 1.01 * box.relax)
+        open_rows = open_rows[~arrived]
+        if not len(open_rows):
+            break
+    return Point(x, low, high)
+
+
+def _rows(box: Box, rows: np.ndarray) -> Box:
+    if len(rows) == len(box.target):
+        return box
+    return replace(
+        box,
+        columns=box.columns[rows],
+        target=box.target[rows],
+        lower=box.lower[rows],
+        upper=box.upper[rows],
+    )
+
+
+def left_over(box: Box, x: Float[np.ndarray, "S n"]) -> Float[np.ndarray, "S nv"]:
+    """b - A x."""
+    left = box.target - (box.columns @ x[:, : box.edges, None])[..., 0]
+    left[:, 6:] -= box.stiff * x[:, box.edges :]
+    return np.asarray(left)
+
+
+def value(box: Box, point: Point) -> Float[np.ndarray, " S"]:
+    """The cost, barrier included."""
+    squares = np.sum(left_over(box, point.x) ** 2, axis=1) + np.sum(box.price * point.x**2, axis=1)
+    walls = np.where(np.isfinite(box.lower), np.log(point.above(box)), 0.0)
+    walls += np.where(np.isfinite(box.upper), np.log(point.below(box)), 0.0)
+    return np.asarray(squares / 2 - box.relax * walls.sum(axis=1))
+
+
+def _gaps(point: Point, box: Box) -> Float[np.ndarray, " S"]:
+    """Mean complementarity of each row."""
+    products = point.above(box) * point.low + point.below(box) * point.high
+    bounds = np.isfinite(box.lower).sum(axis=1) + np.isfinite(box.upper).sum(axis=1)
+    return np.asarray(products.sum(axis=1) / np.maximum(bounds, 1))
+
+
+def _advanced(point: Point, box: Box, gaps: np.ndarray) -> tuple[Point, Float[np.ndarray, " S"]]:
+    """One primal-dual step of every row, and how far it wanted to go."""
+    above, below = point.above(box), point.below(box)
+    centre = np.maximum(_CENTRING * gaps, box.relax)[:, None]
+    push_low = np.isfinite(box.lower) * (centre / above)
+    push_high = np.isfinite(box.upper) * (centre / below)
+    barrier = point.low / above + point.high / below
+    dx = _newton(box, barrier, push_low - push_high - _gradient(box, point.x))
+    d_low = push_low - point.low - point.low / above * dx
+    d_high = push_high - point.high + point.high / below * dx
+    share = np.minimum.reduce(
+        [_room(above, dx), _room(below, -dx), _room(point.low, d_low), _room(point.high, d_high)]
+    )[:, None]
+    there = Point(point.x + share * dx, point.low + share * d_low, point.high + share * d_high)
+    return there, np.abs(dx).max(axis=1)
+
+
+def _room(value: np.ndarray, change: np.ndarray) -> np.ndarray:
+    """Largest share of a change, at most all of it, that keeps every value positive."""
+    falling = (change < 0) & (value > 0)
+    ratio = np.where(falling, -value / np.where(falling, change, 1.0), np.inf)
+    return np.asarray(np.minimum(1.0, _TO_THE_WALL * ratio.min(axis=1)))
+
+
+def _gradient(box: Box, x: np.ndarray) -> np.ndarray:
+    left = left_over(box, x)
+    pushes = (box.columns.swapaxes(1, 2) @ left[..., None])[..., 0]
+    return np.concatenate([-pushes, -box.stiff * left[:, 6:]], axis=1) + box.price * x
+
+
+def _newton(box: Box, barrier: np.ndarray, right: np.ndarray) -> np.ndarray:
+    edges, stiff = box.edges, box.stiff
+    own = stiff**2 + box.price[edges:] + barrier[:, edges:]
+    weight = np.ones(box.target.shape)
+    weight[:, 6:] = 1.0 - stiff**2 / own
+    turned = box.columns.swapaxes(1, 2)
+    matrix = turned @ (weight[..., None] * box.columns)
+    unit = np.arange(edges)
+    matrix[:, unit, unit] += box.price[:edges] + barrier[:, :edges]
+    shared = stiff * right[:, edges:] / own
+    reduced = right[:, :edges] - (turned[:, :, 6:] @ shared[..., None])[..., 0]
+    pushes = np.linalg.solve(matrix, reduced[..., None])[..., 0]
+    pulled = (box.columns[:, 6:] @ pushes[..., None])[..., 0]
+    return np.concatenate([pushes, (right[:, edges:] - stiff * pulled) / own], axis=1)

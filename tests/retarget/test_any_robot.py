@@ -1,0 +1,120 @@
+"""A robot that nobody knew, by its description alone: ankles, soles, servos, clashing names."""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+
+from robojackson.errors import BadConfiguration, UnknownName
+from robojackson.motion.reference import ReferenceMotion
+from robojackson.motion.smpl import PLANTED
+from robojackson.retarget import RetargetConfig, Robot, load_robot, retarget
+from robojackson.retarget.config import RepairConfig
+from robojackson.retarget.kinematics import pose, tree
+from tests.retarget import machine
+from tests.retarget.conftest import human
+
+
+@pytest.fixture(scope="module")
+def description(tmp_path_factory: pytest.TempPathFactory):
+    return machine.description(tmp_path_factory.mktemp("machine"))
+
+
+@pytest.fixture(scope="module")
+def small(description) -> Robot:
+    return load_robot(description)
+
+
+@pytest.fixture(scope="module")
+def motion(small: Robot) -> ReferenceMotion:
+    config = RetargetConfig(tempo=1.0, repair=RepairConfig(enough_share=0.0))
+    return retarget(human("walk"), small, config)
+
+
+def test_a_site_of_the_mjcf_with_a_keypoints_name_keeps_its_place_and_its_sensor(small: Robot):
+    model = small.model
+    own = model.sensor_objid[0]
+    np.testing.assert_allclose(model.site_pos[own], [0.03, 0.0, -0.03])
+    assert own not in small.keypoint_sites
+
+
+def test_the_mass_and_the_hinges_are_those_of_the_mjcf(small: Robot):
+    plain = machine.plain_model()
+    np.testing.assert_array_equal(small.model.body_mass, plain.body_mass)
+    np.testing.assert_array_equal(small.model.jnt_range, plain.jnt_range)
+
+
+def test_a_floor_is_added_where_there_is_none(small: Robot):
+    assert (small.model.geom_type == int(mujoco.mjtGeom.mjGEOM_PLANE)).sum() == 1
+
+
+@pytest.mark.parametrize(
+    ("joint", "limit"),
+    [("left_knee", 40.0), ("waist", 30.0), ("left_elbow", 7.0), ("left_hip_yaw", np.inf)],
+)
+def test_torque_limits_of_servos_bounded_joints_and_descriptions(small, joint, limit):
+    """Force range of a servo; the joint's own bound under gear x range = 100; by pattern; none."""
+    assert small.torque_limit[small.joint_names.index(joint)] == limit
+
+
+def test_a_pattern_that_means_no_joint_lists_the_joints(description):
+    with pytest.raises(UnknownName, match=r"\*_tail.*torque_limits.*left_elbow"):
+        load_robot(replace(description, torque_limits={"*_tail": 1.0}))
+
+
+def test_soles_that_are_not_level_at_rest_are_told_with_their_heights(description):
+    rest = dict(description.rest_pose) | {"*_ankle_pitch": 0.3}
+    with pytest.raises(BadConfiguration, match=r"soles are not level.*left_heel_in \d+"):
+        load_robot(replace(description, rest_pose=rest))
+
+
+def test_a_contact_on_another_body_than_its_keypoint_is_refused(description):
+    ball = replace(description.contacts["left_toe_in"], body="left_shin")
+    contacts = dict(description.contacts) | {"left_toe_in": ball}
+    with pytest.raises(BadConfiguration, match=r"left_foot is on 'left_sole', not 'left_shin'"):
+        load_robot(replace(description, contacts=contacts))
+
+
+def test_one_toe_without_the_other_is_refused(description):
+    sites = {key: site for key, site in description.sites.items() if key != "right_toe"}
+    with pytest.raises(BadConfiguration, match="missing right_toe"):
+        load_robot(replace(description, sites=sites, weights={}))
+
+
+def test_balls_are_at_their_offsets_whatever_the_pose(small: Robot, rng: np.random.Generator):
+    qpos = small.standing
+    qpos[7:] = rng.uniform(small.lower, small.upper)
+    data = mujoco.MjData(small.model)
+    data.qpos[:] = qpos
+    mujoco.mj_kinematics(small.model, data)
+    expected = [
+        data.body(ball.body).xpos + data.body(ball.body).xmat.reshape(3, 3) @ ball.offset
+        for ball in small.description.contacts.values()
+    ]
+    np.testing.assert_allclose(pose(tree(small), qpos[None]).ball_pos[0], expected, atol=1e-12)
+
+
+def test_the_walk_keeps_all_hard_bars(motion: ReferenceMotion):
+    card = motion.scorecard
+    assert card["limit_violations"] == 0
+    assert card["floor_penetration_mm"] <= 5
+    assert card["self_penetration_mm"] <= 5
+    assert card["speed_over_limit"] <= 1
+
+
+def test_the_walk_is_followed_to_a_tenth_of_the_leg(motion: ReferenceMotion):
+    assert motion.scorecard["keypoint_mm"] < 55
+    assert motion.scorecard["planted_share"] > 0.5
+
+
+def test_a_foot_that_stands_on_all_corners_is_flat(motion: ReferenceMotion, small: Robot):
+    data, tilts = mujoco.MjData(small.model), []
+    left = [name.startswith("left") for name in motion.contact_names]
+    for qpos, contact in zip(motion.qpos, motion.contact, strict=True):
+        if (contact[left] == PLANTED).all():
+            data.qpos[:] = qpos
+            mujoco.mj_kinematics(small.model, data)
+            tilts.append(np.degrees(np.arccos(data.body("left_sole").xmat[8])))
+    assert len(tilts) > 3
+    assert np.mean(tilts) < 3.0

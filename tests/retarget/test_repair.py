@@ -1,0 +1,67 @@
+"""The dynamics term has the gradient it claims, and repair makes motions feasible."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from robojackson.retarget import RetargetConfig, Robot, repair, retarget
+from robojackson.retarget.banded import Normal
+from robojackson.retarget.cycle import human_clip
+from robojackson.retarget.kinematics import integrate, pose
+from robojackson.retarget.problem import Problem
+from robojackson.retarget.targets import targets
+from tests.retarget.conftest import human, robot_motion
+
+UNREPAIRED = replace(RetargetConfig().repair, weights=())
+
+
+def _problem(robot: Robot) -> Problem:
+    clip, _ = human_clip(human("walk"), 0.015, "auto", 1.0, RetargetConfig().cycle)
+    weights = replace(RetargetConfig().weights, dynamics=0.1)
+    return Problem.of(robot, targets(clip, robot), weights)
+
+
+def _term(problem: Problem, qpos: np.ndarray) -> Normal:
+    out = Normal.empty(len(qpos), qpos.shape[1] - 1)
+    repair.add_dynamics(problem, qpos, pose(problem.tree, qpos), out)
+    return out
+
+
+def test_the_terms_gradient_is_that_of_its_cost(robot: Robot, rng: np.random.Generator):
+    problem, qpos = _problem(robot), robot_motion("walk").qpos
+    here = _term(problem, qpos)
+    for _ in range(3):
+        way = rng.normal(size=here.gradient.shape)
+        ahead, back = (_term(problem, integrate(qpos, s * 1e-7 * way)).cost for s in (1, -1))
+        slope = float(np.sum(here.gradient * way))
+        usual = np.linalg.norm(here.gradient)  # of the slope along a random way
+        assert (ahead - back) / 2e-7 == pytest.approx(slope, abs=0.05 * usual)
+
+
+def test_the_slopes_of_inverse_dynamics_are_its_differences(robot: Robot):
+    problem, qpos = _problem(robot), robot_motion("walk").qpos[:4]
+    zero = np.zeros((4, robot.model.nv))
+    from robojackson.retarget.dynamics import inverse, unconstrained
+
+    model = unconstrained(problem.robot)
+    slopes = repair.inverse_slopes(model, qpos, zero, zero)
+    nudge = zero.copy()
+    nudge[:, 12] = 1e-6
+    rise = (inverse(model, integrate(qpos, nudge), zero, zero) - slopes.force) / 1e-6
+    np.testing.assert_allclose(slopes.position[:, :, 12], rise, atol=1e-3)
+
+
+def test_repair_makes_a_walk_feasible_that_was_not(robot: Robot):
+    config = RetargetConfig(repair=UNREPAIRED)
+    before, after = retarget(human("walk"), robot, config), robot_motion("walk")
+    assert before.scorecard["infeasible_share"] > 0.1
+    assert after.scorecard["infeasible_share"] <= 0.05
+    assert after.scorecard["keypoint_mm"] <= before.scorecard["keypoint_mm"] + 5.0
+
+
+def test_a_motion_that_is_feasible_is_left_alone(robot: Robot):
+    config = RetargetConfig(repair=UNREPAIRED)
+    np.testing.assert_array_equal(
+        retarget(human("hip_shake"), robot, config).qpos, robot_motion("hip_shake").qpos
+    )
