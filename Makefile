@@ -3,6 +3,12 @@
 #   make dance    the hip-shake clip, from video to a dancing robot (ARGS="--minutes 5" and others)
 #   make test     all tests (ARGS="tests/mocap -x")
 #   make bench    accuracy of the mocap stage against ground truth, cost of judging a clip
+#   make bench-mocap  the first of the two alone, writes benchmarks/results/mocap.json and .md
+#   make bench-retarget  our solver beside the paper's mapping and mink (pip install -e '.[bench]')
+#   make bench-learning  speed beside sb3-contrib and bare MuJoCo, policies judged (hours; resumable)
+#   make bench-orchestration  what Prefect costs around the work (PostgreSQL and a server are started)
+#   make chaos    20 studies whose processes, services, disk and wires are cut at random moments
+#   make deploy   pools, deployments and automations on the server of PREFECT_API_URL
 #   make lint     ruff and mypy
 #   make doctor   what is installed and what is missing
 #   make clean    remove the environment and all caches; the store stays
@@ -14,7 +20,7 @@ PY := .venv/bin/python
 ARGS ?=
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: dance test bench lint doctor clean setup
+.PHONY: dance test bench bench-learning bench-mocap bench-retarget chaos bench-orchestration deploy lint doctor clean setup
 .DEFAULT_GOAL := dance
 
 setup:
@@ -26,9 +32,27 @@ dance: setup
 test: setup
 	@$(PY) -m pytest -q $(ARGS)
 
+bench-mocap: setup
+	@$(PY) -m benchmarks.mocap $(ARGS)
+
+bench-retarget: setup
+	@$(PY) -m benchmarks.retarget $(ARGS)
+
 bench: setup
 	@$(PY) -m benchmarks.mocap $(ARGS)
 	@$(PY) -m benchmarks.search
+
+bench-learning: setup
+	@$(PY) -m benchmarks.learning $(ARGS)
+
+bench-orchestration: setup
+	@$(PY) -m benchmarks.orchestration $(ARGS)
+
+chaos: setup
+	@$(PY) -m tools.chaos --trials 20 --seed 0 $(ARGS)
+
+deploy: setup
+	@.venv/bin/robojackson deploy $(ARGS)
 
 lint: setup
 	@$(PY) -m ruff check .

@@ -16,20 +16,27 @@ from typing import Annotated, Literal
 import typer
 
 from flows.console import USAGE_ERROR, Answer, command, complain, log_to_stderr, misused
+from flows.formats import export, import_
+from flows.learning import evaluate, pretrain, train
 from flows.options import (
     Config,
     Folder,
+    Force,
     Json,
     Minutes,
+    Person,
+    Quality,
     Robot,
     Seed,
     Set,
-    SetTrain,
     Trainer,
-    TrainMinutes,
+    Weights,
     chosen,
+    quoted,
 )
+from flows.robots import robots
 from flows.search import catalogue, find, refresh
+from flows.studies import ablation, deploy, metrics
 
 app = typer.Typer(
     name="robojackson",
@@ -52,9 +59,12 @@ def dance(
     robot: Annotated[str | None, typer.Option("--robot", help="Name of a robot.")] = None,
     trainer: Trainer = None,
     seed: Seed = None,
+    person: Person = None,
+    quality: Quality = None,
     start: Annotated[float | None, typer.Option(min=0, help="Trim: begin here, seconds.")] = None,
     end: Annotated[float | None, typer.Option(min=0, help="Trim: end here, seconds.")] = None,
     config: Config = "base",
+    force: Force = False,
     set_: Set = None,
     as_json: Json = False,
 ) -> Answer:
@@ -66,7 +76,9 @@ def dance(
 
     found = None if is_name(source) else resolve(source)
     given = {"minutes": minutes, "robot": robot, "train.trainer": trainer, "train.seed": seed}
-    overrides = chosen(set_, given)
+    overrides = chosen(set_, given | {"dancer.number": person, "detector": quality})
+    if force:
+        overrides["gate"] = False
     settings = settle(config, overrides)
     if found is not None:
         look_at(found, settings, start, end)
@@ -83,23 +95,25 @@ def dance(
     return Answer(made, text=text)
 
 
-for searching in (find, refresh, catalogue):
-    app.command()(searching)
+app.add_typer(robots, name="robots")
+for other in (find, refresh, catalogue, ablation, metrics, deploy):
+    app.command()(other)
 
 
 @app.command()
 @command
 def score(
     video: Annotated[list[Path], typer.Argument(help="Videos, or folders of them.")],
+    person: Person = None,
     config: Config = "base",
     set_: Set = None,
     as_json: Json = False,
 ) -> Answer:
     """How steady the dancer is seen (Algorithm 1): missing joints plus jitter, lowest is best."""
-    from flows import single
+    from flows import scoring
 
     log_to_stderr()
-    return Answer(single.score(video, config, chosen(set_)))
+    return Answer(scoring.score(video, config, chosen(set_, {"dancer.number": person})))
 
 
 @app.command()
@@ -107,6 +121,16 @@ def score(
 def mocap(
     video: Annotated[Path, typer.Argument(help="A video of one person.")],
     out: Folder,
+    hybrik: Weights = None,
+    niki: Weights = None,
+    person: Person = None,
+    quality: Quality = None,
+    people: Annotated[
+        bool, typer.Option("--people", help="Only list who is there, with a picture.")
+    ] = False,
+    hypotheses: Annotated[
+        int, typer.Option(min=0, max=100, help="Also sample what hidden limbs may do: smpl_1...")
+    ] = 0,
     config: Config = "base",
     set_: Set = None,
     as_json: Json = False,
@@ -115,7 +139,14 @@ def mocap(
     from flows import single
 
     log_to_stderr()
-    return Answer(single.mocap(video, out, config, chosen(set_)))
+    if people:
+        from flows.people import list_people
+
+        told, lines = list_people(video, out, config, chosen(set_))
+        return Answer(told, text=lines)
+    brought = {"network.hybrik": quoted(hybrik), "network.niki": quoted(niki)}
+    overrides = chosen(set_, {**brought, "dancer.number": person, "detector": quality})
+    return Answer(single.mocap(video, out, config, overrides, hypotheses))
 
 
 @app.command()
@@ -125,18 +156,21 @@ def retarget(
     out: Folder,
     robot: Robot = "humanoid",
     method: Annotated[
-        Literal["optimise", "paper"] | None, typer.Option(help="Ours, or the paper's Table I.")
+        Literal["optimise", "paper", "framefix"] | None,
+        typer.Option(help="Ours, the paper's Table I, or that with its axes corrected."),
     ] = None,
     video: Annotated[
         bool, typer.Option("--video", help="Also draw it: a video, the contacts, the torques.")
     ] = False,
     config: Config = "base",
+    force: Force = False,
     set_: Set = None,
     as_json: Json = False,
 ) -> Answer:
     """The same motion for a robot: reference.parquet and scorecard.json."""
     from flows import single
 
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
     log_to_stderr()
     overrides = chosen(set_, {"retarget.method": method})
     made = single.retarget(smpl, out, robot, config, overrides)
@@ -144,75 +178,16 @@ def retarget(
         from flows.look import look
 
         made |= look(smpl, out, config, overrides)
+    if not force:
+        single.gate(made["scorecard"], out, config, overrides)
     return Answer(made)
 
 
-@app.command()
-@command
-def export(
-    reference: Annotated[Path, typer.Argument(help="reference.parquet of `robojackson retarget`.")],
-    to: Annotated[
-        Literal["gmr", "csv", "beyondmimic", "locomujoco", "omniretarget", "keyframes"],
-        typer.Option(help="The format; docs/formats.md says who reads it."),
-    ],
-    out: Annotated[Path, typer.Option("-o", "--out", help="File for the result.")],
-    as_json: Json = False,
-) -> Answer:
-    """The robot's motion in the file format of another project."""
-    from flows import export as exporting
-
-    log_to_stderr()
-    return Answer(exporting.export(reference, to, out))
-
-
-@app.command()
-@command
-def train(
-    reference: Annotated[Path, typer.Argument(help="reference.parquet of `robojackson retarget`.")],
-    out: Folder,
-    trainer: Trainer = None,
-    steps: Annotated[int | None, typer.Option(min=1, help="Control steps in all.")] = None,
-    minutes: TrainMinutes = None,
-    seed: Seed = None,
-    setup: Annotated[
-        str | None, typer.Option(help="Path of a training configuration, or setups/NAME.")
-    ] = None,
-    run_id: Annotated[str, typer.Option(help="Name of the run in the tables.")] = "",
-    move: Annotated[str, typer.Option(help="Name of the dance in the tables.")] = "",
-    parent: Annotated[int, typer.Option(hidden=True, help="End with this process.")] = 0,
-    set_: SetTrain = None,
-    as_json: Json = False,
-) -> Answer:
-    """Teach the robot the motion: policy.safetensors and episodes.parquet; resumes by itself."""
-    from flows import training
-
-    if parent:
-        training.die_with(parent)
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
-    log_to_stderr()
-    given = {"trainer": trainer, "steps": steps, "minutes": minutes, "seed": seed}
-    return Answer(training.train(reference, out, setup, chosen(set_, given), run_id, move))
-
-
-@app.command()
-@command
-def evaluate(
-    policy: Annotated[Path, typer.Argument(help="policy.safetensors of `robojackson train`.")],
-    reference: Annotated[Path, typer.Argument(help="The reference.parquet it was trained on.")],
-    seconds: Annotated[float | None, typer.Option(min=0.1, help="Length of a rollout, s.")] = None,
-    out: Annotated[Path | None, typer.Option("-o", "--out", help="Folder for the tables.")] = None,
-    config: Config = "base",
-    set_: Set = None,
-    as_json: Json = False,
-) -> Answer:
-    """Judge a policy on stock physics from many starts, beside baselines that do not dance."""
-    from flows import single
-
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
-    log_to_stderr()
-    overrides = chosen(set_, {"evaluate.seconds": seconds})
-    judged = single.evaluate(policy, reference, out, config, overrides)
-    return Answer(judged, text=single.verdict_lines(judged))
+app.command("import")(import_)
+app.command()(export)
+app.command()(train)
+app.command()(pretrain)
+app.command()(evaluate)
 
 
 @app.command()

@@ -16,17 +16,14 @@ from typing import Any, ParamSpec
 import numpy as np
 import typer
 from pydantic import ValidationError
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from flows.bars import bar as bar
 from robojackson.errors import RoboJacksonError
 
 P = ParamSpec("P")
 INTERRUPTED = 130
 USAGE_ERROR: Any = typer.BadParameter.__bases__[0]
 """What typer raises for words that it does not understand; it has no public name there."""
-STEPS_WITHOUT_TERMINAL = 4
-"""Progress lines of a bar that goes to a file instead of a terminal."""
 
 log = logging.getLogger("robojackson")
 
@@ -142,19 +139,6 @@ def same_command() -> str:
 
 
 @contextmanager
-def bar(label: str) -> Iterator[Callable[[int, int], None]]:
-    """A progress bar on stderr; a few lines where stderr is no terminal."""
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        yield _plain_bar(label)
-        return
-    columns = (TextColumn(label), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True) as progress:
-        task = progress.add_task(label)
-        yield lambda done, total: progress.update(task, completed=done, total=total)
-
-
-@contextmanager
 def ticker() -> Iterator[Callable[[str], None]]:
     """A line on stderr that replaces itself; line after line where there is no terminal."""
     live = sys.stderr.isatty()
@@ -197,22 +181,10 @@ def stdout_is_stderr() -> Iterator[None]:
         os.close(saved)
 
 
-def _plain_bar(label: str) -> Callable[[int, int], None]:
-    told = 0
-
-    def advance(done: int, total: int) -> None:
-        nonlocal told
-        share = done * STEPS_WITHOUT_TERMINAL // max(total, 1)
-        if share > told:
-            told = share
-            log.info("%s %d/%d", label, done, total)
-
-    return advance
-
-
 def complain(line: str) -> None:
     """One line of cause on stderr."""
-    sys.stderr.write(f"robojackson: {' '.join(line.split())}\n")
+    plain_text = "".join(c if c.isprintable() else "?" for c in " ".join(line.split()))
+    sys.stderr.write(f"robojackson: {plain_text}\n")
 
 
 def misused(cause: Any) -> str:

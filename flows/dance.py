@@ -17,12 +17,12 @@ from typing import Any
 from prefect import flow, unmapped
 from prefect.artifacts import acreate_table_artifact
 from prefect.logging import get_run_logger
-from prefect.task_runners import ThreadPoolTaskRunner
 
 from configs.loader import load
 from configs.pipeline import PipelineConfig
 from flows import console
 from flows.orphans import none_left
+from flows.scorers import scorers
 from flows.single import VERDICT
 from flows.tracebacks import without_tracebacks
 from robojackson.clips.stability import Stability
@@ -36,6 +36,7 @@ from storage.store import Store
 from tasks.evaluate import evaluate
 from tasks.landmarks import landmarks
 from tasks.mocap import mocap
+from tasks.network_mocap import network_mocap
 from tasks.page import page
 from tasks.probe import SourceFile, probe
 from tasks.retarget import retarget
@@ -44,7 +45,6 @@ from tasks.train import RunLabels, train
 from tasks.video import video
 
 Artifacts = dict[str, Artifact]
-SCORERS: ThreadPoolTaskRunner[Any] = ThreadPoolTaskRunner(max_workers=2)
 LAST_STAGES_MINUTES = 1.5
 """What evaluation, video and page take; training ends early rather than run into it."""
 
@@ -86,7 +86,7 @@ def run(
         raise console.Interrupted(f"resume: {console.same_command()}") from None
 
 
-@flow(name="dance", flow_run_name="dance-{source}", task_runner=SCORERS)  # type: ignore[arg-type]
+@flow(name="dance", flow_run_name="dance-{source}", task_runner=scorers())
 async def dance(
     source: str,
     config: str = "base",
@@ -130,6 +130,7 @@ async def score_all(
         [clip["video"] for _, clip in named],
         [clip["info"] for _, clip in named],
         unmapped(settings.scoring_detector),
+        unmapped(settings.dancer if settings.dancer.number else None),
     )
     scored = _gathered(stability.map(tracks, unmapped(settings.stability)))
     store = Store.from_environment()
@@ -163,8 +164,11 @@ async def perform(
     began: float,
 ) -> Artifacts:
     """Every stage after the choice, in order."""
-    track = landmarks(best.clip["video"], best.clip["info"], settings.detector)
-    sequence = mocap(track, settings.mocap)
+    track = landmarks(best.clip["video"], best.clip["info"], settings.detector, settings.dancer)
+    if settings.network.hybrik:
+        sequence = network_mocap(best.clip["video"], track, settings.network, settings.mocap)
+    else:
+        sequence = mocap(track, settings.mocap)
     moved = retarget(sequence, robot, settings.retarget)
     reference = moved["reference"]
     if settings.gate:

@@ -6,6 +6,8 @@ import sys
 from importlib.metadata import PackageNotFoundError, distributions, version
 from typing import Any
 
+from robojackson.clips import javascript
+
 GRAPHICS = {
     "libEGL.so.1": "libegl1",
     "libGLESv2.so.2": "libgles2",
@@ -56,12 +58,15 @@ def examine() -> dict[str, Any]:
     ]
     optional = [f"{name}: {how}" for name, how in OPTIONAL.items() if packages[name] is None]
     optional += [words for size, words in models.items() if words and size not in NEEDED_MODELS]
+    engine = javascript.usable()
+    optional += [] if engine else [javascript.ADVICE]
     return {
         "ok": not missing,
         "python": sys.version.split()[0],
         "packages": packages,
         "libraries": libraries,
         "models": {size: not words for size, words in models.items()},
+        "javascript": engine,
         "ffmpeg": bool(shutil.which("ffmpeg")) or installed("imageio-ffmpeg") is not None,
         "missing": missing,
         "optional": optional,

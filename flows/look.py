@@ -1,4 +1,4 @@
-"""Pictures of a retargeting, from files to files: a video, the contacts and the torques."""
+"""Pictures of a retargeting, from files to files: a video, contacts, torques, feasibility."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,6 +9,7 @@ from flows import console, single
 from storage.store import Store
 
 VIDEO, CONTACTS, TORQUES = "retarget.mp4", "contacts.png", "torques.png"
+FEASIBILITY = "feasibility.png"
 
 
 def look(smpl: Path, out: Path, config: str, overrides: Mapping[str, Any]) -> dict[str, Any]:
@@ -21,6 +22,7 @@ def look(smpl: Path, out: Path, config: str, overrides: Mapping[str, Any]) -> di
     from robojackson.motion.reference import ReferenceMotion
     from robojackson.motion.smpl import SmplSequence
     from robojackson.report import plots
+    from robojackson.report.feasibility_plot import feasibility_strip
     from robojackson.report.pair import human_beside_robot
 
     settings = load(PipelineConfig, config, overrides)
@@ -31,13 +33,13 @@ def look(smpl: Path, out: Path, config: str, overrides: Mapping[str, Any]) -> di
     store = Store(out)
     store.put(CONTACTS, plots.png(plots.contact_strip(sequence, reference)))
     store.put(TORQUES, plots.png(plots.torque_heat_map(reference, motors)))
+    drawn = {"contacts": str(out / CONTACTS), "torques": str(out / TORQUES)}
+    if reference.certificate is not None:
+        store.put(FEASIBILITY, plots.png(feasibility_strip(reference)))
+        drawn["feasibility"] = str(out / FEASIBILITY)
     with console.bar("video") as progress:
         human_beside_robot(
             sequence, reference, out / VIDEO, model=robot.model, config=settings.show,
             progress=progress,
         )  # fmt: skip
-    return {
-        "video": str(out / VIDEO),
-        "contacts": str(out / CONTACTS),
-        "torques": str(out / TORQUES),
-    }
+    return {"video": str(out / VIDEO), **drawn}

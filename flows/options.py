@@ -15,7 +15,18 @@ Set = Annotated[
 SetTrain = Annotated[
     list[str] | None, typer.Option("--set", help="Change one value: --set seed=3.")
 ]
+Force = Annotated[bool, typer.Option("--force", help="Go on with a motion that the gate refuses.")]
 Folder = Annotated[Path, typer.Option("-o", "--out", help="Folder for the results.")]
+Weights = Annotated[
+    Path | None, typer.Option(help="Published weights that you bring (docs/official_weights.md).")
+]
+Person = Annotated[
+    int | None, typer.Option(min=1, help="Whom to follow of several people; 1 is the largest.")
+]
+Quality = Annotated[
+    Literal["lite", "full", "heavy", "best"] | None,
+    typer.Option(help="Pose model; best: full and heavy vote, at a third of the speed."),
+]
 Robot = Annotated[str, typer.Option("--robot", help="Name of a robot of configs/robots.")]
 Trainer = Annotated[
     Literal["sbx", "sb3"] | None, typer.Option(help="sbx (JAX, fast) or sb3 (the reference).")
@@ -37,3 +48,8 @@ def chosen(pairs: list[str] | None, given: dict[str, Any] | None = None) -> dict
             raise BadConfiguration(f"--set {pair}: expected KEY=VALUE; --help has an example")
         overrides[key] = value
     return overrides
+
+
+def quoted(path: Path | None) -> str | None:
+    """A path as a value that YAML reads as text, whatever is in it."""
+    return None if path is None else "'" + str(path).replace("'", "''") + "'"

@@ -133,7 +133,7 @@ def motion(store: Store, video: Artifact, settings: PipelineConfig) -> Facts:
     """Mocap and retargeting of a video: what a training starts from."""
     with store.local(video) as path:
         clip = probe(SourceFile(path, video.sha256), settings.video, None, None)
-    track = landmarks(clip["video"], clip["info"], settings.detector)
+    track = landmarks(clip["video"], clip["info"], settings.detector, settings.dancer)
     sequence = mocap(track, settings.mocap)
     robot = load(RobotDescription, f"robots/{settings.robot}")
     moved = retarget(sequence, robot, settings.retarget)

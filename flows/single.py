@@ -8,7 +8,6 @@ import json
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -19,7 +18,6 @@ from flows import console
 from robojackson.errors import (
     NoPersonFound,
     RejectedReference,
-    RoboJacksonError,
     StoreError,
     TrackTooShort,
 )
@@ -27,7 +25,6 @@ from storage import tables
 from storage.store import Store
 
 if TYPE_CHECKING:
-    from robojackson.clips.video import VideoInfo, VideoLimits
     from robojackson.motion.reference import ReferenceMotion
     from robojackson.motion.smpl import SmplSequence
     from robojackson.retarget.robot import Robot
@@ -37,54 +34,41 @@ Overrides = Mapping[str, Any]
 Value = TypeVar("Value")
 
 
-def score(videos: list[Path], config: str, overrides: Overrides) -> Figures:
-    """Algorithm 1 for every video; one without a person is an answer, not an error.
-
-    One that cannot be read is told beside the others' scores, and is an error where it is alone.
-    """
+def mocap(
+    video: Path, out: Path, config: str, overrides: Overrides, hypotheses: int = 0
+) -> Figures:
+    """landmarks.parquet and smpl.parquet of a video, smpl_1.parquet... of what else it allows."""
     from configs.pipeline import PipelineConfig
-    from robojackson.clips.landmarks import detect
-    from robojackson.clips.stability import stability
-
-    settings = load(PipelineConfig, config, overrides)
-    infos, found = _readable(videos, settings.video)
-    for info in infos:
-        video = info.path
-        with console.bar(video.name) as progress:
-            track = detect(video, info, settings.scoring_detector, progress)
-        scored = stability(track, settings.stability)
-        found.append({"video": str(video), "fps": info.fps, **asdict(scored)})
-        if not scored.detected:
-            found[-1]["note"] = f"no person found in {len(track)} of {len(track)} frames"
-    return {"videos": found}
-
-
-def mocap(video: Path, out: Path, config: str, overrides: Overrides) -> Figures:
-    """landmarks.parquet and smpl.parquet of a video."""
-    from configs.pipeline import PipelineConfig
-    from robojackson.clips.landmarks import detect
+    from flows.hypotheses import imagined, names_of
+    from flows.network import mover
     from robojackson.clips.video import probe
-    from robojackson.mocap.recover import recover
+    from robojackson.mocap.seen import see
 
     began = time.monotonic()
     settings = load(PipelineConfig, config, overrides)
+    names = names_of(settings, hypotheses)
     info = probe(video, settings.video)
+    to_motion = mover(video, settings)
     with results_in(out) as store:
         with console.bar(f"landmarks of {video.name}") as progress:
-            track = detect(video, info, settings.detector, progress)
+            track = see(video, info, settings.detector, settings.dancer, progress)
         try:
-            sequence = recover(track, settings.mocap)
+            sequence = to_motion(track)
         except (NoPersonFound, TrackTooShort) as cause:
             raise type(cause)(f"{video}: {cause}") from cause
         store.put("landmarks.parquet", tables.encode(track))
         store.put("smpl.parquet", tables.encode(sequence))
+        for name, other in imagined(track, settings, hypotheses):
+            store.put(name, tables.encode(other))
     return {
         "video": str(video),
         "smpl": str(out / "smpl.parquet"),
+        "hypotheses": [str(out / name) for name in names],
         "landmarks": str(out / "landmarks.parquet"),
         "frames": len(sequence),
         "fps": sequence.fps,
         "detected": int(track.detected.sum()),
+        "person": track.person,
         "floor": _floor(sequence),
         "contact_share": _contact_share(sequence),
         "notes": list(sequence.notes),
@@ -93,10 +77,11 @@ def mocap(video: Path, out: Path, config: str, overrides: Overrides) -> Figures:
 
 
 def retarget(smpl: Path, out: Path, robot: str, config: str, overrides: Overrides) -> Figures:
-    """reference.parquet and scorecard.json of a motion."""
+    """reference.parquet and scorecard.json of a motion, good or bad; `gate` tells which."""
     from configs.pipeline import PipelineConfig
     from robojackson.motion.smpl import SmplSequence
     from robojackson.retarget.motion import retarget as to_robot
+    from robojackson.retarget.scorecard import told
 
     began = time.monotonic()
     settings = load(PipelineConfig, config, overrides)
@@ -105,7 +90,7 @@ def retarget(smpl: Path, out: Path, robot: str, config: str, overrides: Override
     with results_in(out) as store:
         reference = to_robot(sequence, machine, settings.retarget)
         store.put("reference.parquet", tables.encode(reference))
-        scorecard = console.plain(dict(reference.scorecard))
+        scorecard = console.plain(told(reference))
         store.put("scorecard.json", json.dumps(scorecard, indent=1).encode())
     return {
         "reference": str(out / "reference.parquet"),
@@ -117,6 +102,23 @@ def retarget(smpl: Path, out: Path, robot: str, config: str, overrides: Override
         "scorecard": scorecard,
         "seconds": time.monotonic() - began,
     }
+
+
+def gate(scorecard: Figures, out: Path, config: str, overrides: Overrides) -> None:
+    """Refuse a motion that training cannot follow; what was written of it stays.
+
+    Raises:
+        RejectedReference: the message names the figure and what would mend it.
+    """
+    from configs.pipeline import PipelineConfig
+    from robojackson.retarget.scorecard import check
+
+    if not load(PipelineConfig, config, overrides).gate:
+        return
+    try:
+        check(scorecard)
+    except RejectedReference as cause:
+        raise RejectedReference(f"{cause}; it is kept in {out}") from None
 
 
 def evaluate(
@@ -209,35 +211,6 @@ def _contact_share(sequence: "SmplSequence") -> dict[str, float]:
 
     shares = (sequence.contact == PLANTED).mean(0)
     return dict(zip(CONTACT_POINTS, map(float, shares), strict=True))
-
-
-def _readable(
-    sources: list[Path], limits: "VideoLimits"
-) -> tuple[list["VideoInfo"], list[Figures]]:
-    """The videos that can be scored, folders expanded, and what is wrong with the others.
-
-    Raises:
-        RoboJacksonError: the first cause, when there is no video left.
-    """
-    from robojackson.clips.video import list_videos, probe
-
-    infos: list[VideoInfo] = []
-    told: list[Figures] = []
-    causes: list[RoboJacksonError] = []
-    waiting = list(sources)
-    while waiting:
-        video = waiting.pop(0)
-        try:
-            if video.is_dir():
-                waiting[:0] = list_videos(video)
-            else:
-                infos.append(probe(video, limits))
-        except RoboJacksonError as cause:
-            causes.append(cause)
-            told.append({"video": str(video), "error": str(cause)})
-    if causes and not infos:
-        raise causes[0]
-    return infos, told
 
 
 def _floor(sequence: "SmplSequence") -> Figures:

@@ -5,12 +5,14 @@ it, and it holds a lock on its folder, so that no two trainings share a checkpoi
 """
 
 import ctypes
+import json
 import math
 import os
 import signal
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,6 +28,8 @@ from storage.store import Store
 if TYPE_CHECKING:
     from robojackson.rl.config import TrainConfig
 
+PROGRESS = "progress.json"
+"""How far a training is, in its folder."""
 DIE_WITH_PARENT = 1
 """PR_SET_PDEATHSIG of prctl(2)."""
 USUAL_MINUTES = 9.0
@@ -41,27 +45,41 @@ def train(
     overrides: Mapping[str, Any],
     run_id: str = "",
     move: str = "",
+    force: bool = False,
 ) -> dict[str, Any]:
     """Train until the budget is used up; the same call goes on after an interruption.
 
+    Args:
+        setup: `pretrain` and the like of configs/setups, or the path of a training configuration.
+        force: Train on a motion that the gate refuses, too.
     Raises:
         Interrupted: Ctrl-C or SIGTERM, after a checkpoint was written.
+        RejectedReference: the motion's own score card says that the robot cannot follow it.
     """
     from robojackson.motion.reference import ReferenceMotion
+    from robojackson.retarget.scorecard import check, told
     from robojackson.rl.config import TrainConfig
+    from robojackson.rl.shares import both_readings
+    from robojackson.rl.shares import told as asks_told
+    from robojackson.rl.train import Hooks
     from robojackson.rl.train import train as learn
 
-    config = _budgeted(load(TrainConfig, setup, overrides))
+    config = _budgeted(load(TrainConfig, _setup(setup), overrides))
     motion = single.read_table(ReferenceMotion, reference)
     robot = single.robot_of(motion)
+    if not force:
+        check(told(motion))
+    stop = _Wish()
     for wish in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(wish, signal.default_int_handler)
+        signal.signal(wish, stop.heard)
     with single.results_in(out) as store, locked(out), console.ticker() as tell:
         log = _EpisodeLog(store, _common(config, move or _move_of(reference), setup, run_id))
         try:
-            result = learn(
-                motion, robot, config, out, progress=lambda row: tell(status(row)), sink=log.add
-            )
+            asked = asks_told(both_readings(robot, motion, config.environment))
+            if asked:
+                tell(asks(asked))
+            hooks = Hooks(lambda row: _told(row, out, tell), log.add, log.save, stop)
+            result = learn(motion, robot, config, out, hooks)
         except KeyboardInterrupt:
             raise console.Interrupted(
                 f"the checkpoint is in {out}; resume: {console.same_command()}"
@@ -74,8 +92,10 @@ def train(
     return {
         "policy": str(result.policy),
         "reference": str(reference),
+        "mode": config.mode,
         "trainer": config.trainer,
         "seed": config.seed,
+        "asks": asked,
         "steps": result.steps,
         "updates": result.updates,
         "seconds": result.seconds,
@@ -95,6 +115,25 @@ def status(row: Mapping[str, float]) -> str:
     )
 
 
+def asks(found: Mapping[str, Mapping[str, float]]) -> str:
+    """What the reward pays to bodies that do not dance, as one line."""
+    parts = []
+    for reading, of in found.items():
+        shares = (f"{name} {100 * of[name]:.0f} %" for name in of if name != "perfect_step")
+        parts.append(f"({reading}) {', '.join(shares)}")
+    return f"of a perfect dance's reward: {'; '.join(parts)}"
+
+
+def _told(row: Mapping[str, float], out: Path, tell: Callable[[str], None]) -> None:
+    """Say how far it is, and leave it for whoever watches the folder."""
+    tell(status(row))
+    finite = {k: v if math.isfinite(v) else None for k, v in row.items()}
+    whole = out / f".{PROGRESS}"
+    with suppress(OSError):
+        whole.write_text(json.dumps(finite, default=float))
+        whole.replace(out / PROGRESS)
+
+
 def _number(value: float, digits: int) -> str:
     """A dash before there is a figure."""
     return f"{value:.{digits}f}" if math.isfinite(value) else "-"
@@ -106,6 +145,22 @@ def die_with(parent: int) -> None:
         ctypes.CDLL(None).prctl(DIE_WITH_PARENT, signal.SIGKILL, 0, 0, 0)
     if os.getppid() != parent:
         raise console.Interrupted("the process that started this training is gone")
+
+
+class _Wish:
+    """Whether somebody wants the training to stop; who asks twice does not wait for it."""
+
+    def __init__(self) -> None:
+        self._heard = False
+
+    def __call__(self) -> bool:
+        return self._heard
+
+    def heard(self, number: int, frame: object) -> None:
+        """Handler of the signal."""
+        if self._heard:
+            raise KeyboardInterrupt
+        self._heard = True
 
 
 class _EpisodeLog:
@@ -128,10 +183,15 @@ class _EpisodeLog:
         self._saved = time.monotonic()
 
 
+def _setup(name: str | None) -> str | None:
+    """A bare name is one of configs/setups."""
+    bare = name is not None and not {"/", "."} & set(name)
+    return f"setups/{name}" if bare else name
+
+
 def _budgeted(config: "TrainConfig") -> "TrainConfig":
     """With the usual wall time where nothing ends the training."""
-    given = config.steps is not None or config.minutes is not None
-    return config if given else replace(config, minutes=USUAL_MINUTES)
+    return config if config.has_budget else replace(config, minutes=USUAL_MINUTES)
 
 
 def _common(config: "TrainConfig", move: str, setup: str | None, run_id: str) -> dict[str, Any]:

@@ -35,7 +35,7 @@ STANDS, FEWEST_STANDING = 0.4, 6
 """Least share and number of corners that keep their place while the camera stands."""
 SPREAD = 0.25
 """Least share of the image inside the hull of the corners by which a motion is believed."""
-CHANGED, CHANGED_SHARE = 6.0, 20
+CHANGED, CHANGED_SHARE = 5.0, 30
 """A frame is another picture if more than so many percent of the background's pixels changed by
 more than this, of 255."""
 STILL = 0.01

@@ -1,5 +1,7 @@
 """Laws of the camera's path: a pan is measured, a person is no background, a cut is told."""
 
+from collections.abc import Callable
+
 import cv2
 import numpy as np
 import pytest
@@ -90,3 +92,51 @@ def test_a_violent_shake_is_told() -> None:
 def test_a_bare_wall_is_told_to_show_nothing() -> None:
     bare = np.full((HEIGHT, WIDTH, 3), 127, np.uint8)
     assert "cannot be seen" in path_of([bare] * FRAMES).notes[0]
+
+
+def floor_and_sky(seed: int = 0) -> np.ndarray:
+    """Little to hold on to: a plain sky over a floor with a few faint tiles, and noise."""
+    image = np.full((HEIGHT, WIDTH), 180, np.uint8)
+    image[HEIGHT // 2 :] = 140
+    for x in range(20, WIDTH, 90):
+        image[HEIGHT // 2 + 30 : HEIGHT // 2 + 60, x : x + 40] = 125
+    noise = np.random.default_rng(seed).normal(scale=2.0, size=image.shape)
+    return np.repeat(np.clip(image + noise, 0, 255).astype(np.uint8)[..., None], 3, axis=2)
+
+
+def walker_at(x: int) -> np.ndarray:
+    """Landmarks of somebody 60 pixels wide."""
+    corners = np.array([[x, 40], [x + 60, 200]]) / [WIDTH, HEIGHT]
+    return np.linspace(corners[0], corners[1], 33)
+
+
+def test_a_standing_camera_before_little_texture_moves_nothing_and_tells_nothing() -> None:
+    found = path_of([floor_and_sky(seed) for seed in range(FRAMES)])
+    assert found.notes == ()
+    assert np.allclose(found.to_first, np.eye(3))
+
+
+def tiles(seed: int = 0) -> np.ndarray:
+    """A plain sky over a floor of tiles."""
+    image = floor_and_sky(seed)
+    rows, columns = np.indices(image.shape[:2])
+    dark = (rows // 16 + columns // 20) % 2 == 1
+    image[dark & (rows >= HEIGHT // 2)] -= 30
+    return image
+
+
+@pytest.mark.parametrize("background", [wall, tiles])
+def test_somebody_else_who_walks_through_is_no_motion_of_the_camera(
+    background: Callable[[int], np.ndarray],
+) -> None:
+    blots, images, marks = wall(1), [], []
+    for step in range(FRAMES):
+        image = background(0)[-HEIGHT:, -WIDTH:].copy()
+        image[40:200, 30:90] = blots[100:260, 100:160]
+        other = 60 + 4 * step
+        image[30:220, other : other + 80] = blots[300:490, 200:280]
+        images.append(image)
+        marks.append(walker_at(30))
+    found = camera_path(images, np.array(marks), WIDTH, HEIGHT)
+    assert found.notes == ()
+    assert np.allclose(found.to_first, np.eye(3))

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from robojackson.clips.video import trim
+from robojackson.clips.trim import trim
 
 ROOT = Path(__file__).parents[2]
 SPY = """

@@ -182,6 +182,7 @@ def test_doctor_tells_what_is_there_in_one_object() -> None:
     assert {"ok", "packages", "libraries", "models", "missing", "optional"} == set(said.answer) - {
         "python",
         "ffmpeg",
+        "javascript",
     }
     assert not said.loaded_prefect
 
@@ -226,9 +227,10 @@ def test_ctrl_c_in_training_is_resumed_by_the_same_command(tmp_path: Path, short
         command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment()
     ) as process:
         assert process.stderr is not None
-        progress = process.stderr.readline()
+        asked, progress = process.stderr.readline(), process.stderr.readline()
         process.send_signal(signal.SIGINT)
         rest = process.stderr.read()
+    assert "of a perfect dance" in asked
     assert "steps" in progress
     assert (process.returncode, rest.count("resume: robojackson train")) == (130, 1)
     first = int(progress.split()[0].replace(",", ""))

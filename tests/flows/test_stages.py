@@ -117,7 +117,8 @@ def test_train_writes_one_row_an_episode(trained: Said, folder: Path) -> None:
 def test_evaluate_writes_one_row_a_rollout_of_every_policy(judged: Said, folder: Path) -> None:
     data = (folder / "evaluations.parquet").read_bytes()
     rows = tables.decode_rows(EVALUATION_RECORD, data, "f")
-    assert {row["policy"] for row in rows} == {"trained", *judged.answer["baselines"]}
+    known = {"trained", *judged.answer["baselines"], *judged.answer["variants"]}
+    assert {row["policy"] for row in rows} == known
 
 
 def test_training_again_with_the_same_budget_has_nothing_to_do(trained: Said, folder: Path) -> None:

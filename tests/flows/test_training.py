@@ -1,11 +1,13 @@
 """What the training process says, takes for granted and leaves behind."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from flows import single, training
 from robojackson.errors import RejectedReference
+from robojackson.rl import shares
 from robojackson.rl import train as learning
 from robojackson.rl.config import TrainConfig
 
@@ -26,6 +28,7 @@ def budgets(monkeypatch: pytest.MonkeyPatch) -> list[TrainConfig]:
     monkeypatch.setattr(single, "read_table", lambda cls, path: None)
     monkeypatch.setattr(single, "robot_of", lambda motion: None)
     monkeypatch.setattr(learning, "train", refuse)
+    monkeypatch.setattr(shares, "both_readings", lambda *what: {})
     monkeypatch.setattr(training.signal, "signal", lambda *wish: None)
     return seen
 
@@ -37,8 +40,19 @@ def test_before_the_first_episode_there_are_dashes() -> None:
 
 def test_a_refused_training_leaves_nothing(budgets: list, tmp_path: Path) -> None:
     with pytest.raises(RejectedReference):
-        training.train(tmp_path / "reference.parquet", tmp_path / "a" / "b", None, {})
+        training.train(tmp_path / "reference.parquet", tmp_path / "a" / "b", None, {}, force=True)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_motion_that_nobody_has_looked_at_is_not_trained_on(
+    budgets: list, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """The gate of `dance` holds for `train` alone, too; --force goes on."""
+    unseen = SimpleNamespace(scorecard={}, certificate=None)
+    monkeypatch.setattr(single, "read_table", lambda cls, path: unseen)
+    with pytest.raises(RejectedReference, match=r"no score card.*--force"):
+        training.train(tmp_path / "reference.parquet", tmp_path / "a", None, {})
+    assert budgets == []
 
 
 @pytest.mark.parametrize(
@@ -49,5 +63,27 @@ def test_a_training_without_a_budget_gets_the_usual_one(
     given: dict, budget: tuple, budgets: list[TrainConfig], tmp_path: Path
 ) -> None:
     with pytest.raises(RejectedReference):
-        training.train(tmp_path / "reference.parquet", tmp_path, None, given)
+        training.train(tmp_path / "reference.parquet", tmp_path, None, given, force=True)
     assert [(config.steps, config.minutes) for config in budgets] == [budget]
+
+
+def test_what_the_reward_can_ask_for_is_one_line() -> None:
+    found = {"root": {"perfect_step": 4.9, "statue": 1.002, "flail": 0.978}}
+    assert training.asks(found) == "of a perfect dance's reward: (root) statue 100 %, flail 98 %"
+
+
+@pytest.mark.parametrize(
+    ("given", "found"),
+    [("pretrain", "setups/pretrain"), ("setups/x", "setups/x"), ("a.yaml", "a.yaml"), (None, None)],
+)
+def test_a_bare_name_is_one_of_the_setups(given: str | None, found: str | None) -> None:
+    assert training._setup(given) == found
+
+
+def test_who_asks_twice_does_not_wait_for_a_checkpoint() -> None:
+    wish = training._Wish()
+    assert not wish()
+    wish.heard(2, None)
+    assert wish()
+    with pytest.raises(KeyboardInterrupt):
+        wish.heard(2, None)

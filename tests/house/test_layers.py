@@ -18,11 +18,15 @@ MAY_IMPORT = {
 LAYERS = tuple(MAY_IMPORT)
 MAY_IMPORT_PREFECT = {"tasks", "flows"}
 WITHOUT_PREFECT = (
-    *("cli", "console", "doctor", "environment", "export", "look", "options", "search"),
-    *("single", "source", "training"),
+    *("adding", "bars", "cli", "console", "doctor", "environment", "export", "formats"),
+    *("importing", "learning", "look", "network", "options", "people", "robots", "scoring"),
+    *("search", "single", "source", "start", "studies", "training", "walker"),
 )
 """Modules of `flows` that the one-stage commands load."""
-LIGHT = {"typer", "flows.console", "flows.options", "flows.search", "robojackson.errors"}
+LIGHT = {
+    *("typer", "flows.console", "flows.formats", "flows.learning", "flows.options"),
+    *("flows.robots", "flows.search", "flows.studies", "robojackson.errors"),
+}
 """What the command line may import before it knows the command, beside the standard library."""
 
 
@@ -80,7 +84,9 @@ def test_what_the_one_stage_commands_load_imports_no_prefect(name: str) -> None:
     assert not roots(ROOT / "flows" / f"{name}.py") & {"prefect", "tasks"}
 
 
-@pytest.mark.parametrize("name", ["cli", "options", "search"])
+@pytest.mark.parametrize(
+    "name", ["cli", "formats", "learning", "options", "robots", "search", "studies"]
+)
 def test_the_command_line_imports_lazily(name: str) -> None:
     found = set(imports(ROOT / "flows" / f"{name}.py", only_top=True))
     assert found <= LIGHT | {"os", "pathlib", "typing"}

@@ -58,7 +58,7 @@ def test_page_shows_every_stage(results: Results) -> None:
 
 def test_page_shows_every_plot_inside_itself(results: Results) -> None:
     html = render(page_content(results, "dance.mp4"))
-    assert html.count('src="data:image/png;base64,') == 5
+    assert html.count('src="data:image/png;base64,') == 6
 
 
 def test_page_asks_for_nothing_but_the_video(results: Results) -> None:

@@ -1,0 +1,68 @@
+"""Algorithm 1 for the videos that a user names, with no Prefect in memory."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from configs.loader import load
+from flows import console
+from flows.single import Figures, Overrides
+from robojackson.errors import RoboJacksonError
+
+if TYPE_CHECKING:
+    from robojackson.clips.video import VideoInfo, VideoLimits
+
+
+def score(videos: list[Path], config: str, overrides: Overrides) -> Figures:
+    """Algorithm 1 for every video; one without a person is an answer, not an error.
+
+    One that cannot be read is told beside the others' scores, and is an error where it is alone.
+    """
+    from configs.pipeline import PipelineConfig
+    from robojackson.clips.dancer import follow
+    from robojackson.clips.landmarks import detect
+    from robojackson.clips.stability import stability
+
+    settings = load(PipelineConfig, config, overrides)
+    infos, found = _readable(videos, settings.video)
+    for info in infos:
+        video = info.path
+        with console.bar(video.name) as progress:
+            if settings.dancer.number:
+                track = follow(video, info, settings.scoring_detector, settings.dancer, progress)
+            else:
+                track = detect(video, info, settings.scoring_detector, progress)
+        scored = stability(track, settings.stability)
+        found.append({"video": str(video), "fps": info.fps, **asdict(scored)})
+        if not scored.detected:
+            found[-1]["note"] = f"no person found in {len(track)} of {len(track)} frames"
+    return {"videos": found}
+
+
+def _readable(
+    sources: list[Path], limits: "VideoLimits"
+) -> tuple[list["VideoInfo"], list[Figures]]:
+    """The videos that can be scored, folders expanded, and what is wrong with the others.
+
+    Raises:
+        RoboJacksonError: the first cause, when there is no video left.
+    """
+    from robojackson.clips.video import list_videos, probe
+
+    infos: list[VideoInfo] = []
+    told: list[Figures] = []
+    causes: list[RoboJacksonError] = []
+    waiting = list(sources)
+    while waiting:
+        video = waiting.pop(0)
+        try:
+            if video.is_dir():
+                waiting[:0] = list_videos(video)
+            else:
+                infos.append(probe(video, limits))
+        except RoboJacksonError as cause:
+            causes.append(cause)
+            told.append({"video": str(video), "error": str(cause)})
+    if causes and not infos:
+        raise causes[0]
+    return infos, told

@@ -1,0 +1,145 @@
+"""An ablation whose cells are played: who fails, who waits, who is started again, what is told."""
+
+import asyncio
+import json
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+import yaml
+from prefect import State
+from prefect.client.orchestration import get_client
+from prefect.client.schemas.filters import ArtifactFilter, ArtifactFilterKey
+from prefect.exceptions import ParameterTypeError
+from prefect.states import Completed, Crashed, Failed
+
+from configs.loader import load
+from configs.study import Setup, Study
+from flows import ablation, cells
+from robojackson.errors import StudyFailed, TrainingCrashed
+from robojackson.rl.config import EvaluateConfig, TrainConfig
+from storage.artifact import Artifact
+from storage.store import Store
+from tasks.cell import Cell
+
+ROOT = Path(__file__).parents[2]
+SETUPS: tuple[Setup, ...] = ("scratch", "pretrain", "curiosity")
+REFERENCE = Artifact(key="retarget/reference.parquet", sha256="0" * 64)
+
+
+class Played:
+    """An executor of cells that takes a moment, and fails where it is told to."""
+
+    def __init__(self, fails: str = "") -> None:
+        self.fails, self.now, self.most = fails, 0, 0
+
+    async def __call__(self, wanted: Cell) -> dict[str, Artifact]:
+        self.now += 1
+        self.most = max(self.most, self.now)
+        await asyncio.sleep(0.05)
+        self.now -= 1
+        if wanted.name == self.fails:
+            raise TrainingCrashed("run x was killed by SIGKILL")
+        summary = json.dumps({"survived_s": 1.25, "skill": 0.5}).encode()
+        return {"evaluation": Store.from_environment().put("evaluation.json", summary)}
+
+
+@pytest.fixture
+def play(
+    records: Path, store_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> Callable[..., dict[str, Any]]:
+    """Run the flow with played cells, motions and page; the motions and the page are not ours."""
+    page = Store(store_folder).put("studies/index.html", b"page")
+    still = Store(store_folder).put("still.png", b"png")
+    motions = {"reference": REFERENCE, "still": still}
+    monkeypatch.setattr(ablation, "motion", lambda move, study: motions)
+    monkeypatch.setattr(ablation, "report", lambda study, pictures: {"page": page})
+
+    def run(executor: Played, **given: Any) -> dict[str, Any]:
+        monkeypatch.setitem(ablation.EXECUTORS, "local", executor)
+        study = Study(name="played", moves=("walk",), setups=SETUPS, seeds=(0,), **given)
+        return asyncio.run(ablation.ablation(study))
+
+    return run
+
+
+def states_told() -> dict[str, str]:
+    """The last version of the table on Prefect's page: states by cell."""
+    with get_client(sync_client=True) as client:
+        wanted = ArtifactFilter(key=ArtifactFilterKey(any_=["ablation-played"]))
+        versions = client.read_artifacts(artifact_filter=wanted)
+    newest = max(versions, key=lambda version: str(version.created))
+    return {row["cell"]: row["state"] for row in json.loads(str(newest.data))}
+
+
+def test_a_failed_cell_is_named_and_its_neighbours_are_done(play: Any) -> None:
+    with pytest.raises(StudyFailed, match=r"1 of 3 cells failed \(pretrain-walk-s0: run x was"):
+        play(Played(fails="pretrain-walk-s0"))
+    told = {"scratch-walk-s0": "done", "pretrain-walk-s0": "failed", "curiosity-walk-s0": "done"}
+    assert states_told() == told
+
+
+def test_no_more_cells_run_at_once_than_there_are_slots(play: Any) -> None:
+    executor = Played()
+    assert play(executor, slots=2)["cells"] == 3
+    assert executor.most == 2
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"setups": ["bogus"]}, {"steps": 0}, {"seeds": []}, {"stepz": 5}], ids=str
+)
+def test_nonsense_is_refused_before_a_run_starts(wrong: dict[str, Any]) -> None:
+    with pytest.raises(ParameterTypeError):
+        ablation.ablation.validate_parameters({"study": wrong})
+
+
+@pytest.mark.parametrize("name", ["paper", "smoke"])
+def test_a_deployment_is_the_study_of_its_name_on_workers(name: str) -> None:
+    entries = yaml.safe_load((ROOT / "prefect.yaml").read_text())["deployments"]
+    (ours,) = [e for e in entries if e["entrypoint"].endswith(".ablation") and e["name"] == name]
+    wanted = load(Study, f"studies/{name}", {"executor": "work-pool"})
+    assert Study(**ours["parameters"]["study"]) == wanted
+
+
+class Pool:
+    """A work pool whose runs end in the states that it is given, one after the other."""
+
+    def __init__(self, *states: State[Any]) -> None:
+        self.left = list(states)
+        self.names: list[str] = []
+
+    async def __call__(self, deployment: str, **given: Any) -> SimpleNamespace:
+        json.dumps(given["parameters"])
+        self.names.append(given["flow_run_name"])
+        return SimpleNamespace(state=self.left.pop(0))
+
+
+def on_workers(pool: Pool, monkeypatch: pytest.MonkeyPatch) -> dict[str, Artifact]:
+    monkeypatch.setattr(cells, "arun_deployment", pool)
+    train = TrainConfig(steps=100)
+    names: dict[str, Any] = {"study": "s", "move": "walk", "setup": "scratch", "seed": 0}
+    wanted = Cell(
+        **names, reference=REFERENCE, robot="humanoid", train=train, evaluate=EvaluateConfig()
+    )
+    return asyncio.run(cells.anywhere(wanted))
+
+
+def test_a_cell_whose_worker_died_is_given_to_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    pool = Pool(Crashed(message="exit -9"), Completed(data={"policy": REFERENCE}))
+    assert on_workers(pool, monkeypatch) == {"policy": REFERENCE}
+    assert pool.names == ["scratch-walk-s0"] * 2
+
+
+def test_a_cell_that_kills_every_worker_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    pool = Pool(*[Crashed(message="exit -9") for _ in range(3)])
+    with pytest.raises(TrainingCrashed, match="scratch-walk-s0 on a worker: Crashed: exit -9"):
+        on_workers(pool, monkeypatch)
+
+
+def test_a_cell_that_failed_by_itself_is_not_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    pool = Pool(Failed(message="diverged"))
+    with pytest.raises(TrainingCrashed, match="Failed: diverged"):
+        on_workers(pool, monkeypatch)
+    assert len(pool.names) == 1

@@ -1,0 +1,197 @@
+"""The stack of docker-compose.yml as a place where chaos is tried."""
+
+import os
+import random
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, ClassVar
+
+from storage.store import Store
+from tools import postgres
+from tools.processes import Found, under
+from tools.proxy import Proxy
+from tools.restarts import Restarts
+from tools.service import ROOT, Service
+from tools.stack import Stack
+from tools.trials import STUDY
+
+DEPLOYMENT = "ablation/smoke"
+TRAINERS = 2
+CUT_S = (5.0, 20.0)
+GONE_S = 15.0
+"""After which a parent whose process is not there is given up."""
+FLOW, CELL = "flow-worker", "trainer"
+WORK = ("flows.cli train", "flows.cli evaluate")
+ENGINE = "prefect.engine"
+
+
+class Cluster:
+    """A running stack.
+
+    Attributes:
+        store: What it keeps.
+        kinds: What can happen to it: does it and tells what it hit, or None if it cannot now.
+    """
+
+    KINDS: ClassVar = ("cell", "worker", "machine", "parent", "server", "database", "wire")
+
+    def __init__(self, stack: Stack, wire: Proxy) -> None:
+        self._stack, self._wire = stack, wire
+        self._homes = stack.folder / "home"
+        self._missing: float | None = None
+        self.store = Store(stack.client()["ROBOJACKSON_STORE"])
+        doings = (self._cell, self._worker, self._machine, self._parent)
+        services = (self._service("prefect-server"), self._service("postgres"), self._cut)
+        self.kinds: dict[str, Callable[[random.Random], str | None]] = dict(
+            zip(self.KINDS, (*doings, *services), strict=True)
+        )
+
+    @classmethod
+    @contextmanager
+    def ready(cls, folder: Path) -> Iterator["Cluster"]:
+        """A stack that is up for the time of a block, its S3 store behind a wire."""
+        stack = Stack(folder / "stack", scale={CELL: TRAINERS})
+        wire = Proxy(stack.ports["s3"])
+        temporary = stack.folder / "tmp"
+        temporary.mkdir()
+        stack.more = {"AWS_ENDPOINT_URL": f"http://127.0.0.1:{wire.port}", "TMPDIR": str(temporary)}
+        try:
+            stack.up()
+            os.environ.update(_settings(stack.client()))  # before Prefect is imported
+            restarts = Restarts(stack)
+            try:
+                yield cls(stack, wire)
+            finally:
+                restarts.stop()
+        finally:
+            stack.down()
+            for found in under(stack.folder / "home"):
+                found.kill()
+            wire.close()
+            postgres.remove(stack.folder)
+
+    def start(self) -> Any:
+        self._missing = None
+        return _patiently(lambda: _create(DEPLOYMENT, {**STUDY, "executor": "work-pool"}))
+
+    def state(self, run: Any) -> str | None:
+        """Its final state, `DEAD` if its process is gone, None while it runs or nobody answers."""
+        with suppress(Exception):
+            kind = _state(run)
+            if kind in ("COMPLETED", "FAILED", "CRASHED", "CANCELLED"):
+                return kind
+            if kind not in ("PENDING", "RUNNING") or self._flows(FLOW):
+                self._missing = None
+                return None
+        self._missing = self._missing or time.monotonic()
+        return "DEAD" if time.monotonic() - self._missing > GONE_S + CUT_S[1] else None
+
+    def mend(self) -> None:
+        self._wire.mend()
+        for service in self._services(""):
+            end = time.monotonic() + 180
+            while time.monotonic() < end and not _healthy(service):
+                time.sleep(1)
+
+    def alive(self) -> list[str]:
+        services = {s.process.pid for s in self._services("") if s.process}
+        found = [f for f in under(self._homes) if f.pid not in services]
+        return [f"{f.pid} {f.command[:90]}" for f in found if not _is_check(f)]
+
+    def folders(self) -> list[Path]:
+        return [self._homes]
+
+    def _services(self, name: str) -> list[Service]:
+        known = self._stack.services.values()
+        return [s for s in known if s.name.startswith(name) and s.name not in ("setup", "s3")]
+
+    def _flows(self, name: str) -> list[Found]:
+        """Processes of flow runs that workers of a service have started."""
+        homes = [self._homes / s.name for s in self._services(name)]
+        return [f for home in homes for f in under(home) if ENGINE in f.command]
+
+    def _cell(self, rng: random.Random) -> str | None:
+        found = [f for f in under(self._homes) if any(words in f.command for words in WORK)]
+        return _killed(rng, found)
+
+    def _parent(self, rng: random.Random) -> str | None:
+        return _killed(rng, self._flows(FLOW))
+
+    def _worker(self, rng: random.Random) -> str | None:
+        """The worker alone: the runs that it has started go on without it."""
+        service = rng.choice([*self._services(FLOW), *self._services(CELL)])
+        service.kill()
+        return service.name
+
+    def _machine(self, rng: random.Random) -> str | None:
+        """A worker with everything that it has started, as when its container is killed."""
+        busy = [s for s in self._services(CELL) if under(self._homes / s.name)[1:]]
+        service = rng.choice([*self._services(FLOW), *busy])
+        found = under(self._homes / service.name)
+        service.kill()
+        for process in found:
+            process.kill()
+        return f"{service.name} and {len(found) - 1} processes"
+
+    def _service(self, name: str) -> Callable[[random.Random], str | None]:
+        def kill(rng: random.Random) -> str | None:
+            self._stack.services[name].kill()
+            return name
+
+        return kill
+
+    def _cut(self, rng: random.Random) -> str | None:
+        seconds = rng.uniform(*CUT_S)
+        self._wire.cut()
+        time.sleep(seconds)
+        self._wire.mend()
+        return f"S3 for {seconds:.0f} s"
+
+
+def _killed(rng: random.Random, found: list[Found]) -> str | None:
+    if not found:
+        return None
+    victim = rng.choice(found)
+    victim.kill()
+    return " ".join(victim.command.split()[1:4])
+
+
+def _settings(client: dict[str, str]) -> dict[str, str]:
+    return {n: v for n, v in client.items() if n.startswith(("PREFECT_", "AWS_", "DO_NOT"))}
+
+
+def _create(name: str, study: dict[str, Any]) -> Any:
+    from prefect.client.orchestration import get_client
+
+    with get_client(sync_client=True) as client:
+        known = client.read_deployment_by_name(name)
+        return client.create_flow_run_from_deployment(known.id, parameters={"study": study}).id
+
+
+def _state(run: Any) -> str:
+    from prefect.client.orchestration import get_client
+
+    with get_client(sync_client=True) as client:
+        state = client.read_flow_run(run).state
+    return "SCHEDULED" if state is None else state.type.value
+
+
+def _patiently(call: Callable[[], Any]) -> Any:
+    """The answer of a server that may be starting."""
+    for _ in range(60):
+        with suppress(Exception):
+            return call()
+        time.sleep(2)
+    return call()
+
+
+def _healthy(service: Service) -> bool:
+    with suppress(Exception):
+        return service.healthy()
+    return False
+
+
+def _is_check(found: Found) -> bool:
+    return "/health" in found.command or str(ROOT) == found.command

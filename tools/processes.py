@@ -1,0 +1,66 @@
+"""The processes of a stack, found by the home that each of its services has (Linux)."""
+
+import os
+import signal
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Found:
+    """A process that is alive.
+
+    Attributes:
+        pid: Its number.
+        command: Its words.
+        home: The folder that it calls home.
+    """
+
+    pid: int
+    command: str
+    home: Path
+
+    def kill(self) -> None:
+        """SIGKILL; one that has ended meanwhile is no error."""
+        with suppress(ProcessLookupError):
+            os.kill(self.pid, signal.SIGKILL)
+
+
+def under(folder: Path) -> list[Found]:
+    """Every living process whose home is in a folder."""
+    return sorted((f for f in _all() if f.home.is_relative_to(folder)), key=lambda f: f.pid)
+
+
+def _all() -> Iterator[Found]:
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit() and (home := _home(entry)):
+            words = (entry / "cmdline").read_bytes() if entry.exists() else b""
+            if words:  # a dead process that nobody has asked for yet has none
+                command = words.replace(b"\0", b" ").decode(errors="replace").strip()
+                yield Found(int(entry.name), command, home)
+
+
+def _home(entry: Path) -> Path | None:
+    try:
+        given = (entry / "environ").read_bytes().split(b"\0")
+    except OSError:  # ended meanwhile, or another user's
+        return None
+    return next((Path(os.fsdecode(e[5:])) for e in given if e.startswith(b"HOME=")), None)
+
+
+def cpu_seconds(pid: int) -> float:
+    """Processor time of a process and of all below it, those that have ended included."""
+    children: dict[int, list[int]] = {}
+    used: dict[int, float] = {}
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            with suppress(OSError):
+                fields = (entry / "stat").read_text().rpartition(")")[2].split()
+                children.setdefault(int(fields[1]), []).append(int(entry.name))
+                used[int(entry.name)] = sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
+    below = [pid]
+    for one in below:
+        below += children.get(one, [])
+    return sum(used.get(one, 0.0) for one in below)
