@@ -2,6 +2,7 @@
 #
 #   make dance    the hip-shake clip, from video to a dancing robot (ARGS="--minutes 5" and others)
 #   make test     all tests (ARGS="tests/mocap -x")
+#   make test-stack  the whole stack as processes, end to end (minutes; apt-get install postgresql)
 #   make bench    accuracy of the mocap stage against ground truth, cost of judging a clip
 #   make bench-mocap  the first of the two alone, writes benchmarks/results/mocap.json and .md
 #   make bench-retarget  our solver beside the paper's mapping and mink (pip install -e '.[bench]')
@@ -20,7 +21,7 @@ PY := .venv/bin/python
 ARGS ?=
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: dance test bench bench-learning bench-mocap bench-retarget chaos bench-orchestration deploy lint doctor clean setup
+.PHONY: dance test test-stack bench bench-learning bench-mocap bench-retarget chaos bench-orchestration deploy lint doctor clean setup
 .DEFAULT_GOAL := dance
 
 setup:
@@ -31,6 +32,9 @@ dance: setup
 
 test: setup
 	@$(PY) -m pytest -q $(ARGS)
+
+test-stack: setup
+	@$(PY) -m pytest -q -m cluster $(ARGS)
 
 bench-mocap: setup
 	@$(PY) -m benchmarks.mocap $(ARGS)

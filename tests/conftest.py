@@ -10,10 +10,10 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out what needs the world outside, unless it is asked for by `-m network`."""
-    if "network" in str(config.getoption("-m")):
-        return
-    outside = [item for item in items if item.get_closest_marker("network")]
+    """Leave out what needs more than a machine has by itself, unless `-m` asks for it by name."""
+    asked = str(config.getoption("-m"))
+    unasked = [marker for marker in ("network", "cluster") if marker not in asked]
+    outside = [item for item in items if any(item.get_closest_marker(m) for m in unasked)]
     if outside:
         config.hook.pytest_deselected(items=outside)
         items[:] = [item for item in items if item not in outside]

@@ -14,7 +14,7 @@ from tools.processes import Found, under
 from tools.stack import Stack, running
 from tools.trials import STUDY
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(1800)]
+pytestmark = [pytest.mark.cluster, pytest.mark.timeout(1800)]
 AGAIN_S = 120.0
 """Nine cached cells on two workers: ten starts of Python with all that it imports."""
 WORK = "flows.cli train"
