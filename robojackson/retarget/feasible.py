@@ -15,7 +15,7 @@ from robojackson.metrics.retarget import keypoint_error_mm
 from robojackson.retarget import tempo
 from robojackson.retarget.config import RetargetConfig
 from robojackson.retarget.kinematics import continuous, pose, tree
-from robojackson.retarget.optimise import harden
+from robojackson.retarget.optimise import faults, harden
 from robojackson.retarget.problem import Problem
 from robojackson.retarget.resample import resample
 from robojackson.retarget.robot import Robot
@@ -52,7 +52,7 @@ def make_feasible(
     how = config.repair
     if not how.weights or share(robot, given, config) >= how.enough_share:
         return given
-    found = _solved(robot, given, how.weights[0], config)
+    found = _kept(robot, given, _solved(robot, given, how.weights[0], config), config)
     rounds = how.slow_rounds if config.tempo == "auto" else 0
     for _ in range(rounds):
         slower = _slowed(robot, found, config)
@@ -91,7 +91,10 @@ def _solved(robot: Robot, motion: Feasible, weight: float, config: RetargetConfi
 
 
 def _slowed(robot: Robot, motion: Feasible, config: RetargetConfig) -> Feasible | None:
-    """The motion at the tempo that its steps ask for, solved again; None where none asks."""
+    """The motion at the tempo that its steps ask for, solved again.
+
+    None where none asks, or where a hard bar would be broken.
+    """
     aims = motion.aims
     slack = _slack(robot, motion, config, tempo.GRID)
     if (slack[0] <= 1.0).mean() >= config.repair.enough_share:
@@ -108,7 +111,24 @@ def _slowed(robot: Robot, motion: Feasible, config: RetargetConfig) -> Feasible 
         aims=tempo.warped(aims, steps),
         steps=tempo.times_at(motion.steps, steps),
     )
-    return _solved(robot, slower, config.repair.weights[0], config)
+    solved = _solved(robot, slower, config.repair.weights[0], config)
+    kept = _kept(robot, slower, solved, config)
+    # Limbs that passed through each other between two steps are seen to do so when slowed down.
+    return kept if _holds(robot, kept, config) else None
+
+
+def _kept(robot: Robot, before: Feasible, after: Feasible, config: RetargetConfig) -> Feasible:
+    """The motion after a repair, or the one before where the repair broke a hard bar."""
+    return after if _holds(robot, after, config) else before
+
+
+def _holds(robot: Robot, motion: Feasible, config: RetargetConfig) -> bool:
+    """Whether nothing is too deep in the floor or in another limb, and no hinge too fast."""
+    problem = Problem.of(robot, motion.aims, config.weights)
+    broken = faults(problem, motion.qpos, config)
+    if broken.deep or broken.fast:
+        _log.info("repair undone: %s", broken)
+    return not (broken.deep or broken.fast)
 
 
 def _repaired(robot: Robot, given: Feasible, found: Feasible, config: RetargetConfig) -> Feasible:
@@ -121,7 +141,7 @@ def _repaired(robot: Robot, given: Feasible, found: Feasible, config: RetargetCo
             break
         found = _solved(robot, found, weight, config)
         _log.info("weight %g: %.0f %% feasible", weight, 100 * share(robot, found, config))
-        if _error_mm(robot, found) > dearest:
+        if _error_mm(robot, found) > dearest or not _holds(robot, found, config):
             break
         best, good = found, share(robot, found, config)
     return best

@@ -113,7 +113,7 @@ def polished(
         qpos=continuous(clip_to_limits(robot, final.qpos)),
         aims=fine.targets,
         shift=shift,
-        faults=faults(fine, final, config),
+        faults=faults(fine, final.qpos, config),
     )
 
 
@@ -169,12 +169,12 @@ class Faults:
         return self.deep or self.fast or self.slips
 
 
-def faults(problem: Problem, solution: Solution, config: RetargetConfig) -> Faults:
+def faults(problem: Problem, qpos: Float[np.ndarray, "T nq"], config: RetargetConfig) -> Faults:
     """Measure penetration, hinge speed and slip against the bars."""
-    touches = Detector(problem.robot, 0.0).touches(solution.qpos)
+    touches = Detector(problem.robot, 0.0).touches(qpos)
     deepest = -float(touches.distance.min(initial=0.0))
-    fastest = float(np.abs(problem.velocity(solution.qpos)[:, 6:]).max())
-    slip, fast_slip = _slip(problem, solution.qpos)
+    fastest = float(np.abs(problem.velocity(qpos)[:, 6:]).max())
+    slip, fast_slip = _slip(problem, qpos)
     return Faults(
         deepest_m=deepest,
         fastest=fastest,
@@ -188,7 +188,7 @@ def faults(problem: Problem, solution: Solution, config: RetargetConfig) -> Faul
 def harden(problem: Problem, solution: Solution, config: RetargetConfig) -> Solution:
     """Raise the weights of what is over its bar and solve again, a few rounds at most."""
     for _ in range(_HARDENING_ROUNDS):
-        broken = faults(problem, solution, config)
+        broken = faults(problem, solution.qpos, config)
         if not broken.any:
             break
         _log.info("hardening: %s", broken)
