@@ -18,6 +18,11 @@ ONE_AT_A_TIME = threading.Lock()
 """The detector uses all cores by itself, and redirects the process's stderr while it starts."""
 
 
+def alone() -> threading.Lock:
+    """The lock, by a name that can be sent to another process, where it is another lock."""
+    return ONE_AT_A_TIME
+
+
 def _models(parameters: Mapping[str, Any]) -> list[str]:
     sizes = [*models_of(parameters["size"]), *([SCOUT] if parameters.get("dancer") else [])]
     return [sha256_of_file(model_path(size)) for size in sizes]
@@ -29,7 +34,7 @@ def landmarks(
 ) -> Artifact:
     """LandmarkTrack of one person, or, as Algorithm 1 has it, of whom the detector prefers."""
     store = Store.from_environment()
-    with store.local(video) as path, ONE_AT_A_TIME:
+    with store.local(video) as path, alone():
         known = info_of(store, info, path)
         track = see(path, known, size, dancer) if dancer else detect(path, known, size)
     return tables.keep(store, "landmarks", "landmarks.parquet", track)
