@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import anny
 import numpy as np
 import torch
 from jaxtyping import Float, Int
@@ -80,6 +79,8 @@ class Body:
     """One person: Anny's model with a phenotype."""
 
     def __init__(self, phenotype: Mapping[str, float] = DANCER, model: Any = None) -> None:
+        import anny  # of tools/requirements.txt; a test that needs no body runs without it
+
         self.model: Any = model or anny.Anny().to(torch.float32)
         self.phenotype = dict(phenotype)
         self.bone_names: list[str] = [str(name) for name in self.model.bone_labels]

@@ -22,7 +22,7 @@ import torch
 from safetensors.torch import load_file, save_file
 
 from tools.pairs import sources
-from tools.temporal import fit, truths
+from tools.temporal import fit
 from tools.temporal.examples import Example, Truth, load
 from tools.temporal.fit_flow import fit_flow
 from tools.temporal.net import Flow, Lifter
@@ -46,6 +46,8 @@ def truths_of(folder: Path, motions: list[Path], count: int, seed: int) -> list[
     """The truths without pictures, made once."""
     path = folder / f"truths-{seed}-{count}.npz"
     if not path.exists():
+        from tools.temporal import truths  # needs tools/requirements.txt, as the rendering does
+
         log.info("making %d truths without pictures", count)
         made = truths.make(motions, count, seed)
         lengths = [len(item[0]) for item in made]
