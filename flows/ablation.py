@@ -6,7 +6,6 @@ same run again computes only what is missing.
 """
 
 import asyncio
-import os
 from collections.abc import Mapping
 from dataclasses import replace
 from textwrap import shorten
@@ -20,6 +19,7 @@ from configs.pipeline import PipelineConfig
 from configs.study import Move, Study
 from flows.board import Board
 from flows.cells import EXECUTORS
+from flows.chain import to_reference
 from flows.orphans import none_left
 from flows.tracebacks import without_tracebacks
 from robojackson.errors import StudyFailed
@@ -29,12 +29,10 @@ from storage.artifact import Artifact
 from storage.leftovers import sweep
 from storage.store import Store
 from tasks.cell import Cell
-from tasks.landmarks import landmarks
-from tasks.mocap import mocap
 from tasks.probe import SourceFile, probe
-from tasks.retarget import retarget
 from tasks.still import still
 from tasks.study import report
+from tasks.workers import cores
 
 Facts = dict[str, Any]
 REASON = 200
@@ -96,11 +94,9 @@ def motion(move: Move, study: Study) -> dict[str, Artifact]:
     settings = load(PipelineConfig, study.pipeline, move.overrides)
     robot = load(RobotDescription, f"robots/{study.robot}")
     clip = probe(SourceFile.at(move.path), settings.video, None, None)
-    track = landmarks(clip["video"], clip["info"], settings.detector)
-    sequence = mocap(track, settings.mocap)
-    reference = retarget(sequence, robot, settings.retarget)["reference"]
-    picture = still(clip["video"], track, sequence, reference, robot)
-    return {"reference": reference, "still": picture}
+    moved = to_reference(clip, robot, settings)
+    seen = (clip["video"], moved["landmarks"], moved["smpl"], moved["reference"])
+    return {"reference": moved["reference"], "still": still(*seen, robot)}
 
 
 def cells_of(
@@ -158,7 +154,7 @@ def _slots(study: Study) -> int:
     """Cores of this machine; a pool's workers set their own limits."""
     if study.executor == "work-pool":
         return 10_000
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return cores()
 
 
 def _line(cause: BaseException) -> str:

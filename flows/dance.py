@@ -21,6 +21,7 @@ from prefect.logging import get_run_logger
 from configs.loader import load
 from configs.pipeline import PipelineConfig
 from flows import console
+from flows.chain import to_reference
 from flows.orphans import none_left
 from flows.scorers import scorers
 from flows.single import VERDICT
@@ -35,11 +36,8 @@ from storage.artifact import Artifact
 from storage.store import Store
 from tasks.evaluate import evaluate
 from tasks.landmarks import landmarks
-from tasks.mocap import mocap
-from tasks.network_mocap import network_mocap
 from tasks.page import page
 from tasks.probe import SourceFile, probe
-from tasks.retarget import retarget
 from tasks.stability import stability
 from tasks.train import RunLabels, train
 from tasks.video import video
@@ -164,22 +162,17 @@ async def perform(
     began: float,
 ) -> Artifacts:
     """Every stage after the choice, in order."""
-    track = landmarks(best.clip["video"], best.clip["info"], settings.detector, settings.dancer)
-    if settings.network.hybrik:
-        sequence = network_mocap(best.clip["video"], track, settings.network, settings.mocap)
-    else:
-        sequence = mocap(track, settings.mocap)
-    moved = retarget(sequence, robot, settings.retarget)
+    moved = to_reference(best.clip, robot, settings)
     reference = moved["reference"]
     if settings.gate:
         check(json.loads(Store.from_environment().read(moved["scorecard"].key)))
     deadline = began + 60 * (settings.minutes - LAST_STAGES_MINUTES)
     trained = await train(reference, robot, _budgeted(settings), labels, deadline)
     judged = evaluate(trained["policy"], reference, robot, settings.evaluate, labels)
-    seen = (best.clip["video"], track, sequence, reference, judged["rollout"])
+    seen = (best.clip["video"], moved["landmarks"], moved["smpl"], reference, judged["rollout"])
     film = video(*seen, robot, settings.show)
-    made = {**best.clip, "stability": best.stability, "landmarks": track, "smpl": sequence}
-    made |= {**moved, **trained, **judged, "dance": film}
+    made = {**best.clip, "stability": best.stability, **moved}
+    made |= {**trained, **judged, "dance": film}
     return {**made, **page(made, labels.move, Path(best.name).stem)}
 
 

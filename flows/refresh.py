@@ -19,6 +19,7 @@ from configs.dances import Dance, DanceBook
 from configs.finding import FindConfig
 from configs.loader import build, load
 from configs.pipeline import PipelineConfig
+from flows.chain import to_reference
 from flows.entries import Hunt, reason_of, rows
 from flows.find import (
     HUNTERS,
@@ -37,10 +38,7 @@ from robojackson.retarget.robot import RobotDescription
 from storage import candidates
 from storage.artifact import Artifact
 from storage.store import Store
-from tasks.landmarks import landmarks
-from tasks.mocap import mocap
 from tasks.probe import SourceFile, probe
-from tasks.retarget import retarget
 
 FOLDER = "refresh"
 SLACK = 0.1
@@ -133,13 +131,10 @@ def motion(store: Store, video: Artifact, settings: PipelineConfig) -> Facts:
     """Mocap and retargeting of a video: what a training starts from."""
     with store.local(video) as path:
         clip = probe(SourceFile(path, video.sha256), settings.video, None, None)
-    track = landmarks(clip["video"], clip["info"], settings.detector, settings.dancer)
-    sequence = mocap(track, settings.mocap)
-    robot = load(RobotDescription, f"robots/{settings.robot}")
-    moved = retarget(sequence, robot, settings.retarget)
+    moved = to_reference(clip, load(RobotDescription, f"robots/{settings.robot}"), settings)
     return {
         "video": store.address(clip["video"].key),
-        "smpl": store.address(sequence.key),
+        "smpl": store.address(moved["smpl"].key),
         "reference": store.address(moved["reference"].key),
         "scorecard": json.loads(store.read(moved["scorecard"].key)),
     }

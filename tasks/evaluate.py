@@ -1,8 +1,6 @@
 """The verdict on a policy, on stock physics, beside its baselines."""
 
 import json
-from collections.abc import Mapping
-from typing import Any
 
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.retarget.robot import RobotDescription, load_robot
@@ -13,15 +11,11 @@ from storage.codecs import Rollout
 from storage.schemas import EVALUATION_RECORD
 from storage.store import Store
 from tasks.caching import stage
+from tasks.robots import robot_models
 from tasks.train import RunLabels
 
 
-def models(parameters: Mapping[str, Any]) -> list[str]:
-    """Digests of the models that a judgement loads."""
-    return [load_robot(parameters["robot"]).sha256]
-
-
-@stage(models=models, unkeyed=("labels",))
+@stage(models=robot_models, unkeyed=("labels",))
 def evaluate(
     policy: Artifact,
     reference: Artifact,

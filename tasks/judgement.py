@@ -16,13 +16,13 @@ from storage.artifact import Artifact
 from storage.lock import locked
 from storage.store import Store
 from tasks.caching import identity, stage
-from tasks.evaluate import models
 from tasks.process import run_process
+from tasks.robots import robot_models
 
 TABLE, SUMMARY, ROLLOUT = "evaluations.parquet", "evaluation.json", "rollout.parquet"
 
 
-@stage(models=models, reaches=("robojackson.rl.evaluate",), unkeyed=("limit_s",))
+@stage(models=robot_models, reaches=("robojackson.rl.evaluate",), unkeyed=("limit_s",))
 async def judge(
     policy: Artifact,
     reference: Artifact,

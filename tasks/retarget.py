@@ -1,8 +1,6 @@
 """From the motion of a person to the reference motion of a robot."""
 
 import json
-from collections.abc import Mapping
-from typing import Any
 
 from robojackson.motion.smpl import SmplSequence
 from robojackson.retarget.motion import RetargetConfig
@@ -13,13 +11,10 @@ from storage import tables
 from storage.artifact import Artifact
 from storage.store import Store
 from tasks.caching import stage
+from tasks.robots import robot_models
 
 
-def _models(parameters: Mapping[str, Any]) -> list[str]:
-    return [load_robot(parameters["robot"]).sha256]
-
-
-@stage(models=_models)
+@stage(models=robot_models)
 def retarget(
     sequence: Artifact, robot: RobotDescription, config: RetargetConfig
 ) -> dict[str, Artifact]:

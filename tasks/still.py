@@ -1,8 +1,5 @@
 """The picture of a move: video frame, recovered body and robot (the paper's Figures 2-4)."""
 
-from collections.abc import Mapping
-from typing import Any
-
 from robojackson.clips.track import LandmarkTrack
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.motion.smpl import SmplSequence
@@ -12,13 +9,10 @@ from storage import tables
 from storage.artifact import Artifact
 from storage.store import Store
 from tasks.caching import stage
+from tasks.robots import robot_models
 
 
-def _models(parameters: Mapping[str, Any]) -> list[str]:
-    return [load_robot(parameters["robot"]).sha256]
-
-
-@stage(models=_models)
+@stage(models=robot_models)
 def still(
     source: Artifact,
     landmarks: Artifact,

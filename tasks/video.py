@@ -1,8 +1,5 @@
 """The video that proves it: source, skeleton, reference robot and trained robot side by side."""
 
-from collections.abc import Mapping
-from typing import Any
-
 from robojackson.clips.track import LandmarkTrack
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.motion.smpl import SmplSequence
@@ -13,13 +10,10 @@ from storage.artifact import Artifact
 from storage.codecs import Rollout
 from storage.store import Store
 from tasks.caching import stage
+from tasks.robots import robot_models
 
 
-def _models(parameters: Mapping[str, Any]) -> list[str]:
-    return [load_robot(parameters["robot"]).sha256]
-
-
-@stage(models=_models)
+@stage(models=robot_models)
 def video(
     source: Artifact,
     landmarks: Artifact,
