@@ -220,6 +220,7 @@ EVALUATION_RECORD = TableSchema(
         Column("success", F64, "1"),
         Column("strict_success", F64, "1"),
         Column("skill", F64, "1", nullable=True),
+        Column("velocity_score", F64, "1", nullable=True),
         Column("site_error_m", F64, "m", nullable=True),
         Column("drift_m", F64, "m", nullable=True),
         Column("heading_error_deg", F64, "deg", nullable=True),

@@ -17,7 +17,12 @@ LEAST_STEPS = 8
 
 @dataclass(frozen=True)
 class ClipStep:
-    """The reference at one step for each of N environments; `moved` in m/s."""
+    """The reference at one step for each of N environments.
+
+    Attributes:
+        moved: Velocities of the points, m/s.
+        phase: 0..1 of the clip.
+    """
 
     step: Int[np.ndarray, " N"]
     qpos: Float[np.ndarray, "N nq"]
@@ -47,16 +52,25 @@ class Clip:
         self._points = np.asarray(reference.keypoints_w, float)
         self._offset = np.asarray(reference.lap_offset, float)
         self._moved = self._velocities()
+        self._last: ClipStep | None = None
 
     def at(self, step: Int[np.ndarray, " N"]) -> ClipStep:
-        """The reference at each environment's step."""
+        """The reference at each environment's step; read-only: what is asked for twice in a row, as
+        the end of one control step and the beginning of the next are, is computed once."""
+        if self._last is None or not np.array_equal(self._last.step, step):
+            self._last = self._read(np.array(step))
+        return self._last
+
+    def _read(self, step: Int[np.ndarray, " N"]) -> ClipStep:
         lap, index = self._split(step)
         offset = lap[:, None] * self._offset
         qpos = self._qpos[index].copy()
         qpos[:, :3] += offset
         points = self._points[index] + offset[:, None]
-        phase = index / self.steps
-        return ClipStep(step, qpos, self._qvel[index], points, self._moved[index], phase)
+        arrays = qpos, self._qvel[index], points, self._moved[index], index / self.steps
+        for array in arrays:
+            array.setflags(write=False)
+        return ClipStep(step, *arrays)
 
     def take(
         self, values: Float[np.ndarray, "S P 3"], step: Int[np.ndarray, " N"]

@@ -88,6 +88,9 @@ class RewardConfig:
         height, height_width: Root height, m.
         drift, drift_width: Root position, m.
         action_rate: Penalty on the mean squared change of the action.
+        fine: Share of every term that is paid by a narrower bell: the wide one shows the way from
+            afar, the narrow one still pays for the last centimetre.
+        narrow: Width of the narrower bell, in widths of the wide one.
         curiosity: As the paper's; scaled so that a perfect step earns the same share of it.
     """
 
@@ -110,6 +113,8 @@ class RewardConfig:
     drift: float = 0.05
     drift_width: float = 0.5
     action_rate: float = 0.02
+    fine: float = Field(default=0.5, ge=0, le=1)
+    narrow: float = Field(default=0.35, gt=0, le=1)
     curiosity: Curiosity = "off"
 
 

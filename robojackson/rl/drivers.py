@@ -11,8 +11,9 @@ from robojackson.motion.reference import ReferenceMotion
 from robojackson.retarget.robot import Robot
 from robojackson.rl.clip import ClipStep
 from robojackson.rl.config import ControlConfig
+from robojackson.rl.motors import Motors, residual_scale
 from robojackson.rl.observation import observation_size, observe
-from robojackson.rl.physics import Motors, Simulation, residual_scale
+from robojackson.rl.physics import Simulation
 from robojackson.rl.policy import Policy
 from robojackson.rl.rollouts import Driver
 from robojackson.rl.stock import stock_observation, stock_observation_size
@@ -69,13 +70,12 @@ def _trained(policy: Policy, robot: Robot, control: ControlConfig) -> Driver:
             return most * policy.act(stock_observation(sim)[:, : policy.observation_size])
 
         return Driver(control, torque, int(str(policy.facts.get("repeats", 1))))
-    hinge = Motors.of(robot.model).hinge
 
     def target(
         sim: Simulation, following: ClipStep, start: np.ndarray, last: np.ndarray
     ) -> np.ndarray:
         seen = observe(sim.qpos, sim.qvel, sim.points, following, last)
-        return following.qpos[:, 7:][:, hinge] + sim.residual * policy.act(seen)
+        return sim.follow(following) + sim.residual * policy.act(seen)
 
     return Driver(control, target)
 
@@ -92,9 +92,9 @@ def _baselines(
         "mean_pose": lambda sim, following, start, last: np.repeat(
             poses.mean(0, keepdims=True), sim.n, 0
         ),
-        "zero_residual": lambda sim, following, start, last: following.qpos[:, 7:][:, hinge],
+        "zero_residual": lambda sim, following, start, last: sim.follow(following),
         "random": lambda sim, following, start, last: (
-            following.qpos[:, 7:][:, hinge] + scale * rng.uniform(-1, 1, (sim.n, len(hinge)))
+            sim.follow(following) + scale * rng.uniform(-1, 1, (sim.n, len(hinge)))
         ),
     }
     return {name: Driver(control, command) for name, command in commands.items()}

@@ -3,7 +3,8 @@
 24 phases x 3 noisy resets and the default stand, deterministic policy, one horizon each. Success
 is the paper's: no fall (torso below 0.7 m or tilted over 60 degrees). Strict success also forbids
 kneeling and a mean site error above 0.30 m at any step. Skill is told against the best frozen pose
-over 14 sites with hands and head; a fall counts 0.
+over 14 sites with hands and head; a fall counts 0. The velocity score (`metrics.dance`) is told
+along the heading: the only figure that sees a robot jump from place to place.
 """
 
 import logging
@@ -153,7 +154,7 @@ def _tell_strangers(policy: Policy, reference: ReferenceMotion) -> None:
 def summarise(rows: list[dict[str, object]]) -> dict[str, float]:
     """Means over rollouts; limb gains only over those in which the limb had to move."""
     keys = ("survived_s", "success", "strict_success", "skill", "site_error_m", "clip_fraction",
-            "drift_m", "heading_error_deg", "travel_ratio")  # fmt: skip
+            "velocity_score", "drift_m", "heading_error_deg", "travel_ratio")  # fmt: skip
     out = {key: _mean(rows, key) for key in keys}
     limbs = [key for key in rows[0] if key.startswith(MEANT)]
     out |= {key: _mean(rows, key) for key in limbs}

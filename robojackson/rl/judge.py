@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 
 from robojackson.geometry.rotations import heading, wrapped
+from robojackson.metrics.dance import heading_score
 from robojackson.metrics.rollout import (
     best_frozen_error,
     heading_frame,
@@ -74,8 +75,19 @@ class Judge:
             "tempo": self._tempo,
         }
         row |= {name: float(total[i]) for name, total in self._means(rollouts).items()}
+        row["velocity_score"] = self._velocity_score(rollouts, i, span)
         row |= self._whereabouts(rollouts, i, span) | self._limb_figures(here, there)
         return row | self._usage(rollouts, i, span)
+
+    def _velocity_score(self, rollouts: Rollouts, i: int, span: slice) -> float:
+        """Along the heading, path included; a robot that falls has not danced: at most 0."""
+        score = heading_score(
+            rollouts.points[span, i],
+            rollouts.qpos[span, i, 3:7],
+            rollouts.wanted[span, i],
+            rollouts.wanted_qpos[span, i, 3:7],
+        )
+        return min(score, 0.0) if rollouts.fell[i] else score
 
     def _means(self, rollouts: Rollouts) -> dict[str, np.ndarray]:
         """Returns and their terms summed over the rollout, errors as means."""

@@ -7,6 +7,7 @@ import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
+from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
 from robojackson.rl.config import TqcConfig
 from robojackson.rl.randomness import load_random, save_random
@@ -15,7 +16,7 @@ from robojackson.rl.replay import ReplayFiles, buffer_of
 FOREVER = 10**12
 
 
-def arguments(config: TqcConfig, seed: int) -> dict[str, Any]:
+def arguments(config: TqcConfig, seed: int, env: VecEnv) -> dict[str, Any]:
     """Our configuration in the words of Stable-Baselines3, for either TQC."""
     return {
         "policy": "MlpPolicy",
@@ -28,6 +29,7 @@ def arguments(config: TqcConfig, seed: int) -> dict[str, Any]:
         "train_freq": config.steps_per_round,
         "gradient_steps": config.updates_per_round,
         "ent_coef": config.entropy,
+        "target_entropy": -config.target_entropy * float(np.prod(env.action_space.shape or 1)),
         "top_quantiles_to_drop_per_net": config.top_quantiles_to_drop,
         "policy_kwargs": {
             "n_critics": config.critics,

@@ -11,7 +11,6 @@ World frame, metres, radians, seconds, newton-metres. MuJoCo releases the interp
 
 import copy
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from itertools import pairwise
 
 import mujoco
@@ -20,7 +19,10 @@ from jaxtyping import Bool, Float, Int
 
 from robojackson.errors import BadPolicy
 from robojackson.retarget.robot import Robot
+from robojackson.rl.batch import SIZE, Batch, Views, centre_of_mass
+from robojackson.rl.clip import ClipStep
 from robojackson.rl.config import ControlConfig, RandomConfig
+from robojackson.rl.motors import Motors, residual_scale
 
 BAD_STATE = [
     int(kind)
@@ -31,31 +33,6 @@ BAD_STATE = [
     )
 ]
 """Warnings at which MuJoCo resets a state by itself."""
-
-
-@dataclass(frozen=True)
-class Motors:
-    """Actuators of the robot: which hinge each one drives and how strongly.
-
-    Attributes:
-        hinge: Index of the driven hinge among `qpos[7:]`, one an actuator.
-        gear: Torque per unit of control, N m.
-        limit: Largest torque, N m (gear x the control range).
-    """
-
-    hinge: Int[np.ndarray, " nu"]
-    gear: Float[np.ndarray, " nu"]
-    limit: Float[np.ndarray, " nu"]
-
-    @staticmethod
-    def of(model: mujoco.MjModel) -> "Motors":
-        """Read the motors of a model whose first joint is free and whose others are hinges."""
-        gear = model.actuator_gear[:, 0].copy()
-        return Motors(
-            hinge=model.jnt_qposadr[model.actuator_trnid[:, 0]] - 7,
-            gear=gear,
-            limit=gear * model.actuator_ctrlrange[:, 1],
-        )
 
 
 def require_same_clock(simulation_dt: float, reference_dt: float) -> None:
@@ -71,28 +48,6 @@ def require_same_clock(simulation_dt: float, reference_dt: float) -> None:
         )
 
 
-def residual_scale(robot: Robot, control: ControlConfig) -> Float[np.ndarray, " nu"]:
-    """Radians that a full action moves each motor's target: less for the arms."""
-    model = robot.model
-    arms = _moved_by(robot, ("left_hand", "right_hand")) - _moved_by(robot, ("head",))
-    legs = _moved_by(robot, ("left_foot", "right_foot"))
-    joints = model.actuator_trnid[:, 0]
-    is_arm = [int(joint) in arms - legs for joint in joints]
-    return np.where(is_arm, control.arm_residual, control.residual)
-
-
-def _moved_by(robot: Robot, keypoints: tuple[str, ...]) -> set[int]:
-    """Joints between the root and the bodies that carry the keypoints."""
-    model, found = robot.model, set()
-    for name in keypoints:
-        body = model.site_bodyid[robot.keypoint_sites[robot.keypoint_names.index(name)]]
-        while body > 0:
-            first = model.body_jntadr[body]
-            found |= set(range(first, first + model.body_jntnum[body]))
-            body = model.body_parentid[body]
-    return found
-
-
 class Simulation:
     """N copies of a robot.
 
@@ -104,6 +59,7 @@ class Simulation:
         points: Positions of the keypoint sites, world, in step with `qpos`.
         com: Centres of mass as `Humanoid-v5` sees them, one substep behind; law `torque` only.
         datas: MuJoCo's own state of every copy.
+        chunks: Of every thread, its batches: first copy, past the last, and the batch.
     """
 
     def __init__(
@@ -124,13 +80,11 @@ class Simulation:
         if random is not None and random != RandomConfig():
             self._vary(random, np.random.default_rng(seed))
         self.datas = [mujoco.MjData(own) for own in self._models]
-        self._q = [data.qpos[7:] for data in self.datas]
-        self._v = [data.qvel[6:] for data in self.datas]
-        self._ctrl = [data.ctrl for data in self.datas]
+        self._views = Views.of(self.datas)
         self.residual = residual_scale(robot, control)
         bounds = np.linspace(0, n, min(threads, n) + 1).astype(int)
-        self._chunks = list(pairwise(bounds))
-        self._pool = ThreadPoolExecutor(len(self._chunks)) if len(self._chunks) > 1 else None
+        self.chunks = [self._batches(lo, hi) for lo, hi in pairwise(bounds)]
+        self._pool = ThreadPoolExecutor(len(self.chunks)) if len(self.chunks) > 1 else None
         self.qpos = np.zeros((n, model.nq))
         self.qvel = np.zeros((n, model.nv))
         self.points = np.zeros((n, len(robot.keypoint_names), 3))
@@ -163,14 +117,17 @@ class Simulation:
         """
         rows = np.ones(self.n, bool) if active is None else active
         if self._pool is None:
-            self._advance(0, self.n, targets, rows)
+            self._advance(self.chunks[0], targets, rows)
         else:
-            jobs = [self._pool.submit(self._advance, *c, targets, rows) for c in self._chunks]
+            jobs = [self._pool.submit(self._advance, c, targets, rows) for c in self.chunks]
             for job in jobs:
                 job.result()
-        warnings = np.array([data.warning.number for data in self.datas])
-        self.broken = np.any(warnings[:, BAD_STATE] > 0, axis=1)
-        self._gather(np.arange(self.n))
+        self.broken = np.any(np.array(self._views.warnings)[:, BAD_STATE] > 0, axis=1)
+        self._gather_all()
+
+    def follow(self, step: ClipStep) -> Float[np.ndarray, "N nu"]:
+        """Target hinge angles that follow a reference step with nothing learnt, rad."""
+        return step.qpos[:, 7:][:, self.motors.hinge]
 
     def close(self) -> None:
         """Stop the threads."""
@@ -187,41 +144,32 @@ class Simulation:
         factor = 1 + random.gains * rng.uniform(-1, 1, (self.n, 1))
         self.kp, self.kd = self.kp * factor, self.kd * factor
 
-    def _advance(self, lo: int, hi: int, targets: np.ndarray, rows: np.ndarray) -> None:
-        live = [i for i in range(lo, hi) if rows[i]]
-        models, datas, step = self._models, self.datas, mujoco.mj_step
-        law = self.control.law
-        for substep in range(self.control.substeps):
-            if substep == 0 or law == "pd":
-                control = self._controls(lo, hi, targets[lo:hi])
-                for i in live:
-                    self._ctrl[i][:] = control[i - lo]
-            for i in live:
-                step(models[i], datas[i])
-        for i in live:
-            if law == "torque":
-                mujoco.mj_rnePostConstraint(models[i], datas[i])
-                self.com[i] = centre_of_mass(models[i], datas[i])
-            mujoco.mj_kinematics(models[i], datas[i])
+    def _batches(self, lo: int, hi: int) -> list[tuple[int, int, Batch]]:
+        """The copies of one thread, a batch at a time."""
+        found = []
+        for first in range(lo, hi, SIZE):
+            past = min(first + SIZE, hi)
+            kp, kd = (k[first:past] if k.ndim > 1 else k for k in (self.kp, self.kd))
+            models, datas = self._models[first:past], self.datas[first:past]
+            found.append((first, past, Batch(models, datas, self.motors, self.control, kp, kd)))
+        return found
 
-    def _controls(self, lo: int, hi: int, targets: np.ndarray) -> np.ndarray:
-        """What is written to `ctrl` for the copies from `lo` to `hi`."""
-        motors = self.motors
-        if self.control.law == "torque":
-            return targets
-        angle = np.array(self._q[lo:hi])[:, motors.hinge]
-        speed = np.array(self._v[lo:hi])[:, motors.hinge]
-        kp, kd = (k[lo:hi] if k.ndim > 1 else k for k in (self.kp, self.kd))
-        torque = kp * (targets - angle) - kd * speed
-        return np.clip(torque, -motors.limit, motors.limit) / motors.gear
+    def _advance(
+        self, batches: list[tuple[int, int, Batch]], targets: np.ndarray, rows: np.ndarray
+    ) -> None:
+        for lo, hi, batch in batches:
+            batch.advance(targets[lo:hi], rows[lo:hi], self.com[lo:hi])
 
     def _gather(self, indices: np.ndarray) -> None:
-        datas = [self.datas[i] for i in indices]
-        self.qpos[indices] = [data.qpos for data in datas]
-        self.qvel[indices] = [data.qvel for data in datas]
-        self.points[indices] = np.array([data.site_xpos for data in datas])[:, self._sites]
+        for i in indices:
+            data = self.datas[i]
+            self.qpos[i], self.qvel[i] = data.qpos, data.qvel
+            self.points[i] = data.site_xpos[self._sites]
 
-
-def centre_of_mass(model: mujoco.MjModel, data: mujoco.MjData) -> Float[np.ndarray, "3"]:
-    """Of the whole robot, from the poses that MuJoCo computed last, metres, world."""
-    return np.asarray(model.body_mass @ data.xipos / model.body_mass.sum())
+    def _gather_all(self) -> None:
+        """The same for all copies, at the price of few calls."""
+        views, n = self._views, self.n
+        np.concatenate(views.qpos, out=self.qpos.reshape(-1))
+        np.concatenate(views.qvel, out=self.qvel.reshape(-1))
+        sites = np.concatenate(views.sites).reshape(n, -1, 3)
+        sites.take(self._sites, 1, out=self.points)

@@ -92,7 +92,12 @@ def reward_terms(
     errors: TrackingErrors, action_change: Float[np.ndarray, " N"], config: RewardConfig
 ) -> dict[str, Float[np.ndarray, " N"]]:
     """Named terms whose sum is the reward; `action_change` is the mean squared change."""
-    bell = lambda weight, error, width: weight * np.exp(-((error / width) ** 2))  # noqa: E731
+    fine, narrow = config.fine, config.narrow
+
+    def bell(weight: float, error: np.ndarray, width: float) -> np.ndarray:
+        square = (error / width) ** 2
+        return weight * ((1 - fine) * np.exp(-square) + fine * np.exp(-square / narrow**2))
+
     return {
         "joints": bell(config.joints, errors.joints, config.joints_width),
         "sites": bell(config.sites, errors.sites, config.sites_width),

@@ -107,7 +107,7 @@ def roll_out(
         target, before, change = clip.at(starts.step + t + 1), sim.points.copy(), np.zeros(n)
         if t % driver.repeats == 0:
             command = driver.command(sim, target, starts.step, action)
-            residual = command - target.qpos[:, 7:][:, sim.motors.hinge]
+            residual = command - sim.follow(target)
             last, action = action, np.clip(residual / sim.residual, -1, 1)
             change = np.mean((action - last) ** 2, -1)
         sim.step(command, alive)

@@ -16,6 +16,7 @@ import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 
 from robojackson.errors import BadConfiguration, StoreError
+from robojackson.rl.average import ActorAverage
 from robojackson.rl.config import TrainConfig
 from robojackson.rl.hooks import Enough, Hooks, Row
 from robojackson.rl.networks import Networks
@@ -52,6 +53,7 @@ class Run:
         self._cpu_before, self._cpu_began = 0.0, time.process_time()
         self._board = ScalarLog(out / "tensorboard") if config.tensorboard else None
         self.callback = _Callback(self)
+        self._average = ActorAverage(config.tqc.actor_average)
 
     def bind(self, trainer: Trainer) -> None:
         """Attach the trainer; continue from a checkpoint when there is one."""
@@ -68,6 +70,7 @@ class Run:
         trainer.load(folder, self.out / "replay", state["steps"], state["updates"])
         with np.load(folder / "environment.npz", allow_pickle=False) as arrays:
             self.core.restore(dict(arrays))
+        self._average.load(folder)
         self.core.rng.bit_generator.state = state["random"]
         self._before, self._first_step = state["seconds"], state["steps"]
         self._cpu_before = state["cpu_seconds"]
@@ -104,6 +107,7 @@ class Run:
             KeyboardInterrupt: the caller wants to stop; a checkpoint was written.
         """
         now = time.monotonic()
+        self._average.add(self.trainer.acting(), self.trainer.updates())
         try:
             started = self.trainer.steps() > self._first_step
             if started and now - self._told >= self.config.progress_seconds:
@@ -129,6 +133,7 @@ class Run:
             fresh.mkdir()
             self.trainer.save(fresh, self.out / "replay")
             np.savez(fresh / "environment.npz", **self.core.state())
+            self._average.save(fresh)
             (fresh / "run.json").write_text(json.dumps(self._state()))
             for name, content in self._results().items():
                 (self.out / f"{name}.part").write_bytes(content)
@@ -184,7 +189,7 @@ class Run:
         """What a run leaves beside its tables: the policy, and networks to start others from."""
         facts = self._facts()
         networks = Networks(self.trainer.networks(), facts)
-        policy = Policy(self.trainer.layers(), facts)
+        policy = Policy(self._average.layers(self.trainer.layers()), facts)
         return {
             "policy.safetensors": policy.to_bytes(),
             "networks.safetensors": networks.to_bytes(),

@@ -31,7 +31,7 @@ class Sb3Trainer(OffPolicyTrainer):
 
     def __init__(self, env: VecEnv, config: TqcConfig, seed: int) -> None:
         torch.set_num_threads(1)
-        given = arguments(config, seed)
+        given = arguments(config, seed, env)
         if config.gsde:
             given["use_sde"] = True
             given["policy_kwargs"] |= {"clip_mean": 0.0}  # the policy file knows no clipped mean
@@ -46,6 +46,9 @@ class Sb3Trainer(OffPolicyTrainer):
         return tuple(
             (m.weight.detach().numpy().T.copy(), m.bias.detach().numpy().copy()) for m in linear
         )
+
+    def acting(self) -> Layers:
+        return self.layers()
 
     def networks(self) -> Tensors:
         tensors: Tensors = {}

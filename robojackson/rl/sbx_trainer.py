@@ -28,6 +28,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 from robojackson.rl.config import TqcConfig
 from robojackson.rl.networks import CRITICS, TARGETS, Tensors
 from robojackson.rl.off_policy import OffPolicyTrainer, arguments, patient
+from robojackson.rl.quantiles import update_critic
 from robojackson.rl.replay import buffer_of
 from robojackson.rl.trainer import Layers
 
@@ -38,6 +39,8 @@ LOG_STD_RANGE = (-20.0, 2.0)
 
 class OverlappedTQC(TQC):
     """TQC whose updates run while the environments step."""
+
+    update_critic = staticmethod(update_critic)  # type: ignore[assignment]
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -109,7 +112,7 @@ class SbxTrainer(OffPolicyTrainer):
     """The JAX trainer (`Trainer` protocol)."""
 
     def __init__(self, env: VecEnv, config: TqcConfig, seed: int) -> None:
-        given = arguments(config, seed)
+        given = arguments(config, seed, env)
         given["policy_kwargs"] |= {"layer_norm": config.layer_norm}
         model = OverlappedTQC(env=env, policy_delay=config.policy_delay, **given)
         model.warmup = config.warmup
@@ -128,6 +131,9 @@ class SbxTrainer(OffPolicyTrainer):
     def layers(self) -> Layers:
         layers = actor_layers(self.model.policy.actor_state.params)
         return layers[:-1]
+
+    def acting(self) -> Layers:
+        return self.model._acting[:-1]
 
     def networks(self) -> Tensors:
         policy = self.model.policy

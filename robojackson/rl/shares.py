@@ -16,7 +16,7 @@ from robojackson.rl.clip import Clip
 from robojackson.rl.config import ControlConfig, PaperConfig, TerminationConfig, TrackConfig
 from robojackson.rl.meter import Meter
 from robojackson.rl.paper_mode import facing_ahead
-from robojackson.rl.physics import Motors, Simulation
+from robojackson.rl.physics import Simulation
 from robojackson.rl.rollouts import Driver, Moment, Starts, roll_out
 
 MOST_STEPS = 400
@@ -119,9 +119,9 @@ def _earned(
 
 def _replayed(robot: Robot, clip: Clip, meter: Meter) -> float:
     """What the reference's hinge angles earn as targets, up to the fall."""
-    hinge = Motors.of(robot.model).hinge
     driver = Driver(
-        ControlConfig(), lambda sim, following, start, last: following.qpos[:, 7:][:, hinge]
+        ControlConfig(),
+        lambda sim, following, start, last: sim.follow(following),
     )
     at = clip.at(np.zeros(1, int))
     starts = Starts(np.zeros(1, int), at.qpos, at.qvel)

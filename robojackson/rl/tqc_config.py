@@ -19,6 +19,8 @@ PRESETS: dict[str, dict[str, Any]] = {
         "tau": 0.005,
         "gamma": 0.99,
         "policy_delay": 1,
+        "target_entropy": 1.0,
+        "actor_average": 0.0,
         "entropy": "auto",
     },
     # The authors' released code, its replay buffer cut from 1,000,000 to 300,000.
@@ -32,6 +34,8 @@ PRESETS: dict[str, dict[str, Any]] = {
         "tau": 0.005,
         "gamma": 0.99,
         "policy_delay": 1,
+        "target_entropy": 1.0,
+        "actor_average": 0.0,
         "entropy": "auto_0.1",
         "actor": (512, 512, 512),
         "critic": (512, 512, 512),
@@ -59,6 +63,9 @@ class TqcConfig:
         layer_norm: Layer normalisation in the critics; `sbx` only.
         gsde: State-dependent exploration; `sbx` has none and explores with plain noise.
         log_std_init: Logarithm of the first exploration noise; `sb3` uses it with gSDE only.
+        target_entropy: Entropy that exploration keeps, in units of minus the number of actions.
+        actor_average: Weight of the past in the running mean of the actor that becomes the
+            policy, a round of updates; 0 is the last actor.
     """
 
     preset: Literal["dance", "paper", "released"] = "dance"
@@ -81,6 +88,8 @@ class TqcConfig:
     layer_norm: bool = False
     gsde: bool = False
     log_std_init: float = 0.0
+    target_entropy: float = Field(default=1.5, gt=0)
+    actor_average: float = Field(default=0.98, ge=0, lt=1)
 
     @model_validator(mode="before")
     @classmethod

@@ -48,7 +48,7 @@ class TrackMode:
         self.observation_size = observation_size(robot.model.nq - 7, robot.model.nu, len(names))
 
     def command(self, following: ClipStep, action: np.ndarray) -> np.ndarray:
-        return following.qpos[:, 7:][:, self.sim.motors.hinge] + self.sim.residual * action
+        return self.sim.follow(following) + self.sim.residual * action
 
     def observe(self, following: ClipStep, action: np.ndarray) -> Float[np.ndarray, "N D"]:
         return observe(self.sim.qpos, self.sim.qvel, self.sim.points, following, action)

@@ -56,10 +56,31 @@ def test_the_reference_itself_is_a_strict_success_of_skill_one(
     assert judged["limb_gain_left_hand"] == pytest.approx(1)
 
 
+def test_the_velocity_score_is_one_at_the_reference_and_none_for_a_statue(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    whole = perfect(sway)
+    frozen = np.repeat(whole.points[:1], STEPS, 0)
+    statue = dataclasses.replace(whole, points=frozen)
+    assert row(robot, sway, whole)["velocity_score"] == pytest.approx(1)
+    assert row(robot, sway, statue)["velocity_score"] == pytest.approx(0)
+
+
+def test_the_velocity_score_sees_a_jump_that_the_pelvis_frame_does_not(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    points = perfect(sway).points.copy()
+    points[90:, ..., 0] += 1.0
+    judged = row(robot, sway, dataclasses.replace(perfect(sway), points=points))
+    assert judged["skill"] == pytest.approx(1)
+    assert judged["velocity_score"] < 0  # type: ignore[operator]
+
+
 def test_a_fall_has_no_skill_and_no_success(robot: Robot, sway: ReferenceMotion) -> None:
     fall = dataclasses.replace(perfect(sway), length=np.array([40]), fell=np.array([True]))
     judged = row(robot, sway, fall)
     assert (judged["success"], judged["strict_success"], judged["skill"]) == (0, 0, 0)
+    assert judged["velocity_score"] == 0
     assert judged["survived_s"] == pytest.approx(40 * sway.dt)
     assert judged["clip_fraction"] == pytest.approx(0.25)
 

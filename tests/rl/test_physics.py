@@ -5,7 +5,8 @@ import numpy as np
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.retarget.robot import Robot
 from robojackson.rl.config import ControlConfig, RandomConfig
-from robojackson.rl.physics import Motors, Simulation, residual_scale
+from robojackson.rl.motors import Motors, residual_scale
+from robojackson.rl.physics import Simulation
 
 
 def placed(robot: Robot, sway: ReferenceMotion, n: int, threads: int) -> Simulation:

@@ -1,0 +1,46 @@
+"""Judging a policy is light: the whole command loads no library that trains or orchestrates."""
+
+import dataclasses
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from robojackson.motion.reference import ReferenceMotion
+from robojackson.retarget.robot import Robot
+from robojackson.rl.config import ControlConfig
+from robojackson.rl.observation import observation_size
+from robojackson.rl.policy import Policy
+from storage import tables
+from tests.flows.conftest import environment
+
+SPY = """
+import sys
+from flows.cli import app
+heavy = {"jax", "torch", "stable_baselines3", "sb3_contrib", "sbx", "prefect"}
+try:
+    app(sys.argv[1:])
+finally:
+    print("loaded:", sorted(heavy & set(sys.modules)), file=sys.stderr)
+"""
+
+
+def test_the_command_evaluate_loads_nothing_that_trains(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    model = robot.model
+    size = observation_size(model.nq - 7, model.nu, len(robot.keypoint_names))
+    nothing = (np.zeros((size, model.nu)), np.zeros(model.nu))
+    facts = {"robot": "humanoid", "control": dataclasses.asdict(ControlConfig())}
+    (tmp_path / "policy.safetensors").write_bytes(Policy((nothing,), facts).to_bytes())
+    (tmp_path / "reference.parquet").write_bytes(tables.encode(sway))
+    words = ["evaluate", tmp_path / "policy.safetensors", tmp_path / "reference.parquet"]
+    brief = ["-o", tmp_path / "out", "--seconds=0.3", "--set=evaluate.phases=2"]
+    command = [sys.executable, "-c", SPY, *map(str, [*words, *brief])]
+    done = subprocess.run(
+        command, capture_output=True, text=True, check=False, env=environment(), timeout=280
+    )
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "out" / "evaluations.parquet").is_file()
+    assert "loaded: []" in done.stderr
