@@ -34,7 +34,7 @@ test: setup
 	@$(PY) -m pytest -q $(ARGS)
 
 test-stack: setup
-	@$(PY) -m pytest -q -m cluster $(ARGS)
+	@$(PY) -m pytest -q -m cluster tests/deploy $(ARGS)
 
 bench-mocap: setup
 	@$(PY) -m benchmarks.mocap $(ARGS)

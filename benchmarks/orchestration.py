@@ -4,9 +4,9 @@ On the PostgreSQL and the server of tools/stack.py, with played cells (benchmark
 
     cached   nine cells that are all cached: at most 6 s
     busy     nine cells that burn 60 s of processor time each: at most 3 % for orchestration, and
-             both cores at least 90 % busy
+             both cores at least 90 % busy while cells wait
     local    1,000 sleeping cells through the local executor: overhead a cell, and where it bends
-    pool     runs on a work pool with 8 workers of one run each: overhead a run
+    pool     200 sleeping cells through a work pool with 8 workers of one run each
 
 Processor time of this process, of the server and of PostgreSQL is what orchestration costs; it is
 told beside wall time, which other work on the machine would make longer.
@@ -16,180 +16,169 @@ import argparse
 import asyncio
 import json
 import os
-import re
 import subprocess
+import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
-from tools.processes import cpu_seconds
+import yaml
+
+from benchmarks.costs import Begun, Costs, each
 from tools.stack import Stack, running
 
 RESULTS = Path(__file__).parent / "results" / "orchestration.json"
 PARTS = ("cached", "busy", "local", "pool")
 SETUPS = ("scratch", "pretrain", "curiosity")
-CALL = re.compile(r'"(?:GET|POST|PATCH|PUT|DELETE) /api/')
+NINE: dict[str, Any] = {"moves": ("hip_shake", "dance_b", "walk"), "setups": SETUPS, "seeds": (0,)}
+POOL, DEPLOYMENT = "training", "bench"
+QUARTERS = 4
 
 
-class Costs:
-    """What is used from now on: wall time, processor time, calls of the server's API."""
-
-    def __init__(self, stack: Stack) -> None:
-        self._stack, self._first = stack, self._read(stack)
-
-    def so_far(self) -> dict[str, float]:
-        now = self._read(self._stack)
-        return {name: round(now[name] - self._first[name], 2) for name in now}
-
-    @staticmethod
-    def _read(stack: Stack) -> dict[str, float]:
-        own = os.times()
-        log = (stack.folder / "prefect-server.log").read_text(errors="replace")
-        return {
-            "wall_s": time.monotonic(),
-            "flow_cpu_s": own.user + own.system,
-            "work_cpu_s": own.children_user + own.children_system,
-            "server_cpu_s": cpu_seconds(_pid(stack, "prefect-server")),
-            "postgres_cpu_s": cpu_seconds(_pid(stack, "postgres")),
-            "api_calls": len(CALL.findall(log)),
-            "database_kb": _database_kb(stack),
-        }
+def sleepers(count: int) -> dict[str, Any]:
+    """A grid of about so many cells of one move."""
+    return {"moves": ("walk",), "setups": SETUPS, "seeds": tuple(range(count // len(SETUPS)))}
 
 
-def ablate(name: str, seeds: int, seconds: float, burn: bool, slots: int) -> None:
-    """Run the flow over played cells: 3 x `seeds` of them."""
-    from benchmarks.played import played
+def study(name: str, grid: dict[str, Any], **more: Any) -> dict[str, Any]:
+    """A study whose motions are as short as can be, if they are made."""
+    return {"name": name, **grid, "pipeline": "smoke", "gate": False, **more}
+
+
+def ablate(
+    wanted: dict[str, Any],
+    seconds: float,
+    burn: bool,
+    began: Callable[[], None] = lambda: None,
+    motions: bool = False,
+) -> None:
+    """Run the flow over played cells.
+
+    Args:
+        motions: Make the motions of the moves, too; else they are played.
+    """
+    from benchmarks.played import motionless, played
     from configs.study import Study
     from flows.ablation import ablation
 
-    given: dict[str, Any] = {"moves": ("walk",), "setups": SETUPS, "seeds": tuple(range(seeds))}
-    with played(seconds, burn):
-        asyncio.run(ablation(Study(name=name, **given, pipeline="smoke", slots=slots)))
+    with played(seconds, burn, began), nullcontext() if motions else motionless():
+        asyncio.run(ablation(Study(**wanted)))
 
 
 def cached(stack: Stack, wanted: argparse.Namespace) -> dict[str, Any]:
-    """Nine cells again, three times."""
-    ablate("cached", 3, 0.0, False, 2)
-    rounds = []
+    """Nine cells again, three times in this process, then three times by the command."""
+    nine = study("cached", NINE, slots=2)
+    ablate(nine, 0.0, False, motions=True)
+    rounds, commands = [], []
     for _ in range(3):
         costs = Costs(stack)
-        ablate("cached", 3, 0.0, False, 2)
+        ablate(nine, 0.0, False, motions=True)
         rounds.append(costs.so_far())
-    return {"cells": 9, "best_s": min(r["wall_s"] for r in rounds), "rounds": rounds}
+    for _ in range(3):
+        commands.append(_command(stack, nine))
+    return {
+        "cells": 9,
+        "worst_s": max(r["wall_s"] for r in rounds),
+        "worst_command_s": max(commands),
+        "commands_s": commands,
+        "rounds": rounds,
+    }
 
 
 def busy(stack: Stack, wanted: argparse.Namespace) -> dict[str, Any]:
-    """Nine cells of work on two slots; the motion was made before."""
-    ablate("motion", 1, 0.0, False, 2)
-    costs = Costs(stack)
-    ablate(f"busy-{wanted.seconds:g}", 3, wanted.seconds, True, 2)
+    """Nine cells of work on two slots."""
+    ablate(study("first", {**sleepers(3), "seeds": (10_000,)}, slots=2), 0.0, False)
+    costs, began = Costs(stack), Begun(stack)
+    ablate(study(f"busy-{wanted.seconds:g}", NINE, slots=2), wanted.seconds, True, began)
     used = costs.so_far()
-    spent = used["flow_cpu_s"] + used["server_cpu_s"] + used["postgres_cpu_s"]
     rounds = 5  # nine cells on two slots: the last one is alone
     return {
         "cells": 9,
         "seconds_each": wanted.seconds,
         **used,
-        "orchestration_cpu_share": round(spent / used["work_cpu_s"], 4),
+        "orchestration_cpu_share": round(used["orchestration_cpu_s"] / used["work_cpu_s"], 4),
         "wall_over_ideal": round(used["wall_s"] / (rounds * wanted.seconds), 4),
-        "cores_busy": round(used["work_cpu_s"] / (2 * used["wall_s"]), 4),
+        "cores_busy_while_cells_wait": began.busy(cores=2),
     }
 
 
 def local(stack: Stack, wanted: argparse.Namespace) -> dict[str, Any]:
     """More and more sleeping cells, many at once."""
-    ablate("motion", 1, 0.0, False, 2)
-    rows = []
+    ablate(study("first", {**sleepers(3), "seeds": (10_000,)}, slots=2), 0.0, False)
+    rows: list[dict[str, Any]] = []
     for count in wanted.counts:
-        costs = Costs(stack)
-        ablate(f"sleep-{count}", count // 3, 1.0, False, wanted.slots)
+        costs, began = Costs(stack), Begun(stack, every=5)
+        grid = sleepers(count)
+        ablate(study(f"sleep-{count}", grid, slots=wanted.slots), 1.0, False, began)
         used = costs.so_far()
-        rows.append({"cells": count // 3 * 3, **used, **_each(used, count // 3 * 3)})
+        rows.append({"cells": began.count, **used, **each(used, began.count)})
+        rows[-1]["by_quarters"] = began.by_parts(QUARTERS)
     return {"slots": wanted.slots, "sleep_s": 1.0, "rows": rows}
 
 
 def pool(stack: Stack, wanted: argparse.Namespace) -> dict[str, Any]:
-    """Runs that sleep on workers, each a process of its own."""
-    from prefect.deployments import arun_deployment
+    """Sleeping cells on workers, each a process of its own."""
+    from flows import cells
 
-    async def all_runs() -> list[Any]:
-        ask: dict[str, Any] = {"parameters": {"seconds": 1.0}, "timeout": 3600}
-        return await asyncio.gather(
-            *(arun_deployment("nap/bench", **ask) for _ in range(wanted.runs))
-        )
-
-    _deploy_nap()
+    ablate(study("first", {**sleepers(3), "seeds": (10_000,)}, slots=2), 0.0, False)
+    _deploy()
     costs = Costs(stack)
-    runs = asyncio.run(all_runs())
-    used = costs.so_far()
-    ended = sum(run.state.is_completed() for run in runs)
-    workers = stack.scale["trainer"]
-    return {"workers": workers, "runs": wanted.runs, "completed": ended, **used} | _each(
-        used, wanted.runs
-    )
+    with patch.object(cells, "DEPLOYMENT", f"cell/{DEPLOYMENT}"):
+        ablate(study("pool", sleepers(wanted.runs), executor="work-pool"), 0.0, False)
+    used, count = costs.so_far(), len(sleepers(wanted.runs)["seeds"]) * len(SETUPS)
+    workers = {"workers_cpu_ms_each": round(1e3 * used["workers_cpu_s"] / count, 1)}
+    return {"workers": wanted.workers, "cells": count, **used, **each(used, count), **workers}
 
 
-def _each(used: dict[str, float], count: int) -> dict[str, float]:
-    spent = used["flow_cpu_s"] + used["server_cpu_s"] + used["postgres_cpu_s"]
-    figures = {"wall_ms": 1e3 * used["wall_s"], "cpu_ms": 1e3 * spent}
-    figures |= {"calls": used["api_calls"], "database_kb": used["database_kb"]}
-    return {f"{name}_each": round(value / count, 1) for name, value in figures.items()}
+def _command(stack: Stack, wanted: dict[str, Any]) -> float:
+    """Wall time of `robojackson ablation`, from the shell to its last word."""
+    file = stack.folder / "study.yaml"
+    file.write_text(yaml.safe_dump(json.loads(json.dumps(wanted))))
+    began = time.monotonic()
+    words = [sys.executable, "-m", "flows.cli", "ablation", str(file), "--json"]
+    subprocess.run(words, check=True, capture_output=True)
+    return round(time.monotonic() - began, 2)
 
 
-def _deploy_nap() -> None:
+def _deploy() -> None:
+    """Register the cell that sleeps."""
     from prefect.client.orchestration import get_client
+    from prefect.utilities.callables import parameter_schema
 
-    from benchmarks.played import nap
+    from benchmarks.played import pooled
 
     folder = str(Path(__file__).parent.parent)
     step = {"prefect.deployments.steps.set_working_directory": {"directory": folder}}
     with get_client(sync_client=True) as client:
         client.create_deployment(
-            flow_id=client.create_flow(nap),
-            name="bench",
-            entrypoint="benchmarks.played.nap",
-            work_pool_name="training",
+            flow_id=client.create_flow(pooled),
+            name=DEPLOYMENT,
+            entrypoint="benchmarks.played.pooled",
+            work_pool_name=POOL,
             pull_steps=[step],
-            parameter_openapi_schema=nap_schema(),
+            parameter_openapi_schema=parameter_schema(pooled.fn).model_dump_for_openapi(),
         )
-
-
-def nap_schema() -> dict[str, Any]:
-    from prefect.utilities.callables import parameter_schema
-
-    from benchmarks.played import nap
-
-    return parameter_schema(nap.fn).model_dump_for_openapi()
-
-
-def _database_kb(stack: Stack) -> float:
-    """What the database takes on its disk."""
-    ask = ["psql", "-U", "prefect", "-d", "prefect", "-Atc", "select pg_database_size('prefect')"]
-    access = stack.services["postgres"].environment
-    run = subprocess.run(ask, env=access, capture_output=True, text=True, check=True)
-    return int(run.stdout) / 1e3
-
-
-def _pid(stack: Stack, name: str) -> int:
-    process = stack.services[name].process
-    assert process is not None
-    return process.pid
 
 
 @contextmanager
 def _server(folder: Path, workers: int) -> Iterator[Stack]:
-    """A stack whose server counts its calls, and this process as its client."""
-    logged = {"PREFECT_SERVER_LOGGING_LEVEL": "INFO", "PREFECT_LOGGING_LEVEL": "WARNING"}
-    scale = {"flow-worker": 0, "trainer": workers}
-    with running(folder, scale=scale, more=logged) as stack:
-        client = {n: v for n, v in stack.client().items() if n.startswith(("PREFECT_", "DO_NOT"))}
-        del client["PREFECT_RESULTS_DEFAULT_STORAGE_BLOCK"]
-        os.environ.update(client)
-        os.environ["ROBOJACKSON_STORE"] = str(folder / "store")
-        os.environ["PREFECT_LOCAL_STORAGE_PATH"] = str(folder / "records")
+    """A stack whose server counts its calls, and this process as its client.
+
+    With workers the store is the stack's; else it is a folder, as for one machine.
+    """
+    logged = {"PREFECT_SERVER_LOGGING_LEVEL": "INFO"}
+    with running(folder, scale={"flow-worker": 0, "trainer": workers}, more=logged) as stack:
+        ours = ("PREFECT_", "DO_NOT", *(("AWS_", "ROBOJACKSON_") if workers else ()))
+        os.environ.update({n: v for n, v in stack.client().items() if n.startswith(ours)})
+        if not workers:
+            del os.environ["PREFECT_RESULTS_DEFAULT_STORAGE_BLOCK"]
+            os.environ["ROBOJACKSON_STORE"] = str(folder / "store")
+            os.environ["PREFECT_LOCAL_STORAGE_PATH"] = str(folder / "records")
         yield stack
 
 
@@ -197,22 +186,35 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
-    parser.add_argument("--part", action="append", choices=PARTS, help="only this part")
+    parser.add_argument("--part", choices=PARTS, help="only this part")
     parser.add_argument("--seconds", type=float, default=60.0, help="of work in a busy cell")
-    parser.add_argument("--counts", type=int, nargs="+", default=[30, 99, 300, 999])
+    parser.add_argument("--counts", type=int, nargs="+", default=[30, 120, 1000])
     parser.add_argument("--slots", type=int, default=32, help="cells at once in `local`")
     parser.add_argument("--runs", type=int, default=200, help="in `pool`")
     parser.add_argument("--workers", type=int, default=8, help="in `pool`")
     wanted = parser.parse_args()
-    parts = wanted.part or PARTS
-    folder = Path(tempfile.mkdtemp(prefix="robojackson-bench-"))
+    if wanted.part is None:  # Prefect knows one server a process
+        for part in PARTS:
+            words = [sys.executable, "-m", "benchmarks.orchestration", "--part", part]
+            subprocess.run([*words, *sys.argv[1:]], check=True)
+        return
+    made = measured(wanted.part, wanted)
+    print(json.dumps(made, indent=1), flush=True)
     known = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
-    with _server(folder, wanted.workers if "pool" in parts else 0) as stack:
-        for part in parts:
-            known[part] = globals()[part](stack, wanted)
-            known[part]["load"] = [round(one, 1) for one in os.getloadavg()]
-            print(part, json.dumps(known[part], indent=1), flush=True)
-            RESULTS.write_text(json.dumps(known, indent=1) + "\n")
+    RESULTS.write_text(json.dumps({**known, wanted.part: made}, indent=1) + "\n")
+
+
+def measured(part: str, wanted: argparse.Namespace) -> dict[str, Any]:
+    """A part on a stack of its own, with how and when it was measured."""
+    folder = Path(tempfile.mkdtemp(prefix="robojackson-bench-"))
+    with _server(folder, wanted.workers if part == "pool" else 0) as stack:
+        return {
+            "command": " ".join(["python -m benchmarks.orchestration", *sys.argv[1:]]),
+            "date": datetime.now(UTC).isoformat(timespec="seconds"),
+            "load_before": [round(one, 2) for one in os.getloadavg()],
+            **globals()[part](stack, wanted),
+            "load_after": [round(one, 2) for one in os.getloadavg()],
+        }
 
 
 if __name__ == "__main__":

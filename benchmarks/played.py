@@ -5,7 +5,7 @@ A training burns or sleeps a number of seconds in a process of its own and leave
 
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -13,9 +13,13 @@ from unittest.mock import patch
 
 from prefect import flow
 
+from flows import ablation, cells
 from storage import tables
+from storage.artifact import Artifact
 from storage.schemas import EPISODE_RECORD, EVALUATION_RECORD
+from storage.store import Store
 from tasks import judgement, train
+from tasks.cell import Cell
 from tasks.judgement import ROLLOUT, SUMMARY, TABLE
 
 NAMES = {"run_id": "played", "move": "played", "setup": "played", "seed": 0}
@@ -27,18 +31,21 @@ SLEEP = "import time\ntime.sleep({seconds})"
 SAID = {"trainer": "none", "seed": 0, "steps": 1, "updates": 0, "stopped": "", "episodes": 1}
 MARK = "played-work"
 """By which its processes are found."""
+NAP_S = 1.0
 
 
 @contextmanager
-def played(seconds: float, burn: bool) -> Iterator[None]:
+def played(seconds: float, burn: bool, began: Callable[[], None] = lambda: None) -> Iterator[None]:
     """Let every training and judgement of this process be played.
 
     Args:
         seconds: That a training takes, of processor time if it burns; a judgement takes none.
+        began: Called whenever a training begins.
     """
     code = (BURN if burn else SLEEP).format(seconds=seconds)
 
     def command(*given: Any) -> list[str]:
+        began()
         work = Path(given[1])
         (work / "policy.safetensors").write_bytes(given[4].encode())
         rows = tables.encode_rows(EPISODE_RECORD, [EPISODE])
@@ -56,11 +63,24 @@ def played(seconds: float, burn: bool) -> Iterator[None]:
         yield
 
 
-@flow(name="nap")
-async def nap(seconds: float) -> None:
-    """A run on a worker that loads what a cell loads, and sleeps."""
-    import asyncio
+@contextmanager
+def motionless() -> Iterator[None]:
+    """Let the motions of a study be words: its cells play and look at none."""
 
-    import flows.cells  # noqa: F401
+    def motion(move: Any, study: Any) -> dict[str, Artifact]:
+        store = Store.from_environment()
+        names = ("reference", "scorecard", "still")
+        return {name: store.keep("played", name, move.clip.encode()) for name in names}
 
-    await asyncio.sleep(seconds)
+    with (
+        patch.object(ablation, "motion", motion),
+        patch.object(ablation, "gate", lambda study, scorecards: None),
+    ):
+        yield
+
+
+@flow(name="cell", flow_run_name="{cell.name}", persist_result=True)
+async def pooled(cell: Cell) -> dict[str, Artifact]:
+    """A cell on a worker that sleeps in place of learning."""
+    with played(NAP_S, burn=False):
+        return await cells.cell.fn(cell)

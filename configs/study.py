@@ -54,6 +54,8 @@ class Study:
         trainer: `sbx` (JAX, fast) or `sb3` (the reference).
         robot: Name of `configs/robots/*.yaml`.
         pipeline: Name of the configuration that makes the reference motions and judges.
+        gate: Refuse the study when a motion breaks a hard bar of its score card, as `dance` does;
+            off: train on it all the same, and say so.
         train: Values of the training's configuration by key path, for all cells.
         executor: `local`: processes of this machine; `work-pool`: runs that workers take.
         slots: Trainings at once on this machine; the number of its cores if absent.
@@ -70,6 +72,7 @@ class Study:
     trainer: Literal["sbx", "sb3"] = "sbx"
     robot: str = "humanoid"
     pipeline: str = "base"
+    gate: bool = True
     train: dict[str, Any] = Field(default_factory=dict)
     executor: Executor = "local"
     slots: Annotated[int, Field(ge=1)] | None = None

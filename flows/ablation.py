@@ -6,12 +6,14 @@ same run again computes only what is missing.
 """
 
 import asyncio
+import json
 from collections.abc import Mapping
 from dataclasses import replace
 from textwrap import shorten
 from typing import Any
 
 from prefect import flow
+from prefect.context import SyncClientContext
 from prefect.logging import get_run_logger
 
 from configs.loader import load
@@ -22,16 +24,18 @@ from flows.cells import EXECUTORS
 from flows.chain import to_reference
 from flows.orphans import none_left
 from flows.tracebacks import without_tracebacks
-from robojackson.errors import StudyFailed
+from robojackson.errors import RejectedReference, StudyFailed
 from robojackson.retarget.robot import RobotDescription
+from robojackson.retarget.scorecard import check
 from robojackson.rl.config import TrainConfig
+from storage import metrics
 from storage.artifact import Artifact
 from storage.leftovers import sweep
 from storage.store import Store
 from tasks.cell import Cell
 from tasks.probe import SourceFile, probe
 from tasks.still import still
-from tasks.study import report
+from tasks.study import results_page
 from tasks.workers import cores
 
 Facts = dict[str, Any]
@@ -55,16 +59,18 @@ async def ablation(study: Study) -> Facts:
         study: What is compared with what.
     Raises:
         UnknownName, BadConfiguration: a move or setup does not exist; no cell was started.
+        RejectedReference: the gate refuses motions; no cell was started.
         StudyFailed: cells failed; the message names each.
     """
     without_tracebacks()
     sweep(Store.from_environment())
     moves = {name: load(Move, f"moves/{name}") for name in study.moves}
     trainings: dict[str, TrainConfig] = {s: training(study, s) for s in study.setups}
-    motions = {name: motion(move, study) for name, move in moves.items()}
+    with SyncClientContext.get_or_create():  # one connection for all stages of all motions
+        motions = {name: motion(move, study) for name, move in moves.items()}
     cells = cells_of(study, {n: made["reference"] for n, made in motions.items()}, trainings)
+    gate(study, {name: made["scorecard"] for name, made in motions.items()})
     board = Board(study, cells)
-    await board.show()
     slots = asyncio.Semaphore(study.slots or _slots(study))
     execute = EXECUTORS[study.executor]
 
@@ -72,15 +78,15 @@ async def ablation(study: Study) -> Facts:
         async with slots:
             board.running(wanted)
             try:
-                made = await execute(wanted)
-                await board.done(wanted, made)
+                board.done(wanted, await execute(wanted))
             except Exception as cause:
-                await board.failed(wanted, _line(cause))
+                board.failed(wanted, _line(cause))
                 raise
 
-    results = await asyncio.gather(*(one(c) for c in cells), return_exceptions=True)
+    async with board.shown():
+        results = await asyncio.gather(*(one(c) for c in cells), return_exceptions=True)
     outcomes = dict(zip((c.name for c in cells), results, strict=True))
-    return await conclude(study, outcomes, {n: made["still"] for n, made in motions.items()})
+    return conclude(study, moves, outcomes, {n: made["still"] for n, made in motions.items()})
 
 
 def training(study: Study, setup: str) -> TrainConfig:
@@ -90,13 +96,39 @@ def training(study: Study, setup: str) -> TrainConfig:
 
 
 def motion(move: Move, study: Study) -> dict[str, Artifact]:
-    """`reference`, the motion of a move, and `still`, its picture; every stage cached."""
+    """`reference` and `scorecard` of a move, and `still`, its picture; every stage cached."""
     settings = load(PipelineConfig, study.pipeline, move.overrides)
     robot = load(RobotDescription, f"robots/{study.robot}")
     clip = probe(SourceFile.at(move.path), settings.video, None, None)
     moved = to_reference(clip, robot, settings)
     seen = (clip["video"], moved["landmarks"], moved["smpl"], moved["reference"])
-    return {"reference": moved["reference"], "still": still(*seen, robot)}
+    return {name: moved[name] for name in ("reference", "scorecard")} | {
+        "still": still(*seen, robot)
+    }
+
+
+def gate(study: Study, scorecards: Mapping[str, Artifact]) -> None:
+    """Refuse motions that no robot can follow, or say that they are trained on all the same.
+
+    Raises:
+        RejectedReference: the message names each and the figure that failed.
+    """
+    store = Store.from_environment()
+    refused = []
+    for name, scorecard in scorecards.items():
+        try:
+            check(json.loads(store.read(scorecard.key)))
+        except RejectedReference as cause:
+            refused.append(f"{name}: {str(cause).removesuffix(', or --force')}")
+    if not refused:
+        return
+    told = f"study {study.name}: {len(refused)} of {len(scorecards)} motions are refused"
+    if study.gate:
+        raise RejectedReference(
+            f"{told} ({'; '.join(refused)}). No cell was started; `gate: false` (--set gate=false) "
+            "trains on them all the same"
+        )
+    get_run_logger().warning("%s and trained on: %s", told, "; ".join(refused))
 
 
 def cells_of(
@@ -123,8 +155,11 @@ def cells_of(
     ]
 
 
-async def conclude(
-    study: Study, outcomes: Mapping[str, Any], stills: Mapping[str, Artifact]
+def conclude(
+    study: Study,
+    moves: dict[str, Move],
+    outcomes: Mapping[str, Any],
+    stills: dict[str, Artifact],
 ) -> Facts:
     """The page over whatever ended well, and one sentence for what did not.
 
@@ -133,8 +168,9 @@ async def conclude(
     """
     failed = {n: _line(r) for n, r in outcomes.items() if isinstance(r, BaseException)}
     store = Store.from_environment()
-    pictures = {name: store.read(picture.key) for name, picture in stills.items()}
-    made = {} if len(failed) == len(outcomes) else report(study, pictures)
+    made = {}
+    if len(failed) < len(outcomes):
+        made = results_page(study, moves, metrics.kept(store, study.name), stills)
     if failed:
         named = "; ".join(f"{name}: {reason}" for name, reason in failed.items())
         raise StudyFailed(

@@ -5,7 +5,6 @@ from robojackson.retarget.robot import RobotDescription
 from storage.artifact import Artifact
 from tasks.landmarks import landmarks
 from tasks.mocap import mocap
-from tasks.network_mocap import network_mocap
 from tasks.retarget import retarget
 
 
@@ -19,6 +18,8 @@ def to_reference(
     """
     track = landmarks(clip["video"], clip["info"], settings.detector, settings.dancer)
     if settings.network.hybrik:
+        from tasks.network_mocap import network_mocap  # PyTorch: only with weights of one's own
+
         sequence = network_mocap(clip["video"], track, settings.network, settings.mocap)
     else:
         sequence = mocap(track, settings.mocap)

@@ -85,12 +85,7 @@ def dance(
     prepare(Store.from_environment())
     from flows.dance import run
 
-    if found is None:
-        from flows.find import clip_of
-
-        found = clip_of(str(source))
-
-    made = run(found, config, overrides, start, end)
+    made = run(str(found or source), config, overrides, start, end)
     text = [*verdict_lines(made["evaluation"]), f"page   {made['page']}", f"video  {made['video']}"]
     return Answer(made, text=text)
 

@@ -7,6 +7,7 @@ import math
 import os
 import shlex
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, is_dataclass
@@ -22,6 +23,8 @@ from robojackson.errors import RoboJacksonError
 
 P = ParamSpec("P")
 INTERRUPTED = 130
+SECONDS_BETWEEN_LINES = 15.0
+"""Of progress, where every line stays."""
 USAGE_ERROR: Any = typer.BadParameter.__bases__[0]
 """What typer raises for words that it does not understand; it has no public name there."""
 
@@ -154,14 +157,17 @@ def ticker() -> Iterator[Callable[[str], None]]:
 
 @contextmanager
 def stages() -> Iterator[Callable[[str, int, int], None]]:
-    """Progress of several named parts, a tenth at a time."""
+    """Progress of several named parts: a tenth at a time; in a file or a log, when one is long."""
     told: dict[str, int] = {}
+    last = time.monotonic()
+    every_s = 0.0 if sys.stderr.isatty() else SECONDS_BETWEEN_LINES
     with ticker() as tell:
 
         def advance(name: str, done: int, total: int) -> None:
-            tenth = 10 * done // max(total, 1)
-            if tenth > told.get(name, 0):
-                told[name] = tenth
+            nonlocal last
+            tenth, now = 10 * done // max(total, 1), time.monotonic()
+            if tenth > told.get(name, 0) and now - last >= every_s:
+                told[name], last = tenth, now
                 tell(f"{name} {tenth}0 %")
 
         yield advance

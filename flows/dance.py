@@ -1,4 +1,4 @@
-"""The main flow: a video in, a robot that dances it out, and a page that shows it.
+"""The main flow: a dance in, a robot that dances it out, and a page that shows it.
 
 Entry point of the deployment: `flows.dance.dance`. Which stages run and in which order stands here
 and nowhere else; how a stage works is `robojackson`'s, how it is cached is `tasks`'.
@@ -22,12 +22,12 @@ from configs.loader import load
 from configs.pipeline import PipelineConfig
 from flows import console
 from flows.chain import to_reference
+from flows.intake import Minutes, Search, Seconds, Source, videos_of
 from flows.orphans import none_left
 from flows.scorers import scorers
 from flows.single import VERDICT
 from flows.tracebacks import without_tracebacks
 from robojackson.clips.stability import Stability
-from robojackson.clips.video import list_videos
 from robojackson.errors import NoPersonFound, RoboJacksonError
 from robojackson.retarget.robot import RobotDescription
 from robojackson.retarget.scorecard import check
@@ -64,7 +64,7 @@ class Candidate:
 
 
 def run(
-    source: Path,
+    source: str,
     config: str,
     overrides: Mapping[str, Any],
     start_s: float | None = None,
@@ -79,32 +79,39 @@ def run(
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's `&` takes it away
     try:
         with none_left():
-            return asyncio.run(dance(str(source), config, dict(overrides), start_s, end_s))
+            return asyncio.run(dance(source, config, dict(overrides), start_s, end_s))
     except (KeyboardInterrupt, asyncio.CancelledError):
         raise console.Interrupted(f"resume: {console.same_command()}") from None
 
 
 @flow(name="dance", flow_run_name="dance-{source}", task_runner=scorers())
 async def dance(
-    source: str,
+    source: Source,
     config: str = "base",
     overrides: dict[str, Any] | None = None,
-    start_s: float | None = None,
-    end_s: float | None = None,
+    start_s: Seconds | None = None,
+    end_s: Seconds | None = None,
+    minutes: Minutes | None = None,
+    search: Search = Search(),  # noqa: B008 (frozen)
 ) -> dict[str, Any]:
-    """From a video (or a folder of candidates) to a robot that dances it.
+    """From the name of a dance, or a video of it, to a robot that dances it.
 
     Args:
-        source: A video file, or a folder of them.
+        source: Name of a dance, as APT; or address of a video on the web; or path, where the worker
+            is, of a video or of a folder of them, of which the steadiest is danced.
         config: Name or path of the pipeline's configuration.
-        overrides: Values by key path.
+        overrides: Values of it by key path, as robot or train.seed.
         start_s, end_s: Range of the video, seconds.
+        minutes: Budget of the whole pass; that of the configuration if absent.
+        search: How a dance is looked for that is given by its name.
     """
-    began = time.time()
-    settings = load(PipelineConfig, config, overrides)
+    given = {**(overrides or {}), **({} if minutes is None else {"minutes": minutes})}
+    settings = load(PipelineConfig, config, given)
     robot = load(RobotDescription, f"robots/{settings.robot}")
     store = Store.from_environment()
-    candidates = await score_all(list_videos(Path(source)), settings, start_s, end_s)
+    async with videos_of(source, search) as paths:
+        began = time.time()  # what a search takes is no part of the budget
+        candidates = await score_all(paths, settings, start_s, end_s)
     best = choose(candidates)
     labels = RunLabels(*map(catalogue.safe_name, (Path(best.name).stem, settings.setup)))
     made = await perform(best, robot, settings, labels, began)

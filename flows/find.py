@@ -8,7 +8,6 @@ import uuid
 from collections.abc import Mapping
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import Any
 
 from prefect import flow
@@ -18,7 +17,7 @@ from configs.dances import Dance, DanceBook
 from configs.finding import FindConfig
 from configs.loader import build, load
 from flows.entries import Entry, Hunt, rows, summary
-from flows.gallery import show, slug_of
+from flows.gallery import show
 from flows.hunt import bring, hunt
 from flows.tracebacks import without_tracebacks
 from robojackson.clips.candidate import VideoCandidate
@@ -80,26 +79,6 @@ def look_for(
     wanted = replace(dance, source=source, address=address, top=top or every)
     without_tracebacks()
     return asyncio.run(find(wanted.name, asdict(wanted), config, dict(overrides)))
-
-
-def clip_of(words: str, config: str = "finding", book: str = "dances") -> Path:
-    """The best video of a dance in good quality, as a local file.
-
-    When the search fails, the video that an earlier one chose is taken.
-
-    Raises:
-        SearchFailed: no answer, and none was chosen before.
-        NoPersonFound: no video of the search may be danced; the message has the reasons.
-    """
-    dance = load(DanceBook, book).recall(words)
-    store = Store.from_environment()
-    without_tracebacks()
-    chosen = asyncio.run(best(dance.name, asdict(dance), config))
-    artifact = Artifact(**chosen)
-    with store.local(artifact) as path:
-        kept = store.work("dances") / f"{slug_of(dance.name)}{path.suffix}"
-        kept.write_bytes(path.read_bytes())
-    return kept
 
 
 @flow(name="best", flow_run_name="best-{name}", task_runner=HUNTERS)  # type: ignore[arg-type]

@@ -21,6 +21,7 @@ from flows.options import (
     Trainer,
     TrainMinutes,
     chosen,
+    no_file,
 )
 
 Parent = Annotated[int, typer.Option(hidden=True, help="End with this process.")]
@@ -88,7 +89,9 @@ def evaluate(
     policy: Annotated[Path, typer.Argument(help="policy.safetensors of `robojackson train`.")],
     reference: Annotated[Path, typer.Argument(help="The reference.parquet it was trained on.")],
     seconds: Annotated[float | None, typer.Option(min=0.1, help="Length of a rollout, s.")] = None,
-    out: Annotated[Path | None, typer.Option("-o", "--out", help="Folder for the tables.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", callback=no_file, help="Folder for the tables.")
+    ] = None,
     config: Config = "base",
     parent: Parent = 0,
     set_: Set = None,

@@ -16,7 +16,23 @@ SetTrain = Annotated[
     list[str] | None, typer.Option("--set", help="Change one value: --set seed=3.")
 ]
 Force = Annotated[bool, typer.Option("--force", help="Go on with a motion that the gate refuses.")]
-Folder = Annotated[Path, typer.Option("-o", "--out", help="Folder for the results.")]
+
+
+def no_file(out: Path | None) -> Path | None:
+    """A folder, or what may become one.
+
+    Raises:
+        BadParameter: it, or what it should be in, is a file.
+    """
+    found = next((p for p in (out, *out.parents) if p.is_file()), None) if out else None
+    if found is not None:
+        raise typer.BadParameter(f"{found} is a file; a folder is wanted")
+    return out
+
+
+Folder = Annotated[
+    Path, typer.Option("-o", "--out", callback=no_file, help="Folder for the results.")
+]
 Weights = Annotated[
     Path | None, typer.Option(help="Published weights that you bring (docs/official_weights.md).")
 ]

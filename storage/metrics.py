@@ -10,18 +10,24 @@ when and where a cell ran is in the file beside it. DuckDB answers questions abo
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
 
 from robojackson.errors import BadTable, StoreError
 from storage import tables
-from storage.artifact import Artifact
+from storage.artifact import Artifact, sha256_of
 from storage.schemas import EPISODE_RECORD, EVALUATION_RECORD, TableSchema
 from storage.store import Store
 
+if TYPE_CHECKING:
+    from duckdb import DuckDBPyConnection
+
+Ask = Callable[..., list[dict[str, Any]]]
+"""A question in SQL and its parameters to rows."""
 FOLDER = "metrics"
 TABLES: Mapping[str, TableSchema] = {"episodes": EPISODE_RECORD, "evaluations": EVALUATION_RECORD}
 RUNS = f"{FOLDER}/runs"
@@ -57,6 +63,8 @@ class Place:
 def write(store: Store, place: Place, given: Mapping[str, Artifact]) -> dict[str, Artifact]:
     """Put the tables of a cell where questions find them; another run of that cell makes room.
 
+    A table that is there already is not written again.
+
     Args:
         given: `episodes` and `evaluations`, as the stages left them.
     Raises:
@@ -67,7 +75,7 @@ def write(store: Store, place: Place, given: Mapping[str, Artifact]) -> dict[str
     for table, schema in TABLES.items():
         key = given[table].key
         rows = tables.decode_rows(schema, store.read(key), store.address(key))
-        made[table] = store.put(place.key(table), tables.encode_rows(schema, _named(place, rows)))
+        made[table] = _put(store, place.key(table), tables.encode_rows(schema, _named(place, rows)))
     for key in _outdated(store, place):
         store.remove(key)
     return made
@@ -92,22 +100,36 @@ def query(store: Store, sql: str, given: Mapping[str, Any] | None = None) -> lis
     Raises:
         BadTable: the question is not SQL, or names what is not there.
     """
+    with opened(store) as ask:
+        return ask(sql, given)
+
+
+@contextmanager
+def opened(store: Store, study: str | None = None) -> Iterator[Ask]:
+    """The tables, all or those of a study, read once for any number of questions."""
     import duckdb
 
     with duckdb.connect(":memory:") as connection:
         for table in TABLES:
-            connection.register("given", read(store, table))
-            connection.execute(f"CREATE TABLE {table} AS SELECT * FROM given")
-            connection.unregister("given")
-        connection.register("given", _runs(store))
-        connection.execute("CREATE TABLE runs AS SELECT * FROM given")
+            _create(connection, table, read(store, table, study))
+        _create(connection, "runs", _runs(store, study))
         connection.execute("SET enable_external_access = false")
-        try:
-            connection.execute(sql, dict(given or {}))
-            names = [column[0] for column in connection.description or ()]
-            return [dict(zip(names, row, strict=True)) for row in connection.fetchall()]
-        except duckdb.Error as cause:
-            raise BadTable(f"metrics: {' '.join(str(cause).split())}") from cause
+
+        def ask(sql: str, given: Mapping[str, Any] | None = None) -> list[dict[str, Any]]:
+            try:
+                connection.execute(sql, dict(given or {}))
+                names = [column[0] for column in connection.description or ()]
+                return [dict(zip(names, row, strict=True)) for row in connection.fetchall()]
+            except duckdb.Error as cause:
+                raise BadTable(f"metrics: {' '.join(str(cause).split())}") from cause
+
+        yield ask
+
+
+def kept(store: Store, study: str) -> list[Artifact]:
+    """All files of a study: its tables and where they come from."""
+    keys = [key for table in TABLES for key in store.list(f"{FOLDER}/{table}/study={study}")]
+    return [Artifact(key=k, sha256=store.sha256(k)) for k in [*keys, *_notes(store, study)]]
 
 
 def read(store: Store, table: str, study: str | None = None) -> pa.Table:
@@ -140,10 +162,27 @@ def _empty(schema: TableSchema) -> pa.Table:
     return bare.add_column(0, "study", pa.array([], pa.string()))
 
 
-def _runs(store: Store) -> pa.Table:
+def _put(store: Store, key: str, content: bytes) -> Artifact:
+    digest = sha256_of(content)
+    there = store.exists(key) and store.sha256(key) == digest
+    return Artifact(key=key, sha256=digest) if there else store.put(key, content)
+
+
+def _create(connection: "DuckDBPyConnection", name: str, rows: pa.Table) -> None:
+    connection.register("given", rows)
+    connection.execute(f"CREATE TABLE {name} AS SELECT * FROM given")
+    connection.unregister("given")
+
+
+def _notes(store: Store, study: str | None) -> list[str]:
+    """Keys of what is known of the cells' origin; one of another study may be among them."""
+    return [key for key in store.list(RUNS) if study is None or key.endswith(f"-{study}.json")]
+
+
+def _runs(store: Store, study: str | None) -> pa.Table:
     """Provenance, a row a cell: what is not a plain value stands as JSON."""
     rows = []
-    for key in store.list(RUNS):
+    for key in _notes(store, study):
         try:
             facts = json.loads(store.read(key))
         except (StoreError, ValueError) as cause:

@@ -12,6 +12,7 @@ import json
 import textwrap
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
@@ -29,7 +30,6 @@ P = ParamSpec("P")
 R = TypeVar("R")
 Models = Callable[[Mapping[str, Any]], list[str]]
 VERSIONED = ("mujoco", "mediapipe")
-"""Packages whose version is part of every key."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Stage:
             "parameters": identity(keyed),
             "modules": digest(self.roots),
             "models": self.models(parameters),
-            "versions": {name: version(name) for name in VERSIONED},
+            "versions": versions(),
         }
         text = json.dumps(facts, sort_keys=True)
         return f"{self.name}/{hashlib.sha256(text.encode()).hexdigest()}.json"
@@ -105,6 +105,12 @@ def stage(
         return cached(function)
 
     return decorate
+
+
+@cache
+def versions() -> dict[str, str]:
+    """Of the packages whose version is part of every key."""
+    return {name: version(name) for name in VERSIONED}
 
 
 def identity(value: Any) -> Any:

@@ -8,6 +8,7 @@ import ast
 import hashlib
 import threading
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from functools import lru_cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -27,13 +28,40 @@ def digest(roots: Iterable[str], package: str = PACKAGE, folder: Path | None = N
         package: The package whose modules count.
         folder: Where the package is; found by its name when not given.
     """
+    wanted = (tuple(roots), package, folder)
+    known = _known.get(wanted)
+    if known is None or not known.holds():
+        known = _known[wanted] = _made(*wanted)
+    return known.digest
+
+
+@dataclass(frozen=True)
+class _Made:
+    """A digest and the versions of the files that it was made of."""
+
+    digest: str
+    files: tuple[tuple[Path, int, int], ...]
+
+    def holds(self) -> bool:
+        """Whether no file has changed since: a thousand cells ask the same, so it is cheap."""
+        try:
+            return all(_version(path) == (path, *rest) for path, *rest in self.files)
+        except OSError:
+            return False
+
+
+_known: dict[tuple[tuple[str, ...], str, Path | None], _Made] = {}
+
+
+def _made(roots: tuple[str, ...], package: str, folder: Path | None) -> _Made:
     base = folder or _folder_of(package)
     total = hashlib.sha256()
+    files = []
     for name in reached(roots, package, base):
+        files.append(_version(_file_of(name, package, base)))
         if name not in NEVER_CHANGE_A_RESULT:
-            path = _file_of(name, package, base)
-            total.update(f"{name}\0{_parsed(*_version(path))[0]}\0".encode())
-    return total.hexdigest()
+            total.update(f"{name}\0{_parsed(*files[-1])[0]}\0".encode())
+    return _Made(total.hexdigest(), tuple(files))
 
 
 def reached(roots: Iterable[str], package: str, folder: Path) -> list[str]:
@@ -59,7 +87,10 @@ def imports_of(path: Path, module: str = "") -> tuple[str, ...]:
 
 def bare_tree(source: str) -> str:
     """The syntax tree of a source without docstrings and version, as text."""
-    tree = ast.parse(source)
+    return _bared(ast.parse(source))
+
+
+def _bared(tree: ast.AST) -> str:
     for node in ast.walk(tree):
         body = getattr(node, "body", None)
         if isinstance(body, list):
@@ -81,8 +112,9 @@ def _parsed(path: Path, changed_ns: int, size: int) -> tuple[str, tuple[tuple[st
     """Digest of a file's bare tree, and its imports as (name, level); read once a version."""
     source = path.read_text(encoding="utf-8")
     with ONE_PARSER:
-        names = tuple(_imports(ast.parse(source)))
-        return hashlib.sha256(bare_tree(source).encode()).hexdigest(), names
+        tree = ast.parse(source)
+        names = tuple(_imports(tree))
+        return hashlib.sha256(_bared(tree).encode()).hexdigest(), names
 
 
 def _version(path: Path) -> tuple[Path, int, int]:

@@ -3,6 +3,7 @@
 import asyncio
 import json
 import re
+import time
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
@@ -13,7 +14,8 @@ from prefect.artifacts import acreate_progress_artifact, aupdate_progress_artifa
 
 FILE = "progress.json"
 """What a training keeps writing into its folder."""
-EVERY_S = 5.0
+EVERY_S, LATER_S, SHARE = 5.0, 30.0, 0.05
+"""Between two looks at it, seconds: at first, at last, and as a share of the time it has lasted."""
 
 
 @asynccontextmanager
@@ -42,8 +44,10 @@ class _Bar:
         told = f"{self._name}: starting"
         with suppress(Exception):
             self._artifact = await acreate_progress_artifact(0.0, key=key, description=told)
+        began = time.monotonic()
         while self._artifact is not None:
-            await asyncio.sleep(EVERY_S)
+            lasted = time.monotonic() - began
+            await asyncio.sleep(min(max(EVERY_S, SHARE * lasted), LATER_S))
             await self.tell()
 
     async def tell(self) -> None:

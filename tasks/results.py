@@ -7,8 +7,7 @@ import numpy as np
 
 from configs.study import Study
 from robojackson.metrics import study as statistics
-from storage import metrics
-from storage.store import Store
+from storage.metrics import Ask
 
 INTERVALS = 40
 """Of the budget, in the learning curves."""
@@ -27,7 +26,7 @@ def grid_of(study: Study) -> np.ndarray:
     return np.linspace(0, study.steps, INTERVALS + 1)
 
 
-def learning(store: Store, study: Study) -> dict[Key, dict[int, dict[str, np.ndarray]]]:
+def learning(ask: Ask, study: Study) -> dict[Key, dict[int, dict[str, np.ndarray]]]:
     """By (move, setup) and seed: mean return and length of the episodes of each interval."""
     sql = (
         "SELECT move, setup, seed, step, episode_return, episode_length FROM episodes "
@@ -35,7 +34,7 @@ def learning(store: Store, study: Study) -> dict[Key, dict[int, dict[str, np.nda
     )
     grid = grid_of(study)
     found: dict[Key, dict[int, dict[str, np.ndarray]]] = {}
-    for (move, setup, seed), rows in _grouped(metrics.query(store, sql, {"study": study.name})):
+    for (move, setup, seed), rows in _grouped(ask(sql, {"study": study.name})):
         steps = np.array([row["step"] for row in rows], float)
         found.setdefault((move, setup), {})[seed] = {
             name: statistics.curve(steps, np.array([row[name] for row in rows], float), grid)
@@ -59,11 +58,10 @@ def of_learning(curves: Mapping[Key, Seeds], study: Study) -> Figures:
     }
 
 
-def of_judgement(store: Store, study: Study) -> Figures:
+def of_judgement(ask: Ask, study: Study) -> Figures:
     """Means over the rollouts of every trained policy."""
-    means = _means(store)
-    sql = f"SELECT move, setup, seed, {means} FROM evaluations WHERE study = $study "
-    rows = metrics.query(store, f"{sql} AND policy = 'trained' GROUP BY ALL", {"study": study.name})
+    sql = f"SELECT move, setup, seed, {_means(ask)} FROM evaluations WHERE study = $study "
+    rows = ask(f"{sql} AND policy = 'trained' GROUP BY ALL", {"study": study.name})
     found: Figures = {name: {} for name in JUDGED}
     for row in rows:
         for name in JUDGED:
@@ -73,12 +71,10 @@ def of_judgement(store: Store, study: Study) -> Figures:
     return found
 
 
-def of_baselines(store: Store, study: Study) -> dict[str, dict[str, dict[str, float]]]:
+def of_baselines(ask: Ask, study: Study) -> dict[str, dict[str, dict[str, float]]]:
     """By move and policy that learnt nothing: the same figures."""
-    sql = f"SELECT move, policy, {_means(store)} FROM evaluations WHERE study = $study "
-    rows = metrics.query(
-        store, f"{sql} AND policy <> 'trained' GROUP BY ALL ORDER BY ALL", {"study": study.name}
-    )
+    sql = f"SELECT move, policy, {_means(ask)} FROM evaluations WHERE study = $study "
+    rows = ask(f"{sql} AND policy <> 'trained' GROUP BY ALL ORDER BY ALL", {"study": study.name})
     found: dict[str, dict[str, dict[str, float]]] = {move: {} for move in study.moves}
     for row in rows:
         known = {name: float(row[name]) for name in JUDGED if row[name] is not None}
@@ -86,9 +82,9 @@ def of_baselines(store: Store, study: Study) -> dict[str, dict[str, dict[str, fl
     return found
 
 
-def _means(store: Store) -> str:
+def _means(ask: Ask) -> str:
     """SQL of the means of the judged figures; one that no table has is null."""
-    known = metrics.read(store, "evaluations").column_names
+    known = [row["column_name"] for row in ask("DESCRIBE evaluations")]
     gains = [name for name in known if name.startswith("limb_gain_")]
     terms = {name: f"avg({name})" for name in JUDGED if name in known}
     if gains:

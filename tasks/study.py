@@ -1,6 +1,7 @@
 """The results of a study out of its tables: numbers, figures, and a page that says what they show.
 
-Not cached: it reads whatever rows there are now, which takes seconds.
+Drawing takes seconds, so it is done again only when the rows, or the code that reads them, are
+others.
 """
 
 import csv
@@ -8,20 +9,20 @@ import io
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from importlib import resources
 from typing import Any
 
 import numpy as np
 
-from configs.loader import load
 from configs.study import Move, Study
 from robojackson.metrics import study as statistics
 from robojackson.report import study as page
 from robojackson.report.page import Plot
-from robojackson.report.plots import png
-from robojackson.report.study_plots import Curves, judged, learning_curves
 from storage import metrics
-from storage.artifact import Artifact
+from storage.artifact import Artifact, sha256_of
 from storage.store import Store
+from tasks.caching import stage
+from tasks.digest import digest
 from tasks.results import (
     JUDGED,
     Figures,
@@ -35,28 +36,53 @@ from tasks.results import (
 )
 
 FOLDER = "studies"
+TEMPLATES = ("study.html", "page.css")
 PRIMARY = "return_own"
 """The figure that the claims are about, chosen before any run (docs/ablation.md)."""
 
 
-def report(study: Study, pictures: Mapping[str, bytes] | None = None) -> dict[str, Artifact]:
+def _ours(parameters: Mapping[str, Any]) -> list[str]:
+    """What makes the page besides the modules that every stage is keyed by: ours, its template."""
+    here = resources.files("robojackson.report")
+    templates = [sha256_of(here.joinpath(name).read_bytes()) for name in TEMPLATES]
+    return [digest((__name__,), __name__.partition(".")[0]), *templates]
+
+
+@stage(models=_ours)
+def results_page(
+    study: Study, moves: dict[str, Move], rows: list[Artifact], pictures: dict[str, Artifact]
+) -> dict[str, Artifact]:
+    """The files of `report`.
+
+    Args:
+        rows: All files of the study's tables (`storage.metrics.kept`).
+        pictures: By move, as in `report`.
+    """
+    store = Store.from_environment()
+    return report(study, moves, {name: store.read(png.key) for name, png in pictures.items()})
+
+
+def report(
+    study: Study, moves: Mapping[str, Move], pictures: Mapping[str, bytes] | None = None
+) -> dict[str, Artifact]:
     """Write `studies/<name>/` anew: `page`, `table` (CSV), `results` (JSON) and the figures.
 
     Args:
+        moves: Of the study, by name.
         pictures: By move, its video frame, recovered body and robot side by side, as PNG.
     """
     store, rng = Store.from_environment(), np.random.default_rng(0)
-    curves = learning(store, study)
-    figures = {**of_learning(curves, study), **of_judgement(store, study)}
-    baselines = of_baselines(store, study)
-    moves = {name: load(Move, f"moves/{name}") for name in study.moves}
+    with metrics.opened(store, study.name) as ask:
+        curves = learning(ask, study)
+        figures = {**of_learning(curves, study), **of_judgement(ask, study)}
+        baselines, facts = of_baselines(ask, study), _facts(ask, study)
     walking = {name: move.walking for name, move in moves.items()}
     claims = statistics.claims(figures[PRIMARY], walking, rng)
     lines = table(figures, baselines, study, rng)
     plots = _plots(curves, figures, baselines, study)
     content = page.StudyContent(
         title=study.name,
-        facts=_facts(store, study),
+        facts=facts,
         claims=claims,
         lines=lines,
         moves=[_picture(name, moves[name], png) for name, png in (pictures or {}).items()],
@@ -104,6 +130,9 @@ def _plots(
     baselines: Mapping[str, Mapping[str, Mapping[str, float]]],
     study: Study,
 ) -> dict[str, list[Plot]]:
+    from robojackson.report.plots import png  # matplotlib: only when something is drawn
+    from robojackson.report.study_plots import Curves, judged, learning_curves
+
     grid = grid_of(study)
     middle = (grid[1:] + grid[:-1]) / 2
     made: dict[str, list[Plot]] = {"curves": [], "judged": []}
@@ -138,9 +167,9 @@ def _plots(
     return made
 
 
-def _facts(store: Store, study: Study) -> dict[str, Any]:
+def _facts(ask: metrics.Ask, study: Study) -> dict[str, Any]:
     sql = "SELECT DISTINCT git_commit FROM runs WHERE study = $study"
-    commits = [row["git_commit"] or "?" for row in metrics.query(store, sql, {"study": study.name})]
+    commits = [row["git_commit"] or "?" for row in ask(sql, {"study": study.name})]
     return {
         "mode": study.mode,
         "trainer": study.trainer,

@@ -13,10 +13,11 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, ClassVar
 
+import yaml
+
 from storage.store import Store
 from tools.processes import under
 from tools.service import ROOT
-from tools.trials import STUDY
 
 DISK_MB = 400
 HANGS_S = 120.0
@@ -67,12 +68,10 @@ class Alone:
                 found.kill()
             subprocess.run(["umount", "--lazy", disk], check=True)
 
-    def start(self) -> Any:
-        words = ["ablation", "smoke", "--steps", STUDY["steps"], "--json"]
-        words += ["--set", f"name={STUDY['name']}", "--seed", 0]
-        words += [word for move in STUDY["moves"] for word in ("--move", move)]
-        words += [word for setup in STUDY["setups"] for word in ("--setup", setup)]
-        command = [sys.executable, "-m", "flows.cli", *map(str, words)]
+    def start(self, study: dict[str, Any]) -> Any:
+        wanted = self._folder / "study.yaml"
+        wanted.write_text(yaml.safe_dump(study))
+        command = [sys.executable, "-m", "flows.cli", "ablation", str(wanted), "--json"]
         with self._log.open("ab") as out:
             self._run = subprocess.Popen(
                 command, env=self._environment(), cwd=ROOT, stdout=out, stderr=out
@@ -102,27 +101,28 @@ class Alone:
         return {**host, **ours, "PATH": path, "OMP_NUM_THREADS": "1"}
 
     def _fill(self, rng: random.Random) -> str | None:
-        """Fill the disk; whoever hangs on it for two minutes is killed."""
+        """Fill the disk; whoever hangs on it for two minutes is killed.
+
+        A run that ends well has had no need of the disk.
+        """
         assert self._run is not None
         with self._filler.open("wb", buffering=0) as file, suppress(OSError):
             while True:
                 file.write(CHUNK)
         try:
-            self._run.wait(HANGS_S)
+            return "the disk" if self._run.wait(HANGS_S) else None
         except subprocess.TimeoutExpired:
             self._run.send_signal(signal.SIGKILL)
             return "the disk; the run hung and was killed"
-        return "the disk"
 
     def _command(self, rng: random.Random) -> str | None:
         assert self._run is not None
         self._run.send_signal(signal.SIGKILL)
-        return "robojackson ablation"
+        return "robojackson ablation" if self._run.wait() == -signal.SIGKILL else None
 
     def _training(self, rng: random.Random) -> str | None:
         found = [f for f in under(self._home) if any(words in f.command for words in WORK)]
         if not found:
             return None
         victim = rng.choice(found)
-        victim.kill()
-        return " ".join(victim.command.split()[1:4])
+        return " ".join(victim.command.split()[1:4]) if victim.kill() else None

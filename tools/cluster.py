@@ -14,12 +14,14 @@ from tools.processes import Found, under
 from tools.proxy import Proxy
 from tools.restarts import Restarts
 from tools.service import ROOT, Service
-from tools.stack import Stack
-from tools.trials import STUDY
+from tools.stack import QUICK, Stack
+from tools.trials import wait
 
 DEPLOYMENT = "ablation/smoke"
 TRAINERS = 2
 CUT_S = (5.0, 20.0)
+NEEDED_S = 60.0
+"""What a wire that is cut waits for somebody who needs it."""
 GONE_S = 15.0
 """After which a parent whose process is not there is given up."""
 FLOW, CELL = "flow-worker", "trainer"
@@ -56,7 +58,8 @@ class Cluster:
         wire = Proxy(stack.ports["s3"])
         temporary = stack.folder / "tmp"
         temporary.mkdir()
-        stack.more = {"AWS_ENDPOINT_URL": f"http://127.0.0.1:{wire.port}", "TMPDIR": str(temporary)}
+        behind = {"AWS_ENDPOINT_URL": f"http://127.0.0.1:{wire.port}"}
+        stack.more = {**QUICK, **behind, "TMPDIR": str(temporary)}
         try:
             stack.up()
             os.environ.update(_settings(stack.client()))  # before Prefect is imported
@@ -72,9 +75,9 @@ class Cluster:
             wire.close()
             postgres.remove(stack.folder)
 
-    def start(self) -> Any:
+    def start(self, study: dict[str, Any]) -> Any:
         self._missing = None
-        return _patiently(lambda: _create(DEPLOYMENT, {**STUDY, "executor": "work-pool"}))
+        return _patiently(lambda: _create(DEPLOYMENT, {**study, "executor": "work-pool"}))
 
     def state(self, run: Any) -> str | None:
         """Its final state, `DEAD` if its process is gone, None while it runs or nobody answers."""
@@ -109,8 +112,13 @@ class Cluster:
 
     def _flows(self, name: str) -> list[Found]:
         """Processes of flow runs that workers of a service have started."""
-        homes = [self._homes / s.name for s in self._services(name)]
-        return [f for home in homes for f in under(home) if ENGINE in f.command]
+        return [f for s in self._services(name) for f in self._runs(s) if ENGINE in f.command]
+
+    def _runs(self, service: Service) -> list[Found]:
+        """What a service has started: flow runs, trainings, helpers of these."""
+        assert service.process is not None
+        found = under(self._homes / service.name)
+        return [f for f in found if f.pid != service.process.pid and not _is_check(f)]
 
     def _cell(self, rng: random.Random) -> str | None:
         found = [f for f in under(self._homes) if any(words in f.command for words in WORK)]
@@ -122,40 +130,42 @@ class Cluster:
     def _worker(self, rng: random.Random) -> str | None:
         """The worker alone: the runs that it has started go on without it."""
         service = rng.choice([*self._services(FLOW), *self._services(CELL)])
-        service.kill()
-        return service.name
+        return service.name if service.murder() else None
 
     def _machine(self, rng: random.Random) -> str | None:
         """A worker with everything that it has started, as when its container is killed."""
-        busy = [s for s in self._services(CELL) if under(self._homes / s.name)[1:]]
-        service = rng.choice([*self._services(FLOW), *busy])
-        found = under(self._homes / service.name)
-        service.kill()
-        for process in found:
-            process.kill()
-        return f"{service.name} and {len(found) - 1} processes"
+        all_of_them = [*self._services(FLOW), *self._services(CELL)]
+        busy = [s for s in all_of_them if self._runs(s)]
+        if not busy:
+            return None
+        service = rng.choice(busy)
+        service.murder()
+        killed = [found.kill() for found in self._runs(service)]
+        return f"{service.name} and {sum(killed)} processes" if any(killed) else None
 
     def _service(self, name: str) -> Callable[[random.Random], str | None]:
         def kill(rng: random.Random) -> str | None:
-            self._stack.services[name].kill()
-            return name
+            return name if self._stack.services[name].murder() else None
 
         return kill
 
     def _cut(self, rng: random.Random) -> str | None:
-        seconds = rng.uniform(*CUT_S)
+        """From the first one that needed it and did not get it."""
+        seconds, before = rng.uniform(*CUT_S), self._wire.refused
         self._wire.cut()
-        time.sleep(seconds)
+        needed = wait(lambda: self._wire.refused > before, NEEDED_S)
+        if needed:
+            time.sleep(seconds)
         self._wire.mend()
-        return f"S3 for {seconds:.0f} s"
+        told = f"S3 for {seconds:.0f} s, {self._wire.refused - before} calls refused"
+        return told if needed else None
 
 
 def _killed(rng: random.Random, found: list[Found]) -> str | None:
     if not found:
         return None
     victim = rng.choice(found)
-    victim.kill()
-    return " ".join(victim.command.split()[1:4])
+    return " ".join(victim.command.split()[1:4]) if victim.kill() else None
 
 
 def _settings(client: dict[str, str]) -> dict[str, str]:

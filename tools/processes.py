@@ -2,7 +2,8 @@
 
 import os
 import signal
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,10 +23,19 @@ class Found:
     command: str
     home: Path
 
-    def kill(self) -> None:
-        """SIGKILL; one that has ended meanwhile is no error."""
+    def kill(self) -> bool:
+        """SIGKILL; whether it was that which ended it: it is stopped first, and seen to be."""
         with suppress(ProcessLookupError):
+            os.kill(self.pid, signal.SIGSTOP)
+            stopped = _holds(lambda: _state(self.pid) in STOPPED)
             os.kill(self.pid, signal.SIGKILL)
+            return stopped and _holds(lambda: _state(self.pid) in DEAD)
+        return False
+
+
+STOPPED, DEAD = ("T", "t"), ("", "Z", "X")
+"""States of the kernel: stopped by a signal; gone, or waiting to be asked for."""
+SOON_S = 5.0
 
 
 def under(folder: Path) -> list[Found]:
@@ -48,6 +58,22 @@ def _home(entry: Path) -> Path | None:
     except OSError:  # ended meanwhile, or another user's
         return None
     return next((Path(os.fsdecode(e[5:])) for e in given if e.startswith(b"HOME=")), None)
+
+
+def _state(pid: int) -> str:
+    """The kernel's letter for a process, empty when there is none."""
+    try:
+        return (Path("/proc") / str(pid) / "stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return ""
+
+
+def _holds(question: Callable[[], bool]) -> bool:
+    """Whether it comes true soon."""
+    end = time.monotonic() + SOON_S
+    while not question() and time.monotonic() < end:
+        time.sleep(0.01)
+    return question()
 
 
 def cpu_seconds(pid: int) -> float:

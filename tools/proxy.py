@@ -17,10 +17,12 @@ class Proxy:
         port: Where it listens.
         target: Where it forwards to.
         intact: Whether it forwards now.
+        refused: Connections that were asked for while it was cut.
     """
 
     def __init__(self, target: int) -> None:
         self.port, self.target, self.intact = free_port(), target, True
+        self.refused = 0
         self._open: set[socket.socket] = set()
         self._server = socket.create_server((HOST, self.port))
         threading.Thread(target=self._accept, daemon=True).start()
@@ -51,6 +53,7 @@ class Proxy:
     def _connect(self, near: socket.socket) -> None:
         try:
             if not self.intact:
+                self.refused += 1
                 raise ConnectionRefusedError
             far = socket.create_connection((HOST, self.target), timeout=10)
         except OSError:

@@ -86,6 +86,13 @@ class Service:
             with suppress(ProcessLookupError):
                 os.killpg(self.process.pid, how)
 
+    def murder(self) -> bool:
+        """SIGKILL; whether it was that which ended the process."""
+        if self.process is None or self.process.poll() is not None:
+            return False
+        self.kill()
+        return self.process.wait(SECONDS_TO_END) == -signal.SIGKILL
+
     def stop(self) -> None:
         """End it: ask, wait, kill."""
         self.kill(signal.SIGINT if self.user else signal.SIGTERM)

@@ -1,7 +1,7 @@
 """The services of docker-compose.yml as processes of this machine, for tests where no Docker is.
 
-    python -m tools.stack                        start all, print how to reach them, stop at Ctrl-C
-    python -m tools.stack --scale trainer=4
+    python -m tools.stack                        start all, print how to reach them
+    python -m tools.stack --scale trainer=4      the same; Ctrl-C or SIGTERM ends all
 
 Every service of our own image runs the very command, environment and health check of the file; host
 names and ports become 127.0.0.1 and free ports. Two stand-ins: PostgreSQL is Debian's, and the S3
@@ -29,6 +29,13 @@ from tools.service import ROOT, Service, free_port, interpolate
 COMPOSE = ROOT / "docker-compose.yml"
 PASSWORDS = ("POSTGRES_PASSWORD", "S3_PASSWORD")
 PORTS = {"postgres": 5432, "prefect-server": 4200, "s3": 9000, "flow-worker": 8080, "trainer": 8080}
+QUICK = {
+    "PREFECT_WORKER_QUERY_SECONDS": "1",
+    "PREFECT_RUNNER_POLL_FREQUENCY": "2",
+    "ROBOJACKSON_SILENCE_S": os.environ.get("ROBOJACKSON_SILENCE_S", "75"),
+}
+"""For a stack that is tested: workers that ask often, and runs that are soon given up (on a machine
+that is busy, set the variable: a run whose imports take 150 s would be given up)."""
 CLIENT = "flow-worker"
 """The service whose environment a command beside the stack gets."""
 
@@ -177,11 +184,13 @@ def main() -> None:
     wanted = parser.parse_args()
     scale = {name: int(count) for name, count in (text.split("=") for text in wanted.scale)}
     folder = wanted.folder or Path(tempfile.mkdtemp(prefix="robojackson-"))
+    for how in (signal.SIGINT, signal.SIGTERM):  # a shell's `&` takes the first away
+        signal.signal(how, signal.default_int_handler)
     with suppress(KeyboardInterrupt), running(folder, scale=scale) as stack:
         for name, value in stack.client().items():
             if name.startswith(("PREFECT_", "ROBOJACKSON_", "AWS_")):
                 print(f"export {name}={value}")
-        print(f"# logs: {folder}; Ctrl-C stops", flush=True)
+        print(f"# logs: {folder}; Ctrl-C, or SIGTERM, stops", flush=True)
         signal.pause()
 
 

@@ -15,16 +15,20 @@ from storage.store import SCRATCH, Store
 STUDY: dict[str, Any] = {
     "name": "chaos",
     "moves": ["hip_shake"],
-    "setups": ["scratch", "pretrain", "curiosity"],
+    "setups": ["scratch", "pretrain"],
     "seeds": [0],
-    "steps": 400,
+    "trainer": "sb3",
+    "steps": 192,
     "pipeline": "smoke",
-    "train": {"tqc.warmup": 64, "tqc.batch": 32},
+    "train": {"tqc.warmup": 64, "tqc.batch": 32, "checkpoint_seconds": 1.0},
 }
+"""As small as a study can be whose trainings save what they have learnt and go on from it."""
+NEXT = {**STUDY, "name": "next", "seeds": [1]}
+"""Other cells, none of them cached: every machine has to do something again."""
 MADE = ("train", "evaluate", "studies", metrics.FOLDER)
 RECORDS = ("prefect/records/train", "prefect/records/judge")
 """What a run makes besides the motions, and Prefect's records of it."""
-QUIET_S, PATIENCE_S = 4.0, 900.0
+QUIET_S, PATIENCE_S = 4.0, 1800.0
 TRIES = 3
 Tables = dict[str, bytes]
 
@@ -35,8 +39,8 @@ class Bench(Protocol):
     store: Store
     kinds: dict[str, Callable[[random.Random], str | None]]
 
-    def start(self) -> Any:
-        """Begin the study; returns what `state` wants."""
+    def start(self, study: dict[str, Any]) -> Any:
+        """Begin a study; returns what `state` wants."""
 
     def state(self, run: Any) -> str | None:
         """How it ended, or None while it runs."""
@@ -60,6 +64,7 @@ class Trial:
         moment_s: When, after the start of the run, seconds.
         hit: What it hit; empty if the run was over before.
         first, again: How the disturbed run and the one after it ended.
+        runs: How many runs came after it: two if a machine had kept something.
         equal: Whether the tables are those of an undisturbed run, byte for byte.
         left: Processes and files that nobody owns.
         seconds: All of it.
@@ -71,6 +76,7 @@ class Trial:
     hit: str = ""
     first: str = ""
     again: str = ""
+    runs: int = 1
     equal: bool = False
     left: list[str] = field(default_factory=list)
     seconds: float = 0.0
@@ -100,18 +106,21 @@ def disturb(bench: Bench, trial: Trial, rng: random.Random, expected: Tables) ->
     began = time.monotonic()
     for _ in range(TRIES):
         wipe(bench.store)
-        run = bench.start()
+        run = bench.start(STUDY)
         trial.hit = _hit(bench, trial, rng, run)
         if trial.hit:
             break
+        _ended(bench, run)
+        bench.mend()
         trial.moment_s = round(trial.moment_s / 2, 1)
-    trial.first = str(wait(lambda: bench.state(run), PATIENCE_S))
+    trial.first = _ended(bench, run)
     bench.mend()
     trial.again = run_to_end(bench)
     quiet(bench)
     if leftovers(bench):  # a machine takes away what is left when it has its next cell
-        run_to_end(bench)
+        run_to_end(bench, NEXT)
         quiet(bench)
+        trial.runs += 1
     trial.equal = tables(bench.store) == expected
     trial.left = [*bench.alive(), *leftovers(bench)]
     trial.seconds = time.monotonic() - began
@@ -129,9 +138,12 @@ def _hit(bench: Bench, trial: Trial, rng: random.Random, run: Any) -> str:
     return ""
 
 
-def run_to_end(bench: Bench) -> str:
-    """Start the study and wait; how it ended."""
-    run = bench.start()
+def run_to_end(bench: Bench, study: dict[str, Any] = STUDY) -> str:
+    """Start a study and wait; how it ended."""
+    return _ended(bench, bench.start(study))
+
+
+def _ended(bench: Bench, run: Any) -> str:
     return str(wait(lambda: bench.state(run), PATIENCE_S))
 
 

@@ -11,18 +11,21 @@ from typing import Any
 import pytest
 
 from tools.processes import Found, under
-from tools.stack import Stack, running
+from tools.stack import QUICK, Stack, running
 from tools.trials import STUDY
 
-pytestmark = [pytest.mark.cluster, pytest.mark.timeout(1800)]
-AGAIN_S = 120.0
-"""Nine cached cells on two workers: ten starts of Python with all that it imports."""
+pytestmark = [pytest.mark.cluster, pytest.mark.timeout(2400)]
+AGAIN_S = 60.0
+"""Nine cached cells: a start of Python with all that the study imports, and no worker."""
 WORK = "flows.cli train"
+LONG = {"steps": 200_000}
+TRAINERS = 2
 
 
 @pytest.fixture(scope="module")
 def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stack]:
-    with running(tmp_path_factory.mktemp("stack"), scale={"trainer": 2}) as found:
+    folder = tmp_path_factory.mktemp("stack")
+    with running(folder, scale={"trainer": TRAINERS}, more=QUICK) as found:
         yield found
 
 
@@ -31,7 +34,7 @@ def command(stack: Stack, *words: str, **more: str) -> subprocess.CompletedProce
     environment = {**stack.client(), **more}
     run = [sys.executable, "-m", *words]
     return subprocess.run(
-        run, env=environment, capture_output=True, text=True, timeout=1500, check=False
+        run, env=environment, capture_output=True, text=True, timeout=1800, check=False
     )
 
 
@@ -59,7 +62,13 @@ def inspect(stack: Stack, run: str) -> dict[str, Any]:
     return dict(json.loads(said.stdout)) if said.returncode == 0 else {}
 
 
-def until(question: Callable[[], Any], seconds: float = 600.0) -> Any:
+def listed(stack: Stack, *words: str) -> list[dict[str, Any]]:
+    """The runs that the server tells of."""
+    said = prefect(stack, "flow-run", "ls", *words, "--output", "json")
+    return list(json.loads(said.stdout)) if said.returncode == 0 else []
+
+
+def until(question: Callable[[], Any], seconds: float = 900.0) -> Any:
     """The first answer that is not empty."""
     end = time.monotonic() + seconds
     while not (answer := question()) and time.monotonic() < end:
@@ -77,6 +86,12 @@ def trainings(stack: Stack) -> list[Found]:
     return [found for found in under(stack.folder / "home") if WORK in found.command]
 
 
+def others(stack: Stack) -> list[Found]:
+    """Every process but the services'."""
+    services = {service.process.pid for service in stack.services.values() if service.process}
+    return [f for f in under(stack.folder / "home") if f.pid not in services]
+
+
 def test_nine_cells_leave_nine_tables_and_a_second_run_finds_them(stack: Stack) -> None:
     first = prefect(stack, "deployment", "run", "ablation/smoke", "--watch")
     assert first.returncode == 0, first.stdout[-2000:]
@@ -91,29 +106,37 @@ def test_nine_cells_leave_nine_tables_and_a_second_run_finds_them(stack: Stack) 
     assert ask(stack, "SELECT count(*) AS n FROM runs") == [{"n": 9}]
 
 
-def test_a_killed_cell_is_named_and_its_neighbours_are_in_the_tables(stack: Stack) -> None:
-    run = begin(stack, name="killed", retries=0, steps=800)
-    victim = until(lambda: trainings(stack))[0]
-    victim.kill()
+def test_a_killed_cell_is_named_and_its_neighbour_is_in_the_tables(stack: Stack) -> None:
+    run = begin(stack, name="killed", retries=0, steps=2000)
+    assert until(lambda: trainings(stack))[0].kill()
     state = until(lambda: ended(stack, run))
     assert state["type"] == "FAILED"
-    name = re.search(r"1 of 3 cells failed \((\w+)-hip_shake-s0", state["message"])
+    name = re.search(r"1 of 2 cells failed \((\w+)-hip_shake-s0", state["message"])
     assert name, state["message"]
     rows = ask(stack, "SELECT DISTINCT setup FROM episodes WHERE study = 'killed' ORDER BY ALL")
     assert {row["setup"] for row in rows} == set(STUDY["setups"]) - {name[1]}
 
 
 def test_a_cancelled_run_leaves_no_process(stack: Stack) -> None:
-    run = begin(stack, name="cancelled", steps=200_000)
-    until(lambda: len(trainings(stack)) == 2)
+    run = begin(stack, name="cancelled", **LONG)
+    until(lambda: len(trainings(stack)) == TRAINERS)
     assert prefect(stack, "flow-run", "cancel", run).returncode == 0
-    services = {service.process.pid for service in stack.services.values() if service.process}
-
-    def others() -> list[Found]:
-        return [f for f in under(stack.folder / "home") if f.pid not in services]
-
-    assert until(lambda: not others(), 180.0)
+    assert until(lambda: not others(stack), 300.0)
     assert until(lambda: ended(stack, run), 60.0)["type"] == "CANCELLED"
+
+
+def test_the_runs_of_a_dead_worker_are_marked_crashed(stack: Stack) -> None:
+    run = begin(stack, name="dead", retries=0, setups=["scratch"], **LONG)
+    home = until(lambda: trainings(stack))[0].home
+    worker = stack.services[home.name]
+    assert worker.murder()
+    assert all(found.kill() for found in under(home))
+    state = until(lambda: ended(stack, run))
+    worker.start()
+    assert state["type"] == "FAILED"
+    assert "has not been heard of" in state["message"]
+    dead = [r for r in listed(stack, "--state-type", "CRASHED") if r["flow_id"]]
+    assert [r["name"] for r in dead] == ["scratch-hip_shake-s0"]
 
 
 def test_nonsense_is_refused_before_a_run_starts(stack: Stack) -> None:
@@ -123,11 +146,15 @@ def test_nonsense_is_refused_before_a_run_starts(stack: Stack) -> None:
     assert "bogus" in said.stdout + said.stderr
 
 
-def test_the_nightly_refresh_is_planned_by_the_server(stack: Stack) -> None:
-    def planned() -> bool:
-        return "refresh" in prefect(stack, "flow-run", "ls", "--state", "Scheduled").stdout
+def test_a_dance_is_asked_for_by_its_name_and_not_by_nothing(stack: Stack) -> None:
+    said = prefect(stack, "deployment", "run", "dance/on-demand", "-p", "source= ")
+    assert said.returncode != 0
+    assert "source" in said.stdout + said.stderr
 
-    assert until(planned, 120.0)
+
+def test_the_nightly_refresh_is_planned_by_the_server(stack: Stack) -> None:
+    planned = until(lambda: listed(stack, "--flow-name", "refresh", "--state", "Scheduled"), 120.0)
+    assert {run["expected_start_time"][11:16] for run in planned} == {"03:00"}
 
 
 def test_the_server_refuses_strangers(stack: Stack) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import AsyncMock
 
 import pytest
 import yaml
@@ -18,7 +19,8 @@ from prefect.states import Completed, Crashed, Failed
 from configs.loader import load
 from configs.study import Setup, Study
 from flows import ablation, cells
-from robojackson.errors import StudyFailed, TrainingCrashed
+from robojackson.errors import RejectedReference, StudyFailed, TrainingCrashed
+from robojackson.retarget.scorecard import BARS
 from robojackson.rl.config import EvaluateConfig, TrainConfig
 from storage.artifact import Artifact
 from storage.store import Store
@@ -54,10 +56,18 @@ def play(
     page = Store(store_folder).put("studies/index.html", b"page")
     still = Store(store_folder).put("still.png", b"png")
     motions = {"reference": REFERENCE, "still": still}
-    monkeypatch.setattr(ablation, "motion", lambda move, study: motions)
-    monkeypatch.setattr(ablation, "report", lambda study, pictures: {"page": page})
 
-    def run(executor: Played, **given: Any) -> dict[str, Any]:
+    def motion(move: object, study: Study) -> dict[str, Artifact]:
+        card = json.dumps(dict.fromkeys(BARS, 0.0) | {"infeasible_share": infeasible})
+        return motions | {"scorecard": Store(store_folder).put("card.json", card.encode())}
+
+    infeasible = 0.0
+    monkeypatch.setattr(ablation, "motion", motion)
+    monkeypatch.setattr(ablation, "results_page", lambda *given: {"page": page})
+
+    def run(executor: Played, infeasible_share: float = 0.0, **given: Any) -> dict[str, Any]:
+        nonlocal infeasible
+        infeasible = infeasible_share
         monkeypatch.setitem(ablation.EXECUTORS, "local", executor)
         study = Study(name="played", moves=("walk",), setups=SETUPS, seeds=(0,), **given)
         return asyncio.run(ablation.ablation(study))
@@ -79,6 +89,18 @@ def test_a_failed_cell_is_named_and_its_neighbours_are_done(play: Any) -> None:
         play(Played(fails="pretrain-walk-s0"))
     told = {"scratch-walk-s0": "done", "pretrain-walk-s0": "failed", "curiosity-walk-s0": "done"}
     assert states_told() == told
+
+
+def test_a_study_on_a_refused_motion_begins_no_cell_and_says_why(play: Any) -> None:
+    executor = Played()
+    told = r"1 of 1 motions are refused \(walk: .*infeasible_share is 0.5.*gate=false"
+    with pytest.raises(RejectedReference, match=told):
+        play(executor, infeasible_share=0.5)
+    assert executor.most == 0
+
+
+def test_a_study_without_a_gate_trains_on_a_refused_motion(play: Any) -> None:
+    assert play(Played(), infeasible_share=0.5, gate=False)["cells"] == 3
 
 
 def test_no_more_cells_run_at_once_than_there_are_slots(play: Any) -> None:
@@ -116,14 +138,24 @@ class Pool:
         return SimpleNamespace(state=self.left.pop(0))
 
 
-def on_workers(pool: Pool, monkeypatch: pytest.MonkeyPatch) -> dict[str, Artifact]:
+def on_workers(
+    pool: Pool, monkeypatch: pytest.MonkeyPatch, kept: bool = False
+) -> dict[str, Artifact]:
     monkeypatch.setattr(cells, "arun_deployment", pool)
+    monkeypatch.setattr(cells, "is_kept", AsyncMock(return_value=kept))
+    monkeypatch.setattr(cells, "here", AsyncMock(return_value={"policy": REFERENCE}))
     train = TrainConfig(steps=100)
     names: dict[str, Any] = {"study": "s", "move": "walk", "setup": "scratch", "seed": 0}
     wanted = Cell(
         **names, reference=REFERENCE, robot="humanoid", train=train, evaluate=EvaluateConfig()
     )
     return asyncio.run(cells.anywhere(wanted))
+
+
+def test_a_cell_that_was_done_before_asks_no_worker(monkeypatch: pytest.MonkeyPatch) -> None:
+    pool = Pool()
+    assert on_workers(pool, monkeypatch, kept=True) == {"policy": REFERENCE}
+    assert pool.names == []
 
 
 def test_a_cell_whose_worker_died_is_given_to_another(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,13 +1,19 @@
-"""From the name of a dance to the file that is danced, and what happens without a net."""
+"""From what somebody asks to be danced to files, and what happens without a net."""
 
+import asyncio
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
+from prefect import flow
+from prefect.utilities.callables import parameter_schema
+from prefect.utilities.schema_tools.validation import validate
 
-from flows.find import clip_of
-from robojackson.errors import NoPersonFound, SearchFailed
+from flows.dance import dance
+from flows.intake import Search, videos_of
+from robojackson.errors import NoPersonFound, RejectedReference, SearchFailed
 from storage import candidates
 from storage.store import Store
 from tests.search.server import serving
@@ -38,20 +44,45 @@ def near(folder: Path) -> str:
     return str(path)
 
 
+def files(source: str, config: str = "finding", book: str = "dances") -> dict[str, bytes]:
+    """Names and contents of the videos that are meant."""
+
+    @flow
+    async def asked() -> dict[str, bytes]:
+        async with videos_of(source, Search(config=config, book=book)) as paths:
+            return {path.name: path.read_bytes() for path in paths}
+
+    return asyncio.run(asked())
+
+
+def refused(**given: Any) -> bool:
+    """Whether Prefect's server takes no such parameters for a run of `dance`."""
+    schema = parameter_schema(dance.fn).model_dump_for_openapi()
+    return bool(validate(given, schema, raise_on_error=False))
+
+
 def test_a_name_becomes_the_best_video(
     records: Path, store_folder: Path, tmp_path: Path, short_clip: Path
 ) -> None:
     with serving(short_clip.read_bytes()) as web:
         listed = book(tmp_path, f"{web.url}/missing/a.mp4", f"{web.url}/good/b.mp4")
-        path = clip_of("HIPS dance", near(tmp_path), listed)
-    assert (path.stem, path.read_bytes() == short_clip.read_bytes()) == ("hips", True)
+        found = files("HIPS dance ", near(tmp_path), listed)
+    assert found == {"hips.mp4": short_clip.read_bytes()}
+
+
+def test_a_video_that_was_brought_leaves_no_copy(
+    records: Path, store_folder: Path, tmp_path: Path, short_clip: Path
+) -> None:
+    with serving(short_clip.read_bytes()) as web:
+        files("Hips", near(tmp_path), book(tmp_path, f"{web.url}/good/b.mp4"))
+    assert not list((store_folder / "work").rglob("*.mp4"))
 
 
 def test_a_name_without_a_video_that_can_be_danced_tells_every_reason(
     records: Path, store_folder: Path, tmp_path: Path
 ) -> None:
     with serving(b"") as web, pytest.raises(NoPersonFound, match="HTTP 404 not found"):
-        clip_of("Hips", near(tmp_path), book(tmp_path, f"{web.url}/missing/a.mp4"))
+        files("Hips", near(tmp_path), book(tmp_path, f"{web.url}/missing/a.mp4"))
 
 
 def test_without_a_net_the_video_that_was_chosen_last_is_danced(
@@ -63,11 +94,61 @@ def test_without_a_net_the_video_that_was_chosen_last_is_danced(
     times = {"retrieved_at": NOW, "decided_at": NOW}
     chosen = {"decision": "chosen", "video_key": kept.key, "video_sha256": kept.sha256}
     candidates.append(store, [{"dance": "APT", **facts, **times, **chosen}])
-    assert clip_of("apt dance", config).read_bytes() == b"the last one"
+    assert files("apt dance", config) == {"apt.mp4": b"the last one"}
 
 
 def test_without_a_net_and_without_a_choice_the_search_has_failed(
     records: Path, store_folder: Path, config: str
 ) -> None:
     with pytest.raises(SearchFailed, match="no connection"):
-        clip_of("a dance that nobody knows", config)
+        files("a dance that nobody knows", config)
+
+
+def test_an_address_is_brought_without_a_search(
+    records: Path, store_folder: Path, tmp_path: Path, short_clip: Path
+) -> None:
+    with serving(short_clip.read_bytes()) as web:
+        found = files(f"{web.url}/good/my-dance.mp4", near(tmp_path))
+    assert found == {"my-dance.mp4": short_clip.read_bytes()}
+
+
+def test_an_address_that_gives_nothing_is_told_with_its_reason(
+    records: Path, store_folder: Path, tmp_path: Path
+) -> None:
+    with serving(b"") as web, pytest.raises(SearchFailed, match="HTTP 404 not found"):
+        files(f"{web.url}/missing/a.mp4", near(tmp_path))
+
+
+def test_a_path_is_taken_as_it_is(records: Path, short_clip: Path) -> None:
+    assert files(str(short_clip)) == {short_clip.name: short_clip.read_bytes()}
+
+
+def test_a_name_goes_all_the_way_into_the_flow(
+    records: Path, store_folder: Path, tmp_path: Path, short_clip: Path
+) -> None:
+    """To the gate, which refuses the second of a dance as the paper's mapping leaves it."""
+    with serving(short_clip.read_bytes()) as web:
+        listed = book(tmp_path, f"{web.url}/good/b.mp4")
+        search = Search(config=near(tmp_path), book=listed)
+        with pytest.raises(RejectedReference):
+            asyncio.run(dance("Hips", "smoke", {"retarget.method": "paper"}, search=search))
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {},
+        {"source": ""},
+        {"source": "  "},
+        {"source": "APT", "minutes": 0},
+        {"source": "APT", "start_s": -1},
+        {"source": "APT", "search": {"engine": "x"}},
+    ],
+    ids=str,
+)
+def test_nonsense_is_refused_before_a_run(given: dict[str, Any]) -> None:
+    assert refused(**given)
+
+
+def test_a_name_alone_is_enough_for_a_run() -> None:
+    assert not refused(source="APT")

@@ -21,9 +21,12 @@ COMMAND = (sys.executable, "-m", "flows.cli")
         (["dance", "--trainer", "sbxx"], "'sbxx'"),
         (["dance", "--sed", "3"], "--sed"),
         (["train", "reference.parquet"], "--out"),
+        (["train", "reference.parquet", "-o", "there"], "there is a file; a folder is wanted"),
+        (["mocap", "clip.mp4", "-o", "there/below"], "there is a file; a folder is wanted"),
     ],
 )
 def test_a_wrong_word_is_named_in_one_line(words: list[str], named: str, tmp_path: Path) -> None:
+    (tmp_path / "there").write_text("")
     done = subprocess.run(
         [*COMMAND, *words], capture_output=True, text=True, env=environment(), check=False,
         cwd=tmp_path,

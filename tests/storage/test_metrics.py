@@ -47,6 +47,31 @@ def test_the_same_cell_again_writes_the_same_bytes_under_the_same_key(store: Sto
     assert metrics.write(store, cell(), made(store)) == first
 
 
+def test_a_table_that_is_there_is_not_written_again(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = metrics.write(store, cell(), made(store))
+    given = made(store)
+    monkeypatch.setattr(store, "put", lambda key, content: pytest.fail(f"{key} was written"))
+    assert metrics.write(store, cell(), given) == first
+
+
+def test_the_files_of_a_study_are_its_tables_and_notes_alone(store: Store) -> None:
+    other = metrics.Place("other", "walk", "scratch", 0, "r9")
+    for place in (cell(), other):
+        metrics.write(store, place, made(store))
+        metrics.note(store, place, {"run_id": place.run_id})
+    keys = {artifact.key for artifact in metrics.kept(store, "smoke")}
+    assert keys == {cell().key("episodes"), cell().key("evaluations"), metrics.note_key(cell())}
+
+
+def test_a_question_about_a_study_sees_no_other(store: Store) -> None:
+    metrics.write(store, cell(), made(store))
+    metrics.write(store, metrics.Place("other", "walk", "scratch", 0, "r9"), made(store))
+    with metrics.opened(store, "smoke") as ask:
+        assert ask("SELECT DISTINCT study FROM episodes") == [{"study": "smoke"}]
+
+
 def test_a_cell_that_was_trained_anew_replaces_its_rows(store: Store) -> None:
     metrics.write(store, cell(run_id="r1"), made(store, 1.0))
     metrics.write(store, cell(run_id="r2"), made(store, 2.0))

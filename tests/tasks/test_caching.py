@@ -204,7 +204,7 @@ def test_a_model_is_part_of_the_key(tmp_path: Path) -> None:
 def test_a_version_is_part_of_the_key(monkeypatch: pytest.MonkeyPatch) -> None:
     stage = caching.Stage("s", "", (), lambda parameters: [], ())
     before = stage.key({})
-    monkeypatch.setattr(caching, "version", lambda name: "99")
+    monkeypatch.setattr(caching, "versions", lambda: dict.fromkeys(caching.VERSIONED, "99"))
     assert stage.key({}) != before
 
 

@@ -8,11 +8,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from prefect import flow
 
-from configs.study import Study
+from configs.loader import load
+from configs.study import Move, Study
 from storage import metrics, tables
+from storage.artifact import Artifact
 from storage.schemas import EPISODE_RECORD, EVALUATION_RECORD
 from storage.store import Store
+from tasks import study as pages
 from tasks.study import report
 
 STUDY = Study(
@@ -57,7 +61,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
             for setup in STUDY.setups:
                 for seed in STUDY.seeds:
                     publish(Store(root), move, setup, seed)
-        report(STUDY)
+        report(STUDY, {name: load(Move, f"moves/{name}") for name in STUDY.moves})
     return root / "studies" / "known"
 
 
@@ -95,3 +99,26 @@ def test_the_page_stands_alone_and_says_how_few_seeds_there_are(folder: Path) ->
 
 def test_the_code_that_made_the_rows_is_named(folder: Path) -> None:
     assert "0123456789" in (folder / "index.html").read_text()
+
+
+def test_the_page_is_drawn_again_only_when_the_rows_change(
+    records: Path, store_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[str] = []
+
+    def draw(study: Study, *given: Any) -> dict[str, Artifact]:
+        drawn.append(study.name)
+        return {"page": Store(store_folder).put("page.html", b"page")}
+
+    monkeypatch.setattr(pages, "report", draw)
+
+    @flow(name="pages")
+    def page() -> Any:
+        return pages.results_page(STUDY, {}, metrics.kept(Store(store_folder), "known"), {})
+
+    publish(Store(store_folder), "walk", "scratch", 0)
+    first, again = page(), page()
+    assert (first, drawn) == (again, ["known"])
+    publish(Store(store_folder), "walk", "scratch", 1)
+    page()
+    assert drawn == ["known"] * 2

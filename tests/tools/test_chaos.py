@@ -2,12 +2,14 @@
 
 import os
 import random
+import signal
 import socketserver
 import subprocess
 import sys
 import threading
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from urllib.error import URLError
 from urllib.request import urlopen
@@ -15,8 +17,9 @@ from urllib.request import urlopen
 import pytest
 
 from tools.chaos import plan
-from tools.processes import cpu_seconds, under
+from tools.processes import Found, cpu_seconds, under
 from tools.proxy import Proxy
+from tools.service import Service
 from tools.trials import Trial
 
 ANSWER = b"HTTP/1.0 200 OK\r\nContent-Length: 5\r\n\r\nhello"
@@ -54,6 +57,15 @@ def test_a_cut_wire_answers_nobody(wire: Proxy) -> None:
         said(wire)
 
 
+def test_a_cut_wire_counts_who_needed_it(wire: Proxy) -> None:
+    said(wire)
+    before = wire.refused
+    wire.cut()
+    with suppress(URLError, ConnectionError):
+        said(wire)
+    assert (before, wire.refused) == (0, 1)
+
+
 def test_a_mended_wire_forwards_again(wire: Proxy) -> None:
     wire.cut()
     wire.mend()
@@ -68,9 +80,27 @@ def test_processes_are_found_by_their_home_and_killed(tmp_path: Path) -> None:
         process.stdout.readline()
         (found,) = under(tmp_path / "home")
         assert (found.pid, "time.sleep(60)" in found.command) == (process.pid, True)
-        found.kill()
-        process.wait()
+        assert found.kill()
+        assert process.wait() == -signal.SIGKILL
     assert under(tmp_path / "home") == []
+
+
+def test_a_process_that_has_ended_is_not_hit(tmp_path: Path) -> None:
+    with subprocess.Popen([sys.executable, "-S", "-c", ""]) as process:
+        dead = Found(process.pid, "", tmp_path)
+        os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
+        assert not dead.kill()
+
+
+@pytest.mark.parametrize(("script", "hit"), [("import time; time.sleep(60)", True), ("", False)])
+def test_a_service_is_hit_only_while_it_lives(script: str, hit: bool, tmp_path: Path) -> None:
+    command = [sys.executable, "-S", "-c", script]
+    service = Service("s", command, dict(os.environ), None, tmp_path / "log")
+    service.start()
+    assert service.process is not None
+    if not hit:
+        service.process.wait()
+    assert service.murder() == hit
 
 
 def test_processor_time_counts_children_that_have_ended() -> None:
