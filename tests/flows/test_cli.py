@@ -70,11 +70,6 @@ def typo_in_yaml(folder: Path) -> list[object]:
     return ["mocap", clip, "-o", folder / "out", "--config", folder / "mine.yaml"]
 
 
-def unwritable_folder(folder: Path) -> list[object]:
-    (folder / "file").write_text("")
-    return ["mocap", ROOT / "clips" / "hip_shake.mp4", "-o", folder / "file" / "out"]
-
-
 def foreign_table(folder: Path) -> list[object]:
     (folder / "smpl.parquet").write_text("frame,joint\n")
     return ["retarget", folder / "smpl.parquet", "-o", folder / "out"]
@@ -97,7 +92,6 @@ def missing_file(folder: Path) -> list[object]:
         (one_frame, "TrackTooShort"),
         (unknown_robot, "unknown robot 'c3po'"),
         (typo_in_yaml, "mine.yaml: unknown key 'mocap.cutof_hz'. Did you mean 'cutoff_hz'?"),
-        (unwritable_folder, "StoreError"),
         (foreign_table, "smpl.parquet: not a Parquet file"),
         (missing_table, "reference.parquet: no such file"),
         (missing_file, "gone.mp4: no such file"),
