@@ -11,7 +11,7 @@ import pytest
 from robojackson.errors import BadConfiguration, BadPolicy
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.retarget.robot import Robot
-from robojackson.rl.config import EvaluateConfig, TqcConfig, TrackConfig, TrainConfig
+from robojackson.rl.config import EvaluateConfig, PaperConfig, TqcConfig, TrackConfig, TrainConfig
 from robojackson.rl.evaluate import STAND, evaluate
 from robojackson.rl.policy import load_policy
 from robojackson.rl.run import Run
@@ -287,6 +287,7 @@ def test_paper_mode_trains_from_the_shipped_walker(
         steps=160,
         start="walker",
         curiosity="formula",
+        paper=PaperConfig(seconds=1.0),
         tqc=TqcConfig(preset="paper", warmup=150, batch=8),
     )
     rows: list[dict[str, float]] = []
