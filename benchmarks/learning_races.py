@@ -15,6 +15,7 @@ import numpy as np
 from benchmarks.learning_curve import STOCK, area, curve_of, first_at
 from benchmarks.learning_policies import Folders, reference_of
 from benchmarks.learning_speed import told
+from benchmarks.learning_summary import cluster_interval
 
 GOAL_S, FACTOR = 5.0, 10.0
 LAST_SHARE = 0.1
@@ -95,21 +96,14 @@ def concluded(pairs: list[dict[str, Any]], minutes: float, cost_s: float | None)
         "ours": float(np.mean([pair["pretrain_s"] for pair in pairs])),
         "peer": float(np.mean([pair["scratch_s"] for pair in pairs])),
         "gain_s": float(gain.mean()),
-        "gain_95": interval(gain),
+        "gain_95": list(cluster_interval(gain)),
         "saved_cpu_s": per_dance,
-        "saved_95": interval(saved),
+        "saved_95": list(cluster_interval(saved)),
         "pretraining_cpu_s": cost_s,
         "pays_after_dances": pays,
         "seeds": len(pairs),
         "cpu_minutes": minutes,
     }
-
-
-def interval(values: np.ndarray, draws: int = 5000) -> list[float]:
-    """95 % bootstrap interval of the mean over seeds."""
-    rng = np.random.default_rng(0)
-    means = rng.choice(values, (draws, len(values))).mean(1)
-    return [float(np.quantile(means, share)) for share in (0.025, 0.975)]
 
 
 def keep(path: Path, rows: list[dict[str, Any]]) -> None:

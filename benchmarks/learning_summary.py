@@ -18,6 +18,8 @@ AUTHORS_ROBOT = {
     "note": "at best: 27 steps of 0.06 s in the authors' own logs; nothing else can be told of it",
 }
 BESIDE = ("statue", "mean_pose", "zero_residual", "random", "hold")
+RESAMPLES = 5000
+"""Of the seeds, for an interval."""
 TOLD = ("survived_s", "strict_success", "skill", "velocity_score")
 
 
@@ -87,11 +89,11 @@ def bars(found: Mapping[str, Any], move: Move) -> dict[str, bool]:
     return held
 
 
-def cluster_interval(by_seed: Sequence[float], draws: int = 2000) -> tuple[float, float]:
+def cluster_interval(by_seed: Sequence[float] | np.ndarray) -> tuple[float, float]:
     """95 % interval of the mean by resampling seeds; rollouts of one seed are no evidence."""
     rng = np.random.default_rng(0)
     values = np.asarray(by_seed)
-    means = rng.choice(values, (draws, len(values))).mean(1)
+    means = rng.choice(values, (RESAMPLES, len(values))).mean(1)
     return float(np.quantile(means, 0.025)), float(np.quantile(means, 0.975))
 
 

@@ -89,9 +89,10 @@ def _patient(facts: dict[str, Any], silence_s: int) -> dict[str, Any]:
     """An automation as it would be written for another silence."""
     shipped = facts["trigger"]["within"]
     wanted = shipped * silence_s // SILENT_S
-    text = yaml.safe_dump(facts, width=1000)
-    told = text.replace(f" {shipped} s", f" {wanted} s")
-    return dict(yaml.safe_load(told.replace(f"within: {shipped}", f"within: {wanted}")))
+    facts["trigger"]["within"] = wanted
+    for told, name in ((facts, "description"), (facts["actions"][0], "message")):
+        told[name] = told[name].replace(f" {shipped} s", f" {wanted} s")
+    return facts
 
 
 async def _pool(client: PrefectClient, name: str, description: str) -> None:

@@ -28,7 +28,7 @@ class ActorAverage:
         Args:
             updates: Gradient updates so far: what tells rounds apart.
         """
-        if updates <= self._seen:
+        if not self._past or updates <= self._seen:
             return
         self._count, self._seen = self._count + 1, updates
         fresh = max(1 - self._past, 1 / self._count)
@@ -41,7 +41,7 @@ class ActorAverage:
 
     def layers(self, newest: Layers) -> Layers:
         """The mean, or the newest actor where nothing is averaged yet."""
-        return self._mean if self._past and self._count else newest
+        return self._mean if self._count else newest
 
     def save(self, folder: Path) -> None:
         """Part of a checkpoint."""
