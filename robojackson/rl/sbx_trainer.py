@@ -82,6 +82,8 @@ class OverlappedTQC(TQC):
             np.full(batch_size * gradient_steps, self.gamma, np.float32),
         )
         policy = self.policy
+        for state in (policy.actor_state, policy.qf1_state, policy.qf2_state):
+            state.opt_state.hyperparams["learning_rate"] = np.float32(self.lr_schedule(0.0))
         policy.qf1_state, policy.qf2_state, policy.actor_state, self.ent_coef_state, self.key, _ = (
             self._train(
                 self.tau,
@@ -120,7 +122,7 @@ class SbxTrainer(OffPolicyTrainer):
             log.warning("trainer sbx has no gSDE: it explores with plain Gaussian noise")
         if config.log_std_init:
             _raise_noise(model, config.log_std_init)
-        super().__init__(model, {"noise": model.noise})
+        super().__init__(model, config, {"noise": model.noise})
 
     def learn(self, callback: BaseCallback) -> None:
         try:

@@ -21,6 +21,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "policy_delay": 1,
         "target_entropy": 1.0,
         "actor_average": 0.0,
+        "anneal": 0.0,
         "entropy": "auto",
     },
     # The authors' released code, its replay buffer cut from 1,000,000 to 300,000.
@@ -36,6 +37,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "policy_delay": 1,
         "target_entropy": 1.0,
         "actor_average": 0.0,
+        "anneal": 0.0,
         "entropy": "auto_0.1",
         "actor": (512, 512, 512),
         "critic": (512, 512, 512),
@@ -66,6 +68,8 @@ class TqcConfig:
         target_entropy: Entropy that exploration keeps, in units of minus the number of actions.
         actor_average: Weight of the past in the running mean of the actor that becomes the
             policy, a round of updates; 0 is the last actor.
+        anneal: Share of the budget, at its end, over which the learning rate of actor and critics
+            falls to a twentieth: what was learnt settles. 0 keeps it as it is.
     """
 
     preset: Literal["dance", "paper", "released"] = "dance"
@@ -90,6 +94,7 @@ class TqcConfig:
     log_std_init: float = 0.0
     target_entropy: float = Field(default=1.5, gt=0)
     actor_average: float = Field(default=0.98, ge=0, lt=1)
+    anneal: float = Field(default=0.4, ge=0, le=1)
 
     @model_validator(mode="before")
     @classmethod
