@@ -110,8 +110,8 @@ class RewardConfig:
     limb_speed_width: float = 0.6
     height: float = 0.10
     height_width: float = 0.1
-    drift: float = 0.05
-    drift_width: float = 0.5
+    drift: float = 0.10
+    drift_width: float = 0.3
     action_rate: float = 0.02
     fine: float = Field(default=0.5, ge=0, le=1)
     narrow: float = Field(default=0.35, gt=0, le=1)
@@ -220,6 +220,15 @@ class TrainConfig:
             return given
         said = {**said, "tqc": {"preset": "paper", **tqc}}
         return ArgsKwargs(given.args, said) if isinstance(given, ArgsKwargs) else said
+
+    @model_validator(mode="after")
+    def _whole_delays(self) -> "TrainConfig":
+        updates, delay = self.tqc.updates_per_round, self.tqc.policy_delay
+        if self.trainer == "sbx" and updates % delay:
+            raise ValueError(
+                f"tqc.updates_per_round, {updates}, must be a multiple of tqc.policy_delay, {delay}"
+            )
+        return self
 
     @property
     def has_budget(self) -> bool:

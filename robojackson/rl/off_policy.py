@@ -14,24 +14,6 @@ from robojackson.rl.randomness import load_random, save_random
 from robojackson.rl.replay import ReplayFiles, buffer_of
 
 FOREVER = 10**12
-LEAST_RATE = 0.05
-"""Of the learning rate, at the end of annealing."""
-
-
-class Annealing:
-    """The learning rate as a schedule of Stable-Baselines3: constant, then falling linearly.
-
-    Attributes:
-        used: Share of the budget that is used, 0..1.
-    """
-
-    def __init__(self, rate: float, share: float) -> None:
-        self._rate, self._share, self.used = rate, share, 0.0
-
-    def __call__(self, _: float) -> float:
-        if not self._share:
-            return self._rate
-        return self._rate * min(1.0, max(LEAST_RATE, (1 - self.used) / self._share))
 
 
 def arguments(config: TqcConfig, seed: int, env: VecEnv) -> dict[str, Any]:
@@ -72,11 +54,8 @@ class OffPolicyTrainer:
 
     model: Any
 
-    def __init__(
-        self, model: Any, config: TqcConfig, generators: dict[str, np.random.Generator]
-    ) -> None:
+    def __init__(self, model: Any, generators: dict[str, np.random.Generator]) -> None:
         self.model = model
-        self._rate = model.lr_schedule = Annealing(config.learning_rate, config.anneal)
         self._generators = generators | {"warmup": model.action_space.np_random}
         self._files: ReplayFiles | None = None
         model.set_logger(Logger(folder=None, output_formats=[]))
@@ -85,9 +64,6 @@ class OffPolicyTrainer:
         self.model.learn(
             FOREVER, callback=callback, log_interval=FOREVER, reset_num_timesteps=False
         )
-
-    def anneal(self, used: float) -> None:
-        self._rate.used = used
 
     def steps(self) -> int:
         return self.model.num_timesteps

@@ -82,20 +82,15 @@ class Run:
     def cpu_seconds(self) -> float:
         return self._cpu_before + time.process_time() - self._cpu_began
 
-    def used(self) -> dict[str, float]:
-        """How much of every budget is used, shares."""
-        config, shares = self.config, {}
-        if config.steps:
-            shares["steps"] = self.trainer.steps() / config.steps
-        if config.minutes:
-            shares["minutes"] = self.seconds() / (60 * config.minutes)
-        if config.cpu_minutes:
-            shares["cpu_minutes"] = self.cpu_seconds() / (60 * config.cpu_minutes)
-        return shares
-
     def finished(self) -> str:
         """The budget that is used up, or an empty string."""
-        return next((name for name, share in self.used().items() if share >= 1), "")
+        if self.config.steps is not None and self.trainer.steps() >= self.config.steps:
+            return "steps"
+        if self.config.minutes is not None and self.seconds() >= 60 * self.config.minutes:
+            return "minutes"
+        if self.config.cpu_minutes and self.cpu_seconds() >= 60 * self.config.cpu_minutes:
+            return "cpu_minutes"
+        return ""
 
     def episodes(self, rows: list[Row]) -> None:
         steps, first = self.trainer.steps() + self.core.n, self.core.episode - len(rows) + 1
@@ -113,7 +108,6 @@ class Run:
         """
         now = time.monotonic()
         self._average.add(self.trainer.acting(), self.trainer.updates())
-        self.trainer.anneal(min(1.0, max(self.used().values())))
         try:
             started = self.trainer.steps() > self._first_step
             if started and now - self._told >= self.config.progress_seconds:

@@ -37,7 +37,7 @@ class Sb3Trainer(OffPolicyTrainer):
             given["policy_kwargs"] |= {"clip_mean": 0.0}  # the policy file knows no clipped mean
         model = PatientTQC(env=env, device="cpu", **given)
         model.warmup = config.warmup
-        super().__init__(model, config, generators={})
+        super().__init__(model, generators={})
 
     def layers(self) -> Layers:
         actor = self.model.actor

@@ -26,21 +26,18 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
 from robojackson.rl.config import TqcConfig
+from robojackson.rl.dense import LOG_STD_RANGE
 from robojackson.rl.networks import CRITICS, TARGETS, Tensors
 from robojackson.rl.off_policy import OffPolicyTrainer, arguments, patient
-from robojackson.rl.quantiles import update_critic
 from robojackson.rl.replay import buffer_of
 from robojackson.rl.trainer import Layers
+from robojackson.rl.updates import Learnt, round_of_updates
 
 log = logging.getLogger(__name__)
-
-LOG_STD_RANGE = (-20.0, 2.0)
 
 
 class OverlappedTQC(TQC):
     """TQC whose updates run while the environments step."""
-
-    update_critic = staticmethod(update_critic)  # type: ignore[assignment]
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -82,24 +79,22 @@ class OverlappedTQC(TQC):
             np.full(batch_size * gradient_steps, self.gamma, np.float32),
         )
         policy = self.policy
-        for state in (policy.actor_state, policy.qf1_state, policy.qf2_state):
-            state.opt_state.hyperparams["learning_rate"] = np.float32(self.lr_schedule(0.0))
-        policy.qf1_state, policy.qf2_state, policy.actor_state, self.ent_coef_state, self.key, _ = (
-            self._train(
-                self.tau,
-                self.target_entropy,
-                gradient_steps,
-                policy.n_target_quantiles,
-                data,
-                self.policy_delay,
-                (self._n_updates + 1) % self.policy_delay,
-                policy.qf1_state,
-                policy.qf2_state,
+        learnt = round_of_updates(
+            Learnt(
                 policy.actor_state,
+                (policy.qf1_state, policy.qf2_state),
                 self.ent_coef_state,
                 self.key,
-            )
+            ),
+            data,
+            self.tau,
+            self.target_entropy,
+            kept=policy.n_target_quantiles,
+            count=gradient_steps,
+            delay=self.policy_delay,
         )
+        policy.actor_state, self.ent_coef_state, self.key = learnt.actor, learnt.entropy, learnt.key
+        policy.qf1_state, policy.qf2_state = learnt.critics
         self._n_updates += gradient_steps
 
 
@@ -118,11 +113,12 @@ class SbxTrainer(OffPolicyTrainer):
         given["policy_kwargs"] |= {"layer_norm": config.layer_norm}
         model = OverlappedTQC(env=env, policy_delay=config.policy_delay, **given)
         model.warmup = config.warmup
+        model.ent_coef_state = jax.tree_util.tree_map(_strong, model.ent_coef_state)
         if config.gsde:
             log.warning("trainer sbx has no gSDE: it explores with plain Gaussian noise")
         if config.log_std_init:
             _raise_noise(model, config.log_std_init)
-        super().__init__(model, config, {"noise": model.noise})
+        super().__init__(model, {"noise": model.noise})
 
     def learn(self, callback: BaseCallback) -> None:
         try:
@@ -163,7 +159,7 @@ class SbxTrainer(OffPolicyTrainer):
             aimed = _filled(state.target_params, tensors, target)
             setattr(policy, f"qf{i}_state", state.replace(params=params, target_params=aimed))
         if "log_alpha" in tensors:
-            alpha = jax.numpy.asarray(tensors["log_alpha"], jax.numpy.float32).reshape(())
+            alpha = _strong(np.float32(tensors["log_alpha"])).reshape(())
             state = self.model.ent_coef_state
             self.model.ent_coef_state = state.replace(params={"log_ent_coef": alpha})
         self.model._acting = actor_layers(policy.actor_state.params)
@@ -207,6 +203,11 @@ class SbxTrainer(OffPolicyTrainer):
                 for kind, array in zip("wb", layer, strict=True)
             },
         }
+
+
+def _strong(leaf: Any) -> jax.Array:
+    """An array of a type that stays: a weak one would have the updates compiled again and again."""
+    return jax.numpy.asarray(np.asarray(leaf))
 
 
 def _named(part: str, layers: Sequence[tuple[np.ndarray, np.ndarray]]) -> Tensors:

@@ -21,7 +21,6 @@ PRESETS: dict[str, dict[str, Any]] = {
         "policy_delay": 1,
         "target_entropy": 1.0,
         "actor_average": 0.0,
-        "anneal": 0.0,
         "entropy": "auto",
     },
     # The authors' released code, its replay buffer cut from 1,000,000 to 300,000.
@@ -37,7 +36,6 @@ PRESETS: dict[str, dict[str, Any]] = {
         "policy_delay": 1,
         "target_entropy": 1.0,
         "actor_average": 0.0,
-        "anneal": 0.0,
         "entropy": "auto_0.1",
         "actor": (512, 512, 512),
         "critic": (512, 512, 512),
@@ -61,15 +59,13 @@ class TqcConfig:
         warmup: Transitions before the first update, random ones unless the start is pretrained.
         critics: SBX has two, and so has the reference.
         top_quantiles_to_drop: Of each critic's quantiles, against overestimation.
-        policy_delay: Critic updates an actor update; `sb3` knows only 1.
+        policy_delay: Critic updates an actor update, so many times in a round; `sb3` knows only 1.
         layer_norm: Layer normalisation in the critics; `sbx` only.
         gsde: State-dependent exploration; `sbx` has none and explores with plain noise.
         log_std_init: Logarithm of the first exploration noise; `sb3` uses it with gSDE only.
         target_entropy: Entropy that exploration keeps, in units of minus the number of actions.
         actor_average: Weight of the past in the running mean of the actor that becomes the
             policy, a round of updates; 0 is the last actor.
-        anneal: Share of the budget, at its end, over which the learning rate of actor and critics
-            falls to a twentieth: what was learnt settles. 0 keeps it as it is.
     """
 
     preset: Literal["dance", "paper", "released"] = "dance"
@@ -94,7 +90,6 @@ class TqcConfig:
     log_std_init: float = 0.0
     target_entropy: float = Field(default=1.5, gt=0)
     actor_average: float = Field(default=0.98, ge=0, lt=1)
-    anneal: float = Field(default=0.4, ge=0, le=1)
 
     @model_validator(mode="before")
     @classmethod

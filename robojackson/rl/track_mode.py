@@ -23,7 +23,7 @@ from robojackson.rl.starts import SettledStates, StartPhases, default_stand, noi
 
 SETTLED_STATES_NEEDED = 32
 PERFECT_OF_THE_PAPER = 5.0
-"""What a perfect step earns by the paper's reward; by ours it is 1."""
+"""What a perfect step earns by the paper's reward; by ours it is 1.05."""
 PELVIS = "pelvis"
 FEET = ("left_foot", "right_foot")
 EXTREMITIES = ("left_hand", "right_hand", "head")

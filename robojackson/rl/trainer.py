@@ -33,10 +33,6 @@ class Trainer(Protocol):
     def acting(self) -> Layers:
         """The same of the actor that the simulations follow now, without waiting for updates."""
 
-    def anneal(self, used: float) -> None:
-        """Told between two rounds which share of the budget is used, 0..1: what the learning rate
-        goes by."""
-
     def steps(self) -> int:
         """Control steps so far, over all simulations and resumptions."""
 
