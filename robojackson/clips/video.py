@@ -95,9 +95,10 @@ def probe(path: Path, limits: VideoLimits) -> VideoInfo:
         stream = video_stream(container, path)
         told = float(stream.average_rate or stream.guessed_rate or 0)
         promised = stream.frames
-        first = first_frame(container, path)
     stamps = packet_times(path)
     _require_whole(path, len(stamps), promised)
+    with opened(path) as container:
+        first = first_frame(container, path)
     fps = rate(stamps, told)
     if not fps:
         raise UnreadableVideo(f"{path}: the file tells no frame rate")

@@ -117,6 +117,12 @@ class RewardConfig:
     narrow: float = Field(default=0.35, gt=0, le=1)
     curiosity: Curiosity = "off"
 
+    @property
+    def perfect(self) -> float:
+        """What a step earns that equals the reference."""
+        places = self.joints + self.sites + self.hands + self.orientation + self.height + self.drift
+        return places + self.velocity + self.joint_speed + self.limb_speed
+
 
 @dataclass(frozen=True, config=STRICT)
 class TerminationConfig:

@@ -60,7 +60,7 @@ class Meter:
         errors = tracking_errors(sim.qpos, sim.qvel, sim.points, moved, moment.at, self._which)
         terms = reward_terms(errors, moment.change, reward)
         if reward.curiosity != "off":
-            beta = BETA[reward.curiosity] / PERFECT_OF_THE_PAPER
+            beta = BETA[reward.curiosity] * reward.perfect / PERFECT_OF_THE_PAPER
             terms["curiosity"] = beta * np.abs(sim.qvel[:, 6:]).sum(-1)
         return {name: np.where(moment.fell, 0.0, term) for name, term in terms.items()}
 

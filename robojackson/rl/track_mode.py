@@ -23,7 +23,7 @@ from robojackson.rl.starts import SettledStates, StartPhases, default_stand, noi
 
 SETTLED_STATES_NEEDED = 32
 PERFECT_OF_THE_PAPER = 5.0
-"""What a perfect step earns by the paper's reward; by ours it is 1.05."""
+"""What a perfect step earns by the paper's reward; by ours, `RewardConfig.perfect`."""
 PELVIS = "pelvis"
 FEET = ("left_foot", "right_foot")
 EXTREMITIES = ("left_hand", "right_hand", "head")
@@ -62,7 +62,7 @@ class TrackMode:
         errors = tracking_errors(sim.qpos, sim.qvel, sim.points, moved, at, self._which)
         terms = reward_terms(errors, change, reward)
         if reward.curiosity != "off":
-            beta = BETA[reward.curiosity] / PERFECT_OF_THE_PAPER
+            beta = BETA[reward.curiosity] * reward.perfect / PERFECT_OF_THE_PAPER
             terms["curiosity"] = beta * np.abs(sim.qvel[:, 6:]).sum(-1)
         failed = fallen(sim.qpos, rules) | lost(errors, rules) | sim.broken
         return Score(terms, failed, errors.site_mean)

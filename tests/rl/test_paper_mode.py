@@ -245,7 +245,7 @@ def test_a_statue_earns_what_a_dancer_earns_by_the_papers_reward(
 
 def test_a_statue_earns_clearly_less_by_our_reward(robot: Robot, sway: ReferenceMotion) -> None:
     found = shares(robot, sway, TrackConfig())
-    assert found.perfect == pytest.approx(1.0, abs=0.01)
+    assert found.perfect == pytest.approx(TrackConfig().reward.perfect, abs=0.01)
     assert found.of["statue"] < 0.85
     assert found.of["flail"] < found.of["statue"]
 
