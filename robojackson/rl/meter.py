@@ -13,12 +13,10 @@ from robojackson.motion.reference import ReferenceMotion
 from robojackson.retarget.robot import Robot
 from robojackson.rl.clip import Clip
 from robojackson.rl.config import PaperConfig, RewardConfig, TrackConfig
-from robojackson.rl.paper_config import BETA
 from robojackson.rl.paper_mode import PaperPoints
 from robojackson.rl.paper_reward import Miss, miss, paper_terms
-from robojackson.rl.rewards import reward_terms, tracking_errors
 from robojackson.rl.rollouts import Moment, Reading
-from robojackson.rl.track_mode import PERFECT_OF_THE_PAPER, tracked_points
+from robojackson.rl.track_mode import judged, tracked_points
 
 
 class Meter:
@@ -57,11 +55,7 @@ class Meter:
     def _track(self, moment: Moment) -> Reading:
         sim, reward = moment.sim, _reward_of(self._environment)
         moved = (sim.points - moment.before) / self._clip.dt
-        errors = tracking_errors(sim.qpos, sim.qvel, sim.points, moved, moment.at, self._which)
-        terms = reward_terms(errors, moment.change, reward)
-        if reward.curiosity != "off":
-            beta = BETA[reward.curiosity] * reward.perfect / PERFECT_OF_THE_PAPER
-            terms["curiosity"] = beta * np.abs(sim.qvel[:, 6:]).sum(-1)
+        _, terms = judged(sim, moved, moment.at, moment.change, self._which, reward)
         return {name: np.where(moment.fell, 0.0, term) for name, term in terms.items()}
 
 

@@ -13,12 +13,19 @@ from jaxtyping import Float, Int
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.retarget.robot import Robot
 from robojackson.rl.clip import Clip, ClipStep
-from robojackson.rl.config import TrackConfig
+from robojackson.rl.config import RewardConfig, TrackConfig
 from robojackson.rl.mode import Beginning, Score
 from robojackson.rl.observation import observation_size, observe
 from robojackson.rl.paper_config import BETA
 from robojackson.rl.physics import Simulation
-from robojackson.rl.rewards import TrackedPoints, fallen, lost, reward_terms, tracking_errors
+from robojackson.rl.rewards import (
+    TrackedPoints,
+    TrackingErrors,
+    fallen,
+    lost,
+    reward_terms,
+    tracking_errors,
+)
 from robojackson.rl.starts import SettledStates, StartPhases, default_stand, noisy, stand_at
 
 SETTLED_STATES_NEEDED = 32
@@ -57,13 +64,9 @@ class TrackMode:
         """Nothing is counted within a step."""
 
     def score(self, at: ClipStep, before: np.ndarray, change: np.ndarray, episode: int) -> Score:
-        sim, rules, reward = self.sim, self._config.termination, self._config.reward
+        sim, rules = self.sim, self._config.termination
         moved = (sim.points - before) / self.clip.dt
-        errors = tracking_errors(sim.qpos, sim.qvel, sim.points, moved, at, self._which)
-        terms = reward_terms(errors, change, reward)
-        if reward.curiosity != "off":
-            beta = BETA[reward.curiosity] * reward.perfect / PERFECT_OF_THE_PAPER
-            terms["curiosity"] = beta * np.abs(sim.qvel[:, 6:]).sum(-1)
+        errors, terms = judged(sim, moved, at, change, self._which, self._config.reward)
         failed = fallen(sim.qpos, rules) | lost(errors, rules) | sim.broken
         return Score(terms, failed, errors.site_mean)
 
@@ -107,6 +110,28 @@ class TrackMode:
     def restore(self, state: dict[str, Any]) -> None:
         self.starts.failures = np.array(state["failures"])
         self._settled.restore(state)
+
+
+def judged(
+    sim: Simulation,
+    moved: Float[np.ndarray, "N K 3"],
+    at: ClipStep,
+    change: Float[np.ndarray, " N"],
+    which: TrackedPoints,
+    reward: RewardConfig,
+) -> tuple[TrackingErrors, dict[str, Float[np.ndarray, " N"]]]:
+    """Errors of every robot and the terms of its reward, the bonus for curiosity with them.
+
+    Args:
+        moved: Velocity of the points, m/s.
+        change: Mean squared change of the action.
+    """
+    errors = tracking_errors(sim.qpos, sim.qvel, sim.points, moved, at, which)
+    terms = reward_terms(errors, change, reward)
+    if reward.curiosity != "off":
+        beta = BETA[reward.curiosity] * reward.perfect / PERFECT_OF_THE_PAPER
+        terms["curiosity"] = beta * np.abs(sim.qvel[:, 6:]).sum(-1)
+    return errors, terms
 
 
 def tracked_points(names: tuple[str, ...]) -> TrackedPoints:
