@@ -49,8 +49,10 @@ def load(
     except ValidationError as cause:
         key = ".".join([*_keys(cause), ""])
         blamed = [g for g in given if key.startswith(f"{g}.") or f"{g}.".startswith(key)]
-        where = f"--set {blamed[0]}" if blamed else where
-        raise BadConfiguration(f"{where}: {_explain(cls, cause)}") from cause
+        why = _explain(cls, cause)
+        if blamed:  # of several values that do not go together, those that the reason names
+            where = f"--set {', '.join([g for g in blamed if g in why] or blamed)}"
+        raise BadConfiguration(f"{where}: {why}") from cause
 
 
 def build(cls: type[Config], values: Mapping[str, Any], where: str) -> Config:
@@ -167,6 +169,8 @@ def _explain(cls: type, cause: ValidationError) -> str:
         return f"unknown key {where!r}.{hint} Known: {', '.join(known)}"
     if error["type"] in ("missing", "missing_argument"):
         return f"key {where!r} is missing"
+    if error["type"] == "value_error" and isinstance(error["input"], Mapping):
+        return str(error["ctx"]["error"])  # values that do not go together, each right by itself
     return f"{where!r} is {error['input']!r}: {error['msg']}"
 
 

@@ -9,6 +9,7 @@ from pydantic.dataclasses import dataclass
 
 from configs import loader
 from robojackson.errors import BadConfiguration, UnknownName
+from robojackson.rl.config import TrainConfig
 
 STRICT = ConfigDict(extra="forbid")
 
@@ -84,6 +85,15 @@ def test_a_bad_override_is_blamed_on_itself_and_not_on_the_file(write, key: str)
     with pytest.raises(BadConfiguration) as caught:
         loader.load(Outer, write("seed: 1"), {"inner.cyclic": "no", key: "3"})
     assert str(caught.value).startswith(f"--set {key}: unknown key")
+
+
+def test_values_that_do_not_go_together_are_named_and_no_others() -> None:
+    given = {"seed": "2", "tqc.policy_delay": "2", "tqc.updates_per_round": "25"}
+    with pytest.raises(BadConfiguration) as caught:
+        loader.load(TrainConfig, None, given)
+    message = str(caught.value)
+    assert message.startswith("--set tqc.policy_delay, tqc.updates_per_round: ")
+    assert message.endswith("25, must be a multiple of tqc.policy_delay, 2")
 
 
 def test_a_bad_file_is_blamed_though_an_override_was_given(write) -> None:
