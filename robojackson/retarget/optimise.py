@@ -26,7 +26,7 @@ from robojackson.retarget.starts import frame_start, rest_start
 from robojackson.retarget.targets import Targets, every_second
 
 _log = logging.getLogger(__name__)
-_HARDENING_ROUNDS = 3
+_HARDENING_ROUNDS = 6
 _LEAN_ROUNDS = 3
 _UNTANGLING = 30.0
 _FAST_SLIP = 3.5  # the 95th percentile of slip may be so many times its mean's bar
