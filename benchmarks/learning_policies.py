@@ -29,7 +29,8 @@ class Move:
         cpu_minutes: Of one core.
         success, worst: Least strict success, of the mean over seeds and of the worst seed.
         skill: Least skill.
-        authors: Whether it is a file of the authors': not cyclic, limbs are told and not asked for.
+        cyclic: Whether it is danced for a time; else to its end.
+        authors: Whether it is a file of the authors': limbs are told and not asked for.
     """
 
     clip: str
@@ -37,15 +38,21 @@ class Move:
     success: float
     worst: float
     skill: float
+    cyclic: bool = True
     authors: bool = False
+
+    @property
+    def horizons_s(self) -> tuple[float, ...]:
+        """Seconds that it is judged over, a row each."""
+        return HORIZONS_S if self.cyclic else HORIZONS_S[:1]
 
 
 MOVES = {
     "hip_shake": Move("clips/hip_shake.mp4", 10, 0.95, 0.85, 0.5),
     "walk": Move("clips/walk.mp4", 20, 0.90, 0.80, 0.6),
-    "dance_b": Move("clips/dance_b.mp4", 40, 0.85, 0.70, 0.5),
-    "authors_apt1": Move("apt1", 20, 0.85, 0.0, 0.5, authors=True),
-    "authors_walk": Move("walk", 20, 0.85, 0.0, 0.5, authors=True),
+    "dance_b": Move("clips/dance_b.mp4", 40, 0.85, 0.70, 0.5, cyclic=False),
+    "authors_apt1": Move("apt1", 20, 0.85, 0.0, 0.5, cyclic=False, authors=True),
+    "authors_walk": Move("walk", 20, 0.85, 0.0, 0.5, cyclic=False, authors=True),
 }
 
 
@@ -129,7 +136,7 @@ def train_and_judge(
     name: str, seed: int, minutes: float | None, folders: Folders, core: int
 ) -> None:
     """Train one move with one seed and keep the rows of its evaluation; nothing if they exist."""
-    horizons = HORIZONS_S[:1] if MOVES[name].authors else HORIZONS_S
+    horizons = MOVES[name].horizons_s
     if all(folders.row(name, seed, seconds).exists() for seconds in horizons):
         return
     work = folders.work / name

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.learning_policies import HORIZONS_S, MOVES, Folders, Move, forced
+from benchmarks.learning_policies import MOVES, Folders, Move, forced
 from storage import tables
 from storage.schemas import EVALUATION_RECORD
 
@@ -27,7 +27,7 @@ def summary(folders: Folders) -> Rows:
     """One line a move and a horizon over the seeds that there are."""
     lines = []
     for name, move in MOVES.items():
-        for seconds in HORIZONS_S[:1] if move.authors else HORIZONS_S:
+        for seconds in move.horizons_s:
             found = sorted(folders.rows.glob(folders.row(name, "[0-9]*", seconds).name))
             exact = [path for path in found if path == folders.row(name, _seed(path), seconds)]
             if exact:
@@ -44,7 +44,7 @@ def line(name: str, move: Move, seconds: float, seeds: Sequence[Rows]) -> dict[s
     found: dict[str, Any] = {
         "move": name,
         "cpu_minutes": move.cpu_minutes,
-        "horizon_s": None if move.authors else seconds,
+        "horizon_s": seconds if move.cyclic else None,
         "seeds": len(seeds),
         **{key: mean(values) for key, values in by_seed.items()},
         "strict_success_95": list(cluster_interval(success)),
