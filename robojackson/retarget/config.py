@@ -48,6 +48,9 @@ class RetargetConfig:
         stands_share: Share of steps on both feet from which a clip stays on both feet.
         depth_bar_m: Deepest penetration that is left as it is, metres.
         slip_bar_m_s: Largest mean slip of planted soles that is left as it is, m/s.
+        jump_bar_m_s2: Largest acceleration of a keypoint that is taken for a movement, m/s2, where
+            the clip's own are not half as large; beyond it limbs have passed through each other,
+            and another start is tried.
         cycle, weights, solver, repair: Of the stages.
     """
 
@@ -60,6 +63,7 @@ class RetargetConfig:
     stands_share: float = Field(default=0.7, ge=0, le=1)
     depth_bar_m: float = Field(default=0.0045, gt=0)
     slip_bar_m_s: float = Field(default=0.007, gt=0)
+    jump_bar_m_s2: float = Field(default=300.0, gt=0)
     cycle: CycleConfig = Field(default_factory=CycleConfig)
     weights: Weights = Field(default_factory=Weights)
     solver: SolverConfig = Field(default_factory=SolverConfig)

@@ -123,12 +123,13 @@ def _kept(robot: Robot, before: Feasible, after: Feasible, config: RetargetConfi
 
 
 def _holds(robot: Robot, motion: Feasible, config: RetargetConfig) -> bool:
-    """Whether nothing is too deep in the floor or in another limb, and no hinge too fast."""
+    """Whether nothing is too deep in the floor or in another limb, nothing has jumped through one,
+    and no hinge is too fast."""
     problem = Problem.of(robot, motion.aims, config.weights)
     broken = faults(problem, motion.qpos, config)
-    if broken.deep or broken.fast:
+    if bad := broken.deep or broken.fast or broken.jumps:
         _log.info("repair undone: %s", broken)
-    return not (broken.deep or broken.fast)
+    return not bad
 
 
 def _repaired(robot: Robot, given: Feasible, found: Feasible, config: RetargetConfig) -> Feasible:

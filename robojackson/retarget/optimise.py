@@ -26,10 +26,11 @@ from robojackson.retarget.starts import frame_start, rest_start
 from robojackson.retarget.targets import Targets, every_second
 
 _log = logging.getLogger(__name__)
-_HARDENING_ROUNDS = 6
+_HARDENING_ROUNDS = 3
 _LEAN_ROUNDS = 3
 _UNTANGLING = 30.0
 _FAST_SLIP = 3.5  # the 95th percentile of slip may be so many times its mean's bar
+_OWN_JERK = 2.0  # a motion may be so many times as jerky as its targets
 _SKETCHED = 60  # steps from which a clip is solved at a quarter of the control rate first
 
 
@@ -159,26 +160,39 @@ class Faults:
     deepest_m: float
     fastest: float
     slip_m_s: float
+    jerked_m_s2: float
     deep: bool
     fast: bool
     slips: bool
+    jumps: bool
 
     @property
     def any(self) -> bool:
         """Whether any bar is broken."""
+        return self.heavier_weights_help or self.jumps
+
+    @property
+    def heavier_weights_help(self) -> bool:
+        """Whether one is broken other than by a limb that has jumped through another."""
         return self.deep or self.fast or self.slips
 
 
 def faults(problem: Problem, qpos: Float[np.ndarray, "T nq"], config: RetargetConfig) -> Faults:
-    """Measure penetration, hinge speed and slip against the bars."""
+    """Measure penetration, hinge speed, slip and accelerations against the bars."""
     touches = Detector(problem.robot, 0.0).touches(qpos)
     deepest = -float(touches.distance.min(initial=0.0))
     fastest = float(np.abs(problem.velocity(qpos)[:, 6:]).max())
     slip, fast_slip = _slip(problem, qpos)
+    dt, posed = problem.targets.dt, pose(problem.tree, qpos)
+    jerked, asked = (
+        _jerked(points, dt) for points in (posed.site_pos, problem.targets.keypoints_w)
+    )
     return Faults(
         deepest_m=deepest,
         fastest=fastest,
         slip_m_s=slip,
+        jerked_m_s2=jerked,
+        jumps=jerked > max(config.jump_bar_m_s2, _OWN_JERK * asked),
         deep=deepest > config.depth_bar_m,
         fast=fastest > problem.robot.description.max_joint_speed,
         slips=slip > config.slip_bar_m_s or fast_slip > _FAST_SLIP * config.slip_bar_m_s,
@@ -189,7 +203,7 @@ def harden(problem: Problem, solution: Solution, config: RetargetConfig) -> Solu
     """Raise the weights of what is over its bar and solve again, a few rounds at most."""
     for _ in range(_HARDENING_ROUNDS):
         broken = faults(problem, solution.qpos, config)
-        if not broken.any:
+        if not broken.heavier_weights_help:
             break
         _log.info("hardening: %s", broken)
         old = problem.weights
@@ -203,6 +217,13 @@ def harden(problem: Problem, solution: Solution, config: RetargetConfig) -> Solu
         problem = replace(problem, weights=weights)
         solution = solve(problem, solution.qpos, config.solver, config.solver.polish_iterations)
     return solution
+
+
+def _jerked(points: Float[np.ndarray, "T K 3"], dt: float) -> float:
+    """Largest acceleration of a keypoint, m/s2: a limb that has come out on another's far side has
+    passed through it between two steps."""
+    change = np.linalg.norm(np.diff(points, 2, axis=0), axis=-1) / dt**2
+    return float(change.max(initial=0.0))
 
 
 def _slip(problem: Problem, qpos: np.ndarray) -> tuple[float, float]:
