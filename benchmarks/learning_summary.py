@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.learning_policies import MOVES, Folders, Move, forced
+from robojackson.metrics.study import estimate
 from storage import tables
 from storage.schemas import EVALUATION_RECORD
 
@@ -18,8 +19,6 @@ AUTHORS_ROBOT = {
     "note": "at best: 27 steps of 0.06 s in the authors' own logs; nothing else can be told of it",
 }
 BESIDE = ("statue", "mean_pose", "zero_residual", "random", "hold")
-RESAMPLES = 5000
-"""Of the seeds, for an interval."""
 TOLD = ("survived_s", "strict_success", "skill", "velocity_score")
 
 
@@ -91,10 +90,8 @@ def bars(found: Mapping[str, Any], move: Move) -> dict[str, bool]:
 
 def cluster_interval(by_seed: Sequence[float] | np.ndarray) -> tuple[float, float]:
     """95 % interval of the mean by resampling seeds; rollouts of one seed are no evidence."""
-    rng = np.random.default_rng(0)
-    values = np.asarray(by_seed)
-    means = rng.choice(values, (RESAMPLES, len(values))).mean(1)
-    return float(np.quantile(means, 0.025)), float(np.quantile(means, 0.975))
+    found = estimate(list(by_seed), np.random.default_rng(0))
+    return (found.low, found.high) if found.count > 1 else (found.mean, found.mean)
 
 
 def of_policy(rows: Rows, policy: str) -> Rows:
