@@ -10,6 +10,7 @@ import signal
 from asyncio.subprocess import PIPE, Process
 from collections import deque
 from collections.abc import AsyncIterator, Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -94,16 +95,29 @@ async def _read(process: Process) -> bytes:
 
 
 async def _end(process: Process) -> None:
-    """Leave nothing of the process group: ask, wait, kill."""
+    """Leave nothing of the process group: ask, wait, kill; at once where the waiting, too, is cut
+    short."""
     if process.returncode is not None:
         return
-    os.killpg(process.pid, signal.SIGTERM)
+    _tell(process, signal.SIGTERM)
     try:
         async with asyncio.timeout(SECONDS_TO_SAVE):
             await process.wait()
     except TimeoutError:
-        os.killpg(process.pid, signal.SIGKILL)
-        await process.wait()
+        await _kill(process)
+    except asyncio.CancelledError:
+        await _kill(process)
+        raise
+
+
+async def _kill(process: Process) -> None:
+    _tell(process, signal.SIGKILL)
+    await process.wait()
+
+
+def _tell(process: Process, what: signal.Signals) -> None:
+    with suppress(ProcessLookupError):  # it may have ended a moment ago
+        os.killpg(process.pid, what)
 
 
 def _cause(run_id: str, code: int, work: Path, last: deque[str]) -> TrainingFailed:

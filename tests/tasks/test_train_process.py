@@ -85,6 +85,26 @@ def test_a_cancelled_task_leaves_no_process(
     assert ends(int(_read(tmp_path / task.LOG).split()[0]), 10.0)
 
 
+def test_a_task_that_is_cancelled_while_it_ends_leaves_no_process(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(task, "SECONDS_TO_SAVE", 60.0)
+    told = f"import os, sys; print(os.getpid(), file=sys.stderr, flush=True); {STUBBORN}"
+
+    async def cancelled_twice() -> None:
+        command = [sys.executable, "-c", told]
+        running = asyncio.create_task(task.run_process(command, "run", tmp_path, None))
+        while "started" not in _read(tmp_path / task.LOG):
+            await asyncio.sleep(0.02)
+        running.cancel()
+        await asyncio.sleep(0.2)
+        running.cancel()
+        await asyncio.gather(running, return_exceptions=True)
+
+    asyncio.run(cancelled_twice())
+    assert ends(int(_read(tmp_path / task.LOG).split()[0]), 10.0)
+
+
 def test_a_training_ends_when_its_parent_is_killed(tmp_path: Path) -> None:
     child = (
         "import os, sys, time\n"
