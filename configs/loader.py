@@ -51,7 +51,8 @@ def load(
         blamed = [g for g in given if key.startswith(f"{g}.") or f"{g}.".startswith(key)]
         why = _explain(cls, cause)
         if blamed:  # of several values that do not go together, those that the reason names
-            where = f"--set {', '.join([g for g in blamed if g in why] or blamed)}"
+            named = [g for g in blamed if g.removeprefix(key) in why]
+            where = f"--set {', '.join(named or blamed)}"
         raise BadConfiguration(f"{where}: {why}") from cause
 
 

@@ -17,7 +17,7 @@ from robojackson.motion.smpl import PLANTED
 from robojackson.retarget.balance import lean, leaned
 from robojackson.retarget.collision import Detector
 from robojackson.retarget.config import RetargetConfig
-from robojackson.retarget.kinematics import continuous, pose, sole_velocities
+from robojackson.retarget.kinematics import Posed, continuous, pose, sole_velocities
 from robojackson.retarget.problem import Problem
 from robojackson.retarget.resample import resample
 from robojackson.retarget.robot import Robot
@@ -30,7 +30,7 @@ _HARDENING_ROUNDS = 3
 _LEAN_ROUNDS = 3
 _UNTANGLING = 30.0
 _FAST_SLIP = 3.5  # the 95th percentile of slip may be so many times its mean's bar
-_OWN_JERK = 2.0  # a motion may be so many times as jerky as its targets
+_OWN_ACCELERATION = 2.0  # a motion may have so many times its targets'
 _SKETCHED = 60  # steps from which a clip is solved at a quarter of the control rate first
 
 
@@ -160,7 +160,7 @@ class Faults:
     deepest_m: float
     fastest: float
     slip_m_s: float
-    jerked_m_s2: float
+    acceleration_m_s2: float
     deep: bool
     fast: bool
     slips: bool
@@ -182,17 +182,15 @@ def faults(problem: Problem, qpos: Float[np.ndarray, "T nq"], config: RetargetCo
     touches = Detector(problem.robot, 0.0).touches(qpos)
     deepest = -float(touches.distance.min(initial=0.0))
     fastest = float(np.abs(problem.velocity(qpos)[:, 6:]).max())
-    slip, fast_slip = _slip(problem, qpos)
-    dt, posed = problem.targets.dt, pose(problem.tree, qpos)
-    jerked, asked = (
-        _jerked(points, dt) for points in (posed.site_pos, problem.targets.keypoints_w)
-    )
+    posed, aims = pose(problem.tree, qpos), problem.targets
+    slip, fast_slip = _slip(problem, posed)
+    found, asked = (_acceleration(p, aims.dt) for p in (posed.site_pos, aims.keypoints_w))
     return Faults(
         deepest_m=deepest,
         fastest=fastest,
         slip_m_s=slip,
-        jerked_m_s2=jerked,
-        jumps=jerked > max(config.jump_bar_m_s2, _OWN_JERK * asked),
+        acceleration_m_s2=found,
+        jumps=found > max(config.jump_bar_m_s2, _OWN_ACCELERATION * asked),
         deep=deepest > config.depth_bar_m,
         fast=fastest > problem.robot.description.max_joint_speed,
         slips=slip > config.slip_bar_m_s or fast_slip > _FAST_SLIP * config.slip_bar_m_s,
@@ -219,17 +217,16 @@ def harden(problem: Problem, solution: Solution, config: RetargetConfig) -> Solu
     return solution
 
 
-def _jerked(points: Float[np.ndarray, "T K 3"], dt: float) -> float:
+def _acceleration(points: Float[np.ndarray, "T K 3"], dt: float) -> float:
     """Largest acceleration of a keypoint, m/s2: a limb that has come out on another's far side has
     passed through it between two steps."""
     change = np.linalg.norm(np.diff(points, 2, axis=0), axis=-1) / dt**2
     return float(change.max(initial=0.0))
 
 
-def _slip(problem: Problem, qpos: np.ndarray) -> tuple[float, float]:
+def _slip(problem: Problem, posed: Posed) -> tuple[float, float]:
     """Speed of the soles that are planted in two successive steps: mean, 95th percentile, m/s."""
     aims = problem.targets
-    posed = pose(problem.tree, qpos)
     speed = sole_velocities(problem.robot, posed, aims.dt, aims.lap)
     slip = slip_cm_s(speed, aims.contact == PLANTED) / 100
     return (float(slip.mean()), float(np.quantile(slip, 0.95))) if len(slip) else (0.0, 0.0)

@@ -8,6 +8,7 @@ from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
 from configs import loader
+from configs.pipeline import PipelineConfig
 from robojackson.errors import BadConfiguration, UnknownName
 from robojackson.rl.config import TrainConfig
 
@@ -87,12 +88,14 @@ def test_a_bad_override_is_blamed_on_itself_and_not_on_the_file(write, key: str)
     assert str(caught.value).startswith(f"--set {key}: unknown key")
 
 
-def test_values_that_do_not_go_together_are_named_and_no_others() -> None:
+@pytest.mark.parametrize(("cls", "within"), [(TrainConfig, ""), (PipelineConfig, "train.")])
+def test_values_that_do_not_go_together_are_named_and_no_others(cls: type, within: str) -> None:
     given = {"seed": "2", "tqc.policy_delay": "2", "tqc.updates_per_round": "25"}
     with pytest.raises(BadConfiguration) as caught:
-        loader.load(TrainConfig, None, given)
+        loader.load(cls, None, {within + key: value for key, value in given.items()})
     message = str(caught.value)
-    assert message.startswith("--set tqc.policy_delay, tqc.updates_per_round: ")
+    blamed = f"{within}tqc.policy_delay, {within}tqc.updates_per_round"
+    assert message.startswith(f"--set {blamed}: ")
     assert message.endswith("25, must be a multiple of tqc.policy_delay, 2")
 
 

@@ -89,5 +89,5 @@ def test_a_limb_that_jumps_is_a_fault_that_heavier_weights_do_not_mend(robot: Ro
     found = faults(problem, jumping, config)
     assert found.jumps
     assert found.any
-    fast = replace(config, jump_bar_m_s2=10 * found.jerked_m_s2)
+    fast = replace(config, jump_bar_m_s2=10 * found.acceleration_m_s2)
     assert not faults(problem, jumping, fast).jumps

@@ -66,11 +66,15 @@ def test_a_process_that_does_not_end_is_killed(tmp_path: Path) -> None:
         run(SLEEPER, tmp_path, 1.0)
 
 
-@pytest.mark.parametrize("code", [SLEEPER, STUBBORN], ids=["willing", "stubborn"])
+@pytest.mark.parametrize(
+    ("code", "grace_s", "times"),
+    [(SLEEPER, 0.5, 1), (STUBBORN, 0.5, 1), (STUBBORN, 60.0, 2)],
+    ids=["willing", "stubborn", "stubborn and cancelled again while it ends"],
+)
 def test_a_cancelled_task_leaves_no_process(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: str, grace_s: float, times: int
 ) -> None:
-    monkeypatch.setattr(task, "SECONDS_TO_SAVE", 0.5)
+    monkeypatch.setattr(task, "SECONDS_TO_SAVE", grace_s)
     told = f"import os, sys; print(os.getpid(), file=sys.stderr, flush=True); {code}"
 
     async def cancelled() -> None:
@@ -78,30 +82,12 @@ def test_a_cancelled_task_leaves_no_process(
         running = asyncio.create_task(task.run_process(command, "run", tmp_path, None))
         while "started" not in _read(tmp_path / task.LOG):
             await asyncio.sleep(0.02)
-        running.cancel()
+        for _ in range(times):
+            running.cancel()
+            await asyncio.sleep(0.2)
         await asyncio.gather(running, return_exceptions=True)
 
     asyncio.run(cancelled())
-    assert ends(int(_read(tmp_path / task.LOG).split()[0]), 10.0)
-
-
-def test_a_task_that_is_cancelled_while_it_ends_leaves_no_process(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(task, "SECONDS_TO_SAVE", 60.0)
-    told = f"import os, sys; print(os.getpid(), file=sys.stderr, flush=True); {STUBBORN}"
-
-    async def cancelled_twice() -> None:
-        command = [sys.executable, "-c", told]
-        running = asyncio.create_task(task.run_process(command, "run", tmp_path, None))
-        while "started" not in _read(tmp_path / task.LOG):
-            await asyncio.sleep(0.02)
-        running.cancel()
-        await asyncio.sleep(0.2)
-        running.cancel()
-        await asyncio.gather(running, return_exceptions=True)
-
-    asyncio.run(cancelled_twice())
     assert ends(int(_read(tmp_path / task.LOG).split()[0]), 10.0)
 
 
