@@ -8,18 +8,20 @@ import os
 import subprocess
 import sys
 from collections.abc import Mapping
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
 import yaml
 from prefect.automations import Automation
 from prefect.client.orchestration import PrefectClient, get_client
-from prefect.client.schemas.actions import WorkPoolCreate
+from prefect.client.schemas.actions import WorkPoolCreate, WorkPoolUpdate
 from prefect.exceptions import ObjectNotFound
 from prefect.filesystems import RemoteFileSystem
 from prefect.settings import PREFECT_API_URL
 from prefect.workers.process import ProcessWorker
 
+from flows.environment import HEARTBEAT, HEARTBEAT_S
 from robojackson.errors import DeploymentFailed
 from storage.store import Store
 
@@ -35,7 +37,7 @@ RESULTS = "robojackson"
 RECORDS = "prefect/records"
 SILENCE = "ROBOJACKSON_SILENCE_S"
 """Variable: seconds without a sign of life after which a run is marked Crashed."""
-SILENT_S, SHORTEST_S = 150, 61
+SILENT_S, SHORTEST_S = 150, 2 * HEARTBEAT_S + 1
 
 
 def deploy() -> dict[str, Any]:
@@ -79,8 +81,8 @@ def automations() -> list[dict[str, Any]]:
     wanted = os.environ.get(SILENCE, str(SILENT_S))
     if not wanted.isdecimal() or int(wanted) < SHORTEST_S:
         raise DeploymentFailed(
-            f"{SILENCE}={wanted!r}: whole seconds, {SHORTEST_S} at least; runs say every 30 s "
-            "that they live"
+            f"{SILENCE}={wanted!r}: whole seconds, {SHORTEST_S} at least; runs say every "
+            f"{HEARTBEAT_S} s that they live"
         )
     return [_patient(facts, int(wanted)) for facts in yaml.safe_load(AUTOMATIONS.read_text())]
 
@@ -96,14 +98,27 @@ def _patient(facts: dict[str, Any], silence_s: int) -> dict[str, Any]:
 
 
 async def _pool(client: PrefectClient, name: str, description: str) -> None:
+    """A pool that is new, or the one that is there with the heartbeat of our runs."""
     try:
-        await client.read_work_pool(name)
+        known = await client.read_work_pool(name)
     except ObjectNotFound:
-        template = ProcessWorker.get_default_base_job_template()
+        template = with_heartbeat(ProcessWorker.get_default_base_job_template())
         wanted = WorkPoolCreate(
             name=name, type="process", description=description, base_job_template=template
         )
         await client.create_work_pool(wanted)
+        return
+    template = with_heartbeat(known.base_job_template)
+    if template != known.base_job_template:
+        await client.update_work_pool(name, WorkPoolUpdate(base_job_template=template))
+
+
+def with_heartbeat(template: Mapping[str, Any]) -> dict[str, Any]:
+    """A job template whose runs get our heartbeat, whatever environment their worker has."""
+    made = deepcopy(dict(template))
+    env = made["variables"]["properties"]["env"]
+    env["default"] = {**env.get("default", {}), **HEARTBEAT}
+    return made
 
 
 async def _results(store: Store) -> str | None:

@@ -1,7 +1,8 @@
 """What Prefect must find in the environment before it is imported.
 
 Its home is inside the store, so that a run leaves nothing elsewhere; the temporary server gets the
-time that it needs on two busy cores and tells nobody anything.
+time that it needs on two busy cores and tells nobody anything. A run says often enough that it
+lives for the automation that marks dead ones (`configs/automations.yaml`).
 """
 
 import os
@@ -12,7 +13,11 @@ HOME = "prefect"
 RECORDS = "records"
 ROOM_MB = 200
 """Free disk that a flow needs: its records, its server's database, the tables and the video."""
+HEARTBEAT_S = 30
+"""Between two heartbeats of a run; Prefect's own 180 s is longer than the silence that we allow."""
+HEARTBEAT = {"PREFECT_FLOWS_HEARTBEAT_FREQUENCY": str(HEARTBEAT_S)}
 FIXED = {
+    **HEARTBEAT,
     "PREFECT_SERVER_EPHEMERAL_STARTUP_TIMEOUT_SECONDS": "120",
     "PREFECT_SERVER_ANALYTICS_ENABLED": "false",
     "PREFECT_LOGGING_COLORS": "false",

@@ -1,5 +1,6 @@
 """What prefect.yaml deploys."""
 
+import asyncio
 import inspect
 from importlib import import_module
 from pathlib import Path
@@ -8,12 +9,20 @@ from typing import Any
 import pytest
 import yaml
 from prefect import Flow
+from prefect.client.orchestration import get_client
+from prefect.client.schemas.actions import WorkPoolCreate
+from prefect.workers.process import ProcessJobConfiguration, ProcessWorker
 
+from flows import deploy
 from flows.deploy import SILENCE, automations
+from flows.environment import FIXED
 from robojackson.errors import DeploymentFailed
 
 ROOT = Path(__file__).parents[2]
 DEPLOYMENTS = yaml.safe_load((ROOT / "prefect.yaml").read_text())["deployments"]
+FREQUENCY = "PREFECT_FLOWS_HEARTBEAT_FREQUENCY"
+OLDER = ProcessWorker.get_default_base_job_template()
+OLDER["variables"]["properties"]["env"]["default"] = {"CUDA_VISIBLE_DEVICES": "1"}
 
 
 def flow_of(deployment: dict[str, Any]) -> Flow[Any, Any]:
@@ -67,3 +76,27 @@ def test_an_automation_tells_its_seconds() -> None:
 def test_a_silence_shorter_than_two_signs_of_life_is_refused(seconds: str) -> None:
     with pytest.raises(DeploymentFailed, match=f"{SILENCE}='{seconds}': whole seconds, 61 at"):
         within(**{SILENCE: seconds})
+
+
+async def environment_of_a_run(pool: str, known: dict[str, Any] | None) -> dict[str, Any]:
+    """What a worker gives a run of a pool that is registered, and may have been there before."""
+    async with get_client() as client:
+        if known is not None:
+            before = WorkPoolCreate(name=pool, type="process", base_job_template=known)
+            await client.create_work_pool(before)
+        await deploy._pool(client, pool, "")
+        template = (await client.read_work_pool(pool)).base_job_template
+    return dict((await ProcessJobConfiguration.from_template_and_values(template, {})).env)
+
+
+@pytest.mark.parametrize(("pool", "known"), [("new", None), ("older", OLDER)])
+def test_a_run_of_our_pools_may_miss_two_heartbeats(
+    prefect_server: None, pool: str, known: dict[str, Any] | None
+) -> None:
+    env = asyncio.run(environment_of_a_run(pool, known))
+    assert 2 * float(env[FREQUENCY]) < within()["Mark dead runs"]
+    assert env.get("CUDA_VISIBLE_DEVICES") == (known and "1")
+
+
+def test_a_flow_from_the_command_line_may_miss_two_heartbeats() -> None:
+    assert 2 * float(FIXED[FREQUENCY]) < within()["Mark dead runs"]
