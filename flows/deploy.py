@@ -122,18 +122,15 @@ def with_heartbeat(template: Mapping[str, Any]) -> dict[str, Any]:
 
 
 async def _results(store: Store) -> str | None:
-    """Records of tasks beside the store, when it is one that all machines reach."""
+    """Records of tasks beside the store, when it is one that all machines reach.
+
+    How it is reached, endpoint and secrets, each machine finds in its own environment.
+    """
     if "://" not in store.root:
         return None
-    block = RemoteFileSystem(basepath=f"{store.root}/{RECORDS}", settings=_access())
+    block = RemoteFileSystem(basepath=f"{store.root}/{RECORDS}")
     await block.save(RESULTS, overwrite=True)
     return f"remote-file-system/{RESULTS}"
-
-
-def _access() -> dict[str, Any]:
-    """How the object store is reached; its secrets stay in the environment."""
-    endpoint = os.environ.get("AWS_ENDPOINT_URL")
-    return {"client_kwargs": {"endpoint_url": endpoint}} if endpoint else {}
 
 
 async def _automation(facts: Mapping[str, Any]) -> str:

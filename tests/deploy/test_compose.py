@@ -54,9 +54,35 @@ def test_data_is_in_named_volumes() -> None:
     assert used == set(FILE["volumes"])
 
 
-def test_nothing_listens_to_the_world() -> None:
-    ports = [port for service in SERVICES.values() for port in service.get("ports", [])]
-    assert all(port.startswith("127.0.0.1:") for port in ports)
+def ports(**given: str) -> dict[str, list[str]]:
+    """Where each service listens for others than services."""
+    made = interpolate(SERVICES, {**passwords(), **given})
+    return {name: service["ports"] for name, service in made.items() if "ports" in service}
+
+
+def test_nothing_listens_to_the_world_by_itself() -> None:
+    assert ports() == {"prefect-server": ["127.0.0.1:4200:4200"], "s3": ["127.0.0.1:9000:9000"]}
+
+
+def test_other_machines_are_let_in_by_one_address() -> None:
+    told = {"prefect-server": ["10.0.0.5:4200:4200"], "s3": ["10.0.0.5:9000:9000"]}
+    assert ports(BIND="10.0.0.5") == told
+
+
+@pytest.mark.parametrize(
+    ("name", "at_home", "elsewhere"),
+    [
+        ("PREFECT_API_URL", "http://prefect-server:4200/api", "http://10.0.0.5:4200/api"),
+        ("AWS_ENDPOINT_URL", "http://s3:9000", "http://10.0.0.5:9000"),
+    ],
+)
+@pytest.mark.parametrize("worker", ["flow-worker", "trainer"])
+def test_a_worker_of_another_machine_is_told_where_the_first_one_is(
+    worker: str, name: str, at_home: str, elsewhere: str
+) -> None:
+    for given, expected in (({}, at_home), ({name: elsewhere}, elsewhere)):
+        made = interpolate(SERVICES, {**passwords(), **given})
+        assert made[worker]["environment"][name] == expected
 
 
 def test_the_server_asks_who_it_is_and_tells_nobody() -> None:

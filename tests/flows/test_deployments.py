@@ -2,21 +2,26 @@
 
 import asyncio
 import inspect
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import fsspec
 import pytest
 import yaml
+from moto.server import ThreadedMotoServer
 from prefect import Flow
 from prefect.client.orchestration import get_client
 from prefect.client.schemas.actions import WorkPoolCreate
+from prefect.filesystems import RemoteFileSystem
 from prefect.workers.process import ProcessJobConfiguration, ProcessWorker
 
 from flows import deploy
 from flows.deploy import SILENCE, automations
 from flows.environment import FIXED
 from robojackson.errors import DeploymentFailed
+from storage.store import Store
 
 ROOT = Path(__file__).parents[2]
 DEPLOYMENTS = yaml.safe_load((ROOT / "prefect.yaml").read_text())["deployments"]
@@ -100,3 +105,36 @@ def test_a_run_of_our_pools_may_miss_two_heartbeats(
 
 def test_a_flow_from_the_command_line_may_miss_two_heartbeats() -> None:
     assert 2 * float(FIXED[FREQUENCY]) < within()["Mark dead runs"]
+
+
+@pytest.fixture
+def bucket(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    """A store on an S3 server that only the environment knows."""
+    server = ThreadedMotoServer(port=0, verbose=False)
+    server.start()
+    host, port = server.get_host_and_port()
+    monkeypatch.setenv("AWS_ACCESS_KEY_ID", "test")
+    monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "test")
+    monkeypatch.setenv("AWS_DEFAULT_REGION", "us-east-1")
+    monkeypatch.setenv("AWS_ENDPOINT_URL", f"http://{host}:{port}")
+    clients = fsspec.get_filesystem_class("s3")
+    clients.clear_instance_cache()  # those of other tests know other servers
+    yield "s3://records"
+    clients.clear_instance_cache()
+    server.stop()
+
+
+def test_records_are_kept_where_each_machine_finds_the_store(
+    prefect_server: None, bucket: str
+) -> None:
+    """One machine reaches the store by another address than the next: none is written down."""
+    store = Store(bucket).create()
+
+    async def kept() -> RemoteFileSystem:
+        name = await deploy._results(store)
+        made = await RemoteFileSystem.load(str(name).rpartition("/")[2])
+        await made.write_path("a.json", b"record")
+        return made
+
+    assert "endpoint_url" not in str(asyncio.run(kept()).settings)
+    assert store.read(f"{deploy.RECORDS}/a.json") == b"record"
