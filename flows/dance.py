@@ -8,11 +8,11 @@ import asyncio
 import json
 import signal
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from prefect import flow, unmapped
 from prefect.artifacts import acreate_table_artifact
@@ -43,6 +43,7 @@ from tasks.train import RunLabels, train
 from tasks.video import video
 
 Artifacts = dict[str, Artifact]
+Input = TypeVar("Input")
 LAST_STAGES_MINUTES = 1.5
 """What evaluation, video and page take; training ends early rather than run into it."""
 
@@ -124,27 +125,30 @@ async def score_all(
     start_s: float | None,
     end_s: float | None,
 ) -> list[Candidate]:
-    """Algorithm 1 over all candidates; one that cannot be read is left out, unless it is alone."""
+    """Algorithm 1 over all candidates; one that cannot be scored is left out.
+
+    Raises:
+        RoboJacksonError: none can be scored; why the first cannot.
+    """
     sources = [SourceFile.at(path) for path in paths]
     limits = unmapped(settings.video)
-    clips = _gathered(probe.map(sources, limits, unmapped(start_s), unmapped(end_s)))
-    named = [(p.name, c) for p, c in zip(paths, clips, strict=True) if isinstance(c, dict)]
-    if not named:
-        raise next(clip for clip in clips if isinstance(clip, BaseException))
-    tracks = landmarks.map(
-        [clip["video"] for _, clip in named],
-        [clip["info"] for _, clip in named],
-        unmapped(settings.scoring_detector),
-        unmapped(settings.dancer if settings.dancer.number else None),
+    clips = _done(paths, probe.map(sources, limits, unmapped(start_s), unmapped(end_s)))
+    tracks = _done(
+        clips,
+        landmarks.map(
+            [clip["video"] for _, clip in clips],
+            [clip["info"] for _, clip in clips],
+            unmapped(settings.scoring_detector),
+            unmapped(settings.dancer if settings.dancer.number else None),
+        ),
     )
-    scored = _gathered(stability.map(tracks, unmapped(settings.stability)))
+    steady = unmapped(settings.stability)
+    scores = _done(tracks, stability.map([track for _, track in tracks], steady))
     store = Store.from_environment()
-    found = []
-    for (name, clip), score in zip(named, scored, strict=True):
-        if isinstance(score, BaseException):
-            raise score
-        found.append(Candidate(name, clip, score, tables.read(Stability, store, score)))
-    return found
+    return [
+        Candidate(path.name, clip, score, tables.read(Stability, store, score))
+        for ((path, clip), _), score in scores
+    ]
 
 
 def choose(candidates: list[Candidate]) -> Candidate:
@@ -222,15 +226,26 @@ def _budgeted(settings: PipelineConfig) -> Any:
     return replace(config, minutes=settings.train_minutes)
 
 
-def _gathered(futures: Any) -> list[Any]:
-    """Results in order; a failure of the input is a value, another one is raised."""
-    results = [future.result(raise_on_failure=False) for future in futures]
-    for result in results:
-        if isinstance(result, BaseException) and not isinstance(result, RoboJacksonError):
-            raise result
+def _done(inputs: Sequence[Input], futures: Any) -> list[tuple[Input, Any]]:
+    """Inputs with their results, in order, without those whose own fault it is that there is none.
+
+    Raises:
+        RoboJacksonError: there is no result; the first cause.
+        Exception: a failure that no input has caused.
+    """
+    made, causes = [], []
+    for given, future in zip(inputs, futures, strict=True):
+        result = future.result(raise_on_failure=False)
         if isinstance(result, RoboJacksonError):
             get_run_logger().warning("%s", result)
-    return results
+            causes.append(result)
+        elif isinstance(result, BaseException):
+            raise result
+        else:
+            made.append((given, result))
+    if not made:
+        raise causes[0]
+    return made
 
 
 def _rows(figures: Mapping[str, Any]) -> list[dict[str, Any]]:

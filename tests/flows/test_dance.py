@@ -2,11 +2,12 @@
 
 import asyncio
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from prefect import flow, task
 from prefect.client.orchestration import get_client
 from prefect.settings import (
     PREFECT_FLOWS_HEARTBEAT_FREQUENCY,
@@ -15,13 +16,17 @@ from prefect.settings import (
     temporary_settings,
 )
 
-from flows.dance import Candidate, choose, dance
+from configs.loader import load
+from configs.pipeline import PipelineConfig
+from flows import dance as stages
+from flows.dance import Candidate, choose, dance, score_all
 from flows.source import resolve
 from robojackson.clips.stability import Stability
 from robojackson.errors import NoPersonFound, RejectedReference, UnreadableVideo
-from storage import catalogue
+from storage import catalogue, tables
 from storage.artifact import Artifact
 from storage.store import Store
+from tests.flows.conftest import robojackson
 
 OVERRIDES = {"train.trainer": "sb3", "train.steps": 300}
 FILES = {
@@ -145,6 +150,66 @@ def test_a_clip_without_a_person_is_not_danced_however_steady() -> None:
 def test_only_clips_without_a_person_are_an_error_that_counts_frames() -> None:
     with pytest.raises(NoPersonFound, match="empty: no person found in 10 of 10 frames"):
         choose([a_candidate("empty", 0.0, detected=0)])
+
+
+@pytest.fixture
+def score(
+    records: Path, store_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Callable[..., list[str]]:
+    """Names of the candidates that are left when played landmarks of some files fail."""
+
+    @task
+    def probe(source: Any, limits: Any, start: Any, end: Any) -> dict[str, Artifact]:
+        return dict.fromkeys(("video", "info"), Artifact(source.path.name, source.sha256))
+
+    @task
+    def landmarks(video: Artifact, info: Artifact, size: str, dancer: Any) -> Artifact:
+        if video.key.startswith("empty"):
+            raise NoPersonFound(f"{video.key}: no person 3")
+        return video
+
+    @task
+    def stability(track: Artifact, config: Any) -> Artifact:
+        score = a_candidate(track.key, 1.0).score
+        return tables.keep(Store.from_environment(), "stability", "stability.parquet", score)
+
+    for played in (probe, landmarks, stability):
+        monkeypatch.setattr(stages, played.name, played)
+
+    @flow
+    async def scoring(paths: tuple[Path, ...]) -> list[str]:
+        found = await score_all(paths, load(PipelineConfig, "smoke"), None, None)
+        return [candidate.name for candidate in found]
+
+    def run(*names: str) -> list[str]:
+        paths = tuple(tmp_path / name for name in names)
+        for path in paths:
+            path.write_text(path.name)
+        return asyncio.run(scoring(paths))
+
+    return run
+
+
+def test_a_clip_whose_landmarks_fail_leaves_its_neighbours_to_be_danced(
+    score: Callable[..., list[str]],
+) -> None:
+    assert score("a.mp4", "empty.mp4", "b.mp4") == ["a.mp4", "b.mp4"]
+
+
+def test_when_the_landmarks_of_all_clips_fail_the_first_cause_is_told(
+    score: Callable[..., list[str]],
+) -> None:
+    with pytest.raises(NoPersonFound, match=r"^empty_1.mp4: no person 3"):
+        score("empty_1.mp4", "empty_2.mp4")
+
+
+@pytest.mark.slow
+def test_a_person_who_is_not_there_is_one_line(short_clip: Path, tmp_path: Path) -> None:
+    words = ("dance", short_clip, "--person", 3, "--config", "smoke")
+    said = robojackson(*words, ROBOJACKSON_STORE=str(tmp_path / "store"))
+    (told,) = (line for line in said.err.splitlines() if line.startswith("robojackson: "))
+    assert (said.code, "Traceback" in said.err) == (1, False)
+    assert told.startswith("robojackson: NoPersonFound: ")
 
 
 def test_without_a_source_the_hip_shake_is_danced() -> None:
