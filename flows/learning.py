@@ -72,12 +72,16 @@ def pretrain(
     minutes: TrainMinutes = None,
     trainer: Trainer = None,
     seed: Seed = None,
+    parent: Parent = 0,
     set_: SetTrain = None,
     as_json: Json = False,
 ) -> Answer:
     """A robot that walks, for `--setup pretrain`: walker_KIND.safetensors and walker.json."""
     from flows import walker
+    from flows.training import die_with
 
+    if parent:
+        die_with(parent)
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     log_to_stderr()
     given = {"trainer": trainer, "steps": steps, "minutes": minutes, "seed": seed}

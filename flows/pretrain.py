@@ -1,14 +1,26 @@
 """Flow `pretrain`: train a walker in a process of its own; the deployment is `pretrain/walker`."""
 
+import hashlib
 import json
+import os
+import shutil
 import sys
-from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from prefect import flow
 
+from configs.loader import load
+from configs.pipeline import PipelineConfig
+from flows.walker import PIPELINE, ROBOT
+from robojackson.retarget.robot import RobotDescription
+from robojackson.rl.config import TrainConfig
+from storage.lock import locked
 from storage.store import Store
+from tasks.caching import identity
 from tasks.process import run_process
+
+DIGITS = 12
+"""Of the digest in the name of a folder of work."""
 
 
 @flow(name="pretrain", flow_run_name="walker-{kind}-s{seed}")
@@ -19,12 +31,28 @@ async def pretrain(
 
     Returns:
         The key of its networks in the store.
+    Raises:
+        StoreError: the same walker is being trained already.
     """
     store = Store.from_environment()
-    work = Path(store.work(f"walker-{kind}-s{seed}"))
+    name = name_of(kind, steps, seed)
+    work = store.work(name)
     command = [sys.executable, "-m", "flows.cli", "pretrain", "--kind", kind, "-o", str(work)]
-    options = ["--steps", str(steps), "--seed", str(seed), "--json"]
-    answer = json.loads(await run_process([*command, *options], f"walker-{kind}", work, None))
-    made = Path(answer["walker"])
-    store.keep("pretrain", "walker.json", (work / "walker.json").read_bytes())
-    return store.keep("pretrain", made.name, made).key
+    options: dict[str, Any] = {"--steps": steps, "--seed": seed, "--parent": os.getpid()}
+    words = [str(word) for pair in options.items() for word in pair]
+    with locked(work, "task.lock"):
+        await run_process([*command, *words, "--json"], name, work)
+        made = f"walker_{kind}.safetensors"
+        store.keep("pretrain", "walker.json", work / "walker.json")
+        key = store.keep("pretrain", made, work / made).key
+        shutil.rmtree(work, ignore_errors=True)
+    return key
+
+
+def name_of(kind: str, steps: int, seed: int) -> str:
+    """What a walker's folder of work is called: all that makes its training what it is."""
+    config = load(TrainConfig, f"setups/walker-{kind}", {"steps": steps, "seed": seed})
+    robot = load(RobotDescription, f"robots/{ROBOT}")
+    facts = json.dumps(identity([config, robot, load(PipelineConfig, PIPELINE)]), sort_keys=True)
+    digest = hashlib.sha256(facts.encode()).hexdigest()[:DIGITS]
+    return f"walker-{kind}-{steps}-s{seed}-{digest}"

@@ -25,7 +25,7 @@ def resolve(source: str | None) -> Path:
         MissingDependency: the bundled clips are not here.
     """
     if source is None:
-        return _bundled(DEFAULT)
+        return bundled(DEFAULT)
     path = Path(source)
     if path.exists():
         return path
@@ -78,7 +78,12 @@ def look_at(
     raise causes[0]
 
 
-def _bundled(name: str) -> Path:
+def bundled(name: str) -> Path:
+    """A clip of the checkout, wherever the command is given.
+
+    Raises:
+        MissingDependency: the bundled clips are not here.
+    """
     path = BUNDLED / name
     if not path.is_file():
         raise MissingDependency(

@@ -15,13 +15,16 @@ import numpy as np
 
 from configs.loader import load
 from flows import single, training
+from flows.source import bundled
 from storage import tables
 
 if TYPE_CHECKING:
     from robojackson.retarget.robot import Robot
 
 Figures = dict[str, Any]
-WALK = Path("clips/walk.mp4")
+WALK = "walk.mp4"
+ROBOT, PIPELINE = "humanoid", "base"
+"""Names of the configurations that a walker is made with, besides that of its training."""
 CURVE_POINTS = 20
 
 
@@ -32,7 +35,7 @@ def pretrain(kind: str, out: Path, reference: Path | None, overrides: Mapping[st
     from robojackson.rl.policy import load_policy
     from robojackson.rl.stock import stock_observation_size
 
-    robot = load_robot(load(RobotDescription, "robots/humanoid"))
+    robot = load_robot(load(RobotDescription, f"robots/{ROBOT}"))
     motion = reference or _reference(kind, out, robot)
     stands = kind == "paper"  # a motion that only stands has no score card
     trained = training.train(motion, out, f"walker-{kind}", overrides, move="walk", force=stands)
@@ -44,7 +47,7 @@ def pretrain(kind: str, out: Path, reference: Path | None, overrides: Mapping[st
         networks = widened(networks, size)
         judged = _walked(policy, robot)
     else:
-        judged = single.evaluate(out / "policy.safetensors", motion, out, "base", {})
+        judged = single.evaluate(out / "policy.safetensors", motion, out, PIPELINE, {})
     made = out / f"walker_{kind}.safetensors"
     made.write_bytes(networks.to_bytes())
     facts = {
@@ -87,8 +90,8 @@ def _reference(kind: str, out: Path, robot: "Robot") -> Path:
         with single.results_in(out) as store:
             store.put(made.name, tables.encode(standing(robot)))
     elif not made.exists():
-        single.mocap(WALK, out, "base", {})
-        single.retarget(out / "smpl.parquet", out, "humanoid", "base", {})
+        single.mocap(bundled(WALK), out, PIPELINE, {})
+        single.retarget(out / "smpl.parquet", out, ROBOT, PIPELINE, {})
     return made
 
 

@@ -1,0 +1,88 @@
+"""Flow `pretrain`: its process dies with it, and its folder of work is one training's alone."""
+
+import asyncio
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from flows import pretrain as flows
+from flows import single, walker
+from storage.store import Store
+from tests.flows.conftest import robojackson
+
+
+@pytest.fixture
+def asked(store_folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
+    """The commands of played processes, which leave a walker in their folder."""
+    commands: list[list[str]] = []
+
+    async def play(command: list[str], run_id: str, work: Path, *rest: Any) -> bytes:
+        commands.append(command)
+        kind = command[command.index("--kind") + 1]
+        for name in (f"walker_{kind}.safetensors", "walker.json", "checkpoint.zip"):
+            (work / name).write_text(f"{name} of {work.name}")
+        return b""
+
+    monkeypatch.setattr(flows, "run_process", play)
+    return commands
+
+
+def train(kind: str = "paper", **given: int) -> str:
+    return asyncio.run(flows.pretrain.fn(kind, **given))
+
+
+def folder_of(command: list[str]) -> Path:
+    return Path(command[command.index("-o") + 1])
+
+
+def test_the_walker_is_kept_and_its_folder_of_work_is_gone(
+    asked: list[list[str]], store_folder: Path
+) -> None:
+    key = train(steps=64)
+    (command,) = asked
+    told = f"walker_paper.safetensors of {folder_of(command).name}"
+    assert Store(store_folder).read(key).decode() == told
+    assert not folder_of(command).exists()
+
+
+def test_trainings_that_differ_share_no_folder(asked: list[list[str]]) -> None:
+    for given in ({"steps": 64}, {"steps": 65}, {"steps": 64, "seed": 1}):
+        train(**given)
+    train("track", steps=64)
+    assert len({folder_of(command) for command in asked}) == len(asked)
+
+
+def test_a_configuration_that_was_changed_begins_anew(
+    asked: list[list[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    train(steps=64)
+    monkeypatch.setattr(flows, "PIPELINE", "smoke")
+    train(steps=64)
+    assert folder_of(asked[0]) != folder_of(asked[1])
+
+
+def test_a_walker_whose_flow_is_gone_is_not_trained(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    said = robojackson("pretrain", "--kind", "paper", "-o", out, "--steps", 64, "--parent", 1)
+    assert "the process that started this training is gone" in said.err
+    assert not out.exists()
+
+
+def test_the_process_is_told_whose_it_is(
+    asked: list[list[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(flows.os, "getpid", lambda: 4321)
+    train(steps=64)
+    assert asked[0][asked[0].index("--parent") + 1] == "4321"
+
+
+def test_the_bundled_walk_is_found_from_any_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    found: list[bool] = []
+    monkeypatch.setattr(single, "mocap", lambda video, *rest: found.append(video.is_file()))
+    monkeypatch.setattr(single, "retarget", lambda *given: None)
+    walker._reference("track", tmp_path, None)
+    assert found == [True]
