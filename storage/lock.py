@@ -11,27 +11,29 @@ from robojackson.errors import StoreError
 
 
 @contextmanager
-def locked(folder: Path, name: str = "lock") -> Iterator[None]:
-    """Hold a folder for this process; the kernel lets go when the process dies.
+def locked(folder: Path, name: str = "lock", patient: bool = False) -> Iterator[None]:
+    """Hold a folder for this thread; the kernel lets go when the process dies.
 
+    Args:
+        patient: Wait for whoever holds it.
     Raises:
-        StoreError: somebody holds it.
+        StoreError: somebody holds it, and there is no patience.
     """
     path = folder / name
-    with _held(path):
+    with _held(path, fcntl.LOCK_EX if patient else fcntl.LOCK_EX | fcntl.LOCK_NB):
         try:
             yield
         finally:
             path.unlink(missing_ok=True)
 
 
-def _held(path: Path) -> IO[str]:
+def _held(path: Path, how: int) -> IO[str]:
     """The locked file; one that was taken away between opening and locking is made anew."""
     while True:
         path.parent.mkdir(parents=True, exist_ok=True)
         file = path.open("w")
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(file, how)
         except BlockingIOError:
             file.close()
             raise StoreError(

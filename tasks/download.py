@@ -1,8 +1,8 @@
 """Bring a video into the store: from the web in one format, or from a folder as it is.
 
 A download is cached by the video's id and format: by the task's record, and where that is lost by a
-note in the store, so that a file comes over the net once. What an interrupted download left is
-continued.
+note in the store, so that a file comes over the net once, also when two runs want it at once: one
+waits for the other. What an interrupted download left is continued.
 """
 
 import hashlib
@@ -10,6 +10,7 @@ import json
 import logging
 import shutil
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any
 
 from prefect.artifacts import create_progress_artifact, update_progress_artifact
@@ -22,6 +23,7 @@ from robojackson.clips.video import VideoLimits, probe
 from robojackson.clips.web import Offer, WebConfig, fetch, offer
 from robojackson.errors import StoreError, UnreadableVideo
 from storage.artifact import Artifact
+from storage.lock import locked
 from storage.store import Store
 from tasks.caching import stage
 from tasks.probe import SourceFile
@@ -83,7 +85,18 @@ def _had(store: Store, video: WebVideo, chosen: Offer) -> Artifact | None:
 def _bring(
     store: Store, video: WebVideo, chosen: Offer, web: WebConfig, limits: VideoLimits
 ) -> Artifact:
-    folder = store.work(video.folder)
+    """The file that another run has brought meanwhile, or else from the web."""
+    folder = store.work(f"{video.folder}.{chosen.name}")
+    with locked(folder, patient=True):
+        had = _had(store, video, chosen)
+        made = had if had is not None else _fetched(store, video, chosen, folder, web, limits)
+        shutil.rmtree(folder, ignore_errors=True)
+    return made
+
+
+def _fetched(
+    store: Store, video: WebVideo, chosen: Offer, folder: Path, web: WebConfig, limits: VideoLimits
+) -> Artifact:
     path = fetch(chosen, folder, web, _Progress(video, chosen.name))
     try:
         probe(path, limits)
@@ -92,7 +105,6 @@ def _bring(
         raise
     made = store.keep("video", f"clip.{chosen.name.rsplit('.', 1)[-1]}", path)
     store.put(f"{video.folder}/{chosen.name}.json", json.dumps(asdict(made)).encode())
-    shutil.rmtree(folder, ignore_errors=True)
     return made
 
 

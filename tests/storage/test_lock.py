@@ -1,6 +1,8 @@
 """A folder has one holder, and nothing is left when it is let go."""
 
+import time
 from pathlib import Path
+from threading import Thread
 
 import pytest
 
@@ -31,3 +33,20 @@ def test_a_file_that_a_dead_process_left_holds_nothing(tmp_path: Path) -> None:
     (tmp_path / "lock").write_text("")
     with locked(tmp_path):
         assert (tmp_path / "lock").exists()
+
+
+def test_who_is_patient_gets_it_after_the_one_who_has_it(tmp_path: Path) -> None:
+    order = []
+
+    def wait() -> None:
+        with locked(tmp_path, patient=True):
+            order.append("patient")
+
+    waiting = Thread(target=wait)
+    with locked(tmp_path):
+        waiting.start()
+        time.sleep(0.2)
+        order.append("first")
+    waiting.join(10)
+    assert order == ["first", "patient"]
+    assert list(tmp_path.iterdir()) == []

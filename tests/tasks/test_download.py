@@ -1,14 +1,20 @@
 """A file comes over the net once, whole or not at all, and stays inside the store."""
 
+from concurrent.futures import ThreadPoolExecutor
+from itertools import count
 from pathlib import Path
+from threading import Barrier
+from typing import Any
 
 import pytest
 
 from robojackson.clips.formats import FormatConfig
 from robojackson.clips.video import VideoLimits
+from robojackson.clips.web import Offer
 from robojackson.errors import TruncatedVideo
 from storage.artifact import Artifact
 from storage.store import Store
+from tasks import download as task
 from tasks.download import WebVideo, download
 from tests.search.conftest import small_video, web
 from tests.search.server import PATIENT, Web
@@ -33,6 +39,32 @@ def test_a_second_download_asks_what_there_is_and_fetches_nothing(
     before = len(web.asked)
     assert bring(web) == first
     assert (before, len(web.asked) - before) == (2, 1)
+
+
+def test_two_runs_that_want_a_video_at_once_fetch_it_once(
+    web: Web, store_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Both see that it is not there; then one brings it and the other waits."""
+    both, looks, look, fetch = Barrier(2), count(), task._had, task.fetch
+    fetched: list[Path] = []
+
+    def late(store: Store, *what: Any) -> Artifact | None:
+        had = look(store, *what)
+        if next(looks) < 2:
+            both.wait(10)
+        return had
+
+    def counted(chosen: Offer, folder: Path, *rest: Any) -> Path:
+        fetched.append(folder)
+        return fetch(chosen, folder, *rest)
+
+    monkeypatch.setattr(task, "_had", late)
+    monkeypatch.setattr(task, "fetch", counted)
+    with ThreadPoolExecutor(2) as pool:
+        made = list(pool.map(lambda _: bring(web), range(2)))
+    assert len(fetched) == 1
+    assert made[0] == made[1]
+    assert list((store_folder / "work" / "downloads" / "generic").iterdir()) == []
 
 
 def test_an_altered_file_is_downloaded_again(web: Web, store_folder: Path) -> None:
