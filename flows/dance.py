@@ -33,6 +33,7 @@ from robojackson.retarget.robot import RobotDescription
 from robojackson.retarget.scorecard import check
 from storage import catalogue, tables
 from storage.artifact import Artifact
+from storage.leftovers import sweep
 from storage.store import Store
 from tasks.evaluate import evaluate
 from tasks.landmarks import landmarks
@@ -106,10 +107,11 @@ async def dance(
         minutes: Budget of the whole pass; that of the configuration if absent.
         search: How a dance is looked for that is given by its name.
     """
+    store = Store.from_environment()
+    sweep(store, work=False)
     given = {**(overrides or {}), **({} if minutes is None else {"minutes": minutes})}
     settings = load(PipelineConfig, config, given)
     robot = load(RobotDescription, f"robots/{settings.robot}")
-    store = Store.from_environment()
     async with videos_of(source, search) as paths:
         began = time.time()  # what a search takes is no part of the budget
         candidates = await score_all(paths, settings, start_s, end_s)

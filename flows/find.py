@@ -27,6 +27,7 @@ from robojackson.clips.titles import clean_text
 from robojackson.errors import NoPersonFound, SearchFailed
 from storage import candidates
 from storage.artifact import Artifact
+from storage.leftovers import sweep
 from storage.store import Store
 from tasks.workers import cores
 
@@ -51,6 +52,7 @@ async def find(
         config: Name or path of the configuration of the search.
         overrides: Values by key path.
     """
+    sweep(Store.from_environment(), work=False)
     settings = load(FindConfig, config, overrides)
     found = hunt(build(Dance, dance, "dance"), settings, run_id("find"))
     told = rows(found)

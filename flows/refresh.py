@@ -37,6 +37,7 @@ from robojackson.errors import NoPersonFound, SearchFailed
 from robojackson.retarget.robot import RobotDescription
 from storage import candidates
 from storage.artifact import Artifact
+from storage.leftovers import sweep
 from storage.store import Store
 from tasks.probe import SourceFile, probe
 
@@ -67,6 +68,7 @@ async def refresh(
     Raises:
         SearchFailed: every dance failed; the message has the reasons.
     """
+    sweep(Store.from_environment(), work=False)
     settings = asdict(load(FindConfig, config, overrides))
     stages = [pipeline, pipeline_overrides or {}]
     done: dict[str, Facts] = {}

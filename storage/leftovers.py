@@ -1,16 +1,19 @@
 """What processes that were killed left on this machine, and taking it away.
 
 Half-written files (`.part-`), scratch folders, and folders of work. A process holds a lock on what
-it is writing and the kernel lets go when it dies, so whatever nobody holds is nobody's. A training
-that was killed is the exception: its checkpoint is worth going on from, until the same training has
-been finished elsewhere.
+it is writing and the kernel lets go when it dies, so whatever nobody holds is nobody's; it is taken
+away by who holds its lock, so that nobody can begin to use it meanwhile. A training that was killed
+is the exception: its checkpoint is worth going on from, until the same training has been finished
+elsewhere.
 """
 
 import fcntl
 import logging
+import os
 import shutil
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 from robojackson.errors import StoreError
@@ -27,13 +30,18 @@ YOUNG_S = 60.0
 """A folder may be younger than the lock in it."""
 
 
-def sweep(store: Store, parts: bool = True) -> list[Path]:
+def sweep(store: Store, parts: bool = True, work: bool = True) -> list[Path]:
     """Take away what is nobody's; what a living process works on stays.
 
     Args:
         parts: Look for half-written files, too: in all folders of the store, if it is on a disk.
+        work: Look for what cells of ablations left, too: their tables tell what is still needed.
     """
-    gone = [*(_parts(store) if parts else ()), *_scratch(store), *_work(store)]
+    gone = [
+        *(_parts(store) if parts else ()),
+        *_scratch(store),
+        *(_work(store) if work else ()),
+    ]
     for path in gone:
         log.info("left by a process that is dead, taken away: %s", path)
     return gone
@@ -41,19 +49,22 @@ def sweep(store: Store, parts: bool = True) -> list[Path]:
 
 def _parts(store: Store) -> Iterator[Path]:
     """Files whose writing was not finished."""
-    if isinstance(store.place, Folder):
-        for path in store.place.root.rglob(f"{TEMPORARY}*"):
-            if path.is_file() and not _is_held(path):
+    if not isinstance(store.place, Folder):
+        return
+    for folder, _, names in os.walk(store.place.root):  # a folder may go away while it is read
+        for path in (Path(folder, name) for name in names if name.startswith(TEMPORARY)):
+            with suppress(OSError), path.open("rb") as file:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 path.unlink(missing_ok=True)
                 yield path
 
 
 def _scratch(store: Store) -> Iterator[Path]:
     for folder in _folders(store, f"{SCRATCH}/*"):
-        held = folder / HELD
-        if not _is_held(held) if held.exists() else _age_s(folder) > YOUNG_S:
-            shutil.rmtree(folder, ignore_errors=True)
-            yield folder
+        if (folder / HELD).exists() or _age_s(folder) > YOUNG_S:
+            with suppress(StoreError, OSError), locked(folder, HELD):
+                shutil.rmtree(folder, ignore_errors=True)
+                yield folder
 
 
 def _work(store: Store) -> Iterator[Path]:

@@ -68,18 +68,17 @@ class Folder:
     def put(self, key: str, source: Path | bytes) -> None:
         target = self.root / key
         target.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=TEMPORARY, dir=target.parent)
+        file = _begun(target.parent)
         try:
-            with os.fdopen(handle, "wb") as file:
-                fcntl.flock(file, fcntl.LOCK_EX)  # what nobody holds is a dead process's
+            with file:
                 _fill(file, source)
                 file.flush()
                 os.fsync(file.fileno())
-                os.chmod(name, 0o644)
-                os.replace(name, target)
+                os.chmod(file.name, 0o644)
+                os.replace(file.name, target)
             _sync_folder(target.parent)
         finally:
-            Path(name).unlink(missing_ok=True)
+            Path(file.name).unlink(missing_ok=True)
 
     def read(self, key: str) -> bytes:
         return (self.root / key).read_bytes()
@@ -158,6 +157,16 @@ class Remote:
     def _discard(self, path: str) -> None:
         if self._system.exists(path):
             self._system.rm_file(path)
+
+
+def _begun(folder: Path) -> Any:
+    """A temporary file that is held: what nobody holds is a dead process's, and swept away."""
+    while True:
+        file = tempfile.NamedTemporaryFile(prefix=TEMPORARY, dir=folder, delete=False)  # noqa: SIM115
+        fcntl.flock(file, fcntl.LOCK_EX)
+        if Path(file.name).exists():
+            return file
+        file.close()  # it was swept away before it was held
 
 
 def _fill(file: Any, source: Path | bytes) -> None:

@@ -113,7 +113,7 @@ class Store:
         with _one_line(f"cannot write {base}"):
             folder = Path(tempfile.mkdtemp(dir=base))
         try:
-            with locked(folder, HELD):
+            with locked(folder, HELD, patient=True):  # of a sweep that looks at it
                 yield folder
         finally:
             shutil.rmtree(folder, ignore_errors=True)

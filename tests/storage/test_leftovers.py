@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from storage import places
 from storage.leftovers import sweep
 from storage.lock import locked
 from storage.metrics import TABLES, Place
@@ -18,6 +19,7 @@ ROOT = Path(__file__).parents[2]
 DIES = """
 import os, signal, sys
 from pathlib import Path
+from typing import Any
 from storage import places
 from storage.store import Store
 def die(file, source):
@@ -100,3 +102,37 @@ def test_only_a_checkpoint_that_is_still_needed_is_kept(
     leave(store)
     sweep(store)
     assert folder.exists() == kept
+
+
+def test_a_file_that_is_swept_before_it_is_held_is_begun_anew(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another process may sweep between the making of a temporary file and its lock."""
+    hold = places.fcntl.flock
+    swept: list[Path] = []
+
+    def late(file: object, how: int) -> None:
+        if not swept:
+            swept.append(Path("under way"))
+            swept.extend(sweep(store))
+        hold(file, how)
+
+    monkeypatch.setattr(places.fcntl, "flock", late)
+    store.put("mocap/a.bin", b"whole")
+    assert (len(swept), files(store)) == (2, ["mocap/a.bin"])
+
+
+def test_a_folder_that_goes_away_while_the_store_is_looked_through_does_no_harm(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    list_names = os.scandir
+    store.put("a/.part-1", b"half")
+    store.put("b/c.bin", b"whole")
+
+    def vanished(path: object) -> object:
+        if Path(str(path)).name == "b":
+            raise FileNotFoundError(path)
+        return list_names(path)
+
+    monkeypatch.setattr(os, "scandir", vanished)
+    assert [path.name for path in sweep(store)] == [".part-1"]
