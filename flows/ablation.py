@@ -23,6 +23,7 @@ from flows.board import Board
 from flows.cells import EXECUTORS
 from flows.chain import to_reference
 from flows.orphans import none_left
+from flows.server import require_server
 from flows.tracebacks import without_tracebacks
 from robojackson.errors import RejectedReference, StudyFailed
 from robojackson.retarget.robot import RobotDescription
@@ -44,9 +45,14 @@ REASON = 200
 
 
 def run(name: str, overrides: Mapping[str, Any]) -> Facts:
-    """The flow from the command line; Ctrl-C leaves what has ended cached and no process."""
+    """The flow from the command line; Ctrl-C leaves what has ended cached and no process.
+
+    Raises:
+        DeploymentFailed: the server that is named does not answer, or refuses us.
+    """
     study = load(Study, f"studies/{name}" if "." not in name else name, overrides)
     without_tracebacks()
+    require_server()
     with none_left():
         return asyncio.run(ablation(study))
 

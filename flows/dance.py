@@ -25,6 +25,7 @@ from flows.chain import to_reference
 from flows.intake import Minutes, Search, Seconds, Source, videos_of
 from flows.orphans import none_left
 from flows.scorers import scorers
+from flows.server import require_server
 from flows.single import VERDICT
 from flows.tracebacks import without_tracebacks
 from robojackson.clips.stability import Stability
@@ -75,9 +76,11 @@ def run(
     """The flow from the command line: no tracebacks for what is the input's fault.
 
     Raises:
+        DeploymentFailed: the server that is named does not answer, or refuses us.
         Interrupted: Ctrl-C; every stage that has ended is kept, and training left a checkpoint.
     """
     without_tracebacks()
+    require_server()
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's `&` takes it away
     try:
         with none_left():

@@ -22,6 +22,7 @@ from prefect.settings import PREFECT_API_URL
 from prefect.workers.process import ProcessWorker
 
 from flows.environment import HEARTBEAT, HEARTBEAT_S
+from flows.server import answering
 from robojackson.errors import DeploymentFailed
 from storage.store import Store
 
@@ -53,15 +54,13 @@ def deploy() -> dict[str, Any]:
         )
     store = Store.from_environment().create()
     store.require_writable()
-    made = asyncio.run(_prepare(store))
+    with answering():
+        made = asyncio.run(_prepare(store))
     return {**made, "deployments": _register()}
 
 
 async def _prepare(store: Store) -> dict[str, Any]:
     async with get_client() as client:
-        reason = await client.api_healthcheck()
-        if reason is not None:
-            raise DeploymentFailed(f"{client.api_url}: does not answer: {reason}")
         for name, told in POOLS.items():
             await _pool(client, name, told)
     block = await _results(store)

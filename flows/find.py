@@ -19,6 +19,7 @@ from configs.loader import build, load
 from flows.entries import Entry, Hunt, rows, summary
 from flows.gallery import show
 from flows.hunt import bring, hunt
+from flows.server import require_server
 from flows.tracebacks import without_tracebacks
 from robojackson.clips.candidate import VideoCandidate
 from robojackson.clips.sources import folder
@@ -73,6 +74,7 @@ def look_for(
     Raises:
         UnknownName: there is no such source.
         SearchFailed: it does not answer.
+        DeploymentFailed: the Prefect server that is named does not answer, or refuses us.
     """
     source_of(source)
     known = load(DanceBook, "dances").recall(query) if source == "youtube" else None
@@ -80,6 +82,7 @@ def look_for(
     every = ALL if source == folder.NAME else None
     wanted = replace(dance, source=source, address=address, top=top or every)
     without_tracebacks()
+    require_server()
     return asyncio.run(find(wanted.name, asdict(wanted), config, dict(overrides)))
 
 

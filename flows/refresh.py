@@ -30,6 +30,7 @@ from flows.find import (
 )
 from flows.gallery import show, slug_of
 from flows.hunt import hunt
+from flows.server import require_server
 from flows.tracebacks import without_tracebacks
 from robojackson.clips.candidate import VideoCandidate
 from robojackson.clips.titles import clean_text
@@ -92,8 +93,13 @@ async def refresh(
 
 
 def run(dances: list[str] | None, config: str, overrides: Mapping[str, Any]) -> Facts:
-    """The flow from the command line."""
+    """The flow from the command line.
+
+    Raises:
+        DeploymentFailed: the Prefect server that is named does not answer, or refuses us.
+    """
     without_tracebacks()
+    require_server()
     return asyncio.run(refresh(dances, config=config, overrides=dict(overrides)))
 
 

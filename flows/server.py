@@ -1,0 +1,50 @@
+"""Prefect's server as a command meets it: one line where it is not there or does not let us in."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from httpx import HTTPStatusError, TransportError
+from prefect.client.orchestration import get_client
+from prefect.settings import PREFECT_API_URL
+
+from robojackson.errors import DeploymentFailed
+
+REFUSED = (401, 403)
+"""Codes of HTTP with which a server refuses who asks."""
+
+
+def require_server() -> None:
+    """Ask the server that PREFECT_API_URL names, if it names one, whether a run may begin there.
+
+    Raises:
+        DeploymentFailed: it does not answer, or refuses us.
+    """
+    if PREFECT_API_URL.value():
+        with answering(), get_client(sync_client=True) as client:
+            client.hello()
+
+
+@contextmanager
+def answering() -> Iterator[None]:
+    """Whatever a server says or does not say, as one line with what to do.
+
+    Raises:
+        DeploymentFailed: it does not answer, refuses us or something that we ask for.
+    """
+    named = f"the Prefect server of PREFECT_API_URL={PREFECT_API_URL.value()}"
+    try:
+        yield
+    except TransportError as cause:
+        told = str(cause) or type(cause).__name__
+        raise DeploymentFailed(
+            f"{named} does not answer ({told}); start it (`prefect server start`) or correct "
+            "the address; where it is not set, flows start a server of their own"
+        ) from cause
+    except HTTPStatusError as cause:
+        code = cause.response.status_code
+        if code in REFUSED:
+            raise DeploymentFailed(
+                f"{named} refuses us ({code} {cause.response.reason_phrase}); "
+                "set PREFECT_API_AUTH_STRING to its user:password"
+            ) from cause
+        raise DeploymentFailed(f"{named}: {cause}") from cause
