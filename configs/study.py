@@ -7,8 +7,9 @@ the deployments `ablation/paper` and `ablation/smoke` are the same text.
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import AfterValidator, ConfigDict, Field
 from pydantic.dataclasses import dataclass
+from pydantic_core import PydanticCustomError
 
 ROOT = Path(__file__).parent.parent
 STRICT = ConfigDict(extra="forbid")
@@ -16,6 +17,18 @@ Setup = Literal["scratch", "pretrain", "curiosity", "scratch-curiosity"]
 Executor = Literal["local", "work-pool"]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][\w.-]*$", max_length=60)]
 Seed = Annotated[int, Field(ge=0)]
+
+
+def _each_once(values: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Twins would be one cell, which two runs want to train at once."""
+    twice = sorted({value for value in values if values.count(value) > 1})
+    if twice:
+        told = ", ".join(map(str, twice))
+        raise PydanticCustomError("twice", "{told} stands twice", {"told": told})
+    return values
+
+
+Distinct = AfterValidator(_each_once)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -59,14 +72,23 @@ class Study:
         train: Values of the training's configuration by key path, for all cells.
         executor: `local`: processes of this machine; `work-pool`: runs that workers take.
         slots: Trainings at once on this machine; the number of its cores if absent.
-        timeout_minutes: Wall time after which a cell has failed.
+        timeout_minutes: Wall time after which a cell has failed: training, judgement and what is
+            tried again of them, all together; waiting for a worker is no part of it.
         retries: How often a cell whose process was killed is started again.
     """
 
     name: Name = "paper"
-    moves: Annotated[tuple[Name, ...], Field(min_length=1)] = ("hip_shake", "dance_b", "walk")
-    setups: Annotated[tuple[Setup, ...], Field(min_length=1)] = ("scratch", "pretrain", "curiosity")
-    seeds: Annotated[tuple[Seed, ...], Field(min_length=1)] = (0, 1, 2)
+    moves: Annotated[tuple[Name, ...], Field(min_length=1), Distinct] = (
+        "hip_shake",
+        "dance_b",
+        "walk",
+    )
+    setups: Annotated[tuple[Setup, ...], Field(min_length=1), Distinct] = (
+        "scratch",
+        "pretrain",
+        "curiosity",
+    )
+    seeds: Annotated[tuple[Seed, ...], Field(min_length=1), Distinct] = (0, 1, 2)
     mode: Literal["paper", "track"] = "paper"
     steps: Annotated[int, Field(ge=1)] = 50_000
     trainer: Literal["sbx", "sb3"] = "sbx"

@@ -3,6 +3,10 @@
 Entry point of the deployment `cell/pool`: `flows.cells.cell`.
 """
 
+import asyncio
+import time
+from collections.abc import Awaitable, Callable
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -13,7 +17,7 @@ from pydantic import TypeAdapter
 from configs.loader import load
 from flows.ending import Ending
 from flows.tracebacks import without_tracebacks
-from robojackson.errors import TrainingCrashed
+from robojackson.errors import TrainingCrashed, TrainingFailed
 from robojackson.retarget.robot import RobotDescription
 from storage.artifact import Artifact
 from storage.leftovers import sweep
@@ -22,11 +26,12 @@ from tasks.cell import Cell
 from tasks.judgement import judge
 from tasks.kept import kept
 from tasks.metrics import publish
-from tasks.process import was_killed
 from tasks.train import RunLabels, run_id_of, train
 
 DEPLOYMENT = "cell/pool"
-SECONDS_BEFORE_RETRY = 2
+SECONDS_BEFORE_RETRY = 2.0
+SHORTEST_S = 1.0
+"""What a stage gets after the deadline: nothing can be done in it, but what is cached is read."""
 Result = dict[str, Artifact]
 ENDING = Ending()
 """Of the runs on workers that this process waits for."""
@@ -38,28 +43,50 @@ async def cell(cell: Cell) -> Result:
 
     Args:
         cell: What to train, on which motion.
+    Raises:
+        TrainingFailed: a process failed, was killed too often, or the time of the cell is over.
     """
+    deadline = time.monotonic() + 60 * cell.timeout_minutes
     without_tracebacks()
     store = Store.from_environment()
     sweep(store, parts=False)
     robot = _robot(cell.robot)
     labels = RunLabels(cell.move, cell.setup)
-    again: dict[str, Any] = {
-        "retries": cell.retries,
-        "retry_delay_seconds": SECONDS_BEFORE_RETRY,
-        "retry_condition_fn": was_killed,
-    }
-    limit_s = 60 * cell.timeout_minutes
-    trained = await train.with_options(**again)(
-        cell.reference, robot, cell.train, labels, limit_s=limit_s
+    trained = await tried(
+        lambda s: train(cell.reference, robot, cell.train, labels, limit_s=s), cell, deadline
     )
-    judged = await judge.with_options(**again)(
-        trained["policy"], cell.reference, robot, cell.evaluate, limit_s=limit_s
+    policy = trained["policy"]
+    judged = await tried(
+        lambda s: judge(policy, cell.reference, robot, cell.evaluate, limit_s=s), cell, deadline
     )
     run_id = run_id_of(cell.reference, robot, cell.train, labels)
     written = publish(cell, run_id, {**trained, **judged})
     sweep(store, parts=False)
     return {**trained, **judged, **written}
+
+
+async def tried(stage: Callable[[float], Awaitable[Result]], cell: Cell, deadline: float) -> Result:
+    """A stage of a cell, again when its process was killed; an attempt gets the time that is left.
+
+    Prefect's own retries would give every attempt the time of the first.
+
+    Args:
+        stage: Runs it within so many seconds.
+        deadline: At which the cell has failed, by the monotonic clock, seconds.
+    Raises:
+        TrainingFailed: its process failed, was killed too often, or the deadline has come.
+    """
+    for tries_left in range(cell.retries, -1, -1):
+        try:
+            return await stage(max(deadline - time.monotonic(), SHORTEST_S))
+        except TrainingFailed as cause:
+            if time.monotonic() >= deadline:
+                told = f"{cell.name} did not end within {cell.timeout_minutes:g} minutes"
+                raise TrainingFailed(f"{told}: {cause}") from cause
+            if not tries_left or not isinstance(cause, TrainingCrashed):
+                raise
+        await asyncio.sleep(SECONDS_BEFORE_RETRY)
+    raise AssertionError("unreachable")
 
 
 @cache
@@ -87,13 +114,16 @@ async def anywhere(wanted: Cell) -> Result:
     """
     if await is_kept(wanted):
         return await here(wanted)
-    plain = TypeAdapter(Cell).dump_python(wanted, mode="json")
+    left_s = 60 * wanted.timeout_minutes
     for _ in range(1 + wanted.retries):
+        given = replace(wanted, timeout_minutes=left_s / 60)
+        plain = TypeAdapter(Cell).dump_python(given, mode="json")
         begun = await arun_deployment(
             DEPLOYMENT, parameters={"cell": plain}, flow_run_name=wanted.name, timeout=0
         )
         run = await ENDING.of(begun)
-        if run.state is None or not run.state.is_crashed():
+        left_s -= run.total_run_time.total_seconds()
+        if run.state is None or not run.state.is_crashed() or left_s <= 0:
             break
     if run.state is None or not run.state.is_completed():
         said = "has no state" if run.state is None else f"{run.state.name}: {run.state.message}"

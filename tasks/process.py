@@ -12,7 +12,6 @@ from collections import deque
 from collections.abc import AsyncIterator, Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 from prefect.logging import get_run_logger
 
@@ -55,13 +54,6 @@ async def run_process(
     if process.returncode:
         raise _cause(run_id, process.returncode, work, last)
     return answer
-
-
-def was_killed(task: Any, run: Any, state: Any) -> bool:
-    """Prefect's question whether to try again: a crash, yes; whatever the input causes, no."""
-    return isinstance(state.data, TrainingCrashed) or isinstance(
-        getattr(state.data, "exception", None), TrainingCrashed
-    )
 
 
 def environment() -> dict[str, str]:

@@ -3,6 +3,7 @@
 import asyncio
 import json
 from collections.abc import Callable
+from datetime import timedelta
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -19,7 +20,13 @@ from prefect.states import Completed, Crashed, Failed
 from configs.loader import load
 from configs.study import Setup, Study
 from flows import ablation, cells
-from robojackson.errors import RejectedReference, StudyFailed, TrainingCrashed
+from robojackson.errors import (
+    BadConfiguration,
+    RejectedReference,
+    StudyFailed,
+    TrainingCrashed,
+    TrainingFailed,
+)
 from robojackson.retarget.scorecard import BARS
 from robojackson.rl.config import EvaluateConfig, TrainConfig
 from storage.artifact import Artifact
@@ -110,11 +117,28 @@ def test_no_more_cells_run_at_once_than_there_are_slots(play: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"setups": ["bogus"]}, {"steps": 0}, {"seeds": []}, {"stepz": 5}], ids=str
+    "wrong",
+    [{"setups": ["bogus"]}, {"steps": 0}, {"seeds": []}, {"stepz": 5}, {"seeds": [0, 0]}],
+    ids=str,
 )
 def test_nonsense_is_refused_before_a_run_starts(wrong: dict[str, Any]) -> None:
     with pytest.raises(ParameterTypeError):
         ablation.ablation.validate_parameters({"study": wrong})
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ({"seeds": [1, 0, 1]}, r"--set seeds: 'seeds' is \[1, 0, 1\]: 1 stands twice"),
+        ({"moves": ["walk", "walk"]}, "--set moves: .*: walk stands twice"),
+        ({"setups": ["scratch", "pretrain", "scratch"]}, "--set setups: .*: scratch stands twice"),
+    ],
+)
+def test_a_cell_that_would_stand_twice_in_a_study_is_refused(
+    wrong: dict[str, Any], told: str
+) -> None:
+    with pytest.raises(BadConfiguration, match=told):
+        load(Study, "studies/smoke", wrong)
 
 
 @pytest.mark.parametrize("name", ["paper", "smoke"])
@@ -128,14 +152,23 @@ def test_a_deployment_is_the_study_of_its_name_on_workers(name: str) -> None:
 class Pool:
     """A work pool whose runs end in the states that it is given, one after the other."""
 
-    def __init__(self, *states: State[Any]) -> None:
+    def __init__(self, *states: State[Any], run_minutes: float = 0.0) -> None:
         self.left = list(states)
+        self.run_time = timedelta(minutes=run_minutes)
         self.names: list[str] = []
+        self.timeouts: list[float] = []
 
     async def __call__(self, deployment: str, **given: Any) -> SimpleNamespace:
         json.dumps(given["parameters"])
         self.names.append(given["flow_run_name"])
-        return SimpleNamespace(state=self.left.pop(0))
+        self.timeouts.append(given["parameters"]["cell"]["timeout_minutes"])
+        return SimpleNamespace(state=self.left.pop(0), total_run_time=self.run_time)
+
+
+def a_cell(**given: Any) -> Cell:
+    names: dict[str, Any] = {"study": "s", "move": "walk", "setup": "scratch", "seed": 0}
+    configs: dict[str, Any] = {"train": TrainConfig(steps=100), "evaluate": EvaluateConfig()}
+    return Cell(**names, reference=REFERENCE, robot="humanoid", **configs, **given)
 
 
 def on_workers(
@@ -144,12 +177,7 @@ def on_workers(
     monkeypatch.setattr(cells, "arun_deployment", pool)
     monkeypatch.setattr(cells, "is_kept", AsyncMock(return_value=kept))
     monkeypatch.setattr(cells, "here", AsyncMock(return_value={"policy": REFERENCE}))
-    train = TrainConfig(steps=100)
-    names: dict[str, Any] = {"study": "s", "move": "walk", "setup": "scratch", "seed": 0}
-    wanted = Cell(
-        **names, reference=REFERENCE, robot="humanoid", train=train, evaluate=EvaluateConfig()
-    )
-    return asyncio.run(cells.anywhere(wanted))
+    return asyncio.run(cells.anywhere(a_cell()))
 
 
 def test_a_cell_that_was_done_before_asks_no_worker(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -175,3 +203,83 @@ def test_a_cell_that_failed_by_itself_is_not_tried_again(monkeypatch: pytest.Mon
     with pytest.raises(TrainingCrashed, match="Failed: diverged"):
         on_workers(pool, monkeypatch)
     assert len(pool.names) == 1
+
+
+def test_a_cell_that_is_given_to_another_worker_gets_the_time_that_is_left(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    pool = Pool(*[Crashed(message="exit -9") for _ in range(3)], run_minutes=130.0)
+    with pytest.raises(TrainingCrashed):
+        on_workers(pool, monkeypatch)
+    assert pool.timeouts == [240.0, 110.0]
+
+
+KILLED = TrainingCrashed("run x was killed by SIGKILL")
+
+
+class Attempts:
+    """A stage that takes a while and then fails; after all its failures it ends well."""
+
+    def __init__(self, *failures: Exception, seconds: float) -> None:
+        self.left, self.seconds, self.now = list(failures), seconds, 0.0
+        self.limits: list[float] = []
+
+    async def __call__(self, limit_s: float) -> dict[str, Artifact]:
+        self.limits.append(limit_s)
+        self.now += self.seconds
+        if self.left:
+            raise self.left.pop(0)
+        return {"policy": REFERENCE}
+
+    def run(self) -> dict[str, Artifact]:
+        """The stage in a cell of one minute and two retries."""
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(cells, "SECONDS_BEFORE_RETRY", 0.0)
+            patch.setattr(cells, "time", SimpleNamespace(monotonic=lambda: self.now))
+            cell = a_cell(timeout_minutes=1.0, retries=2)
+            return asyncio.run(cells.tried(self, cell, deadline=60.0))
+
+
+def test_each_attempt_gets_the_time_that_the_one_before_it_left() -> None:
+    stage = Attempts(KILLED, KILLED, seconds=20.0)
+    assert stage.run() == {"policy": REFERENCE}
+    assert stage.limits == [60.0, 40.0, 20.0]
+
+
+def test_a_killed_process_is_not_started_again_after_the_deadline() -> None:
+    stage = Attempts(KILLED, KILLED, KILLED, seconds=35.0)
+    with pytest.raises(TrainingFailed, match="scratch-walk-s0 did not end within 1 minutes: run x"):
+        stage.run()
+    assert stage.limits == [60.0, 25.0]
+
+
+@pytest.mark.parametrize(
+    ("failures", "attempts"),
+    [([KILLED] * 3, 3), ([TrainingFailed("exit code 1")], 1)],
+    ids=["killed again and again", "gave up by itself"],
+)
+def test_only_a_killed_process_is_started_again_and_not_for_ever(
+    failures: list[Exception], attempts: int
+) -> None:
+    stage = Attempts(*failures, seconds=1.0)
+    with pytest.raises(TrainingFailed):
+        stage.run()
+    assert len(stage.limits) == attempts
+
+
+def test_training_and_judgement_share_the_time_of_a_cell(
+    store_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    limits: list[float] = []
+
+    async def stage(*given: Any, limit_s: float) -> dict[str, Artifact]:
+        limits.append(limit_s)
+        await asyncio.sleep(0.2)
+        return {"policy": REFERENCE}
+
+    for name in ("train", "judge"):
+        monkeypatch.setattr(cells, name, stage)
+    monkeypatch.setattr(cells, "run_id_of", lambda *given: "walk-scratch-s0-0")
+    monkeypatch.setattr(cells, "publish", lambda *given: {})
+    asyncio.run(cells.cell.fn(a_cell(timeout_minutes=1.0)))
+    assert 60.0 >= limits[0] >= limits[1] + 0.2
