@@ -4,9 +4,10 @@
 
 `speed`, `threads`: our parts beside their peers (`learning_speed`). `policies`: one row a move
 and a seed, trained for the row's CPU minutes and judged on stock physics (`learning_policies`).
-`survival`, `pretraining`: races (`learning_races`). `table` only prints what there is. What exists
-is not computed again, so that all of it may take several sittings. The authors' clips are measured
-where ROBOJACKSON_PAPER names their folder.
+`survival`, `pretraining`: races (`learning_races`). `checkpoints`: what they cost a training
+(`learning_checkpoint`). `table` only prints what there is. What exists is not computed again, so
+that all of it may take several sittings. The authors' clips are measured where ROBOJACKSON_PAPER
+names their folder.
 """
 
 import argparse
@@ -19,11 +20,11 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import learning_policies, learning_races, learning_speed
+from benchmarks import learning_checkpoint, learning_policies, learning_races, learning_speed
 from benchmarks.learning_policies import MOVES, Folders
 from benchmarks.learning_summary import AUTHORS_ROBOT, EXCESS, GAIN, LIMBS, R2, TOLD, summary
 
-PARTS = ("speed", "threads", "policies", "survival", "pretraining", "table")
+PARTS = ("speed", "threads", "policies", "survival", "pretraining", "checkpoints", "table")
 SPEED = ("what", "ours", "peer", "ratio", "bar", "holds", "load_average")
 POLICY = (
     *("move", "horizon_s", "seeds", "strict_success", "strict_success_95", "worst_seed", "skill"),
@@ -48,6 +49,8 @@ def main() -> None:
         minutes = given.cpu_minutes or 5
         row = learning_races.pretraining(folders, given.seeds, minutes, given.walker_cpu_seconds)
         _write(speed, [row], command)
+    if "checkpoints" in wanted:
+        _write(speed, [learning_checkpoint.checkpoints(folders)], command)
     if "policies" in wanted:
         minutes, jobs = given.cpu_minutes, given.jobs
         learning_policies.policies(given.moves, given.seeds, minutes, jobs, folders)
