@@ -137,19 +137,22 @@ class Run:
             (fresh / "run.json").write_text(json.dumps(self._state()))
             for name, content in self._results().items():
                 (self.out / f"{name}.part").write_bytes(content)
+            for file in (*fresh.iterdir(), *self.out.glob("*.safetensors.part")):
+                _to_disk(file)
         except OSError as error:
             shutil.rmtree(fresh, ignore_errors=True)
             for part in self.out.glob("*.safetensors.part"):
                 part.unlink(missing_ok=True)
             raise StoreError(f"{self.out}: the checkpoint cannot be written ({error})") from error
+        # First, since a checkpoint whose budget is used up is not written again.
+        for name in ("policy.safetensors", "networks.safetensors"):
+            os.replace(self.out / f"{name}.part", self.out / name)
         old = self.out / "checkpoint.old"
-        shutil.rmtree(old, ignore_errors=True)
         if final.exists():
+            shutil.rmtree(old, ignore_errors=True)
             final.rename(old)
         fresh.rename(final)
         shutil.rmtree(old, ignore_errors=True)
-        for name in ("policy.safetensors", "networks.safetensors"):
-            os.replace(self.out / f"{name}.part", self.out / name)
         self.trainer.saved()
 
     def _newest(self) -> Path | None:
@@ -243,6 +246,11 @@ class Run:
             "episode_return": mean("episode_return"),
             "site_error_m": mean("site_error_m"),
         }
+
+
+def _to_disk(path: Path) -> None:
+    with path.open("rb") as file:
+        os.fsync(file.fileno())
 
 
 class _Callback(BaseCallback):

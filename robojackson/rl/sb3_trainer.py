@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import torch
 from sb3_contrib import TQC
+from stable_baselines3.common.type_aliases import RolloutReturn
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
 from robojackson.rl.config import TqcConfig
@@ -16,9 +17,19 @@ from robojackson.rl.trainer import Layers
 
 
 class PatientTQC(TQC):
-    """TQC that does not learn from a nearly empty replay buffer."""
+    """TQC that does not learn from a nearly empty replay buffer.
+
+    Attributes:
+        random: State of torch's generator between two rounds, before gSDE draws for the next one.
+    """
 
     warmup = 0
+    random: torch.Tensor | None = None
+
+    def collect_rollouts(self, *args: Any, **named: Any) -> RolloutReturn:
+        """A round of steps."""
+        self.random = torch.get_rng_state()
+        return super().collect_rollouts(*args, **named)
 
     def train(self, gradient_steps: int, batch_size: int = 64) -> None:
         """A round of updates, unless the buffer has still to be filled."""
@@ -69,7 +80,8 @@ class Sb3Trainer(OffPolicyTrainer):
 
     def save(self, folder: Path, replay: Path) -> None:
         state = {name: part.state_dict() for name, part in self._parts().items()}
-        state |= {"log_ent_coef": self.model.log_ent_coef.detach(), "random": torch.get_rng_state()}
+        random = torch.get_rng_state() if self.model.random is None else self.model.random
+        state |= {"log_ent_coef": self.model.log_ent_coef.detach(), "random": random}
         torch.save(state, folder / "networks.pt")
         self._save_rest(folder, replay)
 

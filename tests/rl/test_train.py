@@ -1,8 +1,10 @@
 import dataclasses
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import jax
 import numpy as np
@@ -72,6 +74,52 @@ def test_a_run_in_two_sittings_ends_as_one_that_was_never_stopped(
     result = train(sway, robot, brief(name), tmp_path, Hooks(sink=rows.extend))
     assert result.policy.read_bytes() == whole.policy.read_bytes()
     assert rows == episodes
+
+
+def test_exploration_that_depends_on_the_state_goes_on_to_the_bit(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    """Its matrix is drawn before the moment at which a checkpoint is written."""
+    tqc = dataclasses.replace(SMALL, gsde=True, log_std_init=-2.0)
+    config = dataclasses.replace(brief("sb3"), tqc=tqc)
+    whole = run(robot, sway, config, tmp_path / "whole")
+    rounds = iter([False] * 5 + [True])
+    with pytest.raises(KeyboardInterrupt):
+        train(sway, robot, config, tmp_path / "halves", Hooks(stop=rounds.__next__))
+    halves = run(robot, sway, config, tmp_path / "halves")
+    assert halves.policy.read_bytes() == whole.policy.read_bytes()
+
+
+@pytest.mark.parametrize("place", range(4))
+def test_a_death_between_two_files_of_the_last_checkpoint_loses_nothing(
+    place: int,
+    trained: tuple,
+    robot: Robot,
+    sway: ReferenceMotion,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Two policy files take their place, the old checkpoint goes aside, the new one comes."""
+    whole, _, _, name = trained
+    run(robot, sway, brief(name, 160), tmp_path)
+    left = iter(range(place + 1))
+
+    def dies(way: Any) -> Any:
+        def moved(*files: Any) -> Any:
+            watched = str(files[0]).endswith((".safetensors.part", "checkpoint", ".new"))
+            if watched and next(left) == place:
+                raise SystemExit
+            return way(*files)
+
+        return moved
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "replace", dies(os.replace))
+        patch.setattr(Path, "rename", dies(Path.rename))
+        with pytest.raises(SystemExit):
+            run(robot, sway, brief(name), tmp_path)
+    result = run(robot, sway, brief(name), tmp_path)
+    assert result.policy.read_bytes() == whole.policy.read_bytes()
 
 
 def test_both_trainers_end_at_their_budget_with_a_policy(trained: tuple) -> None:
