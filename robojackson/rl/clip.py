@@ -86,7 +86,7 @@ class Clip:
     def horizon(self, start: Int[np.ndarray, " N"], seconds: float) -> Int[np.ndarray, " N"]:
         """Steps of rollouts: the given time when cyclic, else from each start to the clip's end."""
         if self.cyclic:
-            return np.full(len(start), round(seconds / self.dt))
+            return np.full(len(start), max(1, round(seconds / self.dt)))
         return self.steps - 1 - start
 
     def _velocities(self) -> Float[np.ndarray, "S K 3"]:

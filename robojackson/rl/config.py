@@ -157,7 +157,9 @@ class RandomConfig:
 
     friction: float = Field(default=0.0, ge=0, lt=1)
     gains: float = Field(default=0.0, ge=0, lt=1)
-    integrators: tuple[Literal["RK4", "Euler", "implicitfast"], ...] = ("RK4",)
+    integrators: tuple[Literal["RK4", "Euler", "implicitfast"], ...] = Field(
+        default=("RK4",), min_length=1
+    )
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -226,6 +228,14 @@ class TrainConfig:
             return given
         said = {**said, "tqc": {"preset": "paper", **tqc}}
         return ArgsKwargs(given.args, said) if isinstance(given, ArgsKwargs) else said
+
+    @model_validator(mode="after")
+    def _one_curiosity(self) -> "TrainConfig":
+        inner = {"paper": self.paper.curiosity, "track.reward": self.track.reward.curiosity}
+        for name, said in inner.items():
+            if said not in ("off", self.curiosity):
+                raise ValueError(f"{name}.curiosity: say curiosity={said} instead, for either mode")
+        return self
 
     @model_validator(mode="after")
     def _whole_delays(self) -> "TrainConfig":

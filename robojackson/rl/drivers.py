@@ -2,9 +2,10 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
-from pydantic import TypeAdapter
+from pydantic import TypeAdapter, ValidationError
 
 from robojackson.errors import BadPolicy
 from robojackson.motion.reference import ReferenceMotion
@@ -18,6 +19,7 @@ from robojackson.rl.policy import Policy
 from robojackson.rl.rollouts import Driver
 from robojackson.rl.stock import stock_observation, stock_observation_size
 
+T = TypeVar("T")
 Command = Callable[[Simulation, ClipStep, np.ndarray, np.ndarray], np.ndarray]
 
 
@@ -45,7 +47,24 @@ def control_of(policy: Policy, robot: Robot) -> ControlConfig:
             f"the policy takes {policy.observation_size} observations and robot "
             f"{robot.description.name!r} gives {sizes[0]}: it was trained for another robot"
         )
-    return TypeAdapter(ControlConfig).validate_python(policy.facts["control"])
+    return fact(policy, "control", ControlConfig)
+
+
+def fact(policy: Policy, name: str, kind: type[T]) -> T:
+    """A configuration out of a policy's file.
+
+    Raises:
+        BadPolicy: it holds what this version does not know.
+    """
+    try:
+        return TypeAdapter(kind).validate_python(policy.facts[name])
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, (name, *first["loc"])))
+        raise BadPolicy(
+            f"the policy's file says {where} = {first['input']!r} ({first['msg']}): it is of "
+            "another version of RoboJackson; train it anew"
+        ) from error
 
 
 def drivers(

@@ -14,7 +14,6 @@ from functools import partial
 
 import numpy as np
 from jaxtyping import Float
-from pydantic import TypeAdapter
 
 from robojackson.motion.reference import ReferenceMotion, poses_sha256
 from robojackson.retarget.robot import Robot
@@ -27,7 +26,7 @@ from robojackson.rl.config import (
     TerminationConfig,
     TrackConfig,
 )
-from robojackson.rl.drivers import control_of, drivers, mode_of
+from robojackson.rl.drivers import control_of, drivers, fact, mode_of
 from robojackson.rl.judge import Judge
 from robojackson.rl.meter import Meter, yardstick
 from robojackson.rl.paper_mode import facing_ahead
@@ -110,8 +109,8 @@ def environment_of(policy: Policy, control: ControlConfig) -> TrackConfig | Pape
     paper = mode_of(policy) == "paper"
     if not isinstance(held, Mapping):
         return PaperConfig() if paper else TrackConfig(control=control)
-    known = TypeAdapter(PaperConfig if paper else TrackConfig).validate_python(held)
-    return yardstick(known)
+    kind: type[PaperConfig | TrackConfig] = PaperConfig if paper else TrackConfig
+    return yardstick(fact(policy, "environment", kind))
 
 
 def reward_report(

@@ -23,12 +23,12 @@ class EvaluateConfig:
     seconds: float = Field(default=10.0, gt=0)
     phases: int = Field(default=24, ge=1)
     resets: int = Field(default=3, ge=1)
-    seed: int = 0
-    joint_noise: float = 0.02
-    joint_speed_noise: float = 0.1
-    root_speed_noise: float = 0.02
-    strict_error: float = 0.30
+    seed: int = Field(default=0, ge=0)
+    joint_noise: float = Field(default=0.02, ge=0)
+    joint_speed_noise: float = Field(default=0.1, ge=0)
+    root_speed_noise: float = Field(default=0.02, ge=0)
+    strict_error: float = Field(default=0.30, gt=0)
     kneel_height: float = 0.15
-    fast: float = 0.15
-    max_lag: float = 0.1
-    threads: int = 2
+    fast: float = Field(default=0.15, gt=0)
+    max_lag: float = Field(default=0.1, ge=0)
+    threads: int = Field(default=2, ge=1)

@@ -87,7 +87,9 @@ class Judge:
             rollouts.wanted[span, i],
             rollouts.wanted_qpos[span, i, 3:7],
         )
-        return min(score, 0.0) if rollouts.fell[i] else score
+        if not rollouts.fell[i]:
+            return score
+        return 0.0 if np.isnan(score) else min(score, 0.0)
 
     def _means(self, rollouts: Rollouts) -> dict[str, np.ndarray]:
         """Returns and their terms summed over the rollout, errors as means."""

@@ -33,18 +33,20 @@ class Meter:
         clip: Clip,
         environment: TrackConfig | PaperConfig,
     ) -> None:
-        self._environment, self._clip = environment, clip
-        self._paper = environment if isinstance(environment, PaperConfig) else PaperConfig()
-        self._points = PaperPoints(robot, reference, self._paper)
+        self._clip = clip
+        asked = [PaperConfig()]
+        if isinstance(environment, PaperConfig):
+            asked = [PaperConfig(relative=environment.relative), environment]
+        self._papers = [(config, PaperPoints(robot, reference, config)) for config in asked]
+        self._track = None if isinstance(environment, PaperConfig) else environment.reward
         self._which = tracked_points(robot.keypoint_names)
 
     def __call__(self, moment: Moment) -> Reading:
         """Terms, errors and returns of every robot at one control step."""
-        state = self._points.of(moment.sim)
-        wanted = self._points.wanted(self._clip, moment.at.step)
-        apart = miss(state, *wanted, self._points.weights)
-        paper = paper_terms(state, apart, moment.fell, self._paper.lambda_max, self._paper)
-        own = paper if isinstance(self._environment, PaperConfig) else self._track(moment)
+        read = [self._asked(moment, *paper) for paper in self._papers]
+        (_, paper), (apart, own) = read[0], read[-1]
+        if self._track is not None:
+            own = self._tracked(moment, self._track)
         return {
             **{f"reward_{name}": value for name, value in own.items()},
             **_errors(apart),
@@ -52,8 +54,16 @@ class Meter:
             "return_paper": np.sum(list(paper.values()), 0),
         }
 
-    def _track(self, moment: Moment) -> Reading:
-        sim, reward = moment.sim, _reward_of(self._environment)
+    def _asked(
+        self, moment: Moment, config: PaperConfig, points: PaperPoints
+    ) -> tuple[Miss, Reading]:
+        """Distances and terms of a reward of the paper's kind, lambda at its largest."""
+        state = points.of(moment.sim)
+        apart = miss(state, *points.wanted(self._clip, moment.at.step), points.weights)
+        return apart, paper_terms(state, apart, moment.fell, config.lambda_max, config)
+
+    def _tracked(self, moment: Moment, reward: RewardConfig) -> Reading:
+        sim = moment.sim
         moved = (sim.points - moment.before) / self._clip.dt
         _, terms = judged(sim, moved, moment.at, moment.change, self._which, reward)
         return {name: np.where(moment.fell, 0.0, term) for name, term in terms.items()}
@@ -64,11 +74,6 @@ def yardstick(environment: TrackConfig | PaperConfig) -> TrackConfig | PaperConf
     if isinstance(environment, PaperConfig):
         return replace(environment, curiosity="off")
     return replace(environment, reward=replace(environment.reward, curiosity="off"))
-
-
-def _reward_of(environment: TrackConfig | PaperConfig) -> RewardConfig:
-    assert isinstance(environment, TrackConfig)
-    return environment.reward
 
 
 def _errors(apart: Miss) -> Reading:

@@ -83,11 +83,20 @@ def load_networks(path: Path) -> Networks:
 
 
 def fitted(config: TqcConfig, networks: Networks, critics: bool) -> TqcConfig:
-    """The configuration with the layers that the networks have."""
+    """The configuration with the layers that the networks have.
+
+    Raises:
+        BadPolicy: the critics have no more quantiles than are dropped.
+    """
     shaped = replace(config, actor=networks.widths("actor"))
     if not (critics and networks.has_critics):
         return shaped
     *hidden, quantiles = networks.widths("critic1")
+    if quantiles <= config.top_quantiles_to_drop:
+        raise BadPolicy(
+            f"the critics to start from have {quantiles} quantiles, of which "
+            f"{config.top_quantiles_to_drop} are dropped; start_critics=false takes the actor alone"
+        )
     return replace(shaped, critic=tuple(hidden), quantiles=quantiles)
 
 

@@ -118,3 +118,9 @@ class PaperConfig:
     @classmethod
     def _preset(cls, given: Any) -> Any:
         return with_preset(given, PRESETS, "paper")
+
+    @model_validator(mode="after")
+    def _weighed(self) -> "PaperConfig":
+        if any(weight < 0 for weight in self.weights.values()) or not any(self.weights.values()):
+            raise ValueError("weights: none may be negative, and one at least must count")
+        return self

@@ -21,7 +21,7 @@ log = logging.getLogger(__name__)
 
 ASSETS = Path(__file__).parent.parent / "assets"
 WALKERS = {"track": "walker_track.safetensors", "paper": "walker_paper.safetensors"}
-HUB = re.compile(r"^[\w.-]+/[\w.-]+$")
+HUB = re.compile(r"^[\w.-]+/[\w.-]+(?<!\.safetensors)(?<!\.zip)$")
 
 
 def pretrained(start: str, mode: str) -> Networks | None:
@@ -128,6 +128,9 @@ def _renamed(state: Tensors) -> Tensors:
     for i, (critic, target) in enumerate(zip(CRITICS, TARGETS, strict=True)):
         tensors |= _chain(state, f"critic.qf{i}", critic)
         tensors |= _chain(state, f"critic_target.qf{i}", target)
+    outputs = Networks(tensors, {}).widths(CRITICS[0])
+    if outputs and outputs[-1] == 1:
+        raise ValueError("its critics give one value, as SAC's do")
     return tensors
 
 

@@ -9,7 +9,8 @@ from robojackson.rl.presets import with_preset
 
 PRESETS: dict[str, dict[str, Any]] = {
     "dance": {},
-    # The paper names TQC and 50,000 steps; where it is silent, sb3-contrib's defaults.
+    # The paper names TQC and 50,000 steps; where it is silent, sb3-contrib's defaults, its update
+    # after every step as 32 after 32.
     "paper": {
         "n_envs": 1,
         "steps_per_round": 32,
@@ -95,3 +96,20 @@ class TqcConfig:
     @classmethod
     def _preset(cls, given: Any) -> Any:
         return with_preset(given, PRESETS, "dance")
+
+    @model_validator(mode="after")
+    def _learns(self) -> "TqcConfig":
+        """Refuse numbers with which a training runs to its end and has learnt nothing."""
+        if self.top_quantiles_to_drop >= self.quantiles:
+            raise ValueError(
+                f"top_quantiles_to_drop, {self.top_quantiles_to_drop}, must leave some of the "
+                f"{self.quantiles} quantiles"
+            )
+        room = max(self.buffer // self.n_envs, 1) * self.n_envs
+        if self.warmup > room:
+            raise ValueError(
+                f"the replay buffer has room for {room} transitions ({self.buffer} on "
+                f"{self.n_envs} simulations), and learning would begin after {self.warmup}: "
+                "raise buffer or lower warmup"
+            )
+        return self

@@ -1,7 +1,7 @@
 """The loader reads what YAML says and refuses what it does not know."""
 
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import pytest
 from pydantic import ConfigDict, Field
@@ -152,3 +152,28 @@ def test_a_name_does_not_lead_out_of_the_package() -> None:
 def test_names_are_found_from_any_folder(monkeypatch, tmp_path) -> None:
     monkeypatch.chdir(tmp_path)
     assert loader.find("robots/humanoid").is_file()
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"tqc.quantiles": 2}, "must leave some of the 2 quantiles"),
+        ({"tqc.buffer": 2000}, "room for 1984 transitions .* begin after 2000: raise buffer"),
+        ({"mode": "paper", "paper.curiosity": "formula"}, "say curiosity=formula instead"),
+        ({"track.reward.curiosity": "formula"}, "say curiosity=formula instead"),
+        ({"track.random.integrators": []}, "integrators"),
+        ({"mode": "paper", "paper.weights": {}}, "one at least must count"),
+    ],
+)
+def test_numbers_with_which_nothing_would_be_learnt_are_refused(
+    given: dict[str, Any], told: str
+) -> None:
+    with pytest.raises(BadConfiguration, match=told):
+        loader.load(TrainConfig, None, given)
+
+
+@pytest.mark.parametrize("key", ["threads=0", "joint_noise=-1", "seed=-1", "max_lag=-0.1"])
+def test_numbers_with_which_nothing_can_be_judged_are_refused(key: str) -> None:
+    name, value = key.split("=")
+    with pytest.raises(BadConfiguration, match=name):
+        loader.load(PipelineConfig, None, {f"evaluate.{name}": float(value)})

@@ -9,7 +9,7 @@ from robojackson.errors import BadPolicy, RejectedReference, TrackTooShort
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.retarget.robot import Robot
 from robojackson.rl.clip import Clip
-from robojackson.rl.config import ControlConfig, EvaluateConfig, TerminationConfig
+from robojackson.rl.config import ControlConfig, EvaluateConfig, PaperConfig, TerminationConfig
 from robojackson.rl.evaluate import evaluate
 from robojackson.rl.judge import Judge
 from robojackson.rl.policy import Policy
@@ -83,6 +83,14 @@ def test_a_fall_has_no_skill_and_no_success(robot: Robot, sway: ReferenceMotion)
     assert judged["velocity_score"] == 0
     assert judged["survived_s"] == pytest.approx(40 * sway.dt)
     assert judged["clip_fraction"] == pytest.approx(0.25)
+
+
+@pytest.mark.parametrize("length", [0, 1])
+def test_a_fall_before_there_is_a_velocity_counts_like_any_fall(
+    robot: Robot, sway: ReferenceMotion, length: int
+) -> None:
+    fall = dataclasses.replace(perfect(sway), length=np.array([length]), fell=np.array([True]))
+    assert row(robot, sway, fall)["velocity_score"] == 0
 
 
 def test_kneeling_for_one_step_is_no_strict_success(robot: Robot, sway: ReferenceMotion) -> None:
@@ -211,6 +219,33 @@ def test_every_rollout_is_measured_by_the_papers_reward_too(
         terms = [value for key, value in row.items() if key.startswith("reward_")]
         assert row["return_own"] == pytest.approx(sum(terms))  # type: ignore[arg-type]
         assert 0 < row["return_paper"] < 10 * 5.2  # type: ignore[operator]
+
+
+def test_the_papers_reward_is_the_same_whatever_a_policy_was_trained_with(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    nothing = (np.zeros((348, 17)), np.zeros(17))
+    control = dataclasses.asdict(ControlConfig(law="torque"))
+    facts = {"robot": "humanoid", "mode": "paper", "control": control, "repeats": 1}
+    brief = EvaluateConfig(seconds=0.15, phases=1, resets=1)
+    paid = []
+    for preset in ("paper", "released", "walker"):
+        asked = dataclasses.asdict(PaperConfig(preset=preset))
+        policy = Policy((nothing,), {**facts, "environment": asked})
+        rows = evaluate(policy, sway, robot, brief).rows
+        paid.append([row["return_paper"] for row in rows if row["policy"] == "trained"])
+    assert paid[0][0] > 0
+    assert paid == [paid[0]] * 3
+
+
+def test_a_policy_of_another_version_is_refused_in_words(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    policy = idle(robot, sway)
+    control = {**policy.facts["control"], "jerk": 3}  # type: ignore[dict-item]
+    strange = dataclasses.replace(policy, facts={**policy.facts, "control": control})
+    with pytest.raises(BadPolicy, match=r"control\.jerk = 3 .*another version of RoboJackson"):
+        evaluate(strange, sway, robot, EvaluateConfig(phases=1, resets=1))
 
 
 def test_the_usage_of_a_joint_is_its_spread_over_the_references(

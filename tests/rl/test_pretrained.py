@@ -4,6 +4,7 @@ import io
 import json
 import pickle
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import gymnasium
@@ -11,6 +12,7 @@ import numpy as np
 import onnxruntime
 import pytest
 from sb3_contrib import TQC
+from stable_baselines3 import SAC
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
 from robojackson.errors import BadPolicy, MissingDependency
@@ -71,6 +73,20 @@ def zipped(tmp_path: Path, sde: bool = False) -> tuple[TQC, Path]:
     model = TQC("MlpPolicy", stock, policy_kwargs=net, use_sde=sde, seed=4, device="cpu")
     model.save(tmp_path / "theirs.zip")
     return model, tmp_path / "theirs.zip"
+
+
+def test_a_zip_of_another_algorithm_is_refused(tmp_path: Path) -> None:
+    """SAC has the same names, and critics of one value: TQC would drop it and learn nothing."""
+    model = SAC("MlpPolicy", "Humanoid-v5", policy_kwargs={"net_arch": [8]}, device="cpu")
+    model.save(tmp_path / "sac.zip")
+    with pytest.raises(BadPolicy, match=r"sac\.zip.*one value, as SAC's do"):
+        from_sb3_zip(tmp_path / "sac.zip")
+
+
+def test_networks_whose_quantiles_would_all_be_dropped_are_refused(env: VecEnv) -> None:
+    few = Networks(make_trainer("sb3", env, SMALL, seed=1).networks(), {})
+    with pytest.raises(BadPolicy, match=r"25 quantiles.*start_critics=false"):
+        fitted(replace(SMALL, quantiles=40, top_quantiles_to_drop=30), few, True)
 
 
 @pytest.mark.parametrize("sde", [False, True])
@@ -153,9 +169,10 @@ def test_the_hubs_zip_is_asked_for_by_its_own_name(
     assert found.observation_size == 348
 
 
-def test_a_start_that_does_not_exist_is_refused() -> None:
+@pytest.mark.parametrize("start", ["nowhere/at/all.zip", "out/networks.safetensors", "my/own.zip"])
+def test_a_start_that_does_not_exist_is_refused_without_asking_the_hub(start: str) -> None:
     with pytest.raises(BadPolicy, match="no such file"):
-        pretrained("nowhere/at/all.zip", "paper")
+        pretrained(start, "paper")
 
 
 def test_networks_of_another_mode_are_refused(
