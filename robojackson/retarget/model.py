@@ -8,6 +8,7 @@ import hashlib
 import importlib.util
 import os
 from pathlib import Path
+from xml.etree import ElementTree
 
 import mujoco
 
@@ -19,6 +20,9 @@ STORE = "ROBOJACKSON_STORE"
 ADDED = "store"
 """Prefix of an `mjcf` that `robojackson robots add` unpacks."""
 _OURS = "keypoint/"
+FOLDERS = ("assetdir", "meshdir", "texturedir")
+PARTS = ("include", "model")
+"""Elements whose file is MJCF again."""
 
 
 def site_of(model: mujoco.MjModel, key: str) -> int:
@@ -92,6 +96,33 @@ def compiled(description: RobotDescription, path: Path) -> mujoco.MjModel:
         raise _unreadable(description, error) from error
     model.actuator_gear[:] *= description.gear_scale
     return model
+
+
+def model_sha256(path: Path) -> str:
+    """Digest of an MJCF; where it includes other files or has meshes, of all of them."""
+    digests = [hashlib.sha256(file.read_bytes()) for file in _files(path)]
+    if len(digests) == 1:
+        return digests[0].hexdigest()
+    return hashlib.sha256(b"".join(digest.digest() for digest in digests)).hexdigest()
+
+
+def _files(path: Path) -> list[Path]:
+    """The MJCF and every file that it names, as MuJoCo finds them."""
+    found, folders, texts = [path], [path.parent], [path]
+    for text in texts:  # grows while it is read
+        try:
+            tree = ElementTree.parse(text)
+        except ElementTree.ParseError:  # MuJoCo reads what is no strict XML, too
+            continue
+        for compiler in tree.iter("compiler"):
+            folders += [path.parent / compiler.get(name, "") for name in FOLDERS]
+        for element in tree.iter():
+            places = [folder / element.get("file", "") for folder in folders]
+            file = next((place for place in places if place.is_file()), None)
+            if file is not None and file not in found:
+                found.append(file)
+                texts += [file] if element.tag in PARTS else []
+    return found
 
 
 def _read(path: Path, description: RobotDescription) -> mujoco.MjSpec:

@@ -5,7 +5,6 @@ Every body, joint and site of the description must resolve or `UnknownName` list
 seconds.
 """
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -23,7 +22,7 @@ from robojackson.retarget.description import (
     RobotDescription,
     RobotSource,
 )
-from robojackson.retarget.model import compiled, mjcf_path, site_of
+from robojackson.retarget.model import compiled, mjcf_path, model_sha256, site_of
 from robojackson.retarget.names import known, matching, where
 
 __all__ = [
@@ -39,7 +38,7 @@ class Robot:
     Attributes:
         description: What it was made from.
         model: The MuJoCo model with the keypoint sites.
-        sha256: Digest of the MJCF file.
+        sha256: Digest of the MJCF file and of those that it names.
         joint_names, body_names, keypoint_names, contact_names: World body left out.
         keypoint_sites: Site index a keypoint.
         keypoint_weights: Weight a keypoint.
@@ -105,7 +104,7 @@ def load_robot(description: RobotDescription) -> Robot:
     path = mjcf_path(description)
     model = compiled(description, path)
     check_joints(model, description)
-    return _bind(model, description, hashlib.sha256(path.read_bytes()).hexdigest())
+    return _bind(model, description, model_sha256(path))
 
 
 def _bind(model: mujoco.MjModel, description: RobotDescription, sha256: str) -> Robot:

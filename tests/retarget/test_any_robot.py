@@ -1,6 +1,8 @@
 """A robot that nobody knew, by its description alone: ankles, soles, servos, clashing names."""
 
+import hashlib
 from dataclasses import replace
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -12,6 +14,7 @@ from robojackson.motion.smpl import PLANTED
 from robojackson.retarget import RetargetConfig, Robot, load_robot, retarget
 from robojackson.retarget.config import RepairConfig
 from robojackson.retarget.kinematics import pose, tree
+from robojackson.retarget.model import model_sha256
 from tests.retarget import machine
 from tests.retarget.conftest import human
 
@@ -118,3 +121,25 @@ def test_a_foot_that_stands_on_all_corners_is_flat(motion: ReferenceMotion, smal
             tilts.append(np.degrees(np.arccos(data.body("left_sole").xmat[8])))
     assert len(tilts) > 3
     assert np.mean(tilts) < 3.0
+
+
+def test_the_digest_of_a_model_is_that_of_every_file_it_names(tmp_path: Path) -> None:
+    whole, part = tmp_path / "scene.xml", tmp_path / "parts" / "body.xml"
+    part.parent.mkdir()
+    part.write_text("<mujoco><asset><mesh file='arm.stl'/></asset></mujoco>")
+    whole.write_text(
+        "<mujoco><compiler meshdir='meshes'/><include file='parts/body.xml'/></mujoco>"
+    )
+    mesh = tmp_path / "meshes" / "arm.stl"
+    mesh.parent.mkdir()
+    found = set()
+    for file, content in ((mesh, "solid"), (mesh, "thicker"), (part, "<mujoco/>")):
+        file.write_text(content)
+        found.add(model_sha256(whole))
+    assert len(found) == 3
+
+
+def test_the_digest_of_a_model_of_one_file_is_the_files(tmp_path: Path) -> None:
+    alone = tmp_path / "alone.xml"
+    alone.write_text("<mujoco/>")
+    assert model_sha256(alone) == hashlib.sha256(b"<mujoco/>").hexdigest()
