@@ -84,10 +84,12 @@ async def ablation(study: Study) -> Facts:
         async with slots:
             board.running(wanted)
             try:
-                board.done(wanted, await execute(wanted))
+                made = await execute(wanted)
+                board.done(wanted, made)
             except Exception as cause:
                 board.failed(wanted, _line(cause))
                 raise
+            return made
 
     async with board.shown():
         results = await asyncio.gather(*(one(c) for c in cells), return_exceptions=True)
@@ -174,9 +176,11 @@ def conclude(
     """
     failed = {n: _line(r) for n, r in outcomes.items() if isinstance(r, BaseException)}
     store = Store.from_environment()
+    well = [result["episodes"] for n, result in outcomes.items() if n not in failed]
     made = {}
-    if len(failed) < len(outcomes):
-        made = results_page(study, moves, metrics.kept(store, study.name), stills)
+    if well:
+        rows = metrics.kept(store, study.name, metrics.runs_of(well))
+        made = results_page(study, moves, rows, stills)
     if failed:
         named = "; ".join(f"{name}: {reason}" for name, reason in failed.items())
         raise StudyFailed(

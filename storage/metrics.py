@@ -10,9 +10,9 @@ when and where a cell ran is in the file beside it. DuckDB answers questions abo
 """
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
@@ -31,6 +31,8 @@ Ask = Callable[..., list[dict[str, Any]]]
 FOLDER = "metrics"
 TABLES: Mapping[str, TableSchema] = {"episodes": EPISODE_RECORD, "evaluations": EVALUATION_RECORD}
 RUNS = f"{FOLDER}/runs"
+ALWAYS = ("run_id", "study", "move", "setup", "config")
+"""Columns of `runs`, whatever is known."""
 OVERVIEW = """
 SELECT study, move, setup, seed, count(*) AS rollouts, round(avg(survived_s), 2) AS survived_s,
        round(avg(strict_success), 3) AS strict_success, round(avg(skill), 3) AS skill
@@ -77,13 +79,23 @@ def write(store: Store, place: Place, given: Mapping[str, Artifact]) -> dict[str
         rows = tables.decode_rows(schema, store.read(key), store.address(key))
         made[table] = _put(store, place.key(table), tables.encode_rows(schema, _named(place, rows)))
     for key in _outdated(store, place):
-        store.remove(key)
+        for old in (key, note_key(replace(place, run_id=_run(key)))):
+            if store.exists(old):
+                store.remove(old)
     return made
 
 
 def note_key(place: Place) -> str:
     """The key of what is known of a cell's origin."""
     return f"{RUNS}/{place.run_id}-{place.study}.json"
+
+
+def noted(store: Store, place: Place) -> dict[str, Any]:
+    """What is known of a cell's origin; nothing where it is not there or cannot be read."""
+    try:
+        return dict(json.loads(store.read(note_key(place))))
+    except (StoreError, ValueError):
+        return {}
 
 
 def note(store: Store, place: Place, facts: Mapping[str, Any]) -> Artifact:
@@ -105,14 +117,18 @@ def query(store: Store, sql: str, given: Mapping[str, Any] | None = None) -> lis
 
 
 @contextmanager
-def opened(store: Store, study: str | None = None) -> Iterator[Ask]:
-    """The tables, all or those of a study, read once for any number of questions."""
+def opened(
+    store: Store, study: str | None = None, runs: Collection[str] | None = None
+) -> Iterator[Ask]:
+    """The tables, all or those of a study or of some runs of it, read once for any number of
+    questions.
+    """
     import duckdb
 
     with duckdb.connect(":memory:") as connection:
         for table in TABLES:
-            _create(connection, table, read(store, table, study))
-        _create(connection, "runs", _runs(store, study))
+            _create(connection, table, read(store, table, study, runs))
+        _create(connection, "runs", _runs(store, study, runs))
         connection.execute("SET enable_external_access = false")
 
         def ask(sql: str, given: Mapping[str, Any] | None = None) -> list[dict[str, Any]]:
@@ -126,20 +142,28 @@ def opened(store: Store, study: str | None = None) -> Iterator[Ask]:
         yield ask
 
 
-def kept(store: Store, study: str) -> list[Artifact]:
-    """All files of a study: its tables and where they come from."""
+def kept(store: Store, study: str, runs: Collection[str] | None = None) -> list[Artifact]:
+    """All files of a study, or of some runs of it: its tables and where they come from."""
     keys = [key for table in TABLES for key in store.list(f"{FOLDER}/{table}/study={study}")]
-    return [Artifact(key=k, sha256=store.sha256(k)) for k in [*keys, *_notes(store, study)]]
+    keys = [key for key in keys if runs is None or _run(key) in runs]
+    return [Artifact(key=k, sha256=store.sha256(k)) for k in [*keys, *_notes(store, study, runs)]]
 
 
-def read(store: Store, table: str, study: str | None = None) -> pa.Table:
-    """All rows of a table, with the column `study`, or those of one study."""
+def runs_of(files: Iterable[Artifact]) -> set[str]:
+    """Ids of the runs whose tables are among the files."""
+    return {_run(file.key) for file in files if file.key.endswith(".parquet")}
+
+
+def read(
+    store: Store, table: str, study: str | None = None, runs: Collection[str] | None = None
+) -> pa.Table:
+    """All rows of a table, with the column `study`, or those of one study or of some runs."""
     schema = TABLES[table]
     prefix = f"{FOLDER}/{table}" + (f"/study={study}" if study else "")
     parts = [
         _with_study(tables.decode_table(schema, store.read(key), store.address(key)), key)
         for key in store.list(prefix)
-        if key.endswith(".parquet")
+        if key.endswith(".parquet") and (runs is None or _run(key) in runs)
     ]
     return pa.concat_tables([_empty(schema), *parts], promote_options="default")
 
@@ -174,21 +198,29 @@ def _create(connection: "DuckDBPyConnection", name: str, rows: pa.Table) -> None
     connection.unregister("given")
 
 
-def _notes(store: Store, study: str | None) -> list[str]:
+def _run(key: str) -> str:
+    return key.rpartition("/")[2].removesuffix(".parquet")
+
+
+def _notes(store: Store, study: str | None, runs: Collection[str] | None) -> list[str]:
     """Keys of what is known of the cells' origin; one of another study may be among them."""
-    return [key for key in store.list(RUNS) if study is None or key.endswith(f"-{study}.json")]
+    found = [key for key in store.list(RUNS) if study is None or key.endswith(f"-{study}.json")]
+    if runs is None:
+        return found
+    wanted = {f"{run}-{study}.json" for run in runs}
+    return [key for key in found if key.rpartition("/")[2] in wanted]
 
 
-def _runs(store: Store, study: str | None) -> pa.Table:
+def _runs(store: Store, study: str | None, runs: Collection[str] | None) -> pa.Table:
     """Provenance, a row a cell: what is not a plain value stands as JSON."""
     rows = []
-    for key in _notes(store, study):
+    for key in _notes(store, study, runs):
         try:
             facts = json.loads(store.read(key))
         except (StoreError, ValueError) as cause:
             raise BadTable(f"{store.address(key)}: not JSON: {cause}") from cause
         rows.append({name: _plain(value) for name, value in facts.items()})
-    names = dict.fromkeys(["run_id", "study", "move", "setup", *(n for row in rows for n in row)])
+    names = dict.fromkeys([*ALWAYS, *(n for row in rows for n in row)])
     return pa.table({n: pa.array([row.get(n) for row in rows], pa.string()) for n in names})
 
 

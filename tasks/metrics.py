@@ -18,12 +18,13 @@ from storage.store import Store
 from tasks.cell import Cell
 
 CHECKOUT = Path(__file__).parent.parent
+COMMIT = "ROBOJACKSON_COMMIT"
 TOLD = ("robojackson", "mujoco", "gymnasium", "torch", "jax", "sbx-rl", "sb3-contrib", "prefect")
 """Packages whose version is written down."""
 
 
 def publish(cell: Cell, run_id: str, made: Mapping[str, Artifact]) -> dict[str, Artifact]:
-    """Write the cell's rows and their provenance; the same call again writes the same tables.
+    """Write the cell's rows and where these come from; the same call again writes nothing.
 
     Args:
         run_id: Of the training.
@@ -32,7 +33,7 @@ def publish(cell: Cell, run_id: str, made: Mapping[str, Artifact]) -> dict[str, 
     store = Store.from_environment()
     place = metrics.Place(cell.study, cell.move, cell.setup, cell.seed, run_id)
     written = metrics.write(store, place, made)
-    if not store.exists(metrics.note_key(place)):
+    if metrics.noted(store, place).get("artifacts") != _digests(made):
         metrics.note(store, place, provenance(cell, place, made))
     return written
 
@@ -46,7 +47,7 @@ def provenance(cell: Cell, place: metrics.Place, made: Mapping[str, Artifact]) -
         "config": asdict(cell.train),
         "evaluate": asdict(cell.evaluate),
         "robot": cell.robot,
-        "artifacts": {name: artifact.sha256 for name, artifact in sorted(made.items())},
+        "artifacts": _digests(made),
         "reference_sha256": cell.reference.sha256,
         "versions": {name: _version(name) for name in TOLD},
         "machine": f"{platform.node()} {platform.machine()} {os.cpu_count()} cores",
@@ -56,15 +57,21 @@ def provenance(cell: Cell, place: metrics.Place, made: Mapping[str, Artifact]) -
     }
 
 
+def _digests(made: Mapping[str, Artifact]) -> dict[str, str]:
+    return {name: artifact.sha256 for name, artifact in sorted(made.items())}
+
+
 @cache
 def _commit() -> str:
-    """Of the checkout; `-dirty` where files differ from it, empty where there is no git."""
+    """Of the checkout, `-dirty` where files differ from it; without git, as in a container, what
+    ROBOJACKSON_COMMIT says.
+    """
     command = ["git", "-C", str(CHECKOUT), "describe", "--always", "--dirty", "--abbrev=40"]
     try:
         run = subprocess.run(command, capture_output=True, text=True, timeout=10, check=False)
     except (OSError, subprocess.TimeoutExpired):
-        return ""
-    return run.stdout.strip() if run.returncode == 0 else ""
+        return os.environ.get(COMMIT, "")
+    return run.stdout.strip() if run.returncode == 0 else os.environ.get(COMMIT, "")
 
 
 def _version(package: str) -> str | None:

@@ -7,22 +7,24 @@ others.
 import csv
 import io
 import json
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict
-from importlib import resources
 from typing import Any
 
 import numpy as np
 
 from configs.study import Move, Study
+from robojackson.errors import RoboJacksonError
 from robojackson.metrics import study as statistics
 from robojackson.report import study as page
 from robojackson.report.page import Plot
+from robojackson.rl.pretrained import pretrained
 from storage import metrics
-from storage.artifact import Artifact, sha256_of
+from storage.artifact import Artifact
 from storage.store import Store
 from tasks.caching import stage
-from tasks.digest import digest
+from tasks.digest import drawn_by
 from tasks.results import (
     JUDGED,
     Figures,
@@ -41,41 +43,40 @@ PRIMARY = "return_own"
 """The figure that the claims are about, chosen before any run (docs/ablation.md)."""
 
 
-def _ours(parameters: Mapping[str, Any]) -> list[str]:
-    """What makes the page besides the modules that every stage is keyed by: ours, its template."""
-    here = resources.files("robojackson.report")
-    templates = [sha256_of(here.joinpath(name).read_bytes()) for name in TEMPLATES]
-    return [digest((__name__,), __name__.partition(".")[0]), *templates]
-
-
-@stage(models=_ours)
+@stage(models=lambda parameters: drawn_by(__name__, TEMPLATES))
 def results_page(
     study: Study, moves: dict[str, Move], rows: list[Artifact], pictures: dict[str, Artifact]
 ) -> dict[str, Artifact]:
     """The files of `report`.
 
     Args:
-        rows: All files of the study's tables (`storage.metrics.kept`).
+        rows: Files of the tables of the cells that count (`storage.metrics.kept`).
         pictures: By move, as in `report`.
     """
     store = Store.from_environment()
-    return report(study, moves, {name: store.read(png.key) for name, png in pictures.items()})
+    shown = {name: store.read(png.key) for name, png in pictures.items()}
+    return report(study, moves, shown, metrics.runs_of(rows))
 
 
 def report(
-    study: Study, moves: Mapping[str, Move], pictures: Mapping[str, bytes] | None = None
+    study: Study,
+    moves: Mapping[str, Move],
+    pictures: Mapping[str, bytes] | None = None,
+    runs: Collection[str] | None = None,
 ) -> dict[str, Artifact]:
     """Write `studies/<name>/` anew: `page`, `table` (CSV), `results` (JSON) and the figures.
 
     Args:
         moves: Of the study, by name.
         pictures: By move, its video frame, recovered body and robot side by side, as PNG.
+        runs: Ids of the trainings that count; all that the tables have under its name if absent.
     """
     store, rng = Store.from_environment(), np.random.default_rng(0)
-    with metrics.opened(store, study.name) as ask:
+    with metrics.opened(store, study.name, runs) as ask:
         curves = learning(ask, study)
         figures = {**of_learning(curves, study), **of_judgement(ask, study)}
         baselines, facts = of_baselines(ask, study), _facts(ask, study)
+        notes = [*_few(study), *_starts(ask, study)]
     walking = {name: move.walking for name, move in moves.items()}
     claims = statistics.claims(figures[PRIMARY], walking, rng)
     lines = table(figures, baselines, study, rng)
@@ -88,7 +89,7 @@ def report(
         moves=[_picture(name, moves[name], png) for name, png in (pictures or {}).items()],
         curves=plots["curves"],
         judged=plots["judged"],
-        notes=_notes(study),
+        notes=notes,
     )
     folder = f"{FOLDER}/{study.name}"
     made = {
@@ -179,7 +180,7 @@ def _facts(ask: metrics.Ask, study: Study) -> dict[str, Any]:
     }
 
 
-def _notes(study: Study) -> list[str]:
+def _few(study: Study) -> list[str]:
     pairs = len(study.seeds)
     if pairs >= 6:
         return []
@@ -188,6 +189,29 @@ def _notes(study: Study) -> list[str]:
         f"{pairs} seed{'s' if pairs != 1 else ''}: no difference can have a p below {least:.2g}, "
         "so nothing here is a statement; ten seeds are."
     ]
+
+
+def _starts(ask: metrics.Ask, study: Study) -> list[str]:
+    """What was learnt before the first step of a cell: it belongs to the price of pretraining."""
+    sql = "SELECT DISTINCT setup, config FROM runs WHERE config IS NOT NULL ORDER BY ALL"
+    setups: dict[str, set[str]] = {}
+    for row in ask(sql):
+        setups.setdefault(json.loads(row["config"])["start"], set()).add(row["setup"])
+    setups.pop("scratch", None)
+    return [
+        f"{', '.join(sorted(names))} begin with networks ({start}) that had learnt for "
+        f"{_steps_of(start, study)} control steps before; curves and steps here do not count them."
+        for start, names in setups.items()
+    ]
+
+
+def _steps_of(start: str, study: Study) -> str:
+    try:
+        networks = pretrained(start, study.mode)
+    except RoboJacksonError:
+        networks = None
+    steps = networks.facts.get("steps") if networks else None
+    return f"{steps:,}" if isinstance(steps, int) else "an unknown number of"
 
 
 def _picture(name: str, move: Move, png: bytes) -> Plot:
@@ -214,7 +238,16 @@ def _json(claims: Sequence[statistics.Claim], lines: Sequence[page.Line]) -> byt
         "claims": [{**asdict(claim), "words": page.sentence(claim)} for claim in claims],
         "lines": [asdict(line) for line in lines],
     }
-    return json.dumps(told, indent=1).encode()
+    return json.dumps(_plain(told), indent=1, allow_nan=False).encode()
+
+
+def _plain(value: Any) -> Any:
+    """The same for JSON, which has no words for what is not finite."""
+    if isinstance(value, Mapping):
+        return {name: _plain(inner) for name, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(inner) for inner in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _file(title: str) -> str:

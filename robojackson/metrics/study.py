@@ -24,9 +24,9 @@ class Estimate:
     """A mean over seeds.
 
     Attributes:
-        mean: Of the samples.
-        low, high: Of the 95 % interval; NaN with fewer than two samples.
-        count: Samples.
+        mean: Of the samples that are finite; infinite where there are others only.
+        low, high: Of the 95 % interval; NaN with fewer than two such samples.
+        count: Samples that are finite.
     """
 
     mean: float
@@ -73,11 +73,12 @@ class Claim:
 
 
 def estimate(samples: Sequence[float], rng: np.random.Generator) -> Estimate:
-    """Mean and percentile-bootstrap interval of independent samples."""
-    values = np.asarray(samples, float)
+    """Mean and percentile-bootstrap interval of the finite ones of independent samples."""
+    told = np.asarray(samples, float)
+    values = told[np.isfinite(told)]
     if len(values) < 2:
-        mean = float(values.mean()) if len(values) else np.nan
-        return Estimate(mean, np.nan, np.nan, len(values))
+        beyond = np.inf if np.isinf(told).any() else np.nan
+        return Estimate(float(values[0]) if len(values) else beyond, np.nan, np.nan, len(values))
     if np.ptp(values) == 0:
         return Estimate(float(values[0]), float(values[0]), float(values[0]), len(values))
     found = stats.bootstrap(

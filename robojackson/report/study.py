@@ -83,7 +83,8 @@ def render(content: StudyContent) -> str:
         style=here.joinpath("page.css").read_text("utf-8"),
         columns=[title for title, _, _ in FIGURES.values()],
         rows=[
-            (line, [cell(line.values.get(key), key) for key in FIGURES]) for line in content.lines
+            (line, [cell(line.values.get(key), key, line.seeds) for key in FIGURES])
+            for line in content.lines
         ],
         claims=[(claim, sentence(claim)) for claim in content.claims],
         groups=[
@@ -94,17 +95,17 @@ def render(content: StudyContent) -> str:
     )
 
 
-def cell(value: Estimate | None, key: str) -> str:
-    """A mean with its interval, a dash where there is none."""
+def cell(value: Estimate | None, key: str, seeds: int) -> str:
+    """A mean with its interval, a dash where there is none; and of how many seeds if not of all."""
     if value is None or math.isnan(value.mean):
         return "–"
     _, digits, factor = FIGURES[key]
     if math.isinf(value.mean):
         return "never"
     told = f"{factor * value.mean:,.{digits}f}"
-    if not math.isfinite(value.low + value.high):
-        return told
-    return f"{told} [{factor * value.low:,.{digits}f}, {factor * value.high:,.{digits}f}]"
+    if math.isfinite(value.low + value.high):
+        told += f" [{factor * value.low:,.{digits}f}, {factor * value.high:,.{digits}f}]"
+    return told if value.count >= seeds else f"{told} ({value.count} of {seeds})"
 
 
 def sentence(claim: Claim) -> str:
@@ -125,10 +126,6 @@ def sentence(claim: Claim) -> str:
         least = claim.effect.smallest_p
         told += f", p = {claim.effect.p:.2g} (no smaller than {least:.2g} with so few)"
     return f"{told}; {100 * claim.effect.improvement:.0f} % chance that one run of it is better."
-
-
-def _cells(line: Line) -> list[str]:
-    return [cell(line.values.get(key), key) for key in FIGURES]
 
 
 def _encoded(plots: Sequence[Plot]) -> list[tuple[Plot, str]]:

@@ -37,6 +37,8 @@ ROOT = Path(__file__).parents[2]
 SETUPS: tuple[Setup, ...] = ("scratch", "pretrain", "curiosity")
 REFERENCE = Artifact(key="retarget/reference.parquet", sha256="0" * 64)
 
+EPISODES = "metrics/episodes/study=played/{}.parquet"
+
 
 class Played:
     """An executor of cells that takes a moment, and fails where it is told to."""
@@ -51,8 +53,11 @@ class Played:
         self.now -= 1
         if wanted.name == self.fails:
             raise TrainingCrashed("run x was killed by SIGKILL")
-        summary = json.dumps({"survived_s": 1.25, "skill": 0.5}).encode()
-        return {"evaluation": Store.from_environment().put("evaluation.json", summary)}
+        store, summary = Store.from_environment(), {"survived_s": 1.25, "skill": 0.5}
+        return {
+            "evaluation": store.put("evaluation.json", json.dumps(summary).encode()),
+            "episodes": store.put(EPISODES.format(wanted.name), b"rows"),
+        }
 
 
 @pytest.fixture
@@ -68,9 +73,15 @@ def play(
         card = json.dumps(dict.fromkeys(BARS, 0.0) | {"infeasible_share": infeasible})
         return motions | {"scorecard": Store(store_folder).put("card.json", card.encode())}
 
+    def results_page(
+        study: Study, moves: object, rows: list[Artifact], stills: object
+    ) -> dict[str, Artifact]:
+        run.shown = {row.name for row in rows}  # type: ignore[attr-defined]
+        return {"page": page}
+
     infeasible = 0.0
     monkeypatch.setattr(ablation, "motion", motion)
-    monkeypatch.setattr(ablation, "results_page", lambda *given: {"page": page})
+    monkeypatch.setattr(ablation, "results_page", results_page)
 
     def run(executor: Played, infeasible_share: float = 0.0, **given: Any) -> dict[str, Any]:
         nonlocal infeasible
@@ -96,6 +107,17 @@ def test_a_failed_cell_is_named_and_its_neighbours_are_done(play: Any) -> None:
         play(Played(fails="pretrain-walk-s0"))
     told = {"scratch-walk-s0": "done", "pretrain-walk-s0": "failed", "curiosity-walk-s0": "done"}
     assert states_told() == told
+
+
+def test_the_page_is_of_the_cells_that_ended_well_in_this_run(
+    play: Any, store_folder: Path
+) -> None:
+    """Rows of a cell that failed this time, and of another day's seeds, are in the tables, too."""
+    for earlier in ("pretrain-walk-s0", "scratch-walk-s7"):
+        Store(store_folder).put(EPISODES.format(earlier), b"rows")
+    with pytest.raises(StudyFailed):
+        play(Played(fails="pretrain-walk-s0"))
+    assert play.shown == {"scratch-walk-s0.parquet", "curiosity-walk-s0.parquet"}
 
 
 def test_a_study_on_a_refused_motion_begins_no_cell_and_says_why(play: Any) -> None:

@@ -101,5 +101,18 @@ def test_an_effect_of_nothing_does_not_hold() -> None:
     assert verdicts(scratch=0.3, pretrain=0.3)["Pretraining helps"] == "not shown"
 
 
+def test_an_effect_whose_interval_spans_zero_is_not_shown() -> None:
+    """Four seeds of five gain, the fifth loses more than two of them: a mean alone would hold."""
+    scratch = dict.fromkeys(range(5), 0.0)
+    pretrain = dict(enumerate([0.2, 0.1, 0.15, 0.1, -0.4]))
+    found = study.claims(
+        {("walk", "scratch"): scratch, ("walk", "pretrain"): pretrain}, {"walk": True}, RNG(0)
+    )
+    claim = next(claim for claim in found if claim.text == "Pretraining helps")
+    assert claim.effect is not None
+    assert claim.effect.difference.mean > 0
+    assert claim.verdict == "not shown"
+
+
 def test_a_setup_that_was_not_trained_is_not_measured() -> None:
     assert verdicts(scratch=0.1, pretrain=0.4)["Curiosity helps on dances"] == "not measured"

@@ -73,10 +73,12 @@ def test_a_question_about_a_study_sees_no_other(store: Store) -> None:
 
 
 def test_a_cell_that_was_trained_anew_replaces_its_rows(store: Store) -> None:
-    metrics.write(store, cell(run_id="r1"), made(store, 1.0))
-    metrics.write(store, cell(run_id="r2"), made(store, 2.0))
+    for run_id, survived in (("r1", 1.0), ("r2", 2.0)):
+        metrics.write(store, cell(run_id=run_id), made(store, survived))
+        metrics.note(store, cell(run_id=run_id), {"run_id": run_id})
     rows = metrics.query(store, "SELECT run_id, survived_s FROM evaluations")
     assert rows == [{"run_id": "r2", "survived_s": 2.0}]
+    assert metrics.query(store, "SELECT run_id FROM runs") == [{"run_id": "r2"}]
 
 
 def test_writers_of_different_cells_lose_nothing(store: Store) -> None:

@@ -12,6 +12,8 @@ from prefect import flow
 
 from configs.loader import load
 from configs.study import Move, Study
+from robojackson.metrics.study import estimate
+from robojackson.report.study import cell
 from storage import metrics, tables
 from storage.artifact import Artifact
 from storage.schemas import EPISODE_RECORD, EVALUATION_RECORD
@@ -41,7 +43,9 @@ def publish(store: Store, move: str, setup: str, seed: int) -> None:
         "evaluations": store.keep("t", "v.parquet", tables.encode_rows(EVALUATION_RECORD, rows)),
     }
     metrics.write(store, place, given)
-    metrics.note(store, place, {**names, "study": "known", "git_commit": "0123456789abcdef"})
+    start = "scratch" if setup == "scratch" else "walker"
+    facts = {"study": "known", "git_commit": "0123456789abcdef", "config": {"start": start}}
+    metrics.note(store, place, {**names, **facts})
 
 
 def rollout(names: dict[str, Any], policy: str, worth: float) -> dict[str, Any]:
@@ -99,6 +103,36 @@ def test_the_page_stands_alone_and_says_how_few_seeds_there_are(folder: Path) ->
 
 def test_the_code_that_made_the_rows_is_named(folder: Path) -> None:
     assert "0123456789" in (folder / "index.html").read_text()
+
+
+def test_what_the_walker_had_learnt_before_is_told(folder: Path) -> None:
+    page = (folder / "index.html").read_text()
+    assert "pretrain begin with networks (walker) that had learnt for 671,296 control steps" in page
+
+
+def test_rows_of_other_runs_under_the_name_of_the_study_do_not_count(
+    store_folder: Path,
+) -> None:
+    """Seeds of another day and cells that failed this time."""
+    store = Store(store_folder)
+    for seed in (0, 1, 2):
+        publish(store, "walk", "scratch", seed)
+    wanted = {"scratch-walk-s0", "scratch-walk-s2"}
+    report(STUDY, {"walk": load(Move, "moves/walk")}, runs=wanted)
+    told = json.loads((store_folder / "studies/known/results.json").read_text())
+    line = next(line for line in told["lines"] if line["move"] == "walk")
+    assert line["seeds"] == 2
+    assert line["values"]["return_own"]["mean"] == pytest.approx(1.01)
+
+
+def test_seeds_that_never_reach_the_threshold_are_counted_apart() -> None:
+    rng = np.random.default_rng(0)
+    figures = {"steps_to": {("walk", "scratch"): {0: 100.0, 1: 300.0, 2: np.inf, 3: np.inf}}}
+    (line, *_) = pages.table(figures, {}, Study(moves=("walk",), setups=("scratch",)), rng)
+    assert cell(line.values["steps_to"], "steps_to", line.seeds).startswith("200 [100, 300]")
+    assert cell(line.values["steps_to"], "steps_to", line.seeds).endswith("(2 of 4)")
+    never = estimate([np.inf, np.inf], rng)
+    assert cell(never, "steps_to", 2) == "never"
 
 
 def test_the_page_is_drawn_again_only_when_the_rows_change(

@@ -1,0 +1,66 @@
+"""Where the rows of a cell come from, told beside them."""
+
+from pathlib import Path
+
+import pytest
+
+from robojackson.rl.config import EvaluateConfig, TrainConfig
+from storage import metrics, tables
+from storage.artifact import Artifact
+from storage.schemas import EPISODE_RECORD, EVALUATION_RECORD
+from storage.store import Store
+from tasks import metrics as publishing
+from tasks.cell import Cell
+
+CELL = Cell(
+    study="s",
+    move="walk",
+    setup="scratch",
+    seed=0,
+    reference=Artifact(key="reference.parquet", sha256="0" * 64),
+    robot="humanoid",
+    train=TrainConfig(steps=100),
+    evaluate=EvaluateConfig(),
+)
+NAMES = {"run_id": "r", "move": "walk", "setup": "scratch", "seed": 0}
+
+
+def made(store: Store, policy: bytes) -> dict[str, Artifact]:
+    """What the stages of the cell leave."""
+    episode = {"step": 10, "episode": 0, "episode_return": 2.5, "episode_length": 10}
+    rollout = {"policy": "trained", "phase": 0, "reset": 0, "survived_s": 1.0, "fell": False}
+    rollout |= {"clip_fraction": 1.0, "success": 1.0, "strict_success": 0.0}
+    episodes = tables.encode_rows(EPISODE_RECORD, [{**NAMES, **episode}])
+    evaluations = tables.encode_rows(EVALUATION_RECORD, [{**NAMES, **rollout}])
+    return {
+        "policy": store.keep("t", "policy.safetensors", policy),
+        "training": store.keep("t", "training.json", b"{}"),
+        "episodes": store.keep("t", "episodes.parquet", episodes),
+        "evaluations": store.keep("t", "evaluations.parquet", evaluations),
+    }
+
+
+def commits(store: Store) -> list[str]:
+    return [row["git_commit"] for row in metrics.query(store, "SELECT git_commit FROM runs")]
+
+
+def test_rows_that_are_made_anew_get_the_commit_that_made_them(
+    store_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = Store(store_folder)
+    told = []
+    for commit, policy in (("a", b"first"), ("b", b"first"), ("c", b"second")):
+        monkeypatch.setattr(publishing, "_commit", lambda commit=commit: commit)
+        publishing.publish(CELL, "r", made(store, policy))
+        told.append(commits(store))
+    assert told == [["a"], ["a"], ["c"]]
+
+
+def test_without_git_the_commit_is_what_the_environment_says(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(publishing, "CHECKOUT", tmp_path)
+    monkeypatch.setenv("ROBOJACKSON_COMMIT", "0123abc")
+    publishing._commit.cache_clear()
+    assert publishing._commit() == "0123abc"
+    publishing._commit.cache_clear()
