@@ -1,9 +1,10 @@
 """What makes a stage a cached Prefect task, and what its cache key is made of.
 
 The key: the task's name and text, its parsed configuration, the sha256 of the inputs' content, the
-digest of the modules that it reaches, the sha256 of the models it loads, and the versions of mujoco
-and mediapipe. Paths are never in it. A record whose file is gone or altered cannot be read, which
-Prefect takes for a miss (`tests/tasks/test_caching.py` holds it to that).
+digest of the modules that it reaches and of those that lay out the tables, the sha256 of the models
+it loads, and the versions of mujoco and mediapipe. Paths are never in it. A record whose file is
+gone or altered cannot be read, which Prefect takes for a miss (`tests/tasks/test_caching.py` holds
+it to that).
 """
 
 import hashlib
@@ -13,6 +14,7 @@ import textwrap
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
+from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
@@ -29,6 +31,8 @@ from tasks.digest import bare_tree, digest, imports_of
 P = ParamSpec("P")
 R = TypeVar("R")
 Models = Callable[[Mapping[str, Any]], list[str]]
+LAYOUT = ("storage.codecs", "storage.schemas")
+"""Modules that say how results stand in files."""
 VERSIONED = ("mujoco", "mediapipe")
 
 
@@ -58,6 +62,7 @@ class Stage:
             "parameters": identity(keyed),
             "modules": digest(self.roots),
             "models": self.models(parameters),
+            "layout": layout(),
             "versions": versions(),
         }
         text = json.dumps(facts, sort_keys=True)
@@ -111,6 +116,13 @@ def stage(
 def versions() -> dict[str, str]:
     """Of the packages whose version is part of every key."""
     return {name: version(name) for name in VERSIONED}
+
+
+@cache
+def layout() -> str:
+    """Digest of how results stand in files: a table of an older layout could not be read."""
+    files = [Path(str(import_module(name).__file__)) for name in LAYOUT]
+    return hashlib.sha256("".join(bare_tree(f.read_text()) for f in files).encode()).hexdigest()
 
 
 def identity(value: Any) -> Any:

@@ -10,6 +10,7 @@ import threading
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
+from importlib import resources
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -33,6 +34,18 @@ def digest(roots: Iterable[str], package: str = PACKAGE, folder: Path | None = N
     if known is None or not known.holds():
         known = _known[wanted] = _made(*wanted)
     return known.digest
+
+
+def drawn_by(task: str, templates: Iterable[str]) -> list[str]:
+    """Digests of what makes a page besides the modules that every stage is keyed by.
+
+    Args:
+        task: Name of the module of the stage, which puts the page's content together.
+        templates: Files of `robojackson.report`.
+    """
+    here = resources.files(f"{PACKAGE}.report")
+    files = [hashlib.sha256(here.joinpath(name).read_bytes()).hexdigest() for name in templates]
+    return [digest((task,), task.partition(".")[0]), *files]
 
 
 @dataclass(frozen=True)

@@ -1,14 +1,23 @@
 """From landmarks to the motion of the person."""
 
+from collections.abc import Mapping
+from typing import Any
+
 from robojackson.clips.track import LandmarkTrack
 from robojackson.mocap.recover import MocapConfig, recover
 from storage import tables
-from storage.artifact import Artifact
+from storage.artifact import Artifact, sha256_of_file
 from storage.store import Store
 from tasks.caching import stage
 
 
-@stage()
+def _models(parameters: Mapping[str, Any]) -> list[str]:
+    """Digest of the temporal network's weights, if it is used; the stage misses a missing file."""
+    config = parameters["config"].temporal
+    return [sha256_of_file(config.file)] if config.enabled and config.file.is_file() else []
+
+
+@stage(models=_models)
 def mocap(landmarks: Artifact, config: MocapConfig) -> Artifact:
     """SmplSequence."""
     store = Store.from_environment()

@@ -17,13 +17,15 @@ from storage.codecs import Rollout
 from storage.schemas import EPISODE_RECORD, EVALUATION_RECORD
 from storage.store import Store
 from tasks.caching import stage
+from tasks.digest import drawn_by
 from tasks.probe import info_of
 
+TEMPLATES = ("page.html", "page.css")
 LEFT_OUT = ("video", "info")
 """Artifacts that stay where they are: the user has the video already."""
 
 
-@stage()
+@stage(models=lambda parameters: drawn_by(__name__, TEMPLATES))
 def page(made: dict[str, Artifact], move: str, title: str) -> dict[str, Artifact]:
     """Everything under `dances/<move>-<digest>/`, and `page`, which shows it.
 

@@ -24,11 +24,16 @@ from storage.artifact import Artifact, sha256_of_file
 from storage.lock import locked
 from storage.store import Store
 from tasks.caching import identity, stage
+from tasks.digest import digest
 from tasks.process import run_process
 from tasks.progress import shown
 
+CODE = ("robojackson.rl.train",)
+"""Module of what the process runs."""
 DIGITS = 12
 """Of the digest in a run id."""
+WHOLE = 0.9
+"""Share of its minutes with which a training counts as whole."""
 OVERTIME_S = 300.0
 """What a training may take beyond its budget: start, compilation, last checkpoint."""
 
@@ -47,10 +52,16 @@ class RunLabels:
 
 
 def _models(parameters: Mapping[str, Any]) -> list[str]:
-    return _start(parameters["config"])
+    """Of the networks to start from; and whether the clock cuts it short: with more time the same
+    call then trains for all of its budget.
+    """
+    config = parameters["config"]
+    granted = _minutes(config, parameters.get("deadline"))
+    is_cut = config.minutes is not None and granted < WHOLE * config.minutes
+    return [*_start(config), *(["cut short"] if is_cut else [])]
 
 
-@stage(models=_models, reaches=("robojackson.rl.train",), unkeyed=("labels", "deadline", "limit_s"))
+@stage(models=_models, reaches=CODE, unkeyed=("labels", "deadline", "limit_s"))
 async def train(
     reference: Artifact,
     robot: RobotDescription,
@@ -89,10 +100,13 @@ async def train(
 def run_id_of(
     reference: Artifact, robot: RobotDescription, config: TrainConfig, labels: RunLabels
 ) -> str:
-    """Names and a digest of all that makes the training what it is; no clock, no machine."""
-    facts = json.dumps([identity([reference, robot, config]), _start(config)], sort_keys=True)
-    digest = hashlib.sha256(facts.encode()).hexdigest()[:DIGITS]
-    return f"{labels.move}-{labels.setup}-s{config.seed}-{digest}"
+    """Names and a digest of all that makes the training what it is, its code too; no clock, no
+    machine.
+    """
+    parts = [identity([reference, robot, config]), _start(config), digest(CODE)]
+    facts = json.dumps(parts, sort_keys=True)
+    short = hashlib.sha256(facts.encode()).hexdigest()[:DIGITS]
+    return f"{labels.move}-{labels.setup}-s{config.seed}-{short}"
 
 
 def _start(config: TrainConfig) -> list[str]:

@@ -4,6 +4,7 @@ import asyncio
 import importlib
 import shutil
 import sys
+import time
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -11,9 +12,12 @@ from pathlib import Path
 import pytest
 from prefect import flow
 
+from robojackson.mocap.recover import MocapConfig
+from robojackson.mocap.temporal.lift import TemporalConfig
+from robojackson.rl.config import TrainConfig
 from storage.artifact import Artifact
 from storage.store import Store
-from tasks import caching
+from tasks import caching, mocap, train
 from tasks.digest import digest
 
 FORMULA = '"""A formula."""\n\ndef formula(x):\n    """Twice."""\n    return 2 * x\n'
@@ -206,6 +210,30 @@ def test_a_version_is_part_of_the_key(monkeypatch: pytest.MonkeyPatch) -> None:
     before = stage.key({})
     monkeypatch.setattr(caching, "versions", lambda: dict.fromkeys(caching.VERSIONED, "99"))
     assert stage.key({}) != before
+
+
+def test_the_layout_of_tables_is_part_of_the_key(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A table with a column less than its schema could not be read out of the cache."""
+    stage = caching.Stage("s", "", (), lambda parameters: [], ())
+    before = stage.key({})
+    monkeypatch.setattr(caching, "layout", lambda: "another column")
+    assert stage.key({}) != before
+
+
+def test_the_weights_of_the_temporal_network_are_part_of_the_key(tmp_path: Path) -> None:
+    weights = tmp_path / "mine.safetensors"
+    config = MocapConfig(temporal=TemporalConfig(weights=str(weights)))
+    keys = []
+    for content in (b"a", b"b"):
+        weights.write_bytes(content)
+        keys.append(mocap._models({"config": config}))
+    assert keys[0] != keys[1]
+
+
+def test_a_training_that_the_clock_cuts_short_has_another_key() -> None:
+    config, now = TrainConfig(minutes=9.0), time.time()
+    whole, cut = (train._models({"config": config, "deadline": now + 60 * m}) for m in (9.0, 2.0))
+    assert (whole, cut) == (train._models({"config": config}), [*whole, "cut short"])
 
 
 def test_the_place_of_an_artifact_is_not_part_of_the_key() -> None:

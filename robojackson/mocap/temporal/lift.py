@@ -45,6 +45,11 @@ class TemporalConfig:
     hypothesis: int = 0
     seed: int = 0
 
+    @property
+    def file(self) -> Path:
+        """Where the weights are."""
+        return Path(self.weights) if self.weights else WEIGHTS
+
 
 @plain_dataclass(frozen=True)
 class Lifted:
@@ -81,7 +86,7 @@ def lift(
     Raises:
         BadWeights: the weights file is none of this network's.
     """
-    weights = load(Path(config.weights) if config.weights else WEIGHTS)
+    weights = load(config.file)
     sight = features.look(placed, local, visibility)
     places = features.time_grid(len(placed), fps)
     coarse = at(sight, places)
