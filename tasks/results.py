@@ -15,7 +15,7 @@ THRESHOLD = 0.8
 """Share of the longest mean episode of a move that counts as reached."""
 LAST = 0.1
 """Share of the budget whose episodes are the end."""
-JUDGED = ("return_own", "survived_s", "strict_success", "skill", "limb_gain")
+JUDGED = ("return_own", "survived_s", "stand_s", "strict_success", "skill", "limb_gain")
 Key = tuple[str, str]
 Seeds = Mapping[int, Mapping[str, np.ndarray]]
 Figures = dict[str, dict[Key, dict[int, float]]]
@@ -87,6 +87,8 @@ def _means(ask: Ask) -> str:
     known = [row["column_name"] for row in ask("DESCRIBE evaluations")]
     gains = [name for name in known if name.startswith("limb_gain_")]
     terms = {name: f"avg({name})" for name in JUDGED if name in known}
+    # Paper mode learns from this start alone; the others are moments of the motion.
+    terms["stand_s"] = "avg(survived_s) FILTER (WHERE phase < 0)"
     if gains:
         terms["limb_gain"] = f"avg(list_avg([{', '.join(gains)}]))"
     return ", ".join(f"{terms.get(name, 'NULL')} AS {name}" for name in JUDGED)

@@ -79,6 +79,7 @@ def report(
         notes = [*_few(study), *_starts(ask, study)]
     walking = {name: move.walking for name, move in moves.items()}
     claims = statistics.claims(figures[PRIMARY], walking, rng)
+    compared = statistics.comparisons(figures[PRIMARY], study.moves, rng)
     lines = table(figures, baselines, study, rng)
     plots = _plots(curves, figures, baselines, study)
     content = page.StudyContent(
@@ -86,6 +87,7 @@ def report(
         facts=facts,
         claims=claims,
         lines=lines,
+        comparisons=compared,
         moves=[_picture(name, moves[name], png) for name, png in (pictures or {}).items()],
         curves=plots["curves"],
         judged=plots["judged"],
@@ -95,7 +97,7 @@ def report(
     made = {
         "page": store.put(f"{folder}/index.html", page.render(content).encode()),
         "table": store.put(f"{folder}/table.csv", _csv(lines)),
-        "results": store.put(f"{folder}/results.json", _json(claims, lines)),
+        "results": store.put(f"{folder}/results.json", _json(claims, compared, lines)),
     }
     for plot in (*content.curves, *content.judged, *content.moves):
         made[plot.title] = store.put(f"{folder}/{_file(plot.title)}.png", plot.png)
@@ -232,10 +234,15 @@ def _csv(lines: Sequence[page.Line]) -> bytes:
     return out.getvalue().encode()
 
 
-def _json(claims: Sequence[statistics.Claim], lines: Sequence[page.Line]) -> bytes:
+def _json(
+    claims: Sequence[statistics.Claim],
+    compared: Sequence[statistics.Comparison],
+    lines: Sequence[page.Line],
+) -> bytes:
     told = {
         "primary": PRIMARY,
         "claims": [{**asdict(claim), "words": page.sentence(claim)} for claim in claims],
+        "comparisons": [asdict(comparison) for comparison in compared],
         "lines": [asdict(line) for line in lines],
     }
     return json.dumps(_plain(told), indent=1, allow_nan=False).encode()

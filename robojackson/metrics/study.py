@@ -16,6 +16,13 @@ from scipy import stats
 
 LEVEL = 0.95
 RESAMPLES = 9_999
+COMPARED = (
+    ("pretrain", "scratch"),
+    ("curiosity", "scratch-curiosity"),
+    ("scratch-curiosity", "scratch"),
+    ("curiosity", "pretrain"),
+)
+"""Setups that differ in one thing: twice in pretraining, twice in curiosity."""
 Verdict = Literal["holds", "not shown", "reversed", "not measured"]
 
 
@@ -70,6 +77,20 @@ class Claim:
     expected: int
     verdict: Verdict
     effect: Effect | None
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One setup against another, move by move.
+
+    Attributes:
+        treated, control: Setups that are compared.
+        effects: By move; None where it was not measured.
+    """
+
+    treated: str
+    control: str
+    effects: Mapping[str, Effect | None]
 
 
 def estimate(samples: Sequence[float], rng: np.random.Generator) -> Estimate:
@@ -173,6 +194,36 @@ def claims(
     return [_claim(figures, *question, rng) for question in asked]
 
 
+def comparisons(
+    figures: Mapping[tuple[str, str], Mapping[int, float]],
+    moves: Sequence[str],
+    rng: np.random.Generator,
+) -> list[Comparison]:
+    """The four effects of the 2 x 2 on every move alone, where a mean over moves may hide that one
+    gains what another loses.
+    """
+    return [
+        Comparison(
+            treated,
+            control,
+            {move: _effect(figures, treated, control, [move], rng) for move in moves},
+        )
+        for treated, control in COMPARED
+    ]
+
+
+def _effect(
+    figures: Mapping[tuple[str, str], Mapping[int, float]],
+    treated: str,
+    control: str,
+    moves: Sequence[str],
+    rng: np.random.Generator,
+) -> Effect | None:
+    """Pairs are seeds, each the mean over the moves that both setups have."""
+    pairs = _pairs(figures, treated, control, moves)
+    return effect([a for a, _ in pairs], [b for _, b in pairs], rng) if pairs else None
+
+
 def _claim(
     figures: Mapping[tuple[str, str], Mapping[int, float]],
     text: str,
@@ -182,11 +233,9 @@ def _claim(
     moves: Sequence[str],
     rng: np.random.Generator,
 ) -> Claim:
-    """Pairs are seeds, each the mean over the moves that both setups have."""
-    pairs = _pairs(figures, treated, control, moves)
-    if not pairs:
+    found = _effect(figures, treated, control, moves, rng)
+    if found is None:
         return Claim(text, treated, control, expected, "not measured", None)
-    found = effect([a for a, _ in pairs], [b for _, b in pairs], rng)
     return Claim(text, treated, control, expected, _verdict(found, expected), found)
 
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import jinja2
 
-from robojackson.metrics.study import Claim, Estimate
+from robojackson.metrics.study import Claim, Comparison, Effect, Estimate
 from robojackson.report.page import Plot
 
 FIGURES: Mapping[str, tuple[str, int, float]] = {
@@ -23,6 +23,7 @@ FIGURES: Mapping[str, tuple[str, int, float]] = {
     "steps_to": ("steps to the threshold", 0, 1.0),
     "return_own": ("return by the yardstick", 1, 1.0),
     "survived_s": ("survival, s", 2, 1.0),
+    "stand_s": ("survival from the stand, s", 2, 1.0),
     "strict_success": ("strict success, %", 0, 100.0),
     "skill": ("skill", 2, 1.0),
     "limb_gain": ("limb gain", 2, 1.0),
@@ -57,6 +58,7 @@ class StudyContent:
         facts: How it was done, by name.
         claims: What the paper says, and what was found.
         lines: The table.
+        comparisons: The yardstick's differences between setups, move by move.
         moves: For each move a picture: frame, recovered body, robot (Figures 2-4).
         curves: Learning curves (Figures 5-13).
         judged: Pictures of the judgement.
@@ -67,6 +69,7 @@ class StudyContent:
     facts: Mapping[str, Any] = field(default_factory=dict)
     claims: Sequence[Claim] = ()
     lines: Sequence[Line] = ()
+    comparisons: Sequence[Comparison] = ()
     moves: Sequence[Plot] = ()
     curves: Sequence[Plot] = ()
     judged: Sequence[Plot] = ()
@@ -76,7 +79,7 @@ class StudyContent:
 def render(content: StudyContent) -> str:
     """The page as HTML, one file with everything in it."""
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
-    here = resources.files("robojackson.report")
+    here, compared = resources.files("robojackson.report"), content.comparisons
     template = environment.from_string(here.joinpath("study.html").read_text("utf-8"))
     return template.render(
         content=content,
@@ -86,6 +89,8 @@ def render(content: StudyContent) -> str:
             (line, [cell(line.values.get(key), key, line.seeds) for key in FIGURES])
             for line in content.lines
         ],
+        effects=[(c, [_difference(found) for found in c.effects.values()]) for c in compared],
+        compared_on=list(compared[0].effects) if compared else [],
         claims=[(claim, sentence(claim)) for claim in content.claims],
         groups=[
             ("The moves", _encoded(content.moves)),
@@ -126,6 +131,15 @@ def sentence(claim: Claim) -> str:
         least = claim.effect.smallest_p
         told += f", p = {claim.effect.p:.2g} (no smaller than {least:.2g} with so few)"
     return f"{told}; {100 * claim.effect.improvement:.0f} % chance that one run of it is better."
+
+
+def _difference(found: Effect | None) -> str:
+    if found is None:
+        return "–"
+    told = f"{found.difference.mean:+,.1f}"
+    if math.isfinite(found.difference.low):
+        told += f" [{found.difference.low:+,.1f}, {found.difference.high:+,.1f}]"
+    return told
 
 
 def _encoded(plots: Sequence[Plot]) -> list[tuple[Plot, str]]:

@@ -38,6 +38,7 @@ def publish(store: Store, move: str, setup: str, seed: int) -> None:
         for i, s in enumerate(share)
     ]  # fmt: skip
     rows = [rollout(names, "trained", WORTH[setup] + 0.01 * seed), rollout(names, "statue", 0.5)]
+    rows.append({**rows[1], "phase": -1, "survived_s": 0.9})
     given = {
         "episodes": store.keep("t", "e.parquet", tables.encode_rows(EPISODE_RECORD, episodes)),
         "evaluations": store.keep("t", "v.parquet", tables.encode_rows(EVALUATION_RECORD, rows)),
@@ -80,12 +81,23 @@ def test_the_claims_are_about_the_yardstick_and_have_its_sign(folder: Path) -> N
     assert said["Curiosity helps on dances"]["verdict"] == "not measured"
 
 
+def test_an_effect_is_told_for_every_move_alone(folder: Path) -> None:
+    first, *_, last = results(folder)["comparisons"]
+    assert (first["treated"], first["control"]) == ("pretrain", "scratch")
+    means = {move: found["difference"]["mean"] for move, found in first["effects"].items()}
+    assert means == pytest.approx({"hip_shake": 2.0, "walk": 2.0})
+    assert last["effects"] == {"hip_shake": None, "walk": None}
+    assert "<td>+2.0 [+2.0, +2.0]</td>" in (folder / "index.html").read_text()
+
+
 def test_the_table_has_a_line_a_move_and_setup_and_what_the_statue_does(folder: Path) -> None:
     rows = list(csv.DictReader(io.StringIO((folder / "table.csv").read_text())))
     found = {(row["move"], row["setup"]): row for row in rows}
     assert set(found) == {(m, s) for m in STUDY.moves for s in ("scratch", "pretrain", "statue")}
     assert float(found["walk", "pretrain"]["return_own"]) == pytest.approx(3.015)
     assert float(found["walk", "statue"]["return_own"]) == pytest.approx(0.5)
+    assert float(found["walk", "statue"]["survived_s"]) == pytest.approx(0.7)
+    assert float(found["walk", "statue"]["stand_s"]) == pytest.approx(0.9)
 
 
 def test_steps_to_the_threshold_are_those_of_the_curve(folder: Path) -> None:
