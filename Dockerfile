@@ -1,5 +1,5 @@
 # The worker's image: flows, trainings and the `robojackson` command, as a user without rights.
-#   docker build -t robojackson:0.1.0 [--build-arg TORCH_INDEX=...] .
+#   docker build -t robojackson:0.1.0 [--build-arg TORCH_INDEX=...] [--build-arg GIT_COMMIT=...] .
 FROM python:3.11-slim-bookworm
 
 ENV DEBIAN_FRONTEND=noninteractive PIP_NO_CACHE_DIR=1 PYTHONUNBUFFERED=1
@@ -18,5 +18,7 @@ ARG TORCH_INDEX=""
 COPY --chown=jackson:jackson . .
 RUN TORCH_INDEX="$TORCH_INDEX" sh tools/bootstrap.sh install
 
-ENV PATH=/app/.venv/bin:$PATH ROBOJACKSON_STORE=/app/store
+# Last: it changes with every build. Tables say which commit made them; the image has no git.
+ARG GIT_COMMIT=""
+ENV PATH=/app/.venv/bin:$PATH ROBOJACKSON_STORE=/app/store ROBOJACKSON_COMMIT=$GIT_COMMIT
 CMD ["robojackson", "doctor"]
