@@ -52,9 +52,10 @@ def settle(config: str, overrides: Mapping[str, Any]) -> "PipelineConfig":
     from configs.loader import load
     from configs.pipeline import PipelineConfig
     from robojackson.retarget.robot import RobotDescription, load_robot
+    from robojackson.rl.paper_mode import require_trainable
 
     settings = load(PipelineConfig, config, overrides)
-    load_robot(load(RobotDescription, f"robots/{settings.robot}"))
+    require_trainable(load_robot(load(RobotDescription, f"robots/{settings.robot}")))
     return settings
 
 

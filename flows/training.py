@@ -6,6 +6,7 @@ it, and it holds a lock on its folder, so that no two trainings share a checkpoi
 
 import ctypes
 import json
+import logging
 import math
 import os
 import signal
@@ -28,8 +29,12 @@ from storage.store import Store
 if TYPE_CHECKING:
     from robojackson.rl.config import TrainConfig
 
+log = logging.getLogger(__name__)
+
 PROGRESS = "progress.json"
 """How far a training is, in its folder."""
+CHECKPOINT = "checkpoint"
+"""Folder that a training can go on from, in its own."""
 DIE_WITH_PARENT = 1
 """PR_SET_PDEATHSIG of prctl(2)."""
 USUAL_MINUTES = 9.0
@@ -59,6 +64,7 @@ def train(
     from robojackson.motion.reference import ReferenceMotion
     from robojackson.retarget.scorecard import check, told
     from robojackson.rl.config import TrainConfig
+    from robojackson.rl.paper_mode import require_trainable
     from robojackson.rl.shares import both_readings
     from robojackson.rl.shares import told as asks_told
     from robojackson.rl.train import Hooks
@@ -67,28 +73,29 @@ def train(
     config = _budgeted(load(TrainConfig, _setup(setup), overrides))
     motion = single.read_table(ReferenceMotion, reference)
     robot = single.robot_of(motion)
+    require_trainable(robot)
     if not force:
         check(told(motion))
-    stop = _Wish()
+    stop = _Wish(out)
     for wish in (signal.SIGINT, signal.SIGTERM):
         signal.signal(wish, stop.heard)
     with single.results_in(out) as store, locked(out), console.ticker() as tell:
-        log = _EpisodeLog(store, _common(config, move or _move_of(reference), setup, run_id))
+        rows = _EpisodeLog(store, _common(config, move or _move_of(reference), setup, run_id))
         try:
             asked = asks_told(both_readings(robot, motion, config.environment))
             if asked:
                 tell(asks(asked))
-            hooks = Hooks(lambda row: _told(row, out, tell), log.add, log.save, stop)
+            hooks = Hooks(lambda row: _told(row, out, tell), rows.add, rows.save, stop)
             result = learn(motion, robot, config, out, hooks)
         except KeyboardInterrupt:
-            raise console.Interrupted(
-                f"the checkpoint is in {out}; resume: {console.same_command()}"
-            ) from None
+            there = (out / CHECKPOINT).exists()
+            kept = f"the checkpoint is in {out}; resume" if there else "nothing learnt yet; again"
+            raise console.Interrupted(f"{kept}: {console.same_command()}") from None
         finally:
-            if len(log):
-                log.save()
-        if not len(log):
-            log.save()
+            if len(rows):
+                rows.save()
+        if not len(rows):
+            rows.save()
     return {
         "policy": str(result.policy),
         "reference": str(reference),
@@ -100,7 +107,7 @@ def train(
         "updates": result.updates,
         "seconds": result.seconds,
         "stopped": result.stopped,
-        "episodes": len(log),
+        "episodes": len(rows),
     }
 
 
@@ -150,8 +157,8 @@ def die_with(parent: int) -> None:
 class _Wish:
     """Whether somebody wants the training to stop; who asks twice does not wait for it."""
 
-    def __init__(self) -> None:
-        self._heard = False
+    def __init__(self, out: Path) -> None:
+        self._out, self._heard = out, False
 
     def __call__(self) -> bool:
         return self._heard
@@ -161,6 +168,7 @@ class _Wish:
         if self._heard:
             raise KeyboardInterrupt
         self._heard = True
+        log.warning("stopping after this round of updates, with a checkpoint in %s", self._out)
 
 
 class _EpisodeLog:

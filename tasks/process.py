@@ -114,11 +114,11 @@ def _tell(process: Process, what: signal.Signals) -> None:
 
 def _cause(run_id: str, code: int, work: Path, last: deque[str]) -> TrainingFailed:
     """Which run died, why, where its log is."""
-    told = f"log: {work / LOG}; the same command resumes it"
+    told = f"log: {work / LOG}"
     if code < 0:
         how = f"was killed by {signal.Signals(-code).name}"
         if -code == signal.SIGKILL:
             how += " (by hand, or out of memory)"
-        return TrainingCrashed(f"run {run_id} {how}; {told}")
+        return TrainingCrashed(f"run {run_id} {how}; {told}; the same command resumes it")
     said = last[-1] if last else "it said nothing"
     return TrainingFailed(f"run {run_id} ended with exit code {code}: {said}; {told}")

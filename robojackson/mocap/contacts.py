@@ -24,7 +24,7 @@ JOINT = np.array(list(product(STATES, repeat=len(CONTACT_POINTS))))
 IMPOSSIBLE = -1e9
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
 class ContactConfig:
     """What the states look like. Tuned on dance_a, dance_b and walk.
 

@@ -32,7 +32,7 @@ LEAST_WEIGHT = 1e-4
 ROUNDS = 6
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
 class GravityConfig:
     """How far balance is believed. Tuned on the nine bundled clips.
 

@@ -20,7 +20,7 @@ LARGEST_TIP = np.radians(40.0)
 TIP_HZ = 6.0
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
 class LockConfig:
     """Weights of the root's path; only their ratios matter.
 

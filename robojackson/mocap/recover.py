@@ -29,7 +29,7 @@ from robojackson.mocap.temporal.lift import TemporalConfig, lift
 from robojackson.motion.smpl import SmplSequence
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
 class MocapConfig:
     """How landmarks become a motion.
 
@@ -46,10 +46,10 @@ class MocapConfig:
     """
 
     method: hybrik.Method = "adaptive"
-    focal_px: float | None = None
-    cutoff_hz: float = 4.0
-    depth_cutoff_hz: float = 1.5
-    bone_trust: float = 0.6
+    focal_px: float | None = Field(default=None, gt=0)
+    cutoff_hz: float = Field(default=4.0, gt=0)
+    depth_cutoff_hz: float = Field(default=1.5, gt=0)
+    bone_trust: float = Field(default=0.6, ge=0, le=1)
     temporal: TemporalConfig = Field(default_factory=TemporalConfig)
     refine: RefineConfig = Field(default_factory=RefineConfig)
     gravity: ground.GravityConfig = Field(default_factory=ground.GravityConfig)

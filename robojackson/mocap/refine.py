@@ -36,7 +36,7 @@ HIPS = [ORDER.index("left_hip"), ORDER.index("right_hip")]
 LEAST_VISIBILITY = 0.1
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
 class RefineConfig:
     """Standard deviations of the four terms.
 

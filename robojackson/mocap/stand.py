@@ -23,7 +23,7 @@ LIFTS = 3
 ABOVE = np.array([0.0, 0.0, 1.0])
 
 
-@config_dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
 class StandConfig:
     """Attributes:
     floor_cutoff_hz: Zero-phase low-pass of the height of the floor under the feet, hertz.

@@ -25,6 +25,7 @@ INK = "#8a919c"
 ACCENT, SECOND, GOOD, WARM = "#3b82f6", "#f59e42", "#3fae6b", "#e0607e"
 BASELINE_COLOURS = {
     "statue": "#a78bfa", "mean_pose": "#e879b9", "zero_residual": GOOD, "random": "#9aa3b2",
+    "hold": WARM,
 }  # fmt: skip
 TRAINED = "trained"
 BINS = 60

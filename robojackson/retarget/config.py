@@ -10,7 +10,7 @@ from robojackson.retarget.problem import Weights
 from robojackson.retarget.solver import SolverConfig
 
 
-@config_dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
 class RepairConfig:
     """How far a motion may be bent and slowed down so that the robot can do it.
 
@@ -33,7 +33,7 @@ class RepairConfig:
     slowest: float = Field(default=0.5, ge=0.25, le=1)
 
 
-@config_dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
 class RetargetConfig:
     """How to retarget.
 
@@ -57,7 +57,7 @@ class RetargetConfig:
     method: Literal["optimise", "paper", "framefix"] = "optimise"
     cyclic: Literal["auto", "yes", "no"] = "auto"
     tempo: Literal["auto"] | Annotated[float, Field(ge=0.25, le=2.0)] = "auto"
-    seed: int = 0
+    seed: int = Field(default=0, ge=0)
     starts: int = Field(default=5, ge=1)
     lean_deg: float = Field(default=9.0, ge=0, lt=45)
     stands_share: float = Field(default=0.7, ge=0, le=1)

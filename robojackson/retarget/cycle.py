@@ -32,7 +32,7 @@ _WHOLE_SEAM_M = 0.05  # a clip that was cut as a loop stays whole up to this sea
 _SECONDS = 0.1  # velocity differences count over this time beside pose differences
 
 
-@config_dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
 class CycleConfig:
     """When a clip counts as cyclic.
 

@@ -16,7 +16,7 @@ KEYPOINTS: tuple[str, ...] = (
 )  # fmt: skip
 TOES: tuple[str, ...] = ("left_toe", "right_toe")
 """Keypoints that a robot with ankles may have, too: they aim its feet."""
-_STRICT = ConfigDict(extra="forbid")
+_STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
 Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 Offset = tuple[float, float, float]
 

@@ -28,9 +28,10 @@ BARS: Mapping[str, float] = {
 """Largest allowed value of each gated figure (issue 2, stage 4)."""
 
 _FINDINGS = 2  # that an error message tells
+_TRIM = "(`robojackson dance CLIP --start S --end S`)"
 _MENDING = {
-    "infeasible_share": "tempo: auto, a shorter range of the clip, or a stronger robot",
-    "fallen_share": "a range of the clip without it",
+    "infeasible_share": f"tempo: auto, a shorter range of the clip {_TRIM}, or a stronger robot",
+    "fallen_share": f"a range of the clip without it {_TRIM}",
     "seam_deg": "cyclic: no",
     "seam_mm": "cyclic: no",
     "seam_speed_rad_s": "cyclic: no",

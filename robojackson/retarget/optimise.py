@@ -203,7 +203,7 @@ def harden(problem: Problem, solution: Solution, config: RetargetConfig) -> Solu
         broken = faults(problem, solution.qpos, config)
         if not broken.heavier_weights_help:
             break
-        _log.info("hardening: %s", broken)
+        _log.debug("hardening: %s", broken)
         old = problem.weights
         weights = replace(
             old,

@@ -15,7 +15,7 @@ from robojackson.retarget.targets import Targets
 from robojackson.retarget.wrench import Tolerance
 
 
-@config_dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
 class Weights:
     """Weights of the cost; the keypoints' own are in the robot description.
 

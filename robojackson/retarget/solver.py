@@ -28,7 +28,7 @@ _OVERLAP = 24  # steps that a window looks beyond what is kept of it
 _HELD = 2  # steps of the window before it that an acceleration reaches back to
 
 
-@config_dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
 class SolverConfig:
     """When the solver stops.
 

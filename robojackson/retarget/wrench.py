@@ -19,7 +19,7 @@ _PUSH_PRICE = 1e-4  # of pushes that leave the same, the smallest are taken
 _TORQUE_PRICE = 1e-4  # ... and those with the smallest torques
 
 
-@config_dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
 class Tolerance:
     """What may be left over in a step that counts as feasible: a tracking robot makes up for it.
 

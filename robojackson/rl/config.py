@@ -25,7 +25,7 @@ __all__ = [
     "TrainConfig",
 ]
 
-STRICT = ConfigDict(extra="forbid")
+STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -95,23 +95,23 @@ class RewardConfig:
     """
 
     joints: float = 0.20
-    joints_width: float = 0.25
+    joints_width: float = Field(default=0.25, gt=0)
     sites: float = 0.15
-    sites_width: float = 0.10
+    sites_width: float = Field(default=0.10, gt=0)
     hands: float = 0.10
-    hands_width: float = 0.12
+    hands_width: float = Field(default=0.12, gt=0)
     orientation: float = 0.10
-    orientation_width: float = 0.4
+    orientation_width: float = Field(default=0.4, gt=0)
     velocity: float = 0.05
-    velocity_width: float = 0.6
+    velocity_width: float = Field(default=0.6, gt=0)
     joint_speed: float = 0.05
-    joint_speed_width: float = 2.0
+    joint_speed_width: float = Field(default=2.0, gt=0)
     limb_speed: float = 0.20
-    limb_speed_width: float = 0.6
+    limb_speed_width: float = Field(default=0.6, gt=0)
     height: float = 0.10
-    height_width: float = 0.1
+    height_width: float = Field(default=0.1, gt=0)
     drift: float = 0.10
-    drift_width: float = 0.3
+    drift_width: float = Field(default=0.3, gt=0)
     action_rate: float = 0.02
     fine: float = Field(default=0.5, ge=0, le=1)
     narrow: float = Field(default=0.35, gt=0, le=1)
@@ -202,7 +202,7 @@ class TrainConfig:
 
     mode: Literal["track", "paper"] = "track"
     trainer: Literal["sbx", "sb3"] = "sbx"
-    seed: int = Field(default=0, ge=0)
+    seed: int = Field(default=0, ge=0, lt=2**32)
     steps: int | None = Field(default=None, ge=1)
     minutes: float | None = Field(default=None, gt=0)
     cpu_minutes: float | None = Field(default=None, gt=0)

@@ -4,7 +4,7 @@ from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
 class EvaluateConfig:
     """How a policy is judged on stock physics.
 
@@ -23,7 +23,7 @@ class EvaluateConfig:
     seconds: float = Field(default=10.0, gt=0)
     phases: int = Field(default=24, ge=1)
     resets: int = Field(default=3, ge=1)
-    seed: int = Field(default=0, ge=0)
+    seed: int = Field(default=0, ge=0, lt=2**32)
     joint_noise: float = Field(default=0.02, ge=0)
     joint_speed_noise: float = Field(default=0.1, ge=0)
     root_speed_noise: float = Field(default=0.02, ge=0)

@@ -63,7 +63,7 @@ POINT_WEIGHTS = {
 hand for a wrist."""
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
 class PaperConfig:
     """The paper's task on stock Humanoid-v5: torques, 348 observations, no phase.
 

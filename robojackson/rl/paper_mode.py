@@ -12,13 +12,14 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from robojackson.errors import UnknownName
+from robojackson.errors import BadConfiguration, UnknownName
 from robojackson.geometry.rotations import heading, quat_multiply
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.retarget.robot import Robot
 from robojackson.rl.clip import Clip, ClipStep
 from robojackson.rl.config import ControlConfig, PaperConfig
 from robojackson.rl.mode import Beginning, Score
+from robojackson.rl.paper_config import POINT_WEIGHTS
 from robojackson.rl.paper_reward import PaperState, has_fallen, miss, paper_terms, ramp
 from robojackson.rl.physics import Simulation
 from robojackson.rl.stock import (
@@ -109,6 +110,21 @@ class PaperMode:
         here = self.sim.points - self.sim.points[:, pelvis, None]
         there = at.points - at.points[:, pelvis, None]
         return np.linalg.norm(here - there, axis=-1).mean(-1)
+
+
+def require_trainable(robot: Robot) -> None:
+    """Refuse a robot that the rewards cannot look at.
+
+    Raises:
+        BadConfiguration: it lacks points that they name.
+    """
+    known = (*robot.keypoint_names, *robot.body_names)
+    missing = [name for name in (PELVIS, *POINT_WEIGHTS) if name not in known]
+    if missing:
+        raise BadConfiguration(
+            f"training is not possible on robot {robot.description.name!r} yet: it has no "
+            f"{', '.join(missing)}; retargeting, its video and export are"
+        )
 
 
 class PaperPoints:

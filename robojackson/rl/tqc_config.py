@@ -47,7 +47,7 @@ PRESETS: dict[str, dict[str, Any]] = {
 """`dance` is how we teach tracking: the defaults below."""
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
 class TqcConfig:
     """TQC and how often it learns.
 
@@ -73,7 +73,7 @@ class TqcConfig:
     n_envs: int = Field(default=32, ge=1)
     steps_per_round: int = Field(default=8, ge=1)
     updates_per_round: int = Field(default=24, ge=1)
-    learning_rate: float = Field(default=5e-4, gt=0)
+    learning_rate: float = Field(default=5e-4, gt=0, lt=1)
     buffer: int = Field(default=300_000, ge=1_000, le=300_000)
     warmup: int = Field(default=2_000, ge=1)
     batch: int = Field(default=256, ge=1)

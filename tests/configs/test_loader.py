@@ -1,5 +1,6 @@
 """The loader reads what YAML says and refuses what it does not know."""
 
+import math
 from pathlib import Path
 from typing import Any, Literal
 
@@ -172,8 +173,19 @@ def test_numbers_with_which_nothing_would_be_learnt_are_refused(
         loader.load(TrainConfig, None, given)
 
 
-@pytest.mark.parametrize("key", ["threads=0", "joint_noise=-1", "seed=-1", "max_lag=-0.1"])
-def test_numbers_with_which_nothing_can_be_judged_are_refused(key: str) -> None:
-    name, value = key.split("=")
-    with pytest.raises(BadConfiguration, match=name):
-        loader.load(PipelineConfig, None, {f"evaluate.{name}": float(value)})
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        *[("evaluate.threads", 0), ("evaluate.joint_noise", -1.0), ("evaluate.seed", -1)],
+        *[("evaluate.max_lag", -0.1), ("evaluate.seconds", math.inf)],
+        *[("mocap.cutoff_hz", -1.0), ("mocap.depth_cutoff_hz", 0.0), ("mocap.focal_px", -5.0)],
+        *[("mocap.bone_trust", math.nan), ("mocap.focal_px", math.inf), ("mocap.bone_trust", 5.0)],
+        *[("retarget.seed", -1), ("retarget.solver.damping", math.inf)],
+        *[("retarget.weights.height", math.inf), ("train.seed", 2**32)],
+        *[("train.track.episode_seconds", math.inf), ("train.track.reward.joints", math.nan)],
+        *[("train.track.reward.sites_width", 0.0), ("train.tqc.learning_rate", math.inf)],
+    ],
+)
+def test_numbers_that_no_stage_can_use_are_refused(key: str, value: float) -> None:
+    with pytest.raises(BadConfiguration, match=key.rpartition(".")[2]):
+        loader.load(PipelineConfig, None, {key: value})

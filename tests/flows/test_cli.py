@@ -226,6 +226,7 @@ def test_ctrl_c_in_training_is_resumed_by_the_same_command(tmp_path: Path, short
         rest = process.stderr.read()
     assert "of a perfect dance" in asked
     assert "steps" in progress
+    assert "stopping after this round" in rest
     assert (process.returncode, rest.count("resume: robojackson train")) == (130, 1)
     first = int(progress.split()[0].replace(",", ""))
     again = robojackson(*words, f"--steps={first + 200}")

@@ -9,12 +9,12 @@ from gymnasium.utils.env_checker import check_env as check_gymnasium
 from stable_baselines3.common.env_checker import check_env as check_sb3
 
 from configs.loader import load, names
-from robojackson.errors import UnknownName
+from robojackson.errors import BadConfiguration, UnknownName
 from robojackson.geometry.rotations import heading, quat_angle
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.retarget.robot import Robot
 from robojackson.rl.config import PaperConfig, TrackConfig, TrainConfig
-from robojackson.rl.paper_mode import facing_ahead
+from robojackson.rl.paper_mode import facing_ahead, require_trainable
 from robojackson.rl.paper_reward import Miss, PaperState, has_fallen, miss, paper_terms, ramp
 from robojackson.rl.shares import both_readings, shares
 from robojackson.rl.standing import standing
@@ -231,6 +231,13 @@ def test_the_curriculum_goes_by_the_episodes_of_the_run(
 def test_weights_that_weigh_nothing_are_refused(weights: dict[str, float]) -> None:
     with pytest.raises(ValueError, match="one at least must count"):
         PaperConfig(weights=weights)
+
+
+def test_a_robot_without_the_points_of_the_rewards_is_refused_in_words(robot: Robot) -> None:
+    bodies = tuple(name for name in robot.body_names if name != "lwaist")
+    require_trainable(robot)
+    with pytest.raises(BadConfiguration, match=r"not possible on robot 'humanoid' yet.*no lwaist"):
+        require_trainable(dataclasses.replace(robot, body_names=bodies))
 
 
 def test_a_point_without_a_body_is_refused(robot: Robot, sway: ReferenceMotion) -> None:

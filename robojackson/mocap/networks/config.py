@@ -9,7 +9,7 @@ from pydantic.dataclasses import dataclass
 from robojackson.errors import BadConfiguration
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
 class NetworkConfig:
     """HybrIK's network, and NIKI after it, instead of BlazePose's metres.
 

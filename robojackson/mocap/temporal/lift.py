@@ -24,7 +24,7 @@ HIDDEN_BELOW = 0.35
 """A limb whose landmarks are less visible than this counts as hidden."""
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
 class TemporalConfig:
     """How the temporal network is used.
 
