@@ -172,7 +172,17 @@ def _explain(cls: type, cause: ValidationError) -> str:
         return f"key {where!r} is missing"
     if error["type"] == "value_error" and isinstance(error["input"], Mapping):
         return str(error["ctx"]["error"])  # values that do not go together, each right by itself
-    return f"{where!r} is {error['input']!r}: {error['msg']}"
+    return f"{where!r} is {error['input']!r}: {_wanted(cause)}"
+
+
+def _wanted(cause: ValidationError) -> str:
+    """What the first wrong value should be; of a union, every alternative."""
+    errors = cause.errors()
+    key = errors[0]["loc"]
+    if not key or not _is_branch(key[-1]):
+        return errors[0]["msg"]
+    told = [error["msg"] for error in errors if error["loc"][:-1] == key[:-1]]
+    return " or ".join([told[0], *(each.removeprefix("Input should be ") for each in told[1:])])
 
 
 def _keys(cause: ValidationError) -> list[str]:

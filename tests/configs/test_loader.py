@@ -2,7 +2,7 @@
 
 import math
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import pytest
 from pydantic import ConfigDict, Field
@@ -32,6 +32,7 @@ class Outer:
     inner: Inner = Field(default_factory=Inner)
     maybe: Inner | None = None
     sites: dict[str, Inner] = Field(default_factory=dict)
+    speed: Literal["auto"] | Annotated[float, Field(ge=0.25)] = "auto"
 
 
 @pytest.fixture
@@ -80,6 +81,12 @@ def test_a_wrong_value_is_refused_with_its_path_and_itself(write) -> None:
 def test_a_value_out_of_its_range_is_refused(write) -> None:
     with pytest.raises(BadConfiguration, match="greater than or equal to 0"):
         loader.load(Outer, write("seed: -1"))
+
+
+def test_a_value_that_fits_no_alternative_is_told_all_of_them(write) -> None:
+    told = r"'speed' is -1: Input should be 'auto' or greater than or equal to 0\.25$"
+    with pytest.raises(BadConfiguration, match=told):
+        loader.load(Outer, write("speed: -1"))
 
 
 @pytest.mark.parametrize("key", ["sed", "inner.widht", "inner.widht.more"])
