@@ -83,7 +83,7 @@ def find(name_or_path: str | Path) -> Path:
     if path.is_file() and path.resolve().is_relative_to(FOLDER.resolve()):
         return path
     folder = given.parent.name
-    kind = folder.removesuffix("s") or "configuration"
+    kind = re.sub("ies$", "y", folder).removesuffix("s") or "configuration"
     raise UnknownName(kind, given.name, _told(path), names(folder))
 
 

@@ -152,6 +152,12 @@ def test_an_unknown_name_lists_the_known_ones() -> None:
         loader.load(Outer, "robots/c3po")
 
 
+@pytest.mark.parametrize(("folder", "kind"), [("studies", "study"), ("moves", "move")])
+def test_what_is_unknown_is_called_what_it_is(folder: str, kind: str) -> None:
+    with pytest.raises(UnknownName, match=f"unknown {kind} 'nosuch'"):
+        loader.find(f"{folder}/nosuch")
+
+
 def test_a_name_does_not_lead_out_of_the_package() -> None:
     with pytest.raises(UnknownName):
         loader.find("../tests/configs/given")
