@@ -104,11 +104,16 @@ def score(
     set_: Set = None,
     as_json: Json = False,
 ) -> Answer:
-    """How steady the dancer is seen (Algorithm 1): missing joints plus jitter, lowest is best."""
+    """How steady the dancer is seen (Algorithm 1): missing joints plus jitter, lowest is best.
+
+    Exit code 1 where a video that is named cannot be read; one inside a folder is only told.
+    """
     from flows import scoring
 
     log_to_stderr()
-    return Answer(scoring.score(video, config, chosen(set_, {"dancer.number": person})))
+    scored = scoring.score(video, config, chosen(set_, {"dancer.number": person}))
+    unread = {told["video"] for told in scored["videos"] if "error" in told}
+    return Answer(scored, code=1 if unread & set(map(str, video)) else 0)
 
 
 @app.command()

@@ -121,6 +121,14 @@ def test_a_readable_video_is_scored_beside_one_that_is_not(tmp_path: Path) -> No
     (tmp_path / "notes.mp4").write_text("this is not a video")
     code, out, _ = invoke("score", tmp_path / "notes.mp4", tmp_path / "more", "--json")
     told = [set(video) & {"error", "stability_score"} for video in json.loads(out)["videos"]]
+    assert (code, told) == (1, [{"error"}, {"stability_score"}])
+
+
+def test_only_a_video_that_is_named_must_be_readable(tmp_path: Path) -> None:
+    write_video(tmp_path / "empty.mp4", 5)
+    (tmp_path / "notes.mp4").write_text("this is not a video")
+    code, out, _ = invoke("score", tmp_path, "--json")
+    told = [set(video) & {"error", "stability_score"} for video in json.loads(out)["videos"]]
     assert (code, told) == (0, [{"error"}, {"stability_score"}])
 
 
