@@ -56,7 +56,7 @@ def dance(
         typer.Argument(help="A video, a folder of candidates, or the name of a dance to look for."),
     ] = None,
     minutes: Minutes = None,
-    robot: Annotated[str | None, typer.Option("--robot", help="Name of a robot.")] = None,
+    robot: Robot = None,
     trainer: Trainer = None,
     seed: Seed = None,
     person: Person = None,
@@ -154,7 +154,7 @@ def mocap(
 def retarget(
     smpl: Annotated[Path, typer.Argument(help="smpl.parquet of `robojackson mocap`.")],
     out: Folder,
-    robot: Robot = "humanoid",
+    robot: Robot = None,
     method: Annotated[
         Literal["optimise", "paper", "framefix"] | None,
         typer.Option(help="Ours, the paper's Table I, or that with its axes corrected."),
@@ -172,8 +172,8 @@ def retarget(
 
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     log_to_stderr()
-    overrides = chosen(set_, {"retarget.method": method})
-    made = single.retarget(smpl, out, robot, config, overrides)
+    overrides = chosen(set_, {"retarget.method": method, "robot": robot})
+    made = single.retarget(smpl, out, config, overrides)
     if video:
         from flows.look import look
 

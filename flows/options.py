@@ -43,7 +43,7 @@ Quality = Annotated[
     Literal["lite", "full", "heavy", "best"] | None,
     typer.Option(help="Pose model; best: full and heavy vote, at a third of the speed."),
 ]
-Robot = Annotated[str, typer.Option("--robot", help="Name of a robot of configs/robots.")]
+Robot = Annotated[str | None, typer.Option("--robot", help="Name of a robot of configs/robots.")]
 Trainer = Annotated[
     Literal["sbx", "sb3"] | None, typer.Option(help="sbx (JAX, fast) or sb3 (the reference).")
 ]

@@ -76,7 +76,7 @@ def mocap(
     }
 
 
-def retarget(smpl: Path, out: Path, robot: str, config: str, overrides: Overrides) -> Figures:
+def retarget(smpl: Path, out: Path, config: str, overrides: Overrides) -> Figures:
     """reference.parquet and scorecard.json of a motion, good or bad; `gate` tells which."""
     from configs.pipeline import PipelineConfig
     from robojackson.motion.smpl import SmplSequence
@@ -85,7 +85,7 @@ def retarget(smpl: Path, out: Path, robot: str, config: str, overrides: Override
 
     began = time.monotonic()
     settings = load(PipelineConfig, config, overrides)
-    machine = _robot(robot)
+    machine = _robot(settings.robot)
     sequence = read_table(SmplSequence, smpl)
     with results_in(out) as store:
         reference = to_robot(sequence, machine, settings.retarget)

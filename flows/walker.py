@@ -91,7 +91,7 @@ def _reference(kind: str, out: Path, robot: "Robot") -> Path:
             store.put(made.name, tables.encode(standing(robot)))
     elif not made.exists():
         single.mocap(bundled(WALK), out, PIPELINE, {})
-        single.retarget(out / "smpl.parquet", out, ROBOT, PIPELINE, {})
+        single.retarget(out / "smpl.parquet", out, PIPELINE, {"robot": ROBOT})
     return made
 
 

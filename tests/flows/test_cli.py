@@ -64,6 +64,16 @@ def unknown_robot(folder: Path) -> list[object]:
     return ["retarget", folder / "smpl.parquet", "-o", folder / "out", "--robot", "c3po"]
 
 
+def unknown_robot_in_set(folder: Path) -> list[object]:
+    return ["retarget", folder / "smpl.parquet", "-o", folder / "out", "--set", "robot=c3po"]
+
+
+def unknown_robot_in_yaml(folder: Path) -> list[object]:
+    (folder / "mine.yaml").write_text("robot: c3po\n")
+    words = ["retarget", folder / "smpl.parquet", "-o", folder / "out"]
+    return [*words, "--config", folder / "mine.yaml"]
+
+
 def typo_in_yaml(folder: Path) -> list[object]:
     (folder / "mine.yaml").write_text("mocap: {cutof_hz: 5}\n")
     clip = ROOT / "clips" / "hip_shake.mp4"
@@ -91,6 +101,8 @@ def missing_file(folder: Path) -> list[object]:
         (nobody, "NoPersonFound"),
         (one_frame, "TrackTooShort"),
         (unknown_robot, "unknown robot 'c3po'"),
+        (unknown_robot_in_set, "unknown robot 'c3po'"),
+        (unknown_robot_in_yaml, "unknown robot 'c3po'"),
         (typo_in_yaml, "mine.yaml: unknown key 'mocap.cutof_hz'. Did you mean 'cutoff_hz'?"),
         (foreign_table, "smpl.parquet: not a Parquet file"),
         (missing_table, "reference.parquet: no such file"),
