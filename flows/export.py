@@ -49,6 +49,7 @@ HUMAN_FORMATS: Mapping[str, Callable[[SmplSequence], bytes]] = {
     "csv": smpl_csv.write,
 }
 """Of a person's motion."""
+POLICY_SUFFIX = ".safetensors"
 
 
 def export(source: Path, to: str, out: Path) -> dict[str, Any]:
@@ -107,10 +108,9 @@ def holds_a_person(source: Path) -> bool:
         StoreError: there is no such file.
         BadTable: it is no Parquet file.
     """
-    if source.is_dir():
-        raise StoreError(f"{source}: a folder, not a file")
-    if not source.is_file():
-        raise StoreError(f"{source}: no such file")
+    single.require_file(source)
+    if source.suffix == POLICY_SUFFIX:
+        raise BadTable(f"{source}: a policy and no motion; its format is `--to onnx`")
     try:
         return "global_orient" in pq.read_schema(io.BytesIO(source.read_bytes())).names
     except pa.ArrowInvalid as cause:

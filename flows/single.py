@@ -183,9 +183,20 @@ def _robot(name: str) -> "Robot":
 
 def read_table(cls: type[Value], path: Path) -> Value:
     """A table from a path that a user gave."""
+    require_file(path)
+    return tables.decode(cls, path.read_bytes(), str(path))
+
+
+def require_file(path: Path) -> None:
+    """Refuse a path that cannot be read as one file.
+
+    Raises:
+        StoreError: it is a folder, or not there.
+    """
+    if path.is_dir():
+        raise StoreError(f"{path}: a folder, not a file")
     if not path.is_file():
         raise StoreError(f"{path}: no such file")
-    return tables.decode(cls, path.read_bytes(), str(path))
 
 
 @contextmanager

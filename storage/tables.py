@@ -20,6 +20,8 @@ from storage.codecs import CODECS, Codec, codec_of
 from storage.schemas import VERSION, Column, TableSchema
 from storage.store import Store
 
+MAKERS = {"SmplSequence": "mocap", "ReferenceMotion": "retarget"}
+"""Which command writes a table that other commands read."""
 Value = TypeVar("Value")
 Row = Mapping[str, Any]
 
@@ -104,6 +106,7 @@ def check(schema: TableSchema, table: pa.Table, where: str) -> pa.Table:
     Raises:
         BadTable: the message names the column (or metadata key), what is wrong and the file.
     """
+    _require_same(schema, table, where)
     for column in schema.columns:
         if column.name not in table.column_names:
             raise BadTable(
@@ -127,6 +130,14 @@ def metadata_of(table: pa.Table) -> dict[str, Any]:
         except ValueError:
             continue
     return facts
+
+
+def _require_same(schema: TableSchema, table: pa.Table, where: str) -> None:
+    found = metadata_of(table).get("table", schema.name)
+    if found != schema.name:
+        maker = MAKERS.get(schema.name)
+        hint = f"; `robojackson {maker}` writes one" if maker else ""
+        raise BadTable(f"{where}: holds a {found}, expected a {schema.name}{hint}")
 
 
 def _check_column(column: Column, table: pa.Table, where: str) -> None:

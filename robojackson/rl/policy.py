@@ -60,6 +60,8 @@ def load_policy(path: Path) -> Policy:
     Raises:
         BadPolicy: the file is missing, foreign or has layers that do not fit each other.
     """
+    if not path.is_file():
+        raise BadPolicy(f"{path}: {'a folder, not a file' if path.is_dir() else 'no such file'}")
     try:
         with safe_open(path, framework="np") as file:
             header = file.metadata() or {}

@@ -89,6 +89,10 @@ def missing_table(folder: Path) -> list[object]:
     return ["train", folder / "reference.parquet", "-o", folder / "out", "--steps", "10"]
 
 
+def folder_as_table(folder: Path) -> list[object]:
+    return ["train", folder, "-o", folder / "out", "--steps", "10"]
+
+
 def missing_file(folder: Path) -> list[object]:
     return ["dance", folder / "gone.mp4"]
 
@@ -106,6 +110,7 @@ def missing_file(folder: Path) -> list[object]:
         (typo_in_yaml, "mine.yaml: unknown key 'mocap.cutof_hz'. Did you mean 'cutoff_hz'?"),
         (foreign_table, "smpl.parquet: not a Parquet file"),
         (missing_table, "reference.parquet: no such file"),
+        (folder_as_table, ": a folder, not a file"),
         (missing_file, "gone.mp4: no such file"),
     ],
 )

@@ -9,7 +9,7 @@ import pytest
 
 from flows import formats
 from flows.export import FORMATS, HUMAN_FORMATS, export
-from robojackson.errors import RejectedReference, StoreError, UnknownName
+from robojackson.errors import BadTable, RejectedReference, StoreError, UnknownName
 from robojackson.motion import beyondmimic, gmr, keyframes, locomujoco, omniretarget, unitree
 from storage import tables
 from tests.flows.conftest import Said, robojackson
@@ -70,6 +70,12 @@ def test_a_reference_of_another_model_is_refused(tmp_path: Path) -> None:
 def test_a_missing_reference_is_told(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="no such file"):
         export(tmp_path / "reference.parquet", "csv", tmp_path / "motion.csv")
+
+
+def test_a_policy_is_told_its_format(tmp_path: Path) -> None:
+    (tmp_path / "policy.safetensors").write_bytes(b"")
+    with pytest.raises(BadTable, match=r"a policy and no motion; its format is `--to onnx`"):
+        export(tmp_path / "policy.safetensors", "bvh", tmp_path / "motion.bvh")
 
 
 @pytest.fixture(scope="module")

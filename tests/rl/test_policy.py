@@ -40,8 +40,13 @@ def test_a_foreign_file_is_refused(tmp_path: Path, content: bytes) -> None:
 
 
 def test_a_missing_file_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(BadPolicy, match=r"nowhere"):
+    with pytest.raises(BadPolicy, match=r"nowhere\.safetensors: no such file$"):
         load_policy(tmp_path / "nowhere.safetensors")
+
+
+def test_a_folder_is_called_a_folder(tmp_path: Path) -> None:
+    with pytest.raises(BadPolicy, match="a folder, not a file"):
+        load_policy(tmp_path)
 
 
 def test_weights_of_somebody_else_are_refused(tmp_path: Path) -> None:

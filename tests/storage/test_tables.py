@@ -182,7 +182,8 @@ def test_a_foreign_file_is_refused() -> None:
 
 def test_another_table_is_refused() -> None:
     data = tables.encode(a_track(np.random.default_rng(1)))
-    with pytest.raises(BadTable, match="'global_orient' of SmplSequence is missing"):
+    told = "holds a LandmarkTrack, expected a SmplSequence; `robojackson mocap` writes one"
+    with pytest.raises(BadTable, match=told):
         tables.decode(SmplSequence, data, "landmarks.parquet")
 
 
