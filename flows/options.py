@@ -9,12 +9,16 @@ from robojackson.errors import BadConfiguration
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 Config = Annotated[str, typer.Option("--config", help="Name or path of a configuration.")]
-Set = Annotated[
-    list[str] | None, typer.Option("--set", help="Change one value: --set train.seed=3.")
-]
-SetTrain = Annotated[
-    list[str] | None, typer.Option("--set", help="Change one value: --set seed=3.")
-]
+
+
+def _set(example: str) -> Any:
+    return typer.Option("--set", help=f"Change one value: --set {example}.")
+
+
+Set = Annotated[list[str] | None, _set("train.seed=3")]
+SetTrain = Annotated[list[str] | None, _set("seed=3")]
+SetFind = Annotated[list[str] | None, _set("filters.person_height_px=100")]
+SetStudy = Annotated[list[str] | None, _set("mode=track")]
 Force = Annotated[bool, typer.Option("--force", help="Go on with a motion that the gate refuses.")]
 
 

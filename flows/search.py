@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from flows.console import Answer, command, log_to_stderr
-from flows.options import Json, Set, chosen
+from flows.options import Json, SetFind, chosen
 
 
 @command
@@ -20,7 +20,7 @@ def find(
         str, typer.Option(help="Of the folder, list, site ({query} stands for it) or server.")
     ] = "",
     config: Annotated[str, typer.Option(help="Name or path of a configuration.")] = "finding",
-    set_: Set = None,
+    set_: SetFind = None,
     as_json: Json = False,
 ) -> Answer:
     """The videos of a dance, ranked: Algorithm 1, and why others are rejected."""
@@ -41,7 +41,7 @@ def refresh(
         list[str] | None, typer.Argument(help="Names in configs/dances.yaml; else all that are due")
     ] = None,
     config: Annotated[str, typer.Option(help="Configuration of the search.")] = "finding",
-    set_: Set = None,
+    set_: SetFind = None,
     as_json: Json = False,
 ) -> Answer:
     """The nightly run, now: for every dance the best new video, up to the robot's motion."""

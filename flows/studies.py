@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 from flows.console import Answer, command, table
-from flows.options import Json, Set, chosen
+from flows.options import Json, SetStudy, chosen
 
 
 @command
@@ -22,7 +22,7 @@ def ablation(
         typer.Option(help="Processes of this machine, or runs that workers take."),
     ] = None,
     slots: Annotated[int | None, typer.Option(min=1, help="Trainings at once.")] = None,
-    set_: Set = None,
+    set_: SetStudy = None,
     as_json: Json = False,
 ) -> Answer:
     """Moves x setups x seeds, each trained and judged, and a page that compares them."""
