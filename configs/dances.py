@@ -15,7 +15,7 @@ class Dance:
 
     Attributes:
         name: What it is called here and in the catalogue.
-        query: What is searched for.
+        query: What is searched for; may be empty where a source needs no more than an address.
         words: Added to the query.
         language: Two letters in which titles are asked for; empty is the site's own choice.
         top: How many videos are judged; None is the usual number.
@@ -25,13 +25,20 @@ class Dance:
     """
 
     name: Annotated[str, Field(min_length=1, max_length=60)]
-    query: Annotated[str, Field(min_length=1)]
+    query: str
     words: tuple[str, ...] = ()
     language: Annotated[str, Field(pattern="^([a-z]{2}(-[A-Za-z]{2,4})?)?$")] = ""
     top: Annotated[int, Field(ge=1)] | None = None
     every_days: Annotated[float, Field(ge=0)] = 1.0
     source: str = "youtube"
     address: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.query.strip() and (self.source == "youtube" or not self.address):
+            raise BadConfiguration(
+                f"{self.name}: the query is empty; it takes words to look for, or the address of "
+                "a folder, list, site or server"
+            )
 
     @property
     def asked(self) -> str:

@@ -23,6 +23,7 @@ from flows.board import Board
 from flows.cells import EXECUTORS
 from flows.chain import to_reference
 from flows.orphans import none_left
+from flows.plan import training
 from flows.server import require_server
 from flows.tracebacks import without_tracebacks
 from robojackson.errors import RejectedReference, StudyFailed
@@ -44,13 +45,12 @@ REASON = 200
 """Characters of why a cell failed."""
 
 
-def run(name: str, overrides: Mapping[str, Any]) -> Facts:
+def run(study: Study) -> Facts:
     """The flow from the command line; Ctrl-C leaves what has ended cached and no process.
 
     Raises:
         DeploymentFailed: the server that is named does not answer, or refuses us.
     """
-    study = load(Study, f"studies/{name}" if "." not in name else name, overrides)
     without_tracebacks()
     require_server()
     with none_left():
@@ -95,12 +95,6 @@ async def ablation(study: Study) -> Facts:
         results = await asyncio.gather(*(one(c) for c in cells), return_exceptions=True)
     outcomes = dict(zip((c.name for c in cells), results, strict=True))
     return conclude(study, moves, outcomes, {n: made["still"] for n, made in motions.items()})
-
-
-def training(study: Study, setup: str) -> TrainConfig:
-    """How the cells of a setup are trained; seeds come later."""
-    given = {"mode": study.mode, "steps": study.steps, "trainer": study.trainer, **study.train}
-    return load(TrainConfig, f"setups/{setup}", given)
 
 
 def motion(move: Move, study: Study) -> dict[str, Artifact]:

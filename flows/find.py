@@ -6,14 +6,14 @@ Entry point of the deployment: `flows.find.find`.
 import asyncio
 import uuid
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from datetime import UTC, datetime
 from typing import Any
 
 from prefect import flow
 from prefect.task_runners import ThreadPoolTaskRunner
 
-from configs.dances import Dance, DanceBook
+from configs.dances import Dance
 from configs.finding import FindConfig
 from configs.loader import build, load
 from flows.entries import Entry, Hunt, rows, summary
@@ -22,9 +22,6 @@ from flows.hunt import bring, hunt
 from flows.server import require_server
 from flows.tracebacks import without_tracebacks
 from robojackson.clips.candidate import VideoCandidate
-from robojackson.clips.sources import folder
-from robojackson.clips.sources import source as source_of
-from robojackson.clips.titles import clean_text
 from robojackson.errors import NoPersonFound, SearchFailed
 from storage import candidates
 from storage.artifact import Artifact
@@ -32,8 +29,6 @@ from storage.leftovers import sweep
 from storage.store import Store
 from tasks.workers import cores
 
-ALL = 10_000
-"""Files of a folder are all judged: nobody counted who watched them."""
 HUNTERS: ThreadPoolTaskRunner[Any] = ThreadPoolTaskRunner(max_workers=2 * cores())
 """Downloads wait for servers and judges for their processes: more threads than cores."""
 
@@ -61,26 +56,13 @@ async def find(
     return answer(found)
 
 
-def look_for(
-    query: str,
-    source: str,
-    address: str,
-    top: int | None,
-    config: str,
-    overrides: Mapping[str, Any],
-) -> dict[str, Any]:
-    """The flow from the command line; a query that `configs/dances.yaml` knows means that dance.
+def look_for(wanted: Dance, config: str, overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """The flow from the command line.
 
     Raises:
-        UnknownName: there is no such source.
-        SearchFailed: it does not answer.
+        SearchFailed: the source does not answer.
         DeploymentFailed: the Prefect server that is named does not answer, or refuses us.
     """
-    source_of(source)
-    known = load(DanceBook, "dances").recall(query) if source == "youtube" else None
-    dance = known or Dance(name=clean_text(query, 60) or source, query=query)
-    every = ALL if source == folder.NAME else None
-    wanted = replace(dance, source=source, address=address, top=top or every)
     without_tracebacks()
     require_server()
     return asyncio.run(find(wanted.name, asdict(wanted), config, dict(overrides)))

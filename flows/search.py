@@ -24,14 +24,19 @@ def find(
     as_json: Json = False,
 ) -> Answer:
     """The videos of a dance, ranked: Algorithm 1, and why others are rejected."""
+    from configs.finding import FindConfig
+    from configs.loader import load
     from flows import ranking
+    from flows.asked import dance_of
     from flows.environment import prepare
     from storage.store import Store
 
+    overrides = chosen(set_)
+    dance = dance_of(query, source, address, top, load(FindConfig, config, overrides))
     prepare(Store.from_environment())
     from flows.find import look_for
 
-    found = look_for(query, source, address, top, config, chosen(set_))
+    found = look_for(dance, config, overrides)
     return Answer(found, text=[*ranking.lines(found["candidates"]), found["summary"]])
 
 
@@ -45,13 +50,16 @@ def refresh(
     as_json: Json = False,
 ) -> Answer:
     """The nightly run, now: for every dance the best new video, up to the robot's motion."""
+    from flows.asked import check_refresh
     from flows.environment import prepare
     from storage.store import Store
 
+    overrides = chosen(set_)
+    check_refresh(dances or None, config, overrides)
     prepare(Store.from_environment())
     from flows.refresh import run
 
-    done = run(dances or None, config, chosen(set_))
+    done = run(dances or None, config, overrides)
     return Answer(done, code=1 if done["failed"] and not done["dances"] else 0)
 
 

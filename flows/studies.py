@@ -27,14 +27,16 @@ def ablation(
 ) -> Answer:
     """Moves x setups x seeds, each trained and judged, and a page that compares them."""
     from flows.environment import prepare
+    from flows.plan import study_of
     from storage.store import Store
 
     given: dict[str, Any] = {"moves": moves, "setups": setups, "seeds": seeds}
     given |= {"steps": steps, "executor": executor, "slots": slots}
+    wanted = study_of(study, chosen(set_, given))
     prepare(Store.from_environment())
     from flows.ablation import run
 
-    made = run(study, chosen(set_, given))
+    made = run(wanted)
     return Answer(made, text=[f"page    {made['page']}", f"tables  {made['tables']}"])
 
 

@@ -47,6 +47,8 @@ def test_an_unknown_dance_is_refused_with_the_known_ones(book: DanceBook) -> Non
         ({"name": "x", "query": "y", "languge": "en"}, "languge"),
         ({"name": "x", "query": "y", "top": 0}, "top"),
         ({"name": "x"}, "query"),
+        ({"name": "x", "query": " "}, "x: the query is empty"),
+        ({"name": "x", "query": "", "source": "youtube", "address": "ytsearch"}, "query is empty"),
         ({"name": "x", "query": "y", "language": "english"}, "language"),
     ],
 )

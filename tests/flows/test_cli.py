@@ -1,6 +1,7 @@
 """Bad input gets one line and a code; the answer on stdout stands alone."""
 
 import json
+import shlex
 import signal
 import subprocess
 import sys
@@ -179,6 +180,36 @@ def test_dance_refuses_bad_input_before_prefect_starts(
     (tmp_path / "notes.mp4").write_text("this is not a video")
     monkeypatch.chdir(tmp_path)
     code, _, err = invoke("dance", *words)
+    assert (code, len(err.splitlines())) == (1, 1)
+    assert told in err
+    assert not (tmp_path / "store").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("find nosuchfolder --source folder", "nosuchfolder: no such file or folder"),
+        ("find nosuch.txt --source urls", "nosuch.txt: cannot be read"),
+        ("find x --set bogus.key=3", "--set bogus.key: unknown key"),
+        ("find x --config nosuch", "unknown configuration 'nosuch'"),
+        ("find x --source nosuch", "unknown source 'nosuch'"),
+        ("find ''", "the query is empty"),
+        ("find '' --source urls", "the query is empty"),
+        ("refresh nosuch", "unknown dance 'nosuch'"),
+        ("refresh --set bogus.key=3", "--set bogus.key: unknown key"),
+        ("ablation nosuch", "unknown study 'nosuch'"),
+        ("ablation smoke --move nosuch", "unknown move 'nosuch'"),
+        ("ablation smoke --setup nosuch", "'setups.0' is 'nosuch'"),
+        ("ablation smoke --set robot=nosuch", "unknown robot 'nosuch'"),
+        ("ablation smoke --set pipeline=nosuch", "unknown configuration 'nosuch'"),
+        ("ablation smoke --set train.sede=3", "unknown key 'sede'"),
+    ],
+)
+def test_a_flow_refuses_simple_mistakes_before_prefect_starts(
+    words: str, told: str, monkeypatch, tmp_path: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, _, err = invoke(*shlex.split(words))
     assert (code, len(err.splitlines())) == (1, 1)
     assert told in err
     assert not (tmp_path / "store").exists()

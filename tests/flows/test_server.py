@@ -9,6 +9,9 @@ from pathlib import Path
 import pytest
 from prefect.settings import PREFECT_API_URL, temporary_settings
 
+from configs.dances import Dance
+from configs.loader import load
+from configs.study import Study
 from flows import ablation, dance, find, refresh
 from flows.deploy import deploy
 from robojackson.errors import DeploymentFailed
@@ -17,8 +20,8 @@ from tools.service import free_port
 
 COMMANDS = {
     "dance": lambda: dance.run("clips/hip_shake.mp4", "smoke", {}),
-    "ablation": lambda: ablation.run("smoke", {}),
-    "find": lambda: find.look_for("x", "folder", "", None, "finding", {}),
+    "ablation": lambda: ablation.run(load(Study, "studies/smoke")),
+    "find": lambda: find.look_for(Dance(name="x", query="x"), "finding", {}),
     "refresh": lambda: refresh.run(None, "finding", {}),
     "deploy": deploy,
 }
