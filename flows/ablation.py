@@ -22,9 +22,8 @@ from configs.study import Move, Study
 from flows.board import Board
 from flows.cells import EXECUTORS
 from flows.chain import to_reference
-from flows.orphans import none_left
+from flows.launch import launch
 from flows.plan import training
-from flows.server import require_server
 from flows.tracebacks import without_tracebacks
 from robojackson.errors import RejectedReference, StudyFailed
 from robojackson.retarget.robot import RobotDescription
@@ -46,15 +45,13 @@ REASON = 200
 
 
 def run(study: Study) -> Facts:
-    """The flow from the command line; Ctrl-C leaves what has ended cached and no process.
+    """The flow from the command line.
 
     Raises:
         DeploymentFailed: the server that is named does not answer, or refuses us.
+        Interrupted: Ctrl-C; what has ended is cached, and no process is left.
     """
-    without_tracebacks()
-    require_server()
-    with none_left():
-        return asyncio.run(ablation(study))
+    return launch(ablation, study)
 
 
 @flow(name="ablation", flow_run_name="{study.name}")

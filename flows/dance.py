@@ -4,9 +4,7 @@ Entry point of the deployment: `flows.dance.dance`. Which stages run and in whic
 and nowhere else; how a stage works is `robojackson`'s, how it is cached is `tasks`'.
 """
 
-import asyncio
 import json
-import signal
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -20,14 +18,11 @@ from prefect.logging import get_run_logger
 
 from configs.loader import load
 from configs.pipeline import PipelineConfig
-from flows import console
 from flows.chain import to_reference
 from flows.intake import Minutes, Search, Seconds, Source, videos_of
-from flows.orphans import none_left
+from flows.launch import launch
 from flows.scorers import scorers
-from flows.server import require_server
 from flows.single import VERDICT
-from flows.tracebacks import without_tracebacks
 from robojackson.clips.stability import Stability
 from robojackson.errors import NoPersonFound, RoboJacksonError
 from robojackson.retarget.robot import RobotDescription
@@ -79,14 +74,7 @@ def run(
         DeploymentFailed: the server that is named does not answer, or refuses us.
         Interrupted: Ctrl-C; every stage that has ended is kept, and training left a checkpoint.
     """
-    without_tracebacks()
-    require_server()
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's `&` takes it away
-    try:
-        with none_left():
-            return asyncio.run(dance(source, config, dict(overrides), start_s, end_s))
-    except (KeyboardInterrupt, asyncio.CancelledError):
-        raise console.Interrupted(f"resume: {console.same_command()}") from None
+    return launch(dance, source, config, dict(overrides), start_s, end_s)
 
 
 @flow(name="dance", flow_run_name="dance-{source}", task_runner=scorers())

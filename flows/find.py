@@ -3,7 +3,6 @@
 Entry point of the deployment: `flows.find.find`.
 """
 
-import asyncio
 import uuid
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -19,8 +18,7 @@ from configs.loader import build, load
 from flows.entries import Entry, Hunt, rows, summary
 from flows.gallery import show
 from flows.hunt import bring, hunt
-from flows.server import require_server
-from flows.tracebacks import without_tracebacks
+from flows.launch import launch
 from robojackson.clips.candidate import VideoCandidate
 from robojackson.errors import NoPersonFound, SearchFailed
 from storage import candidates
@@ -63,9 +61,7 @@ def look_for(wanted: Dance, config: str, overrides: Mapping[str, Any]) -> dict[s
         SearchFailed: the source does not answer.
         DeploymentFailed: the Prefect server that is named does not answer, or refuses us.
     """
-    without_tracebacks()
-    require_server()
-    return asyncio.run(find(wanted.name, asdict(wanted), config, dict(overrides)))
+    return launch(find, wanted.name, asdict(wanted), config, dict(overrides))
 
 
 @flow(name="best", flow_run_name="best-{name}", task_runner=HUNTERS)  # type: ignore[arg-type]

@@ -4,7 +4,6 @@ Entry point of the deployments: `flows.refresh.refresh`. A dance whose search fa
 the others; the result says which failed and why.
 """
 
-import asyncio
 import json
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -30,8 +29,7 @@ from flows.find import (
 )
 from flows.gallery import show, slug_of
 from flows.hunt import hunt
-from flows.server import require_server
-from flows.tracebacks import without_tracebacks
+from flows.launch import launch
 from robojackson.clips.candidate import VideoCandidate
 from robojackson.clips.titles import clean_text
 from robojackson.errors import NoPersonFound, SearchFailed
@@ -46,12 +44,14 @@ FOLDER = "refresh"
 SLACK = 0.1
 """Share of the days between two searches that a nightly run may come early."""
 Facts = dict[str, Any]
+BOOK = "dances"
+"""Where the dances are named: a file of `configs`."""
 
 
 @flow(name="refresh", task_runner=HUNTERS)  # type: ignore[arg-type]
 async def refresh(
     dances: list[str] | None = None,
-    book: str = "dances",
+    book: str = BOOK,
     config: str = "finding",
     overrides: Facts | None = None,
     pipeline: str = "base",
@@ -98,9 +98,7 @@ def run(dances: list[str] | None, config: str, overrides: Mapping[str, Any]) -> 
     Raises:
         DeploymentFailed: the Prefect server that is named does not answer, or refuses us.
     """
-    without_tracebacks()
-    require_server()
-    return asyncio.run(refresh(dances, config=config, overrides=dict(overrides)))
+    return launch(refresh, dances, BOOK, config, dict(overrides))
 
 
 @flow(name="refresh-dance", flow_run_name="{name}", task_runner=HUNTERS)  # type: ignore[arg-type]

@@ -229,7 +229,7 @@ def _to_bytes(
 
 def _from_bytes(data: bytes, where: str) -> pa.Table:
     try:
-        return pq.read_table(io.BytesIO(data))
+        return pq.read_table(io.BytesIO(data), use_threads=False)  # small; a thread may outlive us
     except (pa.ArrowInvalid, OSError) as cause:
         reason = " ".join(str(cause).split())[:120]
         raise BadTable(f"{where}: not a Parquet file ({reason})") from cause
