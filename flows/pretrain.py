@@ -14,7 +14,7 @@ from configs.pipeline import PipelineConfig
 from flows.walker import PIPELINE, ROBOT
 from robojackson.retarget.robot import RobotDescription
 from robojackson.rl.config import TrainConfig
-from storage.lock import locked
+from storage.lock import A_MOMENT, locked
 from storage.store import Store
 from tasks.caching import identity
 from tasks.process import run_process
@@ -40,7 +40,7 @@ async def pretrain(
     command = [sys.executable, "-m", "flows.cli", "pretrain", "--kind", kind, "-o", str(work)]
     options: dict[str, Any] = {"--steps": steps, "--seed": seed, "--parent": os.getpid()}
     words = [str(word) for pair in options.items() for word in pair]
-    with locked(work, "task.lock"):
+    with locked(work, "task.lock", A_MOMENT):
         await run_process([*command, *words, "--json"], name, work)
         made = f"walker_{kind}.safetensors"
         store.keep("pretrain", "walker.json", work / "walker.json")

@@ -1,7 +1,9 @@
 """A folder that one process holds at a time; the file that says so goes away with it."""
 
 import fcntl
+import math
 import os
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,37 +11,49 @@ from typing import IO
 
 from robojackson.errors import StoreError
 
+FOR_EVER = math.inf
+A_MOMENT = 2.0
+"""Seconds for which a folder may be held only in order to see whether it is nobody's."""
+LOOK_S = 0.05
+
 
 @contextmanager
-def locked(folder: Path, name: str = "lock", patient: bool = False) -> Iterator[None]:
+def locked(folder: Path, name: str = "lock", patience_s: float = 0.0) -> Iterator[None]:
     """Hold a folder for this thread; the kernel lets go when the process dies.
 
     Args:
-        patient: Wait for whoever holds it.
+        patience_s: Time to wait for whoever holds it; infinite is for ever.
     Raises:
-        StoreError: somebody holds it, and there is no patience.
+        StoreError: somebody holds it still.
     """
     path = folder / name
-    with _held(path, fcntl.LOCK_EX if patient else fcntl.LOCK_EX | fcntl.LOCK_NB):
+    with _held(path, time.monotonic() + patience_s):
         try:
             yield
         finally:
             path.unlink(missing_ok=True)
 
 
-def _held(path: Path, how: int) -> IO[str]:
+def _held(path: Path, until: float) -> IO[str]:
     """The locked file; one that was taken away between opening and locking is made anew."""
     while True:
         path.parent.mkdir(parents=True, exist_ok=True)
         file = path.open("w")
-        try:
-            fcntl.flock(file, how)
-        except BlockingIOError:
-            file.close()
-            raise StoreError(
-                f"{path.parent}: another training is running there; wait for it to end, "
-                "then give the same command again"
-            ) from None
+        _lock(file, until)
         if path.exists() and os.path.samestat(os.fstat(file.fileno()), path.stat()):
             return file
         file.close()
+
+
+def _lock(file: IO[str], until: float) -> None:
+    while True:
+        try:
+            return fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if time.monotonic() >= until:
+                file.close()
+                raise StoreError(
+                    f"{Path(file.name).parent}: another training is running there; wait for it to "
+                    "end, then give the same command again"
+                ) from None
+            time.sleep(LOOK_S)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from robojackson.errors import StoreError
 from storage.artifact import Artifact, sha256_of, sha256_of_file
-from storage.lock import locked
+from storage.lock import A_MOMENT, locked
 from storage.places import TEMPORARY, Folder, Place, place_at
 
 VARIABLE = "ROBOJACKSON_STORE"
@@ -113,7 +113,7 @@ class Store:
         with _one_line(f"cannot write {base}"):
             folder = Path(tempfile.mkdtemp(dir=base))
         try:
-            with locked(folder, HELD, patient=True):  # of a sweep that looks at it
+            with locked(folder, HELD, patience_s=A_MOMENT):  # of a sweep that looks at it
                 yield folder
         finally:
             shutil.rmtree(folder, ignore_errors=True)

@@ -23,7 +23,7 @@ from robojackson.clips.video import VideoLimits, probe
 from robojackson.clips.web import Offer, WebConfig, fetch, offer
 from robojackson.errors import StoreError, UnreadableVideo
 from storage.artifact import Artifact
-from storage.lock import locked
+from storage.lock import FOR_EVER, locked
 from storage.store import Store
 from tasks.caching import stage
 from tasks.probe import SourceFile
@@ -87,7 +87,7 @@ def _bring(
 ) -> Artifact:
     """The file that another run has brought meanwhile, or else from the web."""
     folder = store.work(f"{video.folder}.{chosen.name}")
-    with locked(folder, patient=True):
+    with locked(folder, patience_s=FOR_EVER):
         had = _had(store, video, chosen)
         made = had if had is not None else _fetched(store, video, chosen, folder, web, limits)
         shutil.rmtree(folder, ignore_errors=True)

@@ -13,7 +13,7 @@ import yaml
 from robojackson.retarget.robot import RobotDescription
 from robojackson.rl.config import EvaluateConfig
 from storage.artifact import Artifact
-from storage.lock import locked
+from storage.lock import A_MOMENT, locked
 from storage.store import Store
 from tasks.caching import identity, stage
 from tasks.process import run_process
@@ -39,7 +39,11 @@ async def judge(
     digest = hashlib.sha256(json.dumps(identity([policy, reference, robot, config])).encode())
     name = f"judge-{digest.hexdigest()[:12]}"
     work = store.work(name)
-    with locked(work, "task.lock"), store.local(policy) as learnt, store.local(reference) as motion:
+    with (
+        locked(work, "task.lock", A_MOMENT),
+        store.local(policy) as learnt,
+        store.local(reference) as motion,
+    ):
         settings = work / "evaluate.yaml"
         settings.write_text(yaml.safe_dump({"evaluate": _plain(config)}))
         words = ["evaluate", learnt, motion, "--out", work, "--config", settings]

@@ -21,7 +21,7 @@ from robojackson.retarget.robot import RobotDescription
 from robojackson.rl.config import TrainConfig
 from robojackson.rl.pretrained import start_file
 from storage.artifact import Artifact, sha256_of_file
-from storage.lock import locked
+from storage.lock import A_MOMENT, locked
 from storage.store import Store
 from tasks.caching import identity, stage
 from tasks.digest import digest
@@ -84,7 +84,7 @@ async def train(
     minutes = _minutes(config, deadline)
     if minutes is not None:
         limit_s = min(limit_s or math.inf, 60 * minutes + OVERTIME_S)
-    with locked(work, "task.lock"), store.local(reference) as path:
+    with locked(work, "task.lock", A_MOMENT), store.local(reference) as path:
         command = _command(path, work, config, labels, run_id, minutes)
         async with shown(work, f"{labels.setup}-{labels.move}-s{config.seed}"):
             answer = await run_process(command, run_id, work, limit_s)

@@ -21,6 +21,7 @@ VERDICT_COLUMNS = (
 )  # fmt: skip
 POLICY_TITLES: Mapping[str, tuple[str, str]] = {
     "trained": ("trained robot", ""),
+    "hold": ("torque held", "the trained robot with its torque held for a whole control step"),
     "statue": ("statue", "holds the pose it starts in"),
     "mean_pose": ("mean pose", "holds the mean pose of the dance"),
     "zero_residual": ("zero residual", "the reference's angles as targets, nothing learnt"),

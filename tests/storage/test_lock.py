@@ -7,7 +7,7 @@ from threading import Thread
 import pytest
 
 from robojackson.errors import StoreError
-from storage.lock import locked
+from storage.lock import FOR_EVER, locked
 
 
 def test_a_second_holder_is_told_in_one_line(tmp_path: Path) -> None:
@@ -39,7 +39,7 @@ def test_who_is_patient_gets_it_after_the_one_who_has_it(tmp_path: Path) -> None
     order = []
 
     def wait() -> None:
-        with locked(tmp_path, patient=True):
+        with locked(tmp_path, patience_s=FOR_EVER):
             order.append("patient")
 
     waiting = Thread(target=wait)
