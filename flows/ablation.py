@@ -34,6 +34,7 @@ from storage.artifact import Artifact
 from storage.leftovers import sweep
 from storage.store import Store
 from tasks.cell import Cell
+from tasks.payments import payments
 from tasks.probe import SourceFile, probe
 from tasks.still import still
 from tasks.study import results_page
@@ -70,7 +71,7 @@ async def ablation(study: Study) -> Facts:
     moves = {name: load(Move, f"moves/{name}") for name in study.moves}
     trainings: dict[str, TrainConfig] = {s: training(study, s) for s in study.setups}
     with SyncClientContext.get_or_create():  # one connection for all stages of all motions
-        motions = {name: motion(move, study) for name, move in moves.items()}
+        motions = {name: motion(move, study, trainings) for name, move in moves.items()}
     cells = cells_of(study, {n: made["reference"] for n, made in motions.items()}, trainings)
     gate(study, {name: made["scorecard"] for name, made in motions.items()})
     board = Board(study, cells)
@@ -91,18 +92,25 @@ async def ablation(study: Study) -> Facts:
     async with board.shown():
         results = await asyncio.gather(*(one(c) for c in cells), return_exceptions=True)
     outcomes = dict(zip((c.name for c in cells), results, strict=True))
-    return conclude(study, moves, outcomes, {n: made["still"] for n, made in motions.items()})
+    return conclude(study, moves, outcomes, motions)
 
 
-def motion(move: Move, study: Study) -> dict[str, Artifact]:
-    """`reference` and `scorecard` of a move, and `still`, its picture; every stage cached."""
+def motion(move: Move, study: Study, trainings: Mapping[str, TrainConfig]) -> dict[str, Artifact]:
+    """What a move is trained on and shown with; every stage cached.
+
+    Returns:
+        `reference` and `scorecard`; `still`, its picture; `payments`, what the rewards of the
+        setups pay to bodies that do not dance it.
+    """
     settings = load(PipelineConfig, study.pipeline, move.overrides)
     robot = load(RobotDescription, f"robots/{study.robot}")
     clip = probe(SourceFile.at(move.path), settings.video, None, None)
     moved = to_reference(clip, robot, settings)
     seen = (clip["video"], moved["landmarks"], moved["smpl"], moved["reference"])
+    rewards = {setup: train.environment for setup, train in trainings.items()}
     return {name: moved[name] for name in ("reference", "scorecard")} | {
-        "still": still(*seen, robot)
+        "still": still(*seen, robot),
+        "payments": payments(moved["reference"], robot, rewards),
     }
 
 
@@ -158,7 +166,7 @@ def conclude(
     study: Study,
     moves: dict[str, Move],
     outcomes: Mapping[str, Any],
-    stills: dict[str, Artifact],
+    motions: Mapping[str, dict[str, Artifact]],
 ) -> Facts:
     """The page over whatever ended well, and one sentence for what did not.
 
@@ -171,7 +179,8 @@ def conclude(
     made = {}
     if well:
         rows = metrics.kept(store, study.name, metrics.runs_of(well))
-        made = results_page(study, moves, rows, stills)
+        stills, paid = ({n: made[w] for n, made in motions.items()} for w in ("still", "payments"))
+        made = results_page(study, moves, rows, stills, paid)
     if failed:
         named = "; ".join(f"{name}: {reason}" for name, reason in failed.items())
         raise StudyFailed(

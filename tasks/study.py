@@ -45,17 +45,22 @@ PRIMARY = "return_own"
 
 @stage(models=lambda parameters: drawn_by(__name__, TEMPLATES))
 def results_page(
-    study: Study, moves: dict[str, Move], rows: list[Artifact], pictures: dict[str, Artifact]
+    study: Study,
+    moves: dict[str, Move],
+    rows: list[Artifact],
+    pictures: dict[str, Artifact],
+    payments: dict[str, Artifact],
 ) -> dict[str, Artifact]:
     """The files of `report`.
 
     Args:
         rows: Files of the tables of the cells that count (`storage.metrics.kept`).
-        pictures: By move, as in `report`.
+        pictures, payments: By move, as in `report`; the second as JSON.
     """
     store = Store.from_environment()
     shown = {name: store.read(png.key) for name, png in pictures.items()}
-    return report(study, moves, shown, metrics.runs_of(rows))
+    paid = {name: json.loads(store.read(told.key)) for name, told in payments.items()}
+    return report(study, moves, shown, metrics.runs_of(rows), paid)
 
 
 def report(
@@ -63,6 +68,7 @@ def report(
     moves: Mapping[str, Move],
     pictures: Mapping[str, bytes] | None = None,
     runs: Collection[str] | None = None,
+    payments: Mapping[str, page.Payments] | None = None,
 ) -> dict[str, Artifact]:
     """Write `studies/<name>/` anew: `page`, `table` (CSV), `results` (JSON) and the figures.
 
@@ -70,6 +76,7 @@ def report(
         moves: Of the study, by name.
         pictures: By move, its video frame, recovered body and robot side by side, as PNG.
         runs: Ids of the trainings that count; all that the tables have under its name if absent.
+        payments: By move, what the rewards of the setups pay to bodies that do not dance it.
     """
     store, rng = Store.from_environment(), np.random.default_rng(0)
     with metrics.opened(store, study.name, runs) as ask:
@@ -88,6 +95,7 @@ def report(
         claims=claims,
         lines=lines,
         comparisons=compared,
+        payments=payments or {},
         moves=[_picture(name, moves[name], png) for name, png in (pictures or {}).items()],
         curves=plots["curves"],
         judged=plots["judged"],

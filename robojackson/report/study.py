@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
+from itertools import groupby
 from typing import Any
 
 import jinja2
@@ -29,6 +30,16 @@ FIGURES: Mapping[str, tuple[str, int, float]] = {
     "limb_gain": ("limb gain", 2, 1.0),
 }
 """Columns of the table: title, digits, factor."""
+BODIES = {
+    "statue": "statue",
+    "mean_pose": "mean pose",
+    "flail": "flailing body",
+    "zero_residual": "zero residual",
+}
+"""Who does not dance, by the names of `robojackson.rl.shares`."""
+
+Payments = Mapping[str, Mapping[str, float]]
+"""By setup: the share of a perfect dance's reward that each body earns, by its name."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +70,7 @@ class StudyContent:
         claims: What the paper says, and what was found.
         lines: The table.
         comparisons: The yardstick's differences between setups, move by move.
+        payments: What the rewards pay to bodies that do not dance, by move.
         moves: For each move a picture: frame, recovered body, robot (Figures 2-4).
         curves: Learning curves (Figures 5-13).
         judged: Pictures of the judgement.
@@ -70,6 +82,7 @@ class StudyContent:
     claims: Sequence[Claim] = ()
     lines: Sequence[Line] = ()
     comparisons: Sequence[Comparison] = ()
+    payments: Mapping[str, Payments] = field(default_factory=dict)
     moves: Sequence[Plot] = ()
     curves: Sequence[Plot] = ()
     judged: Sequence[Plot] = ()
@@ -85,12 +98,17 @@ def render(content: StudyContent) -> str:
         content=content,
         style=here.joinpath("page.css").read_text("utf-8"),
         columns=[title for title, _, _ in FIGURES.values()],
-        rows=[
-            (line, [cell(line.values.get(key), key, line.seeds) for key in FIGURES])
-            for line in content.lines
+        moves=[
+            (
+                move,
+                [(line, [cell(line.values.get(k), k, line.seeds) for k in FIGURES]) for line in of],
+            )
+            for move, of in groupby(content.lines, lambda line: line.move)
         ],
         effects=[(c, [_difference(found) for found in c.effects.values()]) for c in compared],
         compared_on=list(compared[0].effects) if compared else [],
+        paid={move: _by_reward(paid) for move, paid in content.payments.items()},
+        bodies=BODIES,
         claims=[(claim, sentence(claim)) for claim in content.claims],
         groups=[
             ("The moves", _encoded(content.moves)),
@@ -100,17 +118,19 @@ def render(content: StudyContent) -> str:
     )
 
 
-def cell(value: Estimate | None, key: str, seeds: int) -> str:
-    """A mean with its interval, a dash where there is none; and of how many seeds if not of all."""
+def cell(value: Estimate | None, key: str, seeds: int) -> tuple[str, list[str]]:
+    """A mean, a dash where there is none; its interval, and of how many seeds if not of all."""
     if value is None or math.isnan(value.mean):
-        return "–"
+        return "–", []
     _, digits, factor = FIGURES[key]
     if math.isinf(value.mean):
-        return "never"
-    told = f"{factor * value.mean:,.{digits}f}"
-    if math.isfinite(value.low + value.high):
-        told += f" [{factor * value.low:,.{digits}f}, {factor * value.high:,.{digits}f}]"
-    return told if value.count >= seeds else f"{told} ({value.count} of {seeds})"
+        return "never", []
+    spread = []
+    if value.low < value.high:
+        spread.append(f"[{factor * value.low:z,.{digits}f}, {factor * value.high:z,.{digits}f}]")
+    if value.count < seeds:
+        spread.append(f"({value.count} of {seeds})")
+    return f"{factor * value.mean:z,.{digits}f}", spread
 
 
 def sentence(claim: Claim) -> str:
@@ -131,6 +151,13 @@ def sentence(claim: Claim) -> str:
         least = claim.effect.smallest_p
         told += f", p = {claim.effect.p:.2g} (no smaller than {least:.2g} with so few)"
     return f"{told}; {100 * claim.effect.improvement:.0f} % chance that one run of it is better."
+
+
+def _by_reward(paid: Payments) -> list[tuple[str, list[str]]]:
+    """Setups of one reward together, and its shares in per cent."""
+    told = {setup: [f"{100 * of[body]:.0f}" for body in BODIES] for setup, of in paid.items()}
+    rewards = dict.fromkeys(map(tuple, told.values()))
+    return [(", ".join(s for s in told if tuple(told[s]) == r), list(r)) for r in rewards]
 
 
 def _difference(found: Effect | None) -> str:

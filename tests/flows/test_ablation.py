@@ -67,14 +67,14 @@ def play(
     """Run the flow with played cells, motions and page; the motions and the page are not ours."""
     page = Store(store_folder).put("studies/index.html", b"page")
     still = Store(store_folder).put("still.png", b"png")
-    motions = {"reference": REFERENCE, "still": still}
+    motions = {"reference": REFERENCE, "still": still, "payments": still}
 
-    def motion(move: object, study: Study) -> dict[str, Artifact]:
+    def motion(move: object, study: Study, trainings: object) -> dict[str, Artifact]:
         card = json.dumps(dict.fromkeys(BARS, 0.0) | {"infeasible_share": infeasible})
         return motions | {"scorecard": Store(store_folder).put("card.json", card.encode())}
 
     def results_page(
-        study: Study, moves: object, rows: list[Artifact], stills: object
+        study: Study, moves: object, rows: list[Artifact], stills: object, payments: object
     ) -> dict[str, Artifact]:
         run.shown = {row.name for row in rows}  # type: ignore[attr-defined]
         return {"page": page}
