@@ -67,10 +67,11 @@ def played(seconds: float, burn: bool, began: Callable[[], None] = lambda: None)
 def motionless() -> Iterator[None]:
     """Let the motions of a study be words: its cells play and look at none."""
 
-    def motion(move: Any, study: Any) -> dict[str, Artifact]:
+    def motion(move: Any, study: Any, trainings: Any) -> dict[str, Artifact]:
         store = Store.from_environment()
         names = ("reference", "scorecard", "still")
-        return {name: store.keep("played", name, move.clip.encode()) for name in names}
+        made = {name: store.keep("played", name, move.clip.encode()) for name in names}
+        return made | {"payments": store.keep("played", "payments", b"{}")}
 
     with (
         patch.object(ablation, "motion", motion),
