@@ -30,6 +30,7 @@ from unittest.mock import patch
 import yaml
 
 from benchmarks.costs import Begun, Costs, each
+from flows.environment import HEARTBEAT
 from tools.stack import Stack, running
 
 RESULTS = Path(__file__).parent / "results" / "orchestration.json"
@@ -174,7 +175,8 @@ def _server(folder: Path, workers: int) -> Iterator[Stack]:
     logged = {"PREFECT_SERVER_LOGGING_LEVEL": "INFO"}
     with running(folder, scale={"flow-worker": 0, "trainer": workers}, more=logged) as stack:
         ours = ("PREFECT_", "DO_NOT", *(("AWS_", "ROBOJACKSON_") if workers else ()))
-        os.environ.update({n: v for n, v in stack.client().items() if n.startswith(ours)})
+        given = {n: v for n, v in stack.client().items() if n.startswith(ours)}
+        os.environ.update(given | HEARTBEAT)  # without it the automation marks us as dead
         if not workers:
             del os.environ["PREFECT_RESULTS_DEFAULT_STORAGE_BLOCK"]
             os.environ["ROBOJACKSON_STORE"] = str(folder / "store")
