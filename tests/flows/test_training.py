@@ -5,8 +5,10 @@ from types import SimpleNamespace
 
 import pytest
 
+from configs.loader import load
 from flows import single, training
 from robojackson.errors import RejectedReference
+from robojackson.retarget.robot import RobotDescription, load_robot
 from robojackson.rl import shares
 from robojackson.rl import train as learning
 from robojackson.rl.config import TrainConfig
@@ -26,7 +28,8 @@ def budgets(monkeypatch: pytest.MonkeyPatch) -> list[TrainConfig]:
         raise RejectedReference("no")
 
     monkeypatch.setattr(single, "read_table", lambda cls, path: None)
-    monkeypatch.setattr(single, "robot_of", lambda motion: None)
+    humanoid = load_robot(load(RobotDescription, "robots/humanoid"))
+    monkeypatch.setattr(single, "robot_of", lambda motion: humanoid)
     monkeypatch.setattr(learning, "train", refuse)
     monkeypatch.setattr(shares, "both_readings", lambda *what: {})
     monkeypatch.setattr(training.signal, "signal", lambda *wish: None)
@@ -80,8 +83,8 @@ def test_a_bare_name_is_one_of_the_setups(given: str | None, found: str | None) 
     assert training._setup(given) == found
 
 
-def test_who_asks_twice_does_not_wait_for_a_checkpoint() -> None:
-    wish = training._Wish()
+def test_who_asks_twice_does_not_wait_for_a_checkpoint(tmp_path: Path) -> None:
+    wish = training._Wish(tmp_path)
     assert not wish()
     wish.heard(2, None)
     assert wish()
