@@ -23,7 +23,8 @@ class EpisodeTotals:
         rows = {"episode_return": reward, **errors}
         rows |= {f"reward_{name}": value for name, value in terms.items()}
         for name, value in rows.items():
-            self._sums.setdefault(name, np.zeros(self._n))
+            if name not in self._sums:
+                self._sums[name] = np.zeros(self._n)
             self._sums[name] += value
 
     def close(

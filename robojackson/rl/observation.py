@@ -22,8 +22,9 @@ def observe(
     last_action: Float[np.ndarray, "N nu"],
 ) -> Float[np.ndarray, "N D"]:
     """Observation of N robots whose next reference step is `target`, float32."""
-    to_body = np.swapaxes(quat_to_matrix(qpos[:, 3:7]), 1, 2)
-    turn = to_body @ quat_to_matrix(target.qpos[:, 3:7])
+    turned, wanted = quat_to_matrix(np.stack([qpos[:, 3:7], target.qpos[:, 3:7]]))
+    to_body = np.swapaxes(turned, 1, 2)
+    turn = to_body @ wanted
     local = lambda vector: np.einsum("nij,nj->ni", to_body, vector)  # noqa: E731
     angle = 2 * np.pi * target.phase
     parts = [

@@ -122,7 +122,8 @@ class Simulation:
             jobs = [self._pool.submit(self._advance, c, targets, rows) for c in self.chunks]
             for job in jobs:
                 job.result()
-        self.broken = np.any(np.array(self._views.warnings)[:, BAD_STATE] > 0, axis=1)
+        raised = np.concatenate(self._views.warnings).reshape(self.n, -1)
+        self.broken = np.any(raised[:, BAD_STATE] > 0, axis=1)
         self._gather_all()
 
     def follow(self, step: ClipStep) -> Float[np.ndarray, "N nu"]:
