@@ -15,6 +15,8 @@ import tensorflow_probability.substrates.jax as tfp
 from jaxtyping import Array, Float
 from sbx.common.distributions import TanhTransformedDistribution
 
+from robojackson.rl.tqc_config import NORM_EPSILON
+
 NARROW = 128
 """Outputs of a kernel below which its slope is computed transposed."""
 LOG_STD_RANGE = (-20.0, 2.0)
@@ -78,9 +80,9 @@ def actions_of(params: Parameters, observations: Float[Array, "B O"]) -> Any:
     )
 
 
-def is_plain(params: Parameters) -> bool:
-    """Whether the parameters are those of dense layers and nothing else."""
-    return all(name.startswith("Dense_") for name in params["params"])
+def dense_count(params: Parameters) -> int:
+    """Dense layers among a network's layers."""
+    return sum(name.startswith("Dense_") for name in params["params"])
 
 
 def _layer(params: Parameters, i: int) -> tuple[Array, Array]:
@@ -89,7 +91,17 @@ def _layer(params: Parameters, i: int) -> tuple[Array, Array]:
 
 
 def _rest(params: Parameters, first: Array) -> Array:
-    value = first
-    for i in range(1, len(params["params"])):
+    """What follows a critic's first layer."""
+    value, normal = first, "LayerNorm_0" in params["params"]
+    for i in range(1, dense_count(params)):
+        value = _normal(params, i - 1, value) if normal else value
         value = dense(jax.nn.relu(value), *_layer(params, i))
     return value
+
+
+def _normal(params: Parameters, i: int, value: Array) -> Array:
+    """Layer normalisation (Ba et al. 2016)."""
+    layer = params["params"][f"LayerNorm_{i}"]
+    centred = value - value.mean(1, keepdims=True)
+    spread = jnp.square(centred).mean(1, keepdims=True)
+    return centred * jax.lax.rsqrt(spread + NORM_EPSILON) * layer["scale"] + layer["bias"]

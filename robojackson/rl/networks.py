@@ -1,7 +1,8 @@
 """Actor and critics of a TQC run as named arrays, the same names for every trainer, in safetensors.
 
 `actor.0.weight` (in, out), `actor.0.bias`, ..., `mean.*`, `log_std.*`, `critic1.0.weight`, ...,
-`target1.0.weight`, ..., `log_alpha`. Reading a file executes nothing.
+`target1.0.weight`, ..., `log_alpha`; with layer normalisation
+`critic1.norm.0.scale`, `critic1.norm.0.offset`, ... as well. Reading a file executes nothing.
 """
 
 import json
@@ -57,6 +58,11 @@ class Networks:
         )
         return tuple(int(self.tensors[f"{part}.{i}.weight"].shape[1]) for i in range(count))
 
+    @property
+    def layer_norm(self) -> bool:
+        """Whether the critics' layers are normalised."""
+        return f"{CRITICS[0]}.norm.0.scale" in self.tensors
+
     def to_bytes(self) -> bytes:
         """The content of the file."""
         arrays = {n: np.array(t, np.float32, order="C") for n, t in self.tensors.items()}
@@ -91,13 +97,15 @@ def fitted(config: TqcConfig, networks: Networks, critics: bool) -> TqcConfig:
     shaped = replace(config, actor=networks.widths("actor"))
     if not (critics and networks.has_critics):
         return shaped
-    *hidden, quantiles = networks.widths("critic1")
+    *hidden, quantiles = networks.widths(CRITICS[0])
     if quantiles <= config.top_quantiles_to_drop:
         raise BadPolicy(
             f"the critics to start from have {quantiles} quantiles, of which "
             f"{config.top_quantiles_to_drop} are dropped; start_critics=false takes the actor alone"
         )
-    return replace(shaped, critic=tuple(hidden), quantiles=quantiles)
+    return replace(
+        shaped, critic=tuple(hidden), layer_norm=networks.layer_norm, quantiles=quantiles
+    )
 
 
 def chosen(networks: Networks, critics: bool) -> Networks:

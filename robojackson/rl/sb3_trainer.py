@@ -7,13 +7,41 @@ from typing import Any
 import numpy as np
 import torch
 from sb3_contrib import TQC
+from sb3_contrib.tqc.policies import Critic, TQCPolicy
 from stable_baselines3.common.type_aliases import RolloutReturn
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
 from robojackson.rl.config import TqcConfig
 from robojackson.rl.networks import CRITICS, TARGETS, Tensors
 from robojackson.rl.off_policy import OffPolicyTrainer, arguments, patient
+from robojackson.rl.tqc_config import NORM_EPSILON
 from robojackson.rl.trainer import Layers
+
+
+class NormalisedCritic(Critic):
+    """TQC's critics with layer normalisation after every hidden layer."""
+
+    def __init__(self, *args: Any, **named: Any) -> None:
+        super().__init__(*args, **named)
+        for i, plain in enumerate(self.q_networks):
+            *hidden, last = plain
+            normalised: list[torch.nn.Module] = []
+            for layer in hidden:
+                normalised.append(layer)
+                if isinstance(layer, torch.nn.Linear):
+                    norm = torch.nn.LayerNorm(layer.out_features, eps=NORM_EPSILON)
+                    normalised.append(norm)
+            self.q_networks[i] = torch.nn.Sequential(*normalised, last)
+            self.add_module(f"qf{i}", self.q_networks[i])
+
+
+class NormalisedPolicy(TQCPolicy):
+    """TQC's policy with such critics."""
+
+    def make_critic(self, features_extractor: Any = None) -> Critic:
+        """Critics, or their targets."""
+        given = self._update_features_extractor(self.critic_kwargs, features_extractor)
+        return NormalisedCritic(**given).to(self.device)
 
 
 class PatientTQC(TQC):
@@ -46,6 +74,8 @@ class Sb3Trainer(OffPolicyTrainer):
         if config.gsde:
             given["use_sde"] = True
             given["policy_kwargs"] |= {"clip_mean": 0.0}  # the policy file knows no clipped mean
+        if config.layer_norm:
+            given["policy"] = NormalisedPolicy
         model = PatientTQC(env=env, device="cpu", **given)
         model.warmup = config.warmup
         super().__init__(model, generators={})
@@ -63,17 +93,15 @@ class Sb3Trainer(OffPolicyTrainer):
 
     def networks(self) -> Tensors:
         tensors: Tensors = {}
-        for name, layer in self._named().items():
-            tensors[f"{name}.weight"] = layer.weight.detach().numpy().T.copy()
-            tensors[f"{name}.bias"] = layer.bias.detach().numpy().copy()
+        for name, parameter in self._named().items():
+            tensors[name] = parameter.detach().numpy().T.copy()
         return tensors | {"log_alpha": self.model.log_ent_coef.detach().numpy().reshape(()).copy()}
 
     def start_from(self, tensors: Mapping[str, np.ndarray]) -> None:
         with torch.no_grad():
-            for name, layer in self._named().items():
-                if f"{name}.weight" in tensors:
-                    layer.weight.copy_(torch.from_numpy(np.array(tensors[f"{name}.weight"].T)))
-                    layer.bias.copy_(torch.from_numpy(np.array(tensors[f"{name}.bias"])))
+            for name, parameter in self._named().items():
+                if name in tensors:
+                    parameter.copy_(torch.from_numpy(np.array(tensors[name].T)))
             if "log_alpha" in tensors:
                 self.model.log_ent_coef.fill_(float(np.reshape(tensors["log_alpha"], ())))
         self._act_at_once()
@@ -93,19 +121,22 @@ class Sb3Trainer(OffPolicyTrainer):
         torch.set_rng_state(state["random"])
         self._load_rest(folder, replay, steps, updates)
 
-    def _named(self) -> dict[str, torch.nn.Linear]:
-        """The linear layers by our names."""
+    def _named(self) -> dict[str, torch.Tensor]:
+        """The parameters by our names; matrices are transposed there."""
         policy = self.model.policy
         chains = {"actor": policy.actor.latent_pi}
         chains |= {c: policy.critic.q_networks[i] for i, c in enumerate(CRITICS)}
         chains |= {t: policy.critic_target.q_networks[i] for i, t in enumerate(TARGETS)}
-        named = {
-            f"{name}.{i}": layer
-            for name, chain in chains.items()
-            for i, layer in enumerate(m for m in chain if isinstance(m, torch.nn.Linear))
-        }
         heads = {"mean": policy.actor.mu, "log_std": policy.actor.log_std}
-        return named | {n: m for n, m in heads.items() if isinstance(m, torch.nn.Linear)}
+        layers = {n: m for n, m in heads.items() if isinstance(m, torch.nn.Linear)}
+        norms: dict[str, Any] = {}
+        for name, chain in chains.items():
+            layers |= _numbered(f"{name}.", chain, torch.nn.Linear)
+            norms |= _numbered(f"{name}.norm.", chain, torch.nn.LayerNorm)
+        named = {f"{name}.weight": layer.weight for name, layer in layers.items()}
+        named |= {f"{name}.bias": layer.bias for name, layer in layers.items()}
+        named |= {f"{name}.scale": layer.weight for name, layer in norms.items()}
+        return named | {f"{name}.offset": layer.bias for name, layer in norms.items()}
 
     def _parts(self) -> dict[str, Any]:
         return {
@@ -114,3 +145,9 @@ class Sb3Trainer(OffPolicyTrainer):
             "critic_optimizer": self.model.critic.optimizer,
             "entropy_optimizer": self.model.ent_coef_optimizer,
         }
+
+
+def _numbered(prefix: str, chain: torch.nn.Module, kind: type[Any]) -> dict[str, Any]:
+    """The layers of a kind in the order in which they are passed."""
+    found = [module for module in chain.modules() if isinstance(module, kind)]
+    return {f"{prefix}{i}": module for i, module in enumerate(found)}

@@ -26,7 +26,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
 from robojackson.rl.config import TqcConfig
-from robojackson.rl.dense import LOG_STD_RANGE
+from robojackson.rl.dense import LOG_STD_RANGE, dense_count
 from robojackson.rl.networks import CRITICS, TARGETS, Tensors
 from robojackson.rl.off_policy import OffPolicyTrainer, arguments, patient
 from robojackson.rl.replay import buffer_of
@@ -43,7 +43,7 @@ class OverlappedTQC(TQC):
         super().__init__(*args, **kwargs)
         self.warmup = 0
         self.noise = np.random.default_rng(self.seed)
-        self._acting = actor_layers(self.policy.actor_state.params)
+        self._acting = dense_layers(self.policy.actor_state.params)
 
     def predict(  # type: ignore[override]
         self,
@@ -68,7 +68,7 @@ class OverlappedTQC(TQC):
         """Wait for the round before, take its actor, and dispatch the next round."""
         if patient(self, self.warmup):
             return
-        self._acting = actor_layers(self.policy.actor_state.params)
+        self._acting = dense_layers(self.policy.actor_state.params)
         samples = buffer_of(self).sample(batch_size * gradient_steps)
         data = ReplayBufferSamplesNp(
             samples.observations.numpy(),
@@ -98,10 +98,10 @@ class OverlappedTQC(TQC):
         self._n_updates += gradient_steps
 
 
-def actor_layers(params: Any) -> Layers:
-    """The actor's dense layers as numpy arrays: hidden ones, then mean, then log std."""
+def dense_layers(params: Any) -> Layers:
+    """Dense layers in their order as numpy arrays; an actor's last two are mean and log std."""
     tree = jax.device_get(params)["params"]
-    names = sorted(tree, key=lambda name: int(name.rsplit("_", 1)[1]))
+    names = [f"Dense_{i}" for i in range(dense_count(params))]
     return tuple((np.asarray(tree[n]["kernel"]), np.asarray(tree[n]["bias"])) for n in names)
 
 
@@ -127,7 +127,7 @@ class SbxTrainer(OffPolicyTrainer):
             jax.block_until_ready(self._state())
 
     def layers(self) -> Layers:
-        layers = actor_layers(self.model.policy.actor_state.params)
+        layers = dense_layers(self.model.policy.actor_state.params)
         return layers[:-1]
 
     def acting(self) -> Layers:
@@ -135,15 +135,14 @@ class SbxTrainer(OffPolicyTrainer):
 
     def networks(self) -> Tensors:
         policy = self.model.policy
-        *hidden, mean, log_std = actor_layers(policy.actor_state.params)
+        *hidden, mean, log_std = dense_layers(policy.actor_state.params)
         tensors = {
             **_named("actor", hidden),
             **_single("mean", mean),
             **_single("log_std", log_std),
         }
-        if not policy.layer_norm:
-            for name, params in self._critics().items():
-                tensors |= _named(name, actor_layers(params))
+        for name, params in self._critics().items():
+            tensors |= _named(name, dense_layers(params)) | _norms(name, params)
         alpha = self.model.ent_coef_state.params["log_ent_coef"]
         return tensors | {"log_alpha": np.array(jax.device_get(alpha)).reshape(())}
 
@@ -162,7 +161,7 @@ class SbxTrainer(OffPolicyTrainer):
             alpha = _strong(np.float32(tensors["log_alpha"])).reshape(())
             state = self.model.ent_coef_state
             self.model.ent_coef_state = state.replace(params={"log_ent_coef": alpha})
-        self.model._acting = actor_layers(policy.actor_state.params)
+        self.model._acting = dense_layers(policy.actor_state.params)
         self._act_at_once()
 
     def save(self, folder: Path, replay: Path) -> None:
@@ -217,6 +216,15 @@ def _named(part: str, layers: Sequence[tuple[np.ndarray, np.ndarray]]) -> Tensor
     return named
 
 
+def _norms(part: str, params: Any) -> Tensors:
+    tree = jax.device_get(params)["params"]
+    return {
+        f"{part}.norm.{i}.{ours}": np.array(tree[f"LayerNorm_{i}"][theirs])
+        for i in range(len(tree) - dense_count(params))
+        for ours, theirs in (("scale", "scale"), ("offset", "bias"))
+    }
+
+
 def _single(name: str, layer: tuple[np.ndarray, np.ndarray]) -> Tensors:
     return {f"{name}.weight": layer[0].copy(), f"{name}.bias": layer[1].copy()}
 
@@ -235,7 +243,13 @@ def _filled(
 ) -> Any:
     """The parameters with named arrays in the places where there are any."""
     tree = jax.tree_util.tree_map(lambda leaf: leaf, params)
-    for i in range(len(tree["params"])):
+    for i in range(len(tree["params"]) - dense_count(params)):
+        if f"{part}.norm.{i}.scale" in tensors:
+            tree["params"][f"LayerNorm_{i}"] = {
+                "scale": jax.numpy.asarray(tensors[f"{part}.norm.{i}.scale"], jax.numpy.float32),
+                "bias": jax.numpy.asarray(tensors[f"{part}.norm.{i}.offset"], jax.numpy.float32),
+            }
+    for i in range(dense_count(params)):
         name = (heads or {}).get(i, f"{part}.{i}")
         if f"{name}.weight" in tensors:
             tree["params"][f"Dense_{i}"] = {
@@ -252,4 +266,4 @@ def _raise_noise(model: OverlappedTQC, log_std: float) -> None:
     tree = jax.tree_util.tree_map(lambda leaf: leaf, state.params)
     tree["params"][head]["bias"] = jax.numpy.full_like(tree["params"][head]["bias"], log_std)
     model.policy.actor_state = state.replace(params=tree)
-    model._acting = actor_layers(tree)
+    model._acting = dense_layers(tree)

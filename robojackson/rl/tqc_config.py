@@ -23,6 +23,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "target_entropy": 1.0,
         "actor_average": 0.0,
         "entropy": "auto",
+        "layer_norm": False,
     },
     # The authors' released code, its replay buffer cut from 1,000,000 to 300,000.
     "released": {
@@ -40,11 +41,16 @@ PRESETS: dict[str, dict[str, Any]] = {
         "entropy": "auto_0.1",
         "actor": (512, 512, 512),
         "critic": (512, 512, 512),
+        "layer_norm": False,
         "gsde": True,
         "log_std_init": -2.0,
     },
 }
 """`dance` is how we teach tracking: the defaults below."""
+
+
+NORM_EPSILON = 1e-6
+"""Of layer normalisation: flax's."""
 
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
@@ -61,7 +67,9 @@ class TqcConfig:
         critics: SBX has two, and so has the reference.
         top_quantiles_to_drop: Of each critic's quantiles, against overestimation.
         policy_delay: Critic updates an actor update, so many times in a round; `sb3` knows only 1.
-        layer_norm: Layer normalisation in the critics; `sbx` only.
+        actor: Units of the actor's hidden layers.
+        critic: The same of the critics'.
+        layer_norm: Layer normalisation between the critics' layers.
         gsde: State-dependent exploration; `sbx` has none and explores with plain noise.
         log_std_init: Logarithm of the first exploration noise; `sb3` uses it with gSDE only.
         target_entropy: Entropy that exploration keeps, in units of minus the number of actions.
@@ -86,7 +94,7 @@ class TqcConfig:
     entropy: str = Field(default="auto_0.02", pattern=r"^auto(_\d*\.?\d+)?$")
     actor: tuple[int, ...] = (256, 256)
     critic: tuple[int, ...] = (256, 256)
-    layer_norm: bool = False
+    layer_norm: bool = True
     gsde: bool = False
     log_std_init: float = 0.0
     target_entropy: float = Field(default=1.5, gt=0)

@@ -67,12 +67,12 @@ def _critics(learnt: Learnt, batch: Samples, kept: int, tau: float) -> Learnt:
     """One update of both critics and their targets."""
     key, noise, _, _ = jax.random.split(learnt.key, 4)
     key, _, _ = jax.random.split(key, 3)
-    chosen = dense.actions_of(learnt.actor.params, jnp.asarray(batch.next_observations))
+    seen, then = jnp.asarray(batch.observations), jnp.asarray(batch.next_observations)
+    actions = jnp.asarray(batch.actions)
+    chosen = dense.actions_of(learnt.actor.params, then)
     following = chosen.sample(seed=noise)
     alpha = learnt.entropy.apply_fn({"params": learnt.entropy.params})
-    values = [
-        _quantiles(c, c.target_params, batch.next_observations, following) for c in learnt.critics
-    ]
+    values = [dense.quantiles(c.target_params, then, following) for c in learnt.critics]
     future = jnp.concatenate(values, axis=1).T
     lowest_ones = lowest(future, kept)
     soft = future - alpha * chosen.log_prob(following)
@@ -80,9 +80,7 @@ def _critics(learnt: Learnt, batch: Samples, kept: int, tau: float) -> Learnt:
     states = []
     for critic in learnt.critics:
         current, pull = jax.vjp(
-            lambda params, state=critic: _quantiles(
-                state, params, batch.observations, batch.actions
-            ),
+            lambda params: dense.quantiles(params, seen, actions),
             critic.params,
         )
         _, slope = quantile_huber(current.T, wanted, lowest_ones, kept)
@@ -100,7 +98,7 @@ def _actor(learnt: Learnt, observations: Float[Array, "B O"], target_entropy: fl
         actions = chosen.sample(seed=noise)
         log_prob = chosen.log_prob(actions)
         values = [
-            _quantiles(c, c.params, observations, actions, of_actions=True) for c in learnt.critics
+            dense.quantiles_of_actions(c.params, observations, actions) for c in learnt.critics
         ]
         return jnp.mean(alpha * log_prob) - jnp.mean(jnp.stack(values)), -jnp.mean(log_prob)
 
@@ -108,13 +106,3 @@ def _actor(learnt: Learnt, observations: Float[Array, "B O"], target_entropy: fl
     coefficient, _ = TQC.update_temperature(target_entropy, learnt.entropy, entropy)
     actor = learnt.actor.apply_gradients(grads=slope)
     return learnt._replace(actor=actor, entropy=coefficient, key=key)
-
-
-def _quantiles(
-    critic: Any, params: dense.Parameters, observations: Any, actions: Any, of_actions: bool = False
-) -> Array:
-    """A critic's quantiles; by flax where it has more than dense layers."""
-    if not dense.is_plain(params):
-        return critic.apply_fn(params, observations, actions)
-    ours = dense.quantiles_of_actions if of_actions else dense.quantiles
-    return ours(params, observations, actions)

@@ -13,14 +13,23 @@ from robojackson.rl import dense
 BATCH, SEEN, ACTS, QUANTILES = 7, 12, 3, 5
 
 
-@pytest.fixture(params=[(16, 24), (128, 128)], ids=["narrow", "wide"])
-def made(request: pytest.FixtureRequest) -> SimpleNamespace:
+UNITS = {"narrow": [16, 24], "wide": [128, 128]}
+
+
+@pytest.fixture(params=UNITS)
+def units(request: pytest.FixtureRequest) -> list[int]:
+    """Of the hidden layers."""
+    return UNITS[request.param]
+
+
+@pytest.fixture(params=[False, True], ids=["plain", "normalised"])
+def made(request: pytest.FixtureRequest, units: list[int]) -> SimpleNamespace:
     """Networks of sbx, their parameters, and inputs."""
     keys = iter(jax.random.split(jax.random.PRNGKey(0), 4))
     seen = jax.random.normal(next(keys), (BATCH, SEEN))
     acts = jax.random.normal(next(keys), (BATCH, ACTS))
-    critic = ContinuousCritic(net_arch=list(request.param), output_dim=QUANTILES)
-    actor = SquashedGaussianActor(net_arch=list(request.param), action_dim=ACTS)
+    critic = ContinuousCritic(units, use_layer_norm=request.param, output_dim=QUANTILES)
+    actor = SquashedGaussianActor(net_arch=units, action_dim=ACTS)
     return SimpleNamespace(
         seen=seen,
         acts=acts,
@@ -62,10 +71,3 @@ def test_an_actor_and_its_slope_are_flaxs(made: SimpleNamespace) -> None:
         return jax.value_and_grad(value)
 
     same(told(dense.actions_of)(made.of_actor), told(made.actor.apply)(made.of_actor))  # type: ignore[operator]
-
-
-def test_a_critic_with_normalisation_is_not_taken_for_a_plain_one(made: SimpleNamespace) -> None:
-    normalised = ContinuousCritic(net_arch=[8], output_dim=2, use_layer_norm=True)
-    params = normalised.init(jax.random.PRNGKey(0), made.seen, made.acts)
-    assert dense.is_plain(made.of_critic)
-    assert not dense.is_plain(params)

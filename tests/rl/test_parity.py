@@ -1,5 +1,7 @@
 """sb3-contrib and SBX do the same: one batch, one set of weights, the same noise, k updates."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -17,6 +19,7 @@ BATCH, UPDATES = 16, 4
 TQC = TqcConfig(
     preset="paper", n_envs=2, warmup=1, batch=BATCH, actor=(24, 16), critic=(24, 16), buffer=1000
 )
+KINDS = {"plain": TQC, "normalised": replace(TQC, layer_norm=True)}
 
 
 def noise(shape: tuple[int, ...]) -> np.ndarray:
@@ -43,8 +46,9 @@ def part(rows: ReplayBufferSamples, i: int) -> ReplayBufferSamples:
     return ReplayBufferSamples(*(None if x is None else x[span] for x in rows))
 
 
+@pytest.mark.parametrize("kind", KINDS)
 def test_k_updates_of_both_trainers_agree(
-    robot: Robot, sway: ReferenceMotion, monkeypatch: pytest.MonkeyPatch
+    kind: str, robot: Robot, sway: ReferenceMotion, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from tensorflow_probability.substrates.jax.internal import samplers
 
@@ -56,8 +60,8 @@ def test_k_updates_of_both_trainers_agree(
     monkeypatch.setattr(
         samplers, "normal", lambda shape, *rest, **more: noise(tuple(map(int, shape)))
     )
-    torch_trainer = make_trainer("sb3", env, TQC, seed=0)
-    jax_trainer = make_trainer("sbx", env, TQC, seed=1)
+    torch_trainer = make_trainer("sb3", env, KINDS[kind], seed=0)
+    jax_trainer = make_trainer("sbx", env, KINDS[kind], seed=1)
     jax_trainer.start_from(torch_trainer.networks())
     before = torch_trainer.networks()
     rows = transitions()
