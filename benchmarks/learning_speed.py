@@ -24,16 +24,19 @@ Row = dict[str, Any]
 def speed(repeats: int, seconds: float) -> list[Row]:
     """One row a comparison: ours, the peer's, their ratio and the bar."""
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
-    rows = [updates(repeats, seconds), paper_steps(repeats, seconds), told_core(repeats)]
+    rows = [updates(repeats, seconds, layer_norm) for layer_norm in (False, True)]
+    rows += [paper_steps(repeats, seconds), told_core(repeats)]
     return [{**row, "load_average": os.getloadavg()[0]} for row in rows]
 
 
-def updates(repeats: int, seconds: float) -> Row:
-    """Gradient updates a CPU second at equal hyper-parameters, on the tracking observation."""
-    tqc = TqcConfig(policy_delay=1, warmup=1)
+def updates(repeats: int, seconds: float, layer_norm: bool) -> Row:
+    """Gradient updates a CPU second at equal hyper-parameters, on the tracking observation: as
+    sb3-contrib's critics are, and as ours are by default."""
+    tqc = TqcConfig(policy_delay=1, warmup=1, layer_norm=layer_norm)
     work = {name: _rounds(name, TrackConfig(threads=1), tqc) for name in ("sbx", "sb3")}
     ours, theirs = interleaved(work, repeats, seconds)
-    return told("updates/s, sbx over sb3-contrib", ours, theirs, ours / theirs, ">= 4")
+    what = "updates/s, sbx over sb3-contrib" + ", layer normalisation" * layer_norm
+    return told(what, ours, theirs, ours / theirs, ">= 4")
 
 
 def paper_steps(repeats: int, seconds: float) -> Row:
