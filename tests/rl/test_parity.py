@@ -10,6 +10,7 @@ from stable_baselines3.common.type_aliases import ReplayBufferSamples
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.retarget.robot import Robot
 from robojackson.rl.config import PaperConfig, TqcConfig
+from robojackson.rl.networks import Networks, fitted
 from robojackson.rl.replay import buffer_of
 from robojackson.rl.tracking import TrackingCore
 from robojackson.rl.trainer import make_trainer
@@ -77,3 +78,18 @@ def test_k_updates_of_both_trainers_agree(
         np.testing.assert_allclose(ours[name], array, atol=1e-4, err_msg=name)
     moved = np.abs(theirs["actor.0.weight"] - before["actor.0.weight"]).max()
     assert moved > 5e-4
+
+
+@pytest.mark.parametrize("trainer_name", ["sbx", "sb3"])
+def test_what_goes_into_normalised_critics_comes_out(
+    trainer_name: str, robot: Robot, sway: ReferenceMotion
+) -> None:
+    env = TrackingVecEnv(TrackingCore(robot, sway, PaperConfig(), 2, 0))
+    trainer = make_trainer(trainer_name, env, KINDS["normalised"], seed=0)
+    given = {name: array + 0.1 for name, array in trainer.networks().items()}
+    assert {"critic1.norm.0.scale", "target2.norm.1.offset"} <= set(given)
+    trainer.start_from(given)
+    for name, array in trainer.networks().items():
+        np.testing.assert_allclose(array, given[name], atol=1e-6, err_msg=name)
+    shaped = fitted(TQC, Networks(given, {}), critics=True)
+    assert (shaped.layer_norm, shaped.critic) == (True, (24, 16))
