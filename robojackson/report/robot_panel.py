@@ -4,6 +4,7 @@ Without a screen this needs EGL (or OSMesa); `MUJOCO_GL` is honoured, but not ne
 it when it is imported, which is long before anybody here knows that a picture will be wanted.
 """
 
+import contextlib
 import copy
 import importlib
 import os
@@ -141,7 +142,14 @@ def _soften(model: mujoco.MjModel, material: int) -> None:
 
 
 def _gl_context(width: int, height: int) -> Any:
-    """A context of the first backend that works."""
+    """A context of the first backend that works.
+
+    PyTorch's CUDA build brings triton, whose LLVM ends the process with a segmentation fault where
+    Mesa's software renderer has brought its own before; the other way round both work. So the
+    optimizer of a later training finds triton loaded.
+    """
+    with contextlib.suppress(ImportError):
+        importlib.import_module("triton")
     chosen = os.environ.get("MUJOCO_GL", "").lower()
     if sys.platform != "linux" or chosen == "glfw":
         return mujoco.GLContext(width, height)

@@ -1,5 +1,8 @@
 """Geometry of the panels: what stands where in the picture."""
 
+import sys
+from pathlib import Path
+
 import mujoco
 import numpy as np
 import pytest
@@ -108,3 +111,15 @@ def test_drawing_leaves_the_model_as_it_was(model: mujoco.MjModel) -> None:
     np.testing.assert_array_equal(before[0], model.geom_rgba)
     np.testing.assert_array_equal(before[1], model.tex_data)
     assert before[2] == model.vis.global_.fovy
+
+
+def test_triton_is_loaded_before_graphics(
+    model: mujoco.MjModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """PyTorch's CUDA build brings it; loaded after Mesa's renderer it ends the process."""
+    (tmp_path / "triton.py").write_text("")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "triton", raising=False)
+    with RobotView(model, 32, 32, TINT):
+        stand_in = sys.modules.pop("triton")
+    assert stand_in.__file__ == str(tmp_path / "triton.py")
