@@ -6,8 +6,10 @@
 """
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import count, pairwise, takewhile
 from pathlib import Path
 
 import numpy as np
@@ -53,10 +55,8 @@ class Networks:
 
     def widths(self, part: str) -> tuple[int, ...]:
         """Units of every layer of a part."""
-        count = sum(
-            name.startswith(f"{part}.") and name.endswith("weight") for name in self.tensors
-        )
-        return tuple(int(self.tensors[f"{part}.{i}.weight"].shape[1]) for i in range(count))
+        names = (f"{part}.{i}.weight" for i in count())
+        return tuple(self.tensors[n].shape[1] for n in takewhile(self.tensors.__contains__, names))
 
     @property
     def layer_norm(self) -> bool:
@@ -73,19 +73,79 @@ def load_networks(path: Path) -> Networks:
     """Read a networks file.
 
     Raises:
-        BadPolicy: the file is missing or foreign.
+        BadPolicy: the file is missing, foreign or not whole.
     """
     try:
         with safe_open(path, framework="np") as file:
             header = file.metadata() or {}
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-    except (OSError, SafetensorError) as error:
+        facts = json.loads(header.get(FORMAT, "{}"))
+    except (OSError, SafetensorError, TypeError, ValueError) as error:
         raise BadPolicy(f"{path} is not a networks file of ours ({error})") from error
     if FORMAT not in header:
         raise BadPolicy(
             f"{path} is not a {FORMAT} file; `robojackson train` writes networks.safetensors"
         )
-    return Networks(tensors, json.loads(header[FORMAT]))
+    return whole(Networks(tensors, facts), path)
+
+
+def whole(networks: Networks, path: Path) -> Networks:
+    """The networks, if every array is there, measures what its neighbours ask for and is finite.
+
+    Raises:
+        BadPolicy: with the first array that does not.
+    """
+    tensors = networks.tensors
+    flat = sorted(n for n, t in tensors.items() if n.endswith(".weight") and t.ndim != 2)
+    if flat or "mean.weight" not in tensors:
+        raise BadPolicy(f"{path} holds no actor: {flat[0] if flat else 'mean.weight'} is no matrix")
+    needed = _shapes(networks)
+    if missing := sorted(needed.keys() - tensors.keys()):
+        raise BadPolicy(f"{path} is not whole: {missing[0]} is missing")
+    if foreign := sorted(tensors.keys() - needed.keys()):
+        raise BadPolicy(f"{path} holds {foreign[0]}, which belongs to none of its layers")
+    for name, array in tensors.items():
+        if array.shape != needed[name]:
+            raise BadPolicy(
+                f"{path}: {name} has the shape {array.shape}, its layers ask for {needed[name]}"
+            )
+        if not np.isfinite(array).all():
+            raise BadPolicy(f"{path}: {name} holds values that are no numbers")
+    return networks
+
+
+def _shapes(networks: Networks) -> dict[str, tuple[int, ...]]:
+    """Name and shape of every array that networks with such layers have."""
+    tensors, seen, acts = networks.tensors, networks.observation_size, networks.action_size
+    actor = (seen, *_units(tensors, "actor"))
+    shapes = _chain("actor", actor) | _layer("mean", actor[-1], acts)
+    if any(name.startswith("log_std.") for name in tensors):
+        shapes |= _layer("log_std", actor[-1], acts)
+    critic = max((_units(tensors, part) for part in (*CRITICS, *TARGETS)), key=len)
+    normed = any(".norm." in name for name in tensors)
+    for part in (*CRITICS, *TARGETS):
+        shapes |= _chain(part, (seen + acts, *critic)) if critic else {}
+        for i, units in enumerate(critic[:-1] if normed else ()):
+            shapes |= {f"{part}.norm.{i}.{kind}": (units,) for kind in ("scale", "offset")}
+    return shapes | ({"log_alpha": ()} if "log_alpha" in tensors else {})
+
+
+def _units(tensors: Mapping[str, np.ndarray], part: str) -> tuple[int, ...]:
+    """Units of every layer of which there is anything."""
+    found = {m[1] for name in tensors if (m := re.fullmatch(rf"{part}\.(\d+)\.\w+", name))}
+    biases = (tensors.get(f"{part}.{i}.bias", np.empty(0)) for i in range(len(found)))
+    return tuple(bias.size for bias in biases)
+
+
+def _chain(part: str, sizes: tuple[int, ...]) -> dict[str, tuple[int, ...]]:
+    shapes: dict[str, tuple[int, ...]] = {}
+    for i, (taken, given) in enumerate(pairwise(sizes)):
+        shapes |= _layer(f"{part}.{i}", taken, given)
+    return shapes
+
+
+def _layer(name: str, taken: int, given: int) -> dict[str, tuple[int, ...]]:
+    return {f"{name}.weight": (taken, given), f"{name}.bias": (given,)}
 
 
 def fitted(config: TqcConfig, networks: Networks, critics: bool) -> TqcConfig:

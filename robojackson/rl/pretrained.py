@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from robojackson.errors import BadPolicy, MissingDependency
-from robojackson.rl.networks import CRITICS, TARGETS, Networks, Tensors, load_networks
+from robojackson.rl.networks import CRITICS, TARGETS, Networks, Tensors, load_networks, whole
 
 log = logging.getLogger(__name__)
 
@@ -97,7 +97,8 @@ def from_sb3_zip(path: Path) -> Networks:
         tensors = _renamed(state)
     except (KeyError, ValueError) as error:
         raise BadPolicy(f"{path} does not hold an actor and critics of TQC ({error})") from error
-    return Networks(tensors | alpha, {"from": path.name, "steps": told.get("num_timesteps")})
+    facts = {"from": path.name, "steps": told.get("num_timesteps")}
+    return whole(Networks(tensors | alpha, facts), path)
 
 
 def _alpha(archive: zipfile.ZipFile, torch: object) -> Tensors:

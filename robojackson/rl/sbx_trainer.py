@@ -13,7 +13,7 @@ os.environ.setdefault(
 )
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -135,22 +135,16 @@ class SbxTrainer(OffPolicyTrainer):
 
     def networks(self) -> Tensors:
         policy = self.model.policy
-        *hidden, mean, log_std = dense_layers(policy.actor_state.params)
-        tensors = {
-            **_named("actor", hidden),
-            **_single("mean", mean),
-            **_single("log_std", log_std),
-        }
+        tensors = _tensors(policy.actor_state.params, "actor")
         for name, params in self._critics().items():
-            tensors |= _named(name, dense_layers(params)) | _norms(name, params)
+            tensors |= _tensors(params, name)
         alpha = self.model.ent_coef_state.params["log_ent_coef"]
         return tensors | {"log_alpha": np.array(jax.device_get(alpha)).reshape(())}
 
     def start_from(self, tensors: Mapping[str, np.ndarray]) -> None:
         policy = self.model.policy
-        heads = _heads(policy.actor_state.params)
         policy.actor_state = policy.actor_state.replace(
-            params=_filled(policy.actor_state.params, tensors, "actor", heads)
+            params=_filled(policy.actor_state.params, tensors, "actor")
         )
         for i, (critic, target) in enumerate(zip(CRITICS, TARGETS, strict=True), 1):
             state = getattr(policy, f"qf{i}_state")
@@ -209,53 +203,33 @@ def _strong(leaf: Any) -> jax.Array:
     return jax.numpy.asarray(np.asarray(leaf))
 
 
-def _named(part: str, layers: Sequence[tuple[np.ndarray, np.ndarray]]) -> Tensors:
-    named: Tensors = {}
-    for i, layer in enumerate(layers):
-        named |= _single(f"{part}.{i}", layer)
-    return named
+def _places(params: Any, part: str) -> dict[str, tuple[str, str]]:
+    """Module and leaf of flax's tree in which each of our tensors of a part stands."""
+    dense = dense_count(params)
+    heads = {dense - 2: "mean", dense - 1: "log_std"} if part == "actor" else {}
+    places: dict[str, tuple[str, str]] = {}
+    for i in range(dense):
+        name, module = heads.get(i, f"{part}.{i}"), f"Dense_{i}"
+        places |= {f"{name}.weight": (module, "kernel"), f"{name}.bias": (module, "bias")}
+    for i in range(len(params["params"]) - dense):
+        name, module = f"{part}.norm.{i}", f"LayerNorm_{i}"
+        places |= {f"{name}.scale": (module, "scale"), f"{name}.offset": (module, "bias")}
+    return places
 
 
-def _norms(part: str, params: Any) -> Tensors:
+def _tensors(params: Any, part: str) -> Tensors:
+    """The parameters of a part by our names."""
     tree = jax.device_get(params)["params"]
-    return {
-        f"{part}.norm.{i}.{ours}": np.array(tree[f"LayerNorm_{i}"][theirs])
-        for i in range(len(tree) - dense_count(params))
-        for ours, theirs in (("scale", "scale"), ("offset", "bias"))
-    }
+    places = _places(params, part).items()
+    return {name: np.array(tree[module][leaf]) for name, (module, leaf) in places}
 
 
-def _single(name: str, layer: tuple[np.ndarray, np.ndarray]) -> Tensors:
-    return {f"{name}.weight": layer[0].copy(), f"{name}.bias": layer[1].copy()}
-
-
-def _heads(params: Any) -> dict[int, str]:
-    """The actor's last two layers are its heads."""
-    count = len(params["params"])
-    return {count - 2: "mean", count - 1: "log_std"}
-
-
-def _filled(
-    params: Any,
-    tensors: Mapping[str, np.ndarray],
-    part: str,
-    heads: Mapping[int, str] | None = None,
-) -> Any:
+def _filled(params: Any, tensors: Mapping[str, np.ndarray], part: str) -> Any:
     """The parameters with named arrays in the places where there are any."""
     tree = jax.tree_util.tree_map(lambda leaf: leaf, params)
-    for i in range(len(tree["params"]) - dense_count(params)):
-        if f"{part}.norm.{i}.scale" in tensors:
-            tree["params"][f"LayerNorm_{i}"] = {
-                "scale": jax.numpy.asarray(tensors[f"{part}.norm.{i}.scale"], jax.numpy.float32),
-                "bias": jax.numpy.asarray(tensors[f"{part}.norm.{i}.offset"], jax.numpy.float32),
-            }
-    for i in range(dense_count(params)):
-        name = (heads or {}).get(i, f"{part}.{i}")
-        if f"{name}.weight" in tensors:
-            tree["params"][f"Dense_{i}"] = {
-                "kernel": jax.numpy.asarray(tensors[f"{name}.weight"], jax.numpy.float32),
-                "bias": jax.numpy.asarray(tensors[f"{name}.bias"], jax.numpy.float32),
-            }
+    for name, (module, leaf) in _places(params, part).items():
+        if name in tensors:
+            tree["params"][module][leaf] = jax.numpy.asarray(tensors[name], jax.numpy.float32)
     return tree
 
 

@@ -11,6 +11,7 @@ import gymnasium
 import numpy as np
 import onnxruntime
 import pytest
+import torch
 from sb3_contrib import TQC
 from stable_baselines3 import SAC
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv
@@ -204,6 +205,62 @@ def test_networks_read_back_are_those_written(env: VecEnv, tmp_path: Path) -> No
     found = load_networks(tmp_path / "networks.safetensors")
     assert found.facts == {"steps": 3}
     assert all(np.array_equal(found.tensors[name], given.tensors[name]) for name in given.tensors)
+
+
+DAMAGES = {
+    "critic2.norm.0.offset is missing": ("critic2.norm.0.offset", None),
+    "target1.0.weight is missing": ("target1.0.weight", None),
+    "actor.1.bias is missing": ("actor.1.bias", None),
+    "no actor: mean.weight is no matrix": ("mean.weight", None),
+    "no actor: critic1.0.weight is no matrix": ("critic1.0.weight", np.ones(3)),
+    "critic3.0.weight, which belongs to none": ("critic3.0.weight", np.ones((2, 2))),
+    r"critic1.norm.0.scale has the shape \(4,\).*ask for \(10,\)": (
+        "critic1.norm.0.scale",
+        np.ones(4),
+    ),
+    r"critic2.0.weight has the shape \(9, 10\)": ("critic2.0.weight", np.ones((9, 10))),
+    r"log_alpha has the shape \(2,\)": ("log_alpha", np.ones(2)),
+    "log_std.bias holds values that are no numbers": ("log_std.bias", np.full(17, np.nan)),
+}
+
+
+@pytest.mark.parametrize("told", DAMAGES)
+def test_networks_that_are_not_whole_are_refused_and_nothing_is_left(
+    robot: Robot, sway: ReferenceMotion, env: VecEnv, tmp_path: Path, told: str
+) -> None:
+    """What is missing would stay random, unseen; what does not fit would end in a traceback."""
+    tensors = make_trainer("sb3", env, replace(SMALL, layer_norm=True), seed=1).networks()
+    name, array = DAMAGES[told]
+    tensors.pop(name, None)
+    path = tmp_path / "networks.safetensors"
+    path.write_bytes(Networks(tensors | ({} if array is None else {name: array}), {}).to_bytes())
+    config = TrainConfig(mode="paper", steps=16, start=str(path), tqc=SMALL)
+    with pytest.raises(BadPolicy, match=told):
+        train(sway, robot, config, tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_an_actor_alone_is_whole(env: VecEnv, tmp_path: Path) -> None:
+    tensors = make_trainer("sb3", env, SMALL, seed=1).networks()
+    kept = {n: t for n, t in tensors.items() if n.split(".")[0] in ("actor", "mean", "log_std")}
+    path = tmp_path / "networks.safetensors"
+    path.write_bytes(Networks(kept, {}).to_bytes())
+    assert load_networks(path).widths("actor") == SMALL.actor
+
+
+def test_a_zip_that_lacks_a_layer_is_refused(tmp_path: Path) -> None:
+    _, path = zipped(tmp_path)
+    with zipfile.ZipFile(path) as archive:
+        files = {name: archive.read(name) for name in archive.namelist()}
+    state = torch.load(io.BytesIO(files["policy.pth"]), weights_only=True)
+    state = {name: value for name, value in state.items() if not name.startswith("critic.qf1.2")}
+    held = io.BytesIO()
+    torch.save(state, held)
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in (files | {"policy.pth": held.getvalue()}).items():
+            archive.writestr(name, content)
+    with pytest.raises(BadPolicy, match=r"theirs\.zip"):
+        from_sb3_zip(path)
 
 
 @pytest.mark.parametrize("mode", ["paper", "track"])
