@@ -45,6 +45,7 @@ def line(name: str, move: Move, seconds: float, seeds: Sequence[Rows]) -> dict[s
         "cpu_minutes": move.cpu_minutes,
         "horizon_s": seconds if move.cyclic else None,
         "seeds": len(seeds),
+        "steps": mean(row.get("step") for rows in trained for row in rows),
         **{key: mean(values) for key, values in by_seed.items()},
         "strict_success_95": list(cluster_interval(success)),
         "worst_seed": min(success),

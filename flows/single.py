@@ -140,9 +140,8 @@ def evaluate(
         verdict = judge(trained, motion, machine, settings.evaluate, progress)
     summary = console.plain(verdict.summary)
     if out is not None:
-        seed = int(str(trained.facts.get("seed", 0)))
-        common = {"run_id": policy.parent.name, "move": reference.stem, "seed": seed}
-        rows = [{**common, "setup": settings.setup, **row} for row in verdict.rows]
+        common = {"run_id": policy.parent.name, "move": reference.stem, "setup": settings.setup}
+        rows = [{**common, **trained.training, **row} for row in verdict.rows]
         with results_in(out) as store:
             store.put("evaluations.parquet", tables.encode_rows(EVALUATION_RECORD, rows))
             store.put("evaluation.json", json.dumps(summary, indent=1).encode())

@@ -32,10 +32,9 @@ def evaluate(
     with store.local(policy) as path:
         trained = load_policy(path)
     verdict = judge(trained, motion, load_robot(robot), config)
-    seed = int(str(trained.facts.get("seed", 0)))
-    common = {"run_id": f"{labels.move}-{labels.setup}-s{seed}", "seed": seed}
-    names = {"move": labels.move, "setup": labels.setup}
-    rows = tables.encode_rows(EVALUATION_RECORD, [{**common, **names, **r} for r in verdict.rows])
+    run_id = f"{labels.move}-{labels.setup}-s{trained.training['seed']}"
+    common = {"run_id": run_id, "move": labels.move, "setup": labels.setup, **trained.training}
+    rows = tables.encode_rows(EVALUATION_RECORD, [{**common, **r} for r in verdict.rows])
     summary = json.dumps(verdict.summary, indent=1).encode()
     rollout = Rollout(motion.dt, verdict.rollout_qpos)
     return {

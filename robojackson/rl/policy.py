@@ -45,6 +45,13 @@ class Policy:
         """Length of the observation that the first layer takes."""
         return self.layers[0][0].shape[0]
 
+    @property
+    def training(self) -> dict[str, int | None]:
+        """Seed of its training and the control steps that this took, by their names in tables."""
+        told = {name: self.facts.get(name) for name in ("seed", "steps")}
+        seed, steps = (value if isinstance(value, int) else None for value in told.values())
+        return {"seed": seed or 0, "step": steps}
+
     def to_bytes(self) -> bytes:
         """The content of the policy's file."""
         tensors: dict[str, np.ndarray] = {}

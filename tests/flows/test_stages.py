@@ -114,9 +114,12 @@ def test_train_writes_one_row_an_episode(trained: Said, folder: Path) -> None:
     assert len(rows) == trained.answer["episodes"]
 
 
-def test_evaluate_writes_one_row_a_rollout_of_every_policy(judged: Said, folder: Path) -> None:
+def test_evaluate_writes_one_row_a_rollout_of_every_policy(
+    trained: Said, judged: Said, folder: Path
+) -> None:
     data = (folder / "evaluations.parquet").read_bytes()
     rows = tables.decode_rows(EVALUATION_RECORD, data, "f")
+    assert {row["step"] for row in rows} == {trained.answer["steps"]}
     known = {"trained", *judged.answer["baselines"], *judged.answer["variants"]}
     assert {row["policy"] for row in rows} == known
 

@@ -61,3 +61,17 @@ def test_layers_that_do_not_fit_are_refused(tmp_path: Path) -> None:
     (tmp_path / "p.safetensors").write_bytes(wrong.to_bytes())
     with pytest.raises(BadPolicy, match="fit"):
         load_policy(tmp_path / "p.safetensors")
+
+
+@pytest.mark.parametrize(
+    ("facts", "told"),
+    [
+        ({"seed": 3, "steps": 512}, {"seed": 3, "step": 512}),
+        ({}, {"seed": 0, "step": None}),
+        ({"seed": "three", "steps": [1]}, {"seed": 0, "step": None}),
+    ],
+)
+def test_a_policy_tells_the_columns_of_its_training(
+    facts: dict[str, object], told: dict[str, object]
+) -> None:
+    assert Policy((), facts).training == told
