@@ -40,12 +40,13 @@ def line(name: str, move: Move, seconds: float, seeds: Sequence[Rows]) -> dict[s
     trained = [of_policy(rows, "trained") for rows in seeds]
     by_seed = {key: [mean(r.get(key) for r in rows) for rows in trained] for key in TOLD}
     success = [value or 0.0 for value in by_seed["strict_success"]]
+    taken = [row.get("step") for rows in trained for row in rows]
     found: dict[str, Any] = {
         "move": name,
         "cpu_minutes": move.cpu_minutes,
         "horizon_s": seconds if move.cyclic else None,
         "seeds": len(seeds),
-        "steps": mean(row.get("step") for rows in trained for row in rows),
+        "steps": mean(taken) if None not in taken else None,
         **{key: mean(values) for key, values in by_seed.items()},
         "strict_success_95": list(cluster_interval(success)),
         "worst_seed": min(success),

@@ -57,6 +57,13 @@ def test_a_line_tells_the_mean_and_the_worst_seed() -> None:
     assert told["beside"]["statue"]["survived_s"] == 10.0
 
 
+def test_steps_are_told_only_where_every_seed_tells_them() -> None:
+    first, second = rollouts(1.0, 1.0), rollouts(1.0, 1.0)
+    first[0]["step"], second[0]["step"] = 1000, None
+    assert line("walk", MOVES["walk"], 10.0, [first])["steps"] == 1000
+    assert line("walk", MOVES["walk"], 10.0, [first, second])["steps"] is None
+
+
 def test_a_limb_that_flails_misses_its_own_bar_alone() -> None:
     rows = rollouts(1.0, 1.0)
     rows[0]["limb_gain_left_hand"] = 2.0
