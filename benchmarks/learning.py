@@ -27,17 +27,8 @@ from benchmarks.learning_summary import AUTHORS_ROBOT, EXCESS, GAIN, LIMBS, R2, 
 PARTS = ("speed", "threads", "policies", "survival", "pretraining", "checkpoints", "table")
 SPEED = ("what", "ours", "peer", "ratio", "bar", "holds", "load_average")
 POLICY = (
-    *(
-        "move",
-        "horizon_s",
-        "seeds",
-        "steps",
-        "strict_success",
-        "strict_success_95",
-        "worst_seed",
-        "skill",
-    ),
-    *("velocity_score", "survived_s", "forced", "holds"),
+    *("move", "horizon_s", "seeds", "steps", "strict_success", "strict_success_95", "worst_seed"),
+    *("skill", "velocity_score", "survived_s", "forced", "holds"),
 )
 
 

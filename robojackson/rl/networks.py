@@ -96,9 +96,9 @@ def whole(networks: Networks, path: Path) -> Networks:
         BadPolicy: with the first array that does not.
     """
     tensors = networks.tensors
-    flat = sorted(n for n, t in tensors.items() if n.endswith(".weight") and t.ndim != 2)
-    if flat or "mean.weight" not in tensors:
-        raise BadPolicy(f"{path} holds no actor: {flat[0] if flat else 'mean.weight'} is no matrix")
+    weights = {"mean.weight", *(name for name in tensors if name.endswith(".weight"))}
+    if flat := sorted(n for n in weights if n not in tensors or tensors[n].ndim != 2):
+        raise BadPolicy(f"{path} is not whole: {flat[0]} is missing or no matrix")
     needed = _shapes(networks)
     if missing := sorted(needed.keys() - tensors.keys()):
         raise BadPolicy(f"{path} is not whole: {missing[0]} is missing")

@@ -211,8 +211,8 @@ DAMAGES = {
     "critic2.norm.0.offset is missing": ("critic2.norm.0.offset", None),
     "target1.0.weight is missing": ("target1.0.weight", None),
     "actor.1.bias is missing": ("actor.1.bias", None),
-    "no actor: mean.weight is no matrix": ("mean.weight", None),
-    "no actor: critic1.0.weight is no matrix": ("critic1.0.weight", np.ones(3)),
+    "mean.weight is missing or no matrix": ("mean.weight", None),
+    "critic1.0.weight is missing or no matrix": ("critic1.0.weight", np.ones(3)),
     "critic3.0.weight, which belongs to none": ("critic3.0.weight", np.ones((2, 2))),
     r"critic1.norm.0.scale has the shape \(4,\).*ask for \(10,\)": (
         "critic1.norm.0.scale",
