@@ -48,9 +48,11 @@ class Policy:
     @property
     def training(self) -> dict[str, int | None]:
         """Seed of its training and the control steps that this took, by their names in tables."""
-        told = {name: self.facts.get(name) for name in ("seed", "steps")}
-        seed, steps = (value if isinstance(value, int) else None for value in told.values())
-        return {"seed": seed or 0, "step": steps}
+        seed, steps = self.facts.get("seed"), self.facts.get("steps")
+        return {
+            "seed": seed if isinstance(seed, int) else 0,
+            "step": steps if isinstance(steps, int) else None,
+        }
 
     def to_bytes(self) -> bytes:
         """The content of the policy's file."""
