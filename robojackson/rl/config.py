@@ -202,7 +202,7 @@ class TrainConfig:
 
     mode: Literal["track", "paper"] = "track"
     trainer: Literal["sbx", "sb3"] = "sbx"
-    seed: int = Field(default=0, ge=0, lt=2**32)
+    seed: int = Field(default=0, ge=0, lt=2**31)
     steps: int | None = Field(default=None, ge=1)
     minutes: float | None = Field(default=None, gt=0)
     cpu_minutes: float | None = Field(default=None, gt=0)

@@ -48,11 +48,8 @@ class Policy:
     @property
     def training(self) -> dict[str, int | None]:
         """Seed of its training and the control steps that this took, by their names in tables."""
-        seed, steps = self.facts.get("seed"), self.facts.get("steps")
-        return {
-            "seed": seed if isinstance(seed, int) else 0,
-            "step": steps if isinstance(steps, int) else None,
-        }
+        seed, steps = (_count(self.facts.get(name)) for name in ("seed", "steps"))
+        return {"seed": seed or 0, "step": steps}
 
     def to_bytes(self) -> bytes:
         """The content of the policy's file."""
@@ -61,6 +58,11 @@ class Policy:
             tensors[f"layer{i}.weight"] = np.ascontiguousarray(weight, np.float32)
             tensors[f"layer{i}.bias"] = np.ascontiguousarray(bias, np.float32)
         return save(tensors, {FORMAT: json.dumps(dict(self.facts), sort_keys=True)})
+
+
+def _count(value: object) -> int | None:
+    """A number that a table has room for; None for whatever else a file may say."""
+    return value if isinstance(value, int) and 0 <= value < 2**31 else None
 
 
 def load_policy(path: Path) -> Policy:

@@ -194,7 +194,7 @@ def test_numbers_with_which_nothing_would_be_learnt_are_refused(
         *[("mocap.cutoff_hz", -1.0), ("mocap.depth_cutoff_hz", 0.0), ("mocap.focal_px", -5.0)],
         *[("mocap.bone_trust", math.nan), ("mocap.focal_px", math.inf), ("mocap.bone_trust", 5.0)],
         *[("retarget.seed", -1), ("retarget.solver.damping", math.inf)],
-        *[("retarget.weights.height", math.inf), ("train.seed", 2**32)],
+        *[("retarget.weights.height", math.inf), ("train.seed", 2**32), ("train.seed", 2**31)],
         *[("train.track.episode_seconds", math.inf), ("train.track.reward.joints", math.nan)],
         *[("train.track.reward.sites_width", 0.0), ("train.tqc.learning_rate", math.inf)],
     ],

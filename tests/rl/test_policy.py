@@ -69,6 +69,7 @@ def test_layers_that_do_not_fit_are_refused(tmp_path: Path) -> None:
         ({"seed": 3, "steps": 512}, {"seed": 3, "step": 512}),
         ({}, {"seed": 0, "step": None}),
         ({"seed": "three", "steps": [1]}, {"seed": 0, "step": None}),
+        ({"seed": 2**70, "steps": -1}, {"seed": 0, "step": None}),
     ],
 )
 def test_a_policy_tells_the_columns_of_its_training(
