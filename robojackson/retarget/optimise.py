@@ -184,7 +184,7 @@ def faults(problem: Problem, qpos: Float[np.ndarray, "T nq"], config: RetargetCo
     fastest = float(np.abs(problem.velocity(qpos)[:, 6:]).max())
     posed, aims = pose(problem.tree, qpos), problem.targets
     slip, fast_slip = _slip(problem, posed)
-    found, asked = (_acceleration(p, aims.dt) for p in (posed.site_pos, aims.keypoints_w))
+    found, asked = (_acceleration(p, aims) for p in (posed.site_pos, aims.keypoints_w))
     return Faults(
         deepest_m=deepest,
         fastest=fastest,
@@ -217,10 +217,12 @@ def harden(problem: Problem, solution: Solution, config: RetargetConfig) -> Solu
     return solution
 
 
-def _acceleration(points: Float[np.ndarray, "T K 3"], dt: float) -> float:
-    """Largest acceleration of a keypoint, m/s2: a limb that has come out on another's far side has
-    passed through it between two steps."""
-    change = np.linalg.norm(np.diff(points, 2, axis=0), axis=-1) / dt**2
+def _acceleration(points: Float[np.ndarray, "T K 3"], aims: Targets) -> float:
+    """Largest acceleration of a keypoint, m/s2, over a lap's seam as well: a limb that has come out
+    on another's far side has passed through it between two steps."""
+    if aims.lap is not None:
+        points = np.concatenate([points, points[:2] + aims.lap])
+    change = np.linalg.norm(np.diff(points, 2, axis=0), axis=-1) / aims.dt**2
     return float(change.max(initial=0.0))
 
 

@@ -23,6 +23,15 @@ def _problem(robot: Robot) -> Problem:
     return Problem.of(robot, targets(clip, robot), weights)
 
 
+def _gliding(problem: Problem) -> np.ndarray:
+    """One pose that goes as far as the lap does."""
+    count, lap = len(problem.targets), problem.targets.lap
+    assert lap is not None
+    qpos = np.repeat(robot_motion("walk").qpos[:1], count, 0)
+    qpos[:, :3] += np.arange(count)[:, None] * lap / count
+    return qpos
+
+
 def _term(problem: Problem, qpos: np.ndarray) -> Normal:
     out = Normal.empty(len(qpos), qpos.shape[1] - 1)
     repair.add_dynamics(problem, qpos, pose(problem.tree, qpos), out)
@@ -80,14 +89,24 @@ def test_a_dance_whose_legs_cross_is_repaired_and_slowed_down(robot: Robot):
     assert np.abs(np.diff(motion.keypoints_w, axis=0)).max() / motion.dt < 6.0
 
 
-def test_a_limb_that_jumps_is_a_fault_that_heavier_weights_do_not_mend(robot: Robot):
+@pytest.mark.parametrize("step", [20, 0, -1])
+def test_a_limb_that_jumps_is_a_fault_that_heavier_weights_do_not_mend(robot: Robot, step: int):
     problem, config = _problem(robot), RetargetConfig()
-    calm = np.repeat(robot_motion("walk").qpos[:1], len(problem.targets), 0)
+    calm = _gliding(problem)
     jumping = calm.copy()
-    jumping[20, 9] += np.radians(20)
+    jumping[step, 9] += np.radians(20)
     assert not faults(problem, calm, config).jumps
     found = faults(problem, jumping, config)
     assert found.jumps
     assert found.any
     fast = replace(config, jump_bar_m_s2=10 * found.acceleration_m_s2)
     assert not faults(problem, jumping, fast).jumps
+
+
+def test_a_limb_that_comes_out_elsewhere_after_a_lap_has_jumped(robot: Robot):
+    problem = _problem(robot)
+    drifting = _gliding(problem)
+    drifting[:, 9] += np.linspace(0.0, np.radians(60), len(drifting))
+    assert faults(problem, drifting, RetargetConfig()).jumps
+    open_ended = replace(problem, targets=replace(problem.targets, lap=None))
+    assert not faults(open_ended, drifting, RetargetConfig()).jumps
