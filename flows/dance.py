@@ -177,7 +177,7 @@ async def perform(
     film = video(*seen, robot, settings.show)
     made = {**best.clip, "stability": best.stability, **moved}
     made |= {**trained, **judged, "dance": film}
-    return {**made, **page(made, labels.move, Path(best.name).stem)}
+    return {**made, **page(made, labels.move, best.name)}
 
 
 async def conclude(

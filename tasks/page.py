@@ -26,16 +26,16 @@ LEFT_OUT = ("video", "info")
 
 
 @stage(models=lambda parameters: drawn_by(__name__, TEMPLATES))
-def page(made: dict[str, Artifact], move: str, title: str) -> dict[str, Artifact]:
+def page(made: dict[str, Artifact], move: str, file: str) -> dict[str, Artifact]:
     """Everything under `dances/<move>-<digest>/`, and `page`, which shows it.
 
     Args:
         made: What the other stages made, by name.
         move: Name of the dance, for the folder.
-        title: The same for people.
+        file: Name of the file that is danced; the same video may be stored under another.
     """
     store = Store.from_environment()
-    text = render(page_content(_results(store, made, title), made["dance"].name))
+    text = render(page_content(_results(store, made, Path(file)), made["dance"].name))
     digest = hashlib.sha256("".join(a.sha256 for a in made.values()).encode()).hexdigest()
     folder = f"dances/{move}-{digest[:8]}"
     kept = {
@@ -46,10 +46,10 @@ def page(made: dict[str, Artifact], move: str, title: str) -> dict[str, Artifact
     return {**kept, "page": store.put(f"{folder}/index.html", text.encode())}
 
 
-def _results(store: Store, made: Mapping[str, Artifact], title: str) -> Results:
+def _results(store: Store, made: Mapping[str, Artifact], file: Path) -> Results:
     return Results(
-        title=title.replace("_", " "),
-        info=info_of(store, made["info"], Path(made["video"].name)),
+        title=file.stem.replace("_", " "),
+        info=info_of(store, made["info"], file),
         stability=tables.read(Stability, store, made["stability"]),
         sequence=tables.read(SmplSequence, store, made["smpl"]),
         reference=tables.read(ReferenceMotion, store, made["reference"]),

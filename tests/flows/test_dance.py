@@ -122,8 +122,10 @@ def test_an_altered_video_in_the_folder_is_put_back(passes: Passes) -> None:
 @pytest.mark.slow
 def test_a_renamed_copy_of_the_clip_trains_nothing(passes: Passes) -> None:
     (passes.source / "hips.mp4").rename(passes.source / "sway.mp4")
-    passes.run()
+    told = passes.run()
     assert passes.executed() == {"page": 1}
+    shown = Path(told["page"]).read_text()
+    assert ("sway.mp4" in shown, "hips.mp4" in shown) == (True, False)
 
 
 @pytest.mark.slow
