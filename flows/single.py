@@ -22,6 +22,7 @@ from robojackson.errors import (
     TrackTooShort,
 )
 from storage import tables
+from storage.catalogue import safe_name
 from storage.store import Store
 
 if TYPE_CHECKING:
@@ -140,13 +141,21 @@ def evaluate(
         verdict = judge(trained, motion, machine, settings.evaluate, progress)
     summary = console.plain(verdict.summary)
     if out is not None:
-        common = {"run_id": policy.parent.name, "move": reference.stem, "setup": settings.setup}
+        move, setup = safe_name(move_of(reference)), safe_name(trained.setup or settings.setup)
+        seed = trained.training["seed"]
+        common = {"run_id": f"{move}-{setup}-s{seed}", "move": move, "setup": setup}
         rows = [{**common, **trained.training, **row} for row in verdict.rows]
         with results_in(out) as store:
             store.put("evaluations.parquet", tables.encode_rows(EVALUATION_RECORD, rows))
             store.put("evaluation.json", json.dumps(summary, indent=1).encode())
             store.put("rollout.parquet", tables.encode(Rollout(motion.dt, verdict.rollout_qpos)))
     return {"policy": str(policy), "reference": str(reference), **summary}
+
+
+def move_of(reference: Path) -> str:
+    """A reference motion is called by its folder when its own name says nothing."""
+    path = reference.absolute()
+    return path.parent.name if path.stem == "reference" else path.stem
 
 
 VERDICT = ("survived_s", "success", "strict_success", "skill", "site_error_m", "limb_gain")

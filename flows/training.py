@@ -12,9 +12,10 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,12 +34,18 @@ log = logging.getLogger(__name__)
 
 PROGRESS = "progress.json"
 """How far a training is, in its folder."""
-CHECKPOINT = "checkpoint"
-"""Folder that a training can go on from, in its own."""
 DIE_WITH_PARENT = 1
 """PR_SET_PDEATHSIG of prctl(2)."""
 USUAL_MINUTES = 9.0
 """Wall time of a training for which no budget is given."""
+SETUPS = {
+    (False, False): "scratch",
+    (True, False): "pretrain",
+    (True, True): "curiosity",
+    (False, True): "scratch-curiosity",
+}
+"""What a configuration is called that no file gave: by whether it starts from networks, and whether
+curiosity is paid."""
 SAVE_SECONDS = 20.0
 """Between two writes of the table of episodes."""
 
@@ -65,6 +72,7 @@ def train(
     from robojackson.retarget.scorecard import check, told
     from robojackson.rl.config import TrainConfig
     from robojackson.rl.paper_mode import require_trainable
+    from robojackson.rl.run import newest_checkpoint
     from robojackson.rl.shares import both_readings
     from robojackson.rl.shares import told as asks_told
     from robojackson.rl.train import Hooks
@@ -77,18 +85,23 @@ def train(
     if not force:
         check(told(motion))
     stop = _Wish(out)
-    for wish in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(wish, stop.heard)
-    with single.results_in(out) as store, locked(out), console.ticker() as tell:
-        rows = _EpisodeLog(store, _common(config, move or _move_of(reference), setup, run_id))
+    common = _common(config, move or single.move_of(reference), setup, run_id)
+    with (
+        stop.listening(),
+        single.results_in(out) as store,
+        locked(out),
+        console.ticker() as tell,
+    ):
+        rows = _EpisodeLog(store, common, goes_on=newest_checkpoint(out) is not None)
         try:
             asked = asks_told(both_readings(robot, motion, config.environment))
             if asked:
                 tell(asks(asked))
-            hooks = Hooks(lambda row: _told(row, out, tell), rows.add, rows.save, stop)
+            told_of = partial(_told, out=out, tell=tell)
+            hooks = Hooks(told_of, rows.add, rows.save, stop, common["setup"])
             result = learn(motion, robot, config, out, hooks)
         except KeyboardInterrupt:
-            there = (out / CHECKPOINT).exists()
+            there = newest_checkpoint(out)
             kept = f"the checkpoint is in {out}; resume" if there else "nothing learnt yet; again"
             raise console.Interrupted(f"{kept}: {console.same_command()}") from None
         finally:
@@ -163,6 +176,17 @@ class _Wish:
     def __call__(self) -> bool:
         return self._heard
 
+    @contextmanager
+    def listening(self) -> Iterator[None]:
+        """Ctrl-C and SIGTERM are this wish, and afterwards what they were."""
+        wishes = (signal.SIGINT, signal.SIGTERM)
+        before = [(wish, signal.signal(wish, self.heard)) for wish in wishes]
+        try:
+            yield
+        finally:
+            for wish, handler in before:
+                signal.signal(wish, handler)
+
     def heard(self, number: int, frame: object) -> None:
         """Handler of the signal."""
         if self._heard:
@@ -174,8 +198,8 @@ class _Wish:
 class _EpisodeLog:
     """episodes.parquet, written now and then while rows come in."""
 
-    def __init__(self, store: Store, common: Mapping[str, Any]) -> None:
-        self._log = RecordLog(store, "episodes.parquet", EPISODE_RECORD, common)
+    def __init__(self, store: Store, common: Mapping[str, Any], goes_on: bool) -> None:
+        self._log = RecordLog(store, "episodes.parquet", EPISODE_RECORD, common, goes_on)
         self._saved = time.monotonic()
 
     def __len__(self) -> int:
@@ -203,13 +227,7 @@ def _budgeted(config: "TrainConfig") -> "TrainConfig":
 
 
 def _common(config: "TrainConfig", move: str, setup: str | None, run_id: str) -> dict[str, Any]:
-    name = Path(setup).stem if setup else "scratch"
-    move, name = safe_name(move), safe_name(name)
+    usual = SETUPS[config.start != "scratch", config.curiosity != "off"]
+    move, name = safe_name(move), safe_name(Path(setup).stem if setup else usual)
     labels = {"run_id": run_id or f"{move}-{name}-s{config.seed}", "move": move, "setup": name}
     return {**labels, "seed": config.seed}
-
-
-def _move_of(reference: Path) -> str:
-    """A reference motion is called by its folder when its own name says nothing."""
-    path = reference.absolute()
-    return path.parent.name if path.stem == "reference" else path.stem

@@ -16,25 +16,35 @@ import numpy as np
 from configs.loader import load
 from flows import single, training
 from flows.source import bundled
+from robojackson.errors import BadConfiguration
 from storage import tables
 
 if TYPE_CHECKING:
     from robojackson.retarget.robot import Robot
 
 Figures = dict[str, Any]
-WALK = "walk.mp4"
+WALK, STANDING = "walk.mp4", "standing.parquet"
 ROBOT, PIPELINE = "humanoid", "base"
 """Names of the configurations that a walker is made with, besides that of its training."""
 CURVE_POINTS = 20
 
 
 def pretrain(kind: str, out: Path, reference: Path | None, overrides: Mapping[str, Any]) -> Figures:
-    """Train a walker: walker_<kind>.safetensors and walker.json with command, curve, evaluation."""
+    """Train a walker: walker_<kind>.safetensors and walker.json with command, curve, evaluation.
+
+    Raises:
+        BadConfiguration: a reference motion for `paper`, whose walker follows none.
+    """
     from robojackson.retarget.robot import RobotDescription, load_robot
     from robojackson.rl.networks import load_networks, widened
     from robojackson.rl.policy import load_policy
     from robojackson.rl.stock import stock_observation_size
 
+    if kind == "paper" and reference is not None:
+        raise BadConfiguration(
+            f"--reference {reference}: the walker of kind 'paper' follows no motion; leave it out, "
+            "or take --kind track"
+        )
     robot = load_robot(load(RobotDescription, f"robots/{ROBOT}"))
     motion = reference or _reference(kind, out, robot)
     stands = kind == "paper"  # a motion that only stands has no score card
@@ -85,13 +95,15 @@ def _reference(kind: str, out: Path, robot: "Robot") -> Path:
     """The motion that a walker is trained on: none for `paper`, the bundled walk for `track`."""
     from robojackson.rl.standing import standing
 
-    made = out / "reference.parquet"
     if kind == "paper":
         with single.results_in(out) as store:
-            store.put(made.name, tables.encode(standing(robot)))
-    elif not made.exists():
-        single.mocap(bundled(WALK), out, PIPELINE, {})
-        single.retarget(out / "smpl.parquet", out, PIPELINE, {"robot": ROBOT})
+            store.put(STANDING, tables.encode(standing(robot)))
+        return out / STANDING
+    folder = out / Path(WALK).stem  # not among what the user may keep in `out`
+    made = folder / "reference.parquet"
+    if not made.exists():
+        single.mocap(bundled(WALK), folder, PIPELINE, {})
+        single.retarget(folder / "smpl.parquet", folder, PIPELINE, {"robot": ROBOT})
     return made
 
 

@@ -55,6 +55,10 @@ class BadWeights(RoboJacksonError):
     """A file of network weights that is damaged, unsafe to load, or of another network."""
 
 
+class TrainingDiverged(RoboJacksonError):
+    """The networks of a training hold values that are no numbers any more."""
+
+
 class BadPolicy(RoboJacksonError):
     """A policy file that cannot be loaded or does not fit the reference motion."""
 

@@ -33,15 +33,18 @@ class ActorAverage:
         self._count, self._seen = self._count + 1, updates
         fresh = max(1 - self._past, 1 / self._count)
         if self._count == 1:
-            self._mean = tuple((weight.copy(), bias.copy()) for weight, bias in layers)
+            self._mean = _copied(layers)
             return
         for old, new in zip(self._mean, layers, strict=True):
             for kept, array in zip(old, new, strict=True):
                 kept += np.float32(fresh) * (array - kept)
 
-    def layers(self, newest: Layers) -> Layers:
-        """The mean, or the newest actor where nothing is averaged yet."""
-        return self._mean if self._count else newest
+    def layers(self, newest: Layers, updates: int) -> Layers:
+        """The mean with the newest actor in it, which stays out of the mean that goes on."""
+        whole = ActorAverage(self._past)
+        whole._count, whole._seen, whole._mean = self._count, self._seen, _copied(self._mean)
+        whole.add(newest, updates)
+        return whole._mean if whole._count else newest
 
     def save(self, folder: Path) -> None:
         """Part of a checkpoint."""
@@ -60,3 +63,7 @@ class ActorAverage:
             self._seen = int(arrays["seen"])
             pairs = len(arrays.files) // 2 - 1
             self._mean = tuple((arrays[f"{i}w"], arrays[f"{i}b"]) for i in range(pairs))
+
+
+def _copied(layers: Layers) -> Layers:
+    return tuple((weight.copy(), bias.copy()) for weight, bias in layers)

@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
-from pydantic import TypeAdapter, ValidationError
+from pydantic import PositiveInt, TypeAdapter, ValidationError
 
 from robojackson.errors import BadPolicy
 from robojackson.motion.reference import ReferenceMotion
@@ -46,6 +46,11 @@ def control_of(policy: Policy, robot: Robot) -> ControlConfig:
         raise BadPolicy(
             f"the policy takes {policy.observation_size} observations and robot "
             f"{robot.description.name!r} gives {sizes[0]}: it was trained for another robot"
+        )
+    if policy.action_size != robot.model.nu:
+        raise BadPolicy(
+            f"the policy gives {policy.action_size} actions and robot {robot.description.name!r} "
+            f"takes {robot.model.nu}: it was trained for another robot"
         )
     return fact(policy, "control", ControlConfig)
 
@@ -88,7 +93,8 @@ def _trained(policy: Policy, robot: Robot, control: ControlConfig) -> Driver:
         ) -> np.ndarray:
             return most * policy.act(stock_observation(sim)[:, : policy.observation_size])
 
-        return Driver(control, torque, int(str(policy.facts.get("repeats", 1))))
+        repeats = fact(policy, "repeats", PositiveInt) if "repeats" in policy.facts else 1
+        return Driver(control, torque, repeats)
 
     def target(
         sim: Simulation, following: ClipStep, start: np.ndarray, last: np.ndarray

@@ -19,9 +19,11 @@ class Hooks:
         sink: Called with one row for each episode that ended.
         saving: Called before a checkpoint is written: the rows so far should then be safe.
         stop: Asked between two rounds; True ends the run with a checkpoint.
+        setup: What the caller calls the configuration; the policy's file tells it.
     """
 
     progress: Callable[[Row], None] = lambda row: None
     sink: Callable[[list[Row]], None] = lambda rows: None
     saving: Callable[[], None] = lambda: None
     stop: Callable[[], bool] = lambda: False
+    setup: str = ""

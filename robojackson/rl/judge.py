@@ -38,7 +38,8 @@ class Judge:
         self._knees = [names.index(name) for name in KNEES]
         self._limbs = {name: names.index(name) for name in LIMB_ENDS}
         self._model, self._joints = robot.model, robot.joint_names
-        self._tempo = float(reference.scorecard.get("tempo", 1.0))
+        asked, slowed = (reference.scorecard.get(key, 1.0) for key in ("tempo", "tempo_mean"))
+        self._tempo = float(asked * slowed)
 
     def row(
         self, policy: str, label: tuple[int, int], rollouts: Rollouts, i: int

@@ -46,10 +46,21 @@ class Policy:
         return self.layers[0][0].shape[0]
 
     @property
+    def action_size(self) -> int:
+        """Length of the action that the last layer gives."""
+        return self.layers[-1][0].shape[1]
+
+    @property
     def training(self) -> dict[str, int | None]:
         """Seed of its training and the control steps that this took, by their names in tables."""
         seed, steps = (_count(self.facts.get(name)) for name in ("seed", "steps"))
         return {"seed": seed or 0, "step": steps}
+
+    @property
+    def setup(self) -> str:
+        """What the configuration of its training was called; empty where the file does not say."""
+        said = self.facts.get("setup")
+        return said if isinstance(said, str) else ""
 
     def to_bytes(self) -> bytes:
         """The content of the policy's file."""
@@ -82,8 +93,17 @@ def load_policy(path: Path) -> Policy:
         raise BadPolicy(f"{path} is not a policy file of ours ({error})") from error
     if FORMAT not in header:
         raise BadPolicy(f"{path} is not a {FORMAT} file; `robojackson train` writes them")
-    layers = _layers(path, tensors)
-    return Policy(layers, json.loads(header[FORMAT]))
+    return Policy(_layers(path, tensors), _facts(path, header[FORMAT]))
+
+
+def _facts(path: Path, text: str) -> dict[str, object]:
+    try:
+        facts = json.loads(text)
+    except ValueError as error:
+        raise BadPolicy(f"{path}: what it was trained for cannot be read ({error})") from error
+    if not isinstance(facts, dict):
+        raise BadPolicy(f"{path}: what it was trained for is a {type(facts).__name__}, no object")
+    return facts
 
 
 def _layers(
@@ -96,6 +116,10 @@ def _layers(
         )
     except KeyError as error:
         raise BadPolicy(f"{path} lacks tensor {error}") from error
+    if any(weight.ndim != 2 for weight, _ in layers):
+        raise BadPolicy(f"{path} has a layer whose weight is no matrix")
+    if not all(np.isfinite(array).all() for layer in layers for array in layer):
+        raise BadPolicy(f"{path} has weights that are no numbers")
     widths = [weight.shape[1] for weight, _ in layers[:-1]]
     fits = all(w == nxt.shape[0] for w, (nxt, _) in zip(widths, layers[1:], strict=True))
     if not layers or not fits or any(w.shape[1:] != b.shape for w, b in layers):

@@ -45,7 +45,7 @@ class ReplayFiles:
     def load(self, buffer: ReplayBuffer, rows: int) -> None:
         """Fill the buffer as it was when it had got `rows`; later files are removed."""
         for path, first, last in self._files():
-            if first >= rows:
+            if last > rows:
                 path.unlink()
                 continue
             slots = np.arange(first, last) % buffer.buffer_size

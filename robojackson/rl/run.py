@@ -9,17 +9,18 @@ import os
 import shutil
 import time
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 
-from robojackson.errors import BadConfiguration, StoreError
+from robojackson.errors import BadConfiguration, StoreError, TrainingDiverged
 from robojackson.rl.average import ActorAverage
 from robojackson.rl.config import TrainConfig
 from robojackson.rl.hooks import Enough, Hooks, Row
-from robojackson.rl.networks import Networks
+from robojackson.rl.networks import Networks, Tensors
 from robojackson.rl.policy import Policy
 from robojackson.rl.task import Task, TrainResult
 from robojackson.rl.tensorboard import ScalarLog
@@ -29,6 +30,7 @@ from robojackson.rl.trainer import Trainer
 log = logging.getLogger(__name__)
 
 RECENT_EPISODES = 100
+CHECKPOINT, OLD_CHECKPOINT = "checkpoint", "checkpoint.old"
 NOT_OF_THE_RUN = (
     *("steps", "minutes", "cpu_minutes", "checkpoint_seconds", "progress_seconds", "tensorboard"),
 )
@@ -46,7 +48,7 @@ class Run:
         self, out: Path, config: TrainConfig, core: TrackingCore, task: Task, hooks: Hooks
     ) -> None:
         self.out, self.config, self.core, self.task = out, config, core, task
-        self._hooks = hooks
+        self._hooks, self._replay = hooks, out / "replay"
         self._recent: deque[Row] = deque(maxlen=RECENT_EPISODES)
         self._before = 0.0
         self._began = self._saved = self._told = time.monotonic()
@@ -58,8 +60,9 @@ class Run:
     def bind(self, trainer: Trainer) -> None:
         """Attach the trainer; continue from a checkpoint when there is one."""
         self.trainer, self._first_step = trainer, 0
-        folder = self._newest()
-        if folder is None:
+        folder = newest_checkpoint(self.out)
+        if folder is None:  # transitions without one are another training's
+            shutil.rmtree(self._replay, ignore_errors=True)
             return
         state = json.loads((folder / "run.json").read_text())
         if state["configuration"] != self._identity():
@@ -67,7 +70,7 @@ class Run:
                 f"{folder} belongs to another configuration, reference motion or robot; "
                 "remove it or choose another folder"
             )
-        trainer.load(folder, self.out / "replay", state["steps"], state["updates"])
+        trainer.load(folder, self._replay, state["steps"], state["updates"])
         with np.load(folder / "environment.npz", allow_pickle=False) as arrays:
             self.core.restore(dict(arrays))
         self._average.load(folder)
@@ -104,10 +107,13 @@ class Run:
 
         Raises:
             Enough: the budget is used up.
+            TrainingDiverged: the actor's weights are no numbers any more.
             KeyboardInterrupt: the caller wants to stop; a checkpoint was written.
         """
         now = time.monotonic()
-        self._average.add(self.trainer.acting(), self.trainer.updates())
+        layers, updates = self.trainer.acting()
+        self._require_finite(array for layer in layers for array in layer)
+        self._average.add(layers, updates)
         try:
             started = self.trainer.steps() > self._first_step
             if started and now - self._told >= self.config.progress_seconds:
@@ -125,17 +131,24 @@ class Run:
             self._saved = time.monotonic()
 
     def checkpoint(self) -> None:
-        """Write the policy and everything needed to go on, whole or not at all."""
-        fresh, final = self.out / "checkpoint.new", self.out / "checkpoint"
+        """Write the policy and everything needed to go on, whole or not at all.
+
+        Raises:
+            TrainingDiverged: weights are no numbers any more; nothing is written.
+            StoreError: the folder takes no more.
+        """
+        networks = self.trainer.networks()
+        self._require_finite(networks.values())
+        fresh, final = self.out / "checkpoint.new", self.out / CHECKPOINT
         shutil.rmtree(fresh, ignore_errors=True)
         self._hooks.saving()
         try:
             fresh.mkdir()
-            self.trainer.save(fresh, self.out / "replay")
+            self.trainer.save(fresh, self._replay)
             np.savez(fresh / "environment.npz", **self.core.state())
             self._average.save(fresh)
             (fresh / "run.json").write_text(json.dumps(self._state()))
-            for name, content in self._results().items():
+            for name, content in self._results(networks).items():
                 (self.out / f"{name}.part").write_bytes(content)
             for file in (*fresh.iterdir(), *self.out.glob("*.safetensors.part")):
                 _to_disk(file)
@@ -147,20 +160,13 @@ class Run:
         # First, since a checkpoint whose budget is used up is not written again.
         for name in ("policy.safetensors", "networks.safetensors"):
             os.replace(self.out / f"{name}.part", self.out / name)
-        old = self.out / "checkpoint.old"
+        old = self.out / OLD_CHECKPOINT
         if final.exists():
             shutil.rmtree(old, ignore_errors=True)
             final.rename(old)
         fresh.rename(final)
         shutil.rmtree(old, ignore_errors=True)
         self.trainer.saved()
-
-    def _newest(self) -> Path | None:
-        """The last whole checkpoint: the one before when a crash came between two renames."""
-        for name in ("checkpoint", "checkpoint.old"):
-            if (self.out / name / "run.json").exists():
-                return self.out / name
-        return None
 
     def result(self) -> TrainResult:
         return TrainResult(
@@ -188,15 +194,25 @@ class Run:
             "random": self.core.rng.bit_generator.state,
         }
 
-    def _results(self) -> dict[str, bytes]:
+    def _results(self, networks: Tensors) -> dict[str, bytes]:
         """What a run leaves beside its tables: the policy, and networks to start others from."""
         facts = self._facts()
-        networks = Networks(self.trainer.networks(), facts)
-        policy = Policy(self._average.layers(self.trainer.layers()), facts)
+        layers = self._average.layers(self.trainer.layers(), self.trainer.updates())
         return {
-            "policy.safetensors": policy.to_bytes(),
-            "networks.safetensors": networks.to_bytes(),
+            "policy.safetensors": Policy(layers, facts).to_bytes(),
+            "networks.safetensors": Networks(networks, facts).to_bytes(),
         }
+
+    def _require_finite(self, arrays: Iterable[np.ndarray]) -> None:
+        if all(np.isfinite(array).all() for array in arrays):
+            return
+        kept = newest_checkpoint(self.out)
+        where = f"{kept} is of before" if kept else "no checkpoint was written before"
+        raise TrainingDiverged(
+            f"{self.out}: the training diverged: after {self.trainer.steps()} steps its networks "
+            f"hold values that are no numbers ({where}); take a lower tqc.learning_rate or another "
+            "seed, in another folder"
+        )
 
     def _facts(self) -> dict[str, object]:
         """What the policy was trained for."""
@@ -208,6 +224,7 @@ class Run:
             "mode": config.mode,
             "trainer": config.trainer,
             "seed": config.seed,
+            "setup": self._hooks.setup,
             "start": Path(config.start).name,
             "curiosity": config.curiosity,
             "steps": self.trainer.steps(),
@@ -246,6 +263,14 @@ class Run:
             "episode_return": mean("episode_return"),
             "site_error_m": mean("site_error_m"),
         }
+
+
+def newest_checkpoint(out: Path) -> Path | None:
+    """The last whole checkpoint: the one before when a crash came between two renames."""
+    for name in (CHECKPOINT, OLD_CHECKPOINT):
+        if (out / name / "run.json").exists():
+            return out / name
+    return None
 
 
 def _to_disk(path: Path) -> None:

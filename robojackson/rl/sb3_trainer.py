@@ -88,8 +88,8 @@ class Sb3Trainer(OffPolicyTrainer):
             (m.weight.detach().numpy().T.copy(), m.bias.detach().numpy().copy()) for m in linear
         )
 
-    def acting(self) -> Layers:
-        return self.layers()
+    def acting(self) -> tuple[Layers, int]:
+        return self.layers(), self.updates()
 
     def networks(self) -> Tensors:
         tensors: Tensors = {}

@@ -130,8 +130,8 @@ class SbxTrainer(OffPolicyTrainer):
         layers = dense_layers(self.model.policy.actor_state.params)
         return layers[:-1]
 
-    def acting(self) -> Layers:
-        return self.model._acting[:-1]
+    def acting(self) -> tuple[Layers, int]:
+        return self.model._acting[:-1], max(0, self.updates() - self.model.gradient_steps)
 
     def networks(self) -> Tensors:
         policy = self.model.policy

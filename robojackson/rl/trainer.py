@@ -30,8 +30,9 @@ class Trainer(Protocol):
     def layers(self) -> Layers:
         """The actor's layers, (weight (in, out), bias) each, the mean's head last."""
 
-    def acting(self) -> Layers:
-        """The same of the actor that the simulations follow now, without waiting for updates."""
+    def acting(self) -> tuple[Layers, int]:
+        """The same of the actor that the simulations follow now, without waiting for updates, and
+        the gradient updates that it has had."""
 
     def steps(self) -> int:
         """Control steps so far, over all simulations and resumptions."""

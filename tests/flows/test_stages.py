@@ -124,6 +124,17 @@ def test_evaluate_writes_one_row_a_rollout_of_every_policy(
     assert {row["policy"] for row in rows} == known
 
 
+def test_episodes_and_evaluations_of_a_run_can_be_joined(judged: Said, folder: Path) -> None:
+    episodes = (folder / "run" / "episodes.parquet").read_bytes()
+    evaluations = (folder / "evaluations.parquet").read_bytes()
+    keys = ("run_id", "move", "setup", "seed")
+    found = [
+        {tuple(row[key] for key in keys) for row in tables.decode_rows(schema, data, "f")}
+        for schema, data in ((EPISODE_RECORD, episodes), (EVALUATION_RECORD, evaluations))
+    ]
+    assert found[0] == found[1] == {(f"{folder.name}-scratch-s0", folder.name, "scratch", 0)}
+
+
 def test_training_again_with_the_same_budget_has_nothing_to_do(trained: Said, folder: Path) -> None:
     again = robojackson("train", folder / "reference.parquet", "-o", folder / "run", *TINY)
     assert again.answer["steps"] == trained.answer["steps"]

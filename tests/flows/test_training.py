@@ -1,5 +1,6 @@
 """What the training process says, takes for granted and leaves behind."""
 
+import signal
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -81,6 +82,30 @@ def test_what_the_reward_can_ask_for_is_one_line() -> None:
 )
 def test_a_bare_name_is_one_of_the_setups(given: str | None, found: str | None) -> None:
     assert training._setup(given) == found
+
+
+@pytest.mark.parametrize(
+    ("given", "setup", "name"),
+    [
+        ({}, None, "scratch"),
+        ({"start": "walker"}, None, "pretrain"),
+        ({"start": "walker", "curiosity": "formula"}, None, "curiosity"),
+        ({"curiosity": "formula"}, None, "scratch-curiosity"),
+        ({"start": "walker"}, "mine/slow.yaml", "slow"),
+    ],
+)
+def test_a_run_is_called_by_its_file_or_by_what_it_does(
+    given: dict[str, str], setup: str | None, name: str
+) -> None:
+    common = training._common(TrainConfig(**given), "walk", setup, "")  # type: ignore[arg-type]
+    assert (common["setup"], common["run_id"]) == (name, f"walk-{name}-s0")
+
+
+def test_after_a_training_signals_are_what_they_were(tmp_path: Path) -> None:
+    wish, before = training._Wish(tmp_path), signal.getsignal(signal.SIGINT)
+    with wish.listening():
+        assert signal.getsignal(signal.SIGINT) == wish.heard
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 def test_who_asks_twice_does_not_wait_for_a_checkpoint(tmp_path: Path) -> None:

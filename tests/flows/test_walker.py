@@ -4,8 +4,15 @@ import json
 import shlex
 from pathlib import Path
 
+import pytest
+
+from configs.loader import load
 from flows import walker
+from robojackson.errors import BadConfiguration
+from robojackson.retarget.robot import RobotDescription, load_robot
+from robojackson.rl.config import TrainConfig
 from robojackson.rl.networks import load_networks
+from robojackson.rl.pretrained import pretrained
 
 TINY = {
     "trainer": "sb3",
@@ -16,7 +23,10 @@ TINY = {
 
 
 def test_a_walker_for_the_papers_mode_takes_all_348_observations(tmp_path: Path) -> None:
+    mine = tmp_path / "reference.parquet"
+    mine.write_bytes(b"a dance that the user keeps here")
     made = walker.pretrain("paper", tmp_path, None, TINY)
+    assert mine.read_bytes() == b"a dance that the user keeps here"
     networks = load_networks(Path(made["walker"]))
     assert networks.observation_size == 348
     assert not networks.tensors["actor.0.weight"][45:].any()
@@ -25,3 +35,35 @@ def test_a_walker_for_the_papers_mode_takes_all_348_observations(tmp_path: Path)
     assert (told["seed"], told["steps"]) == (3, 64)
     assert told["evaluation"]["episode_return"] > 0
     assert [point["step"] for point in told["curve"]] == sorted(p["step"] for p in told["curve"])
+
+
+def test_a_walker_that_follows_no_motion_takes_none(tmp_path: Path) -> None:
+    with pytest.raises(BadConfiguration, match="--kind track"):
+        walker.pretrain("paper", tmp_path, tmp_path / "reference.parquet", TINY)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_walker_of_track_does_not_take_what_lies_in_its_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "reference.parquet").write_bytes(b"a dance that the user keeps here")
+    made: list[Path] = []
+
+    def a_stage(source: Path, out: Path, *rest: object) -> None:
+        made.append(out)
+
+    monkeypatch.setattr("flows.single.mocap", a_stage)
+    monkeypatch.setattr("flows.single.retarget", a_stage)
+    robot = load_robot(load(RobotDescription, "robots/humanoid"))
+    found = walker._reference("track", tmp_path, robot)
+    assert (found, made) == (tmp_path / "walk" / "reference.parquet", [tmp_path / "walk"] * 2)
+
+
+@pytest.mark.parametrize("kind", ["track", "paper"])
+def test_critics_from_a_walker_are_as_those_from_scratch(kind: str) -> None:
+    """Or a comparison of both would compare critics."""
+    walked = load(TrainConfig, f"setups/walker-{kind}")
+    learnt = load(TrainConfig, "setups/scratch", {"mode": kind})
+    shipped = pretrained("walker", kind)
+    assert shipped is not None
+    assert walked.tqc.layer_norm == learnt.tqc.layer_norm == shipped.layer_norm

@@ -56,6 +56,17 @@ def test_the_reference_itself_is_a_strict_success_of_skill_one(
     assert judged["limb_gain_left_hand"] == pytest.approx(1)
 
 
+@pytest.mark.parametrize(
+    ("scorecard", "tempo"),
+    [({}, 1.0), ({"tempo": 1.0, "tempo_mean": 0.8}, 0.8), ({"tempo": 0.5, "tempo_mean": 1.0}, 0.5)],
+)
+def test_the_tempo_is_the_clips_own_times_what_retargeting_left_of_it(
+    robot: Robot, sway: ReferenceMotion, scorecard: dict[str, float], tempo: float
+) -> None:
+    slow = dataclasses.replace(sway, scorecard=scorecard)
+    assert row(robot, slow, perfect(sway))["tempo"] == pytest.approx(tempo)
+
+
 def test_the_velocity_score_is_one_at_the_reference_and_none_for_a_statue(
     robot: Robot, sway: ReferenceMotion
 ) -> None:

@@ -2,10 +2,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from safetensors.numpy import save_file
+from safetensors.numpy import save, save_file
 
 from robojackson.errors import BadPolicy
-from robojackson.rl.policy import Policy, load_policy
+from robojackson.rl.policy import FORMAT, Policy, load_policy
 
 
 def small_policy() -> Policy:
@@ -16,6 +16,12 @@ def small_policy() -> Policy:
         for s in shapes
     )
     return Policy(layers, {"robot": "humanoid", "seed": 3})
+
+
+def a_file(weight: np.ndarray, header: str) -> bytes:
+    """A policy of one layer."""
+    tensors = {"layer0.weight": weight, "layer0.bias": np.zeros(3)}
+    return save({n: np.asarray(t, np.float32) for n, t in tensors.items()}, {FORMAT: header})
 
 
 def test_a_saved_policy_acts_the_same(tmp_path: Path) -> None:
@@ -61,6 +67,34 @@ def test_layers_that_do_not_fit_are_refused(tmp_path: Path) -> None:
     (tmp_path / "p.safetensors").write_bytes(wrong.to_bytes())
     with pytest.raises(BadPolicy, match="fit"):
         load_policy(tmp_path / "p.safetensors")
+
+
+@pytest.mark.parametrize(
+    ("header", "reason"), [("{", "cannot be read"), ("[1]", "a list, no object")]
+)
+def test_a_header_that_is_no_object_is_refused(tmp_path: Path, header: str, reason: str) -> None:
+    (tmp_path / "p.safetensors").write_bytes(a_file(np.zeros((5, 3)), header))
+    with pytest.raises(BadPolicy, match=reason):
+        load_policy(tmp_path / "p.safetensors")
+
+
+@pytest.mark.parametrize(
+    ("weight", "reason"),
+    [(np.zeros(5), "no matrix"), (np.full((5, 3), np.nan), "no numbers")],
+)
+def test_weights_that_no_layer_can_have_are_refused(
+    tmp_path: Path, weight: np.ndarray, reason: str
+) -> None:
+    (tmp_path / "p.safetensors").write_bytes(a_file(weight, "{}"))
+    with pytest.raises(BadPolicy, match=reason):
+        load_policy(tmp_path / "p.safetensors")
+
+
+@pytest.mark.parametrize(
+    ("facts", "setup"), [({"setup": "pretrain"}, "pretrain"), ({}, ""), ({"setup": 3}, "")]
+)
+def test_a_policy_tells_the_setup_of_its_training(facts: dict[str, object], setup: str) -> None:
+    assert Policy((), facts).setup == setup
 
 
 @pytest.mark.parametrize(

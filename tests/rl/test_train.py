@@ -1,6 +1,7 @@
 import dataclasses
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -10,13 +11,15 @@ import jax
 import numpy as np
 import pytest
 
-from robojackson.errors import BadConfiguration, BadPolicy
+from robojackson.errors import BadConfiguration, BadPolicy, TrainingDiverged
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.retarget.robot import Robot
 from robojackson.rl.config import EvaluateConfig, PaperConfig, TqcConfig, TrackConfig, TrainConfig
+from robojackson.rl.drivers import drivers
 from robojackson.rl.evaluate import STAND, evaluate
-from robojackson.rl.policy import load_policy
+from robojackson.rl.policy import Policy, load_policy
 from robojackson.rl.run import Run
+from robojackson.rl.sb3_trainer import Sb3Trainer
 from robojackson.rl.sbx_trainer import SbxTrainer
 from robojackson.rl.tracking import TrackingCore
 from robojackson.rl.train import Hooks, TrainResult, train
@@ -167,6 +170,40 @@ def test_a_checkpoint_of_another_configuration_is_refused(
         run(robot, sway, other, result.policy.parent)
 
 
+def test_a_run_that_begins_anew_learns_nothing_from_the_one_before(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    """Only its checkpoint was removed, as the refusal of another configuration says."""
+    run(robot, sway, brief("sb3", 480), tmp_path)
+    shutil.rmtree(tmp_path / "checkpoint")
+    run(robot, sway, brief("sb3"), tmp_path)
+    names = sorted(path.name for path in (tmp_path / "replay").iterdir())
+    assert [name.split("-")[1] for name in names] == ["000000000080.npz"]
+
+
+def test_a_training_that_diverges_says_so_and_keeps_what_it_had(
+    trained: tuple, robot: Robot, sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    name = trained[3]
+    run(robot, sway, brief(name, 160), tmp_path)
+    kept = (tmp_path / "policy.safetensors").read_bytes()
+    rows: list[dict[str, float]] = []
+
+    def spoil(trainer: Any, folder: Path, replay: Path, steps: int, updates: int) -> None:
+        load(trainer, folder, replay, steps, updates)
+        bias = "mean.bias"
+        trainer.start_from({bias: np.full_like(trainer.networks()[bias], np.nan)})
+
+    of = {"sbx": SbxTrainer, "sb3": Sb3Trainer}[name]
+    load = of.load
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(of, "load", spoil)
+        with pytest.raises(TrainingDiverged, match=r"160 steps.*checkpoint is of before"):
+            train(sway, robot, brief(name), tmp_path, Hooks(sink=rows.extend))
+    assert rows == []
+    assert (tmp_path / "policy.safetensors").read_bytes() == kept
+
+
 def test_a_checkpoint_of_another_reference_is_refused(
     trained: tuple, robot: Robot, sway: ReferenceMotion
 ) -> None:
@@ -274,6 +311,26 @@ def test_the_table_of_an_evaluation_has_every_start_and_baseline(
     assert own[-1]["phase"] == STAND
     assert 0 <= verdict.summary["success"] <= 1  # type: ignore[operator]
     assert set(verdict.summary["baselines"]) == policies - {"trained", "hold"}  # type: ignore[call-overload]
+
+
+@pytest.mark.parametrize(
+    ("facts", "shape", "reason"),
+    [
+        ({"mode": "paper", "repeats": "often"}, (45, 17), "repeats = 'often'"),
+        ({"mode": "paper"}, (45, 3), "gives 3 actions"),
+    ],
+)
+def test_a_policy_that_no_robot_can_follow_is_refused(
+    facts: dict[str, Any],
+    shape: tuple[int, int],
+    reason: str,
+    robot: Robot,
+    sway: ReferenceMotion,
+) -> None:
+    layers = ((np.zeros(shape, np.float32), np.zeros(shape[1], np.float32)),)
+    policy = Policy(layers, {**facts, "control": {"law": "torque"}})
+    with pytest.raises(BadPolicy, match=reason):
+        drivers(policy, sway, robot, 0)
 
 
 def test_an_evaluation_is_repeatable(trained: tuple, robot: Robot, sway: ReferenceMotion) -> None:

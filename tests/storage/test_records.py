@@ -51,6 +51,18 @@ def test_a_resumed_log_drops_what_came_after_the_checkpoint(tmp_path: Path) -> N
     assert saved_steps(store) == [10, 20, 25, 35, 45]
 
 
+def test_a_log_that_begins_anew_has_no_rows_of_the_one_before(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    first = a_log(store)
+    first.append(episodes(10, 20, 30))
+    first.save()
+    second = RecordLog(store, "episodes.parquet", EPISODE_RECORD, COMMON, goes_on=False)
+    assert saved_steps(store) == [10, 20, 30]
+    second.append(episodes(25))
+    second.save()
+    assert saved_steps(store) == [25]
+
+
 def a_run(name: str, day: int) -> catalogue.Run:
     when = datetime(2026, 11, 1, tzinfo=UTC) + timedelta(days=day)
     return catalogue.Run(name, "walk", "humanoid", "scratch", 0, when, summary={"skill": 0.5})
