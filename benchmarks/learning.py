@@ -69,7 +69,11 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--moves", nargs="*", default=list(MOVES), choices=list(MOVES))
     parser.add_argument("--seeds", nargs="*", type=int, default=[0, 1, 2, 3, 4])
     parser.add_argument("--jobs", type=int, default=1, help="trainings at a time, each on a core")
-    parser.add_argument("--cpu-minutes", type=float, help="instead of the row's own")
+    parser.add_argument(
+        "--cpu-minutes",
+        type=float,
+        help="not the row's own; such policies are in no table",
+    )
     parser.add_argument("--walker-cpu-seconds", type=float, help="what the walker took to train")
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--seconds", type=float, default=4.0, help="of CPU a turn")

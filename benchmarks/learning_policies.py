@@ -80,10 +80,15 @@ class Folders:
         """One Parquet a move, a seed and a horizon."""
         return self.results / "learning"
 
-    def row(self, name: str, seed: int | str, seconds: float) -> Path:
-        """The file of a row."""
+    def row(self, name: str, seed: int | str, seconds: float, minutes: float | None = None) -> Path:
+        """The file of a row; one of another budget than the move's own is in no table."""
         suffix = "" if seconds == HORIZONS_S[0] else f"-{seconds:g}s"
-        return self.rows / f"{name}-s{seed}{suffix}.parquet"
+        return self.rows / f"{name}{budget(minutes)}-s{seed}{suffix}.parquet"
+
+
+def budget(minutes: float | None) -> str:
+    """What the name of a row says of CPU minutes that are not the move's own."""
+    return "" if minutes is None else f"-{minutes:g}min"
 
 
 def command(*words: object, core: int | None = None) -> int:
@@ -136,23 +141,22 @@ def train_and_judge(
     name: str, seed: int, minutes: float | None, folders: Folders, core: int
 ) -> None:
     """Train one move with one seed and keep the rows of its evaluation; nothing if they exist."""
-    horizons = MOVES[name].horizons_s
-    if all(folders.row(name, seed, seconds).exists() for seconds in horizons):
+    kept = {s: folders.row(name, seed, s, minutes) for s in MOVES[name].horizons_s}
+    if all(path.exists() for path in kept.values()):
         return
     work = folders.work / name
-    reference, out = work / "reference.parquet", work / f"s{seed}"
-    budget = minutes or MOVES[name].cpu_minutes
-    options = ["--seed", seed, "--set", f"cpu_minutes={budget}", "--move", name, "--force"]
+    reference, out = work / "reference.parquet", work / f"s{seed}{budget(minutes)}"
+    spent = minutes or MOVES[name].cpu_minutes
+    options = ["--seed", seed, "--set", f"cpu_minutes={spent}", "--move", name, "--force"]
     must("train", reference, "-o", out, *options, core=core)
     folders.rows.mkdir(parents=True, exist_ok=True)
-    for seconds in horizons:
+    for seconds, path in kept.items():
         judged = out / f"judged-{seconds:g}s"
         policy = out / "policy.safetensors"
         must("evaluate", policy, reference, "-o", judged, "--seconds", seconds, core=core)
-        kept = folders.row(name, seed, seconds)
-        part = kept.with_suffix(".part")
+        part = path.with_suffix(".part")
         part.write_bytes((judged / "evaluations.parquet").read_bytes())
-        part.replace(kept)
+        part.replace(path)
 
 
 def policies(

@@ -8,7 +8,7 @@ import pytest
 from benchmarks import learning_policies, learning_races
 from benchmarks.learning_curve import area, first_at
 from benchmarks.learning_policies import MOVES, Folders, source_of
-from benchmarks.learning_summary import LIMBS, bars, cluster_interval, line
+from benchmarks.learning_summary import LIMBS, bars, cluster_interval, line, summary
 
 
 def rollouts(strict: float, gain: float) -> list[dict[str, object]]:
@@ -88,3 +88,28 @@ def test_without_the_authors_files_their_rows_are_left_out(
     learning_policies.policies(["authors_apt1"], [0], None, 1, Folders.at(tmp_path))
     assert source_of(MOVES["authors_apt1"]) is None
     assert list(tmp_path.iterdir()) == []
+
+
+def test_rows_of_another_budget_are_told_apart(tmp_path: Path) -> None:
+    folders = Folders.at(tmp_path)
+    own, brief = folders.row("walk", 0, 10.0), folders.row("walk", 0, 10.0, 1.0)
+    assert (own.name, brief.name) == ("walk-s0.parquet", "walk-1min-s0.parquet")
+    folders.rows.mkdir(parents=True)
+    brief.write_bytes(b"read by no table")
+    assert summary(folders) == []
+
+
+def test_a_peer_that_does_not_arrive_took_all_of_its_time(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    curves = iter(
+        [
+            {"points": [(100.0, 1, 5.1)], "reached": True},
+            {"points": [(998.0, 1, 2.2)], "reached": False},
+        ]
+    )
+    monkeypatch.setattr(learning_races, "curve_of", lambda *given: next(curves))
+    monkeypatch.setattr(learning_races, "reference_of", lambda *given: tmp_path)
+    found = learning_races.survival(Folders.at(tmp_path), 10)
+    assert (found["ratio"], found["holds"]) == (pytest.approx(0.1), True)
+    assert found["peer_is_lower_bound"]
