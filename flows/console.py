@@ -19,7 +19,7 @@ import typer
 from pydantic import ValidationError
 
 from flows.bars import bar as bar
-from robojackson.errors import RoboJacksonError
+from robojackson.errors import RoboJacksonError, StoreError
 
 P = ParamSpec("P")
 INTERRUPTED = 130
@@ -70,7 +70,13 @@ def command(body: Callable[P, Answer]) -> Callable[P, None]:
             _leave(INTERRUPTED, f"interrupted: {cause}")
         except KeyboardInterrupt:
             _leave(INTERRUPTED, "interrupted")
-        say(answer, as_json=bool(kwargs.get("as_json")))
+        try:
+            say(answer, as_json=bool(kwargs.get("as_json")))
+        except BrokenPipeError:  # whoever reads has enough
+            raise
+        except OSError as cause:
+            sys.stdout = open(os.devnull, "w")  # noqa: SIM115 (nothing is left to be flushed)
+            _leave(1, f"StoreError: the answer cannot be written to stdout: {cause.strerror}")
         if answer.code:
             raise typer.Exit(answer.code)
 
@@ -132,7 +138,7 @@ def plain(value: Any) -> Any:
 def log_to_stderr() -> None:
     """Send the log of the libraries to stderr, one short line a record."""
     logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(message)s")
-    for noisy in ("jax", "absl", "matplotlib", "httpx"):
+    for noisy in ("jax", "absl", "matplotlib", "httpx", "torch"):
         logging.getLogger(noisy).setLevel(logging.WARNING)
 
 
@@ -176,6 +182,8 @@ def stages() -> Iterator[Callable[[str, int, int], None]]:
 @contextmanager
 def stdout_is_stderr() -> Iterator[None]:
     """Send what anybody writes to file descriptor 1, C++ included, to stderr."""
+    if sys.stdout is None:
+        raise StoreError("stdout is closed: there is nowhere to write the answer")
     sys.stdout.flush()
     saved = os.dup(1)
     os.dup2(2, 1)

@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING
 from configs.loader import load
 from flows import console
 from flows.single import Figures, Overrides
-from robojackson.errors import RoboJacksonError
+from robojackson.errors import RoboJacksonError, TrackTooShort, UnreadableVideo
 
 if TYPE_CHECKING:
     from robojackson.clips.video import VideoInfo, VideoLimits
+
+UNREADABLE = (UnreadableVideo, TrackTooShort)
+"""What is one video's fault and not of all."""
 
 
 def score(videos: list[Path], config: str, overrides: Overrides) -> Figures:
@@ -25,17 +28,26 @@ def score(videos: list[Path], config: str, overrides: Overrides) -> Figures:
 
     settings = load(PipelineConfig, config, overrides)
     infos, found = _readable(videos, settings.video)
+    causes: list[RoboJacksonError] = []
     for info in infos:
         video = info.path
-        with console.bar(video.name) as progress:
-            if settings.dancer.number:
-                track = follow(video, info, settings.scoring_detector, settings.dancer, progress)
-            else:
-                track = detect(video, info, settings.scoring_detector, progress)
+        try:
+            with console.bar(video.name) as progress:
+                if settings.dancer.number:
+                    which = settings.dancer
+                    track = follow(video, info, settings.scoring_detector, which, progress)
+                else:
+                    track = detect(video, info, settings.scoring_detector, progress)
+        except UNREADABLE as cause:
+            causes.append(cause)
+            found.append({"video": str(video), "error": str(cause)})
+            continue
         scored = stability(track, settings.stability)
         found.append({"video": str(video), "fps": info.fps, **asdict(scored)})
         if not scored.detected:
             found[-1]["note"] = f"no person found in {len(track)} of {len(track)} frames"
+    if causes and len(causes) == len(infos):
+        raise causes[0]
     return {"videos": found}
 
 

@@ -89,7 +89,10 @@ def retarget(smpl: Path, out: Path, config: str, overrides: Overrides) -> Figure
     machine = _robot(settings.robot)
     sequence = read_table(SmplSequence, smpl)
     with results_in(out) as store:
-        reference = to_robot(sequence, machine, settings.retarget)
+        try:
+            reference = to_robot(sequence, machine, settings.retarget)
+        except TrackTooShort as cause:
+            raise TrackTooShort(f"{smpl}: {cause}") from cause
         store.put("reference.parquet", tables.encode(reference))
         scorecard = console.plain(told(reference))
         store.put("scorecard.json", json.dumps(scorecard, indent=1).encode())

@@ -36,10 +36,14 @@ def pretrain(kind: str, out: Path, reference: Path | None, overrides: Mapping[st
         BadConfiguration: a reference motion for `paper`, whose walker follows none.
     """
     from robojackson.retarget.robot import RobotDescription, load_robot
+    from robojackson.rl.config import TrainConfig
     from robojackson.rl.networks import load_networks, widened
     from robojackson.rl.policy import load_policy
     from robojackson.rl.stock import stock_observation_size
 
+    mode = load(TrainConfig, f"setups/walker-{kind}", overrides).mode
+    if mode != kind:
+        raise BadConfiguration(f"mode={mode}: the walker of kind {kind!r} learns in mode {kind}")
     if kind == "paper" and reference is not None:
         raise BadConfiguration(
             f"--reference {reference}: the walker of kind 'paper' follows no motion; leave it out, "

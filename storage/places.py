@@ -61,12 +61,19 @@ class Folder:
 
     def __init__(self, root: Path) -> None:
         self.root = root.absolute()
+        if self.root.is_file():
+            raise NotADirectoryError("a file; a folder is wanted")
 
     def create(self) -> None:
         self.root.mkdir(parents=True, exist_ok=True)
 
     def put(self, key: str, source: Path | bytes) -> None:
-        target = self.root / key
+        target = (self.root / key).resolve()  # a link stays one
+        if target.is_dir():
+            raise IsADirectoryError("a folder; name a file in it")
+        if target.exists() and not target.is_file():
+            raise OSError("a device or a pipe; name a file")
+        mode = target.stat().st_mode & 0o777 if target.exists() else 0o644
         target.parent.mkdir(parents=True, exist_ok=True)
         file = _begun(target.parent)
         try:
@@ -74,7 +81,7 @@ class Folder:
                 _fill(file, source)
                 file.flush()
                 os.fsync(file.fileno())
-                os.chmod(file.name, 0o644)
+                os.chmod(file.name, mode)
                 os.replace(file.name, target)
             _sync_folder(target.parent)
         finally:

@@ -50,8 +50,11 @@ class Store:
         """Write bytes, or copy a local file, under a key; replaces what was there.
 
         Raises:
-            StoreError: full disk, no permission, connection cut; nothing half-written is left.
+            StoreError: full disk, no permission, connection cut, a device in its place, or a name
+                that is no UTF-8; nothing half-written is left.
         """
+        if not _is_text(key):
+            raise StoreError(f"cannot write {key!a}: the name is no UTF-8; choose another")
         with _one_line(f"cannot write {self.address(key)}"):
             digest = _digest(content)
             self.place.put(key, content)
@@ -159,6 +162,15 @@ class Store:
 
 def _digest(content: bytes | Path) -> str:
     return sha256_of(content) if isinstance(content, bytes) else sha256_of_file(content)
+
+
+def _is_text(key: str) -> bool:
+    """Whether a name can be told; a file system takes any bytes."""
+    try:
+        key.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 @contextmanager

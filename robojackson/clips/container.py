@@ -74,6 +74,11 @@ def packet_times(path: Path) -> Float[np.ndarray, " T"]:
     return stamps - stamps[:1] if len(stamps) else stamps
 
 
+def told_rate(stream: VideoStream) -> float:
+    """Frames a second that the file tells; 0 where it tells none."""
+    return float(stream.average_rate or stream.guessed_rate or 0)
+
+
 def rate(stamps: np.ndarray, told: float) -> float:
     """Frames a second: what the file tells, unless its timestamps contradict it."""
     span_s = stamps[-1] if len(stamps) > 1 else 0.0

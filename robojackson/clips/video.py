@@ -13,7 +13,14 @@ from av.video.frame import VideoFrame
 from pydantic import ConfigDict
 from pydantic.dataclasses import dataclass
 
-from robojackson.clips.container import first_frame, opened, packet_times, rate, video_stream
+from robojackson.clips.container import (
+    first_frame,
+    opened,
+    packet_times,
+    rate,
+    told_rate,
+    video_stream,
+)
 from robojackson.clips.track import uneven
 from robojackson.errors import (
     TrackTooShort,
@@ -93,12 +100,17 @@ def probe(path: Path, limits: VideoLimits) -> VideoInfo:
     """
     with opened(path) as container:
         stream = video_stream(container, path)
-        told = float(stream.average_rate or stream.guessed_rate or 0)
+        told = told_rate(stream)
         promised = stream.frames
     stamps = packet_times(path)
     _require_whole(path, len(stamps), promised)
     with opened(path) as container:
         first = first_frame(container, path)
+    if len(stamps) > 1 and stamps[-1] == 0.0:
+        raise UnreadableVideo(
+            f"{path}: all of its {len(stamps)} frames are shown at the same time; write it anew "
+            "with a frame rate (ffmpeg -r 30 -i IN OUT.mp4)"
+        )
     fps = rate(stamps, told)
     if not fps:
         raise UnreadableVideo(f"{path}: the file tells no frame rate")
@@ -149,6 +161,7 @@ def _decoded(path: Path) -> Iterator[tuple[float, VideoFrame]]:
     with opened(path) as container:
         stream = video_stream(container, path)
         stream.thread_type = "NONE"
+        told = told_rate(stream) or 1.0  # where frames have no times
         time_s, good, bad = 0.0, 0, 0
         packets = container.demux(stream)
         while True:
@@ -166,7 +179,7 @@ def _decoded(path: Path) -> Iterator[tuple[float, VideoFrame]]:
                 return
             for frame in frames:
                 good += 1
-                time_s = float(frame.time or 0.0)
+                time_s = good / told if frame.time is None else float(frame.time)
                 yield time_s, frame
 
 
@@ -195,7 +208,7 @@ def require_within(info: VideoInfo, limits: VideoLimits) -> None:
     if info.duration_s > limits.max_duration_s:
         raise VideoTooLong(
             f"{info.path}: {info.duration_s:.1f} s is longer than the limit of "
-            f"{limits.max_duration_s:g} s; trim it or raise max_duration_s"
+            f"{limits.max_duration_s:g} s; trim it or raise video.max_duration_s"
         )
     if info.frames < limits.min_frames:
         raise TrackTooShort(

@@ -20,7 +20,7 @@ class EvaluateConfig:
         max_lag: Longest lag tried for a limb's gain, s.
     """
 
-    seconds: float = Field(default=10.0, gt=0)
+    seconds: float = Field(default=10.0, gt=0, le=3600)
     phases: int = Field(default=24, ge=1)
     resets: int = Field(default=3, ge=1)
     seed: int = Field(default=0, ge=0, lt=2**32)

@@ -30,6 +30,7 @@ from robojackson.rl.trainer import Trainer
 log = logging.getLogger(__name__)
 
 RECENT_EPISODES = 100
+RESULTS = ("policy.safetensors", "networks.safetensors")
 CHECKPOINT, OLD_CHECKPOINT = "checkpoint", "checkpoint.old"
 NOT_OF_THE_RUN = (
     *("steps", "minutes", "cpu_minutes", "checkpoint_seconds", "progress_seconds", "tensorboard"),
@@ -61,8 +62,9 @@ class Run:
         """Attach the trainer; continue from a checkpoint when there is one."""
         self.trainer, self._first_step = trainer, 0
         folder = newest_checkpoint(self.out)
-        if folder is None:  # transitions without one are another training's
+        if folder is None:  # what is there without one is another training's
             shutil.rmtree(self._replay, ignore_errors=True)
+            self._set_aside()
             return
         state = json.loads((folder / "run.json").read_text())
         if state["configuration"] != self._identity():
@@ -158,7 +160,7 @@ class Run:
                 part.unlink(missing_ok=True)
             raise StoreError(f"{self.out}: the checkpoint cannot be written ({error})") from error
         # First, since a checkpoint whose budget is used up is not written again.
-        for name in ("policy.safetensors", "networks.safetensors"):
+        for name in RESULTS:
             os.replace(self.out / f"{name}.part", self.out / name)
         old = self.out / OLD_CHECKPOINT
         if final.exists():
@@ -202,6 +204,13 @@ class Run:
             "policy.safetensors": Policy(layers, facts).to_bytes(),
             "networks.safetensors": Networks(networks, facts).to_bytes(),
         }
+
+    def _set_aside(self) -> None:
+        """Keep the networks of another training that this one's would replace."""
+        for name in RESULTS:
+            if (self.out / name).is_file():
+                os.replace(self.out / name, self.out / f"before-{name}")
+                log.warning("%s was here before; it is before-%s now", name, name)
 
     def _require_finite(self, arrays: Iterable[np.ndarray]) -> None:
         if all(np.isfinite(array).all() for array in arrays):

@@ -38,6 +38,13 @@ def test_an_empty_room_gives_rows_of_nan(write_video) -> None:
     assert np.isnan(track.world_landmarks).all()
 
 
+def test_frames_a_fraction_of_a_millisecond_apart_are_looked_at_in_order() -> None:
+    room = np.zeros((96, 128, 3), np.uint8)
+    with landmarks.video_landmarker("lite") as look:
+        rows = [look(room, time_s) for time_s in (0.0, 0.0003, 0.0003, 0.0006, 0.2)]
+    assert np.isnan(rows).all()
+
+
 def test_unknown_size_names_the_known_ones() -> None:
     with pytest.raises(UnknownName, match="full, heavy, lite"):
         landmarks.model_path("huge")

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import av
 import numpy as np
 import pytest
 
@@ -163,6 +164,27 @@ def test_a_trimmed_range_keeps_its_varying_rate(tmp_path: Path) -> None:
     path = write_at(tmp_path / "phone.mp4", UNEVEN_S)
     out = trim(path, 0.12, 0.77, tmp_path / "part.mp4")
     assert [t for t, _ in timed_frames(out)] == pytest.approx(UNEVEN_S[3:8] - 0.12, abs=1e-4)
+
+
+def test_frames_without_times_come_at_the_rate_that_the_file_tells(tmp_path: Path) -> None:
+    path = tmp_path / "raw.h264"
+    with av.open(str(path), "w", format="h264") as container:
+        stream = container.add_stream("libx264", rate=25)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        for level in range(12):
+            image = np.full((48, 64, 3), 20 * level, np.uint8)
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(image)))
+        container.mux(stream.encode(None))
+    info = probe(path, LIMITS)
+    assert [t for t, _ in timed_frames(path)] == pytest.approx(np.arange(12) / info.fps)
+    assert not info.uneven
+
+
+def test_frames_that_are_all_shown_at_once_are_refused(write_video, monkeypatch) -> None:
+    path = write_video(frames=12)
+    monkeypatch.setattr("robojackson.clips.video.packet_times", lambda path: np.zeros(12))
+    with pytest.raises(UnreadableVideo, match="all of its 12 frames are shown at the same time"):
+        probe(path, LIMITS)
 
 
 def test_an_even_clip_is_told_as_even(write_video) -> None:

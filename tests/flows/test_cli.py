@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import av
 import numpy as np
@@ -14,6 +15,8 @@ from typer.testing import CliRunner
 
 from flows.cli import app
 from flows.console import lines, plain
+from robojackson.clips import landmarks
+from robojackson.errors import TruncatedVideo
 from tests.flows.conftest import ROOT, environment, robojackson
 
 HIPS = ROOT / "clips" / "hip_shake.mp4"
@@ -131,6 +134,43 @@ def test_a_clip_without_a_person_has_a_score(tmp_path: Path) -> None:
         33 * 5,
         "no person found in 5 of 5 frames",
     )
+
+
+def test_a_video_that_breaks_off_while_it_is_looked_at_loses_no_other_score(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    detect = landmarks.detect
+
+    def breaks_off(video: Path, *rest: Any) -> Any:
+        if video.name == "b.mp4":
+            raise TruncatedVideo(f"{video}: damaged")
+        return detect(video, *rest)
+
+    monkeypatch.setattr(landmarks, "detect", breaks_off)
+    clips = [write_video(tmp_path / name, 5) for name in ("a.mp4", "b.mp4", "c.mp4")]
+    code, out, _ = invoke("score", *clips, "--json")
+    told = [set(video) & {"error", "stability_score"} for video in json.loads(out)["videos"]]
+    assert (code, told) == (1, [{"stability_score"}, {"error"}, {"stability_score"}])
+    code, _, err = invoke("score", clips[1])
+    assert (code, err.splitlines()[-1]) == (
+        1,
+        f"robojackson: TruncatedVideo: {clips[1]}: damaged",
+    )
+
+
+@pytest.mark.parametrize(
+    ("where", "reason"),
+    [
+        (">/dev/full", "the answer cannot be written to stdout: No space left on device"),
+        (">&-", "stdout is closed: there is nowhere to write the answer"),
+    ],
+)
+def test_an_answer_that_nobody_gets_is_one_line(where: str, reason: str) -> None:
+    command = f"{shlex.quote(sys.executable)} -m flows.cli robots --json {where}"
+    done = subprocess.run(
+        command, shell=True, cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (1, f"robojackson: StoreError: {reason}\n")
 
 
 def test_a_readable_video_is_scored_beside_one_that_is_not(tmp_path: Path) -> None:

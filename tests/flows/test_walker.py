@@ -43,6 +43,12 @@ def test_a_walker_that_follows_no_motion_takes_none(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+def test_a_walker_of_another_mode_is_refused_before_any_work(tmp_path: Path) -> None:
+    with pytest.raises(BadConfiguration, match="kind 'track' learns in mode track"):
+        walker.pretrain("track", tmp_path, None, {"mode": "paper"})
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_walker_of_track_does_not_take_what_lies_in_its_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

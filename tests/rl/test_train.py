@@ -176,7 +176,10 @@ def test_a_run_that_begins_anew_learns_nothing_from_the_one_before(
     """Only its checkpoint was removed, as the refusal of another configuration says."""
     run(robot, sway, brief("sb3", 480), tmp_path)
     shutil.rmtree(tmp_path / "checkpoint")
+    learnt = (tmp_path / "policy.safetensors").read_bytes()
     run(robot, sway, brief("sb3"), tmp_path)
+    assert (tmp_path / "before-policy.safetensors").read_bytes() == learnt
+    assert (tmp_path / "policy.safetensors").read_bytes() != learnt
     names = sorted(path.name for path in (tmp_path / "replay").iterdir())
     assert [name.split("-")[1] for name in names] == ["000000000080.npz"]
 

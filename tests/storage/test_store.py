@@ -1,6 +1,7 @@
 """A store writes whole files or none, on a disk, in an object store, and where writing fails."""
 
 import errno
+import os
 import resource
 import shutil
 from collections.abc import Iterator
@@ -169,3 +170,40 @@ def test_a_root_that_nobody_can_open_is_one_line() -> None:
 def test_the_environment_names_the_store(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("ROBOJACKSON_STORE", str(tmp_path / "elsewhere"))
     assert Store.from_environment().root == str(tmp_path / "elsewhere")
+
+
+def test_a_file_for_a_store_is_told_at_once(tmp_path: Path) -> None:
+    (tmp_path / "clip.mp4").write_text("a video")
+    with pytest.raises(StoreError, match="a file; a folder is wanted"):
+        Store(tmp_path / "clip.mp4")
+
+
+def test_what_is_no_regular_file_is_never_replaced(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(StoreError, match="a device or a pipe"):
+        Store(tmp_path).put("pipe", b"x")
+    with pytest.raises(StoreError, match="a folder; name a file in it"):
+        Store(tmp_path).put("folder", b"x")
+    assert (tmp_path / "pipe").is_fifo()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["folder", "pipe"]
+
+
+def test_a_link_stays_one_and_a_file_keeps_its_mode(tmp_path: Path) -> None:
+    (tmp_path / "far").mkdir()
+    file, link = tmp_path / "far" / "notes.csv", tmp_path / "link.csv"
+    file.write_bytes(b"old")
+    file.chmod(0o600)
+    link.symlink_to(file)
+    Store(tmp_path).put("link.csv", b"new")
+    assert (link.is_symlink(), file.read_bytes(), file.stat().st_mode & 0o777) == (
+        True,
+        b"new",
+        0o600,
+    )
+
+
+def test_a_name_that_nobody_can_read_is_refused_before_it_is_written(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match="no UTF-8"):
+        Store(tmp_path).put(os.fsdecode(b"b\xff.csv"), b"x")
+    assert files_under(tmp_path) == []
