@@ -62,6 +62,12 @@ def uneven(time_s: Float[np.ndarray, " T"], fps: float) -> bool:
     return bool((np.abs(time_s - grid) * fps > EVEN).any())
 
 
+def even_times(track: LandmarkTrack) -> Float[np.ndarray, " T"]:
+    """Times at equal spaces of 1 / fps from the first frame to the last, seconds."""
+    last = float(track.times[-1])
+    return np.minimum(np.arange(round(last * track.fps) + 1) / track.fps, last)
+
+
 def evenly(track: LandmarkTrack) -> LandmarkTrack:
     """The same motion at equal spaces of 1 / fps, as the stages after this one need it.
 
@@ -69,8 +75,7 @@ def evenly(track: LandmarkTrack) -> LandmarkTrack:
     """
     if track.time_s is None:
         return track
-    count = round(float(track.time_s[-1]) * track.fps) + 1
-    when = np.minimum(np.arange(count) / track.fps, track.time_s[-1])
+    when = even_times(track)
     after = np.clip(np.searchsorted(track.time_s, when), 1, max(len(track) - 1, 1))
     before = after - 1
     span = np.maximum(track.time_s[after] - track.time_s[before], 1e-9)

@@ -11,6 +11,7 @@ import av
 import numpy as np
 from av.video.frame import VideoFrame
 
+from robojackson.clips.track import uneven
 from robojackson.clips.video import VideoLimits, probe, timed_frames
 from robojackson.errors import TrackTooShort
 
@@ -35,8 +36,11 @@ def trim(path: Path, start_s: float, end_s: float, out: Path) -> Path:
     try:
         frames = timed_frames(path, start_s, end_s)
         rate = Fraction(info.fps).limit_denominator(1001)
-        if not _encode(frames, rate, info.uneven, written):
+        times = _encode(frames, rate, info.uneven, written)
+        if not times:
             raise TrackTooShort(f"{path}: no frame between {start_s:g} s and {end_s:g} s")
+        if not info.uneven and uneven(np.array(times), info.fps):  # damaged frames are left out
+            _encode(timed_frames(path, start_s, end_s), rate, True, written)
         written.replace(out)
     finally:
         written.unlink(missing_ok=True)
@@ -45,9 +49,11 @@ def trim(path: Path, start_s: float, end_s: float, out: Path) -> Path:
 
 def _encode(
     frames: Iterator[tuple[float, np.ndarray]], rate: Fraction, timed: bool, out: Path
-) -> int:
-    """Write images as H.264, at their times or at an even rate; returns how many there were."""
-    count, start_s = 0, 0.0
+) -> list[float]:
+    """Write images as H.264, at their times or at an even rate; returns their times since the first
+    of them, seconds."""
+    times: list[float] = []
+    start_s = 0.0
     with av.open(str(out), "w", format="mp4") as container:
         stream = container.add_stream("libx264", rate=rate, options={"crf": "17"})
         stream.pix_fmt = "yuv420p"
@@ -55,7 +61,7 @@ def _encode(
             stream.time_base = stream.codec_context.time_base = Fraction(1, CLOCK)
         for time_s, image in frames:
             even = image[: image.shape[0] // 2 * 2, : image.shape[1] // 2 * 2]
-            if count == 0:
+            if not times:
                 stream.height, stream.width = even.shape[:2]
                 start_s = time_s
             picture = VideoFrame.from_ndarray(np.ascontiguousarray(even))
@@ -64,8 +70,8 @@ def _encode(
                     round((time_s - start_s) * CLOCK),
                     Fraction(1, CLOCK),
                 )
-            count += 1
+            times.append(time_s - start_s)
             container.mux(stream.encode(picture))
-        if count:
+        if times:
             container.mux(stream.encode(None))
-    return count
+    return times

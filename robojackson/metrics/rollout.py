@@ -62,9 +62,16 @@ def best_frozen_error(wanted: Float[np.ndarray, "T K 3"]) -> float:
     return float(min(site_error(wanted, pose[None]).mean() for pose in candidates))
 
 
+STILL_M = 1e-3
+"""Error of the best frozen pose of a reference that does not move, metres."""
+
+
 def skill(error_m: float, frozen_error_m: float) -> float:
-    """1 - error / error of the best frozen pose: 1 is perfect, 0 no better than a statue."""
-    return 1.0 - error_m / max(frozen_error_m, 1e-6)
+    """1 - error / error of the best frozen pose: 1 is perfect, 0 no better than a statue.
+
+    NaN where the reference itself hardly moves: a statue is perfect there.
+    """
+    return 1.0 - error_m / frozen_error_m if frozen_error_m > STILL_M else float("nan")
 
 
 def limb_response(

@@ -4,7 +4,7 @@ landmarks -> repair -> before the camera -> 29 keypoints -> person's skeleton ->
 floor -> contacts -> root lock -> feet pinned -> solve -> SmplSequence in the world frame.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -85,7 +85,12 @@ def recover(track: LandmarkTrack, config: MocapConfig) -> SmplSequence:
 
     sequence = recover_points(seen, posed, landmarks.valid, pinhole, track.fps, config)
     notes = (*track.notes, *sequence.notes, *_swaps(landmarks))
-    return replace(sequence, person=track.person, notes=notes)
+    return replace(sequence, person=track.person, notes=notes, camera=told(sequence.camera, track))
+
+
+def told(camera: Mapping[str, object], track: LandmarkTrack) -> dict[str, object]:
+    """What is known of a camera, which is that of the first frame where it moved."""
+    return {**camera, **({} if track.to_first is None else {"moved": True})}
 
 
 def recover_points(

@@ -15,6 +15,7 @@ from robojackson.clips.track import LandmarkTrack
 from robojackson.mocap.blazepose import (
     MIRROR,
     SHOULDERS,
+    SWAP_FPS,
     landmark,
     swapped_frames,
     track_landmarks,
@@ -49,7 +50,7 @@ def _shape(track: LandmarkTrack) -> tuple[int, int, int, float]:
 
 
 def _unswapped(track: LandmarkTrack) -> LandmarkTrack:
-    if track.detected.sum() < 2:
+    if track.detected.sum() < 2 or track.fps < SWAP_FPS:  # a turn would look like an exchange
         return track
     swap = swapped_frames(track_landmarks(track))
     pick = np.where(swap[:, None], MIRROR, np.arange(len(MIRROR)))

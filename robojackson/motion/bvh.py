@@ -35,6 +35,8 @@ UNITS = (1.0, CENTIMETRE, 0.001, 0.0254, 0.0254 / 0.45)
 """Metres; the last is that of the CMU files."""
 LEG = (0.55, 1.15)
 """Hip to ankle of a person, metres."""
+CHILDS_LEG = 0.2
+"""The shortest of a person who walks, metres."""
 USUAL_LEG = 0.82
 ROUNDS = 3
 """Of rotations and skeleton, each found from the other."""
@@ -105,7 +107,7 @@ def _own(tree: Tree, names: list[str]) -> ForeignMotion:
             offsets[tip] = tree.nodes[names.index(end)].offset
     offsets[0] = 0.0
     rest = assemble(offsets)
-    metre, notes = _unit(rest)
+    metre, notes = _unit(rest, ours=True)
     return ForeignMotion(
         fps=tree.fps,
         rotations=tree.rotations()[:, nodes],
@@ -164,13 +166,18 @@ def _chest_twist(points: np.ndarray, rest: np.ndarray) -> hybrik.TwistRule:
     return rule
 
 
-def _unit(rest: Float[np.ndarray, "29 3"]) -> tuple[float, tuple[str, ...]]:
-    """Metres a unit of the file: the one that gives a person's legs."""
+def _unit(rest: Float[np.ndarray, "29 3"], ours: bool = False) -> tuple[float, tuple[str, ...]]:
+    """Metres a unit of the file: the one that gives a person's legs; we write centimetres, of
+    children too.
+    """
     bones = [("left_knee", "left_hip"), ("left_ankle", "left_knee")]
     leg = sum(float(np.linalg.norm(rest[keypoint(a)] - rest[keypoint(b)])) for a, b in bones)
     if not np.isfinite(leg) or leg <= 0.0:
         raise BadTable(f"{WHERE}: the legs have no length")
+    if ours and CHILDS_LEG <= leg * CENTIMETRE <= LEG[1]:
+        return CENTIMETRE, ()
     for metre in UNITS:
         if LEG[0] <= leg * metre <= LEG[1]:
-            return metre, ()
+            usual = metre in (1.0, CENTIMETRE)
+            return metre, () if usual else (f"unknown unit: taken for {1e3 * metre:.4g} mm",)
     return USUAL_LEG / leg, (f"unknown unit: scaled to legs of {USUAL_LEG} m",)

@@ -36,7 +36,8 @@ def write(sequence: SmplSequence) -> bytes:
     """The `.pt` of a motion."""
     content: dict[str, Any] = {WORLD: _parameters(sequence, Y_UP_TO_WORLD.T, np.zeros(3))}
     camera = sequence.camera
-    if {"rotation_w", "position_w", "focal_px", "width", "height"} <= set(camera):
+    known = {"rotation_w", "position_w", "focal_px", "width", "height"} <= set(camera)
+    if known and not camera.get("moved"):  # only the first frame's is kept
         turn = np.array(camera["rotation_w"], float).T
         place = np.array(camera["position_w"], float)
         content["smpl_params_incam"] = _parameters(sequence, turn, place)

@@ -32,7 +32,7 @@ def still(
         MissingDependency: no way to draw without a screen.
     """
     config = config or VideoConfig(panel_width=240, panel_height=360)
-    when = _moments(reference, track)
+    when = _moments(reference, sequence)
     with ExitStack() as stack:
         film = Film(stack, source, track, sequence, config, when)
         film.add_robot("reference", reference_qpos(reference, when), model, REFERENCE_TINT)
@@ -40,15 +40,15 @@ def still(
     return bytes(cv2.imencode(".png", row[..., ::-1])[1])
 
 
-def _moments(reference: ReferenceMotion, track: LandmarkTrack) -> Timeline:
+def _moments(reference: ReferenceMotion, sequence: SmplSequence) -> Timeline:
     step = np.array([int(share * (len(reference) - 1)) for share in MOMENTS])
-    frame = np.round(np.asarray(reference.source_time_s)[step] * track.fps).astype(int)
+    frame = np.round(np.asarray(reference.source_time_s)[step] * sequence.fps).astype(int)
     still_there = np.zeros(len(step), bool)
     return Timeline(
         time_s=step * reference.dt,
         step=step,
         lap=np.zeros(len(step), int),
-        frame=np.clip(frame, 0, len(track) - 1),
+        frame=np.clip(frame, 0, len(sequence) - 1),
         rollout=np.zeros(len(step), int),
         ended=still_there,
     )

@@ -72,7 +72,9 @@ def side_by_side(
     """
     config = config or VideoConfig()
     steps = 0 if rollout_qpos is None else len(rollout_qpos)
-    when = timeline(reference, track.fps, len(track), steps, float(config.fps), config.max_seconds)
+    when = timeline(
+        reference, track.fps, len(sequence), steps, float(config.fps), config.max_seconds
+    )
     with ExitStack() as stack:
         film = Film(stack, source, track, sequence, config, when)
         film.add_robot("reference", reference_qpos(reference, when), model, REFERENCE_TINT)

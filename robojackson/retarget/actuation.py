@@ -13,14 +13,17 @@ def torque_limits(
 ) -> Float[np.ndarray, " J"]:
     """Limit of every hinge, infinite where nothing drives it; the description goes first.
 
-    A motor gives gear times gain times control range; a position or velocity servo whatever its
-    force range allows; the joint's own force range bounds both.
+    A motor gives gear times gain times control range, several of one joint together; one without a
+    range, or a position or velocity servo, whatever its force range allows; the joint's own force
+    range bounds all.
     """
     limit = np.full(len(joints), np.inf)
+    driven = np.zeros(len(joints))
     for index in range(model.nu):
         if model.actuator_trntype[index] == int(mujoco.mjtTrn.mjTRN_JOINT):
             joint = model.actuator_trnid[index, 0]
-            limit[joint - 1] = min(_force(model, index), _own_limit(model, joint))
+            driven[joint - 1] += _force(model, index)
+            limit[joint - 1] = min(driven[joint - 1], _own_limit(model, joint))
     for pattern, torque in description.torque_limits.items():
         place = where(description, "torque_limits")
         for name in matching("joint", pattern, joints, place):
@@ -32,7 +35,8 @@ def _force(model: mujoco.MjModel, index: int) -> float:
     """Largest torque of one actuator."""
     gear = abs(float(model.actuator_gear[index, 0]))
     force = np.inf
-    if model.actuator_biastype[index] == int(mujoco.mjtBias.mjBIAS_NONE):
+    is_motor = model.actuator_biastype[index] == int(mujoco.mjtBias.mjBIAS_NONE)
+    if is_motor and model.actuator_ctrllimited[index]:
         reach = np.abs(model.actuator_ctrlrange[index]).max()
         force = abs(float(model.actuator_gainprm[index, 0])) * reach
     if model.actuator_forcelimited[index]:

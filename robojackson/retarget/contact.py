@@ -27,21 +27,32 @@ def free_fall(human: Mapping[str, np.ndarray], clip: HumanClip) -> Bool[np.ndarr
     """Stretches without contact over which the hips lose speed as fast as a falling body does."""
     hips = (human["left_hip"] + human["right_hip"])[:, 2] / 2
     smooth = gaussian_filter1d(hips, 0.02 / clip.dt, mode=clip.edges)
-    rise = np.gradient(smooth, clip.dt)
+    laps = clip.lap is not None
+    around = int(laps)  # steps of the neighbouring laps
+    rise = np.gradient(np.pad(smooth, around, mode="wrap"), clip.dt)[around : around + len(hips)]
     out = np.zeros(len(hips), bool)
-    for start, end in runs((clip.contact == AIR).all(axis=1)):
-        seconds = (end - start) * clip.dt
-        fall = (rise[start] - rise[end - 1]) / max(seconds - clip.dt, clip.dt)
-        out[start:end] = seconds >= _SHORTEST_FLIGHT and fall > _FREE_FALL * GRAVITY
+    for steps in stretches((clip.contact == AIR).all(axis=1), laps):
+        seconds = len(steps) * clip.dt
+        fall = (rise[steps[0]] - rise[steps[-1]]) / max(seconds - clip.dt, clip.dt)
+        out[steps] = seconds >= _SHORTEST_FLIGHT and fall > _FREE_FALL * GRAVITY
     return out
 
 
-def without(airborne: Bool[np.ndarray, " N"], hovering: np.ndarray) -> Bool[np.ndarray, " N"]:
+def without(
+    airborne: Bool[np.ndarray, " N"], hovering: np.ndarray, laps: bool
+) -> Bool[np.ndarray, " N"]:
     """The flights in which the body hovers in less than a third of the steps."""
     out = np.zeros_like(airborne)
-    for start, end in runs(airborne):
-        out[start:end] = hovering[start:end].mean() < 1 / 3
+    for steps in stretches(airborne, laps):
+        out[steps] = hovering[steps].mean() < 1 / 3
     return out
+
+
+def stretches(flags: Bool[np.ndarray, " N"], laps: bool) -> list[Int[np.ndarray, " M"]]:
+    """The steps of each stretch of True; one over the seam of a lap is one."""
+    first = int(flags.argmin()) if laps else 0
+    rolled = np.roll(flags, -first)
+    return [np.arange(start + first, end + first) % len(flags) for start, end in runs(rolled)]
 
 
 def runs(flags: Bool[np.ndarray, " N"]) -> list[tuple[int, int]]:

@@ -6,7 +6,7 @@ from the hips and the heading. The lap between them is closed by spreading what 
 """
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -86,6 +86,8 @@ def human_clip(
             f"retarget: at least {_MIN_STEPS * dt:.2f} s are needed"
         )
     lap = None if cyclic == "no" else find_lap(sequence, config)
+    if lap is None and cyclic == "yes":  # whoever turns on with every lap is turned back
+        lap = find_lap(sequence, replace(config, heading_deg=180.0))
     if lap is None or (cyclic == "auto" and not _nearly_cyclic(lap, config)):
         return _open_clip(sequence, dt, tempo), None
     _log.info("lap: frames %d to %d, seam %.3f m", lap.start, lap.end, lap.seam_m)

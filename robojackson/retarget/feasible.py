@@ -118,8 +118,11 @@ def _slowed(robot: Robot, motion: Feasible, config: RetargetConfig) -> Feasible 
 
 
 def _kept(robot: Robot, before: Feasible, after: Feasible, config: RetargetConfig) -> Feasible:
-    """The motion after a repair, or the one before where the repair broke a hard bar."""
-    return after if _holds(robot, after, config) else before
+    """The motion after a repair, or the one before where the repair broke a hard bar or bent it too
+    far."""
+    dearest = config.repair.dearest_mm + _error_mm(robot, before)
+    good = _error_mm(robot, after) <= dearest and _holds(robot, after, config)
+    return after if good else before
 
 
 def _holds(robot: Robot, motion: Feasible, config: RetargetConfig) -> bool:

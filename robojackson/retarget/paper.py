@@ -11,6 +11,7 @@ from jaxtyping import Float
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation, Slerp
 
+from robojackson.errors import BadConfiguration
 from robojackson.geometry.frames import SMPL_TO_WORLD
 from robojackson.geometry.rotations import from_rotation, sign_continuous
 from robojackson.mocap.skeleton import JOINT_NAMES, KEYPOINT_NAMES
@@ -36,6 +37,12 @@ def mapped(
     sequence: SmplSequence, robot: Robot, time_s: Float[np.ndarray, " S"], corrected: bool
 ) -> Float[np.ndarray, "S nq"]:
     """qpos by Table I at the given times in the clip."""
+    hinges_there = {name.partition("_")[2] for name in robot.joint_names}
+    if missing := sorted(_LITERAL.keys() - hinges_there):
+        raise BadConfiguration(
+            f"retarget.method: the paper's table names hinges of Humanoid-v5, and robot "
+            f"{robot.description.name!r} has no {', '.join(missing)}; take method=optimise"
+        )
     frames = np.arange(len(sequence)) / sequence.fps
     hinges = _hinges(sequence, robot, corrected)
     root = _root(sequence, robot)

@@ -78,7 +78,7 @@ def targets(
     balls = keypoints[:, robot.contact_keypoints] + arms
     airborne = free_fall(human, clip)
     if hovering is not None:
-        airborne = without(airborne, hovering)
+        airborne = without(airborne, hovering, clip.lap is not None)
     contact = ball_contact(clip, robot, balls, airborne)
     soles = balls[..., 2] - robot.contact_radii
     keypoints[..., 2] += ground_shift(soles, contact, clip)[:, None]

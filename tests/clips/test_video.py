@@ -121,6 +121,17 @@ def test_trim_keeps_exactly_the_range(write_video, tmp_path: Path) -> None:
     assert abs(levels[0] - 10) <= 3
 
 
+def test_trim_of_a_damaged_video_keeps_its_times(tmp_path: Path) -> None:
+    path = tmp_path / "copy.mp4"
+    path.write_bytes((CLIPS / "dance_a.mp4").read_bytes())
+    damage(path)
+    there = np.array([t for t, _ in timed_frames(path, 0.5, 3.0)])
+    out = trim(path, 0.5, 3.0, tmp_path / "part.mp4")
+    kept = np.array([t for t, _ in timed_frames(out)])
+    assert len(there) < 75  # of 30 a second
+    assert kept == pytest.approx(there - there[0], abs=1e-4)
+
+
 def test_trim_of_nothing_leaves_no_file(write_video, tmp_path: Path) -> None:
     out = tmp_path / "part.mp4"
     with pytest.raises(TrackTooShort):

@@ -103,7 +103,7 @@ def test_a_perfect_network_gives_the_person_before_the_camera(
 ) -> None:
     networks = Networks(exact_network(truth, track, lens, dancer.rest_joints), None, None, ())
     marks = repair(track)
-    found = estimate(images(track), marks, lens, track.fps, 15.0, networks, CONFIG)
+    found = estimate(images(track), marks, None, lens, track.fps, 15.0, networks, CONFIG)
     assert np.abs(found.keypoints - truth[1]).max() < 1e-6
 
 
@@ -142,11 +142,56 @@ def test_a_variable_frame_rate_is_made_even(
     times[1:-1] += 0.4 / track.fps * np.where(np.arange(FRAMES - 2) % 2, 1.0, -1.0)
     uneven = replace(track, time_s=times)
     networks = Networks(exact_network(truth, track, lens, dancer.rest_joints), None, None, ())
-    found = estimate(images(track), repair(track), lens, track.fps, 15.0, networks, CONFIG)
+    found = estimate(images(track), repair(track), None, lens, track.fps, 15.0, networks, CONFIG)
     moved = resampled(found, uneven)
     expected = np.interp(np.arange(FRAMES) / track.fps, times, found.keypoints[:, 18, 0])
     assert np.abs(moved.keypoints[:, 18, 0] - expected).max() < 1e-12
     assert resampled(found, track) is found
+
+
+def test_a_clip_with_damaged_frames_is_made_even(
+    truth: Truth, track: LandmarkTrack, lens: Pinhole, dancer: SmplSequence
+) -> None:
+    """Frames that were left out come back between their neighbours."""
+    times = np.arange(FRAMES) / track.fps
+    times[FRAMES // 2 :] += 3 / track.fps
+    damaged = replace(track, time_s=times)
+    networks = Networks(exact_network(truth, track, lens, dancer.rest_joints), None, None, ())
+    found = network_motion(damaged, images(track), networks, MocapConfig(), CONFIG)
+    assert len(found) == FRAMES + 3
+    error = found.joints[FRAMES // 2 + 5 + 3 :] - dancer.joints[FRAMES // 2 + 5 :]
+    assert np.linalg.norm(error, axis=-1).mean() < 0.1
+
+
+def test_of_a_camera_that_moved_the_crops_are_where_the_person_is_in_each_frame(
+    truth: Truth, track: LandmarkTrack, lens: Pinhole, dancer: SmplSequence
+) -> None:
+    pan = np.linspace(0.0, 0.1, FRAMES)  # of the width, to the left in the frames
+    seen = np.array(track.landmarks)
+    seen[..., 0] -= pan[:, None]
+    back = np.repeat(np.eye(3)[None], FRAMES, 0)
+    back[:, 0, 2] = pan * track.width
+    moved = replace(track, landmarks=seen, to_first=back)
+    network = exact_network(truth, track, lens, dancer.rest_joints)
+    cut: list[np.ndarray] = []
+
+    def watched(image: np.ndarray, box: np.ndarray) -> np.ndarray:
+        cut.append(box)
+        return np.zeros((256, 256, 3), np.uint8)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(crop, "cut", watched)
+        still = network_motion(
+            track, images(track), Networks(network, None, None, ()), MocapConfig(), CONFIG
+        )
+        at_rest, cut[:] = np.array(cut), []
+        network = exact_network(truth, track, lens, dancer.rest_joints)
+        found = network_motion(
+            moved, images(track), Networks(network, None, None, ()), MocapConfig(), CONFIG
+        )
+    assert np.array(cut)[:, 0] == pytest.approx(at_rest[:, 0] - pan * track.width)
+    assert found.joints == pytest.approx(still.joints, abs=1e-6)
+    assert (still.camera.get("moved"), found.camera["moved"]) == (None, True)
 
 
 def test_given_twists_come_back_out_of_the_solve(truth: Truth, dancer: SmplSequence) -> None:
@@ -167,7 +212,7 @@ def test_niki_turns_the_persons_own_bones(
     network = exact_network(truth, track, lens, dancer.rest_joints)
     networks = Networks(network, niki.TwistSwing().eval().double(), None, ())
     marks = repair(track)
-    found = estimate(images(track), marks, lens, track.fps, 15.0, networks, CONFIG)
+    found = estimate(images(track), marks, None, lens, track.fps, 15.0, networks, CONFIG)
     bones = np.linalg.norm(found.keypoints[:, AIM_CHILD[4]] - found.keypoints[:, 4], axis=-1)
     own = np.linalg.norm(found.rest[AIM_CHILD[4]] - found.rest[4])
     assert np.abs(bones - own).max() < 1e-9

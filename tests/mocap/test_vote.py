@@ -63,3 +63,11 @@ def test_a_model_that_sees_everybody_lean_is_turned_to_the_first(
 def test_tracks_of_different_clips_are_refused(hip_shake: LandmarkTrack) -> None:
     with pytest.raises(ValueError, match="same clip"):
         vote([hip_shake, replace(hip_shake, fps=25.0)])
+
+
+def test_in_a_slow_clip_no_sides_are_exchanged(hip_shake: LandmarkTrack) -> None:
+    """Between two frames an eighth of a second apart somebody may have turned round."""
+    image, world = np.array(hip_shake.landmarks), np.array(hip_shake.world_landmarks)
+    image[60:], world[60:] = image[60:][:, MIRROR], world[60:][:, MIRROR]
+    turned = replace(hip_shake, landmarks=image, world_landmarks=world, fps=8.0)
+    assert np.allclose(vote([turned, turned]).landmarks, image)

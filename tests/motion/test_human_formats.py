@@ -2,6 +2,7 @@
 
 import io
 import pickle
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from robojackson.errors import BadTable
 from robojackson.mocap.imported import place
-from robojackson.motion import aist, amass, bvh, gvhmr, smpl_csv
+from robojackson.motion import aist, amass, bvh, gvhmr, smpl_csv, torch_zip
 from robojackson.motion.foreign import PELVIS, ForeignMotion
 from tests.motion.person import FRAMES, UPRIGHT, axis_angles, joints_of, path, person
 
@@ -23,6 +24,11 @@ def placed(motion: ForeignMotion) -> np.ndarray:
     """Joints in our world, from the pelvis."""
     found = place(motion, 30.0).joints
     return found - found[:, :1]
+
+
+CAMERA = {"rotation_w": np.eye(3).tolist(), "position_w": [0.0, -3.0, 1.0], "focal_px": 500.0}
+CAMERA |= {"width": 640, "height": 360}
+INCAM = {"smpl_params_incam", "K_fullimg"}
 
 
 def from_pelvis(joints: np.ndarray) -> np.ndarray:
@@ -43,6 +49,21 @@ def test_formats_with_hands_bring_their_tips_back(module: Any) -> None:
     wanted = person()
     back = place(module.read(module.write(wanted)), wanted.fps)
     np.testing.assert_allclose(back.keypoints_w, wanted.keypoints_w, atol=1e-5)
+
+
+@pytest.mark.parametrize("scale", [0.3, 0.5, 0.65, 1.3])
+def test_a_bvh_of_ours_keeps_the_size_of_the_person(scale: float) -> None:
+    small = replace(person(), rest_joints=scale * person().rest_joints)
+    motion = bvh.read(bvh.write(small))
+    np.testing.assert_allclose(motion.rest_joints, small.rest_joints, atol=1e-5)
+    assert not motion.notes
+
+
+def test_of_a_camera_that_moved_gvhmr_gets_no_view() -> None:
+    still = replace(person(), camera=CAMERA)
+    moved = replace(person(), camera={**CAMERA, "moved": True})
+    views = [set(torch_zip.load(gvhmr.write(s), "f")) & INCAM for s in (still, moved)]
+    assert views == [INCAM, set()]
 
 
 def amass_file(**arrays: Any) -> bytes:

@@ -1,5 +1,6 @@
 """The video from end to end, small, and its encoder."""
 
+import dataclasses
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from robojackson.clips.track import LandmarkTrack
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.motion.smpl import SmplSequence
 from robojackson.report.encoder import write_video
+from robojackson.report.still import _moments
 from robojackson.report.video import VideoConfig, side_by_side
 
 SMALL = VideoConfig(fps=10, panel_width=64, panel_height=96)
@@ -90,3 +92,30 @@ def test_video_that_fails_half_way_leaves_nothing(tmp_path: Path) -> None:
     with pytest.raises(RuntimeError, match="no more"):
         write_video(broken(), 30, tmp_path / "x.mp4")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_after_damaged_frames_the_pictures_go_on(
+    clip: Path, track: LandmarkTrack, sequence: SmplSequence, reference: ReferenceMotion,
+    model: mujoco.MjModel, monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    """The motion has as many frames as the clip has time, the track those that could be read."""
+    last = (len(sequence) - 1) / sequence.fps
+    slow = dataclasses.replace(reference, source_time_s=np.linspace(0.0, last, len(reference)))
+    few = dataclasses.replace(
+        track,
+        landmarks=track.landmarks[::2],
+        world_landmarks=track.world_landmarks[::2],
+        visibility=track.visibility[::2],
+        time_s=np.arange(0, len(track), 2) / track.fps,
+    )
+    assert _moments(slow, sequence).frame.max() > len(few)
+    shown: list[int] = []
+
+    def panels(source: Path, track: LandmarkTrack, frames: np.ndarray, *size: int) -> dict:
+        shown.extend(frames)
+        raise InterruptedError
+
+    monkeypatch.setattr("robojackson.report.video.source_panels", panels)
+    with pytest.raises(InterruptedError):
+        side_by_side(clip, few, sequence, slow, None, clip.parent / "d.mp4", model=model)
+    assert max(shown) > len(few)

@@ -12,9 +12,11 @@ from robojackson.errors import BadConfiguration, UnknownName
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.motion.smpl import PLANTED
 from robojackson.retarget import RetargetConfig, Robot, load_robot, retarget
+from robojackson.retarget.actuation import torque_limits
 from robojackson.retarget.config import RepairConfig
 from robojackson.retarget.kinematics import pose, tree
 from robojackson.retarget.model import model_sha256
+from robojackson.retarget.paper import mapped
 from tests.retarget import machine
 from tests.retarget.conftest import human
 
@@ -59,6 +61,23 @@ def test_a_floor_is_added_where_there_is_none(small: Robot):
 def test_torque_limits_of_servos_bounded_joints_and_descriptions(small, joint, limit):
     """Force range of a servo; the joint's own bound under gear x range = 100; by pattern; none."""
     assert small.torque_limit[small.joint_names.index(joint)] == limit
+
+
+def test_a_motor_without_a_range_has_no_limit_and_those_of_one_joint_add_up(description):
+    link = "<body><joint name='{}'/><geom size='.1'/>"
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><worldbody><body><freejoint/><geom size='.1'/>{link.format("a")}
+        {link.format("b")}</body></body></body></worldbody><actuator><motor joint="a" gear="50"/>
+        <motor joint="b" gear="2" ctrlrange="-1 1"/><motor joint="b" gear="3" ctrlrange="-1 1"/>
+        </actuator></mujoco>"""
+    )
+    limits = torque_limits(model, replace(description, torque_limits={}), ("a", "b"))
+    assert limits.tolist() == [np.inf, 5.0]
+
+
+def test_the_papers_mapping_is_refused_where_its_hinges_are_not(small: Robot):
+    with pytest.raises(BadConfiguration, match="take method=optimise"):
+        mapped(human("hip_shake"), small, np.arange(60) * 0.015, False)
 
 
 def test_a_pattern_that_means_no_joint_lists_the_joints(description):

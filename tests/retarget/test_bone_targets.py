@@ -75,15 +75,35 @@ def test_a_body_that_does_not_fall_stands_on_something_whatever_the_labels_say(r
     assert (targets(bare, robot).contact != AIR).any(axis=1).all()
 
 
-def test_a_jump_is_airborne_where_it_falls(robot: Robot):
+def _jump(laps: bool = False) -> HumanClip:
+    """Two seconds of which steps 20 to 34 are a leap."""
     clip = _clip("hip_shake")
     time = np.arange(15) * clip.dt
     points = np.repeat(clip.keypoints_w[:1], 60, axis=0)
     points[20:35, :, 2] += (4.905 * time * (time[-1] - time))[:, None]
     contact = np.ones((60, 4), int)
     contact[21:34] = AIR
-    jump = HumanClip(np.arange(60) * clip.dt, points, contact, np.ones(60, bool), clip.dt, None)
-    aims = targets(jump, robot)
+    lap = np.zeros(3) if laps else None
+    return HumanClip(np.arange(60) * clip.dt, points, contact, np.ones(60, bool), clip.dt, lap)
+
+
+@pytest.mark.parametrize("shift", [0, 22, 27, 31, 33])
+def test_a_jump_over_the_seam_of_a_lap_is_one_jump(robot: Robot, shift: int):
+    """Wherever the lap begins, the same steps of it are in the air."""
+    whole = _jump(laps=True)
+    turned = replace(
+        whole,
+        keypoints_w=np.roll(whole.keypoints_w, -shift, 0),
+        contact=np.roll(whole.contact, -shift, 0),
+    )
+    aims, expected = targets(turned, robot), targets(whole, robot)
+    assert expected.airborne.sum() >= 11
+    np.testing.assert_array_equal(np.roll(aims.airborne, shift), expected.airborne)
+    np.testing.assert_array_equal(np.roll(aims.contact, shift, 0), expected.contact)
+
+
+def test_a_jump_is_airborne_where_it_falls(robot: Robot):
+    aims = targets(_jump(), robot)
     assert aims.airborne[22:33].all()
     assert not aims.airborne[:18].any()
     assert (aims.contact[23:32] == AIR).all()

@@ -73,6 +73,12 @@ def test_a_body_that_turns_away_is_not_cyclic():
     assert lap is None
 
 
+def test_whoever_turns_on_with_every_lap_is_closed_on_request():
+    clip, lap = human_clip(_swaying(60, 30, yaw=np.pi / 60), 0.015, "yes", 1.0, CONFIG)
+    assert lap is not None
+    assert clip.lap is not None
+
+
 def _with_an_arm_that_rises(degrees: float) -> SmplSequence:
     """A sway of whole periods through which the left forearm turns by an angle."""
     base = _swaying(60, 30)

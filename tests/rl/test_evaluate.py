@@ -67,6 +67,15 @@ def test_the_tempo_is_the_clips_own_times_what_retargeting_left_of_it(
     assert row(robot, slow, perfect(sway))["tempo"] == pytest.approx(tempo)
 
 
+def test_of_a_reference_that_stands_still_no_skill_is_told(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    whole = perfect(sway)
+    still = np.repeat(whole.wanted[:1], STEPS, 0)
+    judged = row(robot, sway, dataclasses.replace(whole, wanted=still, points=still + 0.01))
+    assert np.isnan(judged["skill"])
+
+
 def test_the_velocity_score_is_one_at_the_reference_and_none_for_a_statue(
     robot: Robot, sway: ReferenceMotion
 ) -> None:

@@ -8,6 +8,8 @@ import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
 
+from robojackson.clips.background import warp
+
 SIDE_PX = 256
 MARGIN = 1.25
 """Side of the square over the larger side of the person's tight box."""
@@ -29,6 +31,17 @@ def person_boxes(image: Float[np.ndarray, "T 33 2"]) -> Float[np.ndarray, "T 3"]
     low, high = low - size * [ASIDE, ABOVE], high + size * [ASIDE, BELOW]
     side = np.maximum((high - low).max(1), 1.0) * MARGIN
     return np.concatenate([(low + high) / 2.0, side[:, None]], 1)
+
+
+def moved(
+    boxes: Float[np.ndarray, "T 3"], to_first: Float[np.ndarray, "T 3 3"]
+) -> Float[np.ndarray, "T 3"]:
+    """The squares as they lie in the image of the first frame, upright and as large as there."""
+    centre, half = boxes[:, None, :2], boxes[:, None, 2:] / 2.0
+    across = np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]])
+    ends = warp(centre + half * across, to_first)
+    side = np.linalg.norm(ends[:, 1::2] - ends[:, ::2], axis=-1).mean(1)
+    return np.concatenate([warp(centre, to_first)[:, 0], side[:, None]], 1)
 
 
 def cut(image: UInt8[np.ndarray, "H W 3"], box: Float[np.ndarray, "3"]) -> np.ndarray:

@@ -6,7 +6,7 @@ twist of every bone, and the person's rest joints.
 
 import logging
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 
@@ -114,6 +114,7 @@ def device_of(config: NetworkConfig) -> torch.device:
 def estimate(
     images: Iterable[np.ndarray],
     landmarks: Landmarks,
+    to_first: Float[np.ndarray, "T 3 3"] | None,
     camera: Pinhole,
     fps: float,
     depth_cutoff_hz: float,
@@ -125,7 +126,8 @@ def estimate(
 
     Args:
         images: RGB frames, as many as there are landmarks.
-        landmarks: Where the person is in the image.
+        landmarks: Where the person is in each frame's own image.
+        to_first: Takes pixels of each frame to those of the first, for a camera that moved.
         camera: The fixed lens.
         fps: Frames a second.
         depth_cutoff_hz: Low-pass of the person's distance, hertz.
@@ -135,6 +137,10 @@ def estimate(
     """
     view = lift.View(crop.person_boxes(landmarks.image), camera.width, camera.height)
     seen = sight(images, view, networks.hybrik, config, progress)
+    if to_first is not None:
+        boxes = crop.moved(seen.view.boxes, to_first[: len(seen.uvd)])
+        seen = replace(seen, view=replace(seen.view, boxes=boxes))
+    view = seen.view
     rest = _rest_joints(seen, networks.body)
     scale = seen.scale
     if config.update_scale:

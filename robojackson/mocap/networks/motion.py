@@ -10,12 +10,12 @@ import numpy as np
 from jaxtyping import Float
 
 from robojackson.clips.evidence import weighed
-from robojackson.clips.track import LandmarkTrack, evenly
+from robojackson.clips.track import LandmarkTrack, even_times, evenly
 from robojackson.mocap import camera as cameras
 from robojackson.mocap.blazepose import fill_gaps, repair
 from robojackson.mocap.networks.config import NetworkConfig
 from robojackson.mocap.networks.estimate import Estimate, Networks, Progress, estimate
-from robojackson.mocap.recover import MocapConfig, recover_points
+from robojackson.mocap.recover import MocapConfig, recover_points, told
 from robojackson.mocap.smooth import lowpass
 from robojackson.mocap.turned import TurnedBody, pose_keypoints
 from robojackson.motion.smpl import SmplSequence
@@ -44,7 +44,8 @@ def network_motion(
     track = weighed(track)
     focal = mocap.focal_px or cameras.guess_focal(track.width, track.height)
     lens = cameras.Pinhole(focal, track.width, track.height)
-    shown = (repair(track), lens, track.fps, mocap.depth_cutoff_hz)
+    in_frame = repair(replace(track, to_first=None))
+    shown = (in_frame, track.to_first, lens, track.fps, mocap.depth_cutoff_hz)
     found = estimate(images, *shown, networks, config, progress)
     even = evenly(track)
     landmarks = repair(even)
@@ -53,19 +54,20 @@ def network_motion(
         found.keypoints, poser(found, mocap), landmarks.valid, lens, even.fps, mocap
     )
     notes = (*found.notes, *track.notes, *sequence.notes)
-    return replace(sequence, betas=found.betas, person=track.person, notes=notes)
+    camera = told(sequence.camera, track)
+    return replace(sequence, betas=found.betas, person=track.person, notes=notes, camera=camera)
 
 
 def resampled(found: Estimate, track: LandmarkTrack) -> Estimate:
     """The estimate at equal spaces of 1 / fps, as `clips.track.evenly` does it with landmarks."""
     if track.time_s is None:
         return found
-    when = np.minimum(np.arange(len(track)) / track.fps, track.time_s[-1])
+    when = even_times(track)
 
     def at(values: np.ndarray) -> np.ndarray:
         columns = values.reshape(len(values), -1).T
         rows = np.stack([np.interp(when, track.times, column) for column in columns], -1)
-        return rows.reshape(values.shape)
+        return rows.reshape(len(when), *values.shape[1:])
 
     return replace(
         found,
