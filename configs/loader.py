@@ -99,7 +99,8 @@ def _told(path: Path) -> str:
 
 
 class _Yaml12(yaml.SafeLoader):
-    """SafeLoader with the booleans of YAML 1.2, exponents without a dot, and no doubled keys."""
+    """SafeLoader with the scalars of YAML 1.2, in which 010 is ten and nothing a date, and no
+    doubled keys."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         seen: set[Any] = set()
@@ -113,8 +114,10 @@ class _Yaml12(yaml.SafeLoader):
         return super().construct_mapping(node, deep)
 
 
+BASES = {"0o": 8, "0x": 16}
+ANEW = (":bool", ":float", ":int", ":timestamp")
 _Yaml12.yaml_implicit_resolvers = {
-    first: [(tag, pattern) for tag, pattern in rules if not tag.endswith((":bool", ":float"))]
+    first: [(tag, pattern) for tag, pattern in rules if not tag.endswith(ANEW)]
     for first, rules in yaml.SafeLoader.yaml_implicit_resolvers.items()
 }
 _Yaml12.add_implicit_resolver(
@@ -124,6 +127,15 @@ _Yaml12.add_implicit_resolver(
     "tag:yaml.org,2002:float",
     re.compile(r"^[-+]?(?:(?:\d+\.\d*|\.\d+)(?:[eE][-+]?\d+)?|\d+[eE][-+]?\d+|\.inf|\.nan)$"),
     list("-+0123456789."),
+)
+_Yaml12.add_implicit_resolver(
+    "tag:yaml.org,2002:int",
+    re.compile(r"^(?:[-+]?\d+|0o[0-7]+|0x[0-9a-fA-F]+)$"),
+    list("-+0123456789"),
+)
+_Yaml12.add_constructor(
+    "tag:yaml.org,2002:int",
+    lambda loader, node: int(text := loader.construct_scalar(node), BASES.get(text[:2], 10)),
 )
 
 
@@ -146,7 +158,7 @@ def _parsed(value: Any, where: str) -> Any:
         return value
     try:
         return yaml.load(value, Loader=_Yaml12)
-    except yaml.YAMLError as cause:
+    except (yaml.YAMLError, ValueError, TypeError, RecursionError) as cause:
         raise BadConfiguration(f"{where}: {' '.join(str(cause).split())}") from cause
 
 

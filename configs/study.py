@@ -7,11 +7,13 @@ the deployments `ablation/paper` and `ablation/smoke` are the same text.
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, ConfigDict, Field
+from pydantic import AfterValidator, ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
 ROOT = Path(__file__).parent.parent
+OF_THE_STUDY = ("robot", "setup", "minutes", "other_minutes", "gate", "train", "evaluate", "show")
+"""Keys of the pipeline's configuration that are no part of a motion."""
 STRICT = ConfigDict(extra="forbid")
 Setup = Literal["scratch", "pretrain", "curiosity", "scratch-curiosity"]
 Executor = Literal["local", "work-pool"]
@@ -39,13 +41,21 @@ class Move:
         clip: Path of its video, from the checkout.
         paper: What the paper calls it, if it stands for a move of the paper.
         walking: Whether it is walking rather than dancing (the paper's third claim).
-        overrides: Values of the pipeline's configuration by key path.
+        overrides: Values of the pipeline's configuration by key path, of what makes its motion.
     """
 
     clip: str
     paper: str = ""
     walking: bool = False
     overrides: dict[str, Any] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _of_the_motion(self) -> "Move":
+        """Refuse what the study says for all of its moves, or nobody would read."""
+        for key in self.overrides:
+            if key.partition(".")[0] in OF_THE_STUDY:
+                raise ValueError(f"overrides.{key}: is no part of a motion; the study says it")
+        return self
 
     @property
     def path(self) -> Path:

@@ -24,7 +24,7 @@ from flows.launch import launch
 from flows.scorers import scorers
 from flows.single import VERDICT
 from robojackson.clips.stability import Stability
-from robojackson.errors import NoPersonFound, RoboJacksonError
+from robojackson.errors import NoPersonFound, RoboJacksonError, UnreadableVideo
 from robojackson.retarget.robot import RobotDescription
 from robojackson.retarget.scorecard import check
 from storage import catalogue, tables
@@ -123,7 +123,7 @@ async def score_all(
     Raises:
         RoboJacksonError: none can be scored; why the first cannot.
     """
-    sources = [SourceFile.at(path) for path in paths]
+    paths, sources = _there(paths)
     limits = unmapped(settings.video)
     clips = _done(paths, probe.map(sources, limits, unmapped(start_s), unmapped(end_s)))
     tracks = _done(
@@ -214,9 +214,33 @@ async def conclude(
 def _budgeted(settings: PipelineConfig) -> Any:
     """The training's configuration with what the pass leaves it, unless it says itself."""
     config = settings.train
-    if config.steps is not None or config.minutes is not None:
+    if config.has_budget:
+        if (config.minutes or 0.0) > settings.train_minutes:
+            get_run_logger().warning(
+                "train.minutes=%g is more than minutes=%g leave it: it may be cut short",
+                config.minutes,
+                settings.minutes,
+            )
         return config
     return replace(config, minutes=settings.train_minutes)
+
+
+def _there(paths: Sequence[Path]) -> tuple[tuple[Path, ...], list[SourceFile]]:
+    """The files that can be read.
+
+    Raises:
+        UnreadableVideo: none can; why the first cannot.
+    """
+    found, causes = [], []
+    for path in paths:
+        try:
+            found.append((path, SourceFile.at(path)))
+        except OSError as cause:
+            causes.append(UnreadableVideo(f"{path}: cannot be read ({cause.strerror})"))
+            get_run_logger().warning("%s", causes[-1])
+    if not found:
+        raise causes[0]
+    return tuple(path for path, _ in found), [source for _, source in found]
 
 
 def _done(inputs: Sequence[Input], futures: Any) -> list[tuple[Input, Any]]:

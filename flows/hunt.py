@@ -42,6 +42,7 @@ def hunt(
     run_id: str,
     known: Collection[tuple[str, str]] = (),
     reigning: Mapping[str, Any] | None = None,
+    failed: Collection[tuple[str, str]] = (),
 ) -> Hunt:
     """Find, judge and rank the videos of a dance; every one of them goes into the catalogue.
 
@@ -51,6 +52,7 @@ def hunt(
         run_id: For the catalogue.
         known: Videos that were judged before and need not be again.
         reigning: Row of the catalogue of the video chosen last, which a new one has to beat.
+        failed: Videos that failed before and are tried again where there is nothing else.
     Raises:
         SearchFailed: the source does not answer.
     """
@@ -58,7 +60,7 @@ def hunt(
     limits = replace(settings.selection, top=dance.top or settings.selection.top)
     source = replace(settings, web=web, selection=limits)
     found = search(dance.source, dance.asked, dance.address, limits.searched, web)
-    selection = select(found, known, limits)
+    selection = select(found, known, limits, failed)
     get_run_logger().info("%s: %s", dance.name, summary(found, selection))
     had = bring(selection.kept, "score", source)
     entries = challenged(ranked(judged(had, source), source), reigning, source)

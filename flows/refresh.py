@@ -6,7 +6,7 @@ the others; the result says which failed and why.
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
@@ -19,7 +19,7 @@ from configs.finding import FindConfig
 from configs.loader import build, load
 from configs.pipeline import PipelineConfig
 from flows.chain import to_reference
-from flows.entries import Hunt, reason_of, rows
+from flows.entries import REASON_LENGTH, Entry, reason_of, rows
 from flows.find import (
     HUNTERS,
     in_good_quality,
@@ -32,7 +32,7 @@ from flows.hunt import hunt
 from flows.launch import launch
 from robojackson.clips.candidate import VideoCandidate
 from robojackson.clips.titles import clean_text
-from robojackson.errors import NoPersonFound, SearchFailed
+from robojackson.errors import NoPersonFound, RoboJacksonError, SearchFailed
 from robojackson.retarget.robot import RobotDescription
 from storage import candidates
 from storage.artifact import Artifact
@@ -40,6 +40,8 @@ from storage.leftovers import sweep
 from storage.store import Store
 from tasks.probe import SourceFile, probe
 
+KIND = "refresh"
+"""Beginning of the ids of its runs in the catalogue."""
 FOLDER = "refresh"
 SLACK = 0.1
 """Share of the days between two searches that a nightly run may come early."""
@@ -114,22 +116,33 @@ async def refresh_dance(
     wanted = build(Dance, dance, "dance")
     settings = build(FindConfig, config, "config")
     store = Store.from_environment()
-    reigning = candidates.champion(store, wanted.name)
-    seen = candidates.known(store, wanted.name)
-    found = hunt(wanted, settings, run_id("refresh"), seen, reigning)
+    stages = load(PipelineConfig, pipeline, pipeline_overrides)
+    mine = (store, wanted.name, KIND)  # what `find` judges is nothing to this
+    reigning = candidates.champion(*mine)
+    seen, failing = candidates.known(*mine), candidates.failed(*mine)
+    found = hunt(wanted, settings, run_id(KIND), seen, reigning, failing)
     told = rows(found)
     chosen = told[0] if found.chosen else reigning
     await show(wanted.name, told, chosen)
     if chosen is None:
         raise NoPersonFound(nothing(found))
-    video = _video(found, reigning, settings)
-    stages = load(PipelineConfig, pipeline, pipeline_overrides)
+    try:
+        made = motion(store, _video(found.chosen, reigning, settings), stages)
+    except RoboJacksonError as cause:
+        if not found.chosen:
+            raise
+        candidates.append(store, [{**told[0], **_failed(cause)}])
+        if reigning is None:
+            raise
+        get_run_logger().warning("%s: %s; the one before is danced", wanted.name, cause)
+        found, chosen = replace(found, entries=found.entries[1:]), reigning
+        made = motion(store, _video(None, reigning, settings), stages)
     return {
         "run_id": found.run_id,
         "judged": len(told),
         "is_new": found.chosen is not None,
         "chosen": {key: chosen[key] for key in ("video_id", "url", "title", "stability_score")},
-        **motion(store, video, stages),
+        **made,
     }
 
 
@@ -146,10 +159,17 @@ def motion(store: Store, video: Artifact, settings: PipelineConfig) -> Facts:
     }
 
 
-def _video(found: Hunt, reigning: Facts | None, settings: FindConfig) -> Artifact:
+def _failed(cause: RoboJacksonError) -> Facts:
+    """What the catalogue says of a choice of which no motion could be made."""
+    reason = f"no motion could be made of it: {reason_of(cause)}"
+    reason = clean_text(reason, REASON_LENGTH)
+    return {"decision": "failed", "reason": reason, "decided_at": datetime.now(UTC)}
+
+
+def _video(chosen: Entry | None, reigning: Facts | None, settings: FindConfig) -> Artifact:
     """The file to dance: of the new choice, or of the video that still reigns."""
-    if found.chosen:
-        return in_good_quality(found.chosen, settings)
+    if chosen:
+        return in_good_quality(chosen, settings)
     assert reigning
     candidate = VideoCandidate(
         video_id=reigning["video_id"],

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 BUNDLED = Path(__file__).parent.parent / "clips"
 DEFAULT = "hip_shake.mp4"
+LONGEST = 1000
+"""Of a path or a name, bytes."""
 
 
 def resolve(source: str | None) -> Path:
@@ -26,6 +28,7 @@ def resolve(source: str | None) -> Path:
     """
     if source is None:
         return bundled(DEFAULT)
+    _require_words(source)
     path = Path(source)
     if path.exists():
         return path
@@ -38,9 +41,19 @@ def resolve(source: str | None) -> Path:
 
 def is_name(source: str | None) -> bool:
     """Whether a SOURCE is the name of a dance: no path, and nothing that looks like one."""
-    if source is None or Path(source).exists():
+    if source is None:
+        return False
+    _require_words(source)
+    if Path(source).exists():
         return False
     return os.sep not in source and Path(source).suffix.lower() not in SUFFIXES
+
+
+def _require_words(source: str) -> None:
+    if not source.strip():
+        raise UnreadableVideo("SOURCE is empty: give a video, a folder or the name of a dance")
+    if len(source.encode(errors="replace")) > LONGEST:
+        raise UnreadableVideo(f"{source[:40]}...: too long for a path or the name of a dance")
 
 
 def settle(config: str, overrides: Mapping[str, Any]) -> "PipelineConfig":

@@ -104,6 +104,7 @@ def query(store: Store, sql: str, given: Mapping[str, Any] | None = None) -> lis
         try:
             connection.execute(sql, dict(given or {}))
             names = [column[0] for column in connection.description or ()]
+            tables.require_distinct(names)
             return [
                 dict(zip(names, map(_in_utc, row), strict=True)) for row in connection.fetchall()
             ]
@@ -127,19 +128,41 @@ def compact(store: Store, least: int = COMPACT_FROM) -> Artifact | None:
     return made
 
 
-def champion(store: Store, dance: str) -> dict[str, Any] | None:
-    """The judgement of the video that was chosen last for a dance, if its file is still there."""
-    found = [row for row in records(store, dance) if row["decision"] == "chosen"]
-    for row in reversed(found):
-        if row["video_key"] and store.exists(row["video_key"]):
+def champion(store: Store, dance: str, kind: str = "") -> dict[str, Any] | None:
+    """The judgement of the video that was chosen last for a dance, if its file is still there and
+    it has not failed since.
+
+    Args:
+        kind: Beginning of the ids of the runs that count, such as `refresh`.
+    """
+    gone: set[tuple[str, str]] = set()
+    for row in reversed(_of(store, dance, kind)):
+        if row["decision"] == "failed":
+            gone.add(_key_of(row))
+        is_chosen = row["decision"] == "chosen" and _key_of(row) not in gone
+        if is_chosen and row["video_key"] and store.exists(row["video_key"]):
             return row
     return None
 
 
-def known(store: Store, dance: str) -> set[tuple[str, str]]:
+def known(store: Store, dance: str, kind: str = "") -> set[tuple[str, str]]:
     """Source and id of every video that was judged for a dance; a failed one may be tried again."""
-    found = records(store, dance)
-    return {(row["source"], row["video_id"]) for row in found if row["decision"] != "failed"}
+    found = _of(store, dance, kind)
+    return {_key_of(row) for row in found if row["decision"] != "failed"}
+
+
+def failed(store: Store, dance: str, kind: str = "") -> set[tuple[str, str]]:
+    """Source and id of every video that could never be judged for a dance."""
+    found = _of(store, dance, kind)
+    return {_key_of(row) for row in found} - known(store, dance, kind)
+
+
+def _of(store: Store, dance: str, kind: str) -> list[dict[str, Any]]:
+    return [row for row in records(store, dance) if row["run_id"].startswith(kind)]
+
+
+def _key_of(row: Row) -> tuple[str, str]:
+    return row["source"], row["video_id"]
 
 
 def _write(store: Store, kind: str, rows: Sequence[Row]) -> Artifact:

@@ -135,6 +135,7 @@ def opened(
             try:
                 connection.execute(sql, dict(given or {}))
                 names = [column[0] for column in connection.description or ()]
+                tables.require_distinct(names)
                 return [dict(zip(names, row, strict=True)) for row in connection.fetchall()]
             except duckdb.Error as cause:
                 raise BadTable(f"metrics: {' '.join(str(cause).split())}") from cause

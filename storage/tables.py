@@ -233,3 +233,9 @@ def _from_bytes(data: bytes, where: str) -> pa.Table:
     except (pa.ArrowInvalid, OSError) as cause:
         reason = " ".join(str(cause).split())[:120]
         raise BadTable(f"{where}: not a Parquet file ({reason})") from cause
+
+
+def require_distinct(names: Sequence[str]) -> None:
+    """Raise `BadTable` for an answer with two columns of one name: rows by name would lose one."""
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise BadTable(f"two columns are called {', '.join(twice)}: name them with AS")

@@ -7,6 +7,7 @@ import numpy as np
 
 from configs.study import Study
 from robojackson.metrics import study as statistics
+from robojackson.rl.evaluate_config import TRAINED, VARIANTS
 from storage.metrics import Ask
 
 INTERVALS = 40
@@ -74,7 +75,8 @@ def of_judgement(ask: Ask, study: Study) -> Figures:
 def of_baselines(ask: Ask, study: Study) -> dict[str, dict[str, dict[str, float]]]:
     """By move and policy that learnt nothing: the same figures."""
     sql = f"SELECT move, policy, {_means(ask)} FROM evaluations WHERE study = $study "
-    rows = ask(f"{sql} AND policy <> 'trained' GROUP BY ALL ORDER BY ALL", {"study": study.name})
+    given = {"study": study.name, "taught": [TRAINED, *VARIANTS]}
+    rows = ask(f"{sql} AND policy NOT IN $taught GROUP BY ALL ORDER BY ALL", given)
     found: dict[str, dict[str, dict[str, float]]] = {move: {} for move in study.moves}
     for row in rows:
         known = {name: float(row[name]) for name in JUDGED if row[name] is not None}

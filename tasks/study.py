@@ -24,7 +24,7 @@ from storage import metrics
 from storage.artifact import Artifact
 from storage.store import Store
 from tasks.caching import stage
-from tasks.digest import drawn_by
+from tasks.digest import digest, drawn_by
 from tasks.results import (
     JUDGED,
     Figures,
@@ -43,7 +43,11 @@ PRIMARY = "return_own"
 """The figure that the claims are about, chosen before any run (docs/ablation.md)."""
 
 
-@stage(models=lambda parameters: drawn_by(__name__, TEMPLATES))
+def _models(parameters: Mapping[str, Any]) -> list[str]:
+    return [*drawn_by(__name__, TEMPLATES), digest(("storage.metrics",), "storage")]
+
+
+@stage(models=_models)
 def results_page(
     study: Study,
     moves: dict[str, Move],

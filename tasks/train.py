@@ -52,13 +52,14 @@ class RunLabels:
 
 
 def _models(parameters: Mapping[str, Any]) -> list[str]:
-    """Of the networks to start from; and whether the clock cuts it short: with more time the same
-    call then trains for all of its budget.
+    """Of the networks to start from; and whether the clock cuts it short, to how many tenths: with
+    more time the same call then trains for longer.
     """
     config = parameters["config"]
     granted = _minutes(config, parameters.get("deadline"))
-    is_cut = config.minutes is not None and granted < WHOLE * config.minutes
-    return [*_start(config), *(["cut short"] if is_cut else [])]
+    if config.minutes is None or granted is None or granted >= WHOLE * config.minutes:
+        return _start(config)
+    return [*_start(config), f"cut short to {math.floor(10 * granted / config.minutes)} tenths"]
 
 
 @stage(models=_models, reaches=CODE, unkeyed=("labels", "deadline", "limit_s"))

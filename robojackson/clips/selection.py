@@ -41,8 +41,12 @@ def select(
     found: Sequence[VideoCandidate],
     known: Collection[tuple[str, str]],
     config: SelectionConfig,
+    failed: Collection[tuple[str, str]] = (),
 ) -> Selection:
     """The videos to download: no long ones, no live streams, each once, the most watched first.
+
+    One that failed before waits until there is no other: or a few that always fail would take all
+    places every night.
 
     A video whose length the source does not tell is kept: the downloaded file will tell.
 
@@ -50,6 +54,7 @@ def select(
         found: In the order of the search, which breaks ties of the view count.
         known: Keys of videos that were judged before.
         config: Limits.
+        failed: Keys of videos that could not be had or judged before.
     """
     fit: list[VideoCandidate] = []
     dropped: list[tuple[VideoCandidate, str]] = []
@@ -61,9 +66,13 @@ def select(
             dropped.append((candidate, reason))
         else:
             fit.append(candidate)
-    ordered = sorted(fit, key=lambda c: -1 if c.view_count is None else c.view_count, reverse=True)
+    ordered = sorted(fit, key=lambda c: (c.key in failed, -_views(c)))
     spare = [(c, f"not among the {config.top} most watched") for c in ordered[config.top :]]
     return Selection(tuple(ordered[: config.top]), (*dropped, *spare))
+
+
+def _views(candidate: VideoCandidate) -> int:
+    return -1 if candidate.view_count is None else candidate.view_count
 
 
 def _reason(

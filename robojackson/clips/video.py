@@ -84,7 +84,8 @@ def list_videos(source: Path) -> tuple[Path, ...]:
         return (source,)
     if not source.is_dir():
         raise UnreadableVideo(f"{source}: no such file or folder")
-    found = tuple(p for p in sorted(source.iterdir()) if p.suffix.lower() in SUFFIXES)
+    there = (path for path in sorted(source.iterdir()) if path.is_file())
+    found = tuple(path for path in there if path.suffix.lower() in SUFFIXES)
     if not found:
         raise UnreadableVideo(f"{source}: the folder holds no video ({', '.join(SUFFIXES)})")
     return found

@@ -1,8 +1,8 @@
 """Every number of training and evaluation, with its unit. A setup file holds only what differs."""
 
 from collections.abc import Mapping
-from dataclasses import replace
-from typing import Any, Literal
+from dataclasses import field, replace
+from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass
@@ -209,9 +209,9 @@ class TrainConfig:
     start: str = Field(default="scratch", min_length=1)
     start_critics: bool = True
     curiosity: Curiosity = "off"
-    checkpoint_seconds: float = Field(default=60.0, gt=0)
-    progress_seconds: float = Field(default=5.0, gt=0)
-    tensorboard: bool = False
+    checkpoint_seconds: Annotated[float, Field(gt=0)] = field(default=60.0, compare=False)
+    progress_seconds: Annotated[float, Field(gt=0)] = field(default=5.0, compare=False)
+    tensorboard: bool = field(default=False, compare=False)
     track: TrackConfig = Field(default_factory=TrackConfig)
     paper: PaperConfig = Field(default_factory=PaperConfig)
     tqc: TqcConfig = Field(default_factory=TqcConfig)

@@ -27,6 +27,7 @@ from robojackson.rl.config import (
     TrackConfig,
 )
 from robojackson.rl.drivers import control_of, drivers, fact, mode_of
+from robojackson.rl.evaluate_config import TRAINED, VARIANTS
 from robojackson.rl.judge import Judge
 from robojackson.rl.meter import Meter, yardstick
 from robojackson.rl.paper_mode import facing_ahead
@@ -94,10 +95,10 @@ def evaluate(
         judged = [judge.row(name, label, done, i) for i, label in enumerate(labels)]
         rows += judged
         summaries[name] = summarise(judged)
-        if name == "trained":
+        if name == TRAINED:
             qpos = _shown(done, starts)
-    own = summaries.pop("trained")
-    variants = {"hold": summaries.pop("hold")} if "hold" in summaries else {}
+    own = summaries.pop(TRAINED)
+    variants = {name: summaries.pop(name) for name in VARIANTS if name in summaries}
     reward = reward_report(robot, reference, environment, own, float(horizon.mean()))
     told = {"variants": variants, "baselines": summaries, "reward": reward}
     return Evaluation({**own, **told}, rows, qpos)

@@ -3,6 +3,9 @@
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
+TRAINED, VARIANTS = "trained", ("hold",)
+"""What tables call the trained policy, and the same under another law of its torque."""
+
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
 class EvaluateConfig:

@@ -145,6 +145,13 @@ def test_folder_lists_its_videos_by_name(write_video, tmp_path: Path) -> None:
     assert list_videos(tmp_path) == (first, second)
 
 
+def test_what_is_no_file_in_a_folder_is_left_out(write_video, tmp_path: Path) -> None:
+    good = write_video("b.mp4", frames=2)
+    (tmp_path / "a.mp4").symlink_to(tmp_path / "gone.mp4")
+    (tmp_path / "c.mp4").mkdir()
+    assert list_videos(tmp_path) == (good,)
+
+
 def test_folder_without_videos_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UnreadableVideo, match="holds no video"):
         list_videos(tmp_path)

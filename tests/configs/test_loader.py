@@ -202,3 +202,16 @@ def test_numbers_with_which_nothing_would_be_learnt_are_refused(
 def test_numbers_that_no_stage_can_use_are_refused(key: str, value: float) -> None:
     with pytest.raises(BadConfiguration, match=key.rpartition(".")[2]):
         loader.load(PipelineConfig, None, {key: value})
+
+
+@pytest.mark.parametrize(
+    ("text", "seed"), [("010", 10), ("0o10", 8), ("0x10", 16), ("+7", 7), ("1000", 1000)]
+)
+def test_whole_numbers_are_those_of_yaml_1_2(text: str, seed: int) -> None:
+    assert loader.load(Outer, None, {"seed": text}).seed == seed
+
+
+@pytest.mark.parametrize("text", ["1:30", "2024-13-45", "{[1]: 2}", "9" * 5000, "[" * 3000])
+def test_what_is_no_value_is_told_with_its_key(text: str) -> None:
+    with pytest.raises(BadConfiguration, match="seed"):
+        loader.load(Outer, None, {"seed": text})

@@ -1,6 +1,7 @@
 """The whole flow on a real clip, as short as it can be: it makes everything, and only once."""
 
 import asyncio
+import logging
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -20,7 +21,7 @@ from configs.loader import load
 from configs.pipeline import PipelineConfig
 from flows import dance as stages
 from flows.dance import Candidate, choose, dance, score_all
-from flows.source import resolve
+from flows.source import is_name, resolve
 from robojackson.clips.stability import Stability
 from robojackson.errors import NoPersonFound, RejectedReference, UnreadableVideo
 from storage import catalogue, tables
@@ -216,6 +217,29 @@ def test_a_person_who_is_not_there_is_one_line(short_clip: Path, tmp_path: Path)
 
 def test_without_a_source_the_hip_shake_is_danced() -> None:
     assert resolve(None).name == "hip_shake.mp4"
+
+
+@pytest.mark.parametrize("source", ["", "  ", "x" * 1001])
+def test_a_source_without_words_or_with_too_many_is_refused(source: str) -> None:
+    for look in (is_name, resolve):
+        with pytest.raises(UnreadableVideo, match=r"SOURCE is empty|too long"):
+            look(source)
+
+
+def test_a_training_that_says_its_processor_time_gets_no_clock() -> None:
+    told = stages._budgeted(load(PipelineConfig, "base", {"train.cpu_minutes": 60}))
+    assert (told.minutes, told.cpu_minutes) == (None, 60)
+
+
+def test_files_that_cannot_be_read_are_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stages, "get_run_logger", lambda: logging.getLogger("dance"))
+    good, gone = tmp_path / "b.mp4", tmp_path / "a.mp4"
+    good.write_bytes(b"x")
+    assert stages._there([gone, good])[0] == (good,)
+    with pytest.raises(UnreadableVideo, match=r"a\.mp4: cannot be read \(No such file"):
+        stages._there([gone])
 
 
 @pytest.mark.parametrize("source", ["gone.mp4", "no/such/thing", "moonwalk"])

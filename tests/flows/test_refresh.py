@@ -2,8 +2,10 @@
 
 import asyncio
 import json
+import logging
 from collections.abc import Iterator
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +20,15 @@ from prefect.settings import (
     temporary_settings,
 )
 
+from configs.dances import Dance
+from flows import refresh as nightly
+from flows.entries import Entry, Hunt, rows
 from flows.refresh import refresh
-from robojackson.errors import SearchFailed
+from robojackson.clips.candidate import VideoCandidate
+from robojackson.clips.selection import Selection
+from robojackson.errors import SearchFailed, TrackTooShort
 from storage import candidates
+from storage.artifact import Artifact
 from storage.store import Store
 from tests.search.server import Web, serving
 
@@ -164,3 +172,56 @@ def test_a_dance_that_is_not_due_waits(nights: Nights) -> None:
 def test_every_dance_failing_is_a_failed_run(nights: Nights) -> None:
     with pytest.raises(SearchFailed, match=r"Nowhere: .*404"):
         nights.again(["Nowhere"])
+
+
+def test_a_choice_of_which_no_motion_can_be_made_leaves_the_one_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = Store(tmp_path)
+    kept, now = store.keep("video", "clip.mp4", b"x"), datetime.now(UTC)
+    row = {
+        "dance": "APT",
+        "source": "site",
+        "url": "http://host/v",
+        "retrieved_at": datetime.now(UTC),
+    }
+    row |= {"title": "", "query": "", "video_key": kept.key, "video_sha256": kept.sha256}
+    old = {**row, "video_id": "old", "run_id": "refresh-1", "decided_at": now}
+    candidates.append(store, [{**old, "decision": "chosen", "stability_score": 1.0}])
+    candidate = VideoCandidate(
+        "new", "http://host/new", "", "", "site", retrieved_at=datetime.now(UTC)
+    )
+
+    def hunt(dance: Dance, *rest: object) -> Hunt:
+        entry = Entry(candidate, "chosen", video=kept)
+        made = Hunt(dance, "refresh-2", (entry,), Selection((candidate,), ()))
+        candidates.append(store, rows(made))
+        return made
+
+    def motion(store: Store, video: Artifact, settings: object) -> dict[str, Any]:
+        if video.key == "new":
+            raise TrackTooShort("1 frame")
+        return {"reference": video.key}
+
+    async def show(*told: object) -> None:
+        return None
+
+    monkeypatch.setenv("ROBOJACKSON_STORE", str(tmp_path))
+    for name, stand_in in {
+        "hunt": hunt, "motion": motion, "show": show,
+        "in_good_quality": lambda *given: Artifact("new", "0" * 64),
+        "of_candidate": lambda *given: Artifact("old", "0" * 64),
+        "get_run_logger": lambda: logging.getLogger("refresh"),
+    }.items():  # fmt: skip
+        monkeypatch.setattr(nightly, name, stand_in)
+    given = ({"name": "APT", "query": "APT"}, {}, "smoke", {})
+    result = asyncio.run(nightly.refresh_dance.fn("APT", *given))
+    assert (result["chosen"]["video_id"], result["is_new"], result["reference"]) == (
+        "old",
+        False,
+        "old",
+    )
+    reigning = candidates.champion(store, "APT")
+    assert reigning is not None
+    assert reigning["video_id"] == "old"
+    assert ("site", "new") in candidates.known(store, "APT")

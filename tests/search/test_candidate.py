@@ -149,3 +149,10 @@ def test_ties_keep_the_order_of_the_search() -> None:
         "v2",
         "v3",
     ]
+
+
+def test_videos_that_failed_before_take_the_places_that_are_left() -> None:
+    found = [one(video_id=f"v{i}", view_count=100 - i) for i in range(8)]
+    failed = {("youtube", f"v{i}") for i in range(5)}
+    left = select(found, (), SelectionConfig(), failed)
+    assert [c.video_id for c in left.kept] == ["v5", "v6", "v7", "v0", "v1"]

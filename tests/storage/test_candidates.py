@@ -173,3 +173,39 @@ def test_a_video_whose_file_is_gone_does_not_reign(store: Store) -> None:
 def test_a_video_that_failed_may_be_tried_again(store: Store) -> None:
     candidates.append(store, [row("bad", decision="failed"), row("seen", decision="rejected")])
     assert candidates.known(store, "APT") == {("youtube", "seen")}
+
+
+def test_a_choice_that_failed_since_does_not_reign(store: Store) -> None:
+    kept = store.keep("video", "clip.mp4", b"x")
+    chosen = {"decision": "chosen", "video_key": kept.key, "video_sha256": kept.sha256}
+    for hour, name in enumerate(("first", "second")):
+        candidates.append(store, [row(name, decided_at=NOW + timedelta(hours=hour), **chosen)])
+    late = NOW + timedelta(hours=2)
+    candidates.append(store, [row("second", decision="failed", decided_at=late)])
+    reigning = candidates.champion(store, "APT")
+    assert reigning is not None
+    assert reigning["video_id"] == "first"
+    assert candidates.known(store, "APT") == {("youtube", "first"), ("youtube", "second")}
+
+
+def test_what_a_person_looked_for_is_nothing_to_the_nightly_runs(store: Store) -> None:
+    kept = store.keep("video", "clip.mp4", b"x")
+    chosen = {"decision": "chosen", "video_key": kept.key, "video_sha256": kept.sha256}
+    candidates.append(store, [row("steady", run_id="refresh-1", **chosen)])
+    later = NOW + timedelta(hours=1)
+    candidates.append(store, [row("shaky", run_id="find-1", decided_at=later, **chosen)])
+    reigning = candidates.champion(store, "APT", "refresh")
+    assert reigning is not None
+    assert reigning["video_id"] == "steady"
+    assert candidates.known(store, "APT", "refresh") == {("youtube", "steady")}
+
+
+def test_a_video_that_could_never_be_judged_is_told(store: Store) -> None:
+    candidates.append(store, [row("bad", decision="failed"), row("seen", decision="failed")])
+    candidates.append(store, [row("seen", decision="rejected", decided_at=NOW)])
+    assert candidates.failed(store, "APT") == {("youtube", "bad")}
+
+
+def test_columns_of_one_name_are_refused(store: Store) -> None:
+    with pytest.raises(BadTable, match="two columns are called a: name them with AS"):
+        candidates.query(store, "SELECT 1 AS a, 2 AS a")

@@ -4,7 +4,6 @@ import asyncio
 import importlib
 import shutil
 import sys
-import time
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -230,10 +229,19 @@ def test_the_weights_of_the_temporal_network_are_part_of_the_key(tmp_path: Path)
     assert keys[0] != keys[1]
 
 
-def test_a_training_that_the_clock_cuts_short_has_another_key() -> None:
-    config, now = TrainConfig(minutes=9.0), time.time()
-    whole, cut = (train._models({"config": config, "deadline": now + 60 * m}) for m in (9.0, 2.0))
-    assert (whole, cut) == (train._models({"config": config}), [*whole, "cut short"])
+def test_a_training_that_the_clock_cuts_short_has_another_key(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(train.time, "time", lambda: 0.0)
+    config = TrainConfig(minutes=20.0)
+    half, one, nine, most, whole, more = (
+        train._models({"config": config, "deadline": 60.0 * minutes})
+        for minutes in (0.5, 1.0, 9.0, 17.9, 18.5, 30.0)
+    )
+    assert whole == more == train._models({"config": config})
+    cut = [[*whole, f"cut short to {tenths} tenths"] for tenths in (0, 4, 8)]
+    assert [half, nine, most] == cut
+    assert half == one
 
 
 def test_the_place_of_an_artifact_is_not_part_of_the_key() -> None:

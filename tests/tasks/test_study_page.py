@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from prefect import flow
+from pydantic import ValidationError
 
 from configs.loader import load
 from configs.study import Move, Study
@@ -40,6 +41,7 @@ def publish(store: Store, move: str, setup: str, seed: int) -> None:
         for i, s in enumerate(share)
     ]  # fmt: skip
     rows = [rollout(names, "trained", WORTH[setup] + 0.01 * seed), rollout(names, "statue", 0.5)]
+    rows.append(rollout(names, "hold", 0.4))
     rows.append({**rows[1], "phase": -1, "survived_s": 0.9})
     given = {
         "episodes": store.keep("t", "e.parquet", tables.encode_rows(EPISODE_RECORD, episodes)),
@@ -178,3 +180,8 @@ def test_the_page_is_drawn_again_only_when_the_rows_change(
     publish(Store(store_folder), "walk", "scratch", 1)
     page()
     assert drawn == ["known"] * 2
+
+
+def test_a_key_of_a_move_that_is_no_part_of_its_motion_is_refused() -> None:
+    with pytest.raises(ValidationError, match=r"overrides\.evaluate\.seconds: is no part"):
+        Move(clip="clips/walk.mp4", overrides={"evaluate.seconds": 3})
