@@ -32,7 +32,7 @@ from flows.hunt import hunt
 from flows.launch import launch
 from robojackson.clips.candidate import VideoCandidate
 from robojackson.clips.titles import clean_text
-from robojackson.errors import NoPersonFound, RoboJacksonError, SearchFailed
+from robojackson.errors import BadConfiguration, NoPersonFound, RoboJacksonError, SearchFailed
 from robojackson.retarget.robot import RobotDescription
 from storage import candidates
 from storage.artifact import Artifact
@@ -69,6 +69,7 @@ async def refresh(
         pipeline: Name or path of the configuration of the stages after it.
         pipeline_overrides: Of that, values by key path.
     Raises:
+        BadConfiguration: two dances of the book have the same letters and digits.
         SearchFailed: every dance failed; the message has the reasons.
     """
     sweep(Store.from_environment(), work=False)
@@ -76,7 +77,7 @@ async def refresh(
     stages = [pipeline, pipeline_overrides or {}]
     done: dict[str, Facts] = {}
     failed: dict[str, str] = {}
-    picked = load(DanceBook, book).pick(dances)
+    picked = _told_apart(load(DanceBook, book)).pick(dances)
     due = [dance for dance in picked if dances is not None or _is_due(dance)]
     for dance in due:
         state = await refresh_dance(dance.name, asdict(dance), settings, *stages, return_state=True)
@@ -180,6 +181,18 @@ def _video(chosen: Entry | None, reigning: Facts | None, settings: FindConfig) -
     )
     scored = Artifact(key=reigning["video_key"], sha256=reigning["video_sha256"])
     return of_candidate(candidate, scored, settings)
+
+
+def _told_apart(book: DanceBook) -> DanceBook:
+    """The book, if no two dances would share what is noted of them."""
+    by_slug: dict[str, str] = {}
+    for dance in book.dances:
+        other = by_slug.setdefault(slug_of(dance.name), dance.name)
+        if other != dance.name:
+            raise BadConfiguration(
+                f"dances: {other!r} and {dance.name!r} have the same letters and digits; rename one"
+            )
+    return book
 
 
 def _is_due(dance: Dance) -> bool:

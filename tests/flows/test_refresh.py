@@ -20,13 +20,13 @@ from prefect.settings import (
     temporary_settings,
 )
 
-from configs.dances import Dance
+from configs.dances import Dance, DanceBook
 from flows import refresh as nightly
 from flows.entries import Entry, Hunt, rows
 from flows.refresh import refresh
 from robojackson.clips.candidate import VideoCandidate
 from robojackson.clips.selection import Selection
-from robojackson.errors import SearchFailed, TrackTooShort
+from robojackson.errors import BadConfiguration, SearchFailed, TrackTooShort
 from storage import candidates
 from storage.artifact import Artifact
 from storage.store import Store
@@ -225,3 +225,9 @@ def test_a_choice_of_which_no_motion_can_be_made_leaves_the_one_before(
     assert reigning is not None
     assert reigning["video_id"] == "old"
     assert ("site", "new") in candidates.known(store, "APT")
+
+
+def test_dances_that_would_share_their_notes_are_refused() -> None:
+    book = DanceBook((Dance(name="C", query="c"), Dance(name="C++", query="c plus plus")))
+    with pytest.raises(BadConfiguration, match="'C' and 'C\\+\\+' have the same letters"):
+        nightly._told_apart(book)
