@@ -6,7 +6,7 @@ the others; the result says which failed and why.
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
@@ -136,12 +136,12 @@ async def refresh_dance(
         if reigning is None:
             raise
         get_run_logger().warning("%s: %s; the one before is danced", wanted.name, cause)
-        found, chosen = replace(found, entries=found.entries[1:]), reigning
+        chosen = reigning
         made = motion(store, _video(None, reigning, settings), stages)
     return {
         "run_id": found.run_id,
         "judged": len(told),
-        "is_new": found.chosen is not None,
+        "is_new": chosen is not reigning,
         "chosen": {key: chosen[key] for key in ("video_id", "url", "title", "stability_score")},
         **made,
     }
@@ -162,8 +162,7 @@ def motion(store: Store, video: Artifact, settings: PipelineConfig) -> Facts:
 
 def _failed(cause: RoboJacksonError) -> Facts:
     """What the catalogue says of a choice of which no motion could be made."""
-    reason = f"no motion could be made of it: {reason_of(cause)}"
-    reason = clean_text(reason, REASON_LENGTH)
+    reason = clean_text(f"no motion could be made of it: {reason_of(cause)}", REASON_LENGTH)
     return {"decision": "failed", "reason": reason, "decided_at": datetime.now(UTC)}
 
 

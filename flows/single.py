@@ -144,15 +144,20 @@ def evaluate(
         verdict = judge(trained, motion, machine, settings.evaluate, progress)
     summary = console.plain(verdict.summary)
     if out is not None:
-        move, setup = safe_name(move_of(reference)), safe_name(trained.setup or settings.setup)
-        seed = trained.training["seed"]
-        common = {"run_id": f"{move}-{setup}-s{seed}", "move": move, "setup": setup}
+        setup = trained.setup or settings.setup
+        common = labels_of(move_of(reference), setup, trained.training["seed"])
         rows = [{**common, **trained.training, **row} for row in verdict.rows]
         with results_in(out) as store:
             store.put("evaluations.parquet", tables.encode_rows(EVALUATION_RECORD, rows))
             store.put("evaluation.json", json.dumps(summary, indent=1).encode())
             store.put("rollout.parquet", tables.encode(Rollout(motion.dt, verdict.rollout_qpos)))
     return {"policy": str(policy), "reference": str(reference), **summary}
+
+
+def labels_of(move: str, setup: str, seed: int | None) -> Figures:
+    """The columns by which episodes and evaluations of a run are joined."""
+    move, setup = safe_name(move), safe_name(setup)
+    return {"run_id": f"{move}-{setup}-s{seed}", "move": move, "setup": setup, "seed": seed}
 
 
 def move_of(reference: Path) -> str:

@@ -21,7 +21,6 @@ from typing import TYPE_CHECKING, Any
 
 from configs.loader import load
 from flows import console, single
-from storage.catalogue import safe_name
 from storage.lock import locked
 from storage.records import RecordLog
 from storage.schemas import EPISODE_RECORD
@@ -228,6 +227,5 @@ def _budgeted(config: "TrainConfig") -> "TrainConfig":
 
 def _common(config: "TrainConfig", move: str, setup: str | None, run_id: str) -> dict[str, Any]:
     usual = SETUPS[config.start != "scratch", config.curiosity != "off"]
-    move, name = safe_name(move), safe_name(Path(setup).stem if setup else usual)
-    labels = {"run_id": run_id or f"{move}-{name}-s{config.seed}", "move": move, "setup": name}
-    return {**labels, "seed": config.seed}
+    labels = single.labels_of(move, Path(setup).stem if setup else usual, config.seed)
+    return labels | ({"run_id": run_id} if run_id else {})

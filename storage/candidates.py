@@ -147,18 +147,21 @@ def champion(store: Store, dance: str, kind: str = "") -> dict[str, Any] | None:
 
 def known(store: Store, dance: str, kind: str = "") -> set[tuple[str, str]]:
     """Source and id of every video that was judged for a dance; a failed one may be tried again."""
-    found = _of(store, dance, kind)
-    return {_key_of(row) for row in found if row["decision"] != "failed"}
+    return _judged(_of(store, dance, kind))
 
 
 def failed(store: Store, dance: str, kind: str = "") -> set[tuple[str, str]]:
     """Source and id of every video that could never be judged for a dance."""
     found = _of(store, dance, kind)
-    return {_key_of(row) for row in found} - known(store, dance, kind)
+    return {_key_of(row) for row in found} - _judged(found)
 
 
 def _of(store: Store, dance: str, kind: str) -> list[dict[str, Any]]:
     return [row for row in records(store, dance) if row["run_id"].startswith(kind)]
+
+
+def _judged(found: Iterable[Row]) -> set[tuple[str, str]]:
+    return {_key_of(row) for row in found if row["decision"] != "failed"}
 
 
 def _key_of(row: Row) -> tuple[str, str]:

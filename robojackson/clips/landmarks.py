@@ -127,15 +127,15 @@ def video_landmarker(size: str) -> Iterator[Callable[[np.ndarray, float], np.nda
     """
     require_graphics()
     with _landmarker(model_path(size)) as landmarker:
-        quiet_first = [True]
         last_ms = -1
 
         def look(image: np.ndarray, time_s: float) -> np.ndarray:
             import mediapipe
 
             nonlocal last_ms
+            is_first = last_ms < 0
             last_ms = max(round(time_s * 1000.0), last_ms + 1)  # MediaPipe's time must rise
-            with _quiet_stderr(enabled=quiet_first.pop() if quiet_first else False):
+            with _quiet_stderr(enabled=is_first):
                 rows = np.ascontiguousarray(image)  # padded rows would be read askew, silently
                 picture = mediapipe.Image(image_format=mediapipe.ImageFormat.SRGB, data=rows)
                 result = landmarker.detect_for_video(picture, last_ms)

@@ -4,6 +4,7 @@ The actor of the last round is one draw around what was learnt; its mean over th
 the reference more closely at no cost (Polyak & Juditsky, 1992).
 """
 
+from copy import deepcopy
 from pathlib import Path
 
 import numpy as np
@@ -33,7 +34,7 @@ class ActorAverage:
         self._count, self._seen = self._count + 1, updates
         fresh = max(1 - self._past, 1 / self._count)
         if self._count == 1:
-            self._mean = _copied(layers)
+            self._mean = deepcopy(layers)
             return
         for old, new in zip(self._mean, layers, strict=True):
             for kept, array in zip(old, new, strict=True):
@@ -41,8 +42,7 @@ class ActorAverage:
 
     def layers(self, newest: Layers, updates: int) -> Layers:
         """The mean with the newest actor in it, which stays out of the mean that goes on."""
-        whole = ActorAverage(self._past)
-        whole._count, whole._seen, whole._mean = self._count, self._seen, _copied(self._mean)
+        whole = deepcopy(self)
         whole.add(newest, updates)
         return whole._mean if whole._count else newest
 
@@ -63,7 +63,3 @@ class ActorAverage:
             self._seen = int(arrays["seen"])
             pairs = len(arrays.files) // 2 - 1
             self._mean = tuple((arrays[f"{i}w"], arrays[f"{i}b"]) for i in range(pairs))
-
-
-def _copied(layers: Layers) -> Layers:
-    return tuple((weight.copy(), bias.copy()) for weight, bias in layers)
