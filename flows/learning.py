@@ -20,8 +20,8 @@ from flows.options import (
     SetTrain,
     Trainer,
     TrainMinutes,
+    a_folder,
     chosen,
-    no_file,
 )
 
 Parent = Annotated[int, typer.Option(hidden=True, help="End with this process.")]
@@ -94,7 +94,10 @@ def evaluate(
     reference: Annotated[Path, typer.Argument(help="The reference.parquet it was trained on.")],
     seconds: Annotated[float | None, typer.Option(min=0.1, help="Length of a rollout, s.")] = None,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", callback=no_file, help="Folder for the tables.")
+        Path | None,
+        typer.Option(
+            "-o", "--out", parser=a_folder, metavar="<path>", help="Folder for the tables."
+        ),
     ] = None,
     config: Config = "base",
     parent: Parent = 0,

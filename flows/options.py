@@ -22,20 +22,25 @@ SetStudy = Annotated[list[str] | None, _set("mode=track")]
 Force = Annotated[bool, typer.Option("--force", help="Go on with a motion that the gate refuses.")]
 
 
-def no_file(out: Path | None) -> Path | None:
+def a_folder(text: str) -> Path:
     """A folder, or what may become one.
 
     Raises:
-        BadParameter: it, or what it should be in, is a file.
+        BadParameter: it is empty, as where a shell's variable is not set; it, or what it should
+            be in, is a file.
     """
-    found = next((p for p in (out, *out.parents) if p.is_file()), None) if out else None
+    if not text:
+        raise typer.BadParameter("no folder is named; `.` is the current one")
+    out = Path(text)
+    found = next((p for p in (out, *out.parents) if p.is_file()), None)
     if found is not None:
         raise typer.BadParameter(f"{found} is a file; a folder is wanted")
     return out
 
 
 Folder = Annotated[
-    Path, typer.Option("-o", "--out", callback=no_file, help="Folder for the results.")
+    Path,
+    typer.Option("-o", "--out", parser=a_folder, metavar="<path>", help="Folder for the results."),
 ]
 Weights = Annotated[
     Path | None, typer.Option(help="Published weights that you bring (docs/official_weights.md).")

@@ -1,9 +1,19 @@
-"""Names, units and meaning of the figures that the page shows."""
+"""Names, units and meaning of what the page and its plots show."""
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
+
+POLICY_TITLES: Mapping[str, tuple[str, str]] = {
+    "trained": ("trained robot", ""),
+    "hold": ("torque held", "the trained robot with its torque held for a whole control step"),
+    "statue": ("statue", "holds the pose it starts in"),
+    "mean_pose": ("mean pose", "holds the mean pose of the dance"),
+    "zero_residual": ("zero residual", "the reference's angles as targets, nothing learnt"),
+    "random": ("random", "random corrections to the reference's angles"),
+}
+"""What a policy of the tables is called, and what it does."""
 
 
 @dataclass(frozen=True)

@@ -13,20 +13,12 @@ from typing import Any
 
 import jinja2
 
-from robojackson.report.facts import Fact, facts, written
+from robojackson.report.facts import POLICY_TITLES, Fact, facts, written
 
 VERDICT_COLUMNS = (
     "survived_s", "success", "strict_success", "skill", "site_error_m", "limb_gain", "drift_m",
     "heading_error_deg",
 )  # fmt: skip
-POLICY_TITLES: Mapping[str, tuple[str, str]] = {
-    "trained": ("trained robot", ""),
-    "hold": ("torque held", "the trained robot with its torque held for a whole control step"),
-    "statue": ("statue", "holds the pose it starts in"),
-    "mean_pose": ("mean pose", "holds the mean pose of the dance"),
-    "zero_residual": ("zero residual", "the reference's angles as targets, nothing learnt"),
-    "random": ("random", "random corrections to the reference's angles"),
-}
 SCORECARD_LINES = (
     "seconds", "cyclic", "keypoint_mm", "keypoint_p95_mm", "keypoint_leaned_mm", "lean_deg",
     "bone_deg", "limit_violations",

@@ -18,16 +18,15 @@ from matplotlib.image import AxesImage
 
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.motion.smpl import CONTACT_POINTS, SmplSequence
-from robojackson.report.facts import decimal
+from robojackson.report.facts import POLICY_TITLES, decimal
+from robojackson.rl.evaluate_config import TRAINED, VARIANTS
 
 Row = Mapping[str, Any]
 INK = "#8a919c"
 ACCENT, SECOND, GOOD, WARM = "#3b82f6", "#f59e42", "#3fae6b", "#e0607e"
 BASELINE_COLOURS = {
     "statue": "#a78bfa", "mean_pose": "#e879b9", "zero_residual": GOOD, "random": "#9aa3b2",
-    "hold": WARM,
 }  # fmt: skip
-TRAINED = "trained"
 BINS = 60
 TRACKED_JOINTS = 6
 TORQUE_SHOWN = 2.0
@@ -53,19 +52,25 @@ def training_curve(episodes: Sequence[Row], dt: float) -> Figure:
 
 
 def survival_by_phase(rows: Sequence[Row], dt: float) -> Figure:
-    """Mean survival from each start phase, of the trained robot and of its baselines."""
+    """Mean survival from each start phase: the trained robot as bars, under another law of its
+    torque as a dashed line, its baselines as lines.
+    """
     figure, (axes,) = figure_of(7.0, 2.8)
     for policy in dict.fromkeys(str(row["policy"]) for row in rows):
         chosen = [row for row in rows if row["policy"] == policy and row["phase"] >= 0]
         phases = np.array(sorted({int(row["phase"]) for row in chosen}))
         mean = [np.mean([r["survived_s"] for r in chosen if r["phase"] == p]) for p in phases]
+        title = POLICY_TITLES.get(policy, (policy.replace("_", " "), ""))[0]
         if policy == TRAINED:
             width = 0.8 * dt * float(np.diff(phases).min()) if len(phases) > 1 else 0.1
             place = phases * dt
-            axes.bar(place, mean, width, align="edge", color=ACCENT, label="trained robot")
+            axes.bar(place, mean, width, align="edge", color=ACCENT, label=title)
+        elif policy in VARIANTS:
+            title = f"{POLICY_TITLES[TRAINED][0]}, {title}"
+            axes.plot(phases * dt, mean, ".--", lw=1, color=SECOND, label=title)
         else:
             colour = BASELINE_COLOURS.get(policy, INK)
-            axes.plot(phases * dt, mean, ".-", lw=1, color=colour, label=policy.replace("_", " "))
+            axes.plot(phases * dt, mean, ".-", lw=1, color=colour, label=title)
     axes.set_xlabel("start phase, s into the dance")
     axes.set_ylabel("survival, s")
     legend(axes)

@@ -167,6 +167,14 @@ def test_default_stand_is_no_phase(results: Results) -> None:
     assert len(axes.patches) == 3
 
 
+def test_the_policy_under_another_law_is_not_drawn_as_a_baseline(results: Results) -> None:
+    trained = list(results.evaluations)
+    others = [{**row, "policy": name} for name in ("hold", "statue") for row in trained]
+    axes = plots.survival_by_phase([*trained, *others], 0.015).axes[0]
+    styles = {str(line.get_label()): line.get_linestyle() for line in axes.lines}
+    assert styles == {"trained robot, torque held": "--", "statue": "-"}
+
+
 def test_training_curve_is_the_median() -> None:
     rows = [{"step": 10, "episode_length": n, "episode_return": 0.0} for n in (100, 200, 900)]
     line = plots.training_curve(rows, 0.01).axes[0].lines[0]
