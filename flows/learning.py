@@ -18,9 +18,9 @@ from flows.options import (
     Seed,
     Set,
     SetTrain,
+    TablesFolder,
     Trainer,
     TrainMinutes,
-    a_folder,
     chosen,
 )
 
@@ -93,12 +93,7 @@ def evaluate(
     policy: Annotated[Path, typer.Argument(help="policy.safetensors of `robojackson train`.")],
     reference: Annotated[Path, typer.Argument(help="The reference.parquet it was trained on.")],
     seconds: Annotated[float | None, typer.Option(min=0.1, help="Length of a rollout, s.")] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "-o", "--out", parser=a_folder, metavar="<path>", help="Folder for the tables."
-        ),
-    ] = None,
+    out: TablesFolder = None,
     config: Config = "base",
     parent: Parent = 0,
     set_: Set = None,

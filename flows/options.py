@@ -22,7 +22,7 @@ SetStudy = Annotated[list[str] | None, _set("mode=track")]
 Force = Annotated[bool, typer.Option("--force", help="Go on with a motion that the gate refuses.")]
 
 
-def a_folder(text: str) -> Path:
+def _folder(text: str) -> Path:
     """A folder, or what may become one.
 
     Raises:
@@ -38,10 +38,12 @@ def a_folder(text: str) -> Path:
     return out
 
 
-Folder = Annotated[
-    Path,
-    typer.Option("-o", "--out", parser=a_folder, metavar="<path>", help="Folder for the results."),
-]
+def _out(text: str) -> Any:
+    return typer.Option("-o", "--out", parser=_folder, metavar="<path>", help=text)
+
+
+Folder = Annotated[Path, _out("Folder for the results.")]
+TablesFolder = Annotated[Path | None, _out("Folder for the tables.")]
 Weights = Annotated[
     Path | None, typer.Option(help="Published weights that you bring (docs/official_weights.md).")
 ]

@@ -14,6 +14,7 @@ from typing import Any
 import jinja2
 
 from robojackson.report.facts import POLICY_TITLES, Fact, facts, written
+from robojackson.rl.evaluate_config import TRAINED
 
 VERDICT_COLUMNS = (
     "survived_s", "success", "strict_success", "skill", "site_error_m", "limb_gain", "drift_m",
@@ -154,12 +155,12 @@ def _tiles(evaluation: Mapping[str, Any]) -> list[Fact]:
 def _verdicts(evaluation: Mapping[str, Any]) -> list[_Verdict]:
     if not evaluation:
         return []
-    policies = {"trained": evaluation, **evaluation.get("baselines", {})}
+    policies = {TRAINED: evaluation, **evaluation.get("baselines", {})}
     rows = []
     for name, figures in policies.items():
         title, meaning = POLICY_TITLES.get(name, (name, ""))
         values = [written(column, figures.get(column)) for column in VERDICT_COLUMNS]
-        rows.append(_Verdict(title, meaning, values, name == "trained"))
+        rows.append(_Verdict(title, meaning, values, name == TRAINED))
     return rows
 
 

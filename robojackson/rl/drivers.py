@@ -12,6 +12,7 @@ from robojackson.motion.reference import ReferenceMotion
 from robojackson.retarget.robot import Robot
 from robojackson.rl.clip import ClipStep
 from robojackson.rl.config import ControlConfig
+from robojackson.rl.evaluate_config import TRAINED
 from robojackson.rl.motors import Motors, residual_scale
 from robojackson.rl.observation import observation_size, observe
 from robojackson.rl.physics import Simulation
@@ -77,9 +78,9 @@ def drivers(
 ) -> dict[str, Driver]:
     """The policy, its variants and the baselines by name; each baseline follows the PD law."""
     control = control_of(policy, robot)
-    found = {"trained": _trained(policy, robot, control)}
+    found = {TRAINED: _trained(policy, robot, control)}
     if control.law == "pd":
-        found["hold"] = replace(found["trained"], control=replace(control, law="hold"))
+        found["hold"] = replace(found[TRAINED], control=replace(control, law="hold"))
     usual = control if control.law == "pd" else ControlConfig(substeps=control.substeps)
     return found | _baselines(reference, robot, usual, seed)
 
