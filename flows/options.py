@@ -27,12 +27,15 @@ def _folder(text: str) -> Path:
 
     Raises:
         BadParameter: it is empty, as where a shell's variable is not set; it, or what it should
-            be in, is a file.
+            be in, is a file; no place can have this name, or none that we may see.
     """
     if not text:
         raise typer.BadParameter("no folder is named; `.` is the current one")
     out = Path(text)
-    found = next((p for p in (out, *out.parents) if p.is_file()), None)
+    try:
+        found = next((p for p in (out, *out.parents) if p.is_file()), None)
+    except OSError as cause:
+        raise typer.BadParameter(f"no folder can be there: {cause.strerror}") from cause
     if found is not None:
         raise typer.BadParameter(f"{found} is a file; a folder is wanted")
     return out

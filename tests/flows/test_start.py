@@ -24,6 +24,7 @@ COMMAND = (sys.executable, "-m", "flows.cli")
         (["train", "reference.parquet", "-o", "there"], "there is a file; a folder is wanted"),
         (["mocap", "clip.mp4", "-o", "there/below"], "there is a file; a folder is wanted"),
         (["mocap", "clip.mp4", "-o", ""], "no folder is named"),
+        (["mocap", "clip.mp4", "-o", 300 * "a"], "no folder can be there: File name too long"),
     ],
 )
 def test_a_wrong_word_is_named_in_one_line(words: list[str], named: str, tmp_path: Path) -> None:
