@@ -178,9 +178,7 @@ def _server(folder: Path, workers: int) -> Iterator[Stack]:
         given = {n: v for n, v in stack.client().items() if n.startswith(ours)}
         os.environ.update(given | HEARTBEAT)  # without it the automation marks us as dead
         if not workers:
-            del os.environ["PREFECT_RESULTS_DEFAULT_STORAGE_BLOCK"]
             os.environ["ROBOJACKSON_STORE"] = str(folder / "store")
-            os.environ["PREFECT_LOCAL_STORAGE_PATH"] = str(folder / "records")
         yield stack
 
 

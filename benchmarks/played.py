@@ -67,7 +67,7 @@ def played(seconds: float, burn: bool, began: Callable[[], None] = lambda: None)
 def motionless() -> Iterator[None]:
     """Let the motions of a study be words: its cells play and look at none."""
 
-    def motion(move: Any, study: Any, trainings: Any) -> dict[str, Artifact]:
+    def motion(name: str, move: Any, study: Any, trainings: Any) -> dict[str, Artifact]:
         store = Store.from_environment()
         names = ("reference", "scorecard", "still")
         made = {name: store.keep("played", name, move.clip.encode()) for name in names}
@@ -80,7 +80,7 @@ def motionless() -> Iterator[None]:
         yield
 
 
-@flow(name="cell", flow_run_name="{cell.name}", persist_result=True)
+@flow(name="cell", flow_run_name="{cell.name}")
 async def pooled(cell: Cell) -> dict[str, Artifact]:
     """A cell on a worker that sleeps in place of learning."""
     with played(NAP_S, burn=False):

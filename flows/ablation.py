@@ -24,6 +24,7 @@ from flows.cells import EXECUTORS
 from flows.chain import to_reference
 from flows.launch import launch
 from flows.plan import training
+from flows.showing import show_study
 from flows.tracebacks import without_tracebacks
 from robojackson.errors import RejectedReference, StudyFailed
 from robojackson.retarget.robot import RobotDescription
@@ -33,6 +34,7 @@ from storage import metrics
 from storage.artifact import Artifact
 from storage.leftovers import sweep
 from storage.store import Store
+from tasks.caching import labelled
 from tasks.cell import Cell
 from tasks.payments import payments
 from tasks.probe import SourceFile, probe
@@ -71,7 +73,7 @@ async def ablation(study: Study) -> Facts:
     moves = {name: load(Move, f"moves/{name}") for name in study.moves}
     trainings: dict[str, TrainConfig] = {s: training(study, s) for s in study.setups}
     with SyncClientContext.get_or_create():  # one connection for all stages of all motions
-        motions = {name: motion(move, study, trainings) for name, move in moves.items()}
+        motions = {name: motion(name, move, study, trainings) for name, move in moves.items()}
     cells = cells_of(study, {n: made["reference"] for n, made in motions.items()}, trainings)
     gate(study, {name: made["scorecard"] for name, made in motions.items()})
     board = Board(study, cells)
@@ -92,26 +94,31 @@ async def ablation(study: Study) -> Facts:
     async with board.shown():
         results = await asyncio.gather(*(one(c) for c in cells), return_exceptions=True)
     outcomes = dict(zip((c.name for c in cells), results, strict=True))
-    return conclude(study, moves, outcomes, motions)
+    return await conclude(study, moves, outcomes, motions)
 
 
-def motion(move: Move, study: Study, trainings: Mapping[str, TrainConfig]) -> dict[str, Artifact]:
-    """What a move is trained on and shown with; every stage cached.
+def motion(
+    name: str, move: Move, study: Study, trainings: Mapping[str, TrainConfig]
+) -> dict[str, Artifact]:
+    """Make what a move is trained on and shown with; every stage cached.
 
+    Args:
+        name: Of the move; its task runs are named after it.
     Returns:
         `reference` and `scorecard`; `still`, its picture; `payments`, what the rewards of the
         setups pay to bodies that do not dance it.
     """
     settings = load(PipelineConfig, study.pipeline, move.overrides)
     robot = load(RobotDescription, f"robots/{study.robot}")
-    clip = probe(SourceFile.at(move.path), settings.video, None, None)
-    moved = to_reference(clip, robot, settings)
-    seen = (clip["video"], moved["landmarks"], moved["smpl"], moved["reference"])
     rewards = {setup: train.environment for setup, train in trainings.items()}
-    return {name: moved[name] for name in ("reference", "scorecard")} | {
-        "still": still(*seen, robot),
-        "payments": payments(moved["reference"], robot, rewards),
-    }
+    with labelled(name):
+        clip = probe(SourceFile.at(move.path), settings.video, None, None)
+        moved = to_reference(clip, robot, settings)
+        seen = (clip["video"], moved["landmarks"], moved["smpl"], moved["reference"])
+        return {name: moved[name] for name in ("reference", "scorecard")} | {
+            "still": still(*seen, robot),
+            "payments": payments(moved["reference"], robot, rewards),
+        }
 
 
 def gate(study: Study, scorecards: Mapping[str, Artifact]) -> None:
@@ -162,13 +169,13 @@ def cells_of(
     ]
 
 
-def conclude(
+async def conclude(
     study: Study,
     moves: dict[str, Move],
     outcomes: Mapping[str, Any],
     motions: Mapping[str, dict[str, Artifact]],
 ) -> Facts:
-    """The page over whatever ended well, and one sentence for what did not.
+    """Write the page over what ended well, and raise what did not in one sentence.
 
     Raises:
         StudyFailed: a cell failed.
@@ -181,6 +188,7 @@ def conclude(
         rows = metrics.kept(store, study.name, metrics.runs_of(well))
         stills, paid = ({n: made[w] for n, made in motions.items()} for w in ("still", "payments"))
         made = results_page(study, moves, rows, stills, paid)
+        await show_study(store, study.name, made)
     if failed:
         named = "; ".join(f"{name}: {reason}" for name, reason in failed.items())
         raise StudyFailed(

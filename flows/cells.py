@@ -19,20 +19,18 @@ from flows.ending import Ending
 from flows.tracebacks import without_tracebacks
 from robojackson.errors import TrainingCrashed, TrainingFailed
 from robojackson.retarget.robot import RobotDescription
-from storage.artifact import Artifact
 from storage.leftovers import sweep
 from storage.store import Store
+from tasks.caching import labelled
 from tasks.cell import Cell
 from tasks.judgement import judge
-from tasks.kept import kept
-from tasks.metrics import publish
+from tasks.metrics import Result, publish, published
 from tasks.train import RunLabels, run_id_of, train
 
 DEPLOYMENT = "cell/pool"
 SECONDS_BEFORE_RETRY = 2.0
 SHORTEST_S = 1.0
 """What a stage gets after the deadline: nothing can be done in it, but what is cached is read."""
-Result = dict[str, Artifact]
 ENDING = Ending()
 """Of the runs on workers that this process waits for."""
 
@@ -52,17 +50,17 @@ async def cell(cell: Cell) -> Result:
     sweep(store, parts=False)
     robot = _robot(cell.robot)
     labels = RunLabels(cell.move, cell.setup)
-    trained = await tried(
-        lambda s: train(cell.reference, robot, cell.train, labels, limit_s=s), cell, deadline
-    )
-    policy = trained["policy"]
-    judged = await tried(
-        lambda s: judge(policy, cell.reference, robot, cell.evaluate, limit_s=s), cell, deadline
-    )
-    run_id = run_id_of(cell.reference, robot, cell.train, labels)
-    written = publish(cell, run_id, {**trained, **judged})
+    with labelled(cell.name):
+        trained = await tried(
+            lambda s: train(cell.reference, robot, cell.train, labels, limit_s=s), cell, deadline
+        )
+        policy = trained["policy"]
+        judged = await tried(
+            lambda s: judge(policy, cell.reference, robot, cell.evaluate, limit_s=s), cell, deadline
+        )
+    made = publish(cell, _run_id(cell), {**trained, **judged})
     sweep(store, parts=False)
-    return {**trained, **judged, **written}
+    return made
 
 
 async def tried(stage: Callable[[float], Awaitable[Result]], cell: Cell, deadline: float) -> Result:
@@ -109,10 +107,14 @@ async def anywhere(wanted: Cell) -> Result:
 
     One that was done before is read here: a worker would take seconds to start for nothing.
 
+    Its result is read from the store: Prefect's own results do not reach another process on every
+    store.
+
     Raises:
         TrainingCrashed: it did not end well; a failed child does not raise by itself.
+        StoreError: it ended well and left nothing in this store; the message names why.
     """
-    if await is_kept(wanted):
+    if await asyncio.to_thread(is_recorded, wanted):
         return await here(wanted)
     left_s = 60 * wanted.timeout_minutes
     for _ in range(1 + wanted.retries):
@@ -128,17 +130,21 @@ async def anywhere(wanted: Cell) -> Result:
     if run.state is None or not run.state.is_completed():
         said = "has no state" if run.state is None else f"{run.state.name}: {run.state.message}"
         raise TrainingCrashed(f"{wanted.name} on a worker: {said}")
-    return TypeAdapter(Result).validate_python(await run.state.aresult())
+    return await asyncio.to_thread(published, wanted, _run_id(wanted))
 
 
-async def is_kept(wanted: Cell) -> bool:
-    """Whether everything that takes time was done before and is still there."""
-    robot = _robot(wanted.robot)
-    trained = await kept(train, reference=wanted.reference, robot=robot, config=wanted.train)
+def is_recorded(wanted: Cell) -> bool:
+    """Return whether everything that takes time was done before and is still in the store."""
+    given = (wanted.reference, _robot(wanted.robot))
+    trained = train.recorded(*given, wanted.train)
     if trained is None:
         return False
-    given = {"reference": wanted.reference, "robot": robot, "config": wanted.evaluate}
-    return await kept(judge, policy=trained["policy"], **given) is not None
+    return judge.recorded(trained["policy"], *given, wanted.evaluate) is not None
+
+
+def _run_id(wanted: Cell) -> str:
+    labels = RunLabels(wanted.move, wanted.setup)
+    return run_id_of(wanted.reference, _robot(wanted.robot), wanted.train, labels)
 
 
 EXECUTORS: dict[str, Any] = {"local": here, "work-pool": anywhere}

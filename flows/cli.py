@@ -15,6 +15,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from flows.backups import backup, restore
 from flows.console import USAGE_ERROR, Answer, command, complain, log_to_stderr, misused
 from flows.formats import export, import_
 from flows.learning import evaluate, pretrain, train
@@ -36,7 +37,7 @@ from flows.options import (
 )
 from flows.robots import robots
 from flows.search import catalogue, find, refresh
-from flows.studies import ablation, deploy, metrics
+from flows.studies import ablation, deploy, metrics, server
 
 app = typer.Typer(
     name="robojackson",
@@ -83,15 +84,21 @@ def dance(
     if found is not None:
         look_at(found, settings, start, end)
     prepare(Store.from_environment())
-    from flows.dance import run
+    made = None
+    if found is not None:
+        from flows.replay import replayed
 
-    made = run(str(found or source), config, overrides, start, end)
+        made = replayed(found, config, overrides, start, end)
+    if made is None:
+        from flows.dance import run
+
+        made = run(str(found or source), config, overrides, start, end)
     text = [*verdict_lines(made["evaluation"]), f"page   {made['page']}", f"video  {made['video']}"]
     return Answer(made, text=text)
 
 
 app.add_typer(robots, name="robots")
-for other in (find, refresh, catalogue, ablation, metrics, deploy):
+for other in (find, refresh, catalogue, ablation, metrics, deploy, backup, restore, server):
     app.command()(other)
 
 

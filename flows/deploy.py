@@ -1,6 +1,6 @@
-"""What a Prefect server must know of us: pools, deployments, automations, where results are kept.
+"""What a Prefect server must know of us: pools, deployments, automations.
 
-Everything is told by name and may be told again: a second run changes nothing but what changed.
+Everything is registered by name and may be registered again: only what has changed is changed.
 """
 
 import asyncio
@@ -17,12 +17,11 @@ from prefect.automations import Automation
 from prefect.client.orchestration import PrefectClient, get_client
 from prefect.client.schemas.actions import WorkPoolCreate, WorkPoolUpdate
 from prefect.exceptions import ObjectNotFound
-from prefect.filesystems import RemoteFileSystem
 from prefect.settings import PREFECT_API_URL
 from prefect.workers.process import ProcessWorker
 
 from flows.environment import HEARTBEAT, HEARTBEAT_S
-from flows.server import answering
+from flows.server import answering, await_server
 from robojackson.errors import DeploymentFailed
 from storage.store import Store
 
@@ -33,40 +32,38 @@ POOLS = {
     "training": "Cells of an ablation and trainings: one at a time and core.",
 }
 """Parents and cells apart: parents that wait would hold every slot of a common pool."""
-RESULTS = "robojackson"
-"""Name of the block that keeps Prefect's records in the store."""
-RECORDS = "prefect/records"
 SILENCE = "ROBOJACKSON_SILENCE_S"
 """Variable: seconds without a sign of life after which a run is marked Crashed."""
 SILENT_S, SHORTEST_S = 150, 2 * HEARTBEAT_S + 1
 
 
-def deploy() -> dict[str, Any]:
+def deploy(wait_s: float = 0.0) -> dict[str, Any]:
     """Register everything with the server of PREFECT_API_URL.
 
+    Args:
+        wait_s: How long a server that was just started may take to answer, seconds.
     Raises:
         DeploymentFailed: no server is named or answers, or it refuses something.
     """
     if not PREFECT_API_URL.value():
         raise DeploymentFailed(
-            "PREFECT_API_URL names no server; start one (`prefect server start`) and set "
+            "PREFECT_API_URL names no server; start one (`robojackson server`) and set "
             "PREFECT_API_URL=http://127.0.0.1:4200/api"
         )
+    await_server(wait_s)
     store = Store.from_environment().create()
     store.require_writable()
     with answering():
-        made = asyncio.run(_prepare(store))
+        made = asyncio.run(_prepare())
     return {**made, "deployments": _register()}
 
 
-async def _prepare(store: Store) -> dict[str, Any]:
+async def _prepare() -> dict[str, Any]:
     async with get_client() as client:
         for name, told in POOLS.items():
             await _pool(client, name, told)
-    block = await _results(store)
     return {
         "pools": list(POOLS),
-        "results": block,
         "automations": [await _automation(facts) for facts in automations()],
     }
 
@@ -118,18 +115,6 @@ def with_heartbeat(template: Mapping[str, Any]) -> dict[str, Any]:
     env = made["variables"]["properties"]["env"]
     env["default"] = {**env.get("default", {}), **HEARTBEAT}
     return made
-
-
-async def _results(store: Store) -> str | None:
-    """Records of tasks beside the store, when it is one that all machines reach.
-
-    How it is reached, endpoint and secrets, each machine finds in its own environment.
-    """
-    if "://" not in store.root:
-        return None
-    block = RemoteFileSystem(basepath=f"{store.root}/{RECORDS}")
-    await block.save(RESULTS, overwrite=True)
-    return f"remote-file-system/{RESULTS}"
 
 
 async def _automation(facts: Mapping[str, Any]) -> str:

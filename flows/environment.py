@@ -1,16 +1,16 @@
 """What Prefect must find in the environment before it is imported.
 
 Its home is inside the store, so that a run leaves nothing elsewhere; the temporary server gets the
-time that it needs on two busy cores and tells nobody anything. A run says often enough that it
+time that it needs on two busy cores and sends no usage data. A run reports often enough that it
 lives for the automation that marks dead ones (`configs/automations.yaml`).
 """
 
 import os
+from pathlib import Path
 
 from storage.store import Store
 
 HOME = "prefect"
-RECORDS = "records"
 ROOM_MB = 200
 """Free disk that a flow needs: its records, its server's database, the tables and the video."""
 HEARTBEAT_S = 30
@@ -24,6 +24,27 @@ FIXED = {
     "DO_NOT_TRACK": "1",
 }
 
+SERVER = {
+    # Relative to the page: right for every host name, port and proxy.
+    ("PREFECT_UI_API_URL", "PREFECT_SERVER_UI_API_URL"): "/api",
+    # The newer pages of Prefect 3.8 contact an analytics service whatever the settings say.
+    ("PREFECT_SERVER_UI_V2_ENABLED",): "false",
+    ("PREFECT_SERVER_UI_SHOW_PROMOTIONAL_CONTENT",): "false",
+}
+"""Names of a variable of the server, and what it is where none of them is set."""
+
+
+def prepare_server(store: Store) -> None:
+    """Set what a server of ours needs and the user has not set, for this process.
+
+    Raises:
+        StoreError: too little room on the disk of the store.
+    """
+    prepare(store)
+    for names, value in SERVER.items():
+        if not any(name in os.environ for name in names):
+            os.environ[names[0]] = value
+
 
 def prepare(store: Store) -> None:
     """Set what the user has not set, for this process and its children.
@@ -32,12 +53,8 @@ def prepare(store: Store) -> None:
         StoreError: too little room on the disk of the store; Prefect's server would hang on it.
     """
     store.require_writable(ROOM_MB)
-    home = store.here / HOME
-    home.mkdir(parents=True, exist_ok=True)  # without it the server's database cannot be opened
-    wanted = {
-        "PREFECT_HOME": str(home),
-        "PREFECT_LOCAL_STORAGE_PATH": str(home / RECORDS),
-        **FIXED,
-    }
+    wanted = {"PREFECT_HOME": str(store.here / HOME), **FIXED}
     for name, value in wanted.items():
         os.environ.setdefault(name, value)
+    # Without it the server's database cannot be opened.
+    Path(os.environ["PREFECT_HOME"]).expanduser().mkdir(parents=True, exist_ok=True)

@@ -10,7 +10,6 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
-from prefect import unmapped
 from prefect.futures import PrefectFuture
 from prefect.logging import get_run_logger
 
@@ -84,13 +83,13 @@ def judged(
 ) -> list[Entry]:
     """All candidates with their figures, or with the reason why there are none."""
     there = [video for _, video in had if isinstance(video, Artifact)]
-    futures = iter(judge.map(there, unmapped(settings.judge)) if there else ())
+    outcomes = iter(judge.outcomes([(video, settings.judge) for video in there]))
     entries = []
     for candidate, video in had:
         if isinstance(video, str):
             entries.append(Entry(candidate, reason=video))
             continue
-        made = _outcome(next(futures))
+        made = _or_reason(next(outcomes))
         is_failed = isinstance(made, str)
         entries.append(
             Entry(candidate, reason=made, video=video)
@@ -150,7 +149,11 @@ def _outcome(future: PrefectFuture[Any] | str) -> Any:
     """The result of a task, or the reason in one line."""
     if isinstance(future, str):
         return future
-    result = future.result(raise_on_failure=False)
+    return _or_reason(future.result(raise_on_failure=False))
+
+
+def _or_reason(result: Any) -> Any:
+    """Return a result as it is, and an exception as its reason in one line."""
     if not isinstance(result, BaseException):
         return result
     reason = reason_of(result)

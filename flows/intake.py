@@ -10,6 +10,7 @@ from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
+from urllib.parse import urlsplit
 
 from prefect.logging import get_run_logger
 from pydantic import ConfigDict, Field
@@ -25,6 +26,7 @@ from robojackson.clips.sources import urls
 from robojackson.clips.titles import web_address
 from robojackson.clips.video import list_videos
 from storage.artifact import Artifact
+from storage.catalogue import safe_name
 from storage.store import Store
 
 Source = Annotated[str, Field(min_length=1, max_length=1000, pattern=r"\S")]
@@ -85,6 +87,19 @@ def of_address(address: str, search: Search) -> tuple[str, Artifact]:
     (wanted,) = urls.search("", address, 1, settings.web, datetime.now(UTC))
     get_run_logger().info("bringing %s", wanted.url)
     return slug_of(Path(wanted.title).stem), of_candidate(wanted, None, settings)
+
+
+def name_of(source: str) -> str:
+    """Return what to call the run of a source: the dance, or the file or folder without its path.
+
+    Args:
+        source: Name of a dance, address of a video, or path.
+    """
+    source = source.strip()
+    if web_address(source):
+        parts = urlsplit(source)
+        return safe_name(parts.query or parts.path)
+    return safe_name(source if is_name(source) else Path(source).absolute().stem)
 
 
 @contextmanager

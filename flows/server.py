@@ -1,5 +1,6 @@
 """Prefect's server as a command meets it: one line where it is not there or does not let us in."""
 
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -9,6 +10,7 @@ from prefect.settings import PREFECT_API_URL
 
 from robojackson.errors import DeploymentFailed
 
+EVERY_S = 0.5
 REFUSED = (401, 403)
 """Codes of HTTP with which a server refuses who asks."""
 
@@ -24,6 +26,24 @@ def require_server() -> None:
             client.hello()
 
 
+def await_server(seconds: float) -> None:
+    """Return when the server of PREFECT_API_URL answers; one that was just started takes a while.
+
+    Args:
+        seconds: How long it may take.
+    Raises:
+        DeploymentFailed: it does not answer in that time, or refuses us.
+    """
+    end = time.monotonic() + seconds
+    while True:
+        try:
+            return require_server()
+        except DeploymentFailed as cause:
+            if not isinstance(cause.__cause__, TransportError) or time.monotonic() >= end:
+                raise
+        time.sleep(EVERY_S)
+
+
 @contextmanager
 def answering() -> Iterator[None]:
     """Whatever a server says or does not say, as one line with what to do.
@@ -37,7 +57,7 @@ def answering() -> Iterator[None]:
     except TransportError as cause:
         told = str(cause) or type(cause).__name__
         raise DeploymentFailed(
-            f"{named} does not answer ({told}); start it (`prefect server start`) or correct "
+            f"{named} does not answer ({told}); start it (`robojackson server`) or correct "
             "the address; where it is not set, flows start a server of their own"
         ) from cause
     except HTTPStatusError as cause:

@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from flows.console import Answer, command, table
+from flows.console import Answer, command, complain, table
 from flows.options import Json, SetStudy, chosen
 
 
@@ -61,8 +61,34 @@ def metrics(
 
 
 @command
-def deploy(as_json: Json = False) -> Answer:
+def deploy(
+    wait: Annotated[
+        float, typer.Option(min=0, help="Seconds to wait for a server that was just started.")
+    ] = 0.0,
+    as_json: Json = False,
+) -> Answer:
     """Register pools, deployments and automations with the server of PREFECT_API_URL."""
     from flows.deploy import deploy as register
 
-    return Answer(register())
+    return Answer(register(wait))
+
+
+@command
+def server(
+    host: Annotated[str, typer.Option(help="Where to listen; 0.0.0.0 is every network.")] = (
+        "127.0.0.1"
+    ),
+    port: Annotated[int, typer.Option(min=1, max=65535, help="Where to listen.")] = 4200,
+    as_json: Json = False,
+) -> Answer:
+    """Prefect's server and pages, with the results of the store; Ctrl-C ends it."""
+    from flows.environment import prepare_server
+    from storage.store import Store
+
+    store = Store.from_environment().create()
+    prepare_server(store)
+    from flows.serving import serve
+
+    complain(f"pages http://{host}:{port}, PREFECT_API_URL=http://{host}:{port}/api")
+    serve(store, host, port)
+    return Answer({"store": store.root}, text=[])

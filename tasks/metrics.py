@@ -12,30 +12,56 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from robojackson.errors import StoreError
 from storage import metrics
 from storage.artifact import Artifact
 from storage.store import Store
 from tasks.cell import Cell
 
+Result = dict[str, Artifact]
+RESULT = "result"
+"""Under which the note of a cell keeps its artifacts, keys and digests."""
 CHECKOUT = Path(__file__).parent.parent
 COMMIT = "ROBOJACKSON_COMMIT"
 TOLD = ("robojackson", "mujoco", "gymnasium", "torch", "jax", "sbx-rl", "sb3-contrib", "prefect")
 """Packages whose version is written down."""
 
 
-def publish(cell: Cell, run_id: str, made: Mapping[str, Artifact]) -> dict[str, Artifact]:
+def publish(cell: Cell, run_id: str, made: Mapping[str, Artifact]) -> Result:
     """Write the cell's rows and where these come from; the same call again writes nothing.
 
     Args:
         run_id: Of the training.
         made: What its stages left.
+    Returns:
+        What the stages left, with the tables under their keys among the metrics.
     """
     store = Store.from_environment()
-    place = metrics.Place(cell.study, cell.move, cell.setup, cell.seed, run_id)
-    written = metrics.write(store, place, made)
-    if metrics.noted(store, place).get("artifacts") != _digests(made):
-        metrics.note(store, place, provenance(cell, place, made))
+    place = _place(cell, run_id)
+    written = {**made, **metrics.write(store, place, made)}
+    noted = metrics.noted(store, place)
+    known = {"artifacts": _digests(made), RESULT: _plain(written)}
+    if {name: noted.get(name) for name in known} != known:
+        metrics.note(store, place, {**provenance(cell, place, made), **known})
     return written
+
+
+def published(cell: Cell, run_id: str) -> Result:
+    """Return what `publish` returned, on whatever machine that was.
+
+    Raises:
+        StoreError: this store has nothing of that run.
+    """
+    store = Store.from_environment()
+    try:
+        found = metrics.noted(store, _place(cell, run_id))[RESULT]
+        return {name: Artifact(**artifact) for name, artifact in found.items()}
+    except (KeyError, TypeError, ValueError, AttributeError) as cause:
+        raise StoreError(
+            f"{cell.name}: its worker ended well, but {store.root} has no result of run {run_id}: "
+            "the worker uses another store or another version of the code; give it the same "
+            "ROBOJACKSON_STORE (an absolute path, or an address) and the same checkout"
+        ) from cause
 
 
 def provenance(cell: Cell, place: metrics.Place, made: Mapping[str, Artifact]) -> dict[str, Any]:
@@ -47,7 +73,6 @@ def provenance(cell: Cell, place: metrics.Place, made: Mapping[str, Artifact]) -
         "config": asdict(cell.train),
         "evaluate": asdict(cell.evaluate),
         "robot": cell.robot,
-        "artifacts": _digests(made),
         "reference_sha256": cell.reference.sha256,
         "versions": {name: _version(name) for name in TOLD},
         "machine": f"{platform.node()} {platform.machine()} {os.cpu_count()} cores",
@@ -55,6 +80,14 @@ def provenance(cell: Cell, place: metrics.Place, made: Mapping[str, Artifact]) -
         "finished_at": datetime.now(UTC).isoformat(timespec="seconds"),
         "training": json.loads(Store.from_environment().read(made["training"].key)),
     }
+
+
+def _place(cell: Cell, run_id: str) -> metrics.Place:
+    return metrics.Place(cell.study, cell.move, cell.setup, cell.seed, run_id)
+
+
+def _plain(made: Mapping[str, Artifact]) -> dict[str, dict[str, str]]:
+    return {name: asdict(artifact) for name, artifact in made.items()}
 
 
 def _digests(made: Mapping[str, Artifact]) -> dict[str, str]:

@@ -4,13 +4,11 @@ import hashlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from robojackson.clips.stability import Stability
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.motion.smpl import SmplSequence
-from robojackson.report.page import render
-from robojackson.report.summary import Results, page_content
 from storage import tables
 from storage.artifact import Artifact
 from storage.codecs import Rollout
@@ -19,6 +17,9 @@ from storage.store import Store
 from tasks.caching import stage
 from tasks.digest import drawn_by
 from tasks.probe import info_of
+
+if TYPE_CHECKING:
+    from robojackson.report.summary import Results
 
 TEMPLATES = ("page.html", "page.css")
 LEFT_OUT = ("video", "info")
@@ -34,6 +35,9 @@ def page(made: dict[str, Artifact], move: str, file: str) -> dict[str, Artifact]
         move: Name of the dance, for the folder.
         file: Name of the file that is danced; the same video may be stored under another.
     """
+    from robojackson.report.page import render  # matplotlib
+    from robojackson.report.summary import page_content
+
     store = Store.from_environment()
     text = render(page_content(_results(store, made, Path(file)), made["dance"].name))
     digest = hashlib.sha256("".join(a.sha256 for a in made.values()).encode()).hexdigest()
@@ -46,7 +50,9 @@ def page(made: dict[str, Artifact], move: str, file: str) -> dict[str, Artifact]
     return {**kept, "page": store.put(f"{folder}/index.html", text.encode())}
 
 
-def _results(store: Store, made: Mapping[str, Artifact], file: Path) -> Results:
+def _results(store: Store, made: Mapping[str, Artifact], file: Path) -> "Results":
+    from robojackson.report.summary import Results
+
     return Results(
         title=file.stem.replace("_", " "),
         info=info_of(store, made["info"], file),

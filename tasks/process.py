@@ -13,12 +13,10 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import suppress
 from pathlib import Path
 
-from prefect.logging import get_run_logger
-
 from robojackson.errors import TrainingCrashed, TrainingFailed
+from robojackson.rl.hooks import SECONDS_TO_SAVE
+from tasks.logs import run_logger
 
-SECONDS_TO_SAVE = 30.0
-"""What a process gets to write its checkpoint before it is killed."""
 CHECKOUT = Path(__file__).parent.parent
 LOG = "process.log"
 
@@ -64,7 +62,7 @@ def environment() -> dict[str, str]:
 
 
 async def _forward(process: Process, log_file: Path, last: deque[str]) -> None:
-    say: Callable[[str], None] = get_run_logger().info
+    say: Callable[[str], None] = run_logger().info
     with log_file.open("a") as file:
         async for line in _lines(process):
             file.write(f"{line}\n")

@@ -10,8 +10,6 @@ from pathlib import Path
 from typing import Any
 from uuid import UUID
 
-from prefect.artifacts import acreate_progress_artifact, aupdate_progress_artifact
-
 FILE = "progress.json"
 """What a training keeps writing into its folder."""
 EVERY_S, LATER_S, SHARE = 5.0, 30.0, 0.05
@@ -40,6 +38,8 @@ class _Bar:
         self._artifact: UUID | None = None
 
     async def watch(self) -> None:
+        from prefect.artifacts import acreate_progress_artifact
+
         key = re.sub(r"[^a-z0-9]+", "-", self._name.lower()).strip("-")
         told = f"{self._name}: starting"
         with suppress(Exception):
@@ -52,6 +52,8 @@ class _Bar:
 
     async def tell(self) -> None:
         """What the file says now."""
+        from prefect.artifacts import aupdate_progress_artifact
+
         with suppress(Exception):
             row = json.loads(self._path.read_text())
             if self._artifact is not None:

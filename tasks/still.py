@@ -1,8 +1,9 @@
-"""The picture of a move: video frame, recovered body and robot (the paper's Figures 2-4)."""
+"""Pictures: of a move (the paper's Figures 2-4), and of the film of a dance."""
 
 from robojackson.clips.track import LandmarkTrack
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.motion.smpl import SmplSequence
+from robojackson.report.still import middle_of
 from robojackson.report.still import still as draw
 from robojackson.retarget.robot import RobotDescription, load_robot
 from storage import tables
@@ -31,3 +32,11 @@ def still(
             load_robot(robot).model,
         )
     return store.keep("still", "still.png", picture)
+
+
+@stage()
+def snapshot(film: Artifact) -> Artifact:
+    """Keep a PNG of the middle of a film."""
+    store = Store.from_environment()
+    with store.local(film) as path:
+        return store.keep("still", "still.png", middle_of(path))

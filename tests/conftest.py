@@ -42,20 +42,17 @@ def prefect_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 
 @pytest.fixture
-def records(prefect_server: None, tmp_path: Path) -> Iterator[Path]:
-    """An empty folder for the cache records of Prefect."""
+def records(prefect_server: None, store_folder: Path) -> Iterator[None]:
+    """An empty store for the records of stages, and a server for their runs."""
     from prefect.settings import (
         PREFECT_FLOWS_HEARTBEAT_FREQUENCY,
-        PREFECT_LOCAL_STORAGE_PATH,
         PREFECT_LOGGING_LEVEL,
         temporary_settings,
     )
 
-    folder = tmp_path / "records"
     wanted = {
-        PREFECT_LOCAL_STORAGE_PATH: folder,
         PREFECT_FLOWS_HEARTBEAT_FREQUENCY: None,
         PREFECT_LOGGING_LEVEL: "ERROR",
     }
     with temporary_settings(wanted):
-        yield folder
+        yield

@@ -26,8 +26,8 @@ STUDY: dict[str, Any] = {
 NEXT = {**STUDY, "name": "next", "seeds": [1]}
 """Other cells, none of them cached: every machine has to do something again."""
 MADE = ("train", "evaluate", "studies", metrics.FOLDER)
-RECORDS = ("prefect/records/train", "prefect/records/judge")
-"""What a run makes besides the motions, and Prefect's records of it."""
+RECORDS = ("records/train", "records/judge")
+"""What a run makes besides the motions, and the records of its stages."""
 QUIET_S, PATIENCE_S = 4.0, 1800.0
 TRIES = 3
 Tables = dict[str, bytes]

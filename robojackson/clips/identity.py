@@ -12,7 +12,6 @@ import numpy as np
 from jaxtyping import Float
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as configuration
-from scipy.optimize import linear_sum_assignment
 
 from robojackson.clips.crowd import Sighting
 from robojackson.clips.person import stature
@@ -98,6 +97,8 @@ def _lasts(piece: Piece, shortest_s: float, period_s: float) -> bool:
 
 def chains(pieces: list[Piece], config: IdentityConfig) -> list[list[Piece]]:
     """Pieces in order, one list a person."""
+    from scipy.optimize import linear_sum_assignment
+
     count = len(pieces)
     if not count:
         return []

@@ -12,7 +12,6 @@ import numpy as np
 from jaxtyping import Float
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as configuration
-from scipy.optimize import linear_sum_assignment
 
 from robojackson.clips.crowd import Sighting
 from robojackson.clips.person import stature, trunk
@@ -108,6 +107,8 @@ def _piece_of(index: int, now: float, seen: Sighting, size: tuple[int, int]) -> 
 
 def _claims(alive: Sequence[Piece], seen: Sequence[Piece], config: PieceConfig) -> dict[int, int]:
     """Which piece goes on with which sighting, the least change in all."""
+    from scipy.optimize import linear_sum_assignment
+
     if not alive or not seen:
         return {}
     far = np.array([[_step(a, b, config) for b in seen] for a in alive])

@@ -8,7 +8,6 @@ confidence is the chance that it lies within `NEAR_M` of where it is said to be,
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import chi2
 
 from robojackson.mocap.blazepose import BODY, LANDMARK_NAMES
 from robojackson.mocap.refine import HIPS, ORDER, SIZE, Evidence, RefineConfig, residuals, stiffness
@@ -36,6 +35,8 @@ def certainty(
         visibility: Of the landmarks; face, hands and feet are no surer than they are visible.
         config: The refinement's.
     """
+    from scipy.stats import chi2
+
     variance = root_relative(covariances(body, evidence, config))
     near = chi2.cdf(NEAR_M**2 / (variance * max(1.0, REPEATED_S * evidence.fps)), df=3)
     sure = np.array(visibility)

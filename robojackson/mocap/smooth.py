@@ -1,7 +1,6 @@
 """Zero-phase smoothing in time (Butterworth forth and back; Winter 2009, chapter 3)."""
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
 
 ORDER = 2
 
@@ -12,6 +11,8 @@ def lowpass(values: np.ndarray, fps: float, cutoff_hz: float) -> np.ndarray:
     A cut-off at or above half the frame rate, or a clip too short to filter, changes nothing. The
     ends are reflected oddly, so that a straight line stays one.
     """
+    from scipy.signal import butter, sosfiltfilt
+
     padding = min(len(values) - 1, int(np.ceil(2.0 * fps / cutoff_hz)))
     if cutoff_hz >= 0.49 * fps or padding < 2:
         return np.array(values, float)

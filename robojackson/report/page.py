@@ -82,7 +82,7 @@ class _Section:
 
 
 @dataclass(frozen=True)
-class _Verdict:
+class Verdict:
     """One row of the evaluation table."""
 
     title: str
@@ -99,10 +99,10 @@ def render(content: PageContent) -> str:
     return template.render(
         content=content,
         style=here.joinpath("page.css").read_text("utf-8"),
-        headline=_headline(content.evaluation),
+        headline=headline(content.evaluation),
         tiles=_tiles(content.evaluation),
         columns=[Fact("", "")] + facts(dict.fromkeys(VERDICT_COLUMNS)),
-        verdicts=_verdicts(content.evaluation),
+        verdicts=verdicts(content.evaluation),
         sections=_sections(content),
         plots=[(plot, base64.b64encode(plot.png).decode()) for plot in content.plots],
     )
@@ -116,8 +116,8 @@ def write_page(content: PageContent, out: Path) -> Path:
     return out
 
 
-def _headline(evaluation: Mapping[str, Any]) -> str:
-    """One sentence that says how well it went, beside the best of the baselines."""
+def headline(evaluation: Mapping[str, Any]) -> str:
+    """Return one sentence that says how well it went, beside the best of the baselines."""
     if not evaluation:
         return ""
     said = (
@@ -152,7 +152,8 @@ def _tiles(evaluation: Mapping[str, Any]) -> list[Fact]:
     ]
 
 
-def _verdicts(evaluation: Mapping[str, Any]) -> list[_Verdict]:
+def verdicts(evaluation: Mapping[str, Any]) -> list[Verdict]:
+    """Return the figures of the trained policy and of its baselines, ready to read."""
     if not evaluation:
         return []
     policies = {TRAINED: evaluation, **evaluation.get("baselines", {})}
@@ -160,7 +161,7 @@ def _verdicts(evaluation: Mapping[str, Any]) -> list[_Verdict]:
     for name, figures in policies.items():
         title, meaning = POLICY_TITLES.get(name, (name, ""))
         values = [written(column, figures.get(column)) for column in VERDICT_COLUMNS]
-        rows.append(_Verdict(title, meaning, values, name == TRAINED))
+        rows.append(Verdict(title, meaning, values, name == TRAINED))
     return rows
 
 

@@ -1,13 +1,16 @@
 """A picture of a move: video frame, recovered body and robot, at a few moments (Figures 2-4)."""
 
 from contextlib import ExitStack
+from itertools import islice
 from pathlib import Path
 
 import cv2
 import mujoco
 import numpy as np
+from jaxtyping import UInt8
 
 from robojackson.clips.track import LandmarkTrack
+from robojackson.clips.video import read_frames
 from robojackson.motion.reference import ReferenceMotion
 from robojackson.motion.smpl import SmplSequence
 from robojackson.report.robot_panel import REFERENCE_TINT
@@ -37,7 +40,21 @@ def still(
         film = Film(stack, source, track, sequence, config, when)
         film.add_robot("reference", reference_qpos(reference, when), model, REFERENCE_TINT)
         row = np.concatenate(list(film.pictures()), axis=1)
-    return bytes(cv2.imencode(".png", row[..., ::-1])[1])
+    return _png(row)
+
+
+def middle_of(film: Path) -> bytes:
+    """Return the picture in the middle of a video, as PNG.
+
+    Raises:
+        UnreadableVideo, TruncatedVideo: the file cannot be decoded to its end.
+    """
+    frames = sum(1 for _ in read_frames(film))
+    return _png(next(islice(read_frames(film), frames // 2, None)))
+
+
+def _png(rgb: UInt8[np.ndarray, "H W 3"]) -> bytes:
+    return bytes(cv2.imencode(".png", rgb[..., ::-1])[1])
 
 
 def _moments(reference: ReferenceMotion, sequence: SmplSequence) -> Timeline:

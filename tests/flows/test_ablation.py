@@ -62,14 +62,14 @@ class Played:
 
 @pytest.fixture
 def play(
-    records: Path, store_folder: Path, monkeypatch: pytest.MonkeyPatch
+    records: None, store_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> Callable[..., dict[str, Any]]:
     """Run the flow with played cells, motions and page; the motions and the page are not ours."""
     page = Store(store_folder).put("studies/index.html", b"page")
     still = Store(store_folder).put("still.png", b"png")
     motions = {"reference": REFERENCE, "still": still, "payments": still}
 
-    def motion(move: object, study: Study, trainings: object) -> dict[str, Artifact]:
+    def motion(name: str, move: object, study: Study, trainings: object) -> dict[str, Artifact]:
         card = json.dumps(dict.fromkeys(BARS, 0.0) | {"infeasible_share": infeasible})
         return motions | {"scorecard": Store(store_folder).put("card.json", card.encode())}
 
@@ -197,7 +197,9 @@ def on_workers(
     pool: Pool, monkeypatch: pytest.MonkeyPatch, kept: bool = False
 ) -> dict[str, Artifact]:
     monkeypatch.setattr(cells, "arun_deployment", pool)
-    monkeypatch.setattr(cells, "is_kept", AsyncMock(return_value=kept))
+    monkeypatch.setattr(cells, "is_recorded", lambda cell: kept)
+    monkeypatch.setattr(cells, "published", lambda cell, run_id: {"policy": REFERENCE})
+    monkeypatch.setattr(cells, "run_id_of", lambda *given: "walk-scratch-s0-0")
     monkeypatch.setattr(cells, "here", AsyncMock(return_value={"policy": REFERENCE}))
     return asyncio.run(cells.anywhere(a_cell()))
 
@@ -209,7 +211,7 @@ def test_a_cell_that_was_done_before_asks_no_worker(monkeypatch: pytest.MonkeyPa
 
 
 def test_a_cell_whose_worker_died_is_given_to_another(monkeypatch: pytest.MonkeyPatch) -> None:
-    pool = Pool(Crashed(message="exit -9"), Completed(data={"policy": REFERENCE}))
+    pool = Pool(Crashed(message="exit -9"), Completed())
     assert on_workers(pool, monkeypatch) == {"policy": REFERENCE}
     assert pool.names == ["scratch-walk-s0"] * 2
 

@@ -62,7 +62,7 @@ def refused(**given: Any) -> bool:
 
 
 def test_a_name_becomes_the_best_video(
-    records: Path, store_folder: Path, tmp_path: Path, short_clip: Path
+    records: None, store_folder: Path, tmp_path: Path, short_clip: Path
 ) -> None:
     with serving(short_clip.read_bytes()) as web:
         listed = book(tmp_path, f"{web.url}/missing/a.mp4", f"{web.url}/good/b.mp4")
@@ -71,7 +71,7 @@ def test_a_name_becomes_the_best_video(
 
 
 def test_a_video_that_was_brought_leaves_no_copy(
-    records: Path, store_folder: Path, tmp_path: Path, short_clip: Path
+    records: None, store_folder: Path, tmp_path: Path, short_clip: Path
 ) -> None:
     with serving(short_clip.read_bytes()) as web:
         files("Hips", near(tmp_path), book(tmp_path, f"{web.url}/good/b.mp4"))
@@ -79,14 +79,14 @@ def test_a_video_that_was_brought_leaves_no_copy(
 
 
 def test_a_name_without_a_video_that_can_be_danced_tells_every_reason(
-    records: Path, store_folder: Path, tmp_path: Path
+    records: None, store_folder: Path, tmp_path: Path
 ) -> None:
     with serving(b"") as web, pytest.raises(NoPersonFound, match="HTTP 404 not found"):
         files("Hips", near(tmp_path), book(tmp_path, f"{web.url}/missing/a.mp4"))
 
 
 def test_without_a_net_the_video_that_was_chosen_last_is_danced(
-    records: Path, store_folder: Path, config: str
+    records: None, store_folder: Path, config: str
 ) -> None:
     store = Store(store_folder)
     kept = store.keep("video", "clip.mp4", b"the last one")
@@ -98,14 +98,14 @@ def test_without_a_net_the_video_that_was_chosen_last_is_danced(
 
 
 def test_without_a_net_and_without_a_choice_the_search_has_failed(
-    records: Path, store_folder: Path, config: str
+    records: None, store_folder: Path, config: str
 ) -> None:
     with pytest.raises(SearchFailed, match="no connection"):
         files("a dance that nobody knows", config)
 
 
 def test_an_address_is_brought_without_a_search(
-    records: Path, store_folder: Path, tmp_path: Path, short_clip: Path
+    records: None, store_folder: Path, tmp_path: Path, short_clip: Path
 ) -> None:
     with serving(short_clip.read_bytes()) as web:
         found = files(f"{web.url}/good/my-dance.mp4", near(tmp_path))
@@ -113,18 +113,18 @@ def test_an_address_is_brought_without_a_search(
 
 
 def test_an_address_that_gives_nothing_is_told_with_its_reason(
-    records: Path, store_folder: Path, tmp_path: Path
+    records: None, store_folder: Path, tmp_path: Path
 ) -> None:
     with serving(b"") as web, pytest.raises(SearchFailed, match="HTTP 404 not found"):
         files(f"{web.url}/missing/a.mp4", near(tmp_path))
 
 
-def test_a_path_is_taken_as_it_is(records: Path, short_clip: Path) -> None:
+def test_a_path_is_taken_as_it_is(records: None, short_clip: Path) -> None:
     assert files(str(short_clip)) == {short_clip.name: short_clip.read_bytes()}
 
 
 def test_a_name_goes_all_the_way_into_the_flow(
-    records: Path, store_folder: Path, tmp_path: Path, short_clip: Path
+    records: None, store_folder: Path, tmp_path: Path, short_clip: Path
 ) -> None:
     """To the gate, which refuses the second of a dance as the paper's mapping leaves it."""
     with serving(short_clip.read_bytes()) as web:

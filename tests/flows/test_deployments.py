@@ -2,6 +2,7 @@
 
 import asyncio
 import inspect
+import os
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
@@ -11,17 +12,18 @@ import fsspec
 import pytest
 import yaml
 from moto.server import ThreadedMotoServer
-from prefect import Flow
+from prefect import Flow, flow
 from prefect.client.orchestration import get_client
 from prefect.client.schemas.actions import WorkPoolCreate
-from prefect.filesystems import RemoteFileSystem
 from prefect.workers.process import ProcessJobConfiguration, ProcessWorker
 
 from flows import deploy
 from flows.deploy import SILENCE, automations
 from flows.environment import FIXED
 from robojackson.errors import DeploymentFailed
+from storage.artifact import Artifact
 from storage.store import Store
+from tasks.caching import stage
 
 ROOT = Path(__file__).parents[2]
 DEPLOYMENTS = yaml.safe_load((ROOT / "prefect.yaml").read_text())["deployments"]
@@ -124,17 +126,23 @@ def bucket(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     server.stop()
 
 
+@stage()
+def noted(text: str) -> Artifact:
+    return Store.from_environment().put("note.txt", text.encode())
+
+
 def test_records_are_kept_where_each_machine_finds_the_store(
-    prefect_server: None, bucket: str
+    prefect_server: None, bucket: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """One machine reaches the store by another address than the next: none is written down."""
     store = Store(bucket).create()
+    monkeypatch.setenv("ROBOJACKSON_STORE", bucket)
+    made = flow(lambda: noted("words"), name="noting")()
+    assert noted.recorded("words") == made
+    (record,) = store.list("records/noted")
+    assert os.environ["AWS_ENDPOINT_URL"].encode() not in store.read(record)
 
-    async def kept() -> RemoteFileSystem:
-        name = await deploy._results(store)
-        made = await RemoteFileSystem.load(str(name).rpartition("/")[2])
-        await made.write_path("a.json", b"record")
-        return made
 
-    assert "endpoint_url" not in str(asyncio.run(kept()).settings)
-    assert store.read(f"{deploy.RECORDS}/a.json") == b"record"
+def test_deploying_registers_no_place_for_results(prefect_server: None, store_folder: Path) -> None:
+    """A block of the server would know one machine's address, and a local store had none."""
+    assert "results" not in asyncio.run(deploy._prepare())

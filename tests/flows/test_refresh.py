@@ -15,7 +15,6 @@ from prefect.client.orchestration import get_client
 from prefect.client.schemas.filters import ArtifactFilter, ArtifactFilterKey
 from prefect.settings import (
     PREFECT_FLOWS_HEARTBEAT_FREQUENCY,
-    PREFECT_LOCAL_STORAGE_PATH,
     PREFECT_LOGGING_LEVEL,
     temporary_settings,
 )
@@ -94,7 +93,6 @@ def nights(
 ) -> Iterator[Nights]:
     folder = tmp_path_factory.mktemp("refresh")
     wanted = {
-        PREFECT_LOCAL_STORAGE_PATH: folder / "records",
         PREFECT_FLOWS_HEARTBEAT_FREQUENCY: None,
         PREFECT_LOGGING_LEVEL: "ERROR",
     }
@@ -140,7 +138,7 @@ def test_the_same_video_under_another_name_is_a_copy(nights: Nights) -> None:
 
 def test_a_hostile_name_leaves_nothing_outside_the_store(nights: Nights) -> None:
     outside = {path.name for path in nights.folder.iterdir()}
-    assert outside == {"store", "records", "urls.txt", "dances.yaml"}
+    assert outside == {"store", "urls.txt", "dances.yaml"}
 
 
 def test_prefect_shows_the_table_with_the_reasons(nights: Nights) -> None:

@@ -12,7 +12,7 @@ from prefect_dask import DaskTaskRunner
 
 from configs.loader import load
 from configs.pipeline import PipelineConfig
-from flows.dance import score_all
+from flows.pipeline import score_all
 from flows.scorers import VARIABLE, scorers
 from robojackson.clips.trim import trim
 from robojackson.errors import MissingDependency
@@ -41,7 +41,7 @@ def scores(runner: TaskRunner[Any], clips: tuple[Path, ...]) -> dict[str, float]
 
     @flow(task_runner=runner)
     async def score() -> dict[str, float]:
-        found = await score_all(clips, settings, None, None)
+        found = score_all(clips, settings, None, None)
         return {candidate.name: candidate.score.stability_score for candidate in found}
 
     return asyncio.run(score())
@@ -49,7 +49,7 @@ def scores(runner: TaskRunner[Any], clips: tuple[Path, ...]) -> dict[str, float]
 
 @pytest.mark.slow
 def test_a_dask_cluster_gives_the_scores_of_threads(
-    records: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    records: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     names = ("hip_shake", "walk")
     clips = tuple(trim(ROOT / f"clips/{n}.mp4", 0.0, 1.0, tmp_path / f"{n}.mp4") for n in names)

@@ -115,7 +115,7 @@ class Standin:
 
 @pytest.fixture
 def standin(
-    tmp_path: Path, records: Path, store_folder: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, records: None, store_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[Standin]:
     folder = tmp_path / "standin"
     folder.mkdir()
@@ -198,14 +198,14 @@ def test_two_tasks_with_equal_inputs_do_not_collide(standin: Standin) -> None:
 
 def test_a_model_is_part_of_the_key(tmp_path: Path) -> None:
     keys = {
-        caching.Stage("s", "", (), lambda parameters, m=model: [m], ()).key({})
+        caching.KeyRecipe("s", "", (), lambda parameters, m=model: [m], ()).key({})
         for model in ("a", "b")
     }
     assert len(keys) == 2
 
 
 def test_a_version_is_part_of_the_key(monkeypatch: pytest.MonkeyPatch) -> None:
-    stage = caching.Stage("s", "", (), lambda parameters: [], ())
+    stage = caching.KeyRecipe("s", "", (), lambda parameters: [], ())
     before = stage.key({})
     monkeypatch.setattr(caching, "versions", lambda: dict.fromkeys(caching.VERSIONED, "99"))
     assert stage.key({}) != before
@@ -213,7 +213,7 @@ def test_a_version_is_part_of_the_key(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_layout_of_tables_is_part_of_the_key(monkeypatch: pytest.MonkeyPatch) -> None:
     """A table with a column less than its schema could not be read out of the cache."""
-    stage = caching.Stage("s", "", (), lambda parameters: [], ())
+    stage = caching.KeyRecipe("s", "", (), lambda parameters: [], ())
     before = stage.key({})
     monkeypatch.setattr(caching, "layout", lambda: "another column")
     assert stage.key({}) != before
@@ -245,7 +245,7 @@ def test_a_training_that_the_clock_cuts_short_has_another_key(
 
 
 def test_the_place_of_an_artifact_is_not_part_of_the_key() -> None:
-    stage = caching.Stage("s", "", (), lambda parameters: [], ())
+    stage = caching.KeyRecipe("s", "", (), lambda parameters: [], ())
     here, there = (Artifact(key=key, sha256="0" * 64) for key in ("a/x", "b/y"))
     assert stage.key({"clip": here}) == stage.key({"clip": there})
 

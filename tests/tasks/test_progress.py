@@ -7,6 +7,7 @@ from typing import Any
 from uuid import UUID, uuid4
 
 import pytest
+from prefect import artifacts
 
 from tasks import progress
 
@@ -33,8 +34,8 @@ class Page:
 
 def train(page: Page, work: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     """A training that writes how far it is, twice."""
-    monkeypatch.setattr(progress, "acreate_progress_artifact", page.create)
-    monkeypatch.setattr(progress, "aupdate_progress_artifact", page.update)
+    monkeypatch.setattr(artifacts, "acreate_progress_artifact", page.create)
+    monkeypatch.setattr(artifacts, "aupdate_progress_artifact", page.update)
     monkeypatch.setattr(progress, "EVERY_S", 0.01)
 
     async def run() -> str:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from robojackson.errors import StoreError
 from robojackson.rl.config import EvaluateConfig, TrainConfig
 from storage import metrics, tables
 from storage.artifact import Artifact
@@ -64,3 +65,17 @@ def test_without_git_the_commit_is_what_the_environment_says(
     publishing._commit.cache_clear()
     assert publishing._commit() == "0123abc"
     publishing._commit.cache_clear()
+
+
+def test_a_study_reads_what_a_cell_left_from_the_store_alone(store_folder: Path) -> None:
+    left = publishing.publish(CELL, "r", made(Store(store_folder), b"p"))
+    assert publishing.published(CELL, "r") == left
+    assert left["episodes"].key.startswith("metrics/episodes/study=s/")
+
+
+def test_a_cell_that_left_nothing_in_this_store_is_named_with_what_to_do(
+    store_folder: Path,
+) -> None:
+    publishing.publish(CELL, "r", made(Store(store_folder), b"p"))
+    with pytest.raises(StoreError, match=r"scratch-walk-s0: .* no result of run other: .* store"):
+        publishing.published(CELL, "other")

@@ -160,7 +160,7 @@ def test_seeds_that_never_reach_the_threshold_are_counted_apart() -> None:
 
 
 def test_the_page_is_drawn_again_only_when_the_rows_change(
-    records: Path, store_folder: Path, monkeypatch: pytest.MonkeyPatch
+    records: None, store_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drawn: list[str] = []
 

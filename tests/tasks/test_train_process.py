@@ -1,7 +1,6 @@
 """A training is a process of its own: it leaves no orphan, and its death has a name."""
 
 import asyncio
-import logging
 import signal
 import subprocess
 import sys
@@ -15,11 +14,6 @@ from tasks import process as task
 
 SLEEPER = "import time; print('started', file=__import__('sys').stderr, flush=True); time.sleep(60)"
 STUBBORN = f"import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN); {SLEEPER}"
-
-
-@pytest.fixture(autouse=True)
-def logger(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(task, "get_run_logger", lambda: logging.getLogger("train"))
 
 
 def run(code: str, folder: Path, limit_s: float | None = None) -> None:
