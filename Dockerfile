@@ -7,18 +7,20 @@ WORKDIR /app
 
 RUN useradd --create-home --uid 10001 jackson && chown jackson:jackson /app
 
-# System libraries first: they change least. bootstrap.sh knows which are missing.
+# System libraries first: they change least. bootstrap.sh lists those that are missing; pg_dump and
+# pg_restore (of the major version of docker-compose.yml's PostgreSQL) are for backup and restore.
 COPY tools/bootstrap.sh tools/bootstrap.sh
 RUN apt-get update -qq \
-    && apt-get install -y -qq --no-install-recommends $(sh tools/bootstrap.sh missing) \
+    && apt-get install -y -qq --no-install-recommends \
+        postgresql-client-15 $(sh tools/bootstrap.sh missing) \
     && rm -rf /var/lib/apt/lists/*
 
 USER jackson
 ARG TORCH_INDEX=""
 COPY --chown=jackson:jackson . .
-RUN TORCH_INDEX="$TORCH_INDEX" sh tools/bootstrap.sh install
+RUN TORCH_INDEX="$TORCH_INDEX" EXTRAS=fast,s3 sh tools/bootstrap.sh install
 
-# Last: it changes with every build. Tables say which commit made them; the image has no git.
+# Last: it changes with every build. Tables record which commit made them; the image has no git.
 ARG GIT_COMMIT=""
 ENV PATH=/app/.venv/bin:$PATH ROBOJACKSON_STORE=/app/store ROBOJACKSON_COMMIT=$GIT_COMMIT
 CMD ["robojackson", "doctor"]

@@ -4,6 +4,7 @@ One experiment is one `Study`; `configs/studies/*.yaml` are those that ship, and
 the deployments `ablation/paper` and `ablation/smoke` are the same text.
 """
 
+from dataclasses import field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -65,7 +66,7 @@ class Move:
 
 @dataclass(frozen=True, config=STRICT)
 class Study:
-    """One ablation.
+    """One ablation. How its cells are run (the last four fields) is no part of what it is.
 
     Attributes:
         name: Of the study, in the tables and on the page.
@@ -106,7 +107,7 @@ class Study:
     pipeline: str = "base"
     gate: bool = True
     train: dict[str, Any] = Field(default_factory=dict)
-    executor: Executor = "local"
-    slots: Annotated[int, Field(ge=1)] | None = None
-    timeout_minutes: Annotated[float, Field(gt=0)] = 240.0
-    retries: Annotated[int, Field(ge=0)] = 2
+    executor: Executor = field(default="local", compare=False)
+    slots: Annotated[int, Field(ge=1)] | None = field(default=None, compare=False)
+    timeout_minutes: Annotated[float, Field(gt=0)] = field(default=240.0, compare=False)
+    retries: Annotated[int, Field(ge=0)] = field(default=2, compare=False)

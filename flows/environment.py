@@ -37,10 +37,13 @@ SERVER = {
 def prepare_server(store: Store) -> None:
     """Set what a server of ours needs and the user has not set, for this process.
 
+    It reads the store and need not write it.
+
     Raises:
-        StoreError: too little room on the disk of the store.
+        StoreError: too little room on the disk of the database.
     """
-    prepare(store)
+    store.require_room(ROOM_MB)
+    _set_home(store)
     for names, value in SERVER.items():
         if not any(name in os.environ for name in names):
             os.environ[names[0]] = value
@@ -53,6 +56,10 @@ def prepare(store: Store) -> None:
         StoreError: too little room on the disk of the store; Prefect's server would hang on it.
     """
     store.require_writable(ROOM_MB)
+    _set_home(store)
+
+
+def _set_home(store: Store) -> None:
     wanted = {"PREFECT_HOME": str(store.here / HOME), **FIXED}
     for name, value in wanted.items():
         os.environ.setdefault(name, value)

@@ -75,17 +75,20 @@ def deploy(
 
 @command
 def server(
-    host: Annotated[str, typer.Option(help="Where to listen; 0.0.0.0 is every network.")] = (
-        "127.0.0.1"
-    ),
-    port: Annotated[int, typer.Option(min=1, max=65535, help="Where to listen.")] = 4200,
+    host: Annotated[
+        str,
+        typer.Option(
+            envvar="PREFECT_SERVER_API_HOST", help="Where to listen; 0.0.0.0 is every network."
+        ),
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option(envvar="PREFECT_SERVER_API_PORT", min=1, max=65535)] = 4200,
     as_json: Json = False,
 ) -> Answer:
     """Prefect's server and pages, with the results of the store; Ctrl-C ends it."""
     from flows.environment import prepare_server
     from storage.store import Store
 
-    store = Store.from_environment().create()
+    store = Store.from_environment()
     prepare_server(store)
     from flows.serving import serve
 

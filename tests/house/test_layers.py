@@ -18,14 +18,14 @@ MAY_IMPORT = {
 LAYERS = tuple(MAY_IMPORT)
 MAY_IMPORT_PREFECT = {"tasks", "flows"}
 WITHOUT_PREFECT = (
-    *("adding", "bars", "cli", "console", "doctor", "environment", "export", "formats"),
+    *("adding", "backups", "bars", "cli", "console", "doctor", "environment", "export", "formats"),
     *("importing", "learning", "look", "network", "options", "people", "robots", "scoring"),
     *("search", "single", "source", "start", "studies", "training", "walker"),
 )
 """Modules of `flows` that the one-stage commands load."""
 LIGHT = {
     *("typer", "flows.console", "flows.formats", "flows.learning", "flows.options"),
-    *("flows.robots", "flows.search", "flows.studies", "robojackson.errors"),
+    *("flows.backups", "flows.robots", "flows.search", "flows.studies", "robojackson.errors"),
 }
 """What the command line may import before it knows the command, beside the standard library."""
 

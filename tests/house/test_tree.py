@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 ROOT = Path(__file__).parents[2]
-NOT_OURS = {"store", "build", "node_modules", "__pycache__"}
+NOT_OURS = {"store", "backup", "build", "node_modules", "__pycache__"}
 TEXT = {".py", ".md", ".toml", ".yaml", ".yml", ".txt", ".cfg", ".html", ".css", ".example", ""}
 MACHINE_PATH = re.compile(r"(?<![\w.$}])/(?:work|home|root|Users)/\w")
 INDEX_HOST = re.compile(r"https?://\S*(?:/simple\b|pypi|whl/|npm)|--(?:extra-)?index-url[= ]+http")
