@@ -2,7 +2,8 @@
 #
 #   make dance    the hip-shake clip, from video to a dancing robot (ARGS="--minutes 5" and others)
 #   make test     all tests (ARGS="tests/mocap -x")
-#   make test-stack  the whole stack as processes, end to end (minutes; apt-get install postgresql)
+#   make test-stack  the whole stack and the documented server as processes, end to end (half an
+#                 hour; apt-get install postgresql chromium)
 #   make bench    accuracy of the mocap stage against ground truth, cost of judging a clip
 #   make bench-mocap  the first of the two alone, writes benchmarks/results/mocap.json and .md
 #   make bench-retarget  our solver beside the paper's mapping and mink (pip install -e '.[bench]')

@@ -5,7 +5,6 @@ import json
 import logging
 import math
 import os
-import shlex
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -19,10 +18,12 @@ import typer
 from pydantic import ValidationError
 
 from flows.bars import bar as bar
+from flows.interruption import INTERRUPTED, conclude
+from flows.interruption import complain as complain
+from flows.interruption import same_command as same_command
 from robojackson.errors import RoboJacksonError, StoreError
 
 P = ParamSpec("P")
-INTERRUPTED = 130
 SECONDS_BETWEEN_LINES = 15.0
 """Of progress, where every line stays."""
 USAGE_ERROR: Any = typer.BadParameter.__bases__[0]
@@ -67,9 +68,9 @@ def command(body: Callable[P, Answer]) -> Callable[P, None]:
         except OSError as cause:
             _leave(1, f"StoreError: {cause}")
         except Interrupted as cause:
-            _leave(INTERRUPTED, f"interrupted: {cause}")
+            _leave_interrupted(f"interrupted: {cause}")
         except KeyboardInterrupt:
-            _leave(INTERRUPTED, "interrupted")
+            _leave_interrupted(f"interrupted: resume: {same_command()}")
         try:
             say(answer, as_json=bool(kwargs.get("as_json")))
         except BrokenPipeError:  # whoever reads has enough
@@ -142,11 +143,6 @@ def log_to_stderr() -> None:
         logging.getLogger(noisy).setLevel(logging.WARNING)
 
 
-def same_command() -> str:
-    """The command line that was given, to be given again."""
-    return "robojackson " + " ".join(shlex.quote(word) for word in sys.argv[1:])
-
-
 @contextmanager
 def ticker() -> Iterator[Callable[[str], None]]:
     """A line on stderr that replaces itself; line after line where there is no terminal."""
@@ -195,12 +191,6 @@ def stdout_is_stderr() -> Iterator[None]:
         os.close(saved)
 
 
-def complain(line: str) -> None:
-    """One line of cause on stderr."""
-    plain_text = "".join(c if c.isprintable() else "?" for c in " ".join(line.split()))
-    sys.stderr.write(f"robojackson: {plain_text}\n")
-
-
 def misused(cause: Any) -> str:
     """What typer does not understand of the words that were given, with the value in question."""
     message = cause.format_message().rstrip(".")
@@ -213,6 +203,11 @@ def misused(cause: Any) -> str:
 def _leave(code: int, line: str) -> None:
     complain(line)
     raise typer.Exit(code)
+
+
+def _leave_interrupted(line: str) -> None:
+    conclude(line)
+    raise typer.Exit(INTERRUPTED)
 
 
 def _word(value: Any) -> str:

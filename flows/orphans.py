@@ -1,52 +1,119 @@
-"""A flow that dies leaves nothing behind, not even when it is killed without a word.
+"""The processes that a command has started: found by a mark in their environment, and ended.
 
 Prefect starts its temporary server as a child, which outlives a SIGKILL of its parent. So a tiny
 process waits at the other end of a pipe: when the pipe closes without a farewell, it ends every
 process that carries this flow's mark in its environment. Linux only; elsewhere it does nothing.
+Only the standard library is imported here.
 """
 
 import os
 import signal
-import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 VARIABLE = "ROBOJACKSON_FLOW"
 FAREWELL = b"all is well"
+HALF_WRITTEN = ".part-"
+"""Beginning of the names of files that are being written: `storage.places.TEMPORARY`, whose import
+is heavy."""
+DIE_WITH_PARENT = 1
+"""PR_SET_PDEATHSIG of prctl(2)."""
+KILL_S = 0.5
+"""How long killed processes may take to be gone, seconds."""
+
+
+def new_mark() -> str:
+    """Return a mark that no other process carries."""
+    return f"{os.getpid()}-{os.urandom(8).hex()}"
 
 
 @contextmanager
 def none_left() -> Iterator[None]:
-    """Inside, every process that is started ends with this one."""
+    """Inside, every process that is started ends with this one, which may carry a mark already."""
+    import subprocess
+
     if not Path("/proc/self/environ").exists():
         yield
         return
-    mark = f"{os.getpid()}-{os.urandom(8).hex()}"
+    given = os.environ.get(VARIABLE)
+    mark = os.environ[VARIABLE] = given or new_mark()
     command = [sys.executable, "-S", "-E", __file__, mark]
     watch = subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True)
-    os.environ[VARIABLE] = mark
     try:
         yield
     finally:
-        del os.environ[VARIABLE]
+        if given is None:
+            del os.environ[VARIABLE]
         watch.communicate(FAREWELL)
 
 
+def end_with_parent(parent: int) -> bool:
+    """Have the kernel kill this process when its parent ends; return whether it is still there."""
+    if sys.platform == "linux":
+        import ctypes
+
+        ctypes.CDLL(None).prctl(DIE_WITH_PARENT, signal.SIGKILL, 0, 0, 0)
+    return os.getppid() == parent
+
+
+def marked(mark: str) -> set[int]:
+    """Return the living processes that carry the mark, this one left out."""
+    variable = f"{VARIABLE}={mark}".encode()
+    pids = (int(folder.name) for folder in Path("/proc").iterdir() if folder.name.isdigit())
+    return {pid for pid in pids if variable in _environment(pid)} - {os.getpid()}
+
+
 def end_all(mark: str) -> None:
-    """End every process that carries the mark."""
-    wanted = f"{VARIABLE}={mark}".encode()
-    for folder in Path("/proc").iterdir():
-        if folder.name.isdigit() and wanted in _environment(folder):
-            os.kill(int(folder.name), signal.SIGTERM)
+    """Ask every process that carries the mark to end."""
+    _signal(marked(mark), signal.SIGTERM)
 
 
-def _environment(folder: Path) -> list[bytes]:
+def kill_all(mark: str, *more: int) -> set[Path]:
+    """Kill every process that carries the mark, and these; return what they were writing."""
+    deadline = time.monotonic() + KILL_S
+    doomed = {*more, *marked(mark)}
+    _signal(doomed, signal.SIGSTOP)  # so that none begins another file
+    files = half_written(doomed)
+    while doomed and time.monotonic() < deadline:
+        _signal(doomed, signal.SIGKILL)
+        doomed = marked(mark)
+    return files
+
+
+def half_written(pids: Iterable[int]) -> set[Path]:
+    """Return the files with temporary names that processes have open."""
+    files = {Path(name) for pid in pids for name in _open_files(pid)}
+    return {file for file in files if file.name.startswith(HALF_WRITTEN)}
+
+
+def holding(name: str, pids: Iterable[int]) -> set[int]:
+    """Return those of the processes that hold a memory file of that name open."""
+    return {pid for pid in pids if any(f.startswith(f"/memfd:{name} ") for f in _open_files(pid))}
+
+
+def _signal(pids: Iterable[int], number: signal.Signals) -> None:
+    for pid in pids:
+        with suppress(ProcessLookupError):
+            os.kill(pid, number)
+
+
+def _environment(pid: int) -> list[bytes]:
     try:
-        return (folder / "environ").read_bytes().split(b"\0")
+        return Path(f"/proc/{pid}/environ").read_bytes().split(b"\0")
     except OSError:  # ended meanwhile, or another user's
         return []
+
+
+def _open_files(pid: int) -> Iterator[str]:
+    """Yield the names of the files that a process has open."""
+    folder = f"/proc/{pid}/fd"
+    with suppress(OSError):  # as above
+        for number in os.listdir(folder):
+            with suppress(OSError):
+                yield os.readlink(f"{folder}/{number}")
 
 
 if __name__ == "__main__":

@@ -1,17 +1,21 @@
-"""Where the command starts: nothing heavy is imported before Ctrl-C gets its one line."""
+"""Where the command starts: nothing heavy is imported before Ctrl-C is guarded."""
 
 import sys
 
-INTERRUPTED = 130
+from flows.interruption import INTERRUPTED, conclude, same_command
+from flows.supervisor import guarded
 
 
 def main() -> None:
-    """Entry point of the console script; ends the process."""
+    """Run the console script and end the process."""
+    sys.exit(guarded(_command))
+
+
+def _command() -> int:
     try:
         from flows.cli import main as command
 
-        code = command()
+        return command()
     except KeyboardInterrupt:
-        sys.stderr.write("robojackson: interrupted\n")
-        code = INTERRUPTED
-    sys.exit(code)
+        conclude(f"interrupted: resume: {same_command()}")
+        return INTERRUPTED

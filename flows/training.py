@@ -4,13 +4,10 @@ A process of its own, with no Prefect in memory. It can be told to die with the 
 it, and it holds a lock on its folder, so that no two trainings share a checkpoint.
 """
 
-import ctypes
 import json
 import logging
 import math
-import os
 import signal
-import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -21,6 +18,8 @@ from typing import TYPE_CHECKING, Any
 
 from configs.loader import load
 from flows import console, single
+from flows.interruption import STOPS, UnsavedFlag, is_guarded
+from flows.orphans import end_with_parent
 from storage.lock import locked
 from storage.records import RecordLog
 from storage.schemas import EPISODE_RECORD
@@ -33,8 +32,6 @@ log = logging.getLogger(__name__)
 
 PROGRESS = "progress.json"
 """How far a training is, in its folder."""
-DIE_WITH_PARENT = 1
-"""PR_SET_PDEATHSIG of prctl(2)."""
 USUAL_MINUTES = 9.0
 """Wall time of a training for which no budget is given."""
 SETUPS = {
@@ -83,7 +80,7 @@ def train(
     require_trainable(robot)
     if not force:
         check(told(motion))
-    stop = _Wish(out)
+    stop = _StopRequest(out)
     common = _common(config, move or single.move_of(reference), setup, run_id)
     with (
         stop.listening(),
@@ -97,7 +94,9 @@ def train(
             if asked:
                 tell(asks(asked))
             told_of = partial(_told, out=out, tell=tell)
-            hooks = Hooks(told_of, rows.add, rows.save, stop, common["setup"])
+            hooks = Hooks(
+                told_of, rows.add, stop.unsaved.set, rows.save, stop, setup=common["setup"]
+            )
             result = learn(motion, robot, config, out, hooks)
         except KeyboardInterrupt:
             there = newest_checkpoint(out)
@@ -160,38 +159,43 @@ def _number(value: float, digits: int) -> str:
 
 def die_with(parent: int) -> None:
     """Ask the kernel to end this process when the one that started it ends (Linux only)."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(DIE_WITH_PARENT, signal.SIGKILL, 0, 0, 0)
-    if os.getppid() != parent:
+    if not end_with_parent(parent):
         raise console.Interrupted("the process that started this training is gone")
 
 
-class _Wish:
-    """Whether somebody wants the training to stop; who asks twice does not wait for it."""
+class _StopRequest:
+    """Whether the training is to stop, and whether it has learning to save when it does.
+
+    Attributes:
+        unsaved: The flag for which the supervisor of the command waits.
+    """
 
     def __init__(self, out: Path) -> None:
-        self._out, self._heard = out, False
+        self._out, self._received = out, False
+        self.unsaved = UnsavedFlag()
 
     def __call__(self) -> bool:
-        return self._heard
+        return self._received
 
     @contextmanager
     def listening(self) -> Iterator[None]:
-        """Ctrl-C and SIGTERM are this wish, and afterwards what they were."""
-        wishes = (signal.SIGINT, signal.SIGTERM)
-        before = [(wish, signal.signal(wish, self.heard)) for wish in wishes]
+        """Receive Ctrl-C and SIGTERM inside; afterwards restore handlers and clear the flag."""
+        before = [(number, signal.signal(number, self.receive)) for number in STOPS]
         try:
             yield
         finally:
-            for wish, handler in before:
-                signal.signal(wish, handler)
+            self.unsaved.clear()
+            for number, handler in before:
+                signal.signal(number, handler)
 
-    def heard(self, number: int, frame: object) -> None:
-        """Handler of the signal."""
-        if self._heard:
+    def receive(self, number: int, frame: object) -> None:
+        """Handle a signal; a second one ends a training that has no supervisor to do so."""
+        if not self._received:
+            self._received = True
+            checkpoint = f", with a checkpoint in {self._out}" if self.unsaved.is_set else ""
+            log.warning("stopping after this round of updates%s", checkpoint)
+        elif not is_guarded():
             raise KeyboardInterrupt
-        self._heard = True
-        log.warning("stopping after this round of updates, with a checkpoint in %s", self._out)
 
 
 class _EpisodeLog:

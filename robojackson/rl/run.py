@@ -51,7 +51,7 @@ class Run:
         self.out, self.config, self.core, self.task = out, config, core, task
         self._hooks, self._replay = hooks, out / "replay"
         self._recent: deque[Row] = deque(maxlen=RECENT_EPISODES)
-        self._before = 0.0
+        self._before, self._has_learnt = 0.0, False
         self._began = self._saved = self._told = time.monotonic()
         self._cpu_before, self._cpu_began = 0.0, time.process_time()
         self._board = ScalarLog(out / "tensorboard") if config.tensorboard else None
@@ -60,7 +60,7 @@ class Run:
 
     def bind(self, trainer: Trainer) -> None:
         """Attach the trainer; continue from a checkpoint when there is one."""
-        self.trainer, self._first_step = trainer, 0
+        self.trainer, self._first_step, self._saved_updates = trainer, 0, 0
         folder = newest_checkpoint(self.out)
         if folder is None:  # what is there without one is another training's
             shutil.rmtree(self._replay, ignore_errors=True)
@@ -79,6 +79,7 @@ class Run:
         self.core.rng.bit_generator.state = state["random"]
         self._before, self._first_step = state["seconds"], state["steps"]
         self._cpu_before = state["cpu_seconds"]
+        self._saved_updates = state["updates"]
         log.info("resuming at %d steps", state["steps"])
 
     def seconds(self) -> float:
@@ -116,6 +117,9 @@ class Run:
         layers, updates = self.trainer.acting()
         self._require_finite(array for layer in layers for array in layer)
         self._average.add(layers, updates)
+        if not self._has_learnt and self.trainer.updates() > self._saved_updates:
+            self._has_learnt = True
+            self._hooks.learnt()
         try:
             started = self.trainer.steps() > self._first_step
             if started and now - self._told >= self.config.progress_seconds:

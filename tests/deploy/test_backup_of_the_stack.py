@@ -14,7 +14,7 @@ import pytest
 from tools import postgres, seaweed
 from tools.stack import QUICK, Stack
 
-pytestmark = [pytest.mark.cluster, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.cluster, pytest.mark.ci, pytest.mark.timeout(900)]
 CORE = ("postgres", "s3", "prefect-server", "setup")
 RUNS = 3
 FILES = {

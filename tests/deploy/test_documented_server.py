@@ -123,7 +123,7 @@ def end(folder: Path) -> None:
             os.kill(found.pid, how)
 
 
-@pytest.fixture(scope="module", params=["sqlite", "postgresql"])
+@pytest.fixture(scope="module", params=[pytest.param("sqlite", marks=pytest.mark.ci), "postgresql"])
 def documented(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Documented]:

@@ -92,6 +92,7 @@ def others(stack: Stack) -> list[Found]:
     return [f for f in under(stack.folder / "home") if f.pid not in services]
 
 
+@pytest.mark.ci
 def test_nine_cells_leave_nine_tables_and_a_second_run_finds_them(stack: Stack) -> None:
     first = prefect(stack, "deployment", "run", "ablation/smoke", "--watch")
     assert first.returncode == 0, first.stdout[-2000:]
@@ -141,6 +142,7 @@ def test_the_runs_of_a_dead_worker_are_marked_crashed(stack: Stack) -> None:
     assert [r["name"] for r in dead] == ["scratch-hip_shake-s0"]
 
 
+@pytest.mark.ci
 def test_nonsense_is_refused_before_a_run_starts(stack: Stack) -> None:
     wrong = json.dumps({"name": "x", "setups": ["bogus"]})
     said = prefect(stack, "deployment", "run", "ablation/smoke", "-p", f"study={wrong}")
@@ -148,17 +150,20 @@ def test_nonsense_is_refused_before_a_run_starts(stack: Stack) -> None:
     assert "bogus" in said.stdout + said.stderr
 
 
+@pytest.mark.ci
 def test_a_dance_is_asked_for_by_its_name_and_not_by_nothing(stack: Stack) -> None:
     said = prefect(stack, "deployment", "run", "dance/on-demand", "-p", "source= ")
     assert said.returncode != 0
     assert "source" in said.stdout + said.stderr
 
 
+@pytest.mark.ci
 def test_the_nightly_refresh_is_planned_by_the_server(stack: Stack) -> None:
     planned = until(lambda: listed(stack, "--flow-name", "refresh", "--state", "Scheduled"), 120.0)
     assert {run["expected_start_time"][11:16] for run in planned} == {"03:00"}
 
 
+@pytest.mark.ci
 def test_the_server_refuses_strangers(stack: Stack) -> None:
     run = prefect(stack, "deployment", "ls", PREFECT_API_AUTH_STRING="robojackson:wrong")
     assert run.returncode != 0

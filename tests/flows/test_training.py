@@ -1,5 +1,6 @@
 """What the training process says, takes for granted and leaves behind."""
 
+import os
 import signal
 from pathlib import Path
 from types import SimpleNamespace
@@ -8,11 +9,14 @@ import pytest
 
 from configs.loader import load
 from flows import single, training
+from flows.interruption import UNSAVED
+from flows.orphans import VARIABLE, holding
 from robojackson.errors import RejectedReference
 from robojackson.retarget.robot import RobotDescription, load_robot
 from robojackson.rl import shares
 from robojackson.rl import train as learning
 from robojackson.rl.config import TrainConfig
+from robojackson.rl.hooks import Hooks
 
 NAN = float("nan")
 ROW = {"steps": 1000, "steps_per_s": 500.0, "survived_s": NAN, "site_error_m": NAN}
@@ -102,16 +106,61 @@ def test_a_run_is_called_by_its_file_or_by_what_it_does(
 
 
 def test_after_a_training_signals_are_what_they_were(tmp_path: Path) -> None:
-    wish, before = training._Wish(tmp_path), signal.getsignal(signal.SIGINT)
-    with wish.listening():
-        assert signal.getsignal(signal.SIGINT) == wish.heard
+    request, before = training._StopRequest(tmp_path), signal.getsignal(signal.SIGINT)
+    with request.listening():
+        assert signal.getsignal(signal.SIGINT) == request.receive
+        request.unsaved.set()
     assert signal.getsignal(signal.SIGINT) is before
+    assert not request.unsaved.is_set
 
 
-def test_who_asks_twice_does_not_wait_for_a_checkpoint(tmp_path: Path) -> None:
-    wish = training._Wish(tmp_path)
-    assert not wish()
-    wish.heard(2, None)
-    assert wish()
+def test_a_second_signal_does_not_wait_for_a_checkpoint(tmp_path: Path) -> None:
+    request = training._StopRequest(tmp_path)
+    assert not request()
+    request.receive(2, None)
+    assert request()
     with pytest.raises(KeyboardInterrupt):
-        wish.heard(2, None)
+        request.receive(2, None)
+
+
+def test_under_a_supervisor_a_second_signal_does_not_cut_a_checkpoint_short(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The supervisor and the task each send one; ending at once is the supervisor's part."""
+    monkeypatch.setenv(VARIABLE, "mark")
+    request = training._StopRequest(tmp_path)
+    request.receive(15, None)
+    request.receive(15, None)
+    assert request()
+
+
+@pytest.mark.parametrize("has_learnt", [False, True])
+def test_a_checkpoint_is_announced_where_there_is_learning_to_save(
+    has_learnt: bool, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    request = training._StopRequest(tmp_path)
+    if has_learnt:
+        request.unsaved.set()
+    request.receive(2, None)
+    request.unsaved.clear()
+    assert (f"with a checkpoint in {tmp_path}" in caplog.text) == has_learnt
+
+
+def test_a_signal_before_any_learning_finds_the_flag_down(
+    budgets: list, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The flag is what the supervisor waits for: the training's hook sets it, the end clears it."""
+    flags: list[tuple[bool, set[int]]] = []
+    ours = {os.getpid()}
+
+    def learn(motion, robot, config: TrainConfig, out: Path, hooks: Hooks) -> None:
+        flags.append((False, holding(UNSAVED, ours)))
+        hooks.learnt()
+        flags.append((True, holding(UNSAVED, ours)))
+        raise RejectedReference("no")
+
+    monkeypatch.setattr(learning, "train", learn)
+    with pytest.raises(RejectedReference):
+        training.train(tmp_path / "reference.parquet", tmp_path / "out", None, {}, force=True)
+    assert flags == [(False, set()), (True, ours)]
+    assert holding(UNSAVED, ours) == set()
