@@ -202,7 +202,7 @@ def conclude(
 
 
 def _budgeted(settings: PipelineConfig) -> Any:
-    """Return the training's configuration; what is left of the pass is its budget if it has none."""
+    """Return the training's configuration, by default with what is left of the pass as its budget."""
     config = settings.train
     if config.has_budget:
         if (config.minutes or 0.0) > settings.train_minutes:
