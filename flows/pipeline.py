@@ -202,7 +202,7 @@ def conclude(
 
 
 def _budgeted(settings: PipelineConfig) -> Any:
-    """Return the training's configuration, by default with what is left of the pass as its budget."""
+    """Return the training's configuration; its default budget is what is left of the pass."""
     config = settings.train
     if config.has_budget:
         if (config.minutes or 0.0) > settings.train_minutes:

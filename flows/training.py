@@ -94,9 +94,7 @@ def train(
             if asked:
                 tell(asks(asked))
             told_of = partial(_told, out=out, tell=tell)
-            hooks = Hooks(
-                told_of, rows.add, stop.unsaved.set, rows.save, stop, setup=common["setup"]
-            )
+            hooks = Hooks(told_of, rows.add, stop.learnt, rows.save, stop, setup=common["setup"])
             result = learn(motion, robot, config, out, hooks)
         except KeyboardInterrupt:
             there = newest_checkpoint(out)
@@ -187,6 +185,12 @@ class _StopRequest:
             self.unsaved.clear()
             for number, handler in before:
                 signal.signal(number, handler)
+
+    def learnt(self) -> None:
+        """Set the flag; a training that is already to stop does not delay its end by what it has
+        only just begun to learn."""
+        if not self._received:
+            self.unsaved.set()
 
     def receive(self, number: int, frame: object) -> None:
         """Handle a signal; a second one ends a training that has no supervisor to do so."""

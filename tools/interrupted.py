@@ -23,7 +23,7 @@ class End:
     Attributes:
         moment_s: When it was interrupted, seconds after its start.
         acknowledged_s, ended_s: From the signal to the first line about it, and to the end.
-        saving: Whether the acknowledgement spoke of a checkpoint.
+        saving: Whether it said that a checkpoint is being saved.
         code: Exit code.
         lines: What it wrote after the signal.
         faults: What is wrong with it, empty if nothing is.
@@ -102,7 +102,7 @@ class Running:
             sent - self.began,
             first[0] - sent,
             ended - sent,
-            "saving" in first[1],
+            any("saving" in line for _, line in after),
             code,
             tuple(line for _, line in after),
             tuple(faults),

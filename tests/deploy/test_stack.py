@@ -92,7 +92,6 @@ def others(stack: Stack) -> list[Found]:
     return [f for f in under(stack.folder / "home") if f.pid not in services]
 
 
-@pytest.mark.ci
 def test_nine_cells_leave_nine_tables_and_a_second_run_finds_them(stack: Stack) -> None:
     first = prefect(stack, "deployment", "run", "ablation/smoke", "--watch")
     assert first.returncode == 0, first.stdout[-2000:]
@@ -107,6 +106,7 @@ def test_nine_cells_leave_nine_tables_and_a_second_run_finds_them(stack: Stack) 
     assert ask(stack, "SELECT count(*) AS n FROM runs") == [{"n": 9}]
 
 
+@pytest.mark.ci
 def test_a_killed_cell_is_named_and_its_neighbour_is_in_the_tables(stack: Stack) -> None:
     run = begin(stack, name="killed", retries=0, steps=2000)
     assert until(lambda: trainings(stack))[0].kill()

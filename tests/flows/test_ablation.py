@@ -66,6 +66,8 @@ def play(
 ) -> Callable[..., dict[str, Any]]:
     """Run the flow with played cells, motions and page; the motions and the page are not ours."""
     page = Store(store_folder).put("studies/index.html", b"page")
+    table = Store(store_folder).put("studies/table.csv", b"")
+    results = Store(store_folder).put("studies/results.json", b'{"claims": []}')
     still = Store(store_folder).put("still.png", b"png")
     motions = {"reference": REFERENCE, "still": still, "payments": still}
 
@@ -77,7 +79,7 @@ def play(
         study: Study, moves: object, rows: list[Artifact], stills: object, payments: object
     ) -> dict[str, Artifact]:
         run.shown = {row.name for row in rows}  # type: ignore[attr-defined]
-        return {"page": page}
+        return {"page": page, "table": table, "results": results}
 
     infeasible = 0.0
     monkeypatch.setattr(ablation, "motion", motion)

@@ -134,13 +134,20 @@ def test_under_a_supervisor_a_second_signal_does_not_cut_a_checkpoint_short(
     assert request()
 
 
+def test_what_is_first_learnt_after_the_signal_does_not_delay_the_end(tmp_path: Path) -> None:
+    request = training._StopRequest(tmp_path)
+    request.receive(2, None)
+    request.learnt()
+    assert not request.unsaved.is_set
+
+
 @pytest.mark.parametrize("has_learnt", [False, True])
 def test_a_checkpoint_is_announced_where_there_is_learning_to_save(
     has_learnt: bool, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     request = training._StopRequest(tmp_path)
     if has_learnt:
-        request.unsaved.set()
+        request.learnt()
     request.receive(2, None)
     request.unsaved.clear()
     assert (f"with a checkpoint in {tmp_path}" in caplog.text) == has_learnt
