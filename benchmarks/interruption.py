@@ -150,8 +150,12 @@ def main() -> None:
         for name, words in commands(Path(inputs)).items():
             if options.commands and name not in options.commands:
                 continue
-            load = os.getloadavg()[0]
-            made[name] = measure(words, options.moments, rng) | {"load_before": round(load, 2)}
+            how = {
+                "command": " ".join(["python -m benchmarks.interruption", *sys.argv[1:]]),
+                "date": datetime.now(UTC).isoformat(timespec="seconds"),
+                "load_before": round(os.getloadavg()[0], 2),
+            }
+            made[name] = how | measure(words, options.moments, rng)
             shown = {key: value for key, value in made[name].items() if key != "ends"}
             print(name, json.dumps(shown), flush=True)
             for end in made[name]["ends"]:
@@ -160,13 +164,7 @@ def main() -> None:
                     key: round(end[key], 3) for key in ("moment_s", "acknowledged_s", "ended_s")
                 }
     known = json.loads(RESULTS.read_text())["commands"] if RESULTS.exists() else {}
-    result = {
-        "what": __doc__,
-        "command": " ".join(["python -m benchmarks.interruption", *sys.argv[1:]]),
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "cores": os.cpu_count(),
-        "commands": known | made,
-    }
+    result = {"what": __doc__, "cores": os.cpu_count(), "commands": known | made}
     RESULTS.write_text(json.dumps(result, indent=1) + "\n")
     if not all(one["passed"] for one in made.values()):
         raise SystemExit("a bar is missed or an end has faults: see above")

@@ -98,7 +98,7 @@ class Cluster:
                 time.sleep(1)
 
     def alive(self) -> list[str]:
-        services = {s.process.pid for s in self._services("") if s.process}
+        services = self._stack.pids
         found = [f for f in under(self._homes) if f.pid not in services]
         return [f"{f.pid} {f.command[:90]}" for f in found if not _is_check(f)]
 

@@ -76,6 +76,25 @@ def _holds(question: Callable[[], bool]) -> bool:
     return question()
 
 
+def forks(pid: int) -> set[int]:
+    """Return the children of a process that run its own command: what a supervisor guards."""
+    entries = [entry for entry in Path("/proc").iterdir() if entry.name.isdigit()]
+    command = _command(Path(f"/proc/{pid}"))
+    return {int(e.name) for e in entries if _parent(e) == pid and _command(e) == command}
+
+
+def _command(entry: Path) -> bytes:
+    with suppress(OSError):
+        return (entry / "cmdline").read_bytes()
+    return b""
+
+
+def _parent(entry: Path) -> int:
+    with suppress(OSError):
+        return int((entry / "stat").read_text().rpartition(")")[2].split()[1])
+    return 0
+
+
 def cpu_seconds(pid: int) -> float:
     """Processor time of a process and of all below it, those that have ended included."""
     children: dict[int, list[int]] = {}

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from tools.processes import forks
+
 ROOT = Path(__file__).parent.parent
 VARIABLE = re.compile(r"\$\{(\w+)(?:(:[?-])([^}]*))?\}")
 HEALTHY_S = 600.0
@@ -81,6 +83,13 @@ class Service:
             if time.monotonic() > end:
                 raise StackError(f"{self.name} is not healthy after {seconds:.0f} s; {self.log}")
             time.sleep(0.5)
+
+    @property
+    def pids(self) -> set[int]:
+        """The process, and the one that runs the command where this one supervises it."""
+        if self.process is None:
+            return set()
+        return {self.process.pid, *forks(self.process.pid)}
 
     def kill(self, how: signal.Signals = signal.SIGKILL) -> None:
         """Send a signal to the process and all its children."""

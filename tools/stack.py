@@ -122,6 +122,11 @@ class Stack:
             _found(words), env=environment, cwd=ROOT, capture_output=True, text=True, check=False
         )
 
+    @property
+    def pids(self) -> set[int]:
+        """The processes of the services themselves, without the runs that workers have started."""
+        return {pid for service in self.services.values() for pid in service.pids}
+
     def client(self) -> dict[str, str]:
         """The environment of a command beside the stack: what a worker has."""
         return self._environment(CLIENT, "client")

@@ -88,7 +88,7 @@ def trainings(stack: Stack) -> list[Found]:
 
 def others(stack: Stack) -> list[Found]:
     """Every process but the services'."""
-    services = {service.process.pid for service in stack.services.values() if service.process}
+    services = stack.pids
     return [f for f in under(stack.folder / "home") if f.pid not in services]
 
 
