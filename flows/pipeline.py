@@ -149,28 +149,18 @@ async def perform(
         began: When the budget of the pass began, Unix time, seconds.
     """
     with labelled(labels.move):
-        return await _perform(best, robot, settings, labels, began)
-
-
-async def _perform(
-    best: Candidate,
-    robot: RobotDescription,
-    settings: PipelineConfig,
-    labels: RunLabels,
-    began: float,
-) -> Artifacts:
-    moved = to_reference(best.clip, robot, settings)
-    reference = moved["reference"]
-    if settings.gate:
-        check(json.loads(Store.from_environment().read(moved["scorecard"].key)))
-    deadline = began + 60 * (settings.minutes - LAST_STAGES_MINUTES)
-    trained = await train(reference, robot, _budgeted(settings), labels, deadline)
-    judged = evaluate(trained["policy"], reference, robot, settings.evaluate, labels)
-    seen = (best.clip["video"], moved["landmarks"], moved["smpl"], reference, judged["rollout"])
-    film = video(*seen, robot, settings.show)
-    made = {**best.clip, "stability": best.stability, **moved}
-    made |= {**trained, **judged, "dance": film, "still": snapshot(film)}
-    return {**made, **page(made, labels.move, best.name)}
+        moved = to_reference(best.clip, robot, settings)
+        reference = moved["reference"]
+        if settings.gate:
+            check(json.loads(Store.from_environment().read(moved["scorecard"].key)))
+        deadline = began + 60 * (settings.minutes - LAST_STAGES_MINUTES)
+        trained = await train(reference, robot, _budgeted(settings), labels, deadline)
+        judged = evaluate(trained["policy"], reference, robot, settings.evaluate, labels)
+        shown = (best.clip["video"], moved["landmarks"], moved["smpl"], reference)
+        film = video(*shown, judged["rollout"], robot, settings.show)
+        made = {**best.clip, "stability": best.stability, **moved, **trained, **judged}
+        made |= {"dance": film, "still": snapshot(film)}
+        return {**made, **page(made, labels.move, best.name)}
 
 
 def conclude(

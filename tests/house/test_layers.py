@@ -19,8 +19,9 @@ LAYERS = tuple(MAY_IMPORT)
 MAY_IMPORT_PREFECT = {"tasks", "flows"}
 WITHOUT_PREFECT = (
     *("adding", "backups", "bars", "cli", "console", "doctor", "environment", "export", "formats"),
-    *("importing", "learning", "look", "network", "options", "people", "robots", "scoring"),
-    *("search", "single", "source", "start", "studies", "training", "walker"),
+    *("importing", "interruption", "learning", "look", "network", "options", "orphans", "people"),
+    *("robots", "scoring", "search", "single", "source", "start", "studies", "supervisor"),
+    *("training", "walker"),
 )
 """Modules of `flows` that the one-stage commands load."""
 LIGHT = {
