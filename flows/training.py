@@ -5,8 +5,8 @@ it, and it holds a lock on its folder, so that no two trainings share a checkpoi
 """
 
 import json
-import logging
 import math
+import os
 import signal
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -27,8 +27,6 @@ from storage.store import Store
 
 if TYPE_CHECKING:
     from robojackson.rl.config import TrainConfig
-
-log = logging.getLogger(__name__)
 
 PROGRESS = "progress.json"
 """How far a training is, in its folder."""
@@ -197,7 +195,8 @@ class _StopRequest:
         if not self._received:
             self._received = True
             checkpoint = f", with a checkpoint in {self._out}" if self.unsaved.is_set else ""
-            log.warning("stopping after this round of updates%s", checkpoint)
+            # Not by the log: the signal may come while a line is being written there.
+            os.write(2, f"stopping after this round of updates{checkpoint}\n".encode())
         elif not is_guarded():
             raise KeyboardInterrupt
 

@@ -42,7 +42,8 @@ class Running:
     """A command with a store of its own, whose lines on stderr are read as they come."""
 
     def __init__(self, words: Sequence[str], store: Path) -> None:
-        environment = {**os.environ, "ROBOJACKSON_STORE": str(store), "OMP_NUM_THREADS": "1"}
+        kept = {k: v for k, v in os.environ.items() if not k.startswith("PREFECT_")}
+        environment = {**kept, "ROBOJACKSON_STORE": str(store), "OMP_NUM_THREADS": "1"}
         self._store = store
         self._lines: list[tuple[float, str]] = []
         self._changed = threading.Condition()
