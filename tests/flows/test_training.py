@@ -143,14 +143,14 @@ def test_what_is_first_learnt_after_the_signal_does_not_delay_the_end(tmp_path: 
 
 @pytest.mark.parametrize("has_learnt", [False, True])
 def test_a_checkpoint_is_announced_where_there_is_learning_to_save(
-    has_learnt: bool, tmp_path: Path, caplog: pytest.LogCaptureFixture
+    has_learnt: bool, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     request = training._StopRequest(tmp_path)
     if has_learnt:
         request.learnt()
     request.receive(2, None)
     request.unsaved.clear()
-    assert (f"with a checkpoint in {tmp_path}" in caplog.text) == has_learnt
+    assert (f"with a checkpoint in {tmp_path}" in capfd.readouterr().err) == has_learnt
 
 
 def test_a_signal_before_any_learning_finds_the_flag_down(
