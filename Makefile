@@ -38,23 +38,23 @@ test-stack: setup
 	@$(PY) -m pytest -q -m cluster tests/deploy $(ARGS)
 
 bench-mocap: setup
-	@$(PY) -m benchmarks.mocap $(ARGS)
+	@$(PY) -m benchmarks.mocap.accuracy $(ARGS)
 
 bench-retarget: setup
-	@$(PY) -m benchmarks.retarget $(ARGS)
+	@$(PY) -m benchmarks.retarget.compare $(ARGS)
 
 bench: setup
-	@$(PY) -m benchmarks.mocap $(ARGS)
-	@$(PY) -m benchmarks.search
+	@$(PY) -m benchmarks.mocap.accuracy $(ARGS)
+	@$(PY) -m benchmarks.search.suite
 
 bench-learning: setup
-	@$(PY) -m benchmarks.learning $(ARGS)
+	@$(PY) -m benchmarks.learning.suite $(ARGS)
 
 bench-orchestration: setup
-	@$(PY) -m benchmarks.orchestration $(ARGS)
+	@$(PY) -m benchmarks.orchestration.suite $(ARGS)
 
 chaos: setup
-	@$(PY) -m tools.chaos --trials 20 --seed 0 $(ARGS)
+	@$(PY) -m tests.chaos.run --trials 20 --seed 0 $(ARGS)
 
 deploy: setup
 	@.venv/bin/robojackson deploy $(ARGS)

@@ -16,31 +16,31 @@ from prefect import flow
 from prefect.context import SyncClientContext
 from prefect.logging import get_run_logger
 
-from configs.loader import load
-from configs.pipeline import PipelineConfig
-from configs.study import Move, Study
-from flows.board import Board
+from configs.study_config import Move, Study
 from flows.cells import EXECUTORS
-from flows.chain import to_reference
-from flows.launch import launch
-from flows.plan import training
-from flows.showing import show_study
-from flows.tracebacks import without_tracebacks
+from flows.runtime.launch import launch
+from flows.runtime.run_artifacts import show_study
+from flows.runtime.tracebacks import without_tracebacks
+from flows.study.progress_table import Board
+from flows.study.study_plan import training
+from flows.video_pass.motion_stages import to_reference
 from robojackson.errors import RejectedReference, StudyFailed
-from robojackson.retarget.robot import RobotDescription
+from robojackson.pipeline.pipeline_config import PipelineConfig
+from robojackson.pipeline.yaml_loader import load
 from robojackson.retarget.scorecard import check
-from robojackson.rl.config import TrainConfig
-from storage import metrics
+from robojackson.rl.config.train_config import TrainConfig
+from robojackson.robot.model import RobotDescription
+from storage import study_tables
 from storage.artifact import Artifact
 from storage.leftovers import sweep
 from storage.store import Store
-from tasks.caching import labelled
-from tasks.cell import Cell
-from tasks.payments import payments
-from tasks.probe import SourceFile, probe
-from tasks.still import still
-from tasks.study import results_page
-from tasks.workers import cores
+from tasks.audit_rewards import payments
+from tasks.draw_pictures import still
+from tasks.probe_video import SourceFile, probe
+from tasks.runtime.stage import labelled
+from tasks.runtime.worker_processes import cores
+from tasks.study_cell import Cell
+from tasks.write_study_page import results_page
 
 Facts = dict[str, Any]
 REASON = 200
@@ -185,7 +185,7 @@ async def conclude(
     well = [result["episodes"] for n, result in outcomes.items() if n not in failed]
     made = {}
     if well:
-        rows = metrics.kept(store, study.name, metrics.runs_of(well))
+        rows = study_tables.kept(store, study.name, study_tables.runs_of(well))
         stills, paid = ({n: made[w] for n, made in motions.items()} for w in ("still", "payments"))
         made = results_page(study, moves, rows, stills, paid)
         await show_study(store, study.name, made)

@@ -14,18 +14,18 @@ from prefect import flow
 from prefect.deployments import arun_deployment
 from pydantic import TypeAdapter
 
-from configs.loader import load
-from flows.ending import Ending
-from flows.tracebacks import without_tracebacks
+from flows.runtime.tracebacks import without_tracebacks
+from flows.study.run_watcher import Ending
 from robojackson.errors import TrainingCrashed, TrainingFailed
-from robojackson.retarget.robot import RobotDescription
+from robojackson.pipeline.yaml_loader import load
+from robojackson.robot.model import RobotDescription
 from storage.leftovers import sweep
 from storage.store import Store
-from tasks.caching import labelled
-from tasks.cell import Cell
-from tasks.judgement import judge
-from tasks.metrics import Result, publish, published
-from tasks.train import RunLabels, run_id_of, train
+from tasks.evaluate_policy import judge
+from tasks.publish_tables import Result, publish, published
+from tasks.runtime.stage import labelled
+from tasks.study_cell import Cell
+from tasks.train_policy import RunLabels, run_id_of, train
 
 DEPLOYMENT = "cell/pool"
 SECONDS_BEFORE_RETRY = 2.0

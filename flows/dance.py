@@ -1,7 +1,7 @@
 """The main flow: a dance in, a robot that dances it out, and a page that shows it.
 
 Entry point of the deployment: `flows.dance.dance`. Which stages run and in which order stands in
-`flows.pipeline`; how a stage works is `robojackson`'s, how it is cached is `tasks`'.
+`flows.video_pass.dance_stages`; how a stage works is `robojackson`'s, how it is cached is `tasks`'.
 """
 
 from collections.abc import Mapping
@@ -10,13 +10,13 @@ from typing import Any
 from prefect import flow
 from prefect.runtime import flow_run
 
-from configs.loader import load
-from configs.pipeline import PipelineConfig
-from flows.intake import Minutes, Search, Seconds, Source, name_of, videos_of
-from flows.launch import launch
-from flows.pipeline import danced
-from flows.scorers import scorers
-from flows.showing import show_dance
+from flows.runtime.launch import launch
+from flows.runtime.run_artifacts import show_dance
+from flows.search.inputs import Minutes, Search, Seconds, Source, name_of, videos_of
+from flows.search.scoring_pool import scorers
+from flows.video_pass.dance_stages import danced
+from robojackson.pipeline.pipeline_config import PipelineConfig
+from robojackson.pipeline.yaml_loader import load
 from storage.leftovers import sweep
 from storage.store import Store
 

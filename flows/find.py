@@ -12,20 +12,20 @@ from typing import Any
 from prefect import flow
 from prefect.task_runners import ThreadPoolTaskRunner
 
-from configs.dances import Dance
-from configs.finding import FindConfig
-from configs.loader import build, load
-from flows.entries import Entry, Hunt, rows, summary
-from flows.gallery import show
-from flows.hunt import bring, hunt
-from flows.launch import launch
-from robojackson.clips.candidate import VideoCandidate
+from configs.dance_book import Dance
+from configs.find_config import FindConfig
+from flows.runtime.launch import launch
+from flows.search.search_artifacts import show
+from flows.search.search_entries import Entry, Hunt, rows, summary
+from flows.search.search_pipeline import bring, hunt
+from robojackson.clips.web.video_candidate import VideoCandidate
 from robojackson.errors import NoPersonFound, SearchFailed
-from storage import candidates
+from robojackson.pipeline.yaml_loader import build, load
+from storage import candidate_catalogue
 from storage.artifact import Artifact
 from storage.leftovers import sweep
 from storage.store import Store
-from tasks.workers import cores
+from tasks.runtime.worker_processes import cores
 
 HUNTERS: ThreadPoolTaskRunner[Any] = ThreadPoolTaskRunner(max_workers=2 * cores())
 """Downloads wait for servers and judges for their processes: more threads than cores."""
@@ -78,7 +78,7 @@ async def best(
     try:
         found = hunt(wanted, settings, run_id("dance"))
     except SearchFailed:
-        reigning = candidates.champion(store, wanted.name)
+        reigning = candidate_catalogue.champion(store, wanted.name)
         if reigning is None:
             raise
         return {"key": reigning["video_key"], "sha256": reigning["video_sha256"]}

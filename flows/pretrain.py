@@ -9,15 +9,15 @@ from typing import Any, Literal
 
 from prefect import flow
 
-from configs.loader import load
-from configs.pipeline import PipelineConfig
-from flows.walker import PIPELINE, ROBOT
-from robojackson.retarget.robot import RobotDescription
-from robojackson.rl.config import TrainConfig
-from storage.lock import A_MOMENT, locked
+from robojackson.cli.walker_training import PIPELINE, ROBOT
+from robojackson.pipeline.folder_lock import A_MOMENT, locked
+from robojackson.pipeline.pipeline_config import PipelineConfig
+from robojackson.pipeline.yaml_loader import load
+from robojackson.rl.config.train_config import TrainConfig
+from robojackson.robot.model import RobotDescription
 from storage.store import Store
-from tasks.caching import identity
-from tasks.process import run_process
+from tasks.runtime.child_process import run_process
+from tasks.runtime.stage import identity
 
 DIGITS = 12
 """Of the digest in the name of a folder of work."""
@@ -37,7 +37,16 @@ async def pretrain(
     store = Store.from_environment()
     name = name_of(kind, steps, seed)
     work = store.work(name)
-    command = [sys.executable, "-m", "flows.cli", "pretrain", "--kind", kind, "-o", str(work)]
+    command = [
+        sys.executable,
+        "-m",
+        "robojackson.cli.app",
+        "pretrain",
+        "--kind",
+        kind,
+        "-o",
+        str(work),
+    ]
     options: dict[str, Any] = {"--steps": steps, "--seed": seed, "--parent": os.getpid()}
     words = [str(word) for pair in options.items() for word in pair]
     with locked(work, "task.lock", A_MOMENT):

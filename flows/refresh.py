@@ -14,12 +14,8 @@ from prefect import flow
 from prefect.artifacts import acreate_table_artifact
 from prefect.logging import get_run_logger
 
-from configs.dances import Dance, DanceBook
-from configs.finding import FindConfig
-from configs.loader import build, load
-from configs.pipeline import PipelineConfig
-from flows.chain import to_reference
-from flows.entries import REASON_LENGTH, Entry, reason_of, rows
+from configs.dance_book import Dance, DanceBook
+from configs.find_config import FindConfig
 from flows.find import (
     HUNTERS,
     in_good_quality,
@@ -27,18 +23,22 @@ from flows.find import (
     of_candidate,
     run_id,
 )
-from flows.gallery import show, slug_of
-from flows.hunt import hunt
-from flows.launch import launch
-from robojackson.clips.candidate import VideoCandidate
-from robojackson.clips.titles import clean_text
+from flows.runtime.launch import launch
+from flows.search.search_artifacts import show, slug_of
+from flows.search.search_entries import REASON_LENGTH, Entry, reason_of, rows
+from flows.search.search_pipeline import hunt
+from flows.video_pass.motion_stages import to_reference
+from robojackson.clips.web.untrusted_text import clean_text
+from robojackson.clips.web.video_candidate import VideoCandidate
 from robojackson.errors import BadConfiguration, NoPersonFound, RoboJacksonError, SearchFailed
-from robojackson.retarget.robot import RobotDescription
-from storage import candidates
+from robojackson.pipeline.pipeline_config import PipelineConfig
+from robojackson.pipeline.yaml_loader import build, load
+from robojackson.robot.model import RobotDescription
+from storage import candidate_catalogue
 from storage.artifact import Artifact
 from storage.leftovers import sweep
 from storage.store import Store
-from tasks.probe import SourceFile, probe
+from tasks.probe_video import SourceFile, probe
 
 KIND = "refresh"
 """Beginning of the ids of its runs in the catalogue."""
@@ -87,7 +87,7 @@ async def refresh(
         else:
             done[dance.name] = result
             _note(dance, result)
-    candidates.compact(Store.from_environment())
+    candidate_catalogue.compact(Store.from_environment())
     await _tell(done, failed)
     if failed and not done:
         raise SearchFailed("; ".join(f"{name}: {reason}" for name, reason in failed.items()))
@@ -119,8 +119,8 @@ async def refresh_dance(
     store = Store.from_environment()
     stages = load(PipelineConfig, pipeline, pipeline_overrides)
     mine = (store, wanted.name, KIND)  # what `find` judges is nothing to this
-    reigning = candidates.champion(*mine)
-    seen, failing = candidates.known(*mine), candidates.failed(*mine)
+    reigning = candidate_catalogue.champion(*mine)
+    seen, failing = candidate_catalogue.known(*mine), candidate_catalogue.failed(*mine)
     found = hunt(wanted, settings, run_id(KIND), seen, reigning, failing)
     told = rows(found)
     chosen = told[0] if found.chosen else reigning
@@ -132,7 +132,7 @@ async def refresh_dance(
     except RoboJacksonError as cause:
         if not found.chosen:
             raise
-        candidates.append(store, [{**told[0], **_failed(cause)}])
+        candidate_catalogue.append(store, [{**told[0], **_failed(cause)}])
         if reigning is None:
             raise
         get_run_logger().warning("%s: %s; the one before is danced", wanted.name, cause)

@@ -20,8 +20,8 @@ from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
 from robojackson.errors import BackupFailed, StoreError
+from robojackson.pipeline.folder_lock import locked
 from storage.artifact import sha256_of, sha256_of_file
-from storage.lock import locked
 from storage.places import TEMPORARY, Folder
 
 CONTENTS, MANIFESTS = "contents", "backups"

@@ -17,8 +17,8 @@ from contextlib import suppress
 from pathlib import Path
 
 from robojackson.errors import StoreError
-from storage import metrics
-from storage.lock import locked
+from robojackson.pipeline.folder_lock import locked
+from storage import study_tables
 from storage.places import TEMPORARY, Folder
 from storage.store import HELD, SCRATCH, Store
 
@@ -83,7 +83,10 @@ def _work(store: Store) -> Iterator[Path]:
 
 def _finished(store: Store) -> set[str]:
     """Digests of the trainings whose cells are in the tables."""
-    tables = [{_digest(key) for key in store.list(f"{metrics.FOLDER}/{t}")} for t in metrics.TABLES]
+    tables = [
+        {_digest(key) for key in store.list(f"{study_tables.FOLDER}/{t}")}
+        for t in study_tables.TABLES
+    ]
     return set.intersection(*tables)
 
 

@@ -12,8 +12,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from robojackson.errors import StoreError
+from robojackson.pipeline.folder_lock import A_MOMENT, locked
 from storage.artifact import Artifact, sha256_of, sha256_of_file
-from storage.lock import A_MOMENT, locked
 from storage.places import TEMPORARY, Folder, Place, place_at
 
 VARIABLE = "ROBOJACKSON_STORE"

@@ -56,3 +56,12 @@ def records(prefect_server: None, store_folder: Path) -> Iterator[None]:
     }
     with temporary_settings(wanted):
         yield
+
+
+@pytest.fixture(scope="session")
+def short_clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The first second of the hip shake."""
+    from robojackson.clips.trim import trim
+
+    out = tmp_path_factory.mktemp("clip") / "hips.mp4"
+    return trim(Path(__file__).parents[1] / "clips" / "hip_shake.mp4", 0.0, 1.0, out)

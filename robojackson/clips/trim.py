@@ -11,9 +11,9 @@ import av
 import numpy as np
 from av.video.frame import VideoFrame
 
-from robojackson.clips.track import uneven
 from robojackson.clips.video import VideoLimits, probe, timed_frames
 from robojackson.errors import TrackTooShort
+from robojackson.motion.landmark_track import uneven
 
 ANY = VideoLimits(max_duration_s=math.inf, min_frames=1)
 CLOCK = 90_000

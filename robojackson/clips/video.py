@@ -13,7 +13,7 @@ from av.video.frame import VideoFrame
 from pydantic import ConfigDict
 from pydantic.dataclasses import dataclass
 
-from robojackson.clips.container import (
+from robojackson.clips.video_container import (
     first_frame,
     opened,
     packet_times,
@@ -21,13 +21,13 @@ from robojackson.clips.container import (
     told_rate,
     video_stream,
 )
-from robojackson.clips.track import uneven
 from robojackson.errors import (
     TrackTooShort,
     TruncatedVideo,
     UnreadableVideo,
     VideoTooLong,
 )
+from robojackson.motion.landmark_track import uneven
 
 SUFFIXES = (".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi", ".gif")
 TIME_TOLERANCE_S = 1e-6

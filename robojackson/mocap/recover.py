@@ -13,20 +13,21 @@ from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 from scipy.spatial.transform import Rotation
 
-from robojackson.clips.evidence import weighed
-from robojackson.clips.track import LandmarkTrack, evenly
-from robojackson.mocap import camera as cameras
-from robojackson.mocap import ground, hybrik
-from robojackson.mocap.blazepose import BODY, Landmarks, repair
-from robojackson.mocap.body import Body, pose_landmarks
-from robojackson.mocap.bones import fit_skeleton
-from robojackson.mocap.certainty import certainty
-from robojackson.mocap.kinematics import apply
-from robojackson.mocap.refine import RefineConfig, gather, refine
-from robojackson.mocap.smooth import lowpass
-from robojackson.mocap.stand import StandConfig, stand
-from robojackson.mocap.temporal.lift import TemporalConfig, lift
-from robojackson.motion.smpl import SmplSequence
+from robojackson.body import analytic_solve
+from robojackson.body.forward_kinematics import apply
+from robojackson.body.smoothing import lowpass
+from robojackson.clips.quality.visibility import weighed
+from robojackson.mocap.grounding import floor
+from robojackson.mocap.grounding.stance import StandConfig, stand
+from robojackson.mocap.landmarks import pinhole_camera as cameras
+from robojackson.mocap.landmarks.blazepose import BODY, Landmarks, repair
+from robojackson.mocap.landmarks.bone_lengths import fit_skeleton
+from robojackson.mocap.landmarks.covariance import certainty
+from robojackson.mocap.landmarks.refinement import RefineConfig, gather, refine
+from robojackson.mocap.pose.posed_body import Body, pose_landmarks
+from robojackson.mocap.temporal.temporal_lift import TemporalConfig, lift
+from robojackson.motion.landmark_track import LandmarkTrack, evenly
+from robojackson.motion.smpl_sequence import SmplSequence
 
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
@@ -45,14 +46,14 @@ class MocapConfig:
         stand: Of the floor and the feet.
     """
 
-    method: hybrik.Method = "adaptive"
+    method: analytic_solve.Method = "adaptive"
     focal_px: float | None = Field(default=None, gt=0)
     cutoff_hz: float = Field(default=4.0, gt=0)
     depth_cutoff_hz: float = Field(default=1.5, gt=0)
     bone_trust: float = Field(default=0.6, ge=0, le=1)
     temporal: TemporalConfig = Field(default_factory=TemporalConfig)
     refine: RefineConfig = Field(default_factory=RefineConfig)
-    gravity: ground.GravityConfig = Field(default_factory=ground.GravityConfig)
+    gravity: floor.GravityConfig = Field(default_factory=floor.GravityConfig)
     stand: StandConfig = Field(default_factory=StandConfig)
 
 
@@ -112,8 +113,8 @@ def recover_points(
         config: Of the floor and the feet.
     """
     body = posed(points)
-    gravity = ground.find_up(body.pose.points, body.feet, fps, config.gravity)
-    to_world = ground.camera_to_world(gravity.up)
+    gravity = floor.find_up(body.pose.points, body.feet, fps, config.gravity)
+    to_world = floor.camera_to_world(gravity.up)
     body = posed(apply(to_world, points))
     start = body.pose.points.mean((0, 1))
     stance = stand(body, fps, config.stand)
@@ -125,7 +126,7 @@ def recover_points(
 
 def _camera(
     pinhole: cameras.Pinhole,
-    gravity: ground.Gravity,
+    gravity: floor.Gravity,
     to_world: np.ndarray,
     origin: np.ndarray,
 ) -> dict[str, object]:

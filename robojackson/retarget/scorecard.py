@@ -7,17 +7,17 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from robojackson.geometry.rotations import quat_to_matrix
-from robojackson.metrics import retarget as metric
-from robojackson.metrics.dance import velocity_score
-from robojackson.motion.reference import ReferenceMotion
-from robojackson.motion.smpl import AIR, PLANTED
-from robojackson.retarget.certificate import fallen
-from robojackson.retarget.collision import Detector
-from robojackson.retarget.gate import BARS, check, failures, told
-from robojackson.retarget.kinematics import centre_of_mass, pose, sole_velocities, tree
-from robojackson.retarget.resample import forward_velocities, seam_angle, seam_shift, seam_speed
-from robojackson.retarget.robot import KEYPOINTS, Robot
-from robojackson.retarget.targets import BONES, Targets
+from robojackson.metrics import retarget_error as metric
+from robojackson.metrics.dance_score import velocity_score
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.smpl_sequence import AIR, PLANTED
+from robojackson.retarget.feasibility.certification import fallen
+from robojackson.retarget.scorecard_gate import BARS, check, failures, told
+from robojackson.retarget.solver.collision import Detector
+from robojackson.retarget.targets.keypoint_targets import BONES, Targets
+from robojackson.robot.model import KEYPOINTS, Robot
+from robojackson.robot.resampling import forward_velocities, seam_angle, seam_shift, seam_speed
+from robojackson.robot.tree_kinematics import centre_of_mass, pose, sole_velocities, tree
 
 __all__ = ["BARS", "check", "failures", "hovers", "score", "told"]
 

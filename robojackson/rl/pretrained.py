@@ -15,7 +15,14 @@ from pathlib import Path
 import numpy as np
 
 from robojackson.errors import BadPolicy, MissingDependency
-from robojackson.rl.networks import CRITICS, TARGETS, Networks, Tensors, load_networks, whole
+from robojackson.rl.tqc.network_arrays import (
+    CRITICS,
+    TARGETS,
+    Networks,
+    Tensors,
+    load_networks,
+    whole,
+)
 
 log = logging.getLogger(__name__)
 

@@ -15,7 +15,7 @@ from robojackson.errors import (
     UnreadableVideo,
     VideoTooLong,
 )
-from tools.bad_clips import damage, write_timed
+from tests.fixtures.bad_clips import damage, write_timed
 
 CLIPS = Path(__file__).parents[2] / "clips"
 LIMITS = VideoLimits()

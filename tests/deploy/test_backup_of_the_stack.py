@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
-from tools import postgres, seaweed
-from tools.stack import QUICK, Stack
+from tools.stack import postgres, seaweed
+from tools.stack.compose_stack import QUICK, Stack
 
 pytestmark = [pytest.mark.cluster, pytest.mark.ci, pytest.mark.timeout(900)]
 CORE = ("postgres", "s3", "prefect-server", "setup")

@@ -18,8 +18,8 @@ import pytest
 import yaml
 from docker.utils import exclude_paths
 
-from flows.source import BUNDLED, DEFAULT
-from tools.service import ROOT
+from flows.search.dance_source import BUNDLED, DEFAULT
+from tools.stack.service import ROOT
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 PACKAGES = PROJECT["tool"]["setuptools"]["packages"]
@@ -42,7 +42,10 @@ def watch(event, args):
         print("OUTSIDE", path, file=sys.stderr)
 sys.addaudithook(watch)
 """
-COMMAND = WATCH + "import runpy; runpy.run_module('flows.cli', run_name='__main__', alter_sys=True)"
+COMMAND = (
+    WATCH
+    + "import runpy; runpy.run_module('robojackson.cli.app', run_name='__main__', alter_sys=True)"
+)
 ENTRIES = (
     WATCH
     + """

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 import yaml
 
-from tools.service import StackError, interpolate
-from tools.stack import COMPOSE, PASSWORDS, ROLES, passwords
+from tools.stack.compose_stack import COMPOSE, PASSWORDS, ROLES, passwords
+from tools.stack.service import StackError, interpolate
 
 ROOT = Path(__file__).parents[2]
 FILE: dict[str, Any] = yaml.safe_load(COMPOSE.read_text())

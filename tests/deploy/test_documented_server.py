@@ -17,11 +17,11 @@ from typing import Any
 
 import pytest
 
-from storage.metrics import TABLES, query
 from storage.store import Store
-from tools import postgres
-from tools.processes import under
-from tools.service import ROOT, free_port
+from storage.study_tables import TABLES, query
+from tools.stack import postgres
+from tools.stack.processes import under
+from tools.stack.service import ROOT, free_port
 
 pytestmark = [pytest.mark.cluster, pytest.mark.timeout(1800)]
 DOCUMENT = ROOT / "docs" / "deployment.md"
@@ -70,7 +70,7 @@ class Documented:
         )  # fmt: skip
 
     def robojackson(self, *words: object) -> dict[str, Any]:
-        said = self.run(sys.executable, "-m", "flows.cli", *words, "--json")
+        said = self.run(sys.executable, "-m", "robojackson.cli.app", *words, "--json")
         assert said.returncode == 0, said.stderr
         return dict(json.loads(said.stdout))
 
@@ -216,12 +216,12 @@ BROWSER = ("chromium", "--headless", "--no-sandbox", "--disable-gpu", "--no-firs
 def test_the_runs_page_shows_runs_on_any_port_and_host_name(tmp_path: Path) -> None:
     port, environment = free_port(), bare(tmp_path)
     api = f"http://127.0.0.1:{port}/api"
-    command = [sys.executable, "-m", "flows.cli", "server", "--port", str(port)]
+    command = [sys.executable, "-m", "robojackson.cli.app", "server", "--port", str(port)]
     server = subprocess.Popen(command, env=environment, cwd=ROOT)
     try:
         environment["PREFECT_API_URL"] = api
         say = "from prefect import flow; flow(lambda: 1, name='shown', flow_run_name='run-seen')()"
-        waiting = "from flows.server import await_server; await_server(90)"
+        waiting = "from flows.runtime.prefect_server import await_server; await_server(90)"
         for code in (waiting, say):
             subprocess.run([sys.executable, "-c", code], env=environment, cwd=ROOT, check=True)
         data = f"--user-data-dir={tmp_path / 'chromium'}"

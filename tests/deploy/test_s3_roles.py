@@ -13,8 +13,8 @@ import psutil
 import pytest
 import s3fs
 
-from tools.service import ROOT
-from tools.stack import ROLES, Stack
+from tools.stack.compose_stack import ROLES, Stack
+from tools.stack.service import ROOT
 
 BUCKET = "robojackson"
 KEY = f"{BUCKET}/motion/0a/a b ä.bin"
@@ -232,7 +232,14 @@ def test_a_backup_reads_from_it_once(bucket: Stack, tmp_path: Path) -> None:
         "PREFECT_SERVER_DATABASE_CONNECTION_URL": "",
         "PREFECT_HOME": str(tmp_path / "none"),
     }
-    command = [sys.executable, "-m", "flows.cli", "backup", str(tmp_path / "out"), "--json"]
+    command = [
+        sys.executable,
+        "-m",
+        "robojackson.cli.app",
+        "backup",
+        str(tmp_path / "out"),
+        "--json",
+    ]
     for copied in (1, 0):
         run = subprocess.run(
             command, env=given, cwd=ROOT, capture_output=True, text=True, check=False

@@ -17,8 +17,7 @@ from prefect.client.schemas.filters import ArtifactFilter, ArtifactFilterKey
 from prefect.exceptions import ParameterTypeError
 from prefect.states import Completed, Crashed, Failed
 
-from configs.loader import load
-from configs.study import Setup, Study
+from configs.study_config import Setup, Study
 from flows import ablation, cells
 from robojackson.errors import (
     BadConfiguration,
@@ -27,11 +26,12 @@ from robojackson.errors import (
     TrainingCrashed,
     TrainingFailed,
 )
+from robojackson.pipeline.yaml_loader import load
 from robojackson.retarget.scorecard import BARS
-from robojackson.rl.config import EvaluateConfig, TrainConfig
+from robojackson.rl.config.train_config import EvaluateConfig, TrainConfig
 from storage.artifact import Artifact
 from storage.store import Store
-from tasks.cell import Cell
+from tasks.study_cell import Cell
 
 ROOT = Path(__file__).parents[2]
 SETUPS: tuple[Setup, ...] = ("scratch", "pretrain", "curiosity")

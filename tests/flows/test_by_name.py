@@ -12,11 +12,11 @@ from prefect.utilities.callables import parameter_schema
 from prefect.utilities.schema_tools.validation import validate
 
 from flows.dance import dance
-from flows.intake import Search, videos_of
+from flows.search.inputs import Search, videos_of
 from robojackson.errors import NoPersonFound, RejectedReference, SearchFailed
-from storage import candidates
+from storage import candidate_catalogue
 from storage.store import Store
-from tests.search.server import serving
+from tests.fixtures.web_server import serving
 
 NOW = datetime(2026, 11, 21, tzinfo=UTC)
 IMPATIENT = {"retries": 0, "timeout_s": 1, "request_pause_s": 0}
@@ -93,7 +93,7 @@ def test_without_a_net_the_video_that_was_chosen_last_is_danced(
     facts = {"run_id": "r", "source": "youtube", "video_id": "v", "url": "https://host/v"}
     times = {"retrieved_at": NOW, "decided_at": NOW}
     chosen = {"decision": "chosen", "video_key": kept.key, "video_sha256": kept.sha256}
-    candidates.append(store, [{"dance": "APT", **facts, **times, **chosen}])
+    candidate_catalogue.append(store, [{"dance": "APT", **facts, **times, **chosen}])
     assert files("apt dance", config) == {"apt.mp4": b"the last one"}
 
 

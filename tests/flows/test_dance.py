@@ -15,18 +15,19 @@ from prefect.settings import (
     temporary_settings,
 )
 
-from configs.loader import load
-from configs.pipeline import PipelineConfig
-from flows import pipeline as stages
 from flows.dance import dance
-from flows.pipeline import Candidate, choose, score_all
-from flows.source import is_name, resolve
-from robojackson.clips.stability import Stability
+from flows.search.dance_source import is_name, resolve
+from flows.video_pass import dance_stages as stages
+from flows.video_pass.dance_stages import Candidate, choose, score_all
+from robojackson.clips.quality.stability import Stability
 from robojackson.errors import NoPersonFound, RejectedReference, UnreadableVideo
-from storage import catalogue, tables
+from robojackson.pipeline import tables
+from robojackson.pipeline.pipeline_config import PipelineConfig
+from robojackson.pipeline.yaml_loader import load
+from storage import run_catalogue
 from storage.artifact import Artifact
 from storage.store import Store
-from tests.flows.conftest import robojackson
+from tests.fixtures.commands import robojackson
 
 OVERRIDES = {"train.trainer": "sb3", "train.steps": 300}
 FILES = {
@@ -129,7 +130,7 @@ def test_a_renamed_copy_of_the_clip_trains_nothing(passes: Passes) -> None:
 
 @pytest.mark.slow
 def test_the_catalogue_knows_the_run(passes: Passes) -> None:
-    known = {run.run_id for run in catalogue.runs(Store(passes.store))}
+    known = {run.run_id for run in run_catalogue.runs(Store(passes.store))}
     assert passes.first["run_id"] in known
 
 

@@ -17,13 +17,13 @@ from prefect.client.orchestration import get_client
 from prefect.client.schemas.actions import WorkPoolCreate
 from prefect.workers.process import ProcessJobConfiguration, ProcessWorker
 
-from flows import deploy
-from flows.deploy import SILENCE, automations
-from flows.environment import FIXED
+from flows.runtime import deployments
+from flows.runtime.deployments import SILENCE, automations
+from flows.runtime.environment import FIXED
 from robojackson.errors import DeploymentFailed
 from storage.artifact import Artifact
 from storage.store import Store
-from tasks.caching import stage
+from tasks.runtime.stage import stage
 
 ROOT = Path(__file__).parents[2]
 DEPLOYMENTS = yaml.safe_load((ROOT / "prefect.yaml").read_text())["deployments"]
@@ -91,7 +91,7 @@ async def environment_of_a_run(pool: str, known: dict[str, Any] | None) -> dict[
         if known is not None:
             before = WorkPoolCreate(name=pool, type="process", base_job_template=known)
             await client.create_work_pool(before)
-        await deploy._pool(client, pool, "")
+        await deployments._pool(client, pool, "")
         template = (await client.read_work_pool(pool)).base_job_template
     return dict((await ProcessJobConfiguration.from_template_and_values(template, {})).env)
 
@@ -145,4 +145,4 @@ def test_records_are_kept_where_each_machine_finds_the_store(
 
 def test_deploying_registers_no_place_for_results(prefect_server: None, store_folder: Path) -> None:
     """A block of the server would know one machine's address, and a local store had none."""
-    assert "results" not in asyncio.run(deploy._prepare())
+    assert "results" not in asyncio.run(deployments._prepare())

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from flows.source import is_name
-from tests.flows.conftest import Said, robojackson
-from tools.difficult_clips import black, write
+from flows.search.dance_source import is_name
+from tests.fixtures.commands import Said, robojackson
+from tests.fixtures.difficult_clips import black, write
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from flows import pretrain as flows
-from flows import single, walker
+from robojackson.cli import stages, walker_training
 from storage.store import Store
-from tests.flows.conftest import robojackson
+from tests.fixtures.commands import robojackson
 
 
 @pytest.fixture
@@ -82,7 +82,7 @@ def test_the_bundled_walk_is_found_from_any_folder(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     found: list[bool] = []
-    monkeypatch.setattr(single, "mocap", lambda video, *rest: found.append(video.is_file()))
-    monkeypatch.setattr(single, "retarget", lambda *given: None)
-    walker._reference("track", tmp_path, None)
+    monkeypatch.setattr(stages, "mocap", lambda video, *rest: found.append(video.is_file()))
+    monkeypatch.setattr(stages, "retarget", lambda *given: None)
+    walker_training._reference("track", tmp_path, None)
     assert found == [True]

@@ -19,17 +19,17 @@ from prefect.settings import (
     temporary_settings,
 )
 
-from configs.dances import Dance, DanceBook
+from configs.dance_book import Dance, DanceBook
 from flows import refresh as nightly
-from flows.entries import Entry, Hunt, rows
 from flows.refresh import refresh
-from robojackson.clips.candidate import VideoCandidate
-from robojackson.clips.selection import Selection
+from flows.search.search_entries import Entry, Hunt, rows
+from robojackson.clips.web.candidate_selection import Selection
+from robojackson.clips.web.video_candidate import VideoCandidate
 from robojackson.errors import BadConfiguration, SearchFailed, TrackTooShort
-from storage import candidates
+from storage import candidate_catalogue
 from storage.artifact import Artifact
 from storage.store import Store
-from tests.search.server import Web, serving
+from tests.fixtures.web_server import Web, serving
 
 OVERRIDES = {"web.retries": 1, "web.backoff_s": 0.01, "web.timeout_s": 1, "web.request_pause_s": 0}
 FAILURES = {
@@ -59,7 +59,9 @@ class Nights:
 
     def row(self, word: str) -> dict[str, Any]:
         """What the catalogue says of the first video whose address has the word."""
-        return next(row for row in candidates.records(self.store) if f"/{word}/" in row["url"])
+        return next(
+            row for row in candidate_catalogue.records(self.store) if f"/{word}/" in row["url"]
+        )
 
 
 def night(book: Path, dances: list[str] | None = None) -> dict[str, Any]:
@@ -120,7 +122,7 @@ def test_the_chosen_video_is_ready_to_train(nights: Nights) -> None:
 
 
 def test_every_candidate_is_in_the_catalogue(nights: Nights) -> None:
-    decisions = [row["decision"] for row in candidates.records(nights.store, "good one")]
+    decisions = [row["decision"] for row in candidate_catalogue.records(nights.store, "good one")]
     assert sorted(decisions[:6]) == ["chosen", *["failed"] * 4, "rejected"]
 
 
@@ -132,7 +134,9 @@ def test_a_failure_of_the_server_is_the_reason_in_the_table(nights: Nights, kind
 
 
 def test_the_same_video_under_another_name_is_a_copy(nights: Nights) -> None:
-    found = [row for row in candidates.records(nights.store) if row["decision"] == "rejected"]
+    found = [
+        row for row in candidate_catalogue.records(nights.store) if row["decision"] == "rejected"
+    ]
     assert found[0]["reason"].startswith("a copy of")
 
 
@@ -185,7 +189,7 @@ def test_a_choice_of_which_no_motion_can_be_made_leaves_the_one_before(
     }
     row |= {"title": "", "query": "", "video_key": kept.key, "video_sha256": kept.sha256}
     old = {**row, "video_id": "old", "run_id": "refresh-1", "decided_at": now}
-    candidates.append(store, [{**old, "decision": "chosen", "stability_score": 1.0}])
+    candidate_catalogue.append(store, [{**old, "decision": "chosen", "stability_score": 1.0}])
     candidate = VideoCandidate(
         "new", "http://host/new", "", "", "site", retrieved_at=datetime.now(UTC)
     )
@@ -193,7 +197,7 @@ def test_a_choice_of_which_no_motion_can_be_made_leaves_the_one_before(
     def hunt(dance: Dance, *rest: object) -> Hunt:
         entry = Entry(candidate, "chosen", video=kept)
         made = Hunt(dance, "refresh-2", (entry,), Selection((candidate,), ()))
-        candidates.append(store, rows(made))
+        candidate_catalogue.append(store, rows(made))
         return made
 
     def motion(store: Store, video: Artifact, settings: object) -> dict[str, Any]:
@@ -219,10 +223,10 @@ def test_a_choice_of_which_no_motion_can_be_made_leaves_the_one_before(
         False,
         "old",
     )
-    reigning = candidates.champion(store, "APT")
+    reigning = candidate_catalogue.champion(store, "APT")
     assert reigning is not None
     assert reigning["video_id"] == "old"
-    assert ("site", "new") in candidates.known(store, "APT")
+    assert ("site", "new") in candidate_catalogue.known(store, "APT")
 
 
 def test_dances_that_would_share_their_notes_are_refused() -> None:

@@ -25,8 +25,20 @@ WITHOUT_PREFECT = (
 )
 """Modules of `flows` that the one-stage commands load."""
 LIGHT = {
-    *("typer", "flows.console", "flows.formats", "flows.learning", "flows.options"),
-    *("flows.backups", "flows.robots", "flows.search", "flows.studies", "robojackson.errors"),
+    *(
+        "typer",
+        "robojackson.cli.console",
+        "robojackson.cli.format_commands",
+        "robojackson.cli.learning_commands",
+        "robojackson.cli.options",
+    ),
+    *(
+        "flows.cli.backup_commands",
+        "robojackson.cli.robot_commands",
+        "flows.cli.search_commands",
+        "flows.cli.study_commands",
+        "robojackson.errors",
+    ),
 }
 """What the command line may import before it knows the command, beside the standard library."""
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from robojackson.metrics import retarget as metric
+from robojackson.metrics import retarget_error as metric
 
 DT = 0.015
 TIME = np.arange(40) * DT

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from robojackson.metrics.rollout import (
+from robojackson.metrics.rollout_score import (
     best_frozen_error,
     heading_frame,
     limb_response,

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robojackson.clips.track import LandmarkTrack
+from robojackson.motion.landmark_track import LandmarkTrack
 
 GOLDEN = Path(__file__).parents[1] / "golden"
 

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from robojackson.clips.track import LandmarkTrack
+from robojackson.body.skeleton import keypoint
 from robojackson.errors import NoPersonFound
-from robojackson.metrics.motion import floor_penetration, foot_slide, jerk
-from robojackson.mocap.body import pose_sequence
-from robojackson.mocap.feet import foot_points
+from robojackson.metrics.motion_quality import floor_penetration, foot_slide, jerk
+from robojackson.mocap.grounding.feet import foot_points
+from robojackson.mocap.pose.posed_body import pose_sequence
 from robojackson.mocap.recover import MocapConfig, recover
-from robojackson.mocap.skeleton import keypoint
-from robojackson.motion.smpl import AIR, PLANTED, SmplSequence
+from robojackson.motion.landmark_track import LandmarkTrack
+from robojackson.motion.smpl_sequence import AIR, PLANTED, SmplSequence
 
 
 @pytest.fixture(scope="module")

@@ -7,11 +7,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from robojackson.clips.track import LandmarkTrack
-from robojackson.mocap.skeleton import REST_JOINTS
-from robojackson.motion.reference import ReferenceMotion
-from robojackson.motion.smpl import SmplSequence
-from robojackson.report.encoder import write_video
+from robojackson.body.skeleton import REST_JOINTS
+from robojackson.motion.landmark_track import LandmarkTrack
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.smpl_sequence import SmplSequence
+from robojackson.report.video.encoder import write_video
 
 FRAMES, FPS, STEPS, DT = 12, 30.0, 27, 0.015
 SIZE = (96, 64)

@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robojackson.clips.stability import Stability
+from robojackson.clips.quality.stability import Stability
 from robojackson.clips.video import VideoInfo
-from robojackson.motion.reference import ReferenceMotion
-from robojackson.motion.smpl import SmplSequence
-from robojackson.report import plots
-from robojackson.report.facts import fact, written
-from robojackson.report.page import PageContent, render, write_page
-from robojackson.report.summary import Results, page_content, versions
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.smpl_sequence import SmplSequence
+from robojackson.report.pages.page_content import Results, page_content, versions
+from robojackson.report.pages.quantities import fact, written
+from robojackson.report.pages.run_page import PageContent, render, write_page
+from robojackson.report.plots import run_plots
 
 POLICIES = ("trained", "statue")
 SUMMARY = {
@@ -151,41 +151,41 @@ def test_versions_leave_out_what_is_not_installed() -> None:
 
 
 def test_survival_bars_are_means_over_resets(results: Results) -> None:
-    axes = plots.survival_by_phase(results.evaluations, 0.015).axes[0]
+    axes = run_plots.survival_by_phase(results.evaluations, 0.015).axes[0]
     assert [bar.get_height() for bar in axes.patches] == [6.0, 6.0, 6.0]
 
 
 def test_survival_bars_begin_at_their_phase(results: Results) -> None:
     rows = [row for row in results.evaluations if row["phase"] in (0, 18)]
-    axes = plots.survival_by_phase(rows, 0.015).axes[0]
+    axes = run_plots.survival_by_phase(rows, 0.015).axes[0]
     np.testing.assert_allclose([bar.get_x() for bar in axes.patches], [0.0, 0.27])
 
 
 def test_default_stand_is_no_phase(results: Results) -> None:
     stand = {"policy": "trained", "phase": -1, "reset": 0, "survived_s": 99.0}
-    axes = plots.survival_by_phase([*results.evaluations, stand], 0.015).axes[0]
+    axes = run_plots.survival_by_phase([*results.evaluations, stand], 0.015).axes[0]
     assert len(axes.patches) == 3
 
 
 def test_the_policy_under_another_law_is_not_drawn_as_a_baseline(results: Results) -> None:
     trained = list(results.evaluations)
     others = [{**row, "policy": name} for name in ("hold", "statue") for row in trained]
-    axes = plots.survival_by_phase([*trained, *others], 0.015).axes[0]
+    axes = run_plots.survival_by_phase([*trained, *others], 0.015).axes[0]
     styles = {str(line.get_label()): line.get_linestyle() for line in axes.lines}
     assert styles == {"trained robot, torque held": "--", "statue": "-"}
 
 
 def test_training_curve_is_the_median() -> None:
     rows = [{"step": 10, "episode_length": n, "episode_return": 0.0} for n in (100, 200, 900)]
-    line = plots.training_curve(rows, 0.01).axes[0].lines[0]
+    line = run_plots.training_curve(rows, 0.01).axes[0].lines[0]
     np.testing.assert_allclose(line.get_ydata(), [2.0])
 
 
 def test_limb_that_does_not_move_is_told_so() -> None:
-    texts = [text.get_text() for text in plots.limb_gains(SUMMARY).axes[0].texts]
+    texts = [text.get_text() for text in run_plots.limb_gains(SUMMARY).axes[0].texts]
     assert texts == [" 0.93", " does not move in the reference"]
 
 
 def test_plot_is_a_png(results: Results) -> None:
-    figure = plots.contact_strip(results.sequence, results.reference)
-    assert plots.png(figure).startswith(b"\x89PNG")
+    figure = run_plots.contact_strip(results.sequence, results.reference)
+    assert run_plots.png(figure).startswith(b"\x89PNG")

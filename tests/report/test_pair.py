@@ -8,11 +8,12 @@ import mujoco
 import numpy as np
 import pytest
 
-from robojackson.motion.reference import ReferenceMotion
-from robojackson.motion.smpl import SmplSequence
-from robojackson.report import canvas, plots
-from robojackson.report.pair import human_beside_robot
-from robojackson.report.video import VideoConfig
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.smpl_sequence import SmplSequence
+from robojackson.report.plots import run_plots
+from robojackson.report.video import canvas
+from robojackson.report.video.retarget_video import human_beside_robot
+from robojackson.report.video.side_by_side import VideoConfig
 
 SMALL = VideoConfig(fps=10, panel_width=64, panel_height=96, quality=5)
 BLUE_TO_GREY = 20
@@ -70,7 +71,7 @@ def loaded(reference: ReferenceMotion) -> ReferenceMotion:
 def test_the_heat_map_tells_how_long_each_motor_is_over_its_limit(
     reference: ReferenceMotion,
 ) -> None:
-    axes = plots.torque_heat_map(loaded(reference), reference.joint_names).axes[0]
+    axes = run_plots.torque_heat_map(loaded(reference), reference.joint_names).axes[0]
     told = [label.get_text().split("  ")[1] for label in axes.get_yticklabels()]
     assert told == ["0 %", "33 %", *["0 %"] * (len(told) - 2)]
 
@@ -81,11 +82,11 @@ def test_the_colour_changes_at_the_limit(ratio: float, warm: bool) -> None:
         "r", "", 0.1, False, np.zeros(3), *[np.zeros((2, 8))] * 5, np.full((2, 1), ratio),
         np.zeros(2), ("knee",), (), (), (),
     )  # fmt: skip
-    picture = plots.torque_heat_map(reference, ["knee"]).axes[0].images[0]
+    picture = run_plots.torque_heat_map(reference, ["knee"]).axes[0].images[0]
     red, _, blue, _ = picture.cmap(picture.norm(ratio))
     assert (red > blue) == warm
 
 
 def test_a_name_too_few_is_an_error(reference: ReferenceMotion) -> None:
     with pytest.raises(ValueError, match="longer"):
-        plots.torque_heat_map(reference, reference.joint_names[:-1])
+        run_plots.torque_heat_map(reference, reference.joint_names[:-1])

@@ -7,10 +7,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from robojackson.motion.smpl import SmplSequence
-from robojackson.report import canvas
-from robojackson.report.robot_panel import RobotView
-from robojackson.report.skeleton_panel import (
+from robojackson.motion.smpl_sequence import SmplSequence
+from robojackson.report.video import canvas
+from robojackson.report.video.robot_panel import RobotView
+from robojackson.report.video.skeleton_panel import (
     CAMERA_HEIGHT,
     DISTANCE,
     FOCAL,

@@ -9,12 +9,12 @@ import mujoco
 import numpy as np
 import pytest
 
-from robojackson.clips.track import LandmarkTrack
-from robojackson.motion.reference import ReferenceMotion
-from robojackson.motion.smpl import SmplSequence
-from robojackson.report.encoder import write_video
-from robojackson.report.still import _moments
-from robojackson.report.video import VideoConfig, side_by_side
+from robojackson.motion.landmark_track import LandmarkTrack
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.smpl_sequence import SmplSequence
+from robojackson.report.video.encoder import write_video
+from robojackson.report.video.side_by_side import VideoConfig, side_by_side
+from robojackson.report.video.still_picture import _moments
 
 SMALL = VideoConfig(fps=10, panel_width=64, panel_height=96)
 
@@ -115,7 +115,7 @@ def test_after_damaged_frames_the_pictures_go_on(
         shown.extend(frames)
         raise InterruptedError
 
-    monkeypatch.setattr("robojackson.report.video.source_panels", panels)
+    monkeypatch.setattr("robojackson.report.video.side_by_side.source_panels", panels)
     with pytest.raises(InterruptedError):
         side_by_side(clip, few, sequence, slow, None, clip.parent / "d.mp4", model=model)
     assert max(shown) > len(few)

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from robojackson.motion.reference import ReferenceMotion
-from robojackson.report.timeline import reference_qpos, timeline
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.report.video.timeline import reference_qpos, timeline
 
 
 def test_cyclic_reference_starts_again_after_a_lap(reference: ReferenceMotion) -> None:

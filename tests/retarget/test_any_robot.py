@@ -9,16 +9,17 @@ import numpy as np
 import pytest
 
 from robojackson.errors import BadConfiguration, UnknownName
-from robojackson.motion.reference import ReferenceMotion
-from robojackson.motion.smpl import PLANTED
-from robojackson.retarget import RetargetConfig, Robot, load_robot, retarget
-from robojackson.retarget.actuation import torque_limits
-from robojackson.retarget.config import RepairConfig
-from robojackson.retarget.kinematics import pose, tree
-from robojackson.retarget.model import model_sha256
-from robojackson.retarget.paper import mapped
-from tests.retarget import machine
-from tests.retarget.conftest import human
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.smpl_sequence import PLANTED
+from robojackson.retarget.paper_mapping import mapped
+from robojackson.retarget.retarget_config import RepairConfig, RetargetConfig
+from robojackson.retarget.retargeting import retarget
+from robojackson.robot.actuation import torque_limits
+from robojackson.robot.mjcf import model_sha256
+from robojackson.robot.model import Robot, load_robot
+from robojackson.robot.tree_kinematics import pose, tree
+from tests.fixtures import machine
+from tests.fixtures.robots import human
 
 
 @pytest.fixture(scope="module")

@@ -5,16 +5,16 @@ from functools import cache
 import numpy as np
 import pytest
 
-from robojackson.metrics import red_team
-from robojackson.metrics.dance import velocity_score
-from robojackson.retarget import RetargetConfig
-from robojackson.retarget.cycle import human_clip
-from robojackson.retarget.targets import Targets, targets
-from tests.retarget.conftest import human, robot_motion, stock
+from robojackson.metrics import impostors
+from robojackson.metrics.dance_score import velocity_score
+from robojackson.retarget.retarget_config import RetargetConfig
+from robojackson.retarget.targets.cycle import human_clip
+from robojackson.retarget.targets.keypoint_targets import Targets, targets
+from tests.fixtures.robots import human, robot_motion, stock
 
 CLIPS = ("hip_shake", "walk")
 SIDED = [name for name in stock().keypoint_names if name.startswith("left_")]
-NAMES = tuple(red_team.impostors([(0, 1)], np.random.default_rng(0)))
+NAMES = tuple(impostors.impostors([(0, 1)], np.random.default_rng(0)))
 
 
 @cache
@@ -34,7 +34,7 @@ def truth(clip: str) -> np.ndarray:
 def impostor(clip: str, name: str) -> np.ndarray:
     names = [n for n, used in zip(stock().keypoint_names, weighted(), strict=True) if used]
     sides = [(names.index(n), names.index(n.replace("left", "right"))) for n in SIDED if n in names]
-    team = red_team.impostors(sides, np.random.default_rng(0))
+    team = impostors.impostors(sides, np.random.default_rng(0))
     return team[name](truth(clip), 1 / aims(clip).dt)
 
 

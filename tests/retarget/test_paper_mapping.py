@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from robojackson.mocap.skeleton import JOINT_NAMES
-from robojackson.motion.smpl import SmplSequence
-from robojackson.retarget import Robot
-from robojackson.retarget.paper import mapped
-from tests.retarget.conftest import human
+from robojackson.body.skeleton import JOINT_NAMES
+from robojackson.motion.smpl_sequence import SmplSequence
+from robojackson.retarget.paper_mapping import mapped
+from robojackson.robot.model import Robot
+from tests.fixtures.robots import human
 
 
 def _bent(joint: str, rotvec: list[float]) -> SmplSequence:

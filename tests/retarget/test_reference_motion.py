@@ -6,12 +6,14 @@ import mujoco
 import numpy as np
 import pytest
 
-from robojackson.motion.smpl import PLANTED
-from robojackson.retarget import RetargetConfig, Robot, retarget
-from robojackson.retarget.human import at_steps, labels_at
-from robojackson.retarget.resample import seam_angle
+from robojackson.motion.smpl_sequence import PLANTED
+from robojackson.retarget.retarget_config import RetargetConfig
+from robojackson.retarget.retargeting import retarget
 from robojackson.retarget.scorecard import check, failures
-from tests.retarget.conftest import human, robot_motion, stock
+from robojackson.retarget.targets.human_clip import at_steps, labels_at
+from robojackson.robot.model import Robot
+from robojackson.robot.resampling import seam_angle
+from tests.fixtures.robots import human, robot_motion, stock
 
 CLIPS = ("hip_shake", "walk")
 

@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 
 from robojackson.errors import RejectedReference
-from robojackson.motion.reference import ReferenceMotion
-from robojackson.retarget import RetargetConfig, Robot
-from robojackson.retarget.cycle import human_clip
-from robojackson.retarget.kinematics import pose, tree
-from robojackson.retarget.resample import velocities
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.retarget.retarget_config import RetargetConfig
 from robojackson.retarget.scorecard import check, score
-from robojackson.retarget.targets import Targets, targets
-from tests.retarget.conftest import human, robot_motion, stock
+from robojackson.retarget.targets.cycle import human_clip
+from robojackson.retarget.targets.keypoint_targets import Targets, targets
+from robojackson.robot.model import Robot
+from robojackson.robot.resampling import velocities
+from robojackson.robot.tree_kinematics import pose, tree
+from tests.fixtures.robots import human, robot_motion, stock
 
 DT = 0.015
 

@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from configs.loader import load
-from robojackson.motion.reference import ReferenceMotion
-from robojackson.retarget.robot import Robot, RobotDescription, load_robot
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.pipeline.yaml_loader import load
+from robojackson.robot.model import Robot, RobotDescription, load_robot
 
 DT = 0.015
 

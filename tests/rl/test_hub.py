@@ -7,17 +7,17 @@ import huggingface_hub.file_download
 import pytest
 from sb3_contrib import TQC
 
-from configs.loader import load
 from robojackson.errors import BadPolicy, MissingDependency
-from robojackson.motion.reference import ReferenceMotion
-from robojackson.retarget.robot import Robot
-from robojackson.rl.config import TrainConfig
-from robojackson.rl.networks import load_networks
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.pipeline import tables
+from robojackson.pipeline.yaml_loader import load
+from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.pretrained import pretrained
-from robojackson.rl.train import train
-from storage import tables
-from tests.flows.conftest import robojackson
-from tests.rl.hub import serving
+from robojackson.rl.tqc.network_arrays import load_networks
+from robojackson.rl.training import train
+from robojackson.robot.model import Robot
+from tests.fixtures.commands import robojackson
+from tests.fixtures.hub import serving
 
 REPOSITORY = "somebody/Humanoid-v5-TQC-tiny"
 ZIP = f"{REPOSITORY}/resolve/main/humanoid-v5-TQC-tiny.zip"

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robojackson.motion.reference import ReferenceMotion
-from storage import tables
-from storage.schemas import EPISODE_RECORD
-from tests.flows.conftest import environment
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.pipeline import tables
+from robojackson.pipeline.table_schemas import EPISODE_RECORD
+from tests.fixtures.commands import environment
 
 KILLS = 3
 STEPS = {"sbx": 24_000, "sb3": 4_800}
@@ -26,7 +26,7 @@ OPTIONS = (
 
 
 def training(reference: Path, out: Path, trainer: str) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "flows.cli", "train", reference, "-o", out, *OPTIONS]
+    command = [sys.executable, "-m", "robojackson.cli.app", "train", reference, "-o", out, *OPTIONS]
     command += [f"--trainer={trainer}", f"--steps={STEPS[trainer]}"]
     words = [str(word) for word in command]
     return subprocess.Popen(

@@ -7,17 +7,17 @@ from pathlib import Path
 
 import numpy as np
 
-from robojackson.motion.reference import ReferenceMotion
-from robojackson.retarget.robot import Robot
-from robojackson.rl.config import ControlConfig
-from robojackson.rl.observation import observation_size
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.pipeline import tables
+from robojackson.rl.config.train_config import ControlConfig
+from robojackson.rl.modes.observation import observation_size
 from robojackson.rl.policy import Policy
-from storage import tables
-from tests.flows.conftest import environment
+from robojackson.robot.model import Robot
+from tests.fixtures.commands import environment
 
 SPY = """
 import sys
-from flows.cli import app
+from robojackson.cli.app import app
 heavy = {"jax", "torch", "stable_baselines3", "sb3_contrib", "sbx", "prefect"}
 try:
     app(sys.argv[1:])

@@ -7,14 +7,14 @@ import pytest
 import torch
 from stable_baselines3.common.type_aliases import ReplayBufferSamples
 
-from robojackson.motion.reference import ReferenceMotion
-from robojackson.retarget.robot import Robot
-from robojackson.rl.config import PaperConfig, TqcConfig
-from robojackson.rl.networks import Networks, fitted
-from robojackson.rl.replay import buffer_of
-from robojackson.rl.tracking import TrackingCore
-from robojackson.rl.trainer import make_trainer
-from robojackson.rl.vec_env import TrackingVecEnv
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.rl.config.train_config import PaperConfig, TqcConfig
+from robojackson.rl.env.tracking_core import TrackingCore
+from robojackson.rl.env.vec_env import TrackingVecEnv
+from robojackson.rl.tqc.network_arrays import Networks, fitted
+from robojackson.rl.tqc.replay_files import buffer_of
+from robojackson.rl.tqc.trainer import make_trainer
+from robojackson.robot.model import Robot
 
 BATCH, UPDATES = 16, 4
 TQC = TqcConfig(

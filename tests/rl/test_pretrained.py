@@ -17,18 +17,18 @@ from stable_baselines3 import SAC
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
 from robojackson.errors import BadPolicy, MissingDependency
-from robojackson.motion.reference import ReferenceMotion
-from robojackson.retarget.robot import Robot
+from robojackson.formats.onnx_policy import to_onnx
+from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl import pretrained as starting
-from robojackson.rl.config import PaperConfig, TqcConfig, TrainConfig
-from robojackson.rl.networks import Networks, fitted, load_networks, widened
-from robojackson.rl.onnx_file import to_onnx
+from robojackson.rl.config.train_config import PaperConfig, TqcConfig, TrainConfig
+from robojackson.rl.env.tracking_core import TrackingCore
+from robojackson.rl.env.vec_env import TrackingVecEnv
 from robojackson.rl.policy import Policy
 from robojackson.rl.pretrained import from_sb3_zip, pretrained
-from robojackson.rl.tracking import TrackingCore
-from robojackson.rl.train import train
-from robojackson.rl.trainer import make_trainer
-from robojackson.rl.vec_env import TrackingVecEnv
+from robojackson.rl.tqc.network_arrays import Networks, fitted, load_networks, widened
+from robojackson.rl.tqc.trainer import make_trainer
+from robojackson.rl.training import train
+from robojackson.robot.model import Robot
 
 SMALL = TqcConfig(n_envs=2, warmup=8, batch=8, buffer=1000, actor=(12, 8), critic=(10,))
 ran: list[str] = []

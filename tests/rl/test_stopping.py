@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from robojackson.motion.reference import ReferenceMotion
-from robojackson.retarget.robot import Robot
-from robojackson.rl.config import TqcConfig, TrainConfig
-from robojackson.rl.run import Run
-from robojackson.rl.train import Hooks, train
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.rl.config.train_config import TqcConfig, TrainConfig
+from robojackson.rl.training import Hooks, train
+from robojackson.rl.training_run import Run
+from robojackson.robot.model import Robot
 
 SMALL = TqcConfig(
     n_envs=4, warmup=128, batch=32, updates_per_round=2, steps_per_round=8, actor=(8,), critic=(8,)

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
+from robojackson.pipeline.folder_lock import locked
 from storage import places
 from storage.leftovers import sweep
-from storage.lock import locked
-from storage.metrics import TABLES, Place
 from storage.store import Store
+from storage.study_tables import TABLES, Place
 
 ROOT = Path(__file__).parents[2]
 DIES = """

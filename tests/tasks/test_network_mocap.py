@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 import torch
 
-from robojackson.clips.track import LandmarkTrack
 from robojackson.clips.trim import trim
 from robojackson.errors import BadWeights
-from robojackson.mocap.networks.config import NetworkConfig
 from robojackson.mocap.networks.hybrik_net import HybrikResNet
+from robojackson.mocap.networks.network_config import NetworkConfig
 from robojackson.mocap.recover import MocapConfig
-from robojackson.motion.smpl import SmplSequence
-from storage import tables
+from robojackson.motion.landmark_track import LandmarkTrack
+from robojackson.motion.smpl_sequence import SmplSequence
+from robojackson.pipeline import tables
 from storage.store import Store
-from tasks.network_mocap import _models, network_mocap
+from tasks.recover_motion_by_networks import _models, network_mocap
 
 ROOT = Path(__file__).parents[2]
 FRAMES = 6

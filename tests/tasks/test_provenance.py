@@ -5,13 +5,14 @@ from pathlib import Path
 import pytest
 
 from robojackson.errors import StoreError
-from robojackson.rl.config import EvaluateConfig, TrainConfig
-from storage import metrics, tables
+from robojackson.pipeline import tables
+from robojackson.pipeline.table_schemas import EPISODE_RECORD, EVALUATION_RECORD
+from robojackson.rl.config.train_config import EvaluateConfig, TrainConfig
+from storage import study_tables
 from storage.artifact import Artifact
-from storage.schemas import EPISODE_RECORD, EVALUATION_RECORD
 from storage.store import Store
-from tasks import metrics as publishing
-from tasks.cell import Cell
+from tasks import publish_tables as publishing
+from tasks.study_cell import Cell
 
 CELL = Cell(
     study="s",
@@ -42,7 +43,7 @@ def made(store: Store, policy: bytes) -> dict[str, Artifact]:
 
 
 def commits(store: Store) -> list[str]:
-    return [row["git_commit"] for row in metrics.query(store, "SELECT git_commit FROM runs")]
+    return [row["git_commit"] for row in study_tables.query(store, "SELECT git_commit FROM runs")]
 
 
 def test_rows_that_are_made_anew_get_the_commit_that_made_them(

@@ -11,16 +11,17 @@ import pytest
 from prefect import flow
 from pydantic import ValidationError
 
-from configs.loader import load
-from configs.study import Move, Study
-from robojackson.metrics.study import estimate
-from robojackson.report.study import cell
-from storage import metrics, tables
+from configs.study_config import Move, Study
+from robojackson.metrics.ablation_statistics import estimate
+from robojackson.pipeline import tables
+from robojackson.pipeline.table_schemas import EPISODE_RECORD, EVALUATION_RECORD
+from robojackson.pipeline.yaml_loader import load
+from robojackson.report.pages.study_page import cell
+from storage import study_tables
 from storage.artifact import Artifact
-from storage.schemas import EPISODE_RECORD, EVALUATION_RECORD
 from storage.store import Store
-from tasks import study as pages
-from tasks.study import report
+from tasks import write_study_page as pages
+from tasks.write_study_page import report
 
 STUDY = Study(
     name="known", moves=("hip_shake", "walk"), setups=("scratch", "pretrain"), seeds=(0, 1, 2, 3)
@@ -32,7 +33,7 @@ PAID = {"scratch": DULL, "pretrain": DULL, "curiosity": DULL | {"flail": 1.57}}
 
 def publish(store: Store, move: str, setup: str, seed: int) -> None:
     """A cell that learns from nothing to what its setup is worth."""
-    place = metrics.Place("known", move, setup, seed, f"{setup}-{move}-s{seed}")
+    place = study_tables.Place("known", move, setup, seed, f"{setup}-{move}-s{seed}")
     names = {"run_id": place.run_id, "move": move, "setup": setup, "seed": seed}
     share = np.linspace(0.0, 1.0, 50)
     episodes = [
@@ -47,10 +48,10 @@ def publish(store: Store, move: str, setup: str, seed: int) -> None:
         "episodes": store.keep("t", "e.parquet", tables.encode_rows(EPISODE_RECORD, episodes)),
         "evaluations": store.keep("t", "v.parquet", tables.encode_rows(EVALUATION_RECORD, rows)),
     }
-    metrics.write(store, place, given)
+    study_tables.write(store, place, given)
     start = "scratch" if setup == "scratch" else "walker"
     facts = {"study": "known", "git_commit": "0123456789abcdef", "config": {"start": start}}
-    metrics.note(store, place, {**names, **facts})
+    study_tables.note(store, place, {**names, **facts})
 
 
 def rollout(names: dict[str, Any], policy: str, worth: float) -> dict[str, Any]:
@@ -172,7 +173,9 @@ def test_the_page_is_drawn_again_only_when_the_rows_change(
 
     @flow(name="pages")
     def page() -> Any:
-        return pages.results_page(STUDY, {}, metrics.kept(Store(store_folder), "known"), {}, {})
+        return pages.results_page(
+            STUDY, {}, study_tables.kept(Store(store_folder), "known"), {}, {}
+        )
 
     publish(Store(store_folder), "walk", "scratch", 0)
     first, again = page(), page()

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from robojackson.errors import TrainingFailed
-from tasks import process as task
+from tasks.runtime import child_process as task
 
 SLEEPER = "import time; print('started', file=__import__('sys').stderr, flush=True); time.sleep(60)"
 STUBBORN = f"import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN); {SLEEPER}"
@@ -88,7 +88,7 @@ def test_a_cancelled_task_leaves_no_process(
 def test_a_training_ends_when_its_parent_is_killed(tmp_path: Path) -> None:
     child = (
         "import os, sys, time\n"
-        "from flows.training import die_with\n"
+        "from robojackson.cli.training_process import die_with\n"
         "die_with(int(sys.argv[1]))\n"
         "open(sys.argv[2], 'w').write(str(os.getpid()))\n"
         "time.sleep(60)\n"
@@ -107,7 +107,7 @@ def test_a_training_ends_when_its_parent_is_killed(tmp_path: Path) -> None:
 
 
 def test_a_training_whose_parent_is_gone_does_not_begin() -> None:
-    code = "from flows.training import die_with; die_with(1)"
+    code = "from robojackson.cli.training_process import die_with; die_with(1)"
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, check=False, env=task.environment()
     )

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tools import build_pose_models as builder
+from tools.assets import build_pose_models as builder
 
 ASSETS = Path(__file__).resolve().parents[2] / "robojackson" / "assets"
 

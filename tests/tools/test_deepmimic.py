@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tools import deepmimic
+from tools.render import deepmimic
 
 
 def some_motion(frames: int = 7) -> deepmimic.Motion:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tools import deepmimic
-from tools.hip_shake import Dance, Measures, author, solve_leg
+from tools.render import deepmimic
+from tools.render.hip_shake import Dance, Measures, author, solve_leg
 
 BODY = Measures(
     hips={1.0: np.array([0.0, 0.12, 0.0]), -1.0: np.array([0.0, -0.12, 0.0])},

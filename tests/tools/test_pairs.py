@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tools import deepmimic
 from tools.pairs import bvh, gestures, sources
+from tools.render import deepmimic
 
 BVH = """HIERARCHY
 ROOT Hips

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 import torch
 
-from robojackson.mocap.temporal import features, flow, network
+from robojackson.mocap.temporal import error_flow, features, temporal_network
 from robojackson.mocap.temporal.features import Sight
-from tools import train_temporal
 from tools.pairs.sources import RefusedMotion
-from tools.temporal import batches
+from tools.temporal import batches, train_temporal
 from tools.temporal.batches import Batch, Change
 from tools.temporal.examples import Example, flattened
 from tools.temporal.fit_flow import discrepancy
@@ -18,7 +17,7 @@ from tools.temporal.net import Flow, Lifter
 
 
 @pytest.fixture(scope="module")
-def twins(tmp_path_factory: pytest.TempPathFactory) -> tuple[Lifter, Flow, flow.Weights]:
+def twins(tmp_path_factory: pytest.TempPathFactory) -> tuple[Lifter, Flow, error_flow.Weights]:
     torch.manual_seed(1)
     lifter, coupled = Lifter().eval(), Flow()
     for part in (lifter, coupled):
@@ -26,7 +25,7 @@ def twins(tmp_path_factory: pytest.TempPathFactory) -> tuple[Lifter, Flow, flow.
             torch.nn.init.normal_(value, std=0.05)
     path = tmp_path_factory.mktemp("weights") / "random.safetensors"
     train_temporal.save(lifter.half().float(), coupled.half().float(), path)
-    return lifter, coupled, network.load(path)
+    return lifter, coupled, temporal_network.load(path)
 
 
 def person(frames: int = 60, motion: str = "jump") -> Example:
@@ -50,11 +49,11 @@ def batch_of(example: Example) -> Batch:
 
 
 def test_torch_and_numpy_are_the_same_lifter(
-    twins: tuple[Lifter, Flow, flow.Weights],
+    twins: tuple[Lifter, Flow, error_flow.Weights],
 ) -> None:
     lifter, _, weights = twins
     sight = person().sight
-    change, spread, _ = network.run(sight, weights)
+    change, spread, _ = temporal_network.run(sight, weights)
     numbers = torch.from_numpy(features.numbers(sight)[None].astype(np.float32))
     with torch.no_grad():
         correction, log_spread = lifter(numbers)
@@ -62,22 +61,22 @@ def test_torch_and_numpy_are_the_same_lifter(
     assert np.abs(log_spread[0].numpy() - np.log(spread)).max() < 1e-3
 
 
-def test_torch_and_numpy_are_the_same_flow(twins: tuple[Lifter, Flow, flow.Weights]) -> None:
+def test_torch_and_numpy_are_the_same_flow(twins: tuple[Lifter, Flow, error_flow.Weights]) -> None:
     _, coupled, weights = twins
     rng = np.random.default_rng(3)
     error, seen = rng.normal(size=(5, 36)), rng.normal(size=(5, 160))
     with torch.no_grad():
         z, _ = coupled(torch.from_numpy(error).float(), torch.from_numpy(seen).float())
-    assert np.abs(z.numpy() - flow.to_embedding(error, seen, weights)).max() < 1e-4
+    assert np.abs(z.numpy() - error_flow.to_embedding(error, seen, weights)).max() < 1e-4
 
 
-def test_the_flow_in_torch_can_be_inverted(twins: tuple[Lifter, Flow, flow.Weights]) -> None:
+def test_the_flow_in_torch_can_be_inverted(twins: tuple[Lifter, Flow, error_flow.Weights]) -> None:
     _, coupled, _ = twins
     error, seen = torch.randn(5, 36), torch.randn(5, 160)
     assert (coupled.inverse(coupled(error, seen)[0], seen) - error).abs().max() < 1e-5
 
 
-def test_the_volume_is_the_determinant(twins: tuple[Lifter, Flow, flow.Weights]) -> None:
+def test_the_volume_is_the_determinant(twins: tuple[Lifter, Flow, error_flow.Weights]) -> None:
     _, coupled, _ = twins
     error, seen = torch.randn(36), torch.randn(160)
     jacobian = torch.autograd.functional.jacobian(lambda x: coupled(x, seen)[0], error)

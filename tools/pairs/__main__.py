@@ -20,10 +20,10 @@ import numpy as np
 import torch
 from rich.console import Console
 
-from tools import deepmimic
-from tools.anny_body import Body
 from tools.pairs import scenery, sources
 from tools.pairs.clips import make_clip
+from tools.render import deepmimic
+from tools.render.anny_body import Body
 
 
 def main(arguments: list[str] | None = None) -> int:

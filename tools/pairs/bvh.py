@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tools import deepmimic
+from tools.render import deepmimic
 
 TO_DEEPMIMIC = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 DOWN = np.array([0.0, -1.0, 0.0])

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from robojackson.clips.landmarks import video_landmarker
-from robojackson.mocap.blazepose import LANDMARK_NAMES, landmark
-from tools import deepmimic
-from tools.anny_body import Body
+from robojackson.clips.pose_detector import video_landmarker
+from robojackson.mocap.landmarks.blazepose import LANDMARK_NAMES, landmark
 from tools.pairs import gestures, people, scenery, sources
+from tools.render import deepmimic
+from tools.render.anny_body import Body
 
 FPS = 30.0
 FRAMES = (90, 150)

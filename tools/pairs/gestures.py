@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from tools import deepmimic
+from tools.render import deepmimic
 
 HALF_HIPS = 0.085
 ANKLE_HEIGHT = 0.08

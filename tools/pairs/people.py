@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from tools import deepmimic, stage
-from tools.anny_body import Body
+from tools.render import deepmimic, stage
+from tools.render.anny_body import Body
 
 PHENOTYPE: Mapping[str, tuple[float, float]] = {
     "gender": (0.0, 1.0), "age": (0.5, 0.85), "height": (0.25, 0.75), "weight": (0.2, 0.8),

@@ -1,6 +1,6 @@
 """Pictures of people before all sorts of backgrounds, with things in the way.
 
-Camera frame as in `robojackson.mocap.camera`: x right, y down, z forward, metres.
+Camera frame as in `robojackson.mocap.landmarks.pinhole_camera`: x right, y down, z forward, metres.
 """
 
 from collections.abc import Iterator

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tools import deepmimic
 from tools.pairs import bvh
+from tools.render import deepmimic
 
 DEEPMIMIC = (
     "jump", "run", "punch", "roll", "cartwheel", "crawl", "getup_facedown", "getup_faceup",

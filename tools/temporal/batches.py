@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from robojackson.mocap.blazepose import BODY, MIRROR, landmark
+from robojackson.mocap.landmarks.blazepose import BODY, MIRROR, landmark
 from robojackson.mocap.temporal import features
 from robojackson.mocap.temporal.features import FPS, SEEN
 from tools.temporal.examples import Example

@@ -9,15 +9,15 @@ from pathlib import Path
 
 import numpy as np
 
-from robojackson.clips.evidence import weighed
-from robojackson.clips.track import LandmarkTrack
+from robojackson.body.forward_kinematics import apply
+from robojackson.clips.quality.visibility import weighed
 from robojackson.errors import NoPersonFound
-from robojackson.mocap import camera
-from robojackson.mocap.blazepose import BODY, landmark, repair
-from robojackson.mocap.kinematics import apply
+from robojackson.mocap.landmarks import pinhole_camera
+from robojackson.mocap.landmarks.blazepose import BODY, landmark, repair
 from robojackson.mocap.recover import MocapConfig
 from robojackson.mocap.temporal import features
 from robojackson.mocap.temporal.features import Sight
+from robojackson.motion.landmark_track import LandmarkTrack
 
 FOLLOWED_M = 0.25
 """Mean distance across the image over which the detector is not on the person."""
@@ -96,9 +96,9 @@ def read(path: Path) -> Example | None:
 def sight_of(track: LandmarkTrack) -> Sight:
     """As in `recover`, up to the network."""
     config, landmarks = MocapConfig(), repair(track)
-    focal = camera.guess_focal(track.width, track.height)
-    lens = camera.Pinhole(focal, track.width, track.height)
-    placed = camera.place(landmarks, lens, track.fps, config.depth_cutoff_hz)
+    focal = pinhole_camera.guess_focal(track.width, track.height)
+    lens = pinhole_camera.Pinhole(focal, track.width, track.height)
+    placed = pinhole_camera.place(landmarks, lens, track.fps, config.depth_cutoff_hz)
     return features.look(placed, landmarks.local, landmarks.visibility)
 
 

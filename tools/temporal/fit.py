@@ -8,10 +8,10 @@ import numpy as np
 import torch
 from torch import nn
 
-from robojackson.metrics import pose
-from robojackson.mocap.blazepose import BODY
+from robojackson.metrics import pose_error
+from robojackson.mocap.landmarks.blazepose import BODY
 from robojackson.mocap.temporal import features
-from robojackson.mocap.temporal.lift import corrected
+from robojackson.mocap.temporal.temporal_lift import corrected
 from tools.temporal.batches import TWELVE, Batch, Change, change, joined, table, windows
 from tools.temporal.examples import Example, Truth
 from tools.temporal.invented import Detector
@@ -153,7 +153,11 @@ def validate(net: Lifter, examples: Sequence[Example]) -> dict[str, float]:
             correction = net(numbers)[0][0].numpy()
         before, after = features.base(sight)[good], corrected(sight, correction)[good]
         rows.append(
-            [f(x, body[good]) for f in (pose.pa_mpjpe, pose.mpjpe) for x in (before, after)]
+            [
+                f(x, body[good])
+                for f in (pose_error.pa_mpjpe, pose_error.mpjpe)
+                for x in (before, after)
+            ]
         )
     net.train()
     names = ("pa_detector", "pa_network", "rr_detector", "rr_network")

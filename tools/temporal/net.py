@@ -5,9 +5,9 @@
 import torch
 from torch import nn
 
-from robojackson.mocap.temporal import flow
+from robojackson.mocap.temporal import error_flow
 from robojackson.mocap.temporal.features import COUNT
-from robojackson.mocap.temporal.network import DILATIONS, LOG_SPREAD, SPREAD_RANGE
+from robojackson.mocap.temporal.temporal_network import DILATIONS, LOG_SPREAD, SPREAD_RANGE
 
 WIDTH = 160
 JOINTS = 12
@@ -74,15 +74,15 @@ class Flow(nn.Module):
 
     def __init__(self, width: int = WIDTH) -> None:
         super().__init__()
-        self.memory = nn.Parameter(torch.full((flow.SIZE,), 2.0))
-        self.read = nn.Linear(width, flow.CONDITION)
-        self.couplings = nn.ModuleList(_coupling() for _ in range(flow.LAYERS))
+        self.memory = nn.Parameter(torch.full((error_flow.SIZE,), 2.0))
+        self.read = nn.Linear(width, error_flow.CONDITION)
+        self.couplings = nn.ModuleList(_coupling() for _ in range(error_flow.LAYERS))
 
     def forward(self, x: torch.Tensor, h: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """Error to z, and the logarithm of the volume change."""
         condition = torch.relu(self.read(h))
         volume = x.new_zeros(x.shape[:-1])
-        for layer in range(flow.LAYERS):
+        for layer in range(error_flow.LAYERS):
             kept, scale, shift = self._nets(x, condition, layer)
             x = x * kept + (1 - kept) * (x * torch.exp(scale) + shift)
             volume = volume + ((1 - kept) * scale).sum(-1)
@@ -91,7 +91,7 @@ class Flow(nn.Module):
     def inverse(self, z: torch.Tensor, h: torch.Tensor) -> torch.Tensor:
         """z to error."""
         condition = torch.relu(self.read(h))
-        for layer in reversed(range(flow.LAYERS)):
+        for layer in reversed(range(error_flow.LAYERS)):
             kept, scale, shift = self._nets(z, condition, layer)
             z = z * kept + (1 - kept) * (z - shift) * torch.exp(-scale)
         return z
@@ -99,15 +99,15 @@ class Flow(nn.Module):
     def _nets(
         self, x: torch.Tensor, condition: torch.Tensor, layer: int
     ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-        kept = torch.from_numpy(flow.mask_of(layer)).to(x)
+        kept = torch.from_numpy(error_flow.mask_of(layer)).to(x)
         out = self.couplings[layer](torch.cat([x * kept, condition], -1))
-        return kept, 1.5 * torch.tanh(out[..., : flow.SIZE]), out[..., flow.SIZE :]
+        return kept, 1.5 * torch.tanh(out[..., : error_flow.SIZE]), out[..., error_flow.SIZE :]
 
 
 def _coupling() -> nn.Sequential:
     """Log scale and shift of one layer, nothing at first."""
-    last = nn.Linear(flow.HIDDEN, 2 * flow.SIZE)
+    last = nn.Linear(error_flow.HIDDEN, 2 * error_flow.SIZE)
     nn.init.normal_(last.weight, std=1e-3)
     nn.init.zeros_(last.bias)
-    first = nn.Linear(flow.SIZE + flow.CONDITION, flow.HIDDEN)
+    first = nn.Linear(error_flow.SIZE + error_flow.CONDITION, error_flow.HIDDEN)
     return nn.Sequential(first, nn.ReLU(), last)

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import numpy as np
 
-from robojackson.mocap.blazepose import LANDMARK_NAMES
-from robojackson.mocap.camera import guess_focal
+from robojackson.mocap.landmarks.blazepose import LANDMARK_NAMES
+from robojackson.mocap.landmarks.pinhole_camera import guess_focal
 from robojackson.mocap.temporal.features import SEEN
-from tools import deepmimic
-from tools.anny_body import Body
 from tools.pairs import people, scenery, sources
 from tools.pairs.clips import choose_motion
+from tools.render import deepmimic
+from tools.render.anny_body import Body
 from tools.temporal.examples import VALIDATION_MOTIONS, Truth, along_rays
 
 PEOPLE = 60

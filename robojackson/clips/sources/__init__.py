@@ -8,8 +8,8 @@ from importlib import import_module
 from pkgutil import iter_modules
 from typing import Protocol, cast
 
-from robojackson.clips.candidate import VideoCandidate
-from robojackson.clips.web import WebConfig
+from robojackson.clips.web.video_candidate import VideoCandidate
+from robojackson.clips.web.yt_dlp_client import WebConfig
 from robojackson.errors import UnknownName
 
 

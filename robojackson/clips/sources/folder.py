@@ -3,10 +3,10 @@
 from datetime import datetime
 from pathlib import Path
 
-from robojackson.clips.candidate import VideoCandidate
-from robojackson.clips.titles import clean_text, safe_name
 from robojackson.clips.video import list_videos
-from robojackson.clips.web import WebConfig
+from robojackson.clips.web.untrusted_text import clean_text, safe_name
+from robojackson.clips.web.video_candidate import VideoCandidate
+from robojackson.clips.web.yt_dlp_client import WebConfig
 from robojackson.errors import SearchFailed, UnreadableVideo
 
 NAME = "folder"

@@ -6,10 +6,10 @@ from datetime import datetime
 from html.parser import HTMLParser
 from urllib.parse import unquote, urljoin, urlsplit
 
-from robojackson.clips.candidate import GENERIC, VideoCandidate
-from robojackson.clips.titles import clean_text, safe_name, web_address
 from robojackson.clips.video import SUFFIXES
-from robojackson.clips.web import WebConfig
+from robojackson.clips.web.untrusted_text import clean_text, safe_name, web_address
+from robojackson.clips.web.video_candidate import GENERIC, VideoCandidate
+from robojackson.clips.web.yt_dlp_client import WebConfig
 from robojackson.errors import SearchFailed
 
 LARGEST_PAGE = 4_000_000

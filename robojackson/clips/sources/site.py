@@ -5,8 +5,8 @@ from datetime import datetime
 from typing import Any
 from urllib.parse import quote_plus
 
-from robojackson.clips.candidate import VideoCandidate, from_info
-from robojackson.clips.web import WebConfig, entries, listing
+from robojackson.clips.web.video_candidate import VideoCandidate, from_info
+from robojackson.clips.web.yt_dlp_client import WebConfig, entries, listing
 from robojackson.errors import SearchFailed
 
 

@@ -4,9 +4,9 @@ import logging
 from datetime import datetime
 from pathlib import Path
 
-from robojackson.clips.candidate import GENERIC, VideoCandidate
-from robojackson.clips.titles import clean_text, safe_name, web_address
-from robojackson.clips.web import WebConfig
+from robojackson.clips.web.untrusted_text import clean_text, safe_name, web_address
+from robojackson.clips.web.video_candidate import GENERIC, VideoCandidate
+from robojackson.clips.web.yt_dlp_client import WebConfig
 from robojackson.errors import SearchFailed
 
 COMMENT = "#"

@@ -2,9 +2,9 @@
 
 from datetime import datetime
 
-from robojackson.clips.candidate import VideoCandidate
 from robojackson.clips.sources.site import candidates
-from robojackson.clips.web import WebConfig, listing
+from robojackson.clips.web.video_candidate import VideoCandidate
+from robojackson.clips.web.yt_dlp_client import WebConfig, listing
 
 
 def search(

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional
 
-from robojackson.mocap.networks.blocks import BasicBlock, Bottleneck, convolution, normed
+from robojackson.mocap.networks.residual_blocks import BasicBlock, Bottleneck, convolution, normed
 
 WIDTHS = (48, 96, 192, 384)
 BLOCKS = 4

@@ -10,11 +10,11 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from robojackson.mocap.blazepose import mirror_of
-from robojackson.mocap.networks.checkpoint import Weights, install
+from robojackson.body.skeleton import KEYPOINT_NAMES
+from robojackson.mocap.landmarks.blazepose import mirror_of
 from robojackson.mocap.networks.hrnet import FEATURES, HRNet
 from robojackson.mocap.networks.resnet import LAYERS, ResNet34
-from robojackson.mocap.skeleton import KEYPOINT_NAMES
+from robojackson.mocap.networks.weight_files import Weights, install
 
 SIDE = 64
 """Cells of a heatmap along each of its three axes."""

@@ -12,8 +12,8 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from robojackson.mocap.networks.checkpoint import Weights, install
 from robojackson.mocap.networks.real_nvp import RealNvp, ShapedRealNvp
+from robojackson.mocap.networks.weight_files import Weights, install
 
 JOINT_INPUTS = 29 * 3 + 29
 ROTATIONS = 24 * 6

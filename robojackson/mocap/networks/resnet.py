@@ -4,7 +4,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional
 
-from robojackson.mocap.networks.blocks import BasicBlock
+from robojackson.mocap.networks.residual_blocks import BasicBlock
 
 LAYERS = ((64, 3), (128, 4), (256, 6), (512, 3))
 """Width and number of blocks; every layer but the first halves the image."""

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from robojackson.body.skeleton import KEYPOINT_NAMES, PARENTS, REST_OFFSETS, assemble
 from robojackson.errors import BadWeights
-from robojackson.mocap.blazepose import mirror_of
-from robojackson.mocap.networks.checkpoint import Weights
-from robojackson.mocap.skeleton import KEYPOINT_NAMES, PARENTS, REST_OFFSETS, assemble
+from robojackson.mocap.landmarks.blazepose import mirror_of
+from robojackson.mocap.networks.weight_files import Weights
 
 LEAF_VERTICES: Mapping[str, int] = {
     "head_top": 411,

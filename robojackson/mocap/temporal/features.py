@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from robojackson.mocap.blazepose import BODY, LANDMARK_NAMES, MIRROR, landmark
-from robojackson.mocap.camera import DOWN, METRES_PER_METRE
-from robojackson.mocap.kinematics import apply, unit
+from robojackson.body.forward_kinematics import apply, unit
+from robojackson.mocap.landmarks.blazepose import BODY, LANDMARK_NAMES, MIRROR, landmark
+from robojackson.mocap.landmarks.pinhole_camera import DOWN, METRES_PER_METRE
 
 HIPS = (landmark("left_hip"), landmark("right_hip"))
 FPS = 30.0

@@ -1,0 +1,188 @@
+"""Policies of the bundled dances and of the authors' clips, trained and judged: one cached row a
+move and a seed, so that it may take several sittings.
+
+A row's training is pinned to a core of its own and ended by the CPU minutes of its bar. A motion
+that the gate refuses is trained on all the same, and the row says so.
+"""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from queue import SimpleQueue
+
+ROOT = Path(__file__).parents[2]
+PAPER = "ROBOJACKSON_PAPER"
+HORIZONS_S = (10.0, 20.0)
+
+
+@dataclass(frozen=True)
+class Move:
+    """A row of the table of policies: what it may cost and what it must show.
+
+    Attributes:
+        clip: A video of the repository, or the name of a file in the folder of the authors'.
+        cpu_minutes: Of one core.
+        success, worst: Least strict success, of the mean over seeds and of the worst seed.
+        skill: Least skill.
+        cyclic: Whether it is danced for a time; else to its end.
+        authors: Whether it is a file of the authors': limbs are told and not asked for.
+    """
+
+    clip: str
+    cpu_minutes: float
+    success: float
+    worst: float
+    skill: float
+    cyclic: bool = True
+    authors: bool = False
+
+    @property
+    def horizons_s(self) -> tuple[float, ...]:
+        """Seconds that it is judged over, a row each."""
+        return HORIZONS_S if self.cyclic else HORIZONS_S[:1]
+
+
+MOVES = {
+    "hip_shake": Move("clips/hip_shake.mp4", 10, 0.95, 0.85, 0.5),
+    "walk": Move("clips/walk.mp4", 20, 0.90, 0.80, 0.6),
+    "dance_b": Move("clips/dance_b.mp4", 40, 0.85, 0.70, 0.5, cyclic=False),
+    "authors_apt1": Move("apt1", 20, 0.85, 0.0, 0.5, cyclic=False, authors=True),
+    "authors_walk": Move("walk", 20, 0.85, 0.0, 0.5, cyclic=False, authors=True),
+}
+
+
+@dataclass(frozen=True)
+class Folders:
+    """Where a benchmark keeps its things.
+
+    Attributes:
+        work: Motions, checkpoints, policies: not for the repository.
+        results: Tables for the repository.
+    """
+
+    work: Path
+    results: Path
+
+    @staticmethod
+    def at(folder: Path | None) -> "Folders":
+        """The usual ones, or both within one folder."""
+        if folder is None:
+            return Folders(ROOT / "store" / "bench-learning", Path(__file__).parents[1] / "results")
+        return Folders(folder.absolute() / "work", folder.absolute() / "results")
+
+    @property
+    def rows(self) -> Path:
+        """One Parquet a move, a seed and a horizon."""
+        return self.results / "learning"
+
+    def row(self, name: str, seed: int | str, seconds: float, minutes: float | None = None) -> Path:
+        """The file of a row; one of another budget than the move's own is in no table."""
+        suffix = "" if seconds == HORIZONS_S[0] else f"-{seconds:g}s"
+        return self.rows / f"{name}{budget(minutes)}-s{seed}{suffix}.parquet"
+
+
+def budget(minutes: float | None) -> str:
+    """What the name of a row says of CPU minutes that are not the move's own."""
+    return "" if minutes is None else f"-{minutes:g}min"
+
+
+def command(*words: object, core: int | None = None) -> int:
+    """One of our commands on one thread, pinned to a core where one is named; its exit status."""
+    line = [sys.executable, "-m", "robojackson.cli.app", *map(str, words)]
+    if core is not None:
+        line = ["taskset", "-c", str(core), *line]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    return subprocess.run(line, check=False, cwd=ROOT, env=environment).returncode
+
+
+def must(*words: object, core: int | None = None) -> None:
+    """The same for a command without which nothing goes on."""
+    if status := command(*words, core=core):
+        raise SystemExit(f"`robojackson {' '.join(map(str, words))}` ended with {status}")
+
+
+def source_of(move: Move) -> Path | None:
+    """The file that a move comes from; None where the authors' are not at hand."""
+    if not move.authors:
+        return ROOT / move.clip
+    found = Path(os.environ.get(PAPER, "")) / f"{move.clip}.pt"
+    return found if PAPER in os.environ and found.is_file() else None
+
+
+def reference_of(name: str, folders: Folders) -> Path:
+    """The motion of a move for the robot, made once; `gate.json` beside it tells the verdict."""
+    move, work = MOVES[name], folders.work / name
+    reference = work / "reference.parquet"
+    if (work / "gate.json").is_file():
+        return reference
+    source = source_of(move)
+    assert source is not None
+    must("import" if move.authors else "mocap", source, "-o", work)
+    options = ["--set", "retarget.cyclic=no"] if move.authors else []
+    refused = command("retarget", work / "smpl.parquet", "-o", work, *options)
+    if not reference.is_file():
+        raise SystemExit(f"{name}: no reference motion was made (status {refused})")
+    (work / "gate.json").write_text(json.dumps({"forced": bool(refused)}))
+    return reference
+
+
+def forced(name: str, folders: Folders) -> bool:
+    """Whether the gate refused the move's motion, so that it was forced."""
+    told = folders.work / name / "gate.json"
+    return told.is_file() and bool(json.loads(told.read_text())["forced"])
+
+
+def train_and_judge(
+    name: str, seed: int, minutes: float | None, folders: Folders, core: int
+) -> None:
+    """Train one move with one seed and keep the rows of its evaluation; nothing if they exist."""
+    kept = {s: folders.row(name, seed, s, minutes) for s in MOVES[name].horizons_s}
+    if all(path.exists() for path in kept.values()):
+        return
+    work = folders.work / name
+    reference, out = work / "reference.parquet", work / f"s{seed}{budget(minutes)}"
+    spent = minutes or MOVES[name].cpu_minutes
+    options = ["--seed", seed, "--set", f"cpu_minutes={spent}", "--move", name, "--force"]
+    must("train", reference, "-o", out, *options, core=core)
+    folders.rows.mkdir(parents=True, exist_ok=True)
+    for seconds, path in kept.items():
+        judged = out / f"judged-{seconds:g}s"
+        policy = out / "policy.safetensors"
+        must("evaluate", policy, reference, "-o", judged, "--seconds", seconds, core=core)
+        part = path.with_suffix(".part")
+        part.write_bytes((judged / "evaluations.parquet").read_bytes())
+        part.replace(path)
+
+
+def policies(
+    names: Iterable[str], seeds: Iterable[int], minutes: float | None, jobs: int, folders: Folders
+) -> None:
+    """All rows, `jobs` at a time, each on a core of its own; Ctrl-C keeps checkpoints."""
+    present = [name for name in names if source_of(MOVES[name]) is not None]
+    for name in present:
+        reference_of(name, folders)
+    cores: SimpleQueue[int] = SimpleQueue()
+    for core in sorted(os.sched_getaffinity(0))[:jobs]:
+        cores.put(core)
+
+    def row(name: str, seed: int) -> None:
+        core = cores.get()
+        try:
+            train_and_judge(name, seed, minutes, folders, core)
+        finally:
+            cores.put(core)
+
+    jobs = max(1, cores.qsize())
+    with ThreadPoolExecutor(jobs) as pool:
+        work = [pool.submit(row, name, seed) for name in present for seed in seeds]
+        try:
+            for job in work:
+                job.result()
+        except BaseException:
+            pool.shutdown(wait=True, cancel_futures=True)
+            raise

@@ -1,0 +1,136 @@
+"""Speed of learning beside its peers, interleaved in one process on one core, in CPU time, so that
+a busy machine changes both alike; `threads` alone is wall time and wants two idle cores.
+"""
+
+import os
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from benchmarks.learning.environment_core import core, humanoid
+from robojackson.rl.config.train_config import ControlConfig, PaperConfig, TqcConfig, TrackConfig
+from robojackson.rl.env.tracking_core import TrackingCore
+from robojackson.rl.env.vec_env import TrackingVecEnv
+from robojackson.rl.modes.standing_motion import standing
+from robojackson.rl.sim.simulation import Simulation
+from robojackson.rl.tqc.replay_files import buffer_of
+from robojackson.rl.tqc.trainer import make_trainer
+
+Row = dict[str, Any]
+
+
+def speed(repeats: int, seconds: float) -> list[Row]:
+    """One row a comparison: ours, the peer's, their ratio and the bar."""
+    os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+    rows = [updates(repeats, seconds, layer_norm) for layer_norm in (False, True)]
+    rows += [paper_steps(repeats, seconds), told_core(repeats)]
+    return [{**row, "load_average": os.getloadavg()[0]} for row in rows]
+
+
+def updates(repeats: int, seconds: float, layer_norm: bool) -> Row:
+    """Gradient updates a CPU second at equal hyper-parameters, on the tracking observation: as
+    sb3-contrib's critics are, and as ours are by default."""
+    tqc = TqcConfig(policy_delay=1, warmup=1, layer_norm=layer_norm)
+    work = {name: _rounds(name, TrackConfig(threads=1), tqc) for name in ("sbx", "sb3")}
+    ours, theirs = interleaved(work, repeats, seconds)
+    what = "updates/s, sbx over sb3-contrib" + ", layer normalisation" * layer_norm
+    return told(what, ours, theirs, ours / theirs, ">= 4")
+
+
+def paper_steps(repeats: int, seconds: float) -> Row:
+    """CPU seconds a step of paper mode: 348 observations, one update a step, same networks."""
+    tqc = TqcConfig(preset="paper", warmup=1)
+    work = {name: _rounds(name, PaperConfig(), tqc, step=True) for name in ("sbx", "sb3")}
+    ours, theirs = (1 / rate for rate in interleaved(work, repeats, seconds))
+    what = "paper mode, CPU s a step, sbx over sb3-contrib"
+    return told(what, ours, theirs, ours / theirs, "<= 0.45")
+
+
+def _rounds(
+    trainer_name: str, environment: TrackConfig | PaperConfig, tqc: TqcConfig, step: bool = False
+) -> Callable[[], int]:
+    """A function that does one round (its steps, too, where asked) and tells its updates."""
+    robot = humanoid()
+    env = TrackingVecEnv(TrackingCore(robot, standing(robot), environment, tqc.n_envs, 0))
+    trainer = make_trainer(trainer_name, env, tqc, seed=0)
+    model: Any = trainer.model  # type: ignore[attr-defined]
+    rng = np.random.default_rng(0)
+    seen: Any = env.reset()
+    buffer = buffer_of(model)
+
+    def act(action: np.ndarray) -> None:
+        nonlocal seen
+        after: Any
+        after, reward, done, infos = env.step(action)
+        buffer.add(seen, after, action, reward, done, infos)
+        seen = after
+
+    for _ in range(256):
+        act(rng.uniform(-1, 1, (tqc.n_envs, env.core.action_size)))
+
+    def one_round() -> int:
+        for _ in range(tqc.steps_per_round if step else 0):
+            act(model.predict(seen, deterministic=False)[0])
+        model.train(tqc.updates_per_round, tqc.batch)
+        if trainer_name == "sbx":
+            import jax
+
+            jax.block_until_ready(trainer._state())  # type: ignore[attr-defined]
+        return tqc.updates_per_round
+
+    one_round()
+    return one_round
+
+
+def interleaved(
+    work: Mapping[str, Callable[[], int]], repeats: int, seconds: float
+) -> tuple[float, ...]:
+    """Units a CPU second of each, turn by turn; the median over turns."""
+    rates: dict[str, list[float]] = {name: [] for name in work}
+    for _ in range(repeats):
+        for name, one_round in work.items():
+            began, done = time.process_time(), 0
+            while time.process_time() - began < seconds:
+                done += one_round()
+            rates[name].append(done / (time.process_time() - began))
+    return tuple(float(np.median(found)) for found in rates.values())
+
+
+def told_core(repeats: int) -> Row:
+    """Substeps a CPU second of the whole environment over a bare mj_step loop, same physics.
+
+    `ratio_batched` is told beside it: over a bare loop in the order of our batches.
+    """
+    speeds = core(repeats)
+    what = "environment, substeps/s, over a bare mj_step loop"
+    row = told(what, speeds.ours, speeds.bare, speeds.ratio, ">= 0.88")
+    return {**row, "peer_batched": speeds.batched, "ratio_batched": speeds.ratio_batched}
+
+
+def threads(repeats: int = 5, n: int = 32, steps: int = 100) -> Row:
+    """Environment steps a second of two threads over one, wall time: two cores must be idle."""
+    robot = humanoid()
+    motion = standing(robot)
+    rates: dict[int, list[float]] = {1: [], 2: []}
+    for _ in range(repeats):
+        for count, found in rates.items():
+            sim = Simulation(robot, ControlConfig(), n, count)
+            sim.place(np.arange(n), np.repeat(motion.qpos[:1], n, 0), np.zeros((n, 23)))
+            targets = np.repeat(motion.qpos[:1, 7:][:, sim.motors.hinge], n, 0)
+            began = time.perf_counter()
+            for _ in range(steps):
+                sim.step(targets)
+            found.append(n * steps / (time.perf_counter() - began))
+            sim.close()
+    one, two = (float(np.median(found)) for found in rates.values())
+    row = told("environment steps/s, two threads over one (wall)", two, one, two / one, ">= 1.6")
+    return {**row, "load_average": os.getloadavg()[0]}
+
+
+def told(name: str, ours: float, theirs: float, ratio: float, bar: str) -> Row:
+    """A comparison as a row, and whether its bar holds."""
+    word, limit = bar.split()
+    holds = ratio >= float(limit) if word == ">=" else ratio <= float(limit)
+    return {"what": name, "ours": ours, "peer": theirs, "ratio": ratio, "bar": bar, "holds": holds}

@@ -1,0 +1,115 @@
+"""Trained policies as one table: means over seeds, every bar, and those that do not dance."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.learning.policies import MOVES, Folders, Move, forced
+from robojackson.metrics.ablation_statistics import estimate
+from robojackson.pipeline import tables
+from robojackson.pipeline.table_schemas import EVALUATION_RECORD
+
+Rows = list[dict[str, Any]]
+LIMBS = ("left_foot", "right_foot", "left_hand", "right_hand", "head")
+GAIN, R2, EXCESS = (0.8, 1.2), 0.5, 0.15
+AUTHORS_ROBOT = {
+    "survived_s": 1.63,
+    "note": "at best: 27 steps of 0.06 s in the authors' own logs; nothing else can be told of it",
+}
+BESIDE = ("statue", "mean_pose", "zero_residual", "random", "hold")
+TOLD = ("survived_s", "strict_success", "skill", "velocity_score")
+
+
+def summary(folders: Folders) -> Rows:
+    """One line a move and a horizon over the seeds that there are."""
+    lines = []
+    for name, move in MOVES.items():
+        for seconds in move.horizons_s:
+            found = sorted(folders.rows.glob(folders.row(name, "[0-9]*", seconds).name))
+            exact = [path for path in found if path == folders.row(name, _seed(path), seconds)]
+            if exact:
+                seeds = [_read(path) for path in exact]
+                lines.append({**line(name, move, seconds, seeds), "forced": forced(name, folders)})
+    return lines
+
+
+def line(name: str, move: Move, seconds: float, seeds: Sequence[Rows]) -> dict[str, Any]:
+    """Figures of a move and whether each of its bars holds."""
+    trained = [of_policy(rows, "trained") for rows in seeds]
+    by_seed = {key: [mean(r.get(key) for r in rows) for rows in trained] for key in TOLD}
+    success = [value or 0.0 for value in by_seed["strict_success"]]
+    taken = [row.get("step") for rows in trained for row in rows]
+    found: dict[str, Any] = {
+        "move": name,
+        "cpu_minutes": move.cpu_minutes,
+        "horizon_s": seconds if move.cyclic else None,
+        "seeds": len(seeds),
+        "steps": mean(taken) if None not in taken else None,
+        **{key: mean(values) for key, values in by_seed.items()},
+        "strict_success_95": list(cluster_interval(success)),
+        "worst_seed": min(success),
+    }
+    for kind in ("limb_gain", "limb_r2", "excess_speed"):
+        found[kind] = {
+            limb: mean(mean(r.get(f"{kind}_{limb}") for r in rows) for rows in trained)
+            for limb in LIMBS
+        }
+    found["bars"] = bars(found, move)
+    found["holds"] = all(found["bars"].values())
+    found["beside"] = {
+        policy: {
+            key: mean(r.get(key) for rows in seeds for r in of_policy(rows, policy)) for key in TOLD
+        }
+        for policy in BESIDE
+    }
+    return found
+
+
+def bars(found: Mapping[str, Any], move: Move) -> dict[str, bool]:
+    """Each bar by name; of a limb that the dance does not move nothing is asked."""
+    held = {
+        f"strict success >= {move.success:g}": found["strict_success"] >= move.success,
+        f"worst seed >= {move.worst:g}": found["worst_seed"] >= move.worst,
+        f"skill >= {move.skill:g}": found["skill"] >= move.skill,
+    }
+    if move.authors:
+        del held[f"worst seed >= {move.worst:g}"]
+        return held
+    low, high = GAIN
+    for limb in LIMBS:
+        gain, r2 = found["limb_gain"][limb], found["limb_r2"][limb]
+        excess = found["excess_speed"][limb]
+        if gain is not None:
+            held[f"gain {limb} {low:g}-{high:g}"] = low <= gain <= high
+        if r2 is not None:
+            held[f"R2 {limb} >= {R2:g}"] = r2 >= R2
+        if excess is not None:
+            held[f"excess {limb} <= {EXCESS:g}"] = excess <= EXCESS
+    return held
+
+
+def cluster_interval(by_seed: Sequence[float] | np.ndarray) -> tuple[float, float]:
+    """95 % interval of the mean by resampling seeds; rollouts of one seed are no evidence."""
+    found = estimate(list(by_seed), np.random.default_rng(0))
+    return (found.low, found.high) if found.count > 1 else (found.mean, found.mean)
+
+
+def of_policy(rows: Rows, policy: str) -> Rows:
+    """The rollouts of one driver."""
+    return [row for row in rows if row["policy"] == policy]
+
+
+def mean(values: Any) -> float | None:
+    """Of those that are numbers; None where there is none."""
+    finite = [float(value) for value in values if value is not None and np.isfinite(value)]
+    return float(np.mean(finite)) if finite else None
+
+
+def _read(path: Path) -> Rows:
+    return tables.decode_rows(EVALUATION_RECORD, path.read_bytes(), str(path))
+
+
+def _seed(path: Path) -> str:
+    return path.stem.rsplit("-s", 1)[1].split("-")[0]

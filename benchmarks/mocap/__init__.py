@@ -1,0 +1,1 @@
+"""How close motion capture comes to the truth."""

@@ -1,0 +1,1 @@
+"""What Prefect, the cache and the command line cost around the work."""

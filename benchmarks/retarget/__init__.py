@@ -1,0 +1,1 @@
+"""Our retargeting beside its peers."""

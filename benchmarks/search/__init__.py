@@ -1,0 +1,1 @@
+"""What assessing a video costs."""

@@ -1,0 +1,23 @@
+"""How a dance is found: what is kept of a search, what is downloaded, how it is judged."""
+
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass
+
+from robojackson.clips.quality.assessment import JudgeConfig
+from robojackson.clips.quality.candidate_ranking import FilterConfig
+from robojackson.clips.web.candidate_selection import SelectionConfig
+from robojackson.clips.web.download_formats import FormatConfig
+from robojackson.clips.web.yt_dlp_client import WebConfig
+
+
+@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+class FindConfig:
+    """Attributes:
+    selection, web, formats, judge, filters: Of the steps, in their order.
+    """
+
+    selection: SelectionConfig = Field(default_factory=SelectionConfig)
+    web: WebConfig = Field(default_factory=WebConfig)
+    formats: FormatConfig = Field(default_factory=FormatConfig)
+    judge: JudgeConfig = Field(default_factory=JudgeConfig)
+    filters: FilterConfig = Field(default_factory=FilterConfig)

@@ -1,0 +1,87 @@
+"""The commands that look for dances: find, refresh and catalogue.
+
+Like `robojackson.cli.app`, each imports what it needs inside itself.
+"""
+
+from typing import Annotated
+
+import typer
+
+from robojackson.cli.console import Answer, command, log_to_stderr
+from robojackson.cli.options import Json, SetFind, chosen
+
+
+@command
+def find(
+    query: Annotated[str, typer.Argument(help="A dance; or the folder, or list, of the source.")],
+    top: Annotated[int | None, typer.Option(min=1, help="How many videos to judge.")] = None,
+    source: Annotated[str, typer.Option(help="youtube, folder, urls, site or server.")] = "youtube",
+    address: Annotated[
+        str, typer.Option(help="Of the folder, list, site ({query} stands for it) or server.")
+    ] = "",
+    config: Annotated[str, typer.Option(help="Name or path of a configuration.")] = "finding",
+    set_: SetFind = None,
+    as_json: Json = False,
+) -> Answer:
+    """The videos of a dance, ranked: Algorithm 1, and why others are rejected."""
+    from configs.find_config import FindConfig
+    from flows.runtime.environment import prepare
+    from flows.search import ranking_table as ranking
+    from flows.search.requests import dance_of
+    from robojackson.pipeline.yaml_loader import load
+    from storage.store import Store
+
+    overrides = chosen(set_)
+    dance = dance_of(query, source, address, top, load(FindConfig, config, overrides))
+    prepare(Store.from_environment())
+    from flows.find import look_for
+
+    found = look_for(dance, config, overrides)
+    return Answer(found, text=[*ranking.lines(found["candidates"]), found["summary"]])
+
+
+@command
+def refresh(
+    dances: Annotated[
+        list[str] | None, typer.Argument(help="Names in configs/dances.yaml; else all that are due")
+    ] = None,
+    config: Annotated[str, typer.Option(help="Configuration of the search.")] = "finding",
+    set_: SetFind = None,
+    as_json: Json = False,
+) -> Answer:
+    """The nightly run, now: for every dance the best new video, up to the robot's motion."""
+    from flows.runtime.environment import prepare
+    from flows.search.requests import check_refresh
+    from storage.store import Store
+
+    overrides = chosen(set_)
+    check_refresh(dances or None, config, overrides)
+    prepare(Store.from_environment())
+    from flows.refresh import run
+
+    done = run(dances or None, config, overrides)
+    return Answer(done, code=1 if done["failed"] and not done["dances"] else 0)
+
+
+@command
+def catalogue(
+    dance: Annotated[str | None, typer.Option(help="Only this dance.")] = None,
+    sql: Annotated[
+        str | None, typer.Option(help="A question to DuckDB about the table `candidates`.")
+    ] = None,
+    as_json: Json = False,
+) -> Answer:
+    """Every video that was ever judged, and why it was danced or not."""
+    from flows.search import ranking_table as ranking
+    from robojackson.cli import console
+    from storage import candidate_catalogue
+    from storage.store import Store
+
+    log_to_stderr()
+    store = Store.from_environment()
+    if sql is not None:
+        found = candidate_catalogue.query(store, sql)
+        named = {str(number): row for number, row in enumerate(found, 1)}
+        return Answer({"rows": found}, text=console.table(named, list(found[0]) if found else []))
+    rows = candidate_catalogue.records(store, dance)
+    return Answer({"candidates": rows}, text=ranking.lines(rows))

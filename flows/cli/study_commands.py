@@ -1,0 +1,97 @@
+"""The commands about experiments: `ablation`, `metrics` and `deploy`."""
+
+from typing import Annotated, Any, Literal
+
+import typer
+
+from robojackson.cli.console import Answer, command, complain, table
+from robojackson.cli.options import Json, SetStudy, chosen
+
+
+@command
+def ablation(
+    study: Annotated[
+        str, typer.Argument(help="Name of configs/studies/*.yaml, or a path.")
+    ] = "paper",
+    moves: Annotated[list[str] | None, typer.Option("--move", help="Only this move.")] = None,
+    setups: Annotated[list[str] | None, typer.Option("--setup", help="Only this setup.")] = None,
+    seeds: Annotated[list[int] | None, typer.Option("--seed", help="Only this seed.")] = None,
+    steps: Annotated[int | None, typer.Option(min=1, help="Control steps of a training.")] = None,
+    executor: Annotated[
+        Literal["local", "work-pool"] | None,
+        typer.Option(help="Processes of this machine, or runs that workers take."),
+    ] = None,
+    slots: Annotated[int | None, typer.Option(min=1, help="Trainings at once.")] = None,
+    set_: SetStudy = None,
+    as_json: Json = False,
+) -> Answer:
+    """Moves x setups x seeds, each trained and judged, and a page that compares them."""
+    from flows.runtime.environment import prepare
+    from flows.study.study_plan import study_of
+    from storage.store import Store
+
+    given: dict[str, Any] = {"moves": moves, "setups": setups, "seeds": seeds}
+    given |= {"steps": steps, "executor": executor, "slots": slots}
+    wanted = study_of(study, chosen(set_, given))
+    prepare(Store.from_environment())
+    from flows.ablation import run
+
+    made = run(wanted)
+    return Answer(made, text=[f"page    {made['page']}", f"tables  {made['tables']}"])
+
+
+@command
+def metrics(
+    sql: Annotated[
+        str | None,
+        typer.Option(help="A question in SQL about `episodes`, `evaluations` and `runs`."),
+    ] = None,
+    as_json: Json = False,
+) -> Answer:
+    """The tables of all studies; without a question, a line a cell."""
+    from storage import study_tables as kept
+    from storage.store import Store
+
+    rows = kept.query(Store.from_environment(), sql or kept.OVERVIEW)
+    if not rows:
+        return Answer({"rows": []}, text=["no rows; `robojackson ablation` makes some"])
+    return Answer(
+        {"rows": rows}, text=table({str(n): row for n, row in enumerate(rows, 1)}, tuple(rows[0]))
+    )
+
+
+@command
+def deploy(
+    wait: Annotated[
+        float, typer.Option(min=0, help="Seconds to wait for a server that was just started.")
+    ] = 0.0,
+    as_json: Json = False,
+) -> Answer:
+    """Register pools, deployments and automations with the server of PREFECT_API_URL."""
+    from flows.runtime.deployments import deploy as register
+
+    return Answer(register(wait))
+
+
+@command
+def server(
+    host: Annotated[
+        str,
+        typer.Option(
+            envvar="PREFECT_SERVER_API_HOST", help="Where to listen; 0.0.0.0 is every network."
+        ),
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option(envvar="PREFECT_SERVER_API_PORT", min=1, max=65535)] = 4200,
+    as_json: Json = False,
+) -> Answer:
+    """Prefect's server and pages, with the results of the store; Ctrl-C ends it."""
+    from flows.runtime.environment import prepare_server
+    from storage.store import Store
+
+    store = Store.from_environment()
+    prepare_server(store)
+    from flows.runtime.result_server import serve
+
+    complain(f"pages http://{host}:{port}, PREFECT_API_URL=http://{host}:{port}/api")
+    serve(store, host, port)
+    return Answer({"store": store.root}, text=[])

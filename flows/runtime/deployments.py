@@ -1,0 +1,140 @@
+"""What a Prefect server must know of us: pools, deployments, automations.
+
+Everything is registered by name and may be registered again: only what has changed is changed.
+"""
+
+import asyncio
+import os
+import subprocess
+import sys
+from collections.abc import Mapping
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+import yaml
+from prefect.automations import Automation
+from prefect.client.orchestration import PrefectClient, get_client
+from prefect.client.schemas.actions import WorkPoolCreate, WorkPoolUpdate
+from prefect.exceptions import ObjectNotFound
+from prefect.settings import PREFECT_API_URL
+from prefect.workers.process import ProcessWorker
+
+from flows.runtime.environment import HEARTBEAT, HEARTBEAT_S
+from flows.runtime.prefect_server import answering, await_server
+from robojackson.errors import DeploymentFailed
+from storage.store import Store
+
+ROOT = Path(__file__).parents[2]
+AUTOMATIONS = ROOT / "configs" / "automations.yaml"
+POOLS = {
+    "flows": "Parents: refresh, dance, ablation. They wait more than they work.",
+    "training": "Cells of an ablation and trainings: one at a time and core.",
+}
+"""Parents and cells apart: parents that wait would hold every slot of a common pool."""
+SILENCE = "ROBOJACKSON_SILENCE_S"
+"""Variable: seconds without a sign of life after which a run is marked Crashed."""
+SILENT_S, SHORTEST_S = 150, 2 * HEARTBEAT_S + 1
+
+
+def deploy(wait_s: float = 0.0) -> dict[str, Any]:
+    """Register everything with the server of PREFECT_API_URL.
+
+    Args:
+        wait_s: How long a server that was just started may take to answer, seconds.
+    Raises:
+        DeploymentFailed: no server is named or answers, or it refuses something.
+    """
+    if not PREFECT_API_URL.value():
+        raise DeploymentFailed(
+            "PREFECT_API_URL names no server; start one (`robojackson server`) and set "
+            "PREFECT_API_URL=http://127.0.0.1:4200/api"
+        )
+    await_server(wait_s)
+    store = Store.from_environment().create()
+    store.require_writable()
+    with answering():
+        made = asyncio.run(_prepare())
+    return {**made, "deployments": _register()}
+
+
+async def _prepare() -> dict[str, Any]:
+    async with get_client() as client:
+        for name, told in POOLS.items():
+            await _pool(client, name, told)
+    return {
+        "pools": list(POOLS),
+        "automations": [await _automation(facts) for facts in automations()],
+    }
+
+
+def automations() -> list[dict[str, Any]]:
+    """The automations that are shipped, with the silence that the environment allows a run.
+
+    Raises:
+        DeploymentFailed: less than two signs of life would have to be missing.
+    """
+    wanted = os.environ.get(SILENCE, str(SILENT_S))
+    if not wanted.isdecimal() or int(wanted) < SHORTEST_S:
+        raise DeploymentFailed(
+            f"{SILENCE}={wanted!r}: whole seconds, {SHORTEST_S} at least; runs say every "
+            f"{HEARTBEAT_S} s that they live"
+        )
+    return [_patient(facts, int(wanted)) for facts in yaml.safe_load(AUTOMATIONS.read_text())]
+
+
+def _patient(facts: dict[str, Any], silence_s: int) -> dict[str, Any]:
+    """An automation as it would be written for another silence."""
+    shipped = facts["trigger"]["within"]
+    wanted = shipped * silence_s // SILENT_S
+    facts["trigger"]["within"] = wanted
+    for told, name in ((facts, "description"), (facts["actions"][0], "message")):
+        told[name] = told[name].replace(f" {shipped} s", f" {wanted} s")
+    return facts
+
+
+async def _pool(client: PrefectClient, name: str, description: str) -> None:
+    """A pool that is new, or the one that is there with the heartbeat of our runs."""
+    try:
+        known = await client.read_work_pool(name)
+    except ObjectNotFound:
+        template = with_heartbeat(ProcessWorker.get_default_base_job_template())
+        wanted = WorkPoolCreate(
+            name=name, type="process", description=description, base_job_template=template
+        )
+        await client.create_work_pool(wanted)
+        return
+    template = with_heartbeat(known.base_job_template)
+    if template != known.base_job_template:
+        await client.update_work_pool(name, WorkPoolUpdate(base_job_template=template))
+
+
+def with_heartbeat(template: Mapping[str, Any]) -> dict[str, Any]:
+    """A job template whose runs get our heartbeat, whatever environment their worker has."""
+    made = deepcopy(dict(template))
+    env = made["variables"]["properties"]["env"]
+    env["default"] = {**env.get("default", {}), **HEARTBEAT}
+    return made
+
+
+async def _automation(facts: Mapping[str, Any]) -> str:
+    wanted = Automation(**facts)
+    try:
+        known = await Automation.aread(name=wanted.name)
+    except ValueError:
+        await wanted.acreate()
+    else:
+        wanted.id = known.id
+        await wanted.aupdate()
+    return wanted.name
+
+
+def _register() -> list[str]:
+    """prefect.yaml by Prefect's own command, from the folder it stands in."""
+    command = [sys.executable, "-m", "prefect", "--no-prompt", "deploy", "--all"]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    if run.returncode:
+        said = (run.stdout + run.stderr).strip().splitlines()
+        raise DeploymentFailed(f"prefect deploy failed: {said[-1] if said else 'without a word'}")
+    entries = yaml.safe_load((ROOT / "prefect.yaml").read_text())["deployments"]
+    return [f"{entry['entrypoint'].rsplit('.', 1)[1]}/{entry['name']}" for entry in entries]

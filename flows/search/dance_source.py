@@ -1,0 +1,107 @@
+"""What the SOURCE of a dance means: a file, a folder, or the name of a dance."""
+
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from robojackson.clips.video import SUFFIXES
+from robojackson.errors import MissingDependency, RoboJacksonError, UnreadableVideo
+
+if TYPE_CHECKING:
+    from robojackson.pipeline.pipeline_config import PipelineConfig
+
+BUNDLED = Path(__file__).parents[2] / "clips"
+DEFAULT = "hip_shake.mp4"
+LONGEST = 1000
+"""Of a path or a name, bytes."""
+
+
+def resolve(source: str | None) -> Path:
+    """The file or folder that a user means; without one, the bundled hip shake.
+
+    Raises:
+        UnreadableVideo: it looks like a path and is not there, or it is the name of a dance.
+        MissingDependency: the bundled clips are not here.
+    """
+    if source is None:
+        return bundled(DEFAULT)
+    _require_words(source)
+    path = Path(source)
+    if path.exists():
+        return path
+    if os.sep in source or path.suffix.lower() in SUFFIXES:
+        raise UnreadableVideo(f"{source}: no such file or folder")
+    raise UnreadableVideo(
+        f"{source!r} is no file but the name of a dance: `robojackson find` looks for its videos"
+    )
+
+
+def is_name(source: str | None) -> bool:
+    """Whether a SOURCE is the name of a dance: no path, and nothing that looks like one."""
+    if source is None:
+        return False
+    _require_words(source)
+    if Path(source).exists():
+        return False
+    return os.sep not in source and Path(source).suffix.lower() not in SUFFIXES
+
+
+def _require_words(source: str) -> None:
+    if not source.strip():
+        raise UnreadableVideo("SOURCE is empty: give a video, a folder or the name of a dance")
+    if len(source.encode(errors="replace")) > LONGEST:
+        raise UnreadableVideo(f"{source[:40]}...: too long for a path or the name of a dance")
+
+
+def settle(config: str, overrides: Mapping[str, Any]) -> "PipelineConfig":
+    """The configuration, checked with its robot before anything costly starts.
+
+    Raises:
+        BadConfiguration, UnknownName: it cannot be used.
+    """
+    from robojackson.pipeline.pipeline_config import PipelineConfig
+    from robojackson.pipeline.yaml_loader import load
+    from robojackson.rl.modes.paper_mode import require_trainable
+    from robojackson.robot.model import RobotDescription, load_robot
+
+    settings = load(PipelineConfig, config, overrides)
+    require_trainable(load_robot(load(RobotDescription, f"robots/{settings.robot}")))
+    return settings
+
+
+def look_at(
+    source: Path, settings: "PipelineConfig", start_s: float | None, end_s: float | None
+) -> None:
+    """Raise what the flow would raise much later: no video of the source can be danced."""
+    from robojackson.clips.time_range import span
+    from robojackson.clips.video import list_videos, probe
+
+    limits = settings.video
+    trims = start_s is not None or end_s is not None
+    allowed = replace(limits, max_duration_s=math.inf) if trims else limits
+    causes = []
+    for path in list_videos(source):
+        try:
+            span(probe(path, allowed), limits, start_s, end_s)
+            return
+        except RoboJacksonError as cause:
+            causes.append(cause)
+    raise causes[0]
+
+
+def bundled(name: str) -> Path:
+    """A clip of the checkout, wherever the command is given.
+
+    Raises:
+        MissingDependency: the bundled clips are not here.
+    """
+    path = BUNDLED / name
+    if not path.is_file():
+        raise MissingDependency(
+            f"the bundled clip {name} is part of the checkout and not of the installed package: "
+            "give a video file"
+        )
+    return path

@@ -1,0 +1,112 @@
+"""From what somebody asked to be danced to video files of this machine.
+
+That may be the name of a dance, the address of a video on the web, or the path of a file or folder.
+Names are searched and their steadiest video is brought; an address is brought as it is.
+"""
+
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
+from dataclasses import asdict
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated
+from urllib.parse import urlsplit
+
+from prefect.logging import get_run_logger
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass
+
+from configs.dance_book import DanceBook
+from configs.find_config import FindConfig
+from flows.find import best, of_candidate
+from flows.search.dance_source import is_name, resolve
+from flows.search.search_artifacts import slug_of
+from robojackson.clips.sources import urls
+from robojackson.clips.video import list_videos
+from robojackson.clips.web.untrusted_text import web_address
+from robojackson.pipeline.yaml_loader import load
+from storage.artifact import Artifact
+from storage.run_catalogue import safe_name
+from storage.store import Store
+
+Source = Annotated[str, Field(min_length=1, max_length=1000, pattern=r"\S")]
+Seconds = Annotated[float, Field(ge=0)]
+Minutes = Annotated[float, Field(gt=0)]
+
+
+@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+class Search:
+    """How a dance is looked for that is given by its name.
+
+    Attributes:
+        config: Name or path of the configuration of the search.
+        book: Name or path of the list of dances; a name that is not in it is searched as it is.
+    """
+
+    config: str = "finding"
+    book: str = "dances"
+
+
+@asynccontextmanager
+async def videos_of(source: str, search: Search) -> AsyncIterator[tuple[Path, ...]]:
+    """The files that are meant, here for the time of the block.
+
+    Raises:
+        UnreadableVideo: it looks like a path and is not there, or holds no video.
+        SearchFailed: no answer from the web, and no earlier search has chosen a video.
+        NoPersonFound: no video of the search may be danced; the message has the reasons.
+    """
+    source = source.strip()
+    if web_address(source):
+        with _file(*of_address(source, search)) as path:
+            yield (path,)
+    elif is_name(source):
+        with _file(*await of_name(source, search)) as path:
+            yield (path,)
+    else:
+        yield list_videos(resolve(source))
+
+
+async def of_name(words: str, search: Search) -> tuple[str, Artifact]:
+    """The best video of a dance in good quality, and what it is called.
+
+    When the search fails, the video that an earlier one chose is taken.
+    """
+    dance = load(DanceBook, search.book).recall(words)
+    chosen = await best(dance.name, asdict(dance), search.config)
+    return slug_of(dance.name), Artifact(**chosen)
+
+
+def of_address(address: str, search: Search) -> tuple[str, Artifact]:
+    """A video of the web in good quality, and what it is called.
+
+    Raises:
+        SearchFailed: it cannot be had; the message has the reason.
+    """
+    settings = load(FindConfig, search.config)
+    (wanted,) = urls.search("", address, 1, settings.web, datetime.now(UTC))
+    get_run_logger().info("bringing %s", wanted.url)
+    return slug_of(Path(wanted.title).stem), of_candidate(wanted, None, settings)
+
+
+def name_of(source: str) -> str:
+    """Return what to call the run of a source: the dance, or the file or folder without its path.
+
+    Args:
+        source: Name of a dance, address of a video, or path.
+    """
+    source = source.strip()
+    if web_address(source):
+        parts = urlsplit(source)
+        return safe_name(parts.query or parts.path)
+    return safe_name(source if is_name(source) else Path(source).absolute().stem)
+
+
+@contextmanager
+def _file(name: str, video: Artifact) -> Iterator[Path]:
+    """An artifact as a file that has a name."""
+    store = Store.from_environment()
+    with store.scratch() as folder:
+        path = folder / f"{name or 'dance'}{Path(video.name).suffix}"
+        path.write_bytes(store.read(video.key))
+        yield path

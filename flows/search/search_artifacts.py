@@ -1,0 +1,33 @@
+"""What Prefect's pages show of a search: the table, the pictures, the link to the chosen video."""
+
+import re
+from typing import Any
+
+from prefect.artifacts import (
+    acreate_link_artifact,
+    acreate_markdown_artifact,
+    acreate_table_artifact,
+)
+
+from flows.search import ranking_table
+from robojackson.clips.web.untrusted_text import clean_text, in_markdown, web_address
+from storage.run_catalogue import safe_name
+
+
+async def show(name: str, rows: list[dict[str, Any]], chosen: dict[str, Any] | None) -> None:
+    """Three artifacts under keys that stay the same for a dance, so that there is a history."""
+    slug = slug_of(name)
+    told = f"Videos judged for {in_markdown(clean_text(name))}"
+    table = ranking_table.plain_rows(rows)
+    await acreate_table_artifact(key=f"candidates-{slug}", table=table, description=told)
+    text = ranking_table.markdown(name, rows)
+    await acreate_markdown_artifact(key=f"pictures-{slug}", markdown=text, description=told)
+    link = web_address(chosen["url"]) if chosen else ""
+    if chosen and link:
+        title = clean_text(chosen["title"])
+        await acreate_link_artifact(key=f"chosen-{slug}", link=link, link_text=title)
+
+
+def slug_of(name: str) -> str:
+    """A name in the letters that a key of Prefect may have."""
+    return re.sub(r"[^a-z0-9]+", "-", safe_name(name).lower()).strip("-")

@@ -1,0 +1,103 @@
+"""What became of every video of a search, and the same as rows of the catalogue."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, fields
+from datetime import UTC, datetime
+from typing import Any
+
+from configs.dance_book import Dance
+from robojackson.clips.quality.assessment import Quality
+from robojackson.clips.quality.stability import Stability
+from robojackson.clips.web.candidate_selection import Selection
+from robojackson.clips.web.untrusted_text import clean_text
+from robojackson.clips.web.video_candidate import VideoCandidate
+from robojackson.errors import RoboJacksonError
+from storage.artifact import Artifact
+
+REASON_LENGTH = 200
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A candidate and what became of it.
+
+    Attributes:
+        candidate: The video.
+        decision: chosen, accepted, rejected or failed.
+        reason: Why not; empty for those that may be danced.
+        video: Its file, scored; None when it could not be had.
+        made: What the judge made of it.
+        score, quality: The figures; None when it could not be judged.
+    """
+
+    candidate: VideoCandidate
+    decision: str = "failed"
+    reason: str = ""
+    video: Artifact | None = None
+    made: dict[str, Artifact] | None = None
+    score: Stability | None = None
+    quality: Quality | None = None
+
+
+@dataclass(frozen=True)
+class Hunt:
+    """What came out of a search.
+
+    Attributes:
+        dance: What was looked for.
+        run_id: Under which it is in the catalogue.
+        entries: The chosen one first, then by rank, rejected and failed ones last.
+        selection: Of the search.
+    """
+
+    dance: Dance
+    run_id: str
+    entries: tuple[Entry, ...]
+    selection: Selection
+
+    @property
+    def chosen(self) -> Entry | None:
+        """The one to dance, None when there is none."""
+        return next((entry for entry in self.entries if entry.decision == "chosen"), None)
+
+
+def rows(found: Hunt) -> list[dict[str, Any]]:
+    """The entries as rows of the catalogue."""
+    now = datetime.now(UTC)
+    labels = {"run_id": found.run_id, "dance": found.dance.name, "decided_at": now}
+    return [{**labels, **_row(entry)} for entry in found.entries]
+
+
+def summary(found: Sequence[VideoCandidate], selection: Selection) -> str:
+    """What the selection did, in one line."""
+    reasons: dict[str, int] = {}
+    for _, reason in selection.dropped:
+        kind = "too long" if "long, the limit" in reason else reason
+        reasons[kind] = reasons.get(kind, 0) + 1
+    told = ", ".join(f"{count} {reason}" for reason, count in reasons.items())
+    return f"{len(found)} found, {len(selection.kept)} kept" + (f" ({told})" if told else "")
+
+
+def reason_of(error: BaseException) -> str:
+    """An error as the reason in a table: one line, without the path of our own copy."""
+    if not isinstance(error, RoboJacksonError):
+        return clean_text(f"unexpected {type(error).__name__}: {error}", REASON_LENGTH)
+    return clean_text(re.sub(r"^/\S*?: ", "", str(error)), REASON_LENGTH)
+
+
+def _row(entry: Entry) -> dict[str, Any]:
+    candidate = entry.candidate
+    told = {f.name: getattr(candidate, f.name) for f in fields(candidate) if f.name != "live"}
+    measured = asdict(entry.quality) if entry.quality else {}
+    scored = asdict(entry.score) if entry.score else {}
+    video = entry.video
+    return {
+        **told,
+        **measured,
+        **scored,
+        "decision": entry.decision,
+        "reason": entry.reason,
+        "video_key": video.key if video else None,
+        "video_sha256": video.sha256 if video else None,
+    }

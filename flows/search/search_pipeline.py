@@ -1,0 +1,193 @@
+"""From a query to a ranked table of videos and the one to dance: what `find` and `refresh` share.
+
+Search, select, download, judge, rank, write down. A video that fails on the way gets its reason and
+harms no other; only a search that fails is an error.
+"""
+
+import json
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+from prefect.futures import PrefectFuture
+from prefect.logging import get_run_logger
+
+from configs.dance_book import Dance
+from configs.find_config import FindConfig
+from flows.search.search_entries import REASON_LENGTH, Entry, Hunt, reason_of, rows, summary
+from robojackson.clips.quality import candidate_ranking
+from robojackson.clips.quality.assessment import Quality
+from robojackson.clips.quality.duplicates import copies
+from robojackson.clips.quality.stability import Stability
+from robojackson.clips.sources import folder
+from robojackson.clips.web.candidate_selection import select
+from robojackson.clips.web.download_formats import Purpose
+from robojackson.clips.web.untrusted_text import clean_text
+from robojackson.clips.web.video_candidate import VideoCandidate
+from robojackson.motion.landmark_track import LandmarkTrack
+from robojackson.pipeline import tables
+from storage import candidate_catalogue
+from storage.artifact import Artifact
+from storage.store import Store
+from tasks.assess_video import judge
+from tasks.download_video import WebVideo, download, take
+from tasks.probe_video import SourceFile
+from tasks.search_videos import search
+
+
+def hunt(
+    dance: Dance,
+    settings: FindConfig,
+    run_id: str,
+    known: Collection[tuple[str, str]] = (),
+    reigning: Mapping[str, Any] | None = None,
+    failed: Collection[tuple[str, str]] = (),
+) -> Hunt:
+    """Find, judge and rank the videos of a dance; every one of them goes into the catalogue.
+
+    Args:
+        dance: What to look for.
+        settings: How.
+        run_id: For the catalogue.
+        known: Videos that were judged before and need not be again.
+        reigning: Row of the catalogue of the video chosen last, which a new one has to beat.
+        failed: Videos that failed before and are tried again where there is nothing else.
+    Raises:
+        SearchFailed: the source does not answer.
+    """
+    web = replace(settings.web, language=dance.language or settings.web.language)
+    limits = replace(settings.selection, top=dance.top or settings.selection.top)
+    source = replace(settings, web=web, selection=limits)
+    found = search(dance.source, dance.asked, dance.address, limits.searched, web)
+    selection = select(found, known, limits, failed)
+    get_run_logger().info("%s: %s", dance.name, summary(found, selection))
+    had = bring(selection.kept, "score", source)
+    entries = challenged(ranked(judged(had, source), source), reigning, source)
+    made = Hunt(dance, run_id, tuple(entries), selection)
+    candidate_catalogue.append(Store.from_environment(), rows(made))
+    return made
+
+
+def bring(
+    kept: Sequence[VideoCandidate], purpose: Purpose, settings: FindConfig
+) -> list[tuple[VideoCandidate, Artifact | str]]:
+    """The files of candidates in one format; the reason instead of one that cannot be had."""
+    waiting: list[PrefectFuture[Any] | str] = []
+    for candidate in kept:
+        waiting.append(_submitted(candidate, purpose, settings))
+    return [(c, _outcome(w)) for c, w in zip(kept, waiting, strict=True)]
+
+
+def judged(
+    had: Sequence[tuple[VideoCandidate, Artifact | str]], settings: FindConfig
+) -> list[Entry]:
+    """All candidates with their figures, or with the reason why there are none."""
+    there = [video for _, video in had if isinstance(video, Artifact)]
+    outcomes = iter(judge.outcomes([(video, settings.judge) for video in there]))
+    entries = []
+    for candidate, video in had:
+        if isinstance(video, str):
+            entries.append(Entry(candidate, reason=video))
+            continue
+        made = _or_reason(next(outcomes))
+        is_failed = isinstance(made, str)
+        entries.append(
+            Entry(candidate, reason=made, video=video)
+            if is_failed
+            else _with_figures(Entry(candidate, video=video, made=made))
+        )
+    return entries
+
+
+def ranked(entries: Sequence[Entry], settings: FindConfig) -> list[Entry]:
+    """The entries in the order of their places, each with its decision and reason."""
+    config = settings.filters
+    by_name = {f"{i}": entry for i, entry in enumerate(entries) if entry.score}
+    scores = {name: entry.score for name, entry in by_name.items() if entry.score}
+    order = candidate_ranking.order(scores, config)
+    against = {
+        name: candidate_ranking.objections(entry.score, entry.quality, config)
+        for name, entry in by_name.items()
+        if entry.score and entry.quality
+    }
+    copied = _copied({name: by_name[name] for name in order if not against[name]}, settings)
+    places = candidate_ranking.rank(order, against, copied)
+    done = [replace(by_name[p.name], decision=p.decision, reason=p.reason) for p in places]
+    return done + [entry for entry in entries if not entry.score]
+
+
+def challenged(
+    entries: Sequence[Entry], reigning: Mapping[str, Any] | None, settings: FindConfig
+) -> list[Entry]:
+    """The entries, the best one not chosen if the video that was chosen last is steadier."""
+    if reigning is None or not entries or entries[0].decision != "chosen":
+        return list(entries)
+    first = entries[0]
+    old = Stability(**{f.name: reigning[f.name] for f in fields(Stability)})
+    assert first.score
+    if candidate_ranking.order({"old": old, "new": first.score}, settings.filters)[0] == "new":
+        return list(entries)
+    reason = clean_text(f"{reigning['title'] or reigning['video_id']} is steadier", REASON_LENGTH)
+    return [replace(first, decision="accepted", reason=reason), *entries[1:]]
+
+
+def _submitted(
+    candidate: VideoCandidate, purpose: Purpose, settings: FindConfig
+) -> PrefectFuture[Any] | str:
+    """The task that brings a video; the reason when a local file cannot even be looked at."""
+    if candidate.source == folder.NAME:
+        try:
+            return take.submit(SourceFile.at(Path(candidate.url)))
+        except OSError as cause:
+            return clean_text(f"cannot be read ({cause.strerror})")
+    video = WebVideo(candidate.source, candidate.video_id, candidate.url, candidate.title)
+    limits = settings.judge.video
+    return download.submit(video, purpose, settings.formats, settings.web, limits)
+
+
+def _outcome(future: PrefectFuture[Any] | str) -> Any:
+    """The result of a task, or the reason in one line."""
+    if isinstance(future, str):
+        return future
+    return _or_reason(future.result(raise_on_failure=False))
+
+
+def _or_reason(result: Any) -> Any:
+    """Return a result as it is, and an exception as its reason in one line."""
+    if not isinstance(result, BaseException):
+        return result
+    reason = reason_of(result)
+    get_run_logger().warning("%s", reason)
+    return reason
+
+
+def _with_figures(entry: Entry) -> Entry:
+    store = Store.from_environment()
+    assert entry.made
+    score = tables.read(Stability, store, entry.made["stability"])
+    return replace(entry, score=score, quality=_quality(store, entry.made["quality"]))
+
+
+def _quality(store: Store, artifact: Artifact) -> Quality:
+    return Quality(**json.loads(store.read(artifact.key)))
+
+
+def _copied(fit: dict[str, Entry], settings: FindConfig) -> dict[str, str]:
+    """Which of the videos are copies of others, by name; the reason names the other's title."""
+    if settings.filters.copies is None:
+        return {}
+    store = Store.from_environment()
+    largest = sorted(fit, key=lambda n: -(q.person_height_px if (q := fit[n].quality) else 0.0))
+    tracks = {
+        name: tables.read(LandmarkTrack, store, made["landmarks"])
+        for name in largest
+        if (made := fit[name].made)
+    }
+    found = copies(tracks, settings.filters.copies)
+    return {name: _titled(reason, fit) for name, reason in found.items()}
+
+
+def _titled(reason: str, fit: dict[str, Entry]) -> str:
+    words, name = reason.rsplit(" ", 1)
+    return f"{words} {fit[name].candidate.title or fit[name].candidate.video_id}"

@@ -1,0 +1,33 @@
+"""Other motions that a video allows: what limbs that nobody saw may have done."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from robojackson.errors import BadConfiguration
+from robojackson.mocap.recover import recover
+from robojackson.motion.landmark_track import LandmarkTrack
+from robojackson.motion.smpl_sequence import SmplSequence
+from robojackson.pipeline.pipeline_config import PipelineConfig
+
+
+def names_of(settings: PipelineConfig, count: int) -> list[str]:
+    """`smpl_1.parquet` and so on.
+
+    Raises:
+        BadConfiguration: there is no temporal network in this run to sample from.
+    """
+    if count and (settings.network.hybrik or not settings.mocap.temporal.enabled):
+        raise BadConfiguration(
+            "--hypotheses samples the embedded temporal network: leave --hybrik away, and "
+            "mocap.temporal.enabled true"
+        )
+    return [f"smpl_{number}.parquet" for number in range(1, count + 1)]
+
+
+def imagined(
+    track: LandmarkTrack, settings: PipelineConfig, count: int
+) -> Iterator[tuple[str, SmplSequence]]:
+    """Samples of the temporal network, seeded, each with the name of its file."""
+    for number, name in enumerate(names_of(settings, count), 1):
+        temporal = replace(settings.mocap.temporal, hypothesis=number)
+        yield name, recover(track, replace(settings.mocap, temporal=temporal))

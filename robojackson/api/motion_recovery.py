@@ -1,0 +1,33 @@
+"""The motion of a tracked person: by the networks whose weights a user brought, or by our own."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from robojackson.cli import console
+from robojackson.clips.video import read_frames
+from robojackson.mocap.recover import recover
+from robojackson.motion.landmark_track import LandmarkTrack
+from robojackson.motion.smpl_sequence import SmplSequence
+from robojackson.pipeline.pipeline_config import PipelineConfig
+
+
+def mover(video: Path, settings: PipelineConfig) -> Callable[[LandmarkTrack], SmplSequence]:
+    """What `settings.network` chooses, its weights loaded before the work begins.
+
+    Raises:
+        BadWeights: a file of weights cannot be used.
+    """
+    if not settings.network.hybrik:
+        return lambda track: recover(track, settings.mocap)
+    from robojackson.mocap.networks.inference import load_networks
+    from robojackson.mocap.networks.network_motion import network_motion
+
+    networks = load_networks(settings.network)
+
+    def move(track: LandmarkTrack) -> SmplSequence:
+        images = read_frames(video)
+        with console.bar(f"networks on {video.name}") as progress:
+            chosen = (settings.mocap, settings.network)
+            return network_motion(track, images, networks, *chosen, progress)
+
+    return move

@@ -1,0 +1,1 @@
+"""The human body: skeleton, kinematics, analytic inverse kinematics, smoothing."""

@@ -1,0 +1,135 @@
+"""HybrIK's analytic solve: keypoints and twists to rotations (Li et al., CVPR 2021, section 3.3).
+
+Down the tree, each joint swings its rest bone onto the wanted one and turns it by its twist. NAIVE
+aims along the predicted bone; ADAPTIVE aims from where the parent really ended, so that errors do
+not add up along a limb. Metres; any common frame of keypoints.
+"""
+
+from collections.abc import Callable
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from robojackson.body.forward_kinematics import (
+    TINY,
+    apply,
+    kabsch,
+    rotate_about,
+    swing,
+    twist,
+    unit,
+)
+from robojackson.body.skeleton import AIM_CHILD, JOINT_NAMES, PARENTS, keypoint
+
+Method = Literal["adaptive", "naive"]
+TwistRule = Callable[[int, np.ndarray], np.ndarray]
+"""(joint, global rotation with its swing and without its twist) -> (T, 2) cos and sin."""
+
+
+def _levels() -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Joints 1..23 in groups that do not hang on one another."""
+    depth = [0]
+    for parent in PARENTS[1 : len(JOINT_NAMES)]:
+        depth.append(depth[parent] + 1)
+    groups = [np.flatnonzero(np.array(depth) == level) for level in range(1, max(depth) + 1)]
+    return [(g, np.array(PARENTS)[g], np.array(AIM_CHILD)[g]) for g in groups]
+
+
+CARRY_OVER_LIMIT = 0.015
+"""Metres; an adaptive bone that differs more from the predicted one is not corrected (HybrIK)."""
+LEVELS = _levels()
+"""(joints, their parents, the children that they aim at) by distance from the pelvis."""
+ROOT_CHILDREN = (keypoint("spine1"), keypoint("left_hip"), keypoint("right_hip"))
+
+
+def solve(
+    keypoints: Float[np.ndarray, "T 29 3"],
+    rest_joints: Float[np.ndarray, "*T 29 3"],
+    twist: Float[np.ndarray, "T 23 2"],
+    method: Method = "adaptive",
+) -> Float[np.ndarray, "T 24 3 3"]:
+    """Local rotation matrices that pose `rest_joints` (T or 1 of them) onto the keypoints.
+
+    Args:
+        keypoints: Targets, metres, order of `KEYPOINT_NAMES`.
+        rest_joints: The T-pose, metres.
+        twist: (cos, sin) of joints 1..23 about their rest bones; need not have length one.
+        method: adaptive or naive.
+    """
+    turns = np.broadcast_to(np.asarray(twist, float), (len(keypoints), 23, 2))
+    return solve_with(keypoints, rest_joints, lambda joint, _: turns[:, joint - 1], method)
+
+
+def solve_with(
+    keypoints: Float[np.ndarray, "T 29 3"],
+    rest_joints: Float[np.ndarray, "*T 29 3"],
+    twist_rule: TwistRule,
+    method: Method = "adaptive",
+) -> Float[np.ndarray, "T 24 3 3"]:
+    """As `solve`, with each twist decided when the joint's swing is known."""
+    goal = np.asarray(keypoints, float)
+    count = len(goal)
+    rest = np.broadcast_to(np.asarray(rest_joints, float), (count, 29, 3))
+    local = np.empty((count, 24, 3, 3))
+    world = np.empty((count, 24, 3, 3))
+    position = np.empty((count, 24, 3))
+    local[:, 0] = world[:, 0] = _root(goal, rest, method)
+    position[:, 0] = goal[:, 0]
+    for joints, parents, children in LEVELS:
+        above = world[:, parents]
+        ends = position[:, parents] + apply(above, rest[:, joints] - rest[:, parents])
+        bone = rest[:, children] - rest[:, joints]
+        wanted = _wanted(goal[:, children], goal[:, joints], ends, bone, method)
+        swung = swing(bone, apply(np.swapaxes(above, -1, -2), wanted))
+        ahead = above @ swung
+        turns = [twist_rule(int(joint), ahead[:, k]) for k, joint in enumerate(joints)]
+        turn = twist(bone, np.stack(turns, 1))
+        position[:, joints] = ends
+        local[:, joints] = swung @ turn
+        world[:, joints] = ahead @ turn
+    return local
+
+
+def _wanted(
+    child: np.ndarray, start: np.ndarray, end: np.ndarray, bone: np.ndarray, method: Method
+) -> np.ndarray:
+    """The direction along which the bones of some joints shall lie.
+
+    Args:
+        child: Where the bones should end.
+        start: Where they should begin.
+        end: Where their parents really end.
+        bone: In the rest pose.
+        method: naive or adaptive.
+    """
+    predicted = child - start
+    if method == "naive":
+        return predicted
+    length = np.linalg.norm(predicted, axis=-1, keepdims=True)
+    rescaled = predicted * np.linalg.norm(bone, axis=-1, keepdims=True) / np.maximum(length, TINY)
+    corrected = child - end
+    far = np.linalg.norm(corrected - rescaled, axis=-1, keepdims=True) > CARRY_OVER_LIMIT
+    return np.where(far, rescaled, corrected)
+
+
+def _root(goal: np.ndarray, rest: np.ndarray, method: Method) -> np.ndarray:
+    children = list(ROOT_CHILDREN)
+    bones = rest[:, children] - rest[:, :1]
+    wanted = goal[:, children] - goal[:, :1]
+    if method == "adaptive":
+        return kabsch(bones, wanted)
+    swung = swing(bones[:, 0], wanted[:, 0])
+    axis = unit(wanted[:, 0])
+    before = _across(apply(swung, bones[:, 1:].mean(1)), axis)
+    after = _across(wanted[:, 1:].mean(1), axis)
+    cosine = np.sum(before * after, -1)
+    sine = np.sum(np.cross(before, after) * axis, -1)
+    size = np.hypot(cosine, sine)
+    cosine = np.where(size < TINY, 1.0, cosine / np.maximum(size, TINY))
+    return rotate_about(axis, cosine, sine / np.maximum(size, TINY)) @ swung
+
+
+def _across(vector: np.ndarray, axis: np.ndarray) -> np.ndarray:
+    """The part of a vector at right angles to a unit axis."""
+    return vector - np.sum(vector * axis, -1, keepdims=True) * axis

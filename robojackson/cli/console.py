@@ -1,0 +1,226 @@
+"""Manners of the command line: the answer on stdout, the rest on stderr, one line of cause."""
+
+import functools
+import json
+import logging
+import math
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, is_dataclass
+from pathlib import Path
+from typing import Any, ParamSpec
+
+import numpy as np
+import typer
+from pydantic import ValidationError
+
+from robojackson.cli.lifetime.interruption import INTERRUPTED, conclude
+from robojackson.cli.lifetime.interruption import complain as complain
+from robojackson.cli.lifetime.interruption import same_command as same_command
+from robojackson.cli.progress_bar import bar as bar
+from robojackson.errors import RoboJacksonError, StoreError
+
+P = ParamSpec("P")
+SECONDS_BETWEEN_LINES = 15.0
+"""Of progress, where every line stays."""
+USAGE_ERROR: Any = typer.BadParameter.__bases__[0]
+"""What typer raises for words that it does not understand; it has no public name there."""
+
+log = logging.getLogger("robojackson")
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a command has to say.
+
+    Attributes:
+        data: The object that `--json` prints.
+        code: Exit code.
+        text: What a person reads instead of all of `data`.
+    """
+
+    data: Mapping[str, Any]
+    code: int = 0
+    text: Sequence[str] = ()
+
+
+class Interrupted(Exception):
+    """Ctrl-C where something can be said about going on; the message is that line."""
+
+
+def command(body: Callable[P, Answer]) -> Callable[P, None]:
+    """A command out of a function: prints its answer, turns errors into one line and a code.
+
+    The function has a keyword `as_json`; while it runs, stdout is stderr, so that no library can
+    put a word beside the answer.
+    """
+
+    @functools.wraps(body)
+    def run(*args: P.args, **kwargs: P.kwargs) -> None:
+        try:
+            with stdout_is_stderr():
+                answer = body(*args, **kwargs)
+        except RoboJacksonError as cause:
+            _leave(1, f"{type(cause).__name__}: {cause}")
+        except OSError as cause:
+            _leave(1, f"StoreError: {cause}")
+        except Interrupted as cause:
+            _leave_interrupted(f"interrupted: {cause}")
+        except KeyboardInterrupt:
+            _leave_interrupted(f"interrupted: resume: {same_command()}")
+        try:
+            say(answer, as_json=bool(kwargs.get("as_json")))
+        except BrokenPipeError:  # whoever reads has enough
+            raise
+        except OSError as cause:
+            sys.stdout = open(os.devnull, "w")  # noqa: SIM115 (nothing is left to be flushed)
+            _leave(1, f"StoreError: the answer cannot be written to stdout: {cause.strerror}")
+        if answer.code:
+            raise typer.Exit(answer.code)
+
+    return run
+
+
+def say(answer: Answer, as_json: bool) -> None:
+    """Print an answer: one JSON object, or lines for a person."""
+    data = plain(answer.data)
+    if as_json:
+        sys.stdout.write(json.dumps(data) + "\n")
+    else:
+        sys.stdout.write("\n".join(answer.text or lines(data)) + "\n")
+    sys.stdout.flush()
+
+
+def lines(data: Mapping[str, Any], indent: int = 0) -> Iterator[str]:
+    """A mapping for people: one line a value, numbers with four digits."""
+    width = max((len(str(key)) for key in data), default=0)
+    for key, value in data.items():
+        head = " " * indent + str(key)
+        if isinstance(value, Mapping):
+            yield head
+            yield from lines(value, indent + 2)
+        elif isinstance(value, list) and value and isinstance(value[0], Mapping):
+            for item in value:
+                yield head
+                yield from lines(item, indent + 2)
+        else:
+            yield f"{head:<{width + indent}}  {_word(value)}"
+
+
+def table(rows: Mapping[str, Mapping[str, Any]], columns: Sequence[str]) -> list[str]:
+    """Rows by name under a head, columns aligned."""
+    cells = [["", *columns]]
+    cells += [[name, *(_word(row.get(key)) for key in columns)] for name, row in rows.items()]
+    widths = [max(len(line[i]) for line in cells) for i in range(len(cells[0]))]
+    return [
+        "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
+        for line in cells
+    ]
+
+
+def plain(value: Any) -> Any:
+    """The same in JSON's types; NaN and infinity are null."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return plain(asdict(value))
+    if isinstance(value, Mapping):
+        return {str(key): plain(inner) for key, inner in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [plain(inner) for inner in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if value is None or isinstance(value, str | int | bool) else str(value)
+
+
+def log_to_stderr() -> None:
+    """Send the log of the libraries to stderr, one short line a record."""
+    logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(message)s")
+    for noisy in ("jax", "absl", "matplotlib", "httpx", "torch"):
+        logging.getLogger(noisy).setLevel(logging.WARNING)
+
+
+@contextmanager
+def ticker() -> Iterator[Callable[[str], None]]:
+    """A line on stderr that replaces itself; line after line where there is no terminal."""
+    live = sys.stderr.isatty()
+
+    def tell(line: str) -> None:
+        sys.stderr.write(f"\r\x1b[2K{line}" if live else f"{line}\n")
+        sys.stderr.flush()
+
+    yield tell
+    if live:
+        sys.stderr.write("\n")
+
+
+@contextmanager
+def stages() -> Iterator[Callable[[str, int, int], None]]:
+    """Progress of several named parts: a tenth at a time; in a file or a log, when one is long."""
+    told: dict[str, int] = {}
+    last = time.monotonic()
+    every_s = 0.0 if sys.stderr.isatty() else SECONDS_BETWEEN_LINES
+    with ticker() as tell:
+
+        def advance(name: str, done: int, total: int) -> None:
+            nonlocal last
+            tenth, now = 10 * done // max(total, 1), time.monotonic()
+            if tenth > told.get(name, 0) and now - last >= every_s:
+                told[name], last = tenth, now
+                tell(f"{name} {tenth}0 %")
+
+        yield advance
+
+
+@contextmanager
+def stdout_is_stderr() -> Iterator[None]:
+    """Send what anybody writes to file descriptor 1, C++ included, to stderr."""
+    if sys.stdout is None:
+        raise StoreError("stdout is closed: there is nowhere to write the answer")
+    sys.stdout.flush()
+    saved = os.dup(1)
+    os.dup2(2, 1)
+    try:
+        yield
+    finally:
+        sys.stdout.flush()
+        os.dup2(saved, 1)
+        os.close(saved)
+
+
+def misused(cause: Any) -> str:
+    """What typer does not understand of the words that were given, with the value in question."""
+    message = cause.format_message().rstrip(".")
+    if isinstance(cause.__cause__, ValidationError):
+        given = repr(cause.__cause__.errors()[0]["input"])
+        message += "" if given in message else f", given {given}"
+    return f"{message} (see --help)"
+
+
+def _leave(code: int, line: str) -> None:
+    complain(line)
+    raise typer.Exit(code)
+
+
+def _leave_interrupted(line: str) -> None:
+    conclude(line)
+    raise typer.Exit(INTERRUPTED)
+
+
+def _word(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, list):
+        return ", ".join(_word(inner) for inner in value)
+    return "-" if value is None else str(value)
+
+
+def here(path: Path) -> str:
+    """A path as short as it can be said from here."""
+    try:
+        return str(path.relative_to(Path.cwd()))
+    except ValueError:
+        return str(path)

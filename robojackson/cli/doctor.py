@@ -1,0 +1,114 @@
+"""What this machine has and lacks, and the line that brings what is missing. Imports no Prefect."""
+
+import ctypes
+import shutil
+import sys
+from importlib.metadata import PackageNotFoundError, distributions, version
+from typing import Any
+
+from robojackson.clips.web import javascript_runtimes
+
+GRAPHICS = {
+    "libEGL.so.1": "libegl1",
+    "libGLESv2.so.2": "libgles2",
+    "libOpenGL.so.0": "libopengl0",
+}
+REQUIRED = (
+    "mediapipe",
+    "mujoco",
+    "gymnasium",
+    "torch",
+    "stable-baselines3",
+    "sb3-contrib",
+    "prefect",
+    "fastapi",
+    "numpy",
+    "scipy",
+    "pyarrow",
+    "pydantic",
+    "opencv-python-headless",
+    "av",
+    "yt-dlp",
+    "duckdb",
+)
+OPTIONAL = {
+    "sbx-rl": ".venv/bin/pip install -e '.[fast]'",
+    "s3fs": ".venv/bin/pip install -e '.[s3]'",
+    "prefect-dask": ".venv/bin/pip install -e '.[dask]'",
+    "prefect-ray": ".venv/bin/pip install -e '.[ray]'",
+}
+OTHER_OPENCV = ("opencv-python", "opencv-contrib-python", "opencv-contrib-python-headless")
+MODELS = ("lite", "full", "heavy")
+NEEDED_MODELS = ("lite", "full")
+
+
+def examine() -> dict[str, Any]:
+    """Versions, system libraries, pose models; `missing` and `optional` say how to get things."""
+    packages = {name: installed(name) for name in (*REQUIRED, *OPTIONAL)}
+    libraries = {name: loads(name) for name in GRAPHICS}
+    models = {size: model(size) for size in MODELS}
+    missing = [f"{name}: run `make` again" for name in REQUIRED if packages[name] is None]
+    missing += _system_line(libraries)
+    missing += [words for size, words in models.items() if words and size in NEEDED_MODELS]
+    missing += [
+        f"{name} hides the headless OpenCV: pip uninstall {name}, then reinstall "
+        "opencv-python-headless with --no-deps --force-reinstall"
+        for name in OTHER_OPENCV
+        if installed(name)
+    ]
+    optional = [f"{name}: {how}" for name, how in OPTIONAL.items() if packages[name] is None]
+    optional += [words for size, words in models.items() if words and size not in NEEDED_MODELS]
+    engine = javascript_runtimes.usable()
+    optional += [] if engine else [javascript_runtimes.ADVICE]
+    return {
+        "ok": not missing,
+        "python": sys.version.split()[0],
+        "packages": packages,
+        "libraries": libraries,
+        "models": {size: not words for size, words in models.items()},
+        "javascript": engine,
+        "ffmpeg": bool(shutil.which("ffmpeg")) or installed("imageio-ffmpeg") is not None,
+        "missing": missing,
+        "optional": optional,
+    }
+
+
+def installed(name: str) -> str | None:
+    """Version of a package, None where it is not installed."""
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None
+
+
+def opencv_builds() -> list[str]:
+    """The OpenCV packages in this environment; there should be one."""
+    names = {str(d.metadata["Name"]).lower() for d in distributions() if d.metadata["Name"]}
+    return sorted(name for name in names if name.startswith("opencv"))
+
+
+def loads(name: str) -> bool:
+    """Whether the system has a shared library."""
+    try:
+        ctypes.CDLL(name)
+    except OSError:
+        return False
+    return True
+
+
+def model(size: str) -> str:
+    """Empty, or how to get the pose model of that size."""
+    from robojackson.clips.pose_detector import model_path
+    from robojackson.errors import MissingDependency
+
+    try:
+        model_path(size)
+    except MissingDependency as cause:
+        return str(cause)
+    return ""
+
+
+def _system_line(libraries: dict[str, bool]) -> list[str]:
+    packages = [GRAPHICS[name] for name, found in libraries.items() if not found]
+    line = " ".join(("apt-get install --no-install-recommends", *packages, "libgl1-mesa-dri"))
+    return [f"system libraries: {line}"] if packages else []

@@ -1,0 +1,61 @@
+"""`robojackson export` and `import`: motions in the file formats of other projects."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from robojackson.cli.console import Answer, command, log_to_stderr
+from robojackson.cli.options import Config, Folder, Json, Set, chosen
+
+
+@command
+def export(
+    motion: Annotated[
+        Path,
+        typer.Argument(
+            help="reference.parquet of a robot, smpl.parquet of a person, or a policy (onnx)."
+        ),
+    ],
+    to: Annotated[
+        Literal[
+            "gmr", "csv", "beyondmimic", "locomujoco", "omniretarget", "keyframes",
+            "amass", "bvh", "gvhmr", "onnx",
+        ],
+        typer.Option(help="The format; docs/formats.md says who reads it."),
+    ],
+    out: Annotated[Path, typer.Option("-o", "--out", help="File for the result.")],
+    as_json: Json = False,
+) -> Answer:  # fmt: skip
+    """A robot's or a person's motion, or a policy, in the file format of another project."""
+    from robojackson.cli import exporting
+
+    log_to_stderr()
+    if to == "onnx":
+        return Answer(exporting.export_policy(motion, out))
+    return Answer(exporting.export(motion, to, out))
+
+
+@command
+def import_(
+    file: Annotated[
+        Path,
+        typer.Argument(help="HybrIK's res.pk or NIKI's .pt, AMASS, AIST++, GVHMR, BVH or our csv."),
+    ],
+    out: Folder,
+    fps: Annotated[
+        float | None,
+        typer.Option(min=1.0, max=1000.0, help="Frames a second, where the file is silent."),
+    ] = None,
+    up: Annotated[
+        Literal["y", "z"] | None, typer.Option(help="Axis that points up, where it is unusual.")
+    ] = None,
+    config: Config = "base",
+    set_: Set = None,
+    as_json: Json = False,
+) -> Answer:
+    """A human motion of another project, put on the floor: smpl.parquet; runs nothing in a file."""
+    from robojackson.cli.importing import import_motion
+
+    log_to_stderr()
+    return Answer(import_motion(file, out, fps, up, config, chosen(set_)))

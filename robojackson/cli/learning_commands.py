@@ -1,0 +1,114 @@
+"""The commands that teach and judge: `train`, `pretrain` and `evaluate`.
+
+Like `robojackson.cli.app`, each imports what it needs inside itself.
+"""
+
+import os
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from robojackson.cli.console import Answer, command, log_to_stderr
+from robojackson.cli.options import (
+    Config,
+    Folder,
+    Force,
+    Json,
+    Seed,
+    Set,
+    SetTrain,
+    TablesFolder,
+    Trainer,
+    TrainMinutes,
+    chosen,
+)
+
+Parent = Annotated[int, typer.Option(hidden=True, help="End with this process.")]
+
+
+@command
+def train(
+    reference: Annotated[Path, typer.Argument(help="reference.parquet of `robojackson retarget`.")],
+    out: Folder,
+    mode: Annotated[
+        Literal["track", "paper"] | None, typer.Option(help="Ours that dances, or the paper's.")
+    ] = None,
+    trainer: Trainer = None,
+    steps: Annotated[int | None, typer.Option(min=1, help="Policy steps in all.")] = None,
+    minutes: TrainMinutes = None,
+    seed: Seed = None,
+    setup: Annotated[
+        str | None, typer.Option(help="Name of a setup of configs/setups, or a path.")
+    ] = None,
+    run_id: Annotated[str, typer.Option(help="Name of the run in the tables.")] = "",
+    move: Annotated[str, typer.Option(help="Name of the dance in the tables.")] = "",
+    parent: Parent = 0,
+    force: Force = False,
+    set_: SetTrain = None,
+    as_json: Json = False,
+) -> Answer:
+    """Teach the robot the motion: policy.safetensors and episodes.parquet; resumes by itself."""
+    from robojackson.cli import training_process
+
+    if parent:
+        training_process.die_with(parent)
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    log_to_stderr()
+    given = {"mode": mode, "trainer": trainer, "steps": steps, "minutes": minutes, "seed": seed}
+    return Answer(
+        training_process.train(reference, out, setup, chosen(set_, given), run_id, move, force)
+    )
+
+
+@command
+def pretrain(
+    out: Folder,
+    kind: Annotated[
+        Literal["track", "paper"], typer.Option(help="The mode whose trainings start from it.")
+    ] = "track",
+    reference: Annotated[
+        Path | None, typer.Option(help="Motion to imitate (track); the bundled walk by itself.")
+    ] = None,
+    steps: Annotated[int | None, typer.Option(min=1, help="Policy steps in all.")] = None,
+    minutes: TrainMinutes = None,
+    trainer: Trainer = None,
+    seed: Seed = None,
+    parent: Parent = 0,
+    set_: SetTrain = None,
+    as_json: Json = False,
+) -> Answer:
+    """A robot that walks, for `--setup pretrain`: walker_KIND.safetensors and walker.json."""
+    from robojackson.cli import walker_training
+    from robojackson.cli.training_process import die_with
+
+    if parent:
+        die_with(parent)
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    log_to_stderr()
+    given = {"trainer": trainer, "steps": steps, "minutes": minutes, "seed": seed}
+    return Answer(walker_training.pretrain(kind, out, reference, chosen(set_, given)))
+
+
+@command
+def evaluate(
+    policy: Annotated[Path, typer.Argument(help="policy.safetensors of `robojackson train`.")],
+    reference: Annotated[Path, typer.Argument(help="The reference.parquet it was trained on.")],
+    seconds: Annotated[float | None, typer.Option(min=0.1, help="Length of a rollout, s.")] = None,
+    out: TablesFolder = None,
+    config: Config = "base",
+    parent: Parent = 0,
+    set_: Set = None,
+    as_json: Json = False,
+) -> Answer:
+    """Judge a policy on stock physics from many starts, beside baselines that do not dance."""
+    from robojackson.cli import stages
+    from robojackson.cli.training_process import die_with
+
+    if parent:
+        die_with(parent)
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    log_to_stderr()
+    overrides = chosen(set_, {"evaluate.seconds": seconds})
+    judged = stages.evaluate(policy, reference, out, config, overrides)
+    return Answer(judged, text=stages.verdict_lines(judged))

@@ -1,0 +1,1 @@
+"""Ctrl-C, and the end of every process that a command has started."""

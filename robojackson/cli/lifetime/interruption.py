@@ -1,0 +1,113 @@
+"""Ctrl-C and SIGTERM as the process that does the work meets them; `supervisor` enforces the end.
+
+Only the standard library is imported here, since this precedes everything else.
+"""
+
+import os
+import shlex
+import signal
+import sys
+from types import FrameType
+
+from robojackson.cli.lifetime.orphans import VARIABLE, end_with_parent
+
+INTERRUPTED = 130
+"""Exit code of a command that was interrupted."""
+STOPS = (signal.SIGINT, signal.SIGTERM)
+"""The signals that interrupt a command."""
+UNSAVED = "robojackson-unsaved"
+"""Name of the memory file that a training holds open while it has learning to save."""
+
+_last_line: int | None = None
+"""In the worker of a supervisor, the pipe on which the supervisor receives the last line."""
+
+
+class UnsavedFlag:
+    """A flag of this process that its supervisor can see; the kernel clears it with the process."""
+
+    def __init__(self) -> None:
+        self._file: int | None = None
+
+    @property
+    def is_set(self) -> bool:
+        """Whether the flag is set."""
+        return self._file is not None
+
+    def set(self) -> None:
+        """Set the flag: there is learning that no checkpoint holds."""
+        if self._file is None and sys.platform == "linux":
+            self._file = os.memfd_create(UNSAVED)
+
+    def clear(self) -> None:
+        """Clear the flag."""
+        if self._file is not None:
+            os.close(self._file)
+            self._file = None
+
+
+def is_guarded() -> bool:
+    """Return whether another process of ours enforces the end of this one."""
+    return VARIABLE in os.environ or "--parent" in sys.argv
+
+
+def conclude(line: str) -> None:
+    """Leave the last line of an interrupted command to the supervisor; without one, write it."""
+    if _last_line is None:
+        complain(line)
+    else:
+        os.write(_last_line, line.encode(errors="backslashreplace"))
+
+
+def complain(line: str) -> None:
+    """Write one line of cause on stderr."""
+    sys.stderr.write(f"{as_line(line)}\n")
+
+
+def as_line(text: str) -> str:
+    """Return a text as one printable line that names the command."""
+    plain = "".join(c if c.isprintable() else "?" for c in " ".join(text.split()))
+    return f"robojackson: {plain}"
+
+
+def same_command() -> str:
+    """Return the command line of this process, to be typed again."""
+    return "robojackson " + " ".join(shlex.quote(word) for word in sys.argv[1:])
+
+
+def become_worker(supervisor: int, mark: str, last_line: int) -> None:
+    """Prepare a fork of the supervisor for the command: its group, mark, signals and input.
+
+    A process in the background that reads from the terminal would be stopped; no command reads.
+
+    Args:
+        supervisor: Process id of the supervisor, with which this process ends.
+        mark: What the processes that this one starts carry (`orphans`).
+        last_line: File descriptor on which the supervisor receives the last line.
+    """
+    global _last_line
+    _last_line = last_line
+    os.setpgid(0, 0)
+    if not end_with_parent(supervisor):
+        os._exit(INTERRUPTED)
+    os.environ[VARIABLE] = mark
+    signal.signal(signal.SIGTTOU, signal.SIG_IGN)
+    if os.isatty(0):
+        _discard(0)
+    for number in STOPS:
+        signal.signal(number, _interrupt)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    """Raise KeyboardInterrupt in the worker, which writes nothing from here on."""
+    for stop in STOPS:
+        signal.signal(stop, signal.SIG_IGN)
+    _discard(1, 2)
+    raise KeyboardInterrupt
+
+
+def _discard(*files: int) -> None:
+    """Connect file descriptors to the null device."""
+    null = os.open(os.devnull, os.O_RDWR)
+    for file in files:
+        os.dup2(null, file)
+    os.close(null)

@@ -1,0 +1,39 @@
+"""Who is in a video: a list, and a picture with their numbers."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from robojackson.cli import console, stages
+from robojackson.pipeline.yaml_loader import load
+
+PICTURE = "people.png"
+
+
+def list_people(
+    video: Path, out: Path, config: str, overrides: Mapping[str, Any]
+) -> tuple[dict[str, Any], list[str]]:
+    """Everybody in a video, as an answer and as lines; `--person N` follows one of them.
+
+    Raises:
+        NoPersonFound: nobody is there for long enough.
+    """
+    from robojackson.clips.people.people_picture import portrait
+    from robojackson.clips.people.tracked_people import look_around
+    from robojackson.clips.video import probe
+    from robojackson.errors import NoPersonFound
+    from robojackson.pipeline.pipeline_config import PipelineConfig
+
+    settings = load(PipelineConfig, config, overrides)
+    info = probe(video, settings.video)
+    with stages.results_in(out) as store:
+        with console.bar(f"people of {video.name}") as progress:
+            who = settings.dancer
+            cast = look_around(video, info, who.crowd, who.identity, progress)
+        if not cast.rows:
+            raise NoPersonFound(f"{video}: {cast}")
+        store.put(PICTURE, portrait(video, cast))
+    people, picture = cast.people, str(out / PICTURE)
+    told = {"video": str(video), "people": [asdict(p) for p in people], "picture": picture}
+    return told, [*(f"person {person}" for person in people), f"picture  {picture}"]

@@ -1,0 +1,45 @@
+"""Pictures of a retargeting, from files to files: a video, contacts, torques, feasibility."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from robojackson.cli import console, stages
+from robojackson.pipeline.yaml_loader import load
+from storage.store import Store
+
+VIDEO, CONTACTS, TORQUES = "retarget.mp4", "contacts.png", "torques.png"
+FEASIBILITY = "feasibility.png"
+
+
+def look(smpl: Path, out: Path, config: str, overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """Draw what `single.retarget` wrote into a folder, beside the person it was made from.
+
+    Raises:
+        MissingDependency: no way to draw without a screen.
+    """
+    from robojackson.motion.reference_motion import ReferenceMotion
+    from robojackson.motion.smpl_sequence import SmplSequence
+    from robojackson.pipeline.pipeline_config import PipelineConfig
+    from robojackson.report.plots import run_plots
+    from robojackson.report.plots.feasibility_plot import feasibility_strip
+    from robojackson.report.video.retarget_video import human_beside_robot
+
+    settings = load(PipelineConfig, config, overrides)
+    sequence = stages.read_table(SmplSequence, smpl)
+    reference = stages.read_table(ReferenceMotion, out / "reference.parquet")
+    robot = stages.robot_of(reference)
+    motors = [name for name, moved in zip(robot.joint_names, robot.actuated, strict=True) if moved]
+    store = Store(out)
+    store.put(CONTACTS, run_plots.png(run_plots.contact_strip(sequence, reference)))
+    store.put(TORQUES, run_plots.png(run_plots.torque_heat_map(reference, motors)))
+    drawn = {"contacts": str(out / CONTACTS), "torques": str(out / TORQUES)}
+    if reference.certificate is not None:
+        store.put(FEASIBILITY, run_plots.png(feasibility_strip(reference)))
+        drawn["feasibility"] = str(out / FEASIBILITY)
+    with console.bar("video") as progress:
+        human_beside_robot(
+            sequence, reference, out / VIDEO, model=robot.model, config=settings.show,
+            progress=progress,
+        )  # fmt: skip
+    return {"video": str(out / VIDEO), **drawn}

@@ -1,0 +1,146 @@
+"""Robots of `configs/robots`: which there are, and getting the model of one that is not installed.
+
+A model that a package bundles is taken out of the package's wheel: the wheel alone is downloaded by
+pip, which knows this machine's package index, checked against a pinned sha256, and only the model's
+folder and the licences are unpacked. A folder appears whole or not at all.
+"""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from robojackson.errors import BadConfiguration, DownloadFailed, RoboJacksonError, StoreError
+from robojackson.pipeline.yaml_loader import FOLDER, load
+from robojackson.robot.description import RobotDescription, RobotSource
+from robojackson.robot.mjcf import mjcf_path, robots_folder
+from storage.artifact import sha256_of_file
+
+_ROOM_MB = 120
+
+
+def listed() -> list[dict[str, Any]]:
+    """Every shipped robot: whether its model is here, and how to get it."""
+    names = sorted(path.stem for path in (FOLDER / "robots").glob("*.yaml"))
+    return [_entry(load(RobotDescription, f"robots/{name}")) for name in names]
+
+
+def _entry(description: RobotDescription) -> dict[str, Any]:
+    try:
+        model = str(mjcf_path(description))
+        return {"robot": description.name, "ready": True, "model": model, "note": ""}
+    except BadConfiguration as cause:
+        return {"robot": description.name, "ready": False, "model": "", "note": str(cause)}
+
+
+def add(name: str) -> dict[str, Any]:
+    """Bring the model of a robot into the store; one that is there already is left alone.
+
+    Raises:
+        BadConfiguration: The robot needs nothing.
+        DownloadFailed: No wheel, or not the one that was pinned.
+        StoreError: The store is full or cannot be written.
+    """
+    description = load(RobotDescription, f"robots/{name}")
+    source, folder = description.source, robots_folder() / description.name
+    if source is None:
+        raise BadConfiguration(f"robot {name!r} needs nothing: {mjcf_path(description)} is here")
+    try:
+        model = mjcf_path(description)
+        made = False
+    except BadConfiguration:
+        with _one_line(folder):
+            _fetch(source, folder)
+        model, made = mjcf_path(description), True
+    return {"robot": name, "model": str(model), "added": made, "licence": source.licence}
+
+
+def _fetch(source: RobotSource, folder: Path) -> None:
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    _require_room(folder.parent)
+    with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".adding-") as scratch:
+        wheel = _download(source, Path(scratch) / "wheel")
+        digest = sha256_of_file(wheel)
+        if digest != source.wheel_sha256:
+            raise DownloadFailed(
+                f"{wheel.name} is not the wheel that was pinned: its sha256 is {digest}, expected "
+                f"{source.wheel_sha256}; nothing was kept"
+            )
+        fresh = Path(scratch) / "model"
+        _unpack(wheel, source, fresh)
+        if folder.exists():
+            folder.rename(Path(scratch) / "old")
+        fresh.rename(folder)
+
+
+def _require_room(folder: Path) -> None:
+    free_mb = shutil.disk_usage(folder).free / 1e6
+    if free_mb < _ROOM_MB:
+        raise StoreError(f"{folder} has {free_mb:.0f} MB free, {_ROOM_MB} MB are needed: make room")
+
+
+def _download(source: RobotSource, folder: Path) -> Path:
+    """The wheel, by pip and the index that it is configured for."""
+    wanted = f"{source.package}=={source.version}"
+    command = [
+        *(sys.executable, "-m", "pip", "download", "--no-deps", "--only-binary=:all:"),
+        *("--disable-pip-version-check", "--no-input", "--quiet", "-d", str(folder), wanted),
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    wheels = sorted(folder.glob("*.whl")) if folder.is_dir() else []
+    if done.returncode or not wheels:
+        raise DownloadFailed(
+            f"pip could not download {wanted}: {_cause(done.stderr)}; check the network and "
+            "pip's index, then try again"
+        )
+    return wheels[0]
+
+
+def _cause(stderr: str) -> str:
+    """The last error that pip told, without colours."""
+    lines = [re.sub(r"\x1b\[[0-9;]*m", "", line).strip() for line in stderr.splitlines()]
+    errors = [line for line in lines if line.upper().startswith("ERROR")] or lines or ["no reason"]
+    return errors[-1].removeprefix("ERROR: ").rstrip(".")
+
+
+def _unpack(wheel: Path, source: RobotSource, folder: Path) -> None:
+    """The model's folder, and the licences of the wheel beside it."""
+    with zipfile.ZipFile(wheel) as archive:
+        for name in archive.namelist():
+            target = _place(PurePosixPath(name), source)
+            if target is None or name.endswith("/"):
+                continue
+            if ".." in target.parts:
+                raise DownloadFailed(f"{wheel.name}: {name} leads out of its folder")
+            (folder / target).parent.mkdir(parents=True, exist_ok=True)
+            with archive.open(name) as packed, (folder / target).open("wb") as out:
+                shutil.copyfileobj(packed, out)
+                out.flush()
+                os.fsync(out.fileno())
+    if not folder.is_dir():
+        raise DownloadFailed(f"{wheel.name} has no folder {source.folder}")
+
+
+def _place(name: PurePosixPath, source: RobotSource) -> PurePosixPath | None:
+    """Where a file of the wheel goes; None when it stays out."""
+    if name.is_relative_to(source.folder):
+        return name.relative_to(source.folder)
+    licence = name.name.upper().startswith(("LICENSE", "LICENCE", "COPYING", "NOTICE"))
+    return PurePosixPath("licences", name.name) if licence else None
+
+
+@contextmanager
+def _one_line(folder: Path) -> Iterator[None]:
+    try:
+        yield
+    except RoboJacksonError:
+        raise
+    except (OSError, zipfile.BadZipFile) as cause:
+        raise StoreError(f"cannot write {folder}: {cause}; nothing was kept") from cause

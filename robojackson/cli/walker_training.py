@@ -1,0 +1,128 @@
+"""The walkers that trainings start from, made from files to files with no Prefect.
+
+`paper` learns Humanoid-v5's own reward from the first 45 of its observations; the file that is kept
+takes all 348, the others with weight zero. `track` imitates the bundled walk.
+"""
+
+import json
+import shlex
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from flows.search.dance_source import bundled
+from robojackson.cli import stages, training_process
+from robojackson.errors import BadConfiguration
+from robojackson.pipeline import tables
+from robojackson.pipeline.yaml_loader import load
+
+if TYPE_CHECKING:
+    from robojackson.robot.model import Robot
+
+Figures = dict[str, Any]
+WALK, STANDING = "walk.mp4", "standing.parquet"
+ROBOT, PIPELINE = "humanoid", "base"
+"""Names of the configurations that a walker is made with, besides that of its training."""
+CURVE_POINTS = 20
+
+
+def pretrain(kind: str, out: Path, reference: Path | None, overrides: Mapping[str, Any]) -> Figures:
+    """Train a walker: walker_<kind>.safetensors and walker.json with command, curve, evaluation.
+
+    Raises:
+        BadConfiguration: a reference motion for `paper`, whose walker follows none.
+    """
+    from robojackson.rl.config.train_config import TrainConfig
+    from robojackson.rl.policy import load_policy
+    from robojackson.rl.sim.stock_humanoid import stock_observation_size
+    from robojackson.rl.tqc.network_arrays import load_networks, widened
+    from robojackson.robot.model import RobotDescription, load_robot
+
+    mode = load(TrainConfig, f"setups/walker-{kind}", overrides).mode
+    if mode != kind:
+        raise BadConfiguration(f"mode={mode}: the walker of kind {kind!r} learns in mode {kind}")
+    if kind == "paper" and reference is not None:
+        raise BadConfiguration(
+            f"--reference {reference}: the walker of kind 'paper' follows no motion; leave it out, "
+            "or take --kind track"
+        )
+    robot = load_robot(load(RobotDescription, f"robots/{ROBOT}"))
+    motion = reference or _reference(kind, out, robot)
+    stands = kind == "paper"  # a motion that only stands has no score card
+    trained = training_process.train(
+        motion, out, f"walker-{kind}", overrides, move="walk", force=stands
+    )
+    networks = load_networks(out / "networks.safetensors")
+    policy = load_policy(out / "policy.safetensors")
+    if kind == "paper":
+        model = robot.model
+        size = stock_observation_size(model.nq, model.nv, model.nbody)
+        networks = widened(networks, size)
+        judged = _walked(policy, robot)
+    else:
+        judged = stages.evaluate(out / "policy.safetensors", motion, out, PIPELINE, {})
+    made = out / f"walker_{kind}.safetensors"
+    made.write_bytes(networks.to_bytes())
+    facts = {
+        "command": shlex.join(["robojackson", "pretrain", "--kind", kind, *_words(overrides)]),
+        "seed": trained["seed"],
+        "steps": trained["steps"],
+        "updates": trained["updates"],
+        "curve": curve(out),
+        "evaluation": judged,
+    }
+    (out / "walker.json").write_text(json.dumps(facts, indent=1, default=float))
+    return {"walker": str(made), **facts}
+
+
+def curve(out: Path) -> list[dict[str, float]]:
+    """Mean return and survival of the episodes in equal parts of the training."""
+    from robojackson.pipeline.table_schemas import EPISODE_RECORD
+
+    path = out / "episodes.parquet"
+    rows = tables.decode_rows(EPISODE_RECORD, path.read_bytes(), str(path))
+    parts = np.array_split(np.arange(len(rows)), min(CURVE_POINTS, max(1, len(rows))))
+    mean = lambda part, key: float(np.mean([rows[i][key] for i in part]))  # noqa: E731
+    return [
+        {
+            "step": float(rows[part[-1]]["step"]),
+            "episode_return": mean(part, "episode_return"),
+            "survived_s": mean(part, "survived_s"),
+        }
+        for part in parts
+        if len(part)
+    ]
+
+
+def _reference(kind: str, out: Path, robot: "Robot") -> Path:
+    """The motion that a walker is trained on: none for `paper`, the bundled walk for `track`."""
+    from robojackson.rl.modes.standing_motion import standing
+
+    if kind == "paper":
+        with stages.results_in(out) as store:
+            store.put(STANDING, tables.encode(standing(robot)))
+        return out / STANDING
+    folder = out / Path(WALK).stem  # not among what the user may keep in `out`
+    made = folder / "reference.parquet"
+    if not made.exists():
+        stages.mocap(bundled(WALK), folder, PIPELINE, {})
+        stages.retarget(folder / "smpl.parquet", folder, PIPELINE, {"robot": ROBOT})
+    return made
+
+
+def _walked(policy: Any, robot: "Robot") -> Figures:
+    from robojackson.rl.evaluation.walking import walk
+
+    return asdict(walk(policy, robot))
+
+
+def _words(overrides: Mapping[str, Any]) -> list[str]:
+    """The options of a command that override what the setup says."""
+    options = {"steps": "--steps", "minutes": "--minutes", "seed": "--seed", "trainer": "--trainer"}
+    words: list[str] = []
+    for key, value in overrides.items():
+        words += [options[key], str(value)] if key in options else ["--set", f"{key}={value}"]
+    return words

@@ -1,0 +1,203 @@
+"""The dancer of a clip in which there may be others: one person, the same from first to last frame.
+
+A clip of one is looked at once. Where a few frames show somebody else, everybody is looked for in
+every frame (`crowd`) and told apart (`identity`); then the dancer is followed as if he were alone,
+with all others painted over, because the detector sees best whom it follows. The largest steady
+person is number 1 and danced by default.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool, Float, UInt8
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass as configuration
+
+from robojackson.clips.people.identity import IdentityConfig
+from robojackson.clips.people.person_detection import CrowdConfig, paint, silhouette
+from robojackson.clips.people.person_extent import stature, trunk
+from robojackson.clips.people.tracked_people import SCOUT, Cast, look_around
+from robojackson.clips.pose_detector import (
+    SHORT_SIDE,
+    detect,
+    still_landmarker,
+    track_of,
+    video_landmarker,
+)
+from robojackson.clips.quality.person_count import People, PeopleConfig
+from robojackson.clips.video import VideoInfo, timed_frames
+from robojackson.errors import NoPersonFound
+from robojackson.motion.landmark_track import LandmarkTrack
+
+Progress = Callable[[int, int], None]
+
+
+@configuration(frozen=True, config=ConfigDict(extra="forbid"))
+class DancerConfig:
+    """How the dancer is found among others.
+
+    Attributes:
+        number: Whom to dance: 1 is the largest steady person, None too.
+        scouts: The few frames in which somebody else is looked for.
+        crowd, identity: Of everybody in every frame.
+        astray: Body heights; a row further than this from where the person must be is another's.
+        crowding: People nearer than this hide one another, body heights.
+        longest_gap_s: He is looked for in gaps up to this, seconds.
+    """
+
+    number: int | None = Field(default=None, ge=1)
+    scouts: PeopleConfig = Field(default_factory=PeopleConfig)
+    crowd: CrowdConfig = Field(default_factory=CrowdConfig)
+    identity: IdentityConfig = Field(default_factory=IdentityConfig)
+    astray: float = Field(default=0.3, gt=0)
+    crowding: float = Field(default=0.5, gt=0)
+    longest_gap_s: float = Field(default=1.0, ge=0)
+
+
+def follow(
+    path: Path,
+    info: VideoInfo,
+    size: str,
+    config: DancerConfig,
+    progress: Progress | None = None,
+) -> LandmarkTrack:
+    """Landmarks of one person, NaN rows where he is not seen.
+
+    Args:
+        path: Video file.
+        info: What `probe` found in it.
+        size: lite, full or heavy.
+        config: Whom to follow, and how.
+        progress: Called with (frames done, frames in all); others in view make it several passes.
+    Raises:
+        NoPersonFound: there is no person of that number; the message tells who is there.
+        MissingDependency: no model bundle, or no EGL and GLES libraries.
+    """
+    if config.number is None or config.number == 1:
+        single, others = _scouted(path, info, size, config, progress)
+        if not others:
+            return single
+    passes = 3 if config.number in (None, 1) else 2
+    later = _shifted(progress, info.frames, passes - 2, passes)
+    cast = look_around(path, info, config.crowd, config.identity, later)
+    if len(cast.rows) < 2 and config.number in (None, 1):
+        return single
+    number = config.number or 1
+    if number > len(cast.rows):
+        raise NoPersonFound(f"{path}: there is no person {number} among {len(cast.rows)}: {cast}")
+    rows = _followed(
+        path, cast, number - 1, size, config, _shifted(progress, info.frames, passes - 1, passes)
+    )
+    notes = (f"{len(cast.rows)} people in view, this is person {number}: {cast}",)
+    return track_of(rows, cast.time_s, info, number, notes)
+
+
+def _scouted(
+    path: Path, info: VideoInfo, size: str, config: DancerConfig, progress: Progress | None
+) -> tuple[LandmarkTrack, bool]:
+    """The track of a person who is alone, and whether somebody else was seen in a few frames."""
+    with still_landmarker(SCOUT) as landmarker:
+        scouts = People(info.frames, info.fps, landmarker, config.scouts)
+
+        def watch(index: int, image: np.ndarray, row: np.ndarray) -> None:
+            scouts.see(index, image, row[:, :2])
+
+        track = detect(path, info, size, progress, watch)
+    return track, max(scouts.counts, default=0) > 1
+
+
+def _followed(
+    path: Path,
+    cast: Cast,
+    chosen: int,
+    size: str,
+    config: DancerConfig,
+    progress: Progress | None,
+) -> Float[np.ndarray, "T 33 7"]:
+    """Rows of one person, the others painted over; what the crowd knows where that goes astray."""
+    known = cast.rows[chosen]
+    others = np.array([rows for number, rows in enumerate(cast.rows) if number != chosen])
+    wanted = near_known(known, cast.time_s, config.longest_gap_s)
+    found = np.full_like(known, np.nan)
+    with video_landmarker(size) as look:
+        frames = timed_frames(path, short_side=SHORT_SIDE)
+        for index, (time_s, image) in zip(range(len(known)), frames, strict=False):
+            if wanted[index]:
+                width = config.crowd.limb_width
+                found[index] = look(alone(image, known[index], others[:, index], width), time_s)
+            if progress:
+                progress(index + 1, len(known))
+    size_px = (cast.info.width, cast.info.height)
+    return checked(found, cast.rows, chosen, cast.time_s, size_px, config)
+
+
+def near_known(
+    known: Float[np.ndarray, "T 33 7"], time_s: Float[np.ndarray, " T"], gap_s: float
+) -> Bool[np.ndarray, " T"]:
+    """Frames that are no further from one in which he was seen."""
+    seen = time_s[~np.isnan(known[:, 0, 0])]
+    return np.asarray(np.abs(time_s[:, None] - seen).min(1) <= gap_s)
+
+
+def alone(
+    image: UInt8[np.ndarray, "H W 3"],
+    person: Float[np.ndarray, "33 7"],
+    others: Float[np.ndarray, "P 33 7"],
+    limb_width: float,
+) -> UInt8[np.ndarray, "H W 3"]:
+    """The picture with all others painted over where they do not cover the person."""
+    height, width = image.shape[:2]
+    clear = image.copy()
+    kept = np.zeros((height, width), bool)
+    if not np.isnan(person).any():
+        kept = silhouette(person[:, :2], width, height, limb_width)
+    for other in others:
+        if not np.isnan(other).any():
+            paint(clear, silhouette(other[:, :2], width, height, limb_width) & ~kept)
+    return clear
+
+
+def checked(
+    found: Float[np.ndarray, "T 33 7"],
+    everybody: list[Float[np.ndarray, "T 33 7"]],
+    chosen: int,
+    time_s: Float[np.ndarray, " T"],
+    size: tuple[int, int],
+    config: DancerConfig,
+) -> Float[np.ndarray, "T 33 7"]:
+    """What was found of a person, what was known where that is astray, NaN where neither is.
+
+    While nobody saw him he may be found on the line from the place before to the place after, if no
+    other's line comes near.
+    """
+    known = everybody[chosen]
+    expected, tall = _course(known, time_s, size)
+    places = (found[:, trunk(), :2] * size).mean(1)
+    off = np.linalg.norm(places - expected, axis=-1) / tall
+    trusted = off <= config.astray
+    for number, other in enumerate(everybody):
+        if number != chosen:
+            rival = _course(other, time_s, size)[0]
+            apart = np.linalg.norm(rival - expected, axis=-1) / tall
+            trusted &= off <= np.linalg.norm(rival - places, axis=-1) / tall
+            trusted &= ~np.isnan(known[:, 0, 0]) | (apart > config.crowding)
+    return np.where(trusted[:, None, None], found, known)
+
+
+def _course(
+    rows: Float[np.ndarray, "T 33 7"], time_s: Float[np.ndarray, " T"], size: tuple[int, int]
+) -> tuple[Float[np.ndarray, "T 2"], Float[np.ndarray, " T"]]:
+    """Place of the trunk and stature in every frame, pixels, straight through gaps."""
+    seen = ~np.isnan(rows[:, 0, 0])
+    points = rows[seen, :, :2] * size
+    places = points[:, trunk()].mean(1)
+    course = np.stack([np.interp(time_s, time_s[seen], axis) for axis in places.T], -1)
+    return course, np.interp(time_s, time_s[seen], stature(points))
+
+
+def _shifted(progress: Progress | None, frames: int, before: int, passes: int) -> Progress | None:
+    """Progress of one pass over the frames, so many of which are done before it."""
+    if progress is None:
+        return None
+    return lambda done, total: progress(before * frames + done, passes * frames)

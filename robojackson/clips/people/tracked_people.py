@@ -1,0 +1,103 @@
+"""Everybody in a clip: who is there, how large, where and when; 1 is the largest steady person."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from robojackson.clips.people.identity import IdentityConfig, identify
+from robojackson.clips.people.person_detection import CrowdConfig, Sighting, everybody
+from robojackson.clips.people.person_extent import stature, trunk
+from robojackson.clips.pose_detector import still_landmarker
+from robojackson.clips.video import VideoInfo, timed_frames
+
+SCOUT = "lite"
+"""Size of the pose model that looks for people; the dancer is then followed with a better one."""
+LEFT, RIGHT = 0.4, 0.6
+
+
+@dataclass(frozen=True)
+class Person:
+    """Somebody in a clip.
+
+    Attributes:
+        number: 1 is the largest steady person.
+        height_px: Median size in the image, pixels.
+        seen_share: Share of the frames in which he is seen.
+        from_s, to_s: When he is seen first and last, seconds.
+        place: Median place in the image from the left, 0..1.
+    """
+
+    number: int
+    height_px: float
+    seen_share: float
+    from_s: float
+    to_s: float
+    place: float
+
+    def __str__(self) -> str:
+        side = "left" if self.place < LEFT else "right" if self.place > RIGHT else "middle"
+        return (
+            f"{self.number} ({self.height_px:.0f} px tall, {side}, seen in {self.seen_share:.0%}, "
+            f"{self.from_s:.1f}-{self.to_s:.1f} s)"
+        )
+
+
+@dataclass(frozen=True)
+class Cast:
+    """Everybody in a clip.
+
+    Attributes:
+        rows: One track a person, number 1 first; NaN where he is not seen.
+        time_s: When each frame was taken, seconds.
+        info: The file.
+    """
+
+    rows: list[Float[np.ndarray, "T 33 7"]]
+    time_s: Float[np.ndarray, " T"]
+    info: VideoInfo
+
+    @property
+    def people(self) -> list[Person]:
+        """Who is there, in order of their numbers."""
+        return [self._person(number, rows) for number, rows in enumerate(self.rows, start=1)]
+
+    def __str__(self) -> str:
+        told = "; ".join(str(person) for person in self.people)
+        return told or "nobody is seen for long enough"
+
+    def _person(self, number: int, rows: np.ndarray) -> Person:
+        seen = np.flatnonzero(~np.isnan(rows[:, 0, 0]))
+        points = rows[seen, :, :2] * (self.info.width, self.info.height)
+        return Person(
+            number=number,
+            height_px=float(np.median(stature(points))),
+            seen_share=len(seen) / len(rows),
+            from_s=float(self.time_s[seen[0]]),
+            to_s=float(self.time_s[seen[-1]]),
+            place=float(np.median(rows[seen][:, trunk(), 0])),
+        )
+
+
+def look_around(
+    path: Path,
+    info: VideoInfo,
+    crowd: CrowdConfig,
+    identity: IdentityConfig,
+    progress: Callable[[int, int], None] | None = None,
+) -> Cast:
+    """Everybody in every frame, told apart."""
+    found: list[list[Sighting]] = []
+    times: list[float] = []
+    with still_landmarker(SCOUT) as landmarker:
+        frames = timed_frames(path, short_side=crowd.short_side)
+        for index, (time_s, image) in enumerate(frames):
+            found.append(everybody(image, landmarker, crowd))
+            times.append(time_s)
+            if progress:
+                progress(index + 1, info.frames)
+    when = np.array(times)
+    rows = identify(found, when, (info.width, info.height), identity)
+    return Cast(rows, when, info)

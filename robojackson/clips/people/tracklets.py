@@ -1,0 +1,156 @@
+"""Stretches of frames in which one person was followed and nobody could be taken for another.
+
+From one frame to the next, people are matched by the Hungarian method. Where they touch (two claim
+one sighting, one vanishes or appears beside another) the pieces of all of them end; what follows
+beside somebody who vanished may be either of the two, and says so. Pixels and seconds.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass as configuration
+
+from robojackson.clips.people.person_detection import Sighting
+from robojackson.clips.people.person_extent import stature, trunk
+
+
+@configuration(frozen=True, config=ConfigDict(extra="forbid"))
+class PieceConfig:
+    """Attributes:
+    step: Distance of the trunk from one frame to the next, body heights.
+    step_speed: The same as a speed, body heights a second: what counts at low frame rates.
+    growth: Change of size from one frame to the next, ratio, that counts half of such a step.
+    crowding: People whose trunks are nearer than this touch, body heights.
+    pause_s: A piece outlives so long a gap, seconds.
+    """
+
+    step: float = Field(default=0.12, gt=0)
+    step_speed: float = Field(default=2.5, gt=0)
+    growth: float = Field(default=1.6, gt=1)
+    crowding: float = Field(default=0.5, gt=0)
+    pause_s: float = Field(default=0.1, ge=0)
+
+
+@dataclass
+class Piece:
+    """A stretch of frames in which one person was followed.
+
+    Attributes:
+        frames: Their numbers.
+        time_s: When they were taken.
+        rows: Landmarks.
+        place: Middle of the trunk, pixels.
+        tall: Stature, pixels.
+        looks: Colours.
+        blended: Whether it may be either of two who were seen as one.
+    """
+
+    frames: list[int] = field(default_factory=list)
+    time_s: list[float] = field(default_factory=list)
+    rows: list[np.ndarray] = field(default_factory=list)
+    place: list[np.ndarray] = field(default_factory=list)
+    tall: list[float] = field(default_factory=list)
+    looks: list[np.ndarray] = field(default_factory=list)
+    blended: bool = False
+
+    def take(self, other: "Piece") -> None:
+        """Go on with a single sighting."""
+        for name in ("frames", "time_s", "rows", "place", "tall", "looks"):
+            getattr(self, name).extend(getattr(other, name))
+
+    def add(self, frame: int, time_s: float, seen: Sighting, size: tuple[int, int]) -> None:
+        points = seen.row[:, :2] * size
+        self.frames.append(frame)
+        self.time_s.append(time_s)
+        self.rows.append(seen.row)
+        self.place.append(points[trunk()].mean(0))
+        self.tall.append(max(float(stature(points)), 1.0))
+        self.looks.append(seen.looks)
+
+
+def find_pieces(
+    frames: Sequence[Sequence[Sighting]],
+    time_s: Float[np.ndarray, " T"],
+    size: tuple[int, int],
+    config: PieceConfig,
+) -> list[Piece]:
+    """Stretches without doubt, and those of two seen as one."""
+    done: list[Piece] = []
+    alive: list[Piece] = []
+    for index, sightings in enumerate(frames):
+        now = float(time_s[index])
+        done += [p for p in alive if now - p.time_s[-1] > config.pause_s + 1e-6]
+        alive = [p for p in alive if now - p.time_s[-1] <= config.pause_s + 1e-6]
+        seen = [_piece_of(index, now, sighting, size) for sighting in sightings]
+        goes_on = _claims(alive, seen, config)
+        ended, blended = _touches(alive, seen, goes_on, config)
+        for old, new in goes_on.items():
+            if old in ended:
+                seen[new].blended = new in blended
+            else:
+                alive[old].take(seen[new])
+        taken = {new for old, new in goes_on.items() if old not in ended}
+        done += [p for old, p in enumerate(alive) if old in ended]
+        alive = [p for old, p in enumerate(alive) if old not in ended]
+        alive += [p for new, p in enumerate(seen) if new not in taken]
+    return done + alive
+
+
+def _piece_of(index: int, now: float, seen: Sighting, size: tuple[int, int]) -> Piece:
+    points = seen.row[:, :2] * size
+    tall = max(float(stature(points)), 1.0)
+    return Piece([index], [now], [seen.row], [points[trunk()].mean(0)], [tall], [seen.looks])
+
+
+def _claims(alive: Sequence[Piece], seen: Sequence[Piece], config: PieceConfig) -> dict[int, int]:
+    """Which piece goes on with which sighting, the least change in all."""
+    from scipy.optimize import linear_sum_assignment
+
+    if not alive or not seen:
+        return {}
+    far = np.array([[_step(a, b, config) for b in seen] for a in alive])
+    pairs = zip(*linear_sum_assignment(np.minimum(far, 2.0)), strict=True)
+    return {int(a): int(b) for a, b in pairs if far[a, b] < 1.0}
+
+
+def _touches(
+    alive: Sequence[Piece], seen: Sequence[Piece], goes_on: dict[int, int], config: PieceConfig
+) -> tuple[set[int], set[int]]:
+    """Pieces that end because people touch, and sightings that may be either of two.
+
+    Beside somebody who just vanished a sighting may be his; beside somebody who just appeared both
+    are seen apart again.
+    """
+    ended: set[int] = set()
+    blended: set[int] = set()
+    lost = [i for i in range(len(alive)) if i not in goes_on]
+    fresh = [j for j in range(len(seen)) if j not in goes_on.values()]
+    for old, new in goes_on.items():
+        besides = [i for i in lost if _near(alive[i], alive[old], config)]
+        if besides:
+            ended |= {old, *besides}
+            blended.add(new)
+        if any(_near(seen[j], seen[new], config) for j in fresh):
+            ended.add(old)
+            blended.discard(new)
+        rivals = [i for i in goes_on if i != old and _step(alive[i], seen[new], config) < 1.0]
+        if rivals:
+            ended |= {old, *rivals}
+    return ended, blended
+
+
+def _near(one: Piece, other: Piece, config: PieceConfig) -> bool:
+    tall = max(one.tall[-1], other.tall[-1])
+    return bool(np.linalg.norm(one.place[-1] - other.place[-1]) < config.crowding * tall)
+
+
+def _step(before: Piece, after: Piece, config: PieceConfig) -> float:
+    """How far a sighting is from a piece, 1 is as far as it may be."""
+    away_s = after.time_s[0] - before.time_s[-1]
+    tall = max(before.tall[-1], after.tall[0])
+    moved = np.linalg.norm(after.place[0] - before.place[-1]) / tall
+    grown = abs(np.log(after.tall[0] / before.tall[-1])) / np.log(config.growth)
+    return float(moved / max(config.step, config.step_speed * away_s) + 0.5 * grown)

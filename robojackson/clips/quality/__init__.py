@@ -1,0 +1,1 @@
+"""How fit a clip is for motion capture, and which candidate is best."""

@@ -1,0 +1,91 @@
+"""Copies of a clip among candidates, mirrored ones included, told by how the person moves.
+
+A copy may be smaller, cropped, recoloured, recompressed or start later, so pictures are not
+compared but poses: landmarks relative to the hips, divided by the body's height.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+from jaxtyping import Float
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass
+
+from robojackson.clips.people.person_extent import MIRROR, heights_px, indices
+from robojackson.motion.landmark_track import LandmarkTrack
+
+DELAY_COST = 0.01
+"""Body heights a second of delay: a cyclic dance is its own mirror half a lap later."""
+Poses = Float[np.ndarray, "N 33 2"]
+
+
+@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+class CopyConfig:
+    """Attributes:
+    distance: Mean distance of the landmarks below which two clips show the same, body heights.
+    rate: Poses a second that are compared.
+    lag_s: Longest delay between two copies, seconds.
+    overlap: Least share of the shorter clip that both must show.
+    """
+
+    distance: float = Field(default=0.03, gt=0)
+    rate: float = Field(default=10.0, gt=0)
+    lag_s: float = Field(default=2.0, ge=0)
+    overlap: float = Field(default=0.6, gt=0, le=1)
+
+
+def copies(tracks: Mapping[str, LandmarkTrack], config: CopyConfig) -> dict[str, str]:
+    """Which clips are copies, each with the reason, which names the clip that is kept.
+
+    Args:
+        tracks: By name, the best picture first: of two copies the later one is the copy.
+        config: Limits.
+    """
+    found: dict[str, str] = {}
+    kept: dict[str, Poses] = {}
+    for name, track in tracks.items():
+        mine = poses(track, config.rate)
+        for other, theirs in kept.items():
+            same, turned = distance(mine, theirs, config), distance(mirrored(mine), theirs, config)
+            if min(same, turned) <= config.distance:
+                found[name] = f"a {'mirrored ' if turned < same else ''}copy of {other}"
+                break
+        else:
+            kept[name] = mine
+    return found
+
+
+def poses(track: LandmarkTrack, rate: float) -> Poses:
+    """Landmarks relative to the middle of the hips, in body heights, `rate` times a second."""
+    size = np.array([track.width, track.height])
+    xy = track.landmarks[..., :2] * size
+    hips = xy[:, indices(("left_hip", "right_hip"))].mean(1, keepdims=True)
+    tall = np.nanmedian(heights_px(track)) if track.detected.any() else np.nan
+    count = max(1, int(len(track) / track.fps * rate))
+    chosen = np.minimum((np.arange(count) / rate * track.fps).round().astype(int), len(track) - 1)
+    return ((xy - hips) / tall)[chosen]
+
+
+def mirrored(seen: Poses) -> Poses:
+    """The same poses in a mirror: left is right, in the image and in the names."""
+    return seen[:, list(MIRROR)] * np.array([-1.0, 1.0])
+
+
+def distance(one: Poses, two: Poses, config: CopyConfig) -> float:
+    """Least mean distance over all delays, which cost a little; infinite when nothing overlaps."""
+    shortest = min(len(one), len(two))
+    least = max(2, int(config.overlap * shortest))
+    longest = int(config.lag_s * config.rate)
+    lags = range(-longest, longest + 1)
+    costs = (_at(one, two, lag, least) + DELAY_COST * abs(lag) / config.rate for lag in lags)
+    return min(costs, default=np.inf)
+
+
+def _at(one: Poses, two: Poses, lag: int, least: int) -> float:
+    """Mean distance when the second clip starts `lag` poses after the first."""
+    begin, end = max(0, lag), min(len(one), len(two) + lag)
+    if end - begin < least:
+        return np.inf
+    apart = np.linalg.norm(one[begin:end] - two[begin - lag : end - lag], axis=-1)
+    seen = ~np.isnan(apart).any(1)
+    return float(apart[seen].mean()) if seen.sum() >= least else np.inf

@@ -1,0 +1,79 @@
+"""Stability of a landmark track: missing joints plus jitter (RoboJackson, Algorithm 1).
+
+Landmarks are normalised image coordinates; scores are unitless and LOWER IS STEADIER.
+"""
+
+import numpy as np
+from jaxtyping import Float
+from pydantic import ConfigDict
+from pydantic.dataclasses import dataclass
+
+from robojackson.motion.landmark_track import LANDMARKS, LandmarkTrack
+
+
+@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+class StabilityConfig:
+    """Attributes:
+    visibility_threshold: A landmark below this visibility (0..1) counts as missing.
+    """
+
+    visibility_threshold: float = 0.5
+
+
+@dataclass(frozen=True)
+class Stability:
+    """The score of one clip.
+
+    Attributes:
+        frames: Frames in the clip.
+        detected: Frames in which a person was found.
+        missing_joints: M, landmarks not seen, summed over the clip.
+        jitter: J, normalised image units, summed over the clip.
+        stability_score: M + J; lower is steadier.
+        missing_joints_per_frame, jitter_per_frame: M and J divided by the number of frames: the
+            sums favour short clips.
+    """
+
+    frames: int
+    detected: int
+    missing_joints: int
+    jitter: float
+    stability_score: float
+    missing_joints_per_frame: float
+    jitter_per_frame: float
+
+
+def stability(track: LandmarkTrack, config: StabilityConfig) -> Stability:
+    """M + J of a track; a clip without a person has M = 33 T and J = 0."""
+    frames = len(track)
+    missing = missing_joints(track.visibility, config.visibility_threshold)
+    moved = jitter(track.landmarks[..., :2])
+    return Stability(
+        frames=frames,
+        detected=int(track.detected.sum()),
+        missing_joints=missing,
+        jitter=moved,
+        stability_score=missing + moved,
+        missing_joints_per_frame=missing / max(frames, 1),
+        jitter_per_frame=moved / max(frames, 1),
+    )
+
+
+def missing_joints(visibility: Float[np.ndarray, "T 33"], threshold: float) -> int:
+    """M: landmarks under the threshold, and all 33 of every undetected (NaN) frame."""
+    return int(np.count_nonzero(~(visibility >= threshold)))
+
+
+def jitter(xy: Float[np.ndarray, "T 33 2"]) -> float:
+    """Mean landmark displacement between consecutive frames, summed over the clip.
+
+    J = sum_t 1/N sum_j |L_j,t - L_j,t-1|_2   (Algorithm 1; N = 33)
+
+    Args:
+        xy: Landmark positions, normalised image coordinates; NaN in undetected frames, whose steps
+            count nothing (their landmarks count in M).
+    Returns:
+        Jitter in normalised image units; lower is steadier.
+    """
+    steps = np.linalg.norm(np.diff(xy, axis=0), axis=-1).sum(-1) / LANDMARKS
+    return float(np.nansum(steps))

@@ -1,0 +1,73 @@
+"""Why a request to the web failed, and whether it is worth another try."""
+
+from typing import Any, NamedTuple
+
+from robojackson.clips.web.untrusted_text import clean_text
+
+BUSY, SERVER_FAULT = 429, 500
+REASON_LENGTH = 200
+
+
+class Failure(NamedTuple):
+    """Attributes:
+    reason: In one line.
+    passing: Whether another attempt makes sense.
+    wait_s: Seconds that the server asks to wait.
+    """
+
+    reason: str
+    passing: bool
+    wait_s: float
+
+
+def explain(failure: BaseException) -> Failure:
+    """What an error of yt-dlp, or one inside it, means."""
+    from yt_dlp.networking.exceptions import HTTPError, IncompleteRead, TransportError
+    from yt_dlp.utils import ContentTooShortError
+
+    for cause in _causes(failure):
+        if isinstance(cause, HTTPError):
+            asked = str(cause.response.headers.get("Retry-After") or "")
+            wait_s = float(asked) if asked.isdigit() else 0.0
+            told = clean_text(cause.reason or "", 60)
+            return Failure(_status(cause.status, told), _is_passing(cause.status), wait_s)
+        if isinstance(cause, IncompleteRead | ContentTooShortError):
+            return Failure("the server cut the file short", True, 0.0)
+        if isinstance(cause, TimeoutError) or "timed out" in str(cause).lower():
+            return Failure("the server fell silent", True, 0.0)
+        if isinstance(cause, TransportError):
+            return Failure(f"no connection ({_line(cause)})", True, 0.0)
+    text = _line(failure)
+    is_short = "more expected" in text
+    return Failure("the server cut the file short" if is_short else text, is_short, 0.0)
+
+
+def _causes(failure: BaseException) -> list[BaseException]:
+    """An error and all that yt-dlp hid inside it, the innermost first."""
+    found: list[BaseException] = []
+    waiting: list[Any] = [failure]
+    while waiting:
+        error = waiting.pop()
+        if isinstance(error, BaseException) and error not in found:
+            found.append(error)
+            hidden = (getattr(error, "exc_info", None) or (None, None))[1]
+            inner = (error.__cause__, error.__context__, getattr(error, "cause", None), hidden)
+            waiting.extend(e for e in inner if e is not None)
+    return found[::-1]
+
+
+def _status(status: int, told: str) -> str:
+    kind = {404: "not found", 410: "gone", BUSY: "too many requests", 403: "forbidden"}
+    usual = "redirects without end" if 300 <= status < 400 else told
+    return f"HTTP {status} {kind.get(status, usual)}".rstrip()
+
+
+def _is_passing(status: int) -> bool:
+    return status == BUSY or status >= SERVER_FAULT
+
+
+def _line(error: BaseException) -> str:
+    """yt-dlp's message without its prefixes and its advice about reporting bugs."""
+    text = clean_text(str(error) or type(error).__name__, 10 * REASON_LENGTH)
+    text = text.removeprefix("ERROR: ").split("; please report this issue")[0]
+    return clean_text(text.split(" (caused by")[0], REASON_LENGTH)

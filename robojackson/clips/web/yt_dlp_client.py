@@ -1,0 +1,233 @@
+"""The one place that talks to yt-dlp: what an address holds, and the file behind it.
+
+yt-dlp's Python API, quiet, with our retries around it: a server that is busy, silent or cuts the
+line is asked again after 1, 2, 4 ... times the back-off (or when it says), and a file goes on where
+it stopped. Every failure becomes one line of reason. Sizes in bytes, times in seconds.
+"""
+
+import logging
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass as configuration
+
+from robojackson.clips.web.download_formats import FormatConfig, Purpose, choose
+from robojackson.clips.web.javascript_runtimes import runtimes
+from robojackson.clips.web.request_failures import REASON_LENGTH, explain
+from robojackson.clips.web.untrusted_text import clean_text, safe_name
+from robojackson.errors import DownloadFailed, SearchFailed
+
+Progress = Callable[[int, int | None], None]
+Result = TypeVar("Result")
+BYTES_A_MEGABYTE = 1_000_000
+
+log = logging.getLogger(__name__)
+
+
+@configuration(frozen=True, config=ConfigDict(extra="forbid"))
+class WebConfig:
+    """Manners towards the servers of others.
+
+    Attributes:
+        retries: How often a request that failed for now is made again.
+        backoff_s: Wait before the first of them, seconds; it doubles each time.
+        longest_wait_s: Longest wait that a server may ask for, seconds.
+        timeout_s: Longest silence of a server, seconds.
+        longest_download_s: Longest time that one file may take, seconds.
+        rate_limit_bytes_s: Fastest download, bytes a second; None is no limit.
+        request_pause_s: Pause between two requests for pages, seconds.
+        largest_file_mb: A file beyond this is not downloaded, megabytes.
+        cookies_file: Netscape cookie file that is passed through.
+        proxy: Address of a proxy that is passed through.
+        language: Two letters in which titles are asked for; empty is the site's own choice.
+    """
+
+    retries: int = Field(default=4, ge=0)
+    backoff_s: float = Field(default=2.0, ge=0)
+    longest_wait_s: float = Field(default=60.0, ge=0)
+    timeout_s: float = Field(default=20.0, gt=0)
+    longest_download_s: float = Field(default=900.0, gt=0)
+    rate_limit_bytes_s: float | None = Field(default=4e6, gt=0)
+    request_pause_s: float = Field(default=0.5, ge=0)
+    largest_file_mb: float = Field(default=300.0, gt=0)
+    cookies_file: Path | None = None
+    proxy: str | None = None
+    language: str = ""
+
+
+@dataclass(frozen=True)
+class Offer:
+    """A video with the format that was chosen of it.
+
+    Attributes:
+        name: `<format>.<suffix>`, fit to be a part of a path.
+        info: All that yt-dlp knows, to be handed back to it.
+    """
+
+    name: str
+    info: Mapping[str, Any]
+
+
+def listing(address: str, config: WebConfig) -> dict[str, Any]:
+    """What a search or a page holds, flat: no page of a video is opened, no video downloaded.
+
+    Raises:
+        SearchFailed: the message has the address and the reason.
+    """
+    options = _options(config) | {"extract_flat": "in_playlist"}
+    try:
+        return _patiently(lambda: _extract(address, options), config)
+    except DownloadFailed as cause:
+        raise SearchFailed(f"{clean_text(address)}: {cause}") from cause
+
+
+def offer(url: str, purpose: Purpose, formats: FormatConfig, config: WebConfig) -> Offer:
+    """The format of a video that would be downloaded.
+
+    Raises:
+        DownloadFailed: there is none, or the page cannot be had; the message is the reason.
+    """
+    options = _options(config) | {"format": _selector(purpose, formats)}
+    info = _patiently(lambda: _extract(url, options), config)
+    if info.get("entries") is not None:
+        raise DownloadFailed("a page of several videos, not one")
+    if info.get("is_live"):
+        raise DownloadFailed("a live stream")
+    suffix = safe_name(info.get("ext") or "mp4")
+    return Offer(f"{safe_name(info.get('format_id') or 'only')}.{suffix}", info)
+
+
+def fetch(chosen: Offer, folder: Path, config: WebConfig, progress: Progress | None = None) -> Path:
+    """The file of an offer; what an interrupted download left in the folder is continued.
+
+    Raises:
+        DownloadFailed: the message is the reason.
+    """
+    target = folder / chosen.name
+    template = str(target).replace("%", "%%")
+    limit = int(config.largest_file_mb * BYTES_A_MEGABYTE)
+    options = _options(config) | {
+        "outtmpl": {"default": template},
+        "format": str(chosen.info.get("format_id") or "best"),
+        "max_filesize": limit,
+        "ratelimit": config.rate_limit_bytes_s,
+        "progress_hooks": [_watch(progress, config)],
+    }
+    _patiently(lambda: _download(chosen.info, options), config)
+    if not target.is_file():
+        raise DownloadFailed(f"larger than {config.largest_file_mb:g} MB, or nothing was sent")
+    return target
+
+
+def entries(info: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """The videos of a listing; a page of one video is a listing of one."""
+    found = info.get("entries")
+    return [info] if found is None else [entry for entry in found if entry]
+
+
+def _options(config: WebConfig) -> dict[str, Any]:
+    import imageio_ffmpeg
+
+    options = {
+        "quiet": True,
+        "noprogress": True,
+        "no_warnings": False,
+        "logger": _Log(),
+        "cachedir": False,
+        "color": {"stdout": "never", "stderr": "never"},
+        "noplaylist": True,
+        "socket_timeout": config.timeout_s,
+        "sleep_interval_requests": config.request_pause_s,
+        "retries": 0,
+        "extractor_retries": 0,
+        "fragment_retries": config.retries,
+        "continuedl": True,
+        "ffmpeg_location": imageio_ffmpeg.get_ffmpeg_exe(),
+        "js_runtimes": {name: {"path": place} for name, place in runtimes().items()},
+    }
+    if config.proxy:
+        options["proxy"] = config.proxy
+    if config.language:
+        options["extractor_args"] = {"youtube": {"lang": [config.language]}}
+        options["http_headers"] = {"Accept-Language": config.language}
+    if config.cookies_file:
+        options["cookiefile"] = str(config.cookies_file)
+    return options
+
+
+def _extract(address: str, options: dict[str, Any]) -> dict[str, Any]:
+    from yt_dlp import YoutubeDL
+
+    with YoutubeDL(options) as ydl:
+        info = ydl.extract_info(address, download=False)
+        return ydl.sanitize_info(info)
+
+
+def _download(info: Mapping[str, Any], options: dict[str, Any]) -> None:
+    from yt_dlp import YoutubeDL
+
+    with YoutubeDL(options) as ydl:
+        ydl.process_ie_result(dict(info), download=True)
+
+
+def _selector(purpose: Purpose, formats: FormatConfig) -> Callable[[Mapping[str, Any]], Any]:
+    """Our choice in the form in which yt-dlp asks for it."""
+
+    def select(context: Mapping[str, Any]) -> Any:
+        chosen = choose(context["formats"], purpose, formats)
+        return [] if chosen is None else [chosen]
+
+    return select
+
+
+def _watch(progress: Progress | None, config: WebConfig) -> Callable[[Mapping[str, Any]], None]:
+    """A hook for yt-dlp that passes bytes on and stops a download that takes too long."""
+    began = time.monotonic()
+
+    def hook(state: Mapping[str, Any]) -> None:
+        if progress and state.get("status") in ("downloading", "finished"):
+            total = state.get("total_bytes") or state.get("total_bytes_estimate")
+            progress(int(state.get("downloaded_bytes") or 0), int(total) if total else None)
+        if state.get("status") == "downloading":
+            spent = time.monotonic() - began
+            if spent > config.longest_download_s:
+                raise DownloadFailed(f"not finished after {spent:.0f} s")
+
+    return hook
+
+
+def _patiently(attempt: Callable[[], Result], config: WebConfig) -> Result:
+    """The result of an attempt, repeated while what goes wrong may go right later."""
+    from yt_dlp.utils import YoutubeDLError
+
+    for number in range(config.retries + 1):
+        try:
+            return attempt()
+        except (YoutubeDLError, OSError, ValueError, RecursionError) as cause:
+            reason, transient, asked_s = explain(cause)
+            if not transient or number == config.retries:
+                tried = f" ({number + 1} attempts)" if number else ""
+                raise DownloadFailed(f"{reason}{tried}") from cause
+            wait_s = min(max(config.backoff_s * 2**number, asked_s), config.longest_wait_s)
+            log.info("%s; again in %.3g s", reason, wait_s)
+            time.sleep(wait_s)
+    raise AssertionError("unreachable")
+
+
+class _Log:
+    """yt-dlp's messages in our log, one clean line each."""
+
+    def debug(self, message: str) -> None:
+        log.debug("%s", clean_text(message, REASON_LENGTH))
+
+    info = debug
+
+    def warning(self, message: str) -> None:
+        log.debug("yt-dlp: %s", clean_text(message, REASON_LENGTH))
+
+    def error(self, message: str) -> None:
+        log.debug("yt-dlp: %s", clean_text(message, REASON_LENGTH))

@@ -1,0 +1,183 @@
+"""BVH: written with SMPL's 24 joints in centimetres, y up; read from any skeleton with usual names.
+
+A file with SMPL's names poses its own skeleton. Of another skeleton (CMU, Mixamo, LAFAN1, ...) the
+positions are taken and HybrIK's solve finds the rotations; fingers are left out.
+"""
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial.transform import Rotation
+
+from robojackson.body import analytic_solve
+from robojackson.body.forward_kinematics import apply, unit
+from robojackson.body.skeleton import (
+    JOINT_NAMES,
+    KEYPOINT_NAMES,
+    PARENTS,
+    REST_OFFSETS,
+    assemble,
+    keypoint,
+    pair,
+)
+from robojackson.errors import BadTable
+from robojackson.formats.bvh_names import keypoints_of
+from robojackson.formats.bvh_tree import WHERE, Node, Tree, parse
+from robojackson.formats.foreign_motion import (
+    Y_UP_TO_WORLD,
+    ForeignMotion,
+    skeleton_under,
+    turned_root,
+)
+from robojackson.motion.smpl_sequence import SmplSequence
+
+CENTIMETRE = 0.01
+UNITS = (1.0, CENTIMETRE, 0.001, 0.0254, 0.0254 / 0.45)
+"""Metres; the last is that of the CMU files."""
+LEG = (0.55, 1.15)
+"""Hip to ankle of a person, metres."""
+CHILDS_LEG = 0.2
+"""The shortest of a person who walks, metres."""
+USUAL_LEG = 0.82
+ROUNDS = 3
+"""Of rotations and skeleton, each found from the other."""
+ORDER = "ZXY"
+_ENDS = {parent: index for index, parent in enumerate(PARENTS) if index >= len(JOINT_NAMES)}
+
+
+def write(sequence: SmplSequence) -> bytes:
+    """The BVH of a motion: rotations Z, X, Y in degrees, positions in centimetres."""
+    rest = sequence.rest_joints / CENTIMETRE
+    lines = ["HIERARCHY"]
+    order: list[int] = []
+    _branch(0, rest, 0, lines, order)
+    root, pelvis = turned_root(sequence, Y_UP_TO_WORLD.T)
+    vectors = np.concatenate([root, sequence.body_pose], axis=1).reshape(-1, 3)
+    angles = Rotation.from_rotvec(vectors).as_euler(ORDER, degrees=True)
+    angles = angles.reshape(len(sequence), -1, 3)[:, order].reshape(len(sequence), -1)
+    table = np.concatenate([pelvis / CENTIMETRE, angles], axis=1)
+    lines += ["MOTION", f"Frames: {len(sequence)}", f"Frame Time: {1.0 / sequence.fps:.10f}"]
+    lines += [" ".join(f"{number:.7f}" for number in row) for row in table]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _branch(index: int, rest: np.ndarray, depth: int, lines: list[str], order: list[int]) -> None:
+    """One joint and all below it; `order` collects the joints as they come."""
+    order.append(index)
+    pad, inner = "  " * depth, "  " * (depth + 1)
+    channels = " ".join(f"{axis}rotation" for axis in ORDER)
+    places = "Xposition Yposition Zposition " if index == 0 else ""
+    offset = rest[index] - rest[PARENTS[index]] if index else np.zeros(3)
+    lines += [f"{pad}{'JOINT' if index else 'ROOT'} {KEYPOINT_NAMES[index]}", f"{pad}{{"]
+    lines += [_offset(inner, offset), f"{inner}CHANNELS {3 if index else 6} {places}{channels}"]
+    for child, parent in enumerate(PARENTS[: len(JOINT_NAMES)]):
+        if parent == index:
+            _branch(child, rest, depth + 1, lines, order)
+    if index in _ENDS:
+        tip = rest[_ENDS[index]] - rest[index]
+        lines += [f"{inner}End Site", f"{inner}{{", _offset(inner + "  ", tip), f"{inner}}}"]
+    lines.append(f"{pad}}}")
+
+
+def _offset(pad: str, offset: np.ndarray) -> str:
+    return f"{pad}OFFSET " + " ".join(f"{number:.7f}" for number in offset)
+
+
+def read(data: bytes) -> ForeignMotion:
+    """The motion of a BVH, y up.
+
+    Raises:
+        BadTable: not a BVH, or one in which no person can be found.
+    """
+    tree = parse(data)
+    names = [node.name for node in tree.nodes]
+    if set(JOINT_NAMES) <= set(names):
+        return _own(tree, names)
+    return _other(tree)
+
+
+def _own(tree: Tree, names: list[str]) -> ForeignMotion:
+    """A skeleton with SMPL's joints."""
+    nodes = [names.index(name) for name in JOINT_NAMES]
+    offsets = np.array(REST_OFFSETS)
+    for index, at in enumerate(nodes):
+        _require_parent(tree.nodes[at], names, index)
+        offsets[index] = tree.nodes[at].offset
+    for parent, tip in _ENDS.items():
+        if (end := f"{JOINT_NAMES[parent]}_end") in names:
+            offsets[tip] = tree.nodes[names.index(end)].offset
+    offsets[0] = 0.0
+    rest = assemble(offsets)
+    metre, notes = _unit(rest, ours=True)
+    return ForeignMotion(
+        fps=tree.fps,
+        rotations=tree.rotations()[:, nodes],
+        pelvis=tree.root() * metre,
+        rest_joints=rest * metre,
+        to_world=Y_UP_TO_WORLD.copy(),
+        notes=notes,
+    )
+
+
+def _require_parent(node: Node, names: list[str], index: int) -> None:
+    wanted = JOINT_NAMES[PARENTS[index]] if index else None
+    found = names[node.parent] if node.parent >= 0 else None
+    if found != wanted:
+        raise BadTable(f"{WHERE}: {node.name} hangs on {found}; in SMPL's tree it is {wanted}")
+
+
+def _other(tree: Tree) -> ForeignMotion:
+    """Any other skeleton, by the positions of its joints."""
+    points = keypoints_of(tree)
+    lengths = np.zeros(len(PARENTS))
+    for index, parent in enumerate(PARENTS[1:], start=1):
+        lengths[index] = np.median(np.linalg.norm(points[:, index] - points[:, parent], axis=-1))
+    usual = np.maximum(np.linalg.norm(REST_OFFSETS, axis=-1), 1e-9)
+    rest = assemble(REST_OFFSETS * (lengths / usual)[:, None])
+    metre, notes = _unit(rest)
+    points, rest = points * metre, rest * metre
+    for _ in range(ROUNDS):
+        rotations = analytic_solve.solve_with(points, rest[None], _chest_twist(points, rest))
+        rest = skeleton_under(rotations, points)
+    return ForeignMotion(
+        fps=tree.fps,
+        rotations=analytic_solve.solve_with(points, rest[None], _chest_twist(points, rest)),
+        pelvis=points[:, 0],
+        rest_joints=rest,
+        to_world=Y_UP_TO_WORLD.copy(),
+        notes=("another skeleton than SMPL's: positions kept, twists of the limbs not", *notes),
+    )
+
+
+def _chest_twist(points: np.ndarray, rest: np.ndarray) -> analytic_solve.TwistRule:
+    """The chest turns until its collars lie as they do; no other joint is twisted."""
+    chest, (left, right) = keypoint("spine3"), pair("collar")
+    axis = unit(rest[keypoint("neck")] - rest[chest])
+    line = unit(points[:, left] - points[:, right])
+    before = rest[left] - rest[right]
+
+    def rule(joint: int, swung: np.ndarray) -> np.ndarray:
+        if joint != chest:
+            return np.tile([1.0, 0.0], (len(points), 1))
+        after = apply(np.swapaxes(swung, -1, -2), line)
+        sine = np.sum(np.cross(before, after) * axis, -1)
+        cosine = np.sum(before * after, -1) - (before @ axis) * (after @ axis)
+        return np.stack([cosine, sine], -1)
+
+    return rule
+
+
+def _unit(rest: Float[np.ndarray, "29 3"], ours: bool = False) -> tuple[float, tuple[str, ...]]:
+    """Metres a unit of the file: the one that gives a person's legs; we write centimetres, of
+    children too.
+    """
+    bones = [("left_knee", "left_hip"), ("left_ankle", "left_knee")]
+    leg = sum(float(np.linalg.norm(rest[keypoint(a)] - rest[keypoint(b)])) for a, b in bones)
+    if not np.isfinite(leg) or leg <= 0.0:
+        raise BadTable(f"{WHERE}: the legs have no length")
+    if ours and CHILDS_LEG <= leg * CENTIMETRE <= LEG[1]:
+        return CENTIMETRE, ()
+    for metre in UNITS:
+        if LEG[0] <= leg * metre <= LEG[1]:
+            usual = metre in (1.0, CENTIMETRE)
+            return metre, () if usual else (f"unknown unit: taken for {1e3 * metre:.4g} mm",)
+    return USUAL_LEG / leg, (f"unknown unit: scaled to legs of {USUAL_LEG} m",)

@@ -1,0 +1,1 @@
+"""Archives and pickles, read without running anything in them."""

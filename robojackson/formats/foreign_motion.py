@@ -1,0 +1,184 @@
+"""What a file of another project says of a human motion, in its own axes and its own place.
+
+`mocap.imported_motion` brings it to the world and to the floor. SMPL's bodies turn about the
+pelvis of their template, so that in their files pelvis = transl + PELVIS; metres, radians.
+"""
+
+import warnings
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from itertools import islice
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial.transform import Rotation
+
+from robojackson.body.forward_kinematics import forward
+from robojackson.body.skeleton import PARENTS, REST_JOINTS, assemble, keypoint
+from robojackson.errors import BadTable
+from robojackson.geometry.frames import SMPL_TO_WORLD
+from robojackson.motion.smpl_sequence import SmplSequence
+
+PELVIS: Mapping[str, Float[np.ndarray, "3"]] = {
+    "smpl": np.array([0.0, -0.22, 0.03]),
+    "smplx": np.array([0.0, -0.35, 0.01]),
+}
+"""Pelvis of the neutral template, rounded, metres; SMPL+H has SMPL's."""
+Y_UP_TO_WORLD, Z_UP_TO_WORLD = SMPL_TO_WORLD, np.eye(3)
+BODY_JOINTS = 22
+"""Joints that SMPL, SMPL+H and SMPL-X share: SMPL's two hands are fingers in the others."""
+LARGEST = 1e8
+"""Of any number in a file."""
+LEGS_M = (0.2, 3.0)
+"""Hip to ankle of whoever may be a person, metres."""
+NAMED = 12
+"""Names of a file's arrays that an error tells."""
+REST_KEY = "rest_joints"
+"""Of a skeleton in our own files; other projects do not read it."""
+
+
+@dataclass(frozen=True)
+class ForeignMotion:
+    """A motion as a file has it.
+
+    Attributes:
+        fps: Frames a second; None where the file does not say.
+        rotations: Of the 24 joints relative to their parents, the root's to the file's axes.
+        pelvis: Metres, file's axes.
+        rest_joints: The skeleton that the rotations pose; our own where the file has none.
+        to_world: Rotation from the file's axes to x forward, y left, z up.
+        betas: SMPL's shape.
+        notes: Warnings for the user.
+    """
+
+    fps: float | None
+    rotations: Float[np.ndarray, "T 24 3 3"]
+    pelvis: Float[np.ndarray, "T 3"]
+    rest_joints: Float[np.ndarray, "29 3"] = field(default_factory=lambda: REST_JOINTS.copy())
+    to_world: Float[np.ndarray, "3 3"] = field(default_factory=lambda: Z_UP_TO_WORLD.copy())
+    betas: Float[np.ndarray, "10"] = field(default_factory=lambda: np.zeros(10))
+    notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.pelvis)
+
+
+def rows(content: Mapping[str, Any], name: str, width: int, where: str) -> np.ndarray:
+    """One array of a file as frames of `width` numbers, float64.
+
+    Raises:
+        BadTable: it is missing, has another shape, holds NaN, or too few frames.
+    """
+    if name not in content:
+        raise BadTable(f"{where}: {name!r} is missing. It has: {listed(content)}")
+    found = numbers(content[name])
+    if found.dtype.kind != "f" or not found.size:
+        raise BadTable(f"{where}: {name!r} is no array of numbers, one row a frame")
+    table = found.reshape(len(found), -1)
+    if len(table) < 2 or table.shape[1] != width:
+        raise BadTable(f"{where}: {name!r} is {found.shape}; wanted (frames >= 2, {width})")
+    if not (np.abs(table) < LARGEST).all():
+        raise BadTable(f"{where}: {name!r} holds numbers that are not finite, or over {LARGEST:g}")
+    return table
+
+
+def numbers(value: Any) -> np.ndarray:
+    """Numbers of any shape, at least one axis; none where the value is something else."""
+    try:
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("error")  # of complex numbers, whose half would be lost
+            return np.atleast_1d(np.asarray(value, float))
+    except (TypeError, ValueError, OverflowError, Warning):
+        return np.zeros(0)
+
+
+def number(value: Any) -> float | None:
+    """One finite number, such as a frame rate; None where it is something else."""
+    found = numbers(value).ravel()
+    return float(found[0]) if found.size == 1 and np.isfinite(found[0]) else None
+
+
+def listed(names: Collection[Any]) -> str:
+    """Some names of a file, for a message."""
+    told = ", ".join(str(name)[:40] for name in islice(names, NAMED))
+    more = len(names) - NAMED
+    return (told or "nothing") + (f" and {more} more" if more > 0 else "")
+
+
+def require_person(points: Float[np.ndarray, "*T 29 3"], what: str) -> None:
+    """Legs as long as a person's, all else finite and within reach.
+
+    Raises:
+        BadTable: they are not; such a body breaks what comes after it.
+    """
+    hip, knee, ankle = (points[..., keypoint(f"left_{n}"), :] for n in ("hip", "knee", "ankle"))
+    with np.errstate(all="ignore"):
+        bones = np.linalg.norm(knee - hip, axis=-1) + np.linalg.norm(ankle - knee, axis=-1)
+    legs = float(np.median(bones))
+    if not LEGS_M[0] <= legs <= LEGS_M[1] or not (np.abs(points) < LARGEST).all():
+        raise BadTable(f"{what}: no person's, its legs are {legs:.3g} m long")
+
+
+def same_length(where: str, **tables: np.ndarray) -> None:
+    """All arrays have as many frames.
+
+    Raises:
+        BadTable: they have not.
+    """
+    if len({len(table) for table in tables.values()}) > 1:
+        told = ", ".join(f"{name} {len(table)}" for name, table in tables.items())
+        raise BadTable(f"{where}: arrays of different length ({told})")
+
+
+def matrices(vectors: Float[np.ndarray, "T N"]) -> Float[np.ndarray, "T 24 3 3"]:
+    """Rotation matrices of axis-angle rows; joints that a row lacks are not turned."""
+    given = vectors.reshape(len(vectors), -1, 3)[:, :24]
+    full = np.zeros((len(vectors), 24, 3))
+    full[:, : given.shape[1]] = given
+    return Rotation.from_rotvec(full.reshape(-1, 3)).as_matrix().reshape(-1, 24, 3, 3)
+
+
+def body_vectors(sequence: SmplSequence) -> Float[np.ndarray, "T 72"]:
+    """Axis-angle of all 24 joints."""
+    return np.concatenate([sequence.global_orient, sequence.body_pose], axis=1)
+
+
+def turned_root(
+    sequence: SmplSequence, turn: Float[np.ndarray, "3 3"]
+) -> tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"]]:
+    """Root's axis-angle and pelvis in other axes."""
+    root = Rotation.from_matrix(turn) * Rotation.from_rotvec(sequence.global_orient)
+    return root.as_rotvec(), (sequence.transl + sequence.rest_joints[0]) @ turn.T
+
+
+def betas_of(content: Mapping[str, Any]) -> Float[np.ndarray, "10"]:
+    """The first ten shape numbers of a file, zeros where it has none; a clip's mean."""
+    found = numbers(content.get("betas", np.zeros(10)))
+    with np.errstate(all="ignore"):
+        mean = found.reshape(-1, found.shape[-1]).mean(0) if found.size else np.zeros(10)
+    known = np.where(np.abs(mean) < LARGEST, mean, 0.0)
+    return np.concatenate([known, np.zeros(10)])[:10]
+
+
+def skeleton_of(content: Mapping[str, Any]) -> Float[np.ndarray, "29 3"]:
+    """The rest joints of a file of ours, else our own skeleton."""
+    found = numbers(content.get(REST_KEY, REST_JOINTS))
+    good = found.shape == REST_JOINTS.shape and np.isfinite(found).all()
+    return found if good else REST_JOINTS.copy()
+
+
+def skeleton_under(
+    rotations: Float[np.ndarray, "T 24 3 3"], points: Float[np.ndarray, "T 29 3"]
+) -> Float[np.ndarray, "29 3"]:
+    """The rest joints that rotations pose onto points, least squares over the clip.
+
+    A bone is its parent's rotation times its rest offset, so that the offset is the mean of the
+    bone seen from the parent.
+    """
+    turned = forward(rotations, REST_JOINTS[None], points[:, 0]).rotations
+    offsets = np.zeros((len(PARENTS), 3))
+    for index, parent in enumerate(PARENTS[1:], start=1):
+        bone = points[:, index] - points[:, parent]
+        offsets[index] = np.einsum("tji,tj->ti", turned[:, parent], bone).mean(0)
+    return assemble(offsets)

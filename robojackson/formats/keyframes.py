@@ -1,0 +1,48 @@
+"""MuJoCo keyframes: an MJCF fragment with one key a control step, for `<include file="..."/>`.
+
+time in seconds; qpos with the root quaternion wxyz; qvel as MuJoCo has it. In the viewer of
+`python -m mujoco.viewer` the keys are under "Keyframe".
+"""
+
+from xml.etree import ElementTree
+
+import numpy as np
+
+from robojackson.errors import BadTable
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.robot.sampling import SampledMotion, sampled
+
+
+def write(reference: ReferenceMotion) -> bytes:
+    """The fragment; its root is `mujocoinclude`, so that a model of any name can include it."""
+    motion = sampled(reference)
+    root = ElementTree.Element("mujocoinclude")
+    keyframe = ElementTree.SubElement(root, "keyframe")
+    for step, (qpos, qvel) in enumerate(zip(motion.qpos, np.asarray(motion.qvel), strict=True)):
+        facts = {"name": f"step_{step}", "time": f"{step / motion.fps:.6f}"}
+        facts |= {"qpos": _numbers(qpos), "qvel": _numbers(qvel)}
+        ElementTree.SubElement(keyframe, "key", facts)
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="utf-8", xml_declaration=False) + b"\n"
+
+
+def read(data: bytes) -> SampledMotion:
+    """The motion of a fragment with at least two keys.
+
+    Raises:
+        BadTable: not such a file.
+    """
+    try:
+        keys = ElementTree.fromstring(data).findall("keyframe/key")
+        rows = {
+            name: np.array([key.attrib[name].split() for key in keys], float)
+            for name in ("time", "qpos", "qvel")
+        }
+        fps = (len(keys) - 1) / float(rows["time"][-1, 0] - rows["time"][0, 0])
+    except (ElementTree.ParseError, KeyError, ValueError, IndexError, ZeroDivisionError) as cause:
+        raise BadTable(f"keyframes: not a fragment with keys over time ({cause})") from cause
+    return SampledMotion(fps, rows["qpos"], rows["qvel"])
+
+
+def _numbers(values: np.ndarray) -> str:
+    return " ".join(f"{value:.10g}" for value in values)

@@ -1,0 +1,68 @@
+"""A human motion as a table of text: a head, then a row a frame, for spreadsheets and plots.
+
+time_s; x, y, z of HybrIK's 29 keypoints (metres, world); rx, ry, rz of the 24 joints (axis-angle,
+radians, relative to the parent); state of the four contact points (0 air, 1 planted, 2 sliding).
+"""
+
+import io
+
+import numpy as np
+
+from robojackson.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES
+from robojackson.errors import BadTable
+from robojackson.formats.foreign_motion import (
+    ForeignMotion,
+    body_vectors,
+    matrices,
+    rows,
+    skeleton_under,
+)
+from robojackson.motion.smpl_sequence import CONTACT_POINTS, SmplSequence
+
+WHERE = "motion csv"
+PLACES = [f"{name}_{axis}" for name in KEYPOINT_NAMES for axis in "xyz"]
+TURNS = [f"{name}_r{axis}" for name in JOINT_NAMES for axis in "xyz"]
+HEAD = ["time_s", *PLACES, *TURNS, *(f"contact_{name}" for name in CONTACT_POINTS)]
+
+
+def write(sequence: SmplSequence) -> bytes:
+    """The csv of a motion, eight decimals."""
+    table = np.column_stack(
+        [
+            np.arange(len(sequence)) / sequence.fps,
+            sequence.keypoints_w.reshape(len(sequence), -1),
+            body_vectors(sequence),
+            sequence.contact,
+        ]
+    )
+    sink = io.StringIO()
+    kinds = ["%.8f"] * (len(HEAD) - len(CONTACT_POINTS)) + ["%d"] * len(CONTACT_POINTS)
+    np.savetxt(sink, table, fmt=kinds, delimiter=",", header=",".join(HEAD), comments="")
+    return sink.getvalue().encode()
+
+
+def read(data: bytes) -> ForeignMotion:
+    """The motion of a csv that `write` wrote; its skeleton is found again from the frames.
+
+    Raises:
+        BadTable: not such a file.
+    """
+    try:
+        head, _, body = data.decode("utf-8-sig").partition("\n")
+        if head.strip().split(",") != HEAD or not body.strip():
+            raise ValueError("empty, or its head is not that of `robojackson export --to csv`")
+        lines = [line.split(",") for line in body.splitlines() if line.strip()]
+        if odd := [n for n, line in enumerate(lines, 2) if len(line) != len(HEAD)]:
+            raise ValueError(f"cut off or damaged: line {odd[0]} has not {len(HEAD)} numbers")
+        table = np.array(lines, float)
+    except (ValueError, UnicodeDecodeError) as cause:
+        raise BadTable(f"{WHERE}: {cause}") from cause
+    table = rows({"table": table}, "table", len(HEAD), WHERE)
+    points = table[:, 1 : 1 + len(PLACES)].reshape(-1, len(KEYPOINT_NAMES), 3)
+    rotations = matrices(table[:, 1 + len(PLACES) :][:, : len(TURNS)])
+    span = table[-1, 0] - table[0, 0]
+    if span <= 0.0:
+        raise BadTable(f"{WHERE}: time_s does not grow")
+    rest = skeleton_under(rotations, points)
+    fps = round((len(table) - 1) / span, 5)
+    return ForeignMotion(fps, rotations, points[:, 0], rest)

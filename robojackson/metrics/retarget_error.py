@@ -1,0 +1,80 @@
+"""Figures of a robot motion against its targets; arrays in, floats out.
+
+Metres, radians and seconds in; each name says its own unit out (mm, deg, cm/s).
+"""
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from robojackson.metrics import motion_quality
+
+
+def keypoint_error_mm(
+    actual: Float[np.ndarray, "S K 3"], wanted: Float[np.ndarray, "S K 3"], weighted: np.ndarray
+) -> Float[np.ndarray, "S W"]:
+    """Distance of each weighted keypoint to its target, millimetres."""
+    return np.asarray(1e3 * np.linalg.norm(actual - wanted, axis=-1)[:, weighted])
+
+
+def bone_angles_deg(
+    actual: Float[np.ndarray, "S K 3"],
+    wanted: Float[np.ndarray, "S K 3"],
+    bones: list[tuple[int, int]],
+) -> Float[np.ndarray, "S M"]:
+    """Angle between each bone and its target, degrees."""
+    start, end = np.array(bones).T
+    a, b = actual[:, end] - actual[:, start], wanted[:, end] - wanted[:, start]
+    cosine = np.sum(a * b, -1) / (np.linalg.norm(a, axis=-1) * np.linalg.norm(b, axis=-1))
+    return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+
+
+def jerk(points: Float[np.ndarray, "S K 3"], dt: float) -> float:
+    """Mean length of the third difference, m/s3."""
+    return motion_quality.jerk(points, 1.0 / dt)
+
+
+def hinge_jerk_rms(hinges: Float[np.ndarray, "S J"], dt: float) -> float:
+    """Root mean square of the hinges' third difference, rad/s3."""
+    return float(np.sqrt(np.mean((np.diff(hinges, 3, axis=0) / dt**3) ** 2)))
+
+
+def limit_excess(
+    hinges: Float[np.ndarray, "S J"], lower: np.ndarray, upper: np.ndarray
+) -> Float[np.ndarray, "S J"]:
+    """How far each hinge is outside its limits, radians."""
+    return np.maximum(np.maximum(lower - hinges, hinges - upper), 0.0)
+
+
+def slip_cm_s(
+    sole_velocity: Float[np.ndarray, "M C 2"], planted: Bool[np.ndarray, "S C"]
+) -> Float[np.ndarray, " P"]:
+    """Speed of the soles that should stand still, cm/s, over steps planted at both ends.
+
+    Args:
+        sole_velocity: Horizontal, from each step to the next, m/s; M is S for a lap, else S - 1.
+        planted: Labels at the steps.
+    """
+    both = (planted & np.roll(planted, -1, axis=0))[: len(sole_velocity)]
+    return np.asarray(100 * np.linalg.norm(sole_velocity, axis=-1)[both])
+
+
+def unsupported(
+    sole_height: Float[np.ndarray, "S C"],
+    com_height: Float[np.ndarray, " S"],
+    dt: float,
+    reach_m: float = 0.01,
+    fall: float = 0.4,
+) -> Bool[np.ndarray, " S"]:
+    """Steps in which no sole is near the floor and yet the body does not fall.
+
+    A levitating motion is caught whatever its contact labels say.
+
+    Args:
+        sole_height: Lowest points of the soles over the floor.
+        com_height: Centre of mass.
+        dt: Seconds a step.
+        reach_m: A sole below this can carry, metres.
+        fall: Share of gravity from which the body counts as falling.
+    """
+    falling = -np.gradient(np.gradient(com_height, dt), dt) > fall * 9.81
+    return np.asarray((sole_height > reach_m).all(axis=1) & ~falling)

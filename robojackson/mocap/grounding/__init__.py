@@ -1,0 +1,1 @@
+"""The motion on the floor: gravity, contacts, foot pinning."""

@@ -1,0 +1,141 @@
+"""Contacts of heels and toes with the floor: AIR, PLANTED or SLIDING, by a hidden Markov model.
+
+Each of the four points has three states; a point that touches is low over the refitted floor, a
+planted one is also still in the image and, as far as a single camera sees it, along the ray: what
+walks towards the camera hardly moves in the image. All 81 joint states are weighed together,
+because of the law that binds them: outside free fall something carries the body, so that all four
+in the air is forbidden there. The likeliest path is found by dynamic programming (Viterbi 1967).
+Metres, seconds; floor at z = 0. Order: `motion.smpl_sequence.CONTACT_POINTS`.
+"""
+
+from itertools import product
+
+import numpy as np
+from jaxtyping import Float, Int
+from pydantic import ConfigDict
+from pydantic.dataclasses import dataclass
+
+from robojackson.body.forward_kinematics import unit
+from robojackson.motion.smpl_sequence import AIR, CONTACT_POINTS, PLANTED, SLIDING
+
+STATES = (AIR, PLANTED, SLIDING)
+JOINT = np.array(list(product(STATES, repeat=len(CONTACT_POINTS))))
+"""The 81 joint states, (81, 4)."""
+IMPOSSIBLE = -1e9
+
+
+@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
+class ContactConfig:
+    """What the states look like. Tuned on dance_a, dance_b and walk.
+
+    Attributes:
+        touch_sd_m: Height of a touching point over the refitted floor, standard deviation, metres.
+        air_sd_m: The same of a point in the air.
+        still_sd_mps: Speed in the image of a planted point, one axis, metres a second.
+        moving_sd_mps: The same of any other point.
+        still_along_sd_mps, moving_along_sd_mps: The same along the ray, mostly noise.
+        outlier: Share of measurements that tell nothing.
+        samples_per_s: Independent measurements a second.
+        change: Cost of a change of one point's state, nats.
+    """
+
+    touch_sd_m: float = 0.04
+    air_sd_m: float = 0.2
+    still_sd_mps: float = 0.2
+    moving_sd_mps: float = 1.5
+    still_along_sd_mps: float = 0.6
+    moving_along_sd_mps: float = 1.8
+    outlier: float = 0.02
+    samples_per_s: float = 10.0
+    change: float = 1.0
+
+
+def contacts(
+    height: Float[np.ndarray, "T 4"],
+    speed: Float[np.ndarray, "T 4"],
+    falling: np.ndarray,
+    fps: float,
+    config: ContactConfig,
+    along: Float[np.ndarray, "T 4"] | None = None,
+) -> Int[np.ndarray, "T 4"]:
+    """The likeliest state of every point in every frame; outside free fall one is never AIR.
+
+    Args:
+        height: Of the points over the floor, metres.
+        speed: In the image at the person's distance (`image_speed`), m/s.
+        falling: Frames of free fall.
+        fps: Frames a second.
+        config: Of the model.
+        along: Speed along the ray (`ray_speed`), m/s; None where it is not known.
+    """
+    weight = min(1.0, config.samples_per_s / fps)
+    single = weight * log_likelihood(height, speed, config, along)
+    points = np.arange(len(CONTACT_POINTS))
+    joint = single[:, points, JOINT].sum(-1)
+    airborne = (JOINT == AIR).all(1)
+    joint[np.ix_(~np.asarray(falling, bool), airborne)] = IMPOSSIBLE
+    changes = (JOINT[:, None] != JOINT[None]).sum(-1)
+    return JOINT[likeliest_path(joint, -config.change * changes)].astype(np.int8)
+
+
+def log_likelihood(
+    height: Float[np.ndarray, "T 4"],
+    speed: Float[np.ndarray, "T 4"],
+    config: ContactConfig,
+    along: Float[np.ndarray, "T 4"] | None = None,
+) -> Float[np.ndarray, "T 4 3"]:
+    """Log likelihood of one frame's height and speed in each state, up to a constant.
+
+    Heights are half normal, image speeds Rayleigh without the factor that all states share; an
+    outlier looks like a point in the air or in motion. A raised foot is as often still as not.
+    """
+    up = np.maximum(height, 0.0)
+    loose = _normal(up, config.air_sd_m, 1)
+    touching = (1.0 - config.outlier) * _normal(up, config.touch_sd_m, 1) + config.outlier * loose
+    moving = _normal(speed, config.moving_sd_mps, 2)
+    still = _normal(speed, config.still_sd_mps, 2)
+    if along is not None:
+        moving = moving * _normal(along, config.moving_along_sd_mps, 1)
+        still = still * _normal(along, config.still_along_sd_mps, 1)
+    still = (1.0 - config.outlier) * still
+    still = still + config.outlier * moving
+    raised = 0.5 * (still + moving)
+    return np.log(np.stack([loose * raised, touching * still, touching * moving], -1))
+
+
+def likeliest_path(
+    emission: Float[np.ndarray, "T S"], transition: Float[np.ndarray, "S S"]
+) -> Int[np.ndarray, " T"]:
+    """The path of greatest summed log likelihood; `transition` is from row to column."""
+    best = emission[0]
+    origin = np.empty(emission.shape, int)
+    for frame in range(1, len(emission)):
+        ways = best[:, None] + transition
+        origin[frame] = ways.argmax(0)
+        best = ways[origin[frame], np.arange(len(best))] + emission[frame]
+    path = np.empty(len(emission), int)
+    path[-1] = int(best.argmax())
+    for frame in range(len(emission) - 1, 0, -1):
+        path[frame - 1] = origin[frame, path[frame]]
+    return path
+
+
+def image_speed(points_c: Float[np.ndarray, "T 4 3"], fps: float) -> Float[np.ndarray, "T 4"]:
+    """Speed across the ray from the camera, which stands at the origin, m/s."""
+    if len(points_c) < 2:
+        return np.zeros(points_c.shape[:2])
+    velocity = np.gradient(points_c, axis=0) * fps
+    ray = unit(points_c)
+    along = np.sum(velocity * ray, -1, keepdims=True) * ray
+    return np.asarray(np.linalg.norm(velocity - along, axis=-1))
+
+
+def ray_speed(points_c: Float[np.ndarray, "T 4 3"], fps: float) -> Float[np.ndarray, "T 4"]:
+    """Speed of the distance from the camera, which stands at the origin, m/s; not signed."""
+    if len(points_c) < 2:
+        return np.zeros(points_c.shape[:2])
+    return np.asarray(np.abs(np.gradient(np.linalg.norm(points_c, axis=-1), axis=0)) * fps)
+
+
+def _normal(values: np.ndarray, spread: float, dimensions: int) -> np.ndarray:
+    return np.exp(-0.5 * (values / spread) ** 2) / spread**dimensions

@@ -1,0 +1,242 @@
+"""From the camera to the world: which way is up, and where the floor is.
+
+A static camera sees one gravity for the whole clip. Its direction comes from balance: over a clip
+the centre of mass is, on average, above the points that carry it. The result is believed only near
+the camera's own up. World: x towards the camera, y to its right, z up, floor at z = 0; metres.
+"""
+
+import dataclasses
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+from pydantic import ConfigDict
+from pydantic.dataclasses import dataclass
+
+from robojackson.body.forward_kinematics import unit
+from robojackson.body.skeleton import keypoint, pair
+from robojackson.body.smoothing import lowpass
+from robojackson.mocap.grounding.feet import stretches
+
+GRAVITY = 9.81
+FALL_CUTOFF_HZ = 6.0
+SHORTEST_FALL_S = 0.1
+FALL_SHARE = 0.35
+"""Least mean acceleration of a whole flight, of gravity."""
+FLIGHT_EDGE_S = 0.15
+"""Smoothing hides so much of the beginning and of the end of a free fall, seconds."""
+CAMERA_UP = np.array([0.0, -1.0, 0.0])
+SEEN_SPEED = np.array([1.0, 1.0, 0.4])
+"""Of a speed in the camera frame; in depth a single camera sees mostly noise."""
+LEAST_WEIGHT = 1e-4
+ROUNDS = 6
+
+
+@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
+class GravityConfig:
+    """How far balance is believed. Tuned on the nine bundled clips.
+
+    Attributes:
+        support_height_m: A foot point this much above the lowest carries 1/e of its weight, metres.
+        support_speed_mps: A point this fast carries 1/e of its weight, m/s.
+        floor_sd_m: Spread of the height difference of two feet that both carry, metres.
+        roll_sd_deg, pitch_sd_deg: Spread of how people hold a camera, degrees; with the tails of a
+            Cauchy distribution, so that a camera that balance sees far off level is left there.
+        least_sd_deg: Balance is never believed more closely than this, degrees.
+        samples_per_s: Independent samples of balance a second.
+        max_tilt_deg: Largest believed angle between gravity and the camera's vertical, degrees.
+    """
+
+    support_height_m: float = 0.1
+    support_speed_mps: float = 1.0
+    floor_sd_m: float = 0.05
+    roll_sd_deg: float = 2.5
+    pitch_sd_deg: float = 10.0
+    least_sd_deg: float = 1.5
+    samples_per_s: float = 1.0
+    max_tilt_deg: float = 45.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Gravity:
+    """Attributes:
+    up: Unit vector against gravity, camera frame.
+    source: Where it comes from.
+    tilt_deg: Angle to the camera's own up, degrees.
+    """
+
+    up: Float[np.ndarray, "3"]
+    source: Literal["balance", "camera"]
+    tilt_deg: float
+
+
+def find_up(
+    points: Float[np.ndarray, "T 29 3"],
+    feet: Float[np.ndarray, "T 4 3"],
+    fps: float,
+    config: GravityConfig,
+) -> Gravity:
+    """Up from balance, or the camera's own where balance says something absurd.
+
+    Up is the least eigenvector of three information matrices: the mean of the centre of mass above
+    the carrying points lies along it; feet that both carry differ across it; and the camera is held
+    about level. How much the first one counts follows from its spread over the clip: a dancer who
+    leaps tells less of gravity than one who stands.
+
+    Args:
+        points: Keypoints, camera frame.
+        feet: Heels and toes, camera frame.
+        fps: Frames a second.
+        config: Weights.
+    """
+    up = CAMERA_UP
+    for _ in range(ROUNDS):
+        up = _refined(up, points, feet, fps, config)
+    tilt = float(np.degrees(np.arccos(np.clip(up @ CAMERA_UP, -1.0, 1.0))))
+    if tilt > config.max_tilt_deg:
+        return Gravity(CAMERA_UP, "camera", 0.0)
+    return Gravity(up, "balance", tilt)
+
+
+def _refined(
+    up: np.ndarray, points: np.ndarray, feet: np.ndarray, fps: float, config: GravityConfig
+) -> Float[np.ndarray, "3"]:
+    weight = _carrying(up, feet, fps, config)
+    total = weight.sum(1)
+    share = total / total.sum()
+    lean = centre_of_mass(points) - np.einsum("tk,tki->ti", weight, feet) / total[:, None]
+    mean = share @ lean
+    length = float(np.linalg.norm(mean))
+    stray = lean - mean
+    stray = stray - (stray @ up)[:, None] * up
+    samples = max(1.0, len(feet) / fps * config.samples_per_s)
+    spread = np.sqrt(share @ np.sum(stray**2, -1) / 2.0 / samples) / length
+    spread = max(float(spread), np.radians(config.least_sd_deg))
+    information = (np.eye(3) - np.outer(mean, mean) / length**2) / spread**2
+    information += _between_feet(weight, feet) / total.sum() / config.floor_sd_m**2
+    information += np.diag(_held_level(up, config))
+    least = np.linalg.eigh(information)[1][:, 0]
+    return least * np.sign(least @ mean)
+
+
+def _carrying(
+    up: np.ndarray, feet: np.ndarray, fps: float, config: GravityConfig
+) -> Float[np.ndarray, "T 4"]:
+    """Weight of each foot point: low and still ones carry."""
+    speed = np.linalg.norm(np.gradient(feet, axis=0) * fps * SEEN_SPEED, axis=-1)
+    height = feet @ up
+    above = height - height.min(1, keepdims=True)
+    still = np.exp(-((speed / config.support_speed_mps) ** 2))
+    return still * np.exp(-above / config.support_height_m) + LEAST_WEIGHT
+
+
+def _held_level(up: np.ndarray, config: GravityConfig) -> Float[np.ndarray, "3"]:
+    """Information of a camera held about level; the weight of a Cauchy prior where `up` is now."""
+    spread = np.radians([config.roll_sd_deg, config.pitch_sd_deg])
+    angle = np.arctan2(up[[0, 2]], -up[1])
+    roll, pitch = 1.0 / (spread**2 + angle**2)
+    return np.array([roll, 0.0, pitch])
+
+
+def _between_feet(weight: np.ndarray, feet: np.ndarray) -> Float[np.ndarray, "3 3"]:
+    """Second moment of left minus right foot over the frames in which both carry."""
+    each = weight.reshape(-1, 2, 2)
+    place = np.einsum("tfp,tfpi->tfi", each, feet.reshape(-1, 2, 2, 3)) / each.sum(2)[..., None]
+    apart = place[:, 0] - place[:, 1]
+    return np.einsum("t,ti,tj->ij", each.sum(2).prod(1), apart, apart)
+
+
+def camera_to_world(up: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
+    """Rotation that takes `up` to z and the camera's backward direction to x."""
+    back = np.array([0.0, 0.0, -1.0])
+    x = unit(back - (back @ up) * up)
+    return np.stack([x, np.cross(up, x), up])
+
+
+def centre_of_mass(points: Float[np.ndarray, "T 29 3"]) -> Float[np.ndarray, "T 3"]:
+    """Whole-body centre from segment masses (Winter 2009, table 4.1, rounded)."""
+
+    def middle(name: str) -> np.ndarray:
+        return points[:, list(pair(name))].mean(1)
+
+    def segment(start: str, end: str, part: float) -> np.ndarray:
+        return middle(start) + part * (middle(end) - middle(start))
+
+    trunk = 0.5 * (middle("hip") + middle("shoulder"))
+    return (
+        0.50 * trunk
+        + 0.08 * points[:, keypoint("head")]
+        + 0.20 * segment("hip", "knee", 0.43)
+        + 0.09 * segment("knee", "ankle", 0.43)
+        + 0.03 * middle("foot")
+        + 0.056 * segment("shoulder", "elbow", 0.44)
+        + 0.044 * segment("elbow", "wrist", 0.5)
+    )
+
+
+def free_fall(height: Float[np.ndarray, " T"], fps: float) -> np.ndarray:
+    """Frames in which the pelvis falls freely: its acceleration is below -g / 2 for a while.
+
+    Args:
+        height: Height of the pelvis, metres.
+        fps: Frames a second.
+    """
+    if len(height) < 5:
+        return np.zeros(len(height), bool)
+    acceleration = np.gradient(np.gradient(lowpass(height, fps, FALL_CUTOFF_HZ))) * fps**2
+    falling = acceleration < -GRAVITY / 2.0
+    for start, end in stretches(falling):
+        if (end - start) / fps < SHORTEST_FALL_S:
+            falling[start:end] = False
+    return falling
+
+
+def flight(
+    lowest: Float[np.ndarray, " T"],
+    height: Float[np.ndarray, " T"],
+    falling: np.ndarray,
+    fps: float,
+) -> np.ndarray:
+    """Free fall and the frames around it in which the feet still rise or have not yet landed.
+
+    Smoothing spreads the push and the landing into the fall, so that only its middle is seen. What
+    it cannot change is the mean: a flight grows only while its mean acceleration is that of a fall.
+
+    Args:
+        lowest: Height of the lowest foot point, metres; any level.
+        height: Of the centre of mass, metres; any level.
+        falling: Frames of free fall.
+        fps: Frames a second.
+    """
+    most = round(FLIGHT_EDGE_S * fps)
+    speed = np.gradient(height) * fps
+    flying = np.array(falling, bool)
+
+    def falls(start: int, end: int) -> bool:
+        duration = (end - 1 - start) / fps
+        return bool(speed[end - 1] - speed[start] < -FALL_SHARE * GRAVITY * duration)
+
+    for start, end in stretches(flying):
+        first, last = max(start - most, 0), min(end + most, len(lowest))
+        while start > first and lowest[start - 1] < lowest[start] and falls(start - 1, end):
+            start -= 1
+        while end < last and lowest[end] < lowest[end - 1] and falls(start, end + 1):
+            end += 1
+        flying[start + 1 : end - 1] = True
+    return flying
+
+
+def floor_height(
+    lowest: Float[np.ndarray, " T"], flying: np.ndarray, fps: float, cutoff_hz: float
+) -> Float[np.ndarray, " T"]:
+    """Height of the floor under each frame: that of the lowest foot point, smoothed.
+
+    Nobody levitates: outside flight something touches the floor in every frame. Through a flight
+    the floor goes on in a straight line.
+    """
+    frames = np.arange(len(lowest))
+    grounded = ~flying
+    if not grounded.any():
+        return np.full(len(lowest), lowest.min())
+    supported = np.interp(frames, frames[grounded], lowest[grounded])
+    return lowpass(supported, fps, cutoff_hz)

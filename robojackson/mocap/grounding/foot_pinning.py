@@ -1,0 +1,211 @@
+"""Feet that stand do not slide: the root's path and the legs are moved until they hold still.
+
+World frame, metres. First the whole body: the horizontal path of the root that fits the camera's
+track and keeps planted points still, by linear least squares over the clip. Then the legs: what is
+left is taken up by hip and knee (`legs`), as an animator pins a foot.
+"""
+
+import numpy as np
+from jaxtyping import Float
+from pydantic import ConfigDict, PositiveInt
+from pydantic.dataclasses import dataclass
+from scipy.linalg import solveh_banded
+
+from robojackson.body.skeleton import pair
+from robojackson.body.smoothing import lowpass
+from robojackson.mocap.grounding.feet import stretches
+
+LEASH_ROUNDS, LEASH_POWER = 3, 6
+LARGEST_TIP = np.radians(40.0)
+TIP_HZ = 6.0
+
+
+@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
+class LockConfig:
+    """Weights of the root's path; only their ratios matter.
+
+    Attributes:
+        track: Standard deviation of the camera's track across and along the ray, metres (y, x).
+        slip: Of a planted point's step between two frames, metres.
+        leash_m: Shift along the ray beyond which the track pulls harder and harder, metres.
+        wobble: Of the path's second difference at 30 frames a second, metres.
+        ramp_s: Time over which a standing foot goes over to a moving one, seconds.
+        fade_s: Time over which the correction of a pinned foot fades when it leaves, seconds.
+        rounds: How often contacts, path and pins are found anew.
+    """
+
+    track: tuple[float, float] = (0.02, 0.20)
+    leash_m: float = 0.15
+    slip: float = 0.003
+    wobble: float = 0.003
+    ramp_s: float = 0.1
+    fade_s: float = 0.2
+    rounds: PositiveInt = 2
+
+
+def root_correction(
+    feet: Float[np.ndarray, "T 4 3"],
+    planted: np.ndarray,
+    slope: Float[np.ndarray, " T"],
+    fps: float,
+    config: LockConfig,
+) -> Float[np.ndarray, "T 3"]:
+    """Horizontal shift of the body, so that planted points keep their place; z stays zero.
+
+    Minimises over the clip, (x, y) being the shift: the step of planted points over `slip`, second
+    differences over `wobble`, x over the camera's spread in depth, and y minus what x brings with
+    it along the ray over its spread across: a person who is further away than it seemed is further
+    aside too, or he would leave his place in the image. A foot that slides along the ray looks
+    planted; so where contacts would take the body further than `leash_m` from the track, the track
+    wins.
+
+    Args:
+        feet: Foot points, world axes.
+        planted: Which of them stand.
+        slope: y over x of the ray to the body.
+        fps: Frames a second.
+        config: Weights.
+    """
+    trust = np.ones(len(feet))
+    shift = _shift(feet, planted, slope, trust, fps, config)
+    for _ in range(LEASH_ROUNDS):
+        trust = np.maximum(trust, (shift[:, 0] / config.leash_m) ** LEASH_POWER)
+        shift = _shift(feet, planted, slope, trust, fps, config)
+    return np.concatenate([shift, np.zeros((len(feet), 1))], 1)
+
+
+def _shift(
+    feet: np.ndarray,
+    planted: np.ndarray,
+    slope: np.ndarray,
+    trust: Float[np.ndarray, " T"],
+    fps: float,
+    config: LockConfig,
+) -> Float[np.ndarray, "T 2"]:
+    """The least squares of `root_correction`; `trust` weighs the depth of the track by frame."""
+    held = (planted[1:] & planted[:-1]).astype(float)
+    step = np.diff(feet, axis=0)[..., :2]
+    hold = held.sum(1) / config.slip**2
+    pull = np.einsum("tk,tka->ta", held, step) / config.slip**2
+    across, along = config.track
+    path = path_bands(hold, config.wobble * (30.0 / fps) ** 2)
+    bands = np.zeros((5, 2 * len(feet)))
+    bands[0::2] = np.repeat(path, 2, axis=1)
+    bands[4, 0::2] += trust / along**2 + (slope / across) ** 2
+    bands[4, 1::2] += 1.0 / across**2
+    bands[3, 1::2] -= slope / across**2
+    right = np.zeros((len(feet), 2))
+    right[:-1] += pull
+    right[1:] -= pull
+    return np.asarray(solveh_banded(bands, right.reshape(-1)).reshape(-1, 2))
+
+
+def path_bands(hold: Float[np.ndarray, " S"], wobble: float) -> Float[np.ndarray, "3 T"]:
+    """Upper banded matrix of sum hold (ds)^2 + (dds / wobble)^2 over a path s."""
+    count = len(hold) + 1
+    bands = np.zeros((3, count))
+    bands[2, :-1] += hold
+    bands[2, 1:] += hold
+    bands[1, 1:] -= hold
+    if count > 2:
+        stiff = 1.0 / wobble**2
+        for offset, factor in enumerate((1.0, 4.0, 1.0)):
+            bands[2, offset : count - 2 + offset] += factor * stiff
+        bands[1, 1 : count - 1] -= 2.0 * stiff
+        bands[1, 2:count] -= 2.0 * stiff
+        bands[0, 2:] += stiff
+    return bands
+
+
+def pin_offsets(
+    feet: Float[np.ndarray, "T 4 3"], planted: np.ndarray, ramp: float
+) -> Float[np.ndarray, "T 2 3"]:
+    """How far to move the left and the right foot so that it stands still while planted.
+
+    In each stretch of contact the foot goes to the mean place of its planted points, the lowest of
+    them onto the floor; over `ramp` frames before and after, the correction fades.
+    """
+    offsets = np.zeros((len(feet), 2, 3))
+    for side, points in enumerate(((0, 1), (2, 3))):
+        down = planted[:, points]
+        wanted = np.full((len(feet), 3), np.nan)
+        for start, end in stretches(np.any(down, axis=1)):
+            weight = down[start:end, :, None].astype(float)
+            here = feet[start:end, points]
+            home = (here * weight).sum(0) / np.maximum(weight.sum(0), 1.0)
+            home[..., 2] -= home[down[start:end].any(0), 2].min()
+            off = ((home - here) * weight).sum(1) / np.maximum(weight.sum(1), 1.0)
+            wanted[start:end] = off
+        offsets[:, side] = faded(wanted, ramp)
+    return offsets
+
+
+def faded(wanted: Float[np.ndarray, "T N"], ramp: float) -> Float[np.ndarray, "T N"]:
+    """Values where they are known; elsewhere those of both neighbours, falling smoothly to zero.
+
+    Args:
+        wanted: NaN where nothing is known.
+        ramp: Frames over which a value fades.
+    """
+    known = np.flatnonzero(~np.isnan(wanted[:, 0]))
+    if not len(known):
+        return np.zeros_like(wanted)
+    frames = np.arange(len(wanted))
+    after = np.searchsorted(known, frames).clip(max=len(known) - 1)
+    before = (np.searchsorted(known, frames, side="right") - 1).clip(min=0)
+    shares = []
+    for away in (frames - known[before], known[after] - frames):
+        part = np.where(away < 0, 0.0, np.clip(1.0 - away / ramp, 0.0, 1.0))
+        shares.append((part * part * (3.0 - 2.0 * part))[:, None])
+    total = np.maximum(shares[0] + shares[1], 1.0)
+    return (shares[0] * wanted[known[before]] + shares[1] * wanted[known[after]]) / total
+
+
+def shared_height(
+    offsets: Float[np.ndarray, "T 2 3"], planted: np.ndarray
+) -> Float[np.ndarray, "T 3"]:
+    """The vertical offset that the standing feet have in common: the body follows it.
+
+    A leg that is nearly straight answers a centimetre at the foot with several at the knee; so only
+    the difference between the feet is left to the knees.
+    """
+    stands = planted.reshape(-1, 2, 2).any(2).astype(float)
+    count = stands.sum(1)
+    mean = np.full((len(offsets), 3), np.nan)
+    held = count > 0
+    mean[held] = 0.0
+    mean[held, 2] = (offsets[held, :, 2] * stands[held]).sum(1) / count[held]
+    return _bridged(mean)
+
+
+def tip_angles(
+    points: Float[np.ndarray, "T 29 3"],
+    feet: Float[np.ndarray, "T 4 3"],
+    planted: np.ndarray,
+    fps: float,
+    ramp: float,
+) -> Float[np.ndarray, "T 2"]:
+    """How far to turn each foot about its ankle so that a toe that stands alone meets the floor.
+
+    The detector hardly sees a foot's pitch and sees an ankle well: so a toe in the air is the
+    fault of the pitch, up to a limit, and only the rest that of the leg. For `feet.turn_feet`.
+    """
+    angles = np.full((len(feet), 2), np.nan)
+    chains = zip(pair("ankle"), pair("big_toe"), strict=True)
+    for side, (ankle, toe) in enumerate(chains):
+        alone = planted[:, 2 * side + 1] & ~planted[:, 2 * side]
+        sole = points[:, toe] - points[:, ankle]
+        length = np.linalg.norm(sole, axis=-1)
+        goal = sole[:, 2] - feet[:, 2 * side + 1, 2]
+        now, then = (np.arcsin(np.clip(z / length, -1.0, 1.0)) for z in (sole[:, 2], goal))
+        angles[alone, side] = np.clip(now - then, -LARGEST_TIP, LARGEST_TIP)[alone]
+    wanted = np.concatenate([faded(column[:, None], ramp) for column in angles.T], 1)
+    return lowpass(wanted, fps, TIP_HZ)
+
+
+def _bridged(wanted: np.ndarray) -> np.ndarray:
+    known = ~np.isnan(wanted[:, 0])
+    if not known.any():
+        return np.zeros_like(wanted)
+    time = np.arange(len(wanted))
+    return np.stack([np.interp(time, time[known], column[known]) for column in wanted.T], -1)

@@ -1,0 +1,130 @@
+"""A body on the floor: where its feet touch, the root that keeps them still, and the legs to match.
+
+World axes before the shift to the floor: the camera stands at the origin, z is up. Metres, seconds.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass as config_dataclass
+
+from robojackson.body.smoothing import lowpass
+from robojackson.mocap.grounding import contacts as contact_states
+from robojackson.mocap.grounding import feet, leg_ik
+from robojackson.mocap.grounding import floor as ground
+from robojackson.mocap.grounding import foot_pinning as locks
+from robojackson.mocap.pose.posed_body import Body
+from robojackson.motion.smpl_sequence import AIR, PLANTED, SLIDING
+
+SHORTEST_FLIGHT = 3
+LIFTS = 3
+"""A leg that is bent to lift its foot turns the foot a little, so it is looked at again."""
+ABOVE = np.array([0.0, 0.0, 1.0])
+
+
+@config_dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
+class StandConfig:
+    """Attributes:
+    floor_cutoff_hz: Zero-phase low-pass of the height of the floor under the feet, hertz.
+    contact, lock: Of the feet's states and of what holds them.
+    """
+
+    floor_cutoff_hz: float = 3.0
+    contact: contact_states.ContactConfig = Field(default_factory=contact_states.ContactConfig)
+    lock: locks.LockConfig = Field(default_factory=locks.LockConfig)
+
+
+@dataclass(frozen=True)
+class Stance:
+    """A body on the floor and the states of its foot points."""
+
+    body: Body
+    contact: Int[np.ndarray, "T 4"]
+
+
+@dataclass(frozen=True)
+class _Evidence:
+    """What does not change while the body is moved."""
+
+    fps: float
+    speed: Float[np.ndarray, "T 4"]
+    along: Float[np.ndarray, "T 4"]
+    slope: Float[np.ndarray, " T"]
+    falling: np.ndarray
+    config: StandConfig
+
+    def states(self, body: Body) -> Int[np.ndarray, "T 4"]:
+        height = body.feet[..., 2]
+        return contact_states.contacts(
+            height, self.speed, self.falling, self.fps, self.config.contact, self.along
+        )
+
+    def dropped(self, body: Body, airborne: np.ndarray) -> Body:
+        """The floor under the lowest foot point brought to z = 0."""
+        lowest = body.feet[..., 2].min(1)
+        floor = ground.floor_height(lowest, airborne, self.fps, self.config.floor_cutoff_hz)
+        return body.shifted(np.outer(-floor, ABOVE))
+
+
+def stand(body: Body, fps: float, config: StandConfig) -> Stance:
+    """The body on the floor, its feet level and pinned where they stand, and the contacts."""
+    height = ground.centre_of_mass(body.pose.points)[:, 2]
+    falling = ground.free_fall(height, fps)
+    flying = ground.flight(body.feet[..., 2].min(1), height, falling, fps)
+    speed, root = contact_states.image_speed(body.feet, fps), body.pose.points[:, 0]
+    along = contact_states.ray_speed(body.feet, fps)
+    evidence = _Evidence(fps, speed, along, root[:, 1] / root[:, 0], falling, config)
+    bias = np.full((len(falling), 2), feet.pitch_bias(body.feet, fps))
+    body = evidence.dropped(body.aimed(feet.turn_feet(body.pose.points, bias)), flying)
+    planted = pinned = evidence.states(body) == PLANTED
+    share = np.zeros((len(falling), 2))
+    for _ in range(config.lock.rounds):
+        body, share = _pinned(body, planted, evidence, flying)
+        states = evidence.states(body)
+        pinned, planted = planted, planted | (states == PLANTED)
+        airborne = (states == AIR).all(1)
+        flying = ground.flight(body.feet[..., 2].min(1), height, airborne, fps)
+    body = evidence.dropped(body, flying)
+    for _ in range(LIFTS):
+        body = body.aimed(leg_ik.move_feet(body.pose.points, leg_ik.lift_offsets(body.feet)), share)
+    body = body.shifted(-body.pose.points[0, 0] * [1.0, 1.0, 0.0])
+    states = evidence.states(body)
+    states = np.where((states == PLANTED) & ~pinned, SLIDING, states)
+    states = np.where(pinned, PLANTED, states).astype(np.int8)
+    return Stance(body, _carried(states, body, fps))
+
+
+def _carried(states: np.ndarray, body: Body, fps: float) -> Int[np.ndarray, "T 4"]:
+    """States in which a flight lasts no longer than the body of the result falls."""
+    height = ground.centre_of_mass(body.pose.points)[:, 2]
+    if len(height) < SHORTEST_FLIGHT:
+        return states
+    falls = np.gradient(np.gradient(height)) * fps**2 < -ground.GRAVITY / 2.0
+    carried, lowest = np.array(states), body.feet[..., 2].argmin(1)
+    for start, end in feet.stretches((states == AIR).all(1)):
+        known = np.flatnonzero(falls[start:end])
+        first, last = (start + known[0], start + known[-1] + 1) if len(known) else (end, end)
+        for frame in (*range(start, first), *range(last, end)):
+            carried[frame, lowest[frame]] = SLIDING
+    return carried
+
+
+def _pinned(
+    body: Body, planted: np.ndarray, evidence: _Evidence, flying: np.ndarray
+) -> tuple[Body, Float[np.ndarray, "T 2"]]:
+    """One round: standing feet level, the root moved, toes tipped, legs bent; share of level."""
+    fps, lock = evidence.fps, evidence.config.lock
+    ramp = lock.ramp_s * fps
+    flat = feet.standing(body.feet, planted)
+    held, share = feet.hold_flat(body.pose.points, body.rest, body.feet, flat, ramp)
+    body = evidence.dropped(body.aimed(held, share), flying)
+    body = body.shifted(locks.root_correction(body.feet, planted, evidence.slope, fps, lock))
+    tips = locks.tip_angles(body.pose.points, body.feet, planted, fps, ramp)
+    body = body.aimed(feet.turn_feet(body.pose.points, tips), share)
+    pins = locks.pin_offsets(body.feet, planted, lock.fade_s * fps)
+    shared = locks.shared_height(pins, planted)
+    settled = lowpass(shared, fps, evidence.config.floor_cutoff_hz)
+    body, pins = body.shifted(settled), pins - settled[:, None]
+    return body.aimed(leg_ik.move_feet(body.pose.points, pins), share), share

@@ -1,0 +1,197 @@
+"""Motions of other projects, brought to our world and onto the floor.
+
+A file with a world of its own keeps its motion: axes are changed once, and the floor put at z = 0.
+HybrIK's output has none: joints before a camera whose focal length changes with the box of every
+frame. It is placed again before one camera of fixed focal length, depth filtered, and stands up
+as our own mocap does (gravity, floor, contacts, feet held), with HybrIK's own twists.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial.transform import Rotation
+
+from robojackson.body.forward_kinematics import Pose, forward, split
+from robojackson.body.skeleton import (
+    AIM_CHILD,
+    KEYPOINT_NAMES,
+    PARENTS,
+    REST_OFFSETS,
+    assemble,
+    keypoint,
+)
+from robojackson.body.smoothing import lowpass
+from robojackson.formats.foreign_motion import ForeignMotion, require_person, skeleton_under
+from robojackson.formats.hybrik_output import HybrikMotion
+from robojackson.mocap.grounding import contacts as contact_states
+from robojackson.mocap.grounding import floor as ground
+from robojackson.mocap.grounding.feet import foot_points
+from robojackson.mocap.landmarks import pinhole_camera as cameras
+from robojackson.mocap.landmarks.blazepose import fill_gaps
+from robojackson.mocap.pose.known_twist import TurnedBody, pose_keypoints
+from robojackson.mocap.recover import MocapConfig, recover_points
+from robojackson.motion.smpl_sequence import SmplSequence
+
+FLOOR_M = 0.01
+"""A floor so near to zero is left where it is, metres."""
+CUTOFF_HZ = 6.0
+"""Zero-phase low-pass of HybrIK's joints, which are found frame by frame, hertz."""
+
+
+def place(motion: ForeignMotion, fps: float) -> SmplSequence:
+    """A motion that has a world, in ours: turned once, its floor at z = 0, contacts found.
+
+    Raises:
+        BadTable: its skeleton is no person's.
+    """
+    require_person(motion.rest_joints, "the skeleton")
+    local = np.array(motion.rotations)
+    local[:, 0] = motion.to_world @ local[:, 0]
+    pose = forward(local, motion.rest_joints[None], motion.pelvis @ motion.to_world.T)
+    feet = foot_points(pose, motion.rest_joints)
+    lowest = feet[..., 2].min(1)
+    height = ground.centre_of_mass(pose.points)[:, 2]
+    falling = ground.free_fall(height, fps)
+    flying = ground.flight(lowest, height, falling, fps)
+    floor = float(np.median(lowest[~flying] if (~flying).any() else lowest))
+    notes = list(motion.notes)
+    if abs(floor) > FLOOR_M:
+        notes.append(f"floor found at {100 * floor:.1f} cm of the file's own zero: put at zero")
+        drop = np.array([0.0, 0.0, floor])
+        pose, feet = replace(pose, points=pose.points - drop), feet - drop
+    if float(np.mean(pose.points[:, keypoint("neck"), 2] - pose.points[:, 0, 2])) < 0.0:
+        notes.append("the trunk points down: are the file's axes the usual ones? See --up")
+    speed = np.linalg.norm(np.gradient(feet[..., :2], axis=0), axis=-1) * fps
+    config = contact_states.ContactConfig()
+    states = contact_states.contacts(feet[..., 2], speed, falling, fps, config)
+    return _sequence(fps, local, pose, motion.rest_joints, states, tuple(notes), motion.betas)
+
+
+def stand_up(
+    motion: HybrikMotion, fps: float, config: MocapConfig, cutoff_hz: float = CUTOFF_HZ
+) -> SmplSequence:
+    """HybrIK's motion in the world, on the floor.
+
+    Raises:
+        BadTable: its joints are no person's.
+    """
+    require_person(motion.points, "the joints")
+    full, valid = _all_frames(motion)
+    rest = _skeleton(motion)
+    turns = _twists(full, rest)
+
+    def posed(points: np.ndarray) -> TurnedBody:
+        return pose_keypoints(points, turns, full.confidence, rest, config.method)
+
+    points = before_camera(full, fps, config, cutoff_hz)
+    sequence = recover_points(points, posed, valid, _camera(motion, config), fps, config)
+    return replace(sequence, betas=motion.betas)
+
+
+def before_camera(
+    motion: HybrikMotion, fps: float, config: MocapConfig, cutoff_hz: float = CUTOFF_HZ
+) -> Float[np.ndarray, "T 29 3"]:
+    """Keypoints before a camera of one focal length, smoothed, metres, camera axes.
+
+    The place that fits the keypoints in the image best; HybrIK's own follows the box's width.
+    """
+    rays = _camera(motion, config).rays(motion.pixels)
+    root = cameras.fit_root(motion.points, rays)
+    root[:, 2:] = lowpass(root[:, 2:], fps, config.depth_cutoff_hz)
+    return lowpass(motion.points, fps, cutoff_hz) + lowpass(root, fps, cutoff_hz)[:, None]
+
+
+def kinematics_error_mm(motion: HybrikMotion) -> float | None:
+    """Mean distance of HybrIK's joints to those that its rotations pose in our kinematics.
+
+    Our skeleton takes the offsets that fit best over the clip; None where there are no rotations.
+    """
+    if motion.rotations is None:
+        return None
+    rest = skeleton_under(motion.rotations, motion.points)
+    posed = forward(motion.rotations, rest[None], motion.points[:, 0]).points
+    return float(1e3 * np.linalg.norm(posed - motion.points, axis=-1).mean())
+
+
+def _camera(motion: HybrikMotion, config: MocapConfig) -> cameras.Pinhole:
+    focal = config.focal_px or cameras.guess_focal(motion.width, motion.height)
+    return cameras.Pinhole(focal, motion.width, motion.height)
+
+
+def _skeleton(motion: HybrikMotion) -> Float[np.ndarray, "29 3"]:
+    """HybrIK's own skeleton where its rotations tell it, else ours with its lengths."""
+    if motion.rotations is not None:
+        return skeleton_under(motion.rotations, motion.points)
+    lengths = np.zeros(len(PARENTS))
+    for index, parent in enumerate(PARENTS[1:], start=1):
+        bone = motion.points[:, index] - motion.points[:, parent]
+        lengths[index] = np.median(np.linalg.norm(bone, axis=-1))
+    for index, name in enumerate(KEYPOINT_NAMES):
+        if name.startswith("left_"):
+            other = keypoint(name.replace("left", "right"))
+            lengths[[index, other]] = lengths[[index, other]].mean()
+    usual = np.maximum(np.linalg.norm(REST_OFFSETS, axis=-1), 1e-9)
+    return assemble(REST_OFFSETS * (lengths / usual)[:, None])
+
+
+def _twists(motion: HybrikMotion, rest: np.ndarray) -> Float[np.ndarray, "T 23 2"]:
+    """About our rest bones: HybrIK's own, or what its rotations have."""
+    if motion.rotations is None:
+        return motion.twist
+    bones = np.stack([rest[AIM_CHILD[j]] - rest[j] for j in range(1, 24)])
+    return split(motion.rotations[:, 1:], np.broadcast_to(bones, (len(motion), 23, 3)))[1]
+
+
+def _all_frames(motion: HybrikMotion) -> tuple[HybrikMotion, np.ndarray]:
+    """Frames in which nobody was found between their neighbours, and which were found."""
+    frames = np.arange(motion.frame[-1] + 1)
+    valid = np.isin(frames, motion.frame)
+    if valid.all():
+        return motion, valid
+
+    def filled(values: np.ndarray) -> np.ndarray:
+        spread = np.zeros((len(frames), *values.shape[1:]))
+        spread[valid] = values
+        return fill_gaps(spread, valid)
+
+    rotations = motion.rotations
+    if rotations is not None:
+        left, _, right = np.linalg.svd(filled(rotations))
+        rotations = left @ right
+    return replace(
+        motion,
+        points=filled(motion.points),
+        pixels=filled(motion.pixels),
+        twist=filled(motion.twist),
+        rotations=rotations,
+        confidence=filled(motion.confidence),
+        frame=frames,
+    ), valid
+
+
+def _sequence(
+    fps: float,
+    local: np.ndarray,
+    pose: Pose,
+    rest: np.ndarray,
+    states: np.ndarray,
+    notes: tuple[str, ...],
+    betas: np.ndarray,
+) -> SmplSequence:
+    count = len(local)
+    vectors = Rotation.from_matrix(local.reshape(-1, 3, 3)).as_rotvec().reshape(count, 24, 3)
+    return SmplSequence(
+        fps=fps,
+        global_orient=vectors[:, 0],
+        body_pose=vectors[:, 1:].reshape(-1, 69),
+        transl=pose.points[:, 0] - rest[0],
+        joints=pose.points[:, :24],
+        keypoints_w=pose.points,
+        confidence=np.ones((count, 29)),
+        contact=states,
+        valid=np.ones(count, bool),
+        betas=betas,
+        rest_joints=rest,
+        notes=notes,
+    )

@@ -1,0 +1,1 @@
+"""From detected landmarks to refined points before a camera."""

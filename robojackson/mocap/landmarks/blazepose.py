@@ -1,0 +1,172 @@
+"""BlazePose's 33 landmarks: their names, and the repair of gaps and of swapped sides.
+
+Left and right are the subject's. A gap is a run of frames in which nobody was found.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from robojackson.clips.people.camera_path import warp
+from robojackson.errors import NoPersonFound, TrackTooShort, UnknownName
+from robojackson.motion.landmark_track import LandmarkTrack
+
+LANDMARK_NAMES: tuple[str, ...] = (
+    "nose", "left_eye_inner", "left_eye", "left_eye_outer", "right_eye_inner", "right_eye",
+    "right_eye_outer", "left_ear", "right_ear", "mouth_left", "mouth_right", "left_shoulder",
+    "right_shoulder", "left_elbow", "right_elbow", "left_wrist", "right_wrist", "left_pinky",
+    "right_pinky", "left_index", "right_index", "left_thumb", "right_thumb", "left_hip",
+    "right_hip", "left_knee", "right_knee", "left_ankle", "right_ankle", "left_heel", "right_heel",
+    "left_foot_index", "right_foot_index",
+)  # fmt: skip
+MIN_FRAMES = 2
+PERSON_M = 1.7
+"""Diagonal of the box around a person's body landmarks, metres; for the scale of the image."""
+HIPS_BELOW = 0.06
+"""Its hips are this share of the trunk below the hip joints: 2-4 cm in the images of two bodies, of
+which one is real, under eight cameras."""
+SWAP_PRIOR_M = 0.003
+"""What a frame with exchanged sides costs, metres of mean displacement; tuned on person_cam2."""
+SWAP_FPS = 15.0
+"""At fewer frames a second a turn looks like an exchange: 10 of 26 frames of a dancer at 8 were."""
+
+
+def landmark(name: str) -> int:
+    """Index of a landmark; an unknown name raises `UnknownName` with the known ones."""
+    if name not in LANDMARK_NAMES:
+        raise UnknownName("landmark", name, "mocap.blazepose", LANDMARK_NAMES)
+    return LANDMARK_NAMES.index(name)
+
+
+def mirror_of(name: str) -> str:
+    """The same landmark on the other side; the nose is its own."""
+    swap = {"left": "right", "right": "left"}
+    return "_".join(swap.get(part, part) for part in name.split("_"))
+
+
+MIRROR = np.array([landmark(mirror_of(name)) for name in LANDMARK_NAMES])
+BODY = np.array(
+    [
+        landmark(f"{side}_{name}")
+        for name in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
+        for side in ("left", "right")
+    ]
+)
+"""The twelve landmarks of trunk and limbs, left before right."""
+HIPS = [landmark("left_hip"), landmark("right_hip")]
+SHOULDERS = [landmark("left_shoulder"), landmark("right_shoulder")]
+NECK_DOWN = np.arange(landmark("left_shoulder"), len(LANDMARK_NAMES))
+
+
+@dataclass(frozen=True)
+class Landmarks:
+    """A track without gaps.
+
+    Attributes:
+        image: Pixels of the upright image.
+        local: Metres, axes of the camera (x right, y down, z away), origin between the hips.
+        visibility: 0..1; zero where interpolated.
+        valid: Whether the frame was detected.
+        swapped: Frames in which left and right were put back.
+    """
+
+    image: Float[np.ndarray, "T 33 2"]
+    local: Float[np.ndarray, "T 33 3"]
+    visibility: Float[np.ndarray, "T 33"]
+    valid: np.ndarray
+    swapped: int = 0
+
+
+def repair(track: LandmarkTrack) -> Landmarks:
+    """Fill gaps and put swapped sides back.
+
+    Raises:
+        TrackTooShort: fewer than two frames.
+        NoPersonFound: fewer than two frames with a person.
+    """
+    found = track.detected
+    if len(track) < MIN_FRAMES:
+        raise TrackTooShort(
+            f"motion needs at least {MIN_FRAMES} frames, this clip has {len(track)}"
+        )
+    if found.sum() < MIN_FRAMES:
+        missed = len(track) - int(found.sum())
+        raise NoPersonFound(f"no person found in {missed} of {len(track)} frames")
+    seen = track_landmarks(track)
+    return raise_hips(unswap(seen) if track.fps >= SWAP_FPS else seen)
+
+
+def track_landmarks(track: LandmarkTrack) -> Landmarks:
+    """The landmarks of a track with its gaps filled, sides as the detector has them.
+
+    Where the camera moved, all are in the image of the first frame.
+    """
+    found = track.detected
+    image = track.landmarks[..., :2] * np.array([track.width, track.height], float)
+    if track.to_first is not None:
+        image = warp(image, track.to_first)
+    return Landmarks(
+        image=fill_gaps(image, found),
+        local=fill_gaps(track.world_landmarks, found),
+        visibility=np.where(found[:, None], np.nan_to_num(track.visibility), 0.0),
+        valid=found,
+    )
+
+
+def raise_hips(landmarks: Landmarks) -> Landmarks:
+    """Move the hips along the trunk to where the hip joints are."""
+
+    def raised(points: np.ndarray) -> np.ndarray:
+        moved = np.array(points)
+        trunk = points[:, SHOULDERS].mean(1) - points[:, HIPS].mean(1)
+        moved[:, HIPS] += HIPS_BELOW * trunk[:, None]
+        return moved
+
+    return replace(landmarks, image=raised(landmarks.image), local=raised(landmarks.local))
+
+
+def fill_gaps(values: np.ndarray, found: np.ndarray) -> np.ndarray:
+    """Linear in time inside a gap, the nearest found frame before the first and after the last."""
+    time = np.arange(len(values))
+    flat = values.reshape(len(values), -1)
+    filled = [np.interp(time, time[found], column[found]) for column in flat.T]
+    return np.stack(filled, -1).reshape(values.shape)
+
+
+def unswap(landmarks: Landmarks) -> Landmarks:
+    """Exchange left and right of the body in the frames where that makes the track continuous."""
+    swap = swapped_frames(landmarks)
+    if not swap.any():
+        return landmarks
+    return replace(
+        landmarks,
+        image=np.where(swap[:, None, None], landmarks.image[:, MIRROR], landmarks.image),
+        local=np.where(swap[:, None, None], landmarks.local[:, MIRROR], landmarks.local),
+        visibility=np.where(swap[:, None], landmarks.visibility[:, MIRROR], landmarks.visibility),
+        swapped=int(swap.sum()),
+    )
+
+
+def swapped_frames(landmarks: Landmarks) -> np.ndarray:
+    """The likeliest frames in which the detector took left for right, by dynamic programming.
+
+    Each frame is kept or crossed; a step costs the mean displacement of the body's landmarks (image
+    at the person's scale and depth, metres), a crossed frame a little more.
+    """
+    span = np.linalg.norm(np.ptp(landmarks.image[:, BODY], axis=1), axis=-1).mean()
+    metres = landmarks.image * (PERSON_M / max(span, 1.0))
+    features = np.concatenate([metres, landmarks.local[..., 2:]], -1)
+    kept, crossed = features[:, NECK_DOWN], features[:, MIRROR][:, NECK_DOWN]
+    same = np.linalg.norm(kept[1:] - kept[:-1], axis=-1).mean(-1)
+    other = np.linalg.norm(crossed[1:] - kept[:-1], axis=-1).mean(-1)
+    cost = np.array([0.0, SWAP_PRIOR_M])
+    previous = np.empty((len(same), 2), int)
+    for step, (stay, change) in enumerate(zip(same, other, strict=True)):
+        ways = cost[:, None] + np.array([[stay, change], [change, stay]])
+        previous[step] = ways.argmin(0)
+        cost = ways.min(0) + [0.0, SWAP_PRIOR_M]
+    states = [int(cost.argmin())]
+    for choices in previous[::-1]:
+        states.append(int(choices[states[-1]]))
+    return np.array(states[::-1], bool)

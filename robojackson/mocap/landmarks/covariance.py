@@ -1,0 +1,121 @@
+"""How sure the whole-clip refinement is of each joint: covariances from its own normal matrix.
+
+At the solution the inverse of the normal matrix is the covariance of all joints in all frames
+(Laplace). It is banded, frames couple with the two before and after, so its diagonal blocks follow
+from one pass forward and one back over pairs of frames (Rybicki and Hummer 1991). A joint's
+confidence is the chance that it lies within `NEAR_M` of where it is said to be, seen from the hips.
+"""
+
+import numpy as np
+from jaxtyping import Float
+
+from robojackson.mocap.landmarks.blazepose import BODY, LANDMARK_NAMES
+from robojackson.mocap.landmarks.refinement import (
+    HIPS,
+    ORDER,
+    SIZE,
+    Evidence,
+    RefineConfig,
+    residuals,
+    stiffness,
+)
+
+NEAR_M = 0.15
+REPEATED_S = 0.2
+"""The errors of frames nearer than this are one error: a variance counts so many times as the
+frames in it. Measured on the eight tuned clips: .77 of their joints are said, .84 are, near."""
+HANGS_ON = {
+    "pinky": "wrist", "index": "wrist", "thumb": "wrist", "heel": "ankle", "foot_index": "ankle",
+}  # fmt: skip
+
+
+def certainty(
+    body: Float[np.ndarray, "T 12 3"],
+    evidence: Evidence,
+    visibility: Float[np.ndarray, "T 33"],
+    config: RefineConfig,
+) -> Float[np.ndarray, "T 33"]:
+    """Confidence 0..1 of all landmarks; those that were not refined get that of their carrier.
+
+    Args:
+        body: The refined landmarks, metres, camera.
+        evidence: What they were refined from.
+        visibility: Of the landmarks; face, hands and feet are no surer than they are visible.
+        config: The refinement's.
+    """
+    from scipy.stats import chi2
+
+    variance = root_relative(covariances(body, evidence, config))
+    near = chi2.cdf(NEAR_M**2 / (variance * max(1.0, REPEATED_S * evidence.fps)), df=3)
+    sure = np.array(visibility)
+    sure[:, BODY] = near
+    for index, name in enumerate(LANDMARK_NAMES):
+        side, _, part = name.partition("_")
+        if part in HANGS_ON:
+            sure[:, index] *= near[:, ORDER.index(f"{side}_{HANGS_ON[part]}")]
+    return np.asarray(np.clip(sure, 0.0, 1.0))
+
+
+def covariances(
+    body: Float[np.ndarray, "T 12 3"], evidence: Evidence, config: RefineConfig
+) -> Float[np.ndarray, "T 36 36"]:
+    """Covariance of the joints of each frame, given the whole clip."""
+    jacobian, _ = residuals(body, evidence, config)
+    normal = np.einsum("tri,trj->tij", jacobian, jacobian)
+    count = len(normal) + len(normal) % 2
+    coupling = _second_difference(len(normal), count) * stiffness(evidence.fps, config)
+    blocks = np.zeros((count, SIZE, SIZE))
+    blocks[: len(normal)] = normal
+    blocks[len(normal) :] = np.eye(SIZE)
+    blocks += np.eye(SIZE) * coupling[0][:, None, None]
+    return _diagonal_of_inverse(*_paired(blocks, coupling))[: len(normal)]
+
+
+def root_relative(covariance: Float[np.ndarray, "T 36 36"]) -> Float[np.ndarray, "T 12"]:
+    """Mean variance of the three axes of each joint minus the middle of the hips, m^2."""
+    each = np.eye(len(ORDER))
+    each[:, HIPS] -= 0.5
+    blocks = covariance.reshape(len(covariance), len(ORDER), 3, len(ORDER), 3)
+    traces = np.einsum("tiaja->tij", blocks)
+    return np.einsum("ki,tij,kj->tk", each, traces, each) / 3.0
+
+
+def _second_difference(frames: int, count: int) -> Float[np.ndarray, "3 T"]:
+    """Diagonals 0, 1 and 2 of D2' D2 over so many frames, padded with zeros."""
+    second = np.array([1.0, -2.0, 1.0])
+    diagonals = np.zeros((3, count))
+    if frames < 3:
+        return diagonals
+    for start in range(3):
+        for apart in range(3 - start):
+            product = second[start] * second[start + apart]
+            diagonals[apart, start : frames - 2 + start] += product
+    return diagonals
+
+
+def _paired(blocks: np.ndarray, coupling: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Block tridiagonal form over pairs of frames: diagonal blocks, and those above them."""
+    pairs, eye = len(blocks) // 2, np.eye(SIZE)
+    diagonal = np.zeros((pairs, 2, SIZE, 2, SIZE))
+    diagonal[:, 0, :, 0], diagonal[:, 1, :, 1] = blocks[0::2], blocks[1::2]
+    inside = coupling[1][0::2, None, None] * eye
+    diagonal[:, 0, :, 1] = diagonal[:, 1, :, 0] = inside
+    above = np.zeros((pairs, 2, SIZE, 2, SIZE))
+    above[:, 0, :, 0] = coupling[2][0::2, None, None] * eye
+    above[:, 1, :, 0] = coupling[1][1::2, None, None] * eye
+    above[:, 1, :, 1] = coupling[2][1::2, None, None] * eye
+    return diagonal.reshape(pairs, 2 * SIZE, -1), above.reshape(pairs, 2 * SIZE, -1)
+
+
+def _diagonal_of_inverse(diagonal: np.ndarray, above: np.ndarray) -> Float[np.ndarray, "T 36 36"]:
+    """Blocks of one frame on the diagonal of the inverse of a block tridiagonal matrix."""
+    inverse = np.empty_like(diagonal)
+    gain = np.empty_like(diagonal)
+    inverse[0] = np.linalg.inv(diagonal[0])
+    for k in range(1, len(diagonal)):
+        gain[k - 1] = inverse[k - 1] @ above[k - 1]
+        inverse[k] = np.linalg.inv(diagonal[k] - above[k - 1].T @ gain[k - 1])
+    for k in range(len(diagonal) - 2, -1, -1):
+        inverse[k] += gain[k] @ inverse[k + 1] @ gain[k].T
+    halves = inverse.reshape(len(diagonal), 2, SIZE, 2, SIZE)
+    return np.stack([halves[:, 0, :, 0], halves[:, 1, :, 1]], 1).reshape(-1, SIZE, SIZE)

@@ -1,0 +1,244 @@
+"""Whole-clip refinement of the twelve body landmarks: the likeliest smooth motion of a skeleton.
+
+Minimises over all frames at once, robustly: the distance from what was seen in the image, from the
+detector's depth relative to the hips, from the person's bone lengths, and from no acceleration.
+Gauss-Newton with reweighting; frames couple only through the acceleration, so the normal matrix is
+banded and a clip takes a fraction of a second. Camera frame, metres.
+"""
+
+from dataclasses import dataclass as plain_dataclass
+
+import numpy as np
+from jaxtyping import Float
+from pydantic import ConfigDict
+from pydantic.dataclasses import dataclass
+from scipy.linalg import solveh_banded
+
+from robojackson.body.forward_kinematics import unit
+from robojackson.body.skeleton import keypoint
+from robojackson.mocap.landmarks.blazepose import BODY, LANDMARK_NAMES, landmark
+
+SHAPE = (len(BODY), 3)
+SIZE = SHAPE[0] * SHAPE[1]
+BONES = tuple(
+    (f"{side}_{start}", f"{side}_{end}")
+    for start, end in (
+        ("hip", "knee"),
+        ("knee", "ankle"),
+        ("shoulder", "elbow"),
+        ("elbow", "wrist"),
+        ("shoulder", "hip"),
+    )
+    for side in ("left", "right")
+) + (("left_hip", "right_hip"), ("left_shoulder", "right_shoulder"))
+ORDER = [LANDMARK_NAMES[index] for index in BODY]
+HIPS = [ORDER.index("left_hip"), ORDER.index("right_hip")]
+LEAST_VISIBILITY = 0.1
+
+
+@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
+class RefineConfig:
+    """Standard deviations of the four terms.
+
+    Attributes:
+        enabled: Whether to refine at all.
+        image_m: Of a landmark across the image, at the person's distance, metres.
+        depth_m: Of the detector's depth relative to the hips, metres.
+        bone_m: Of a bone's length in one frame, metres.
+        acceleration_mps2: Of a joint's acceleration, m/s^2.
+        rounds: Gauss-Newton steps.
+    """
+
+    enabled: bool = True
+    image_m: float = 0.03
+    depth_m: float = 0.07
+    bone_m: float = 0.02
+    acceleration_mps2: float = 30.0
+    rounds: int = 12
+
+
+@plain_dataclass(frozen=True)
+class Evidence:
+    """What the clip says about the twelve landmarks.
+
+    Attributes:
+        rays: Image points at depth one.
+        depth: The detector's depth relative to the middle of the hips, metres.
+        trust: 0..1 a landmark, from its visibility.
+        lengths: Of `BONES`, metres.
+        fps: Frames a second.
+        depth_m: Standard deviation of `depth`, metres.
+    """
+
+    rays: Float[np.ndarray, "T 12 2"]
+    depth: Float[np.ndarray, "T 12"]
+    trust: Float[np.ndarray, "T 12"]
+    lengths: Float[np.ndarray, " B"]
+    fps: float
+    depth_m: Float[np.ndarray, "T 12"]
+
+
+def refine(
+    placed: Float[np.ndarray, "T 33 3"],
+    visibility: Float[np.ndarray, "T 33"],
+    rest_joints: Float[np.ndarray, "29 3"],
+    fps: float,
+    config: RefineConfig,
+    depth_m: Float[np.ndarray, "T 12"] | None = None,
+) -> Float[np.ndarray, "T 33 3"]:
+    """Landmarks with the body refined; face, hands and feet follow what they hang on.
+
+    `depth_m` is how far off each depth may be; without it the configuration's one figure counts.
+    """
+    body = placed[:, BODY]
+    evidence = gather(placed, visibility, rest_joints, fps, config, depth_m)
+    for _ in range(config.rounds):
+        body = body + _step(body, evidence, config)
+    return carry_along(placed, body)
+
+
+def gather(
+    placed: Float[np.ndarray, "T 33 3"],
+    visibility: Float[np.ndarray, "T 33"],
+    rest_joints: Float[np.ndarray, "29 3"],
+    fps: float,
+    config: RefineConfig,
+    depth_m: Float[np.ndarray, "T 12"] | None = None,
+) -> Evidence:
+    """What landmarks before the camera say about the body."""
+    body = placed[:, BODY]
+    return Evidence(
+        rays=body[..., :2] / body[..., 2:],
+        depth=body[..., 2] - body[:, HIPS, 2].mean(1, keepdims=True),
+        trust=np.clip(visibility[:, BODY], LEAST_VISIBILITY, 1.0),
+        lengths=bone_lengths(rest_joints),
+        fps=fps,
+        depth_m=np.full(body.shape[:2], config.depth_m) if depth_m is None else depth_m,
+    )
+
+
+def bone_lengths(rest_joints: Float[np.ndarray, "29 3"]) -> Float[np.ndarray, " B"]:
+    """Lengths of `BONES` in a rest pose, metres."""
+    ends = np.array([[keypoint(a), keypoint(b)] for a, b in BONES])
+    return np.linalg.norm(rest_joints[ends[:, 1]] - rest_joints[ends[:, 0]], axis=-1)
+
+
+def carry_along(
+    placed: Float[np.ndarray, "T 33 3"], body: Float[np.ndarray, "T 12 3"]
+) -> Float[np.ndarray, "T 33 3"]:
+    """All landmarks, the others moved as the body landmark that they hang on."""
+    moved = np.array(placed)
+    change = body - placed[:, BODY]
+    shoulders = [ORDER.index("left_shoulder"), ORDER.index("right_shoulder")]
+    head = change[:, shoulders].mean(1)
+    for index, name in enumerate(LANDMARK_NAMES):
+        side, _, part = name.partition("_")
+        if index < landmark("left_shoulder"):
+            moved[:, index] += head
+        elif part in ("pinky", "index", "thumb"):
+            moved[:, index] += change[:, ORDER.index(f"{side}_wrist")]
+        elif part in ("heel", "foot_index"):
+            moved[:, index] += change[:, ORDER.index(f"{side}_ankle")]
+    moved[:, BODY] = body
+    return moved
+
+
+def _step(
+    body: Float[np.ndarray, "T 12 3"], evidence: Evidence, config: RefineConfig
+) -> Float[np.ndarray, "T 12 3"]:
+    """One Gauss-Newton step."""
+    count = len(body)
+    jacobian, residual = residuals(body, evidence, config)
+    normal = np.einsum("tri,trj->tij", jacobian, jacobian)
+    moment = np.einsum("tri,tr->ti", jacobian, residual)
+    bands = _to_bands(normal)
+    stiff = stiffness(evidence.fps, config)
+    second = np.diff(body.reshape(count, SIZE), 2, axis=0) * stiff
+    for offset, factor in enumerate((1.0, -2.0, 1.0)):
+        moment[offset : count - 2 + offset] += factor * second
+    if count > 2:
+        _add_acceleration(bands, count, stiff)
+    step = solveh_banded(bands, -moment.reshape(-1))
+    return step.reshape(count, *SHAPE)
+
+
+def stiffness(fps: float, config: RefineConfig) -> float:
+    """Weight of the squared second difference of a coordinate, 1/m^2; the same at any rate."""
+    return (fps**2 / config.acceleration_mps2) ** 2 * 30.0 / fps
+
+
+def residuals(
+    body: np.ndarray, evidence: Evidence, config: RefineConfig
+) -> tuple[Float[np.ndarray, "T R 36"], Float[np.ndarray, "T R"]]:
+    """Robustly weighted residuals of image, depth and bones, and their derivatives."""
+    parts = (
+        _image(body, evidence, config.image_m),
+        _depth(body, evidence),
+        _bones(body, evidence, config.bone_m),
+    )
+    jacobian = np.concatenate([part[0] for part in parts], 1)
+    residual = np.concatenate([part[1] for part in parts], 1)
+    return jacobian.reshape(*residual.shape, SIZE), residual
+
+
+def _image(body: np.ndarray, evidence: Evidence, spread: float) -> tuple[np.ndarray, np.ndarray]:
+    """(x - u z) / spread across the image at the landmark's own depth, pseudo-Huber."""
+    count, points = body.shape[:2]
+    residual = (body[..., :2] - evidence.rays * body[..., 2:]) / spread
+    robust = (1.0 + (residual**2).sum(-1)) ** -0.25 * np.sqrt(evidence.trust)
+    jacobian = np.zeros((count, points, 2, points, 3))
+    each = np.arange(points)
+    for axis in range(2):
+        jacobian[:, each, axis, each, axis] = robust / spread
+        jacobian[:, each, axis, each, 2] = -evidence.rays[..., axis] * robust / spread
+    return (
+        jacobian.reshape(count, 2 * points, points, 3),
+        (residual * robust[..., None]).reshape(count, -1),
+    )
+
+
+def _depth(body: np.ndarray, evidence: Evidence) -> tuple[np.ndarray, np.ndarray]:
+    """Depth relative to the middle of the hips against the detector's, pseudo-Huber."""
+    count, points = body.shape[:2]
+    spread = evidence.depth_m
+    relative = body[..., 2] - body[:, HIPS, 2].mean(1, keepdims=True)
+    residual = (relative - evidence.depth) / spread
+    robust = (1.0 + residual**2) ** -0.25 * np.sqrt(evidence.trust)
+    each = np.eye(points)
+    each[:, HIPS] -= 0.5
+    jacobian = np.zeros((count, points, points, 3))
+    jacobian[..., 2] = each * (robust / spread)[..., None]
+    return jacobian, residual * robust
+
+
+def _bones(body: np.ndarray, evidence: Evidence, spread: float) -> tuple[np.ndarray, np.ndarray]:
+    """Bone lengths against the person's."""
+    starts = np.array([ORDER.index(start) for start, _ in BONES])
+    ends = np.array([ORDER.index(end) for _, end in BONES])
+    bone = body[:, ends] - body[:, starts]
+    along = unit(bone) / spread
+    jacobian = np.zeros((len(body), len(BONES), *SHAPE))
+    each = np.arange(len(BONES))
+    jacobian[:, each, ends] = along
+    jacobian[:, each, starts] = -along
+    return jacobian, (np.linalg.norm(bone, axis=-1) - evidence.lengths) / spread
+
+
+def _to_bands(blocks: Float[np.ndarray, "T 36 36"]) -> np.ndarray:
+    """Upper banded storage (scipy) of a block-diagonal symmetric matrix, with two frames above."""
+    above = 2 * SIZE
+    bands = np.zeros((above + 1, len(blocks) * SIZE))
+    for offset in range(SIZE):
+        values = np.zeros((len(blocks), SIZE))
+        values[:, offset:] = np.diagonal(blocks, offset, axis1=1, axis2=2)
+        bands[above - offset] = values.reshape(-1)
+    return bands
+
+
+def _add_acceleration(bands: np.ndarray, count: int, stiff: float) -> None:
+    """Add D2' D2 of every coordinate: it couples frames one and two apart."""
+    second = np.diff(np.eye(3), 2, axis=0)[0]
+    for first, left in enumerate(second):
+        for last in range(first, 3):
+            columns = slice(last * SIZE, (count - 2 + last) * SIZE)
+            bands[2 * SIZE - (last - first) * SIZE, columns] += stiff * left * second[last]

@@ -1,0 +1,99 @@
+"""The motion of a clip by the published networks, on the floor of our world.
+
+BlazePose only says where the person is; everything after the network is `mocap.recover`'s.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+
+from robojackson.body.smoothing import lowpass
+from robojackson.clips.quality.visibility import weighed
+from robojackson.mocap.landmarks import pinhole_camera as cameras
+from robojackson.mocap.landmarks.blazepose import fill_gaps, repair
+from robojackson.mocap.networks.inference import Estimate, Networks, Progress, estimate
+from robojackson.mocap.networks.network_config import NetworkConfig
+from robojackson.mocap.pose.known_twist import TurnedBody, pose_keypoints
+from robojackson.mocap.recover import MocapConfig, recover_points, told
+from robojackson.motion.landmark_track import LandmarkTrack, even_times, evenly
+from robojackson.motion.smpl_sequence import SmplSequence
+
+
+def network_motion(
+    track: LandmarkTrack,
+    images: Iterable[np.ndarray],
+    networks: Networks,
+    mocap: MocapConfig,
+    config: NetworkConfig,
+    progress: Progress | None = None,
+) -> SmplSequence:
+    """The motion of the person in a track.
+
+    Args:
+        track: Where the person is.
+        images: The frames of the track, RGB.
+        networks: Loaded from the files of `config`.
+        mocap: Of the lens and of the ground.
+        config: Of the networks.
+        progress: Called with (frames done, frames in all).
+    Raises:
+        TrackTooShort, NoPersonFound: nothing to look at.
+    """
+    track = weighed(track)
+    focal = mocap.focal_px or cameras.guess_focal(track.width, track.height)
+    lens = cameras.Pinhole(focal, track.width, track.height)
+    in_frame = repair(replace(track, to_first=None))
+    shown = (in_frame, track.to_first, lens, track.fps, mocap.depth_cutoff_hz)
+    found = estimate(images, *shown, networks, config, progress)
+    even = evenly(track)
+    landmarks = repair(even)
+    found = steadied(resampled(found, track), landmarks.valid, even.fps, config.cutoff_hz)
+    sequence = recover_points(
+        found.keypoints, poser(found, mocap), landmarks.valid, lens, even.fps, mocap
+    )
+    notes = (*found.notes, *track.notes, *sequence.notes)
+    camera = told(sequence.camera, track)
+    return replace(sequence, betas=found.betas, person=track.person, notes=notes, camera=camera)
+
+
+def resampled(found: Estimate, track: LandmarkTrack) -> Estimate:
+    """The estimate at equal spaces of 1 / fps, as `motion.landmark_track.evenly` does it with
+    landmarks."""
+    if track.time_s is None:
+        return found
+    when = even_times(track)
+
+    def at(values: np.ndarray) -> np.ndarray:
+        columns = values.reshape(len(values), -1).T
+        rows = np.stack([np.interp(when, track.times, column) for column in columns], -1)
+        return rows.reshape(len(when), *values.shape[1:])
+
+    return replace(
+        found,
+        keypoints=at(found.keypoints),
+        twist=at(found.twist),
+        confidence=at(found.confidence),
+    )
+
+
+def poser(
+    found: Estimate, mocap: MocapConfig
+) -> Callable[[Float[np.ndarray, "T 29 3"]], TurnedBody]:
+    """What solves keypoints in any frame with the network's twists."""
+
+    def posed(points: np.ndarray) -> TurnedBody:
+        return pose_keypoints(points, found.twist, found.confidence, found.rest, mocap.method)
+
+    return posed
+
+
+def steadied(found: Estimate, valid: np.ndarray, fps: float, cutoff_hz: float) -> Estimate:
+    """Frames without a person between their neighbours, and all of them low-passed."""
+    turns = found.twist / np.maximum(np.linalg.norm(found.twist, axis=-1, keepdims=True), 1e-9)
+    return replace(
+        found,
+        keypoints=lowpass(fill_gaps(found.keypoints, valid), fps, cutoff_hz),
+        twist=lowpass(fill_gaps(turns, valid), fps, cutoff_hz),
+    )

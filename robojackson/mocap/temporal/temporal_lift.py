@@ -1,0 +1,153 @@
+"""Step 3 of the embedded default: the detector's body, corrected by the temporal network.
+
+Runs with numpy alone (torch only trains). The clip is brought to 30 Hz, seen plain and in a mirror,
+and the mean of both answers is brought back to the clip's own frames.
+"""
+
+from dataclasses import dataclass as plain_dataclass
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+from pydantic import ConfigDict
+from pydantic.dataclasses import dataclass
+
+from robojackson.mocap.landmarks.blazepose import BODY
+from robojackson.mocap.landmarks.refinement import carry_along
+from robojackson.mocap.temporal import error_flow, features
+from robojackson.mocap.temporal.features import Sight
+from robojackson.mocap.temporal.temporal_network import load, run
+
+WEIGHTS = Path(__file__).parents[2] / "assets" / "temporal.safetensors"
+HIDDEN_BELOW = 0.35
+"""A limb whose landmarks are less visible than this counts as hidden."""
+
+
+@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
+class TemporalConfig:
+    """How the temporal network is used.
+
+    Attributes:
+        enabled: Whether to correct the detector at all.
+        weights: Weights file; None is the one that comes with the package.
+        trust: Share of the correction that is applied to what was seen; the detector errs otherwise
+            on real people than on rendered ones, and a hidden joint has nothing else to go by.
+        depth_floor_m: Least spread of a corrected depth, metres.
+        hypothesis: 0 is the likeliest motion; n > 0 the n-th sample of what hidden limbs may do.
+        seed: Of the samples.
+    """
+
+    enabled: bool = True
+    weights: str | None = None
+    trust: float = 0.8
+    depth_floor_m: float = 0.02
+    hypothesis: int = 0
+    seed: int = 0
+
+    @property
+    def file(self) -> Path:
+        """Where the weights are."""
+        return Path(self.weights) if self.weights else WEIGHTS
+
+
+@plain_dataclass(frozen=True)
+class Lifted:
+    """What the network makes of a clip.
+
+    Attributes:
+        points: All landmarks before the camera, metres.
+        spread: Of the twelve across the image and in depth, metres: mean absolute error.
+    """
+
+    points: Float[np.ndarray, "T 33 3"]
+    spread: Float[np.ndarray, "T 12 2"]
+
+    def depth_sd(self, least_m: float) -> Float[np.ndarray, "T 12"]:
+        """Standard deviation of the depths, metres: 1.25 times a mean absolute error (Gauss)."""
+        return np.maximum(1.25 * self.spread[..., 1], least_m)
+
+
+def lift(
+    placed: Float[np.ndarray, "T 33 3"],
+    local: Float[np.ndarray, "T 33 3"],
+    visibility: Float[np.ndarray, "T 33"],
+    fps: float,
+    config: TemporalConfig,
+) -> Lifted:
+    """The landmarks with the body corrected; face, hands and feet follow what they hang on.
+
+    Args:
+        placed: Landmarks before the camera (`camera.place`), metres.
+        local: The detector's own, metres.
+        visibility: 0..1.
+        fps: Frames a second.
+        config: Of the network.
+    Raises:
+        BadWeights: the weights file is none of this network's.
+    """
+    weights = load(config.file)
+    sight = features.look(placed, local, visibility)
+    places = features.time_grid(len(placed), fps)
+    coarse = at(sight, places)
+    change, spread, hidden = correct(coarse, weights)
+    if config.hypothesis:
+        rng = np.random.default_rng([config.seed, config.hypothesis])
+        change = change + imagine(hidden, spread, coarse.visibility, weights, rng)
+    back = np.clip(np.arange(len(placed)) * features.FPS / fps, 0.0, len(places) - 1.0)
+    seen = 1.0 - unseen(visibility)[..., None]
+    change = (1.0 - (1.0 - config.trust) * seen) * features.resample(change, back)
+    points = features.to_camera(sight, corrected(sight, change))
+    return Lifted(carry_along(placed, points), features.resample(spread, back))
+
+
+def corrected(sight: Sight, change: Float[np.ndarray, "T 12 3"]) -> Float[np.ndarray, "T 12 3"]:
+    """The body along the rays: depth of detector and correction, the image at that depth."""
+    depth = sight.local[:, BODY, 2] + change[..., 2]
+    across = features.at_depth(sight, depth) + change[..., :2]
+    return np.concatenate([across, depth[..., None]], -1)
+
+
+def correct(
+    sight: Sight, weights: error_flow.Weights
+) -> tuple[np.ndarray, Float[np.ndarray, "T 12 2"], np.ndarray]:
+    """Correction (T, 12, 3), spread, and the features of the plain view."""
+    plain, spread, hidden = run(sight, weights)
+    other, other_spread, _ = run(features.mirror(sight), weights)
+    flip = np.array([-1.0, 1.0, 1.0])
+    change = (plain + features.mirror_body(other) * flip) / 2.0
+    return change, np.sqrt(spread * features.mirror_body(other_spread)), hidden
+
+
+def imagine(
+    hidden: np.ndarray,
+    spread: np.ndarray,
+    visibility: np.ndarray,
+    weights: error_flow.Weights,
+    rng: np.random.Generator,
+) -> Float[np.ndarray, "T 12 3"]:
+    """Another course of the joints that are not seen, from a sampled embedding."""
+    z = error_flow.sample(len(hidden), weights, rng)
+    error = error_flow.to_error(z, hidden, weights) - error_flow.to_error(
+        np.zeros_like(z), hidden, weights
+    )
+    metres = error.reshape(len(hidden), -1, 3) * spread[..., [0, 0, 1]]
+    return np.asarray(metres * np.sqrt(unseen(visibility))[..., None])
+
+
+def unseen(visibility: Float[np.ndarray, "T 33"]) -> Float[np.ndarray, "T 12"]:
+    """1 for a joint that nobody saw, 0 from `HIDDEN_BELOW` on."""
+    return np.clip((HIDDEN_BELOW - visibility[:, BODY]) / HIDDEN_BELOW, 0.0, 1.0)
+
+
+def at(sight: Sight, places: Float[np.ndarray, " S"]) -> Sight:
+    """The sight at other moments; the axes are not blended, nobody needs them there."""
+    nearest = np.round(places).astype(int)
+    return replace(
+        sight,
+        flat=features.resample(sight.flat, places),
+        local=features.resample(sight.local, places),
+        visibility=features.resample(sight.visibility, places),
+        root=features.resample(sight.root, places),
+        axes=sight.axes[nearest],
+    )

@@ -1,0 +1,72 @@
+"""The temporal network: dilated convolutions over 81 frames at 30 Hz.
+
+It gives for each of the twelve joints a correction of the detector's place (metres along the ray
+axes) and its spread across the image and in depth. Numpy; `tools/temporal/net.py` is its twin in
+torch, which is trained.
+"""
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from robojackson.errors import BadWeights
+from robojackson.mocap.landmarks.blazepose import BODY
+from robojackson.mocap.temporal import features
+from robojackson.mocap.temporal.error_flow import Weights
+from robojackson.mocap.temporal.features import Sight
+
+DILATIONS = (1, 3, 9, 27)
+LOG_SPREAD, SPREAD_RANGE = -3.0, 3.0
+"""Middle of the logarithm of the spread, metres, and how far it may go either way."""
+
+
+def run(sight: Sight, weights: Weights) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """One pass: correction, spread, features."""
+    x = (features.numbers(sight) - weights["mean"]) * weights["scale"]
+    h = x @ weights["enter.weight"].T + weights["enter.bias"]
+    for block, dilation in enumerate(DILATIONS):
+        h = h + _block(h, f"blocks.{block}", dilation, weights)
+    out = h @ weights["leave.weight"].T + weights["leave.bias"]
+    out = out.reshape(len(out), len(BODY), 5)
+    return out[..., :3], np.exp(np.clip(out[..., 3:], -SPREAD_RANGE, SPREAD_RANGE) + LOG_SPREAD), h
+
+
+@cache
+def load(path: Path) -> Weights:
+    """The arrays of a weights file, in single precision.
+
+    Raises:
+        BadWeights: not safetensors, or arrays that are missing.
+    """
+    from safetensors import SafetensorError
+    from safetensors.numpy import load_file
+
+    try:
+        arrays = {name: value.astype(np.float32) for name, value in load_file(path).items()}
+    except (SafetensorError, OSError) as error:
+        raise BadWeights(f"{path}: not a weights file of the temporal network ({error})") from None
+    wanted = {"mean", "scale", "enter.weight", "leave.weight", "flow.memory", "flow.read.weight"}
+    if missing := sorted(wanted - set(arrays)):
+        raise BadWeights(
+            f"{path}: not a weights file of the temporal network: {', '.join(missing)} missing; "
+            "leave temporal.weights empty for the one that comes with RoboJackson"
+        )
+    if arrays["mean"].shape != (features.COUNT,):
+        raise BadWeights(
+            f"{path}: reads {arrays['mean'].size} numbers a frame, this version gives "
+            f"{features.COUNT}; train it again: python -m tools.temporal.train_temporal"
+        )
+    return arrays
+
+
+def _block(h: np.ndarray, name: str, dilation: int, weights: Weights) -> np.ndarray:
+    """Normalise, three frames so far apart, mix; the ends are held."""
+    centred = h - h.mean(-1, keepdims=True)
+    normal = centred / np.sqrt((centred**2).mean(-1, keepdims=True) + 1e-5)
+    normal = normal * weights[f"{name}.norm.weight"] + weights[f"{name}.norm.bias"]
+    held = np.pad(normal, ((dilation, dilation), (0, 0)), mode="edge")
+    taps = [held[tap * dilation : tap * dilation + len(h)] for tap in range(3)]
+    inner = np.concatenate(taps, -1) @ weights[f"{name}.spread.weight"].T
+    inner = np.maximum(inner + weights[f"{name}.spread.bias"], 0.0)
+    return np.asarray(inner @ weights[f"{name}.mix.weight"].T + weights[f"{name}.mix.bias"])

@@ -1,0 +1,1 @@
+"""Configuration and tables of a whole pass."""

@@ -1,0 +1,55 @@
+"""What the whole pipeline does with a video: one section a stage, each defined beside its code."""
+
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass
+
+from robojackson.clips.people.dancer import DancerConfig
+from robojackson.clips.pose_detector import Size
+from robojackson.clips.quality.stability import StabilityConfig
+from robojackson.clips.video import VideoLimits
+from robojackson.mocap.landmarks.pipeline import Quality
+from robojackson.mocap.networks.network_config import NetworkConfig
+from robojackson.mocap.recover import MocapConfig
+from robojackson.report.video.side_by_side import VideoConfig
+from robojackson.retarget.retargeting import RetargetConfig
+from robojackson.rl.config.train_config import EvaluateConfig, TrainConfig
+
+
+@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+class PipelineConfig:
+    """One pass from a video to a robot that dances.
+
+    Attributes:
+        robot: Name of the robot description (`configs/robots/<robot>.yaml`).
+        setup: Name under which the training is recorded.
+        minutes: Wall time of the whole pass, minutes.
+        other_minutes: Share of it that the stages other than training get, minutes.
+        scoring_detector: Size of the pose model that scores candidates.
+        detector: Pose model that feeds mocap; best lets two vote.
+        dancer: Who of several people is danced.
+        gate: Refuse to train on a reference motion that breaks a hard bar of its score card.
+        network: Published networks whose weights the user brings; none by default.
+        video, stability, mocap, retarget, train, evaluate, show: Of the stages.
+    """
+
+    robot: str = "humanoid"
+    setup: str = "scratch"
+    minutes: float = Field(default=12.0, gt=0)
+    other_minutes: float = Field(default=3.0, ge=0)
+    scoring_detector: Size = "lite"
+    detector: Quality = "full"
+    dancer: DancerConfig = Field(default_factory=DancerConfig)
+    gate: bool = True
+    video: VideoLimits = Field(default_factory=VideoLimits)
+    stability: StabilityConfig = Field(default_factory=StabilityConfig)
+    network: NetworkConfig = Field(default_factory=NetworkConfig)
+    mocap: MocapConfig = Field(default_factory=MocapConfig)
+    retarget: RetargetConfig = Field(default_factory=RetargetConfig)
+    train: TrainConfig = Field(default_factory=TrainConfig)
+    evaluate: EvaluateConfig = Field(default_factory=EvaluateConfig)
+    show: VideoConfig = Field(default_factory=VideoConfig)
+
+    @property
+    def train_minutes(self) -> float:
+        """What is left for training, at least half a minute."""
+        return max(0.5, self.minutes - self.other_minutes)

@@ -1,0 +1,219 @@
+"""YAML to frozen dataclasses: unknown keys are refused with the file and the path of the key.
+
+A name such as `smoke` or `robots/humanoid` is a file of `configs`; whatever has a YAML suffix is
+a path. YAML is read as version 1.2 does it: `yes`, `no`, `on` and `off` are words, and a key that
+stands twice is an error.
+"""
+
+import difflib
+import re
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any, TypeVar, get_args, get_type_hints
+
+import yaml
+from pydantic import TypeAdapter, ValidationError
+
+from robojackson.errors import BadConfiguration, UnknownName
+
+Config = TypeVar("Config")
+FOLDER = Path(__file__).parents[2] / "configs"
+"""Of the shipped YAML, in the checkout and where the package is installed."""
+SUFFIXES = (".yaml", ".yml")
+
+
+def load(
+    cls: type[Config], name_or_path: str | Path | None, overrides: Mapping[str, Any] | None = None
+) -> Config:
+    """A configuration, with its defaults where the file says nothing.
+
+    Args:
+        cls: A frozen pydantic dataclass.
+        name_or_path: `base`, `robots/humanoid`, or the path of a YAML file; None is no file.
+        overrides: Values by key path (`{"train.seed": 3}`); text is read as YAML.
+    Raises:
+        UnknownName: no such file.
+        BadConfiguration: an unknown key, a wrong value, or no YAML.
+    """
+    path = None if name_or_path is None else find(name_or_path)
+    values = _read(path) if path else {}
+    given = {
+        key_path: _parsed(value, f"--set {key_path}")
+        for key_path, value in (overrides or {}).items()
+    }
+    for key_path, value in given.items():
+        _set(values, key_path.split("."), value)
+    where = _told(path) if path else "--set"
+    try:
+        return TypeAdapter(cls).validate_python(values)
+    except ValidationError as cause:
+        key = ".".join([*_keys(cause), ""])
+        blamed = [g for g in given if key.startswith(f"{g}.") or f"{g}.".startswith(key)]
+        why = _explain(cls, cause)
+        if blamed:  # of several values that do not go together, those that the reason names
+            named = [g for g in blamed if g.removeprefix(key) in why]
+            where = f"--set {', '.join(named or blamed)}"
+        raise BadConfiguration(f"{where}: {why}") from cause
+
+
+def build(cls: type[Config], values: Mapping[str, Any], where: str) -> Config:
+    """A configuration from a mapping.
+
+    Raises:
+        BadConfiguration: an unknown key or a wrong value; the message has `where` and the key.
+    """
+    try:
+        return TypeAdapter(cls).validate_python(dict(values))
+    except ValidationError as cause:
+        raise BadConfiguration(f"{where}: {_explain(cls, cause)}") from cause
+
+
+def find(name_or_path: str | Path) -> Path:
+    """The file of a configuration.
+
+    Raises:
+        UnknownName: there is none; the message lists those that exist.
+    """
+    given = Path(name_or_path)
+    if given.suffix in SUFFIXES:
+        if given.is_file():
+            return given
+        raise UnknownName("configuration file", str(given), "as a path", names())
+    path = FOLDER / f"{given}.yaml"
+    if path.is_file() and path.resolve().is_relative_to(FOLDER.resolve()):
+        return path
+    folder = given.parent.name
+    kind = re.sub("ies$", "y", folder).removesuffix("s") or "configuration"
+    raise UnknownName(kind, given.name, _told(path), names(folder))
+
+
+def names(folder: str = "") -> tuple[str, ...]:
+    """The configurations of this package, or of one folder of it."""
+    return tuple(sorted(path.stem for path in (FOLDER / folder).glob("*.yaml")))
+
+
+def _told(path: Path) -> str:
+    """What a person calls the file."""
+    inside = path.is_relative_to(FOLDER)
+    return f"configs/{path.relative_to(FOLDER).as_posix()}" if inside else str(path)
+
+
+class _Yaml12(yaml.SafeLoader):
+    """SafeLoader with the scalars of YAML 1.2, in which 010 is ten and nothing a date, and no
+    doubled keys."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        seen: set[Any] = set()
+        for key_node, _ in node.value:
+            key = self.construct_object(key_node, deep=True)
+            if key in seen:
+                raise yaml.constructor.ConstructorError(
+                    None, None, f"key {key!r} stands twice", key_node.start_mark
+                )
+            seen.add(key)
+        return super().construct_mapping(node, deep)
+
+
+BASES = {"0o": 8, "0x": 16}
+ANEW = (":bool", ":float", ":int", ":timestamp")
+_Yaml12.yaml_implicit_resolvers = {
+    first: [(tag, pattern) for tag, pattern in rules if not tag.endswith(ANEW)]
+    for first, rules in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
+_Yaml12.add_implicit_resolver(
+    "tag:yaml.org,2002:bool", re.compile(r"^(?:true|True|TRUE|false|False|FALSE)$"), list("tTfF")
+)
+_Yaml12.add_implicit_resolver(
+    "tag:yaml.org,2002:float",
+    re.compile(r"^[-+]?(?:(?:\d+\.\d*|\.\d+)(?:[eE][-+]?\d+)?|\d+[eE][-+]?\d+|\.inf|\.nan)$"),
+    list("-+0123456789."),
+)
+_Yaml12.add_implicit_resolver(
+    "tag:yaml.org,2002:int",
+    re.compile(r"^(?:[-+]?\d+|0o[0-7]+|0x[0-9a-fA-F]+)$"),
+    list("-+0123456789"),
+)
+_Yaml12.add_constructor(
+    "tag:yaml.org,2002:int",
+    lambda loader, node: int(text := loader.construct_scalar(node), BASES.get(text[:2], 10)),
+)
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        values = _parsed(path.read_text(encoding="utf-8"), _told(path))
+    except (OSError, UnicodeDecodeError) as cause:
+        raise BadConfiguration(f"{_told(path)}: cannot be read ({cause})") from cause
+    if values is None:
+        return {}
+    if not isinstance(values, dict):
+        raise BadConfiguration(
+            f"{_told(path)}: holds {type(values).__name__}, expected keys and values"
+        )
+    return values
+
+
+def _parsed(value: Any, where: str) -> Any:
+    if not isinstance(value, str):
+        return value
+    try:
+        return yaml.load(value, Loader=_Yaml12)
+    except (yaml.YAMLError, ValueError, TypeError, RecursionError) as cause:
+        raise BadConfiguration(f"{where}: {' '.join(str(cause).split())}") from cause
+
+
+def _set(values: dict[str, Any], keys: list[str], value: Any) -> None:
+    for key in keys[:-1]:
+        inner = values.get(key)
+        values[key] = dict(inner) if isinstance(inner, dict) else {}
+        values = values[key]
+    values[keys[-1]] = value
+
+
+def _explain(cls: type, cause: ValidationError) -> str:
+    """The first error in one line."""
+    error = cause.errors()[0]
+    path = _keys(cause)
+    where = ".".join(path) or cls.__name__
+    if error["type"] in ("unexpected_keyword_argument", "extra_forbidden"):
+        known = _keys_at(cls, path[:-1])
+        close = difflib.get_close_matches(path[-1], known, 1)
+        hint = f" Did you mean {close[0]!r}?" if close else ""
+        return f"unknown key {where!r}.{hint} Known: {', '.join(known)}"
+    if error["type"] in ("missing", "missing_argument"):
+        return f"key {where!r} is missing"
+    if error["type"] == "value_error" and isinstance(error["input"], Mapping):
+        return str(error["ctx"]["error"])  # values that do not go together, each right by itself
+    return f"{where!r} is {error['input']!r}: {_wanted(cause)}"
+
+
+def _wanted(cause: ValidationError) -> str:
+    """What the first wrong value should be; of a union, every alternative."""
+    errors = cause.errors()
+    key = errors[0]["loc"]
+    if not key or not _is_branch(key[-1]):
+        return errors[0]["msg"]
+    told = [error["msg"] for error in errors if error["loc"][:-1] == key[:-1]]
+    return " or ".join([told[0], *(each.removeprefix("Input should be ") for each in told[1:])])
+
+
+def _keys(cause: ValidationError) -> list[str]:
+    """The path of the key of the first error."""
+    return [str(part) for part in cause.errors()[0]["loc"] if not _is_branch(part)]
+
+
+def _is_branch(part: int | str) -> bool:
+    """Pydantic puts the tried type of a union between the keys."""
+    return isinstance(part, str) and ("[" in part or part == "dataclass")
+
+
+def _keys_at(cls: Any, path: list[str]) -> list[str]:
+    """The keys that a dataclass allows at a path; none where it cannot be told."""
+    for key in path:
+        candidates = [c for c in (cls, *get_args(cls)) if is_dataclass(c)]
+        if not candidates:
+            return []
+        cls = get_type_hints(candidates[0]).get(key)
+    found = [c for c in (cls, *get_args(cls)) if is_dataclass(c)]
+    return [field.name for field in fields(found[0])] if found else []

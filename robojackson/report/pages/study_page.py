@@ -1,0 +1,173 @@
+"""The page of a study: what the paper claims, Table II in numbers, curves, and what it all means.
+
+Table II of the paper has adjectives; here each is a mean over seeds with its 95 % interval. Beside
+the return with all bonuses in, as the paper shows it, stands what every policy is worth under one
+yardstick: curiosity off, lambda fixed, stock physics.
+"""
+
+import base64
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import resources
+from itertools import groupby
+from typing import Any
+
+import jinja2
+
+from robojackson.metrics.ablation_statistics import Claim, Comparison, Effect, Estimate
+from robojackson.report.pages.run_page import Plot
+
+FIGURES: Mapping[str, tuple[str, int, float]] = {
+    "final_return": ("return at the end, bonuses in", 1, 1.0),
+    "area": ("mean return while learning", 1, 1.0),
+    "steps_to": ("steps to the threshold", 0, 1.0),
+    "return_own": ("return by the yardstick", 1, 1.0),
+    "survived_s": ("survival, s", 2, 1.0),
+    "stand_s": ("survival from the stand, s", 2, 1.0),
+    "strict_success": ("strict success, %", 0, 100.0),
+    "skill": ("skill", 2, 1.0),
+    "limb_gain": ("limb gain", 2, 1.0),
+}
+"""Columns of the table: title, digits, factor."""
+BODIES = {
+    "statue": "statue",
+    "mean_pose": "mean pose",
+    "flail": "flailing body",
+    "zero_residual": "zero residual",
+}
+"""Who does not dance, by the names of `robojackson.rl.evaluation.reward_audit`."""
+
+Payments = Mapping[str, Mapping[str, float]]
+"""By setup: the share of a perfect dance's reward that each body earns, by its name."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """One row of the table.
+
+    Attributes:
+        move, setup: What was trained, or the name of a baseline.
+        seeds: How many.
+        values: Estimates by name of the figure.
+        baseline: Whether nothing was learnt.
+    """
+
+    move: str
+    setup: str
+    seeds: int
+    values: Mapping[str, Estimate]
+    baseline: bool = False
+
+
+@dataclass(frozen=True)
+class StudyContent:
+    """What the page shows.
+
+    Attributes:
+        title: Of the study.
+        facts: How it was done, by name.
+        claims: What the paper says, and what was found.
+        lines: The table.
+        comparisons: The yardstick's differences between setups, move by move.
+        payments: What the rewards pay to bodies that do not dance, by move.
+        moves: For each move a picture: frame, recovered body, robot (Figures 2-4).
+        curves: Learning curves (Figures 5-13).
+        judged: Pictures of the judgement.
+        notes: Warnings for the reader.
+    """
+
+    title: str
+    facts: Mapping[str, Any] = field(default_factory=dict)
+    claims: Sequence[Claim] = ()
+    lines: Sequence[Line] = ()
+    comparisons: Sequence[Comparison] = ()
+    payments: Mapping[str, Payments] = field(default_factory=dict)
+    moves: Sequence[Plot] = ()
+    curves: Sequence[Plot] = ()
+    judged: Sequence[Plot] = ()
+    notes: Sequence[str] = ()
+
+
+def render(content: StudyContent) -> str:
+    """The page as HTML, one file with everything in it."""
+    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
+    here, compared = resources.files("robojackson.report.pages"), content.comparisons
+    template = environment.from_string(here.joinpath("study.html").read_text("utf-8"))
+    return template.render(
+        content=content,
+        style=here.joinpath("page.css").read_text("utf-8"),
+        columns=[title for title, _, _ in FIGURES.values()],
+        moves=[
+            (
+                move,
+                [(line, [cell(line.values.get(k), k, line.seeds) for k in FIGURES]) for line in of],
+            )
+            for move, of in groupby(content.lines, lambda line: line.move)
+        ],
+        effects=[(c, [_difference(found) for found in c.effects.values()]) for c in compared],
+        compared_on=list(compared[0].effects) if compared else [],
+        paid={move: _by_reward(paid) for move, paid in content.payments.items()},
+        bodies=BODIES,
+        claims=[(claim, sentence(claim)) for claim in content.claims],
+        groups=[
+            ("The moves", _encoded(content.moves)),
+            ("While learning", _encoded(content.curves)),
+            ("Judged alike", _encoded(content.judged)),
+        ],
+    )
+
+
+def cell(value: Estimate | None, key: str, seeds: int) -> tuple[str, list[str]]:
+    """A mean, a dash where there is none; its interval, and of how many seeds if not of all."""
+    if value is None or math.isnan(value.mean):
+        return "–", []
+    _, digits, factor = FIGURES[key]
+    if math.isinf(value.mean):
+        return "never", []
+    spread = []
+    if value.low < value.high:
+        spread.append(f"[{factor * value.low:z,.{digits}f}, {factor * value.high:z,.{digits}f}]")
+    if value.count < seeds:
+        spread.append(f"({value.count} of {seeds})")
+    return f"{factor * value.mean:z,.{digits}f}", spread
+
+
+def sentence(claim: Claim) -> str:
+    """What was found of a claim, in words and numbers."""
+    if claim.effect is None:
+        return f"Not measured here: {claim.treated} or {claim.control} was not trained."
+    found = claim.effect.difference
+    how = {
+        "holds": "Holds here",
+        "reversed": "The opposite holds here",
+        "not shown": "Not shown here",
+    }[claim.verdict]
+    told = f"{how}: {claim.treated} minus {claim.control} is {found.mean:+.3g}"
+    if math.isfinite(found.low):
+        told += f" [{found.low:+.3g}, {found.high:+.3g}]"
+    told += f" over {found.count} paired seed{'s' if found.count != 1 else ''}"
+    if math.isfinite(claim.effect.p):
+        least = claim.effect.smallest_p
+        told += f", p = {claim.effect.p:.2g} (no smaller than {least:.2g} with so few)"
+    return f"{told}; {100 * claim.effect.improvement:.0f} % chance that one run of it is better."
+
+
+def _by_reward(paid: Payments) -> list[tuple[str, list[str]]]:
+    """Setups of one reward together, and its shares in per cent."""
+    told = {setup: [f"{100 * of[body]:.0f}" for body in BODIES] for setup, of in paid.items()}
+    rewards = dict.fromkeys(map(tuple, told.values()))
+    return [(", ".join(s for s in told if tuple(told[s]) == r), list(r)) for r in rewards]
+
+
+def _difference(found: Effect | None) -> str:
+    if found is None:
+        return "–"
+    told = f"{found.difference.mean:+,.1f}"
+    if math.isfinite(found.difference.low):
+        told += f" [{found.difference.low:+,.1f}, {found.difference.high:+,.1f}]"
+    return told
+
+
+def _encoded(plots: Sequence[Plot]) -> list[tuple[Plot, str]]:
+    return [(plot, base64.b64encode(plot.png).decode()) for plot in plots]

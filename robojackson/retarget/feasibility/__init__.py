@@ -1,0 +1,1 @@
+"""What the robot can do of a motion: dynamics, contact forces, tempo."""

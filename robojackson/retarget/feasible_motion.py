@@ -1,0 +1,158 @@
+"""Make a motion one that the robot can really do: repair what bends, slow down what does not.
+
+Rounds of solving with the dynamics term in the cost, its weight rising until enough steps are
+feasible or the motion would be bent too far; where that is not enough and the tempo is free, the
+motion is slowed down locally and repaired again.
+"""
+
+import logging
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from robojackson.metrics.retarget_error import keypoint_error_mm
+from robojackson.retarget.feasibility import tempo
+from robojackson.retarget.retarget_config import RetargetConfig
+from robojackson.retarget.solver.clip_problem import Problem
+from robojackson.retarget.solver.levenberg_marquardt import clip_to_limits, solve
+from robojackson.retarget.solver.whole_clip import faults, harden
+from robojackson.retarget.targets.keypoint_targets import Targets
+from robojackson.robot.model import Robot
+from robojackson.robot.resampling import resample
+from robojackson.robot.tree_kinematics import continuous, pose, tree
+
+_log = logging.getLogger(__name__)
+_HELPS = 0.7  # share of the excess that slowing down may leave
+_GUARD = 1.03  # a warp ends with a whole step: all tempos fall by less than that
+_LOOSE = 1e-5  # first damping: repair moves whole bodies over many steps
+_HARDLY_SLOWER = 0.97  # a tempo that is not worth a warp
+
+
+@dataclass(frozen=True)
+class Feasible:
+    """A motion after repair.
+
+    Attributes:
+        qpos: At the control step.
+        aims: Targets at its steps.
+        steps: Fractional step of the motion before that each step shows.
+    """
+
+    qpos: Float[np.ndarray, "S nq"]
+    aims: Targets
+    steps: Float[np.ndarray, " S"]
+
+
+def make_feasible(
+    robot: Robot, qpos: Float[np.ndarray, "S nq"], aims: Targets, config: RetargetConfig
+) -> Feasible:
+    """Repair a motion; slow it down where its tempo is free and that helps."""
+    given = Feasible(qpos, aims, np.arange(len(qpos), dtype=float))
+    how = config.repair
+    if not how.weights or share(robot, given, config) >= how.enough_share:
+        return given
+    found = _kept(robot, given, _solved(robot, given, how.weights[0], config), config)
+    rounds = how.slow_rounds if config.tempo == "auto" else 0
+    for _ in range(rounds):
+        slower = _slowed(robot, found, config)
+        if slower is None or _excess(robot, slower, config) > _HELPS * _excess(
+            robot, found, config
+        ):
+            break
+        found = slower
+    return _repaired(robot, given, found, config)
+
+
+def share(robot: Robot, motion: Feasible, config: RetargetConfig) -> float:
+    """Share of feasible steps."""
+    slack = _slack(robot, motion, config, tempo.GRID[:1])
+    return float((slack[0] <= 1.0).mean())
+
+
+def _excess(robot: Robot, motion: Feasible, config: RetargetConfig) -> float:
+    """Mean slack beyond the tolerance; one lost step counts as three tolerances."""
+    slack = _slack(robot, motion, config, tempo.GRID[:1])
+    return float(np.clip(slack - 1.0, 0.0, 3.0).mean())
+
+
+def _slack(robot: Robot, motion: Feasible, config: RetargetConfig, grid: np.ndarray) -> np.ndarray:
+    aims, tolerance = motion.aims, config.weights.tolerance
+    return tempo.slacks(robot, motion.qpos, aims.dt, aims.lap, tolerance, grid)
+
+
+def _solved(robot: Robot, motion: Feasible, weight: float, config: RetargetConfig) -> Feasible:
+    """Solve with the dynamics term; the hard bars hold afterwards where they can."""
+    problem = Problem.of(robot, motion.aims, replace(config.weights, dynamics=weight))
+    loose = replace(config.solver, damping=_LOOSE, tolerance=config.repair.tolerance)
+    rough = solve(problem, motion.qpos, loose, config.repair.iterations)
+    final = harden(problem, rough, config)
+    return replace(motion, qpos=continuous(clip_to_limits(robot, final.qpos)))
+
+
+def _slowed(robot: Robot, motion: Feasible, config: RetargetConfig) -> Feasible | None:
+    """The motion at the tempo that its steps ask for, solved again.
+
+    None where none asks, or where a hard bar would be broken.
+    """
+    aims = motion.aims
+    slack = _slack(robot, motion, config, tempo.GRID)
+    if (slack[0] <= 1.0).mean() >= config.repair.enough_share:
+        return None
+    rate = tempo.smooth_rate(tempo.wanted_rate(slack), aims.dt, aims.lap is not None)
+    so_far = np.gradient(motion.steps).clip(max=1.0)
+    rate = np.maximum(rate, np.minimum(_GUARD * config.repair.slowest / so_far, 1.0))
+    if rate.min() > _HARDLY_SLOWER:
+        return None
+    steps = tempo.warp(rate, aims.lap is not None)
+    _log.info("slowed down to %.2f at the slowest", rate.min())
+    slower = Feasible(
+        qpos=clip_to_limits(robot, resample(motion.qpos, steps, aims.lap)),
+        aims=tempo.warped(aims, steps),
+        steps=tempo.times_at(motion.steps, steps),
+    )
+    solved = _solved(robot, slower, config.repair.weights[0], config)
+    kept = _kept(robot, slower, solved, config)
+    # Limbs that passed through each other between two steps are seen to do so when slowed down.
+    return kept if _holds(robot, kept, config) else None
+
+
+def _kept(robot: Robot, before: Feasible, after: Feasible, config: RetargetConfig) -> Feasible:
+    """The motion after a repair, or the one before where the repair broke a hard bar or bent it too
+    far."""
+    dearest = config.repair.dearest_mm + _error_mm(robot, before)
+    good = _error_mm(robot, after) <= dearest and _holds(robot, after, config)
+    return after if good else before
+
+
+def _holds(robot: Robot, motion: Feasible, config: RetargetConfig) -> bool:
+    """Whether nothing is too deep in the floor or in another limb, nothing has jumped through one,
+    and no hinge is too fast."""
+    problem = Problem.of(robot, motion.aims, config.weights)
+    broken = faults(problem, motion.qpos, config)
+    if bad := broken.deep or broken.fast or broken.jumps:
+        _log.info("repair undone: %s", broken)
+    return not bad
+
+
+def _repaired(robot: Robot, given: Feasible, found: Feasible, config: RetargetConfig) -> Feasible:
+    """Raise the weight until enough steps are feasible or the motion would be bent too far."""
+    how = config.repair
+    dearest = how.dearest_mm + _error_mm(robot, given)
+    best, good = found, share(robot, found, config)
+    for weight in how.weights[1:]:
+        if good >= how.enough_share:
+            break
+        found = _solved(robot, found, weight, config)
+        _log.info("weight %g: %.0f %% feasible", weight, 100 * share(robot, found, config))
+        if _error_mm(robot, found) > dearest or not _holds(robot, found, config):
+            break
+        best, good = found, share(robot, found, config)
+    return best
+
+
+def _error_mm(robot: Robot, motion: Feasible) -> float:
+    """Mean keypoint error against the motion's own targets."""
+    at = pose(tree(robot), motion.qpos).site_pos
+    error = keypoint_error_mm(at, motion.aims.keypoints_w, robot.keypoint_weights > 0)
+    return float(error.mean())

@@ -1,0 +1,84 @@
+"""The gate: refuses a reference motion that training cannot follow, and says what would mend it."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from robojackson.errors import RejectedReference
+from robojackson.motion.reference_motion import ReferenceMotion
+
+BARS: Mapping[str, float] = {
+    "nan_count": 0.0,
+    "limit_violations": 0.0,
+    "quat_error": 1e-6,
+    "floor_penetration_mm": 5.0,
+    "self_penetration_mm": 5.0,
+    "speed_over_limit": 1.0,
+    "planted_slip_cm_s": 1.0,
+    "planted_slip_p95_cm_s": 3.0,
+    "contact_gap_mm": 5.0,
+    "unsupported_share": 0.05,
+    "seam_deg": 5.0,
+    "seam_mm": 5.0,
+    "seam_speed_rad_s": 1.0,
+    "infeasible_share": 0.1,
+    "fallen_share": 0.0,
+}
+"""Largest allowed value of each gated figure (issue 2, stage 4)."""
+
+_FINDINGS = 2  # that an error message tells
+_TRIM = "(`robojackson dance CLIP --start S --end S`)"
+_MENDING = {
+    "infeasible_share": f"tempo: auto, a shorter range of the clip {_TRIM}, or a stronger robot",
+    "fallen_share": f"a range of the clip without it {_TRIM}",
+    "seam_deg": "cyclic: no",
+    "seam_mm": "cyclic: no",
+    "seam_speed_rad_s": "cyclic: no",
+    "speed_over_limit": "a slower tempo",
+    "planted_slip_cm_s": "method: optimise, or better contact labels",
+    "contact_gap_mm": "method: optimise, or better contact labels",
+    "unsupported_share": "method: optimise, or better contact labels",
+}
+
+
+def failures(card: Mapping[str, float]) -> list[str]:
+    """Names of the gated figures over their bars; one that is missing or not a number fails."""
+    return [name for name, bar in BARS.items() if not card.get(name, np.nan) <= bar]
+
+
+def told(motion: ReferenceMotion) -> dict[str, Any]:
+    """The card as it is written beside the motion: the figures, and the findings in words."""
+    found = motion.certificate
+    return {**motion.scorecard, "findings": [str(f) for f in found.findings] if found else []}
+
+
+def check(card: Mapping[str, Any]) -> None:
+    """The gate of training: a card with its figures and findings, as `told` makes it.
+
+    Raises:
+        RejectedReference: A figure is over its bar; the message names it and what may mend it.
+    """
+    if not set(BARS) & set(card):
+        raise RejectedReference(
+            "reference refused: it has no score card, so nobody knows whether the robot can follow "
+            "it; make one with `robojackson retarget`, or --force"
+        )
+    failed = failures(card)
+    if failed:
+        name = failed[0]
+        others = f" (and {', '.join(failed[1:])})" if failed[1:] else ""
+        raise RejectedReference(
+            f"reference refused: {name} is {card.get(name, np.nan):.4g}, at most {BARS[name]:g} is "
+            f"allowed{others}{_reasons(name, card)}; "
+            f"try {_MENDING.get(name, 'method: optimise')}, or --force"
+        )
+
+
+def _reasons(name: str, card: Mapping[str, Any]) -> str:
+    """The first findings, where they are the reason."""
+    findings = card.get("findings", ())
+    if name not in ("infeasible_share", "fallen_share") or not findings:
+        return ""
+    more = f" (and {len(findings) - _FINDINGS} more)" if len(findings) > _FINDINGS else ""
+    return ": " + ", ".join(findings[:_FINDINGS]) + more

@@ -1,0 +1,1 @@
+"""The solver of a whole clip and the terms of its cost."""

@@ -1,0 +1,99 @@
+"""The cost of a whole clip: squared residuals in Gauss-Newton form.
+
+sum over frames of  w_k |x_k(q) - target|^2  (keypoints)  +  w_h z^2  (soles on the floor)
++ w_s |J_ground(q) v|^2  (planted soles do not slip)  +  w_p min(0, distance)^2  (floor and self)
++ w_a |a|^2  (tangent accelerations)  +  w_v max(0, |v| - v_max)^2  (hinge speed)
++  w_r |q - rest|^2  (posture).
+Metres, radians, seconds; every sum has one term a frame, so that weights hold at any frame rate.
+"""
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from robojackson.retarget.solver.block_banded import Normal
+from robojackson.retarget.solver.clip_problem import Problem
+from robojackson.retarget.solver.contact_terms import add_balance, add_collisions, add_soles
+from robojackson.retarget.solver.dynamics_term import add_dynamics
+from robojackson.robot.tree_kinematics import Posed, point_jacobian
+
+_ROOT_ACCELERATION = np.array([8.0] * 3 + [3.0] * 3)  # m/s2 and rad/s2 beside the hinges' rad/s2
+
+
+def linearise(problem: Problem, qpos: Float[np.ndarray, "N nq"]) -> Normal:
+    """Cost, gradient and Gauss-Newton blocks at a motion."""
+    out = Normal.empty(len(qpos), qpos.shape[1] - 1)
+    posed, touches = problem.detector.look(problem.tree, qpos)
+    velocity = problem.velocity(qpos)
+    keypoint_normal(problem, posed, out)
+    add_soles(problem, posed, out)
+    add_balance(problem, posed, out)
+    add_dynamics(problem, qpos, posed, out)
+    add_collisions(problem, posed, touches, out)
+    _posture(problem, qpos, out)
+    _acceleration(problem, velocity, out)
+    _speed(problem, velocity, out)
+    return out
+
+
+def keypoint_normal(
+    problem: Problem, posed: Posed, out: Normal, frames: Int[np.ndarray, " N"] | None = None
+) -> Float[np.ndarray, " N"]:
+    """Add the keypoint term; returns its cost a frame.
+
+    Args:
+        frames: Whose targets the poses have; those of the clip in order when None.
+    """
+    which = slice(None) if frames is None else frames
+    weight = np.sqrt(problem.targets.weights[which])
+    residual = (posed.site_pos - problem.targets.keypoints_w[which]) * weight[..., None]
+    jacobian = point_jacobian(problem.tree, posed, posed.site_pos, problem.tree.site_body)
+    jacobian *= weight[..., None, None]
+    count, unknowns = out.gradient.shape
+    out.add_rows(residual.reshape(count, -1), jacobian.reshape(count, -1, unknowns))
+    return np.asarray(0.5 * np.sum(residual**2, axis=(1, 2)))
+
+
+def _posture(problem: Problem, qpos: np.ndarray, out: Normal) -> None:
+    away = qpos[:, 7:] - problem.robot.rest
+    weight = problem.weights.posture
+    hinge = np.arange(6, out.gradient.shape[1])
+    out.cost += 0.5 * weight * float(np.sum(away**2))
+    out.gradient[:, 6:] += weight * away
+    out.blocks[0][:, hinge, hinge] += weight
+
+
+def _acceleration(problem: Problem, velocity: np.ndarray, out: Normal) -> None:
+    """Second differences, coupling three frames with coefficients 1, -2, 1."""
+    dt, frames = problem.targets.dt, len(out.gradient)
+    following = np.concatenate([velocity[1:], velocity[:1]]) if problem.ring else velocity[1:]
+    acceleration = (following - velocity[: len(following)]) / dt
+    weight = np.ones(velocity.shape[1])
+    weight[:6] = _ROOT_ACCELERATION
+    weight *= problem.weights.acceleration
+    out.cost += 0.5 * float(np.sum(weight * acceleration**2))
+    unknown = np.arange(len(weight))
+    first = np.arange(len(acceleration))
+    factors = np.array([1.0, -2.0, 1.0]) / dt**2
+    for i, a in enumerate(factors):
+        rows = (first + i) % frames
+        out.gradient[rows] += a * weight * acceleration
+        for j in range(i, 3):
+            out.blocks[j - i][rows[:, None], unknown, unknown] += a * factors[j] * weight
+
+
+def _speed(problem: Problem, velocity: np.ndarray, out: Normal) -> None:
+    """Hinge on hinge speeds over their share of the limit."""
+    limit = problem.weights.speed_share * problem.robot.description.max_joint_speed
+    excess = np.sign(velocity) * np.maximum(0.0, np.abs(velocity) - limit)
+    excess[:, :6] = 0.0
+    frame, unknown = np.nonzero(excess)
+    if not len(frame):
+        return
+    weight, dt, over = problem.weights.speed, problem.targets.dt, excess[frame, unknown]
+    following = (frame + 1) % len(out.gradient)
+    out.cost += 0.5 * weight * float(np.sum(over**2))
+    np.add.at(out.gradient, (frame, unknown), -weight * over / dt)
+    np.add.at(out.gradient, (following, unknown), weight * over / dt)
+    np.add.at(out.blocks[0], (frame, unknown, unknown), weight / dt**2)
+    np.add.at(out.blocks[0], (following, unknown, unknown), weight / dt**2)
+    np.add.at(out.blocks[1], (frame, unknown, unknown), -weight / dt**2)

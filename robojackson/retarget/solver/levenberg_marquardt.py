@@ -1,0 +1,172 @@
+"""Projected Levenberg-Marquardt over a whole clip: hinges never leave their limits.
+
+Active limits are taken out of the system (projected Newton, Bertsekas 1982), the step is clipped to
+the limits, and only a step that lowers the cost is kept.
+"""
+
+import logging
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Bool, Float
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass as config_dataclass
+
+from robojackson.retarget.solver.block_banded import Chain, Normal
+from robojackson.retarget.solver.clip_problem import Problem
+from robojackson.retarget.solver.cost_terms import linearise
+from robojackson.retarget.targets.keypoint_targets import taken
+from robojackson.robot.model import Robot
+from robojackson.robot.tree_kinematics import integrate
+
+_log = logging.getLogger(__name__)
+_AT_LIMIT = 1e-9
+_TRIES = 9
+_WINDOW = 480  # steps solved at once
+_OVERLAP = 24  # steps that a window looks beyond what is kept of it
+_HELD = 2  # steps of the window before it that an acceleration reaches back to
+
+
+@config_dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
+class SolverConfig:
+    """When the solver stops.
+
+    Attributes:
+        iterations: Most Newton steps from each start, at the coarsest rate.
+        polish_iterations: Most Newton steps at each finer rate.
+        tolerance: Relative decrease of the cost at which the control rate stops.
+        rough_tolerance: The same at the coarser rates.
+        largest_turn: Largest change of an angle in one step, radians.
+        damping: First Levenberg-Marquardt damping.
+    """
+
+    iterations: int = Field(default=40, ge=1)
+    polish_iterations: int = Field(default=12, ge=1)
+    tolerance: float = Field(default=1e-3, gt=0)
+    rough_tolerance: float = Field(default=5e-3, gt=0)
+    largest_turn: float = Field(default=0.5, gt=0)
+    damping: float = Field(default=1e-3, gt=0)
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A motion and its cost; windows overlap, so the cost serves to compare solutions only."""
+
+    qpos: Float[np.ndarray, "N nq"]
+    cost: float
+
+
+def solve(
+    problem: Problem,
+    start: Float[np.ndarray, "N nq"],
+    config: SolverConfig,
+    iterations: int,
+    tolerance: float | None = None,
+) -> Solution:
+    """Lower the cost from a start until the decrease is below the tolerance.
+
+    A long clip is solved window after window, so that time is linear in its length and memory does
+    not grow with it: each window begins in the poses that the one before it found and looks beyond
+    the end of what is kept of it.
+
+    Args:
+        tolerance: That of the configuration when None.
+    """
+    wanted = config.tolerance if tolerance is None else tolerance
+    qpos = clip_to_limits(problem.robot, start)
+    windows = _windows(len(qpos)) if not problem.ring else [slice(0, len(qpos))]
+    cost = 0.0
+    for window in windows:
+        part = replace(problem, targets=taken(problem.targets, window))
+        held = _HELD if window.start else 0
+        found = _solve_window(part, qpos[window], config, iterations, wanted, held)
+        qpos[window] = found.qpos
+        cost += found.normal.cost
+    _log.debug("%d frames, %d windows, cost %.5f", len(qpos), len(windows), cost)
+    return Solution(qpos, cost)
+
+
+def _windows(frames: int) -> list[slice]:
+    """Windows of about the same length that overlap."""
+    count = max(1, -(-(frames - _OVERLAP) // (_WINDOW - _OVERLAP)))
+    edges = np.linspace(0, frames - _OVERLAP, count + 1).astype(int)
+    return [slice(int(a), int(b) + _OVERLAP) for a, b in pairwise(edges)]
+
+
+def _solve_window(
+    problem: Problem,
+    qpos: Float[np.ndarray, "N nq"],
+    config: SolverConfig,
+    iterations: int,
+    tolerance: float,
+    held: int,
+) -> "_State":
+    chain = Chain(len(qpos), qpos.shape[1] - 1, problem.ring)
+    state = _State(qpos, linearise(problem, qpos), config.damping)
+    for _ in range(iterations):
+        moved = _descend(problem, chain, state, config, held)
+        if moved is None:
+            break
+        decrease = 1.0 - moved.normal.cost / max(state.normal.cost, 1e-12)
+        state = moved
+        if decrease < tolerance:
+            break
+    return state
+
+
+def clip_to_limits(robot: Robot, qpos: Float[np.ndarray, "N nq"]) -> Float[np.ndarray, "N nq"]:
+    """The same motion with every hinge inside its limits."""
+    out = qpos.copy()
+    out[:, 7:] = np.clip(out[:, 7:], robot.lower, robot.upper)
+    return out
+
+
+@dataclass(frozen=True)
+class _State:
+    """A motion, its normal equations, and how much the next step is damped."""
+
+    qpos: np.ndarray
+    normal: Normal
+    damping: float
+
+
+def _descend(
+    problem: Problem, chain: Chain, state: _State, config: SolverConfig, held: int
+) -> _State | None:
+    """One accepted step, more damped after each failure; None when nothing lowers the cost.
+
+    The damping follows how much of the predicted decrease came true (Nielsen 1999).
+    """
+    normal, damping, growth = state.normal, state.damping, 4.0
+    free = free_unknowns(problem.robot, state.qpos, normal.gradient)
+    free[:held] = False
+    for _ in range(_TRIES):
+        try:
+            step = chain.step(normal, free, damping)
+        except np.linalg.LinAlgError:
+            damping *= 10.0
+            continue
+        share = min(1.0, config.largest_turn / max(1e-9, float(np.abs(step[:, 3:]).max())))
+        trial = clip_to_limits(problem.robot, integrate(state.qpos, share * step))
+        there = linearise(problem, trial)
+        if there.cost < normal.cost:
+            promised = share * (1 - share / 2) * -float(np.sum(normal.gradient * step * free))
+            kept = (normal.cost - there.cost) / max(promised, 1e-12)
+            factor = max(0.2, 1.0 - (2.0 * min(kept, 1.0) - 1.0) ** 3)
+            return _State(trial, there, max(1e-6, damping * factor))
+        damping *= growth
+        growth *= 2.0
+    return None
+
+
+def free_unknowns(
+    robot: Robot, qpos: Float[np.ndarray, "N nq"], gradient: Float[np.ndarray, "N nv"]
+) -> Bool[np.ndarray, "N nv"]:
+    """Unknowns that are not pressed against a limit."""
+    hinges, push = qpos[:, 7:], gradient[:, 6:]
+    held = (hinges <= robot.lower + _AT_LIMIT) & (push > 0)
+    held |= (hinges >= robot.upper - _AT_LIMIT) & (push < 0)
+    free = np.ones(gradient.shape, bool)
+    free[:, 6:] = ~held
+    return free

@@ -1,0 +1,227 @@
+"""Laps: find where a clip repeats itself, close it, and put it on the robot's clock.
+
+A clip is nearly cyclic when some later frame has the pose and the velocity of an early one, seen
+from the hips and the heading. The lap between them is closed by spreading what is left of the seam
+(heading, pose, height, and for a dance on the spot the drift) evenly over the lap. Metres, seconds.
+"""
+
+import logging
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass as config_dataclass
+from scipy.ndimage import gaussian_filter1d
+
+from robojackson.body.skeleton import KEYPOINT_NAMES
+from robojackson.errors import TrackTooShort
+from robojackson.geometry.rotations import wrapped
+from robojackson.motion.smpl_sequence import SmplSequence
+from robojackson.retarget.targets.human_clip import HumanClip, at_steps, labels_at
+
+_log = logging.getLogger(__name__)
+_MIN_STEPS = 16
+_LIMBS = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
+_SEEN = [KEYPOINT_NAMES.index(f"{side}_{a}") for a in _LIMBS for side in ("left", "right")]
+_HIPS, _SHOULDERS = _SEEN[:2], _SEEN[6:8]
+_BONE_STARTS = (0, 1, 2, 3, 6, 7, 8, 9)  # hip, knee, shoulder, elbow: the next joint is two on
+_GOOD_SEAM_M = 0.015  # seams below this are as good as each other: the longest lap wins
+_WHOLE_SEAM_M = 0.05  # a clip that was cut as a loop stays whole up to this seam
+_SECONDS = 0.1  # velocity differences count over this time beside pose differences
+
+
+@config_dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
+class CycleConfig:
+    """When a clip counts as cyclic.
+
+    Attributes:
+        tolerance_m: Largest seam: mean keypoint distance plus a tenth of a second of the mean
+            velocity difference, metres.
+        limb_deg: Largest angle of a limb over the seam, degrees.
+        heading_deg: Largest heading change of a lap, whole turns left out, degrees.
+        in_place_m_s: A lap that travels slower than this is closed on the spot, m/s.
+        keep_share: Smallest share of the clip that a lap must keep.
+    """
+
+    tolerance_m: float = Field(default=0.09, gt=0)
+    limb_deg: float = Field(default=15.0, gt=0)
+    heading_deg: float = Field(default=20.0, gt=0)
+    in_place_m_s: float = Field(default=0.15, ge=0)
+    keep_share: float = Field(default=0.5, gt=0, le=1)
+
+
+@dataclass(frozen=True)
+class Lap:
+    """Frames [start, end) of a lap; `end` may be one past the clip.
+
+    Attributes:
+        start, end: Frames.
+        seam_m: Mean keypoint distance and a tenth of a second of the mean velocity difference.
+        seam_deg: Largest angle between a limb at the start and at the end.
+    """
+
+    start: int
+    end: int
+    seam_m: float
+    seam_deg: float
+
+
+def human_clip(
+    sequence: SmplSequence,
+    dt: float,
+    cyclic: Literal["auto", "yes", "no"],
+    tempo: float,
+    config: CycleConfig,
+) -> tuple[HumanClip, Lap | None]:
+    """The clip at the solver's steps, closed to a lap where it is (or is said to be) cyclic.
+
+    Raises:
+        TrackTooShort: Fewer steps than the solver needs.
+    """
+    if len(sequence) < 4 or len(sequence) / sequence.fps / tempo < _MIN_STEPS * dt:
+        raise TrackTooShort(
+            f"{len(sequence)} frames ({len(sequence) / sequence.fps:.2f} s) are too short to "
+            f"retarget: at least {_MIN_STEPS * dt:.2f} s are needed"
+        )
+    lap = None if cyclic == "no" else find_lap(sequence, config)
+    if lap is None and cyclic == "yes":  # whoever turns on with every lap is turned back
+        lap = find_lap(sequence, replace(config, heading_deg=180.0))
+    if lap is None or (cyclic == "auto" and not _nearly_cyclic(lap, config)):
+        return _open_clip(sequence, dt, tempo), None
+    _log.info("lap: frames %d to %d, seam %.3f m", lap.start, lap.end, lap.seam_m)
+    return _closed_clip(sequence, lap, dt, tempo, config), lap
+
+
+def _nearly_cyclic(lap: Lap, config: CycleConfig) -> bool:
+    return lap.seam_m <= config.tolerance_m and lap.seam_deg <= config.limb_deg
+
+
+def find_lap(sequence: SmplSequence, config: CycleConfig) -> Lap | None:
+    """The whole clip where it is a loop; else the lap with the smallest seam, longer ones
+    preferred when they are as good."""
+    pose, speed, yaw = _features(sequence)
+    frames = len(sequence)
+    shortest = max(int(np.ceil(config.keep_share * frames)), 4)
+    seam, turn = _seams(pose, speed, yaw, 0, np.array([frames]))
+    if seam[0] <= _WHOLE_SEAM_M and turn[0] <= np.radians(config.heading_deg):
+        return Lap(0, frames, float(seam[0]), _limb_angle(pose[0], pose[frames]))
+    best: Lap | None = None
+    best_score = np.inf
+    stride = max(1, frames // 120)
+    for start in range(0, frames - shortest + 1, stride):
+        ends = np.arange(start + shortest, frames + 1)
+        seam, turn = _seams(pose, speed, yaw, start, ends)
+        score = np.maximum(seam, _GOOD_SEAM_M) + 0.02 * (1 - (ends - start) / frames)
+        score[turn > np.radians(config.heading_deg)] = np.inf
+        index = int(score.argmin())
+        if score[index] < best_score:
+            best_score = float(score[index])
+            angle = _limb_angle(pose[start], pose[ends[index]])
+            best = Lap(start, int(ends[index]), float(seam[index]), angle)
+    return best
+
+
+def _seams(
+    pose: np.ndarray, speed: np.ndarray, yaw: np.ndarray, start: int, ends: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Seam, metres, and heading change, radians, of the laps from one start."""
+    seam = np.linalg.norm(pose[ends] - pose[start], axis=-1).mean(axis=1)
+    seam += _SECONDS * np.linalg.norm(speed[ends] - speed[start], axis=-1).mean(axis=1)
+    return seam, np.abs(wrapped(yaw[ends] - yaw[start]))
+
+
+def _limb_angle(a: Float[np.ndarray, "L 3"], b: Float[np.ndarray, "L 3"]) -> float:
+    """Largest angle between the limbs of two poses, degrees."""
+    first = np.stack([a[i + 2] - a[i] for i in _BONE_STARTS])
+    second = np.stack([b[i + 2] - b[i] for i in _BONE_STARTS])
+    lengths = np.linalg.norm(first, axis=1) * np.linalg.norm(second, axis=1)
+    cosine = np.sum(first * second, axis=1) / np.maximum(lengths, 1e-9)
+    return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))).max())
+
+
+def _features(sequence: SmplSequence) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Limbs seen from hips and heading, their velocities, the heading; one frame past the end."""
+    points = _extended(sequence.keypoints_w)
+    yaw = heading(points)
+    limbs = _turned(points[:, _SEEN] - _ground_point(points)[:, None], -yaw)
+    speed = np.gradient(gaussian_filter1d(limbs, 1.0, axis=0), 1 / sequence.fps, axis=0)
+    return limbs, speed, yaw
+
+
+def _extended(points: Float[np.ndarray, "T 29 3"]) -> Float[np.ndarray, "T+1 29 3"]:
+    return np.concatenate([points, 2 * points[-1:] - points[-2:-1]])
+
+
+def heading(points: Float[np.ndarray, "T 29 3"]) -> Float[np.ndarray, " T"]:
+    """Unwrapped angle of the body's forward axis about z, from hips and shoulders, radians."""
+    across = points[:, _HIPS[0]] - points[:, _HIPS[1]]
+    across = across + points[:, _SHOULDERS[0]] - points[:, _SHOULDERS[1]]
+    return np.asarray(np.unwrap(np.arctan2(-across[:, 0], across[:, 1])))
+
+
+def _ground_point(points: np.ndarray) -> Float[np.ndarray, "T 3"]:
+    """The point of the floor under the hips."""
+    return np.asarray((points[:, _HIPS[0]] + points[:, _HIPS[1]]) / 2 * [1.0, 1.0, 0.0])
+
+
+def _turned(vectors: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Vectors (T, P, 3) turned about z by an angle a frame."""
+    cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    return np.stack([cosine * x - sine * y, sine * x + cosine * y, z], axis=-1)
+
+
+def _open_clip(sequence: SmplSequence, dt: float, tempo: float) -> HumanClip:
+    """The whole clip; an odd number of steps, so that every second one is a coarser clip."""
+    last = (len(sequence) - 1) / sequence.fps
+    pairs = int(np.floor(last / tempo / (2 * dt) + 1e-9))
+    time_s = np.arange(2 * pairs + 1) * dt * tempo
+    return HumanClip(
+        time_s=time_s,
+        keypoints_w=at_steps(sequence.keypoints_w, sequence.fps, time_s),
+        contact=labels_at(sequence.contact, sequence.fps, time_s),
+        valid=labels_at(sequence.valid, sequence.fps, time_s),
+        dt=dt,
+        lap=None,
+    )
+
+
+def _closed_clip(
+    sequence: SmplSequence, lap: Lap, dt: float, tempo: float, config: CycleConfig
+) -> HumanClip:
+    """A lap with an even number of steps; the clock is stretched to fit (under one step a lap)."""
+    seconds = (lap.end - lap.start) / sequence.fps
+    steps = max(2 * round(seconds / tempo / (2 * dt)), _MIN_STEPS)
+    share = np.arange(steps + 1) / steps
+    time_s = (lap.start + share * (lap.end - lap.start)) / sequence.fps
+    points = at_steps(_extended(sequence.keypoints_w), sequence.fps, time_s)
+    closed, travel = close(points, config.in_place_m_s * seconds)
+    return HumanClip(
+        time_s=time_s[:-1],
+        keypoints_w=closed[:-1],
+        contact=labels_at(sequence.contact, sequence.fps, time_s[:-1]),
+        valid=labels_at(sequence.valid, sequence.fps, time_s[:-1]),
+        dt=dt,
+        lap=travel,
+    )
+
+
+def close(
+    points: Float[np.ndarray, "N 29 3"], in_place_m: float
+) -> tuple[Float[np.ndarray, "N 29 3"], Float[np.ndarray, "3"]]:
+    """Make the last pose the first one, moved along the floor; what is left over goes evenly.
+
+    Returns the closed points and the displacement of the lap, zero when it is under `in_place_m`.
+    """
+    share = np.linspace(0.0, 1.0, len(points))
+    yaw, ground = heading(points), _ground_point(points)
+    turn = wrapped(yaw[-1] - yaw[0])
+    limbs = _turned(points - ground[:, None], -turn * share)
+    limbs -= (share - 0.5)[:, None, None] * (limbs[-1] - limbs[0])
+    travel = ground[-1] - ground[0]
+    if np.linalg.norm(travel) < in_place_m:
+        ground = ground - share[:, None] * travel
+        travel = np.zeros(3)
+    return limbs + ground[:, None], travel

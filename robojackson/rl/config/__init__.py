@@ -1,0 +1,1 @@
+"""Every number of training and evaluation."""

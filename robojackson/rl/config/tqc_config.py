@@ -1,0 +1,123 @@
+"""The numbers of TQC (Kuznetsov et al., 2020), with presets of the paper and its released code."""
+
+from typing import Any, Literal
+
+from pydantic import ConfigDict, Field, model_validator
+from pydantic.dataclasses import dataclass
+
+from robojackson.rl.config.presets import with_preset
+
+PRESETS: dict[str, dict[str, Any]] = {
+    "dance": {},
+    # The paper names TQC and 50,000 steps; where it is silent, sb3-contrib's defaults, its update
+    # after every step as 32 after 32.
+    "paper": {
+        "n_envs": 1,
+        "steps_per_round": 32,
+        "updates_per_round": 32,
+        "learning_rate": 3e-4,
+        "warmup": 100,
+        "tau": 0.005,
+        "gamma": 0.99,
+        "policy_delay": 1,
+        "target_entropy": 1.0,
+        "actor_average": 0.0,
+        "entropy": "auto",
+        "layer_norm": False,
+    },
+    # The authors' released code, its replay buffer cut from 1,000,000 to 300,000.
+    "released": {
+        "n_envs": 1,
+        "steps_per_round": 32,
+        "updates_per_round": 32,
+        "learning_rate": 1e-4,
+        "warmup": 25_000,
+        "batch": 512,
+        "tau": 0.005,
+        "gamma": 0.99,
+        "policy_delay": 1,
+        "target_entropy": 1.0,
+        "actor_average": 0.0,
+        "entropy": "auto_0.1",
+        "actor": (512, 512, 512),
+        "critic": (512, 512, 512),
+        "layer_norm": False,
+        "gsde": True,
+        "log_std_init": -2.0,
+    },
+}
+"""`dance` is how we teach tracking: the defaults below."""
+
+
+NORM_EPSILON = 1e-6
+"""Of layer normalisation: flax's."""
+
+
+@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
+class TqcConfig:
+    """TQC and how often it learns.
+
+    Attributes:
+        preset: Where the numbers come from that are not given.
+        n_envs: Simulations stepped together.
+        steps_per_round: Policy steps of every simulation between two rounds of updates.
+        updates_per_round: Gradient updates a round.
+        buffer: Transitions kept for replay, float32.
+        warmup: Transitions before the first update, random ones unless the start is pretrained.
+        critics: SBX has two, and so has the reference.
+        top_quantiles_to_drop: Of each critic's quantiles, against overestimation.
+        policy_delay: Critic updates an actor update, so many times in a round; `sb3` knows only 1.
+        actor: Units of the actor's hidden layers.
+        critic: The same of the critics'.
+        layer_norm: Layer normalisation between the critics' layers.
+        gsde: State-dependent exploration; `sbx` has none and explores with plain noise.
+        log_std_init: Logarithm of the first exploration noise; `sb3` uses it with gSDE only.
+        target_entropy: Entropy that exploration keeps, in units of minus the number of actions.
+        actor_average: Weight of the past in the running mean of the actor that becomes the
+            policy, a round of updates; 0 is the last actor.
+    """
+
+    preset: Literal["dance", "paper", "released"] = "dance"
+    n_envs: int = Field(default=32, ge=1)
+    steps_per_round: int = Field(default=8, ge=1)
+    updates_per_round: int = Field(default=24, ge=1)
+    learning_rate: float = Field(default=5e-4, gt=0, lt=1)
+    buffer: int = Field(default=300_000, ge=1_000, le=300_000)
+    warmup: int = Field(default=2_000, ge=1)
+    batch: int = Field(default=256, ge=1)
+    tau: float = Field(default=0.01, gt=0, le=1)
+    gamma: float = Field(default=0.985, gt=0, lt=1)
+    policy_delay: int = Field(default=2, ge=1)
+    critics: Literal[2] = 2
+    quantiles: int = Field(default=25, ge=1)
+    top_quantiles_to_drop: int = Field(default=2, ge=0)
+    entropy: str = Field(default="auto_0.02", pattern=r"^auto(_\d*\.?\d+)?$")
+    actor: tuple[int, ...] = (256, 256)
+    critic: tuple[int, ...] = (256, 256)
+    layer_norm: bool = True
+    gsde: bool = False
+    log_std_init: float = 0.0
+    target_entropy: float = Field(default=1.5, gt=0)
+    actor_average: float = Field(default=0.98, ge=0, lt=1)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _preset(cls, given: Any) -> Any:
+        return with_preset(given, PRESETS, "dance")
+
+    @model_validator(mode="after")
+    def _learns(self) -> "TqcConfig":
+        """Refuse numbers with which a training runs to its end and has learnt nothing."""
+        if self.top_quantiles_to_drop >= self.quantiles:
+            raise ValueError(
+                f"top_quantiles_to_drop, {self.top_quantiles_to_drop}, must leave some of the "
+                f"{self.quantiles} quantiles"
+            )
+        room = max(self.buffer // self.n_envs, 1) * self.n_envs
+        if self.warmup > room:
+            raise ValueError(
+                f"the replay buffer has room for {room} transitions ({self.buffer} on "
+                f"{self.n_envs} simulations), and learning would begin after {self.warmup}: "
+                "raise buffer or lower warmup"
+            )
+        return self

@@ -1,0 +1,260 @@
+"""Every number of training and evaluation, with its unit. A setup file holds only what differs."""
+
+from collections.abc import Mapping
+from dataclasses import field, replace
+from typing import Annotated, Any, Literal
+
+from pydantic import ConfigDict, Field, model_validator
+from pydantic.dataclasses import dataclass
+from pydantic_core import ArgsKwargs
+
+from robojackson.rl.config.evaluate_config import EvaluateConfig
+from robojackson.rl.config.paper_config import Curiosity, PaperConfig
+from robojackson.rl.config.tqc_config import TqcConfig
+
+__all__ = [
+    "ControlConfig",
+    "EvaluateConfig",
+    "PaperConfig",
+    "RandomConfig",
+    "ResetConfig",
+    "RewardConfig",
+    "TerminationConfig",
+    "TqcConfig",
+    "TrackConfig",
+    "TrainConfig",
+]
+
+STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+
+@dataclass(frozen=True, config=STRICT)
+class ControlConfig:
+    """The law of control outside the model (stock physics).
+
+    Attributes:
+        law: `pd`: a PD law evaluated once a substep. `hold`: the same evaluated once a control
+            step, its torque held, as a plain `env.step` does. `torque`: the action is the torque.
+        substeps: Physics substeps a control step (Humanoid-v5: 5 of 3 ms).
+        stiffness: Proportional gain, multiples of the stock torque limit, 1/rad.
+        damping: Derivative gain, multiples of the proportional one, seconds.
+        residual: Largest offset that the policy adds to the reference's joint angles, rad.
+        arm_residual: The same for the arms: enough to hold them up, too little to balance by
+            flailing.
+    """
+
+    law: Literal["pd", "hold", "torque"] = "pd"
+    substeps: int = Field(default=5, ge=1)
+    stiffness: float = Field(default=4.0, gt=0)
+    damping: float = Field(default=0.1, ge=0)
+    residual: float = Field(default=0.5, gt=0)
+    arm_residual: float = Field(default=0.25, gt=0)
+
+
+@dataclass(frozen=True, config=STRICT)
+class ResetConfig:
+    """Reference-state initialisation (Peng et al., DeepMimic, 2018) with noise.
+
+    Attributes:
+        joint_noise: Standard deviation added to hinge angles, rad.
+        joint_speed_noise: Standard deviation added to hinge speeds, rad/s.
+        root_speed_noise: Standard deviation added to the root's velocities, m/s and rad/s.
+        stand_share: Share of episodes that begin in the default stand instead.
+        settled_share: Share that begin in a state which the robot itself reached earlier.
+        failure_share: Share of start phases drawn where episodes fail, the rest uniform.
+    """
+
+    joint_noise: float = Field(default=0.03, ge=0)
+    joint_speed_noise: float = Field(default=0.15, ge=0)
+    root_speed_noise: float = Field(default=0.05, ge=0)
+    stand_share: float = Field(default=0.1, ge=0, le=1)
+    settled_share: float = Field(default=0.3, ge=0, le=1)
+    failure_share: float = Field(default=0.5, ge=0, le=1)
+
+
+@dataclass(frozen=True, config=STRICT)
+class RewardConfig:
+    """Weights and widths of the local tracking reward; a term is weight * exp(-error^2 / width^2).
+
+    Attributes:
+        joints, joints_width: Hinge angles, root mean square, rad.
+        sites, sites_width: Keypoint sites relative to the pelvis, root mean square, m.
+        hands, hands_width: The hands and the head alone, relative to the pelvis, m.
+        orientation, orientation_width: Root orientation, rad.
+        velocity, velocity_width: Root linear velocity, m/s.
+        joint_speed, joint_speed_width: Hinge speeds, root mean square, rad/s.
+        limb_speed, limb_speed_width: Velocities of feet, hands and head, root mean square, m/s:
+            keeps a robot from balancing by flailing or stepping where the dancer stands.
+        height, height_width: Root height, m.
+        drift, drift_width: Root position, m.
+        action_rate: Penalty on the mean squared change of the action.
+        fine: Share of every term that is paid by a narrower bell: the wide one shows the way from
+            afar, the narrow one still pays for the last centimetre.
+        narrow: Width of the narrower bell, in widths of the wide one.
+        curiosity: As the paper's; scaled so that a perfect step earns the same share of it.
+    """
+
+    joints: float = 0.20
+    joints_width: float = Field(default=0.25, gt=0)
+    sites: float = 0.15
+    sites_width: float = Field(default=0.10, gt=0)
+    hands: float = 0.10
+    hands_width: float = Field(default=0.12, gt=0)
+    orientation: float = 0.10
+    orientation_width: float = Field(default=0.4, gt=0)
+    velocity: float = 0.05
+    velocity_width: float = Field(default=0.6, gt=0)
+    joint_speed: float = 0.05
+    joint_speed_width: float = Field(default=2.0, gt=0)
+    limb_speed: float = 0.20
+    limb_speed_width: float = Field(default=0.6, gt=0)
+    height: float = 0.10
+    height_width: float = Field(default=0.1, gt=0)
+    drift: float = 0.10
+    drift_width: float = Field(default=0.3, gt=0)
+    action_rate: float = 0.02
+    fine: float = Field(default=0.5, ge=0, le=1)
+    narrow: float = Field(default=0.35, gt=0, le=1)
+    curiosity: Curiosity = "off"
+
+    @property
+    def perfect(self) -> float:
+        """What a step earns that equals the reference."""
+        places = self.joints + self.sites + self.hands + self.orientation + self.height + self.drift
+        return places + self.velocity + self.joint_speed + self.limb_speed
+
+
+@dataclass(frozen=True, config=STRICT)
+class TerminationConfig:
+    """When an episode ends early. The fall rule is the paper's; the others are for training only.
+
+    Attributes:
+        fall_height: Torso lower than this is a fall, m.
+        fall_tilt: Torso tilted more than this is a fall, rad (60 degrees).
+        orientation: Largest root orientation error, rad.
+        height: Largest root height error, m.
+        sites: Largest mean site error relative to the pelvis, m.
+        drift: Largest root position error, m.
+    """
+
+    fall_height: float = 0.7
+    fall_tilt: float = 1.0471975511965976
+    orientation: float = 1.0
+    height: float = 0.25
+    sites: float = 0.30
+    drift: float = 1.5
+
+
+@dataclass(frozen=True, config=STRICT)
+class RandomConfig:
+    """Physics that differ a little from robot to robot while training; zero is the stock robot.
+
+    Attributes:
+        friction: Half-width of a uniform factor on the friction of all geoms.
+        gains: The same on stiffness and damping of the PD law.
+        integrators: Robot i gets the i-th, over and over.
+    """
+
+    friction: float = Field(default=0.0, ge=0, lt=1)
+    gains: float = Field(default=0.0, ge=0, lt=1)
+    integrators: tuple[Literal["RK4", "Euler", "implicitfast"], ...] = Field(
+        default=("RK4",), min_length=1
+    )
+
+
+@dataclass(frozen=True, config=STRICT)
+class TrackConfig:
+    """The tracking environment.
+
+    Attributes:
+        episode_seconds: Time limit of a training episode, s; its end is bootstrapped.
+        threads: Threads that step the simulations.
+    """
+
+    control: ControlConfig = Field(default_factory=ControlConfig)
+    reset: ResetConfig = Field(default_factory=ResetConfig)
+    reward: RewardConfig = Field(default_factory=RewardConfig)
+    termination: TerminationConfig = Field(default_factory=TerminationConfig)
+    random: RandomConfig = Field(default_factory=RandomConfig)
+    episode_seconds: float = Field(default=6.0, gt=0)
+    threads: int = Field(default=2, ge=1)
+
+
+@dataclass(frozen=True, config=STRICT)
+class TrainConfig:
+    """One training run. It ends at the first of its budgets that is reached.
+
+    Attributes:
+        mode: `track`, the method that dances, or `paper`, the paper's own.
+        trainer: `sbx` (JAX, fast) or `sb3` (sb3-contrib, the reference).
+        seed: Of networks, environments and replay.
+        steps: Policy steps over all simulations, rounded up to a round of updates.
+        minutes: Wall time, minutes.
+        cpu_minutes: Time of the processor, all threads together, minutes.
+        start: Where the networks come from: `scratch`, our `walker` of the mode, a
+            networks.safetensors, an SB3 zip, or a repository of the hub (`owner/name`).
+        start_critics: Whether the critics come from there, too.
+        curiosity: Which of the paper's three weights the curiosity bonus gets.
+        checkpoint_seconds: Time between two checkpoints, s.
+        progress_seconds: Time between two progress rows, s.
+        tensorboard: Whether to log for TensorBoard.
+    """
+
+    mode: Literal["track", "paper"] = "track"
+    trainer: Literal["sbx", "sb3"] = "sbx"
+    seed: int = Field(default=0, ge=0, lt=2**31)
+    steps: int | None = Field(default=None, ge=1)
+    minutes: float | None = Field(default=None, gt=0)
+    cpu_minutes: float | None = Field(default=None, gt=0)
+    start: str = Field(default="scratch", min_length=1)
+    start_critics: bool = True
+    curiosity: Curiosity = "off"
+    checkpoint_seconds: Annotated[float, Field(gt=0)] = field(default=60.0, compare=False)
+    progress_seconds: Annotated[float, Field(gt=0)] = field(default=5.0, compare=False)
+    tensorboard: bool = field(default=False, compare=False)
+    track: TrackConfig = Field(default_factory=TrackConfig)
+    paper: PaperConfig = Field(default_factory=PaperConfig)
+    tqc: TqcConfig = Field(default_factory=TqcConfig)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _tqc_of_mode(cls, given: Any) -> Any:
+        """Paper mode learns with the paper's TQC unless another preset is named."""
+        said: Any = given.kwargs if isinstance(given, ArgsKwargs) else given
+        if not isinstance(said, Mapping) or said.get("mode") != "paper":
+            return given
+        tqc = said.get("tqc", {})
+        if not isinstance(tqc, Mapping) or "preset" in tqc:
+            return given
+        said = {**said, "tqc": {"preset": "paper", **tqc}}
+        return ArgsKwargs(given.args, said) if isinstance(given, ArgsKwargs) else said
+
+    @model_validator(mode="after")
+    def _one_curiosity(self) -> "TrainConfig":
+        inner = {"paper": self.paper.curiosity, "track.reward": self.track.reward.curiosity}
+        for name, said in inner.items():
+            if said not in ("off", self.curiosity):
+                raise ValueError(f"{name}.curiosity: say curiosity={said} instead, for either mode")
+        return self
+
+    @model_validator(mode="after")
+    def _whole_delays(self) -> "TrainConfig":
+        updates, delay = self.tqc.updates_per_round, self.tqc.policy_delay
+        if self.trainer == "sbx" and updates % delay:
+            raise ValueError(
+                f"tqc.updates_per_round, {updates}, must be a multiple of tqc.policy_delay, {delay}"
+            )
+        return self
+
+    @property
+    def has_budget(self) -> bool:
+        """Whether anything ends it."""
+        return any(b is not None for b in (self.steps, self.minutes, self.cpu_minutes))
+
+    @property
+    def environment(self) -> TrackConfig | PaperConfig:
+        """The environment of the mode, with the curiosity of the setup."""
+        if self.mode == "paper":
+            return replace(self.paper, curiosity=self.curiosity)
+        reward = replace(self.track.reward, curiosity=self.curiosity)
+        return replace(self.track, reward=reward)

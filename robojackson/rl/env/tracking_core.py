@@ -1,0 +1,182 @@
+"""The environment: N robots that follow one reference motion, as array code, in either mode.
+
+A `Mode` says what differs (`track_mode`, `paper_mode`): what an action does, what is seen, what a
+step is worth, how an episode begins. Episodes end by a fall, by getting lost, at the end of a clip
+that is not cyclic, or by the time limit; only the last is a truncation and is bootstrapped.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import mujoco
+import numpy as np
+from jaxtyping import Float, Int
+
+from robojackson.errors import UnknownName
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.rl.config.train_config import PaperConfig, TrackConfig
+from robojackson.rl.env.episode_totals import EpisodeTotals
+from robojackson.rl.modes.mode import Mode, Score
+from robojackson.rl.modes.paper_mode import PaperMode
+from robojackson.rl.modes.track_mode import TrackMode
+from robojackson.rl.sim.simulation import require_same_clock
+from robojackson.robot.model import Robot
+
+PHYSICS = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+
+
+@dataclass
+class StepResult:
+    """What one step of all robots brought; arrays have N rows.
+
+    Attributes:
+        observation: After resets.
+        final_observation: Before resets (differs where done).
+        reward, terms: Their sum and its parts.
+        terminated: Ends by failure or with the clip.
+        truncated: Ends by the time limit.
+        episodes: One summary row for each episode that ended.
+    """
+
+    observation: Float[np.ndarray, "N D"]
+    final_observation: Float[np.ndarray, "N D"]
+    reward: Float[np.ndarray, " N"]
+    terms: dict[str, Float[np.ndarray, " N"]]
+    terminated: np.ndarray
+    truncated: np.ndarray
+    episodes: list[dict[str, float]] = field(default_factory=list)
+
+
+class TrackingCore:
+    """N robots that follow one reference motion.
+
+    Attributes:
+        episode: Episodes that ended so far; the paper's curriculum goes by it.
+        step_index: Step of the reference that each robot is at.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        reference: ReferenceMotion,
+        config: TrackConfig | PaperConfig,
+        n: int,
+        seed: int,
+    ) -> None:
+        names = robot.keypoint_names
+        if names != reference.keypoint_names:
+            unknown = sorted(set(reference.keypoint_names) ^ set(names))
+            raise UnknownName("keypoint", ", ".join(unknown), "reference motion", names)
+        self.config, self.n = config, n
+        self.mode = mode_of(robot, reference, config, n, seed)
+        self.sim, self.clip, self.limit = self.mode.sim, self.mode.clip, self.mode.limit
+        require_same_clock(self.sim.dt, reference.dt)
+        self.rng = np.random.default_rng(seed)
+        self.episode = 0
+        self.step_index = np.zeros(n, int)
+        self._start, self._age = np.zeros(n, int), np.zeros(n, int)
+        self._last = np.zeros((n, robot.model.nu))
+        self._totals = EpisodeTotals(n, self.clip.dt)
+        self.observation_size = self.mode.observation_size
+        self.action_size = robot.model.nu
+
+    def reseed(self, seed: int) -> None:
+        """Restart the random numbers and forget what was learnt of starts: the next `reset` and all
+        that follows are then determined."""
+        self.rng = np.random.default_rng(seed)
+        self.mode.forget()
+
+    def reset(self) -> Float[np.ndarray, "N D"]:
+        """Begin N new episodes; those that were under way leave no row."""
+        self._totals.clear(np.arange(self.n))
+        self._begin(np.arange(self.n))
+        return self._observe()
+
+    def step(self, action: Float[np.ndarray, "N nu"]) -> StepResult:
+        """One action of all robots; those whose episode ended begin a new one."""
+        action = np.clip(np.asarray(action, float), -1, 1)
+        before = self.sim.points.copy()
+        self._act(action)
+        change = np.mean((action - self._last) ** 2, -1)
+        self._last = action
+        score = self.mode.score(self.clip.at(self.step_index), before, change, self.episode)
+        reward = np.sum(list(score.terms.values()), 0)
+        over = score.failed | self.clip.ended(self.step_index)
+        late = (self._age >= self.limit) & ~over
+        self._totals.add(reward, score.terms, {"site_error_m": score.site_error, **score.errors})
+        result = StepResult(*(2 * (self._observe(),)), reward, score.terms, over, late)
+        if (over | late).any():
+            result.episodes = self._end(score, over | late, late)
+            result.observation = self._observe()
+        return result
+
+    def state(self) -> dict[str, Any]:
+        """Everything that the next step depends on, as arrays."""
+        size = mujoco.mj_stateSize(self.sim.model, PHYSICS)
+        physics = np.zeros((self.n, size))
+        for row, data in zip(physics, self.sim.datas, strict=True):
+            mujoco.mj_getState(self.sim.model, data, row, PHYSICS)
+        own = {
+            name: getattr(self, name).copy() for name in ("step_index", "_start", "_age", "_last")
+        }
+        seen = {f"sim_{name}": getattr(self.sim, name).copy() for name in SEEN}
+        counted = {"episode": np.array(self.episode), "physics": physics}
+        return {**own, **seen, **counted, **self._totals.state(), **self.mode.state()}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from what `state` gave."""
+        for row, data in zip(state["physics"], self.sim.datas, strict=True):
+            mujoco.mj_setState(self.sim.model, data, row, PHYSICS)
+        for name in ("step_index", "_start", "_age", "_last"):
+            setattr(self, name, np.array(state[name]))
+        for name in SEEN:
+            getattr(self.sim, name)[:] = state[f"sim_{name}"]
+        self.episode = int(state["episode"])
+        self._totals.restore(state)
+        self.mode.restore(state)
+
+    def close(self) -> None:
+        """Stop the threads of the simulation."""
+        self.sim.close()
+
+    def _act(self, action: np.ndarray) -> None:
+        for _ in range(self.mode.repeats):
+            command = self.mode.command(self.clip.at(self.step_index + 1), action)
+            self.sim.step(command)
+            self.step_index += 1
+            self._age += 1
+            self.mode.after(command)
+
+    def _end(self, score: Score, done: np.ndarray, late: np.ndarray) -> list[dict[str, float]]:
+        """Rows of the episodes that ended, after which their robots begin anew."""
+        which = np.flatnonzero(done)
+        told = self.mode.ended(self._start[which], score.failed[which], self._age[which])
+        reached = np.flatnonzero(late)
+        self.mode.keep(reached, self.step_index[reached])
+        rows = self._totals.close(which, self._age, self.mode.repeats)
+        self.episode += len(which)
+        self._begin(which)
+        return [row | told for row in rows]
+
+    def _observe(self) -> np.ndarray:
+        return self.mode.observe(self.clip.at(self.step_index + 1), self._last)
+
+    def _begin(self, indices: Int[np.ndarray, " I"]) -> None:
+        begun = self.mode.begin(len(indices), self.rng)
+        self.sim.place(indices, begun.qpos, begun.qvel)
+        self.step_index[indices] = self._start[indices] = begun.step
+        self._age[indices] = 0
+        self._last[indices] = 0.0
+
+
+SEEN = ("qpos", "qvel", "points", "com", "broken")
+"""What a simulation shows of its copies."""
+
+
+def mode_of(
+    robot: Robot, reference: ReferenceMotion, config: TrackConfig | PaperConfig, n: int, seed: int
+) -> Mode:
+    """The mode that a configuration belongs to."""
+    if isinstance(config, PaperConfig):
+        return PaperMode(robot, reference, config, n, seed)
+    return TrackMode(robot, reference, config, n, seed)

@@ -1,0 +1,135 @@
+"""Who drives a robot when a policy is judged: the policy, and those that do not dance beside it."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+from pydantic import PositiveInt, TypeAdapter, ValidationError
+
+from robojackson.errors import BadPolicy
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.rl.config.evaluate_config import TRAINED
+from robojackson.rl.config.train_config import ControlConfig
+from robojackson.rl.evaluation.rollouts import Driver
+from robojackson.rl.modes.observation import observation_size, observe
+from robojackson.rl.policy import Policy
+from robojackson.rl.sim.motors import Motors, residual_scale
+from robojackson.rl.sim.reference_clip import ClipStep
+from robojackson.rl.sim.simulation import Simulation
+from robojackson.rl.sim.stock_humanoid import stock_observation, stock_observation_size
+from robojackson.robot.model import Robot
+
+T = TypeVar("T")
+Command = Callable[[Simulation, ClipStep, np.ndarray, np.ndarray], np.ndarray]
+
+
+def mode_of(policy: Policy) -> str:
+    """`track` or `paper`."""
+    return str(policy.facts.get("mode", "track"))
+
+
+def control_of(policy: Policy, robot: Robot) -> ControlConfig:
+    """The control law that a policy was trained with.
+
+    Raises:
+        BadPolicy: the policy was trained for another robot, or its file says no control law.
+    """
+    trained_for = policy.facts.get("robot", robot.description.name)
+    if trained_for != robot.description.name:
+        raise BadPolicy(
+            f"the policy was trained for robot {trained_for!r}, not for {robot.description.name!r}"
+        )
+    if "control" not in policy.facts:
+        raise BadPolicy("the policy's file says nothing of its control law")
+    sizes = _observation_sizes(robot, mode_of(policy))
+    if policy.observation_size not in sizes:
+        raise BadPolicy(
+            f"the policy takes {policy.observation_size} observations and robot "
+            f"{robot.description.name!r} gives {sizes[0]}: it was trained for another robot"
+        )
+    if policy.action_size != robot.model.nu:
+        raise BadPolicy(
+            f"the policy gives {policy.action_size} actions and robot {robot.description.name!r} "
+            f"takes {robot.model.nu}: it was trained for another robot"
+        )
+    return fact(policy, "control", ControlConfig)
+
+
+def fact(policy: Policy, name: str, kind: type[T]) -> T:
+    """A configuration out of a policy's file.
+
+    Raises:
+        BadPolicy: it holds what this version does not know.
+    """
+    try:
+        return TypeAdapter(kind).validate_python(policy.facts[name])
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, (name, *first["loc"])))
+        raise BadPolicy(
+            f"the policy's file says {where} = {first['input']!r} ({first['msg']}): it is of "
+            "another version of RoboJackson; train it anew"
+        ) from error
+
+
+def drivers(
+    policy: Policy, reference: ReferenceMotion, robot: Robot, seed: int
+) -> dict[str, Driver]:
+    """The policy, its variants and the baselines by name; each baseline follows the PD law."""
+    control = control_of(policy, robot)
+    found = {TRAINED: _trained(policy, robot, control)}
+    if control.law == "pd":
+        found["hold"] = replace(found[TRAINED], control=replace(control, law="hold"))
+    usual = control if control.law == "pd" else ControlConfig(substeps=control.substeps)
+    return found | _baselines(reference, robot, usual, seed)
+
+
+def _trained(policy: Policy, robot: Robot, control: ControlConfig) -> Driver:
+    if control.law == "torque":
+        most = robot.model.actuator_ctrlrange[:, 1]
+
+        def torque(
+            sim: Simulation, following: ClipStep, start: np.ndarray, last: np.ndarray
+        ) -> np.ndarray:
+            return most * policy.act(stock_observation(sim)[:, : policy.observation_size])
+
+        repeats = fact(policy, "repeats", PositiveInt) if "repeats" in policy.facts else 1
+        return Driver(control, torque, repeats)
+
+    def target(
+        sim: Simulation, following: ClipStep, start: np.ndarray, last: np.ndarray
+    ) -> np.ndarray:
+        seen = observe(sim.qpos, sim.qvel, sim.points, following, last)
+        return sim.follow(following) + sim.residual * policy.act(seen)
+
+    return Driver(control, target)
+
+
+def _baselines(
+    reference: ReferenceMotion, robot: Robot, control: ControlConfig, seed: int
+) -> dict[str, Driver]:
+    hinge = Motors.of(robot.model).hinge
+    scale = residual_scale(robot, control)
+    rng = np.random.default_rng(seed)
+    poses = np.asarray(reference.qpos, float)[:, 7:][:, hinge]
+    commands: dict[str, Command] = {
+        "statue": lambda sim, following, start, last: poses[start % len(poses)],
+        "mean_pose": lambda sim, following, start, last: np.repeat(
+            poses.mean(0, keepdims=True), sim.n, 0
+        ),
+        "zero_residual": lambda sim, following, start, last: sim.follow(following),
+        "random": lambda sim, following, start, last: (
+            sim.follow(following) + scale * rng.uniform(-1, 1, (sim.n, len(hinge)))
+        ),
+    }
+    return {name: Driver(control, command) for name, command in commands.items()}
+
+
+def _observation_sizes(robot: Robot, mode: str) -> tuple[int, ...]:
+    """Lengths of the observations that a policy of a mode may take."""
+    model = robot.model
+    if mode == "paper":
+        joints = model.nq - 2 + model.nv
+        return stock_observation_size(model.nq, model.nv, model.nbody), joints
+    return (observation_size(model.nq - 7, model.nu, len(robot.keypoint_names)),)

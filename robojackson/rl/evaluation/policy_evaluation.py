@@ -1,0 +1,200 @@
+"""How a policy is judged: many starts on stock physics, beside baselines that do not dance.
+
+24 phases x 3 noisy resets and the default stand, deterministic policy, one horizon each. Success
+is the paper's: no fall (torso below 0.7 m or tilted over 60 degrees). Strict success also forbids
+kneeling and a mean site error above 0.30 m at any step. Skill is told against the best frozen pose
+over 14 sites with hands and head; a fall counts 0. The velocity score (`metrics.dance_score`) is
+told along the heading: the only figure that sees a robot jump from place to place.
+"""
+
+import logging
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from jaxtyping import Float
+
+from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
+from robojackson.rl.config.evaluate_config import TRAINED, VARIANTS
+from robojackson.rl.config.train_config import (
+    ControlConfig,
+    EvaluateConfig,
+    PaperConfig,
+    ResetConfig,
+    TerminationConfig,
+    TrackConfig,
+)
+from robojackson.rl.evaluation.controllers import control_of, drivers, fact, mode_of
+from robojackson.rl.evaluation.reward_audit import Shares, both_readings, told
+from robojackson.rl.evaluation.reward_meter import Meter, yardstick
+from robojackson.rl.evaluation.rollout_records import Judge
+from robojackson.rl.evaluation.rollouts import Rollouts, Starts, roll_out
+from robojackson.rl.modes.paper_mode import facing_ahead
+from robojackson.rl.modes.reset_states import default_stand, noisy, stand_at
+from robojackson.rl.policy import Policy
+from robojackson.rl.sim.reference_clip import Clip
+from robojackson.rl.sim.simulation import require_same_clock
+from robojackson.robot.model import Robot
+
+log = logging.getLogger(__name__)
+
+STATUE_SHARE = 0.9
+"""Of a run's own return, above which what a statue earns raises a flag."""
+MEANT = ("limb_", "excess_", "usage_", "reward_", "return_", "error_")
+"""Beginnings of further columns that are averaged over the rollouts."""
+STAND = -1
+"""`phase` of the row that starts in the default stand."""
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """The verdict on a policy.
+
+    Attributes:
+        summary: Means over the policy's rollouts, and those of the baselines by name.
+        rows: One row a rollout, of the policy and of every baseline.
+        rollout_qpos: The policy's rollout from the clip's first step (phase 0, reset 0, whether it
+            falls or not), for the video; row s is the state at the reference's step s.
+    """
+
+    summary: dict[str, object]
+    rows: list[dict[str, object]]
+    rollout_qpos: Float[np.ndarray, "S nq"]
+
+
+def evaluate(
+    policy: Policy,
+    reference: ReferenceMotion,
+    robot: Robot,
+    config: EvaluateConfig,
+    progress: Callable[[str, int, int], None] = lambda name, step, total: None,
+) -> Evaluation:
+    """Judge a policy and its baselines on one reference motion.
+
+    Raises:
+        BadPolicy: the policy's observation does not fit this robot.
+    """
+    control = control_of(policy, robot)
+    require_same_clock(control.substeps * robot.model.opt.timestep, reference.dt)
+    _tell_strangers(policy, reference)
+    environment = environment_of(policy, control)
+    if isinstance(environment, PaperConfig):
+        reference = facing_ahead(reference)
+    clip = Clip(reference)
+    starts, labels = _starts(robot, clip, config)
+    horizon = clip.horizon(starts.step, config.seconds)
+    judge, meter = Judge(robot, reference, config), Meter(robot, reference, clip, environment)
+    rows: list[dict[str, object]] = []
+    summaries: dict[str, dict[str, float]] = {}
+    qpos = np.zeros((0, robot.model.nq))
+    for name, driver in drivers(policy, reference, robot, config.seed).items():
+        tick = partial(progress, name)
+        rules = TerminationConfig()
+        done = roll_out(robot, clip, driver, starts, horizon, config.threads, rules, meter, tick)
+        judged = [judge.row(name, label, done, i) for i, label in enumerate(labels)]
+        rows += judged
+        summaries[name] = summarise(judged)
+        if name == TRAINED:
+            qpos = _shown(done, starts)
+    own = summaries.pop(TRAINED)
+    variants = {name: summaries.pop(name) for name in VARIANTS if name in summaries}
+    reward = reward_report(robot, reference, environment, own, float(horizon.mean()))
+    told = {"variants": variants, "baselines": summaries, "reward": reward}
+    return Evaluation({**own, **told}, rows, qpos)
+
+
+def environment_of(policy: Policy, control: ControlConfig) -> TrackConfig | PaperConfig:
+    """The environment whose reward a policy is measured with: its own, without curiosity."""
+    held = policy.facts.get("environment")
+    paper = mode_of(policy) == "paper"
+    if not isinstance(held, Mapping):
+        return PaperConfig() if paper else TrackConfig(control=control)
+    kind: type[PaperConfig | TrackConfig] = PaperConfig if paper else TrackConfig
+    return yardstick(fact(policy, "environment", kind))
+
+
+def reward_report(
+    robot: Robot,
+    reference: ReferenceMotion,
+    environment: TrackConfig | PaperConfig,
+    own: Mapping[str, float],
+    steps: float,
+) -> dict[str, object]:
+    """Shortcuts made visible: what every term gave, and what bodies get that do not dance.
+
+    `flagged` says that a statue carried along would earn over 90 % of the policy's return.
+    """
+    asked = both_readings(robot, reference, environment)
+    reading = environment.relative if isinstance(environment, PaperConfig) else "track"
+    nothing = Shares(float("nan"), {"statue": float("nan")})  # a reward that asks for no motion
+    known = asked.get(reading, nothing)
+    statue = known.statue * steps
+    terms = {k.removeprefix("reward_"): v for k, v in own.items() if k.startswith("reward_")}
+    total = sum(abs(value) for value in terms.values()) or 1.0
+    return {
+        "of_terms": {name: value / total for name, value in terms.items()},
+        "asks": told(asked),
+        "perfect_return": known.perfect * steps,
+        "statue_return": statue,
+        "own_return": own["return_own"],
+        "flagged": bool(statue > STATUE_SHARE * own["return_own"]),
+    }
+
+
+def _tell_strangers(policy: Policy, reference: ReferenceMotion) -> None:
+    """A policy may be judged on another motion than it learnt, but not without a word."""
+    learnt = policy.facts.get("reference_sha256")
+    if learnt is not None and learnt != poses_sha256(reference):
+        log.warning(
+            "the policy was trained on another reference motion than the one it is judged on"
+        )
+
+
+def summarise(rows: list[dict[str, object]]) -> dict[str, float]:
+    """Means over rollouts; limb gains only over those in which the limb had to move."""
+    keys = ("survived_s", "success", "strict_success", "skill", "site_error_m", "clip_fraction",
+            "velocity_score", "drift_m", "heading_error_deg", "travel_ratio")  # fmt: skip
+    out = {key: _mean(rows, key) for key in keys}
+    limbs = [key for key in rows[0] if key.startswith(MEANT)]
+    out |= {key: _mean(rows, key) for key in limbs}
+    out["limb_gain"] = _nanmean([out[key] for key in limbs if key.startswith("limb_gain_")])
+    out["rollouts"] = float(len(rows))
+    return out
+
+
+def _starts(
+    robot: Robot, clip: Clip, config: EvaluateConfig
+) -> tuple[Starts, list[tuple[int, int]]]:
+    """Evenly spread phases with noisy resets, then the default stand at the first step.
+
+    A clip that is not cyclic is started in its first quarter, so that most of it is always danced.
+    """
+    usable = clip.steps if clip.cyclic else max(1, clip.steps // 4)
+    phases = np.linspace(0, usable, config.phases, endpoint=False).astype(int)
+    labels = [(int(p), r) for p in phases for r in range(config.resets)] + [(STAND, 0)]
+    step = np.array([max(phase, 0) for phase, _ in labels])
+    at = clip.at(step)
+    noise = ResetConfig(
+        joint_noise=config.joint_noise,
+        joint_speed_noise=config.joint_speed_noise,
+        root_speed_noise=config.root_speed_noise,
+    )
+    qpos, qvel = noisy(at.qpos, at.qvel, noise, np.random.default_rng(config.seed))
+    qpos[-1], qvel[-1] = stand_at(default_stand(robot.model), at.qpos[-1, :7]), 0.0
+    return Starts(step, qpos, qvel), labels
+
+
+def _shown(rollouts: Rollouts, starts: Starts) -> np.ndarray:
+    """The rollout from the clip's first step, its start first, with its fall if it falls."""
+    steps = min(int(rollouts.length[0]) + 1, len(rollouts.qpos))
+    return np.concatenate([starts.qpos[:1], rollouts.qpos[:steps, 0]])
+
+
+def _mean(rows: list[dict[str, object]], key: str) -> float:
+    return _nanmean([float(row[key]) for row in rows])  # type: ignore[arg-type]
+
+
+def _nanmean(values: list[float]) -> float:
+    finite = [value for value in values if np.isfinite(value)]
+    return float(np.mean(finite)) if finite else float("nan")

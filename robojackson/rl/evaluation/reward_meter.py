@@ -1,0 +1,80 @@
+"""What every step would earn, whoever drives: the yardstick that all runs are measured with.
+
+Setups are trained with their own reward but measured with the same: curiosity off, lambda fixed at
+its largest value, Humanoid-v5's own reward left out. `reward_*` are the terms of the policy's mode,
+`return_own` their sum, `return_paper` what the paper's reward would have paid.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.rl.config.train_config import PaperConfig, RewardConfig, TrackConfig
+from robojackson.rl.evaluation.rollouts import Moment, Reading
+from robojackson.rl.modes.paper_mode import PaperPoints
+from robojackson.rl.modes.paper_reward import Miss, miss, paper_terms
+from robojackson.rl.modes.track_mode import judged, tracked_points
+from robojackson.rl.sim.reference_clip import Clip
+from robojackson.robot.model import Robot
+
+
+class Meter:
+    """Reads the rewards of a moment.
+
+    Args:
+        environment: Whose reward is the policy's own.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        reference: ReferenceMotion,
+        clip: Clip,
+        environment: TrackConfig | PaperConfig,
+    ) -> None:
+        self._clip = clip
+        asked = [PaperConfig()]
+        if isinstance(environment, PaperConfig):
+            asked = [PaperConfig(relative=environment.relative), environment]
+        self._papers = [(config, PaperPoints(robot, reference, config)) for config in asked]
+        self._track = None if isinstance(environment, PaperConfig) else environment.reward
+        self._which = tracked_points(robot.keypoint_names)
+
+    def __call__(self, moment: Moment) -> Reading:
+        """Terms, errors and returns of every robot at one control step."""
+        read = [self._asked(moment, *paper) for paper in self._papers]
+        (_, paper), (apart, own) = read[0], read[-1]
+        if self._track is not None:
+            own = self._tracked(moment, self._track)
+        return {
+            **{f"reward_{name}": value for name, value in own.items()},
+            **_errors(apart),
+            "return_own": np.sum(list(own.values()), 0),
+            "return_paper": np.sum(list(paper.values()), 0),
+        }
+
+    def _asked(
+        self, moment: Moment, config: PaperConfig, points: PaperPoints
+    ) -> tuple[Miss, Reading]:
+        """Distances and terms of a reward of the paper's kind, lambda at its largest."""
+        state = points.of(moment.sim)
+        apart = miss(state, *points.wanted(self._clip, moment.at.step), points.weights)
+        return apart, paper_terms(state, apart, moment.fell, config.lambda_max, config)
+
+    def _tracked(self, moment: Moment, reward: RewardConfig) -> Reading:
+        sim = moment.sim
+        moved = (sim.points - moment.before) / self._clip.dt
+        _, terms = judged(sim, moved, moment.at, moment.change, self._which, reward)
+        return {name: np.where(moment.fell, 0.0, term) for name, term in terms.items()}
+
+
+def yardstick(environment: TrackConfig | PaperConfig) -> TrackConfig | PaperConfig:
+    """The same environment without the bonus for curiosity."""
+    if isinstance(environment, PaperConfig):
+        return replace(environment, curiosity="off")
+    return replace(environment, reward=replace(environment.reward, curiosity="off"))
+
+
+def _errors(apart: Miss) -> Reading:
+    return {"error_root_m2": apart.root, "error_world_m2": apart.world}

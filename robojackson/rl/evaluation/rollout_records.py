@@ -1,0 +1,135 @@
+"""From one rollout to one row of the evaluation table (definitions in `metrics.rollout_score`)."""
+
+import mujoco
+import numpy as np
+
+from robojackson.geometry.rotations import heading, wrapped
+from robojackson.metrics.dance_score import heading_score
+from robojackson.metrics.rollout_score import (
+    best_frozen_error,
+    heading_frame,
+    limb_response,
+    site_error,
+    skill,
+)
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.rl.config.train_config import EvaluateConfig
+from robojackson.rl.evaluation.rollouts import Rollouts
+from robojackson.rl.modes.track_mode import EXTREMITIES, FEET, PELVIS
+from robojackson.robot.model import Robot
+
+KNEES = ("left_knee", "right_knee")
+LIMB_ENDS = (*FEET, *EXTREMITIES)
+LEAST_MOVING_SHARE = 0.05
+"""Of the frames, below which no gain of a limb is told."""
+LEAST_SPREAD_RAD = 0.02
+"""Of a hinge of the reference, below which no usage is told, radians."""
+LEAST_TRAVEL_M = 0.5
+"""Of the reference, below which no travel ratio is told, metres."""
+
+
+class Judge:
+    """Turns one rollout into one row of the table."""
+
+    def __init__(self, robot: Robot, reference: ReferenceMotion, config: EvaluateConfig) -> None:
+        names = robot.keypoint_names
+        self._config, self._dt = config, reference.dt
+        self._pelvis = names.index(PELVIS)
+        self._knees = [names.index(name) for name in KNEES]
+        self._limbs = {name: names.index(name) for name in LIMB_ENDS}
+        self._model, self._joints = robot.model, robot.joint_names
+        asked, slowed = (reference.scorecard.get(key, 1.0) for key in ("tempo", "tempo_mean"))
+        self._tempo = float(asked * slowed)
+
+    def row(
+        self, policy: str, label: tuple[int, int], rollouts: Rollouts, i: int
+    ) -> dict[str, object]:
+        """Figures of one rollout; errors are means up to its end or its fall."""
+        length, fell = int(rollouts.length[i]), bool(rollouts.fell[i])
+        span = slice(0, max(length, 1))
+        here = heading_frame(rollouts.points[span, i], rollouts.qpos[span, i, 3:7], self._pelvis)
+        there = heading_frame(
+            rollouts.wanted[span, i], rollouts.wanted_qpos[span, i, 3:7], self._pelvis
+        )
+        error = site_error(here, there)
+        knees = rollouts.points[span, i][:, self._knees, 2]
+        wanted_knees = rollouts.wanted[span, i][:, self._knees, 2]
+        low = self._config.kneel_height
+        kneels = bool(((knees < low) & (wanted_knees >= low)).any())
+        strict = not fell and not kneels and float(error.max()) <= self._config.strict_error
+        phase, reset = label
+        row: dict[str, object] = {
+            "policy": policy,
+            "phase": phase,
+            "reset": reset,
+            "survived_s": length * self._dt,
+            "clip_fraction": length / int(rollouts.horizon[i]),
+            "fell": fell,
+            "success": float(not fell),
+            "strict_success": float(strict),
+            "kneels": kneels,
+            "site_error_m": float(error.mean()),
+            "skill": 0.0 if fell else skill(float(error.mean()), best_frozen_error(there)),
+            "integrator": mujoco.mjtIntegrator(self._model.opt.integrator).name.removeprefix(
+                "mjINT_"
+            ),
+            "tempo": self._tempo,
+        }
+        row |= {name: float(total[i]) for name, total in self._means(rollouts).items()}
+        row["velocity_score"] = self._velocity_score(rollouts, i, span)
+        row |= self._whereabouts(rollouts, i, span) | self._limb_figures(here, there)
+        return row | self._usage(rollouts, i, span)
+
+    def _velocity_score(self, rollouts: Rollouts, i: int, span: slice) -> float:
+        """Along the heading, path included; a robot that falls has not danced: at most 0."""
+        score = heading_score(
+            rollouts.points[span, i],
+            rollouts.qpos[span, i, 3:7],
+            rollouts.wanted[span, i],
+            rollouts.wanted_qpos[span, i, 3:7],
+        )
+        if not rollouts.fell[i]:
+            return score
+        return 0.0 if np.isnan(score) else min(score, 0.0)
+
+    def _means(self, rollouts: Rollouts) -> dict[str, np.ndarray]:
+        """Returns and their terms summed over the rollout, errors as means."""
+        steps = np.maximum(np.minimum(rollouts.length + 1, rollouts.horizon), 1)
+        return {
+            name: total / steps if name.startswith("error_") else total
+            for name, total in rollouts.totals.items()
+        }
+
+    def _usage(self, rollouts: Rollouts, i: int, span: slice) -> dict[str, float]:
+        """Every hinge's spread over the rollout, as a multiple of the reference's."""
+        own = rollouts.qpos[span, i, 7:].std(0)
+        wanted = rollouts.wanted_qpos[span, i, 7:].std(0)
+        moves = wanted > LEAST_SPREAD_RAD
+        ratio = np.where(moves, own / np.where(moves, wanted, 1.0), np.nan)
+        return {f"usage_{name}": float(r) for name, r in zip(self._joints, ratio, strict=True)}
+
+    def _whereabouts(self, rollouts: Rollouts, i: int, span: slice) -> dict[str, float]:
+        """What the pelvis-heading frame does not see: where the robot went and which way."""
+        end = span.stop - 1
+        went = rollouts.points[[0, end], i, self._pelvis, :2]
+        wanted = rollouts.wanted[[0, end], i, self._pelvis, :2]
+        turn = heading(rollouts.qpos[end, i, 3:7]) - heading(rollouts.wanted_qpos[end, i, 3:7])
+        path = float(np.linalg.norm(wanted[1] - wanted[0]))
+        forward = float((went[1] - went[0]) @ (wanted[1] - wanted[0]))
+        return {
+            "drift_m": float(np.linalg.norm(went[1] - wanted[1])),
+            "heading_error_deg": float(np.degrees(np.abs(wrapped(turn)))),
+            "travel_ratio": forward / path**2 if path > LEAST_TRAVEL_M else float("nan"),
+        }
+
+    def _limb_figures(self, here: np.ndarray, there: np.ndarray) -> dict[str, float]:
+        figures: dict[str, float] = {}
+        config = self._config
+        for name, k in self._limbs.items():
+            found = limb_response(here[:, k], there[:, k], self._dt, config.fast, config.max_lag)
+            moves = found is not None and found.moving_share > LEAST_MOVING_SHARE
+            figures[f"limb_gain_{name}"] = found.gain if found and moves else float("nan")
+            figures[f"limb_r2_{name}"] = found.r2 if found and moves else float("nan")
+            figures[f"limb_lag_{name}"] = found.lag_s if found and moves else float("nan")
+            figures[f"excess_speed_{name}"] = found.excess_m_s if found else float("nan")
+        return figures

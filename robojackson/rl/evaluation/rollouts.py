@@ -1,0 +1,126 @@
+"""Rollouts of many starts at once on stock physics, recorded until each robot falls."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from robojackson.rl.config.train_config import ControlConfig, TerminationConfig
+from robojackson.rl.modes.rewards import fallen
+from robojackson.rl.sim.reference_clip import Clip, ClipStep
+from robojackson.rl.sim.simulation import Simulation
+from robojackson.robot.model import Robot
+
+Reading = dict[str, Float[np.ndarray, " N"]]
+
+
+@dataclass(frozen=True)
+class Driver:
+    """How robots are driven.
+
+    Attributes:
+        control: The law of control.
+        command: (simulation, next step of the reference, start steps, last action) -> what
+            `Simulation.step` gets.
+        repeats: Control steps for which a command is held.
+    """
+
+    control: ControlConfig
+    command: Callable[[Simulation, ClipStep, np.ndarray, np.ndarray], np.ndarray]
+    repeats: int = 1
+
+
+@dataclass(frozen=True)
+class Starts:
+    """States to start from: the clip step each belongs to and the state itself."""
+
+    step: Int[np.ndarray, " N"]
+    qpos: Float[np.ndarray, "N nq"]
+    qvel: Float[np.ndarray, "N nv"]
+
+
+@dataclass(frozen=True)
+class Moment:
+    """What a meter sees after every control step.
+
+    Attributes:
+        sim: The simulation.
+        at: The reference now.
+        before: The sites one control step ago, world, m.
+        change: Mean squared change of the action: of the residual, in units of a full one.
+        fell: Robots that fell in this very step.
+    """
+
+    sim: Simulation
+    at: ClipStep
+    before: Float[np.ndarray, "N K 3"]
+    change: Float[np.ndarray, " N"]
+    fell: np.ndarray
+
+
+@dataclass(frozen=True)
+class Rollouts:
+    """What N robots did; after its fall a robot's rows repeat the last state.
+
+    Attributes:
+        length: Steps each survived, at most H.
+        fell: Whether each fell before the horizon.
+        horizon: Steps that each was asked for.
+        qpos: States after every step.
+        points: Keypoint sites, world, metres.
+        wanted: The reference's sites at the same steps, world, metres.
+        wanted_qpos: The reference's state.
+        totals: Sums of what the meter read, up to the end or the fall, which counts itself.
+    """
+
+    length: Int[np.ndarray, " N"]
+    fell: np.ndarray
+    horizon: Int[np.ndarray, " N"]
+    qpos: Float[np.ndarray, "H N nq"]
+    points: Float[np.ndarray, "H N K 3"]
+    wanted: Float[np.ndarray, "H N K 3"]
+    wanted_qpos: Float[np.ndarray, "H N nq"]
+    totals: Reading
+
+
+def roll_out(
+    robot: Robot,
+    clip: Clip,
+    driver: Driver,
+    starts: Starts,
+    horizon: Int[np.ndarray, " N"],
+    threads: int,
+    rules: TerminationConfig,
+    meter: Callable[[Moment], Reading] = lambda moment: {},
+    tick: Callable[[int, int], None] = lambda step, total: None,
+) -> Rollouts:
+    """Drive a robot from every start, each to its own horizon or its fall."""
+    n, steps = len(starts.step), int(horizon.max())
+    sim = Simulation(robot, driver.control, n, threads)
+    sim.place(np.arange(n), starts.qpos, starts.qvel)
+    action = command = np.zeros((n, robot.model.nu))
+    alive, length = np.ones(n, bool), np.zeros(n, int)
+    totals: Reading = {}
+    record: list[tuple[np.ndarray, ...]] = []
+    for t in range(steps):
+        target, before, change = clip.at(starts.step + t + 1), sim.points.copy(), np.zeros(n)
+        if t % driver.repeats == 0:
+            command = driver.command(sim, target, starts.step, action)
+            residual = command - sim.follow(target)
+            last, action = action, np.clip(residual / sim.residual, -1, 1)
+            change = np.mean((action - last) ** 2, -1)
+        sim.step(command, alive)
+        still = alive & ~fallen(sim.qpos, rules) & ~sim.broken & (t < horizon)
+        reading = meter(Moment(sim, target, before, change, alive & ~still & (t < horizon)))
+        for name, value in reading.items():
+            totals[name] = totals.get(name, 0.0) + np.where(alive & (t < horizon), value, 0.0)
+        alive = still
+        length += alive
+        record.append((sim.qpos.copy(), sim.points.copy(), target.points, target.qpos))
+        tick(t + 1, steps)
+        if not (alive & (t + 1 < horizon)).any():
+            break
+    sim.close()
+    qpos, points, wanted, wanted_qpos = (np.stack(column) for column in zip(*record, strict=True))
+    return Rollouts(length, length < horizon, horizon, qpos, points, wanted, wanted_qpos, totals)

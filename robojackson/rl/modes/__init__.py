@@ -1,0 +1,1 @@
+"""The two ways to learn a motion: observation, action, reward, reset."""

@@ -1,0 +1,202 @@
+"""The paper's way: torques and 348 observations of stock Humanoid-v5, its reward, its curriculum.
+
+The policy sees no phase and no reference. An episode begins in Humanoid-v5's own reset, which
+stands at the origin and faces +x; the motion is turned so that its first step does the same. It
+ends by a fall, at the end of the motion, or when a cyclic one was danced for `PaperConfig.seconds`.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from robojackson.errors import BadConfiguration, UnknownName
+from robojackson.geometry.rotations import heading, quat_multiply
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.rl.config.paper_config import POINT_WEIGHTS
+from robojackson.rl.config.train_config import ControlConfig, PaperConfig
+from robojackson.rl.modes.mode import Beginning, Score
+from robojackson.rl.modes.paper_reward import PaperState, has_fallen, miss, paper_terms, ramp
+from robojackson.rl.sim.reference_clip import Clip, ClipStep
+from robojackson.rl.sim.simulation import Simulation
+from robojackson.rl.sim.stock_humanoid import (
+    bodies_now,
+    mass_centres_now,
+    own_reward,
+    spin_now,
+    stock_observation,
+    stock_observation_size,
+)
+from robojackson.robot.model import Robot
+
+PELVIS = "pelvis"
+
+
+class PaperMode:
+    """The paper's task for N robots (`Mode` protocol)."""
+
+    def __init__(
+        self, robot: Robot, reference: ReferenceMotion, config: PaperConfig, n: int, seed: int
+    ) -> None:
+        turned = facing_ahead(reference)
+        self._config, self.clip = config, Clip(turned)
+        self.points = PaperPoints(robot, turned, config)
+        self.sim = Simulation(robot, ControlConfig(law="torque"), n, config.threads)
+        model = robot.model
+        self._control = model.actuator_ctrlrange[:, 1]
+        self._stand = model.qpos0.copy()
+        self.repeats = config.repeats
+        self.limit = round(config.seconds / self.clip.dt)
+        whole = stock_observation_size(model.nq, model.nv, model.nbody)
+        self.observation_size = whole if config.observe == "stock" else model.nq - 2 + model.nv
+        self._keypoint_pelvis = robot.keypoint_names.index(PELVIS)
+        self._own, self._com = np.zeros(n), self.sim.com.copy()
+        self._early = 0
+
+    def command(self, following: ClipStep, action: np.ndarray) -> np.ndarray:
+        self._com = self.sim.com.copy()
+        return self._control * action
+
+    def observe(self, following: ClipStep, action: np.ndarray) -> Float[np.ndarray, "N D"]:
+        return stock_observation(self.sim)[:, : self.observation_size]
+
+    def after(self, command: np.ndarray) -> None:
+        """Count Humanoid-v5's own reward of each repeat."""
+        if self._config.own:
+            self._own += own_reward(self.sim, self._com, command)
+
+    def score(self, at: ClipStep, before: np.ndarray, change: np.ndarray, episode: int) -> Score:
+        config = self._config
+        state = self.points.of(self.sim)
+        apart = miss(state, *self.points.wanted(self.clip, at.step), self.points.weights)
+        fell = has_fallen(state, config) | self.sim.broken
+        terms = paper_terms(state, apart, fell, ramp(episode, config), config)
+        if config.own:
+            terms["own"] = config.own * self._own
+            self._own = np.zeros_like(self._own)
+        errors = {"error_root_m2": apart.root, "error_world_m2": apart.world}
+        return Score(terms, fell, self._site_error(at), errors)
+
+    def begin(self, count: int, rng: np.random.Generator) -> Beginning:
+        noise, model = self._config.reset_noise, self.sim.model
+        qpos = self._stand + rng.uniform(-noise, noise, (count, model.nq))
+        qpos[:, 3:7] /= np.linalg.norm(qpos[:, 3:7], axis=-1, keepdims=True)
+        qvel = rng.uniform(-noise, noise, (count, model.nv))
+        return Beginning(np.zeros(count, int), qpos, qvel)
+
+    def ended(
+        self, start: Int[np.ndarray, " I"], failed: np.ndarray, age: Int[np.ndarray, " I"]
+    ) -> dict[str, float]:
+        actions = age / self.repeats
+        self._early += int(np.sum(failed & (actions < self._config.early_fall)))
+        return {"train_early_falls": float(self._early)}
+
+    def keep(self, indices: Int[np.ndarray, " I"], step: Int[np.ndarray, " I"]) -> None:
+        """The paper learns nothing from them."""
+
+    def forget(self) -> None:
+        self._early = 0
+
+    def state(self) -> dict[str, Any]:
+        return {"early": np.array(self._early)}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        self._early = int(state["early"])
+
+    def _site_error(self, at: ClipStep) -> Float[np.ndarray, " N"]:
+        pelvis = self._keypoint_pelvis
+        here = self.sim.points - self.sim.points[:, pelvis, None]
+        there = at.points - at.points[:, pelvis, None]
+        return np.linalg.norm(here - there, axis=-1).mean(-1)
+
+
+def require_trainable(robot: Robot) -> None:
+    """Refuse a robot that the rewards cannot look at.
+
+    Raises:
+        BadConfiguration: it lacks points that they name.
+    """
+    known = (*robot.keypoint_names, *robot.body_names)
+    missing = [name for name in (PELVIS, *POINT_WEIGHTS) if name not in known]
+    if missing:
+        raise BadConfiguration(
+            f"training is not possible on robot {robot.description.name!r} yet: it has no "
+            f"{', '.join(missing)}; retargeting, its video and export are"
+        )
+
+
+class PaperPoints:
+    """The points that the paper's reward compares: keypoints and bodies, bound by name.
+
+    Raises:
+        UnknownName: a point that is neither.
+    """
+
+    def __init__(self, robot: Robot, reference: ReferenceMotion, config: PaperConfig) -> None:
+        sites, bodies = robot.keypoint_names, robot.body_names
+        known = (*sites, *bodies)
+        for name in (*config.weights, PELVIS):
+            if name not in known:
+                raise UnknownName("point", name, "paper.weights", known)
+        self.weights = np.array(list(config.weights.values()))
+        self._sites = _columns(config.weights, sites)
+        self._bodies = _columns([w for w in config.weights if w not in sites], bodies)
+        found = sorted(config.weights, key=lambda name: name not in sites)
+        self._order = _columns(config.weights, found)
+        self._pelvis = bodies.index(PELVIS)
+        told = list(reference.body_names)
+        self._reference = self._named(
+            reference.keypoints_w, reference.body_pos_w[:, [told.index(name) for name in bodies]]
+        )
+        self._root = np.asarray(reference.body_pos_w, float)[:, told.index(PELVIS)]
+
+    def of(self, sim: Simulation) -> PaperState:
+        """What the reward looks at, of every robot of a simulation."""
+        bodies = bodies_now(sim)[:, 1:]
+        _, x, y, _ = sim.qpos[:, 3:7].T
+        return PaperState(
+            points=self._named(sim.points, bodies),
+            root=bodies[:, self._pelvis],
+            com=mass_centres_now(sim),
+            upright=1 - 2 * (x * x + y * y),
+            height=sim.qpos[:, 2],
+            hinge_speed=sim.qvel[:, 6:],
+            spin=spin_now(sim),
+        )
+
+    def wanted(
+        self, clip: Clip, step: Int[np.ndarray, " N"]
+    ) -> tuple[Float[np.ndarray, "N P 3"], Float[np.ndarray, "N 3"]]:
+        """The reference's points and its pelvis at each robot's step, world."""
+        return clip.take(self._reference, step), clip.take(self._root[:, None], step)[:, 0]
+
+    def _named(self, sites: np.ndarray, bodies: np.ndarray) -> Float[np.ndarray, "N P 3"]:
+        found = np.concatenate([sites[:, self._sites], bodies[:, self._bodies]], 1)
+        return np.asarray(found, float)[:, self._order]
+
+
+def facing_ahead(reference: ReferenceMotion) -> ReferenceMotion:
+    """The motion moved and turned so that it begins above the origin, facing +x."""
+    yaw = float(heading(reference.qpos[0, 3:7]))
+    turn = np.array([np.cos(yaw / 2), 0.0, 0.0, -np.sin(yaw / 2)])
+    c, s = np.cos(yaw), np.sin(yaw)
+    to_ahead = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    home = np.array([*reference.qpos[0, :2], 0.0])
+    qpos, qvel = np.array(reference.qpos, float), np.array(reference.qvel, float)
+    qpos[:, :3] = (qpos[:, :3] - home) @ to_ahead.T
+    qpos[:, 3:7] = quat_multiply(np.broadcast_to(turn, (len(qpos), 4)), qpos[:, 3:7])
+    qvel[:, :3] = qvel[:, :3] @ to_ahead.T
+    return replace(
+        reference,
+        qpos=qpos,
+        qvel=qvel,
+        keypoints_w=(np.asarray(reference.keypoints_w, float) - home) @ to_ahead.T,
+        body_pos_w=(np.asarray(reference.body_pos_w, float) - home) @ to_ahead.T,
+        lap_offset=to_ahead @ np.asarray(reference.lap_offset, float),
+    )
+
+
+def _columns(names: Sequence[str] | dict[str, float], known: Sequence[str]) -> list[int]:
+    return [list(known).index(name) for name in names if name in known]

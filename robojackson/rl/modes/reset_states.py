@@ -1,0 +1,133 @@
+"""Where episodes begin: a phase of the clip, a state reached before, or the default stand.
+
+Phases are drawn more often where episodes end early (as in BeyondMimic's adaptive sampling): the
+clip is cut into bins and each keeps a moving average of its failures.
+"""
+
+import mujoco
+import numpy as np
+from jaxtyping import Float, Int
+
+from robojackson.geometry.rotations import heading
+from robojackson.rl.config.train_config import ResetConfig
+from robojackson.rl.sim.reference_clip import Clip
+
+BIN_SECONDS = 0.25
+FORGET = 0.02
+EVEN = 0.5
+SETTLED_STATES = 4096
+
+
+class StartPhases:
+    """Adaptive distribution over the start steps of a clip."""
+
+    def __init__(self, clip: Clip, failure_share: float) -> None:
+        self._last = clip.steps if clip.cyclic else max(1, clip.steps - 1)
+        self._bins = max(1, round(self._last * clip.dt / BIN_SECONDS))
+        self.failures = np.full(self._bins, EVEN)
+        self._share = failure_share
+
+    def draw(self, count: int, rng: np.random.Generator) -> Int[np.ndarray, " count"]:
+        """Start steps, a share of them where failures are frequent."""
+        uniform = rng.integers(self._last, size=count)
+        weight = self.failures + 1e-3
+        bins = rng.choice(self._bins, size=count, p=weight / weight.sum())
+        inside = (bins + rng.random(count)) * self._last / self._bins
+        weak = np.minimum(inside.astype(int), self._last - 1)
+        return np.where(rng.random(count) < self._share, weak, uniform)
+
+    def forget(self) -> None:
+        """Take every phase for equally hard."""
+        self.failures[:] = EVEN
+
+    def record(self, start: Int[np.ndarray, " I"], failed: np.ndarray) -> None:
+        """Learn from ended episodes: the step each began at and whether it fell or got lost."""
+        bins = (start % self._last) * self._bins // self._last
+        for index, bad in zip(bins, failed, strict=True):
+            self.failures[index] += FORGET * (float(bad) - self.failures[index])
+
+
+class SettledStates:
+    """A ring of states in which the robot danced when the time limit came: it got there by itself.
+
+    The root's place over the floor is kept relative to its reference, with the drift that it had.
+    """
+
+    def __init__(self, nq: int, nv: int) -> None:
+        self._qpos = np.zeros((SETTLED_STATES, nq))
+        self._qvel = np.zeros((SETTLED_STATES, nv))
+        self._step = np.zeros(SETTLED_STATES, int)
+        self._count = 0
+
+    def __len__(self) -> int:
+        return min(self._count, SETTLED_STATES)
+
+    def add(self, qpos: np.ndarray, qvel: np.ndarray, step: int) -> None:
+        """Keep one state whose root is relative to the reference at that step of the clip."""
+        slot = self._count % SETTLED_STATES
+        self._qpos[slot], self._qvel[slot], self._step[slot] = qpos, qvel, step
+        self._count += 1
+
+    def forget(self) -> None:
+        """Drop all states."""
+        self._count = 0
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Everything, as arrays."""
+        kept = len(self)
+        named = {"qpos": self._qpos, "qvel": self._qvel, "step": self._step}
+        held = {f"settled_{name}": array[:kept].copy() for name, array in named.items()}
+        return held | {"settled_count": np.array(self._count)}
+
+    def restore(self, state: dict[str, np.ndarray]) -> None:
+        """Go on from what `state` gave."""
+        kept = len(state["settled_step"])
+        self._qpos[:kept], self._qvel[:kept] = state["settled_qpos"], state["settled_qvel"]
+        self._step[:kept], self._count = state["settled_step"], int(state["settled_count"])
+
+    def draw(self, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, int]:
+        """One of the kept states: qpos, qvel and the clip step that it belongs to."""
+        slot = int(rng.integers(len(self)))
+        return self._qpos[slot].copy(), self._qvel[slot].copy(), int(self._step[slot])
+
+
+def noisy(
+    qpos: Float[np.ndarray, "I nq"],
+    qvel: Float[np.ndarray, "I nv"],
+    config: ResetConfig,
+    rng: np.random.Generator,
+) -> tuple[Float[np.ndarray, "I nq"], Float[np.ndarray, "I nv"]]:
+    """The states with Gaussian noise on hinges and velocities."""
+    qpos, qvel = qpos.copy(), qvel.copy()
+    qpos[:, 7:] += rng.normal(0, config.joint_noise, qpos[:, 7:].shape)
+    qvel[:, 6:] += rng.normal(0, config.joint_speed_noise, qvel[:, 6:].shape)
+    qvel[:, :6] += rng.normal(0, config.root_speed_noise, (len(qvel), 6))
+    return qpos, qvel
+
+
+def default_stand(model: mujoco.MjModel) -> Float[np.ndarray, " nq"]:
+    """The model's zero pose with its lowest geom on the floor, facing +x at the origin."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    solid = [i for i in range(model.ngeom) if model.geom_bodyid[i] > 0]
+    lowest = min(data.geom_xpos[i][2] - _reach_down(model, data, i) for i in solid)
+    qpos = model.qpos0.copy()
+    qpos[2] -= lowest
+    return qpos
+
+
+def stand_at(stand: Float[np.ndarray, " nq"], root: Float[np.ndarray, " 7"]) -> np.ndarray:
+    """The default stand moved to a root pose's place over the floor and its heading."""
+    qpos = stand.copy()
+    yaw = float(heading(root[3:7]))
+    qpos[:2] = root[:2]
+    qpos[3:7] = [np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)]
+    return qpos
+
+
+def _reach_down(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> float:
+    """How far a sphere or capsule extends below its centre, metres."""
+    radius, half = model.geom_size[geom][:2]
+    if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_CAPSULE:
+        return float(radius + half * abs(data.geom_xmat[geom].reshape(3, 3)[2, 2]))
+    return float(model.geom_rbound[geom])

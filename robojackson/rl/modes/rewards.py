@@ -1,0 +1,143 @@
+"""Reward terms of the tracking environment: pure functions of a state and its reference.
+
+Each term is `weight * exp(-(error / width)^2)` (DeepMimic, Peng et al. 2018, eq. 3), so the reward
+is greatest when the state equals the reference. Errors are in metres, radians and seconds; the
+sites are compared relative to the pelvis, so that drifting over the floor costs only the drift
+term.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from robojackson.geometry.rotations import quat_angle
+from robojackson.rl.config.train_config import RewardConfig, TerminationConfig
+from robojackson.rl.sim.reference_clip import ClipStep
+
+BELLS = (
+    "joints",
+    "sites",
+    "hands",
+    "orientation",
+    "velocity",
+    "joint_speed",
+    "limb_speed",
+    "height",
+    "drift",
+)
+"""Terms of the reward that pay for a small error: of the same name in `TrackingErrors`, and in
+`RewardConfig`, where `NAME_width` is its width."""
+
+
+@dataclass(frozen=True)
+class TrackedPoints:
+    """Which of the points are special: indices, bound by name.
+
+    Attributes:
+        pelvis: What the others are compared relative to.
+        hands: Hands and head.
+        limbs: Feet, hands and head: the ends that must not flail.
+    """
+
+    pelvis: int
+    hands: tuple[int, ...]
+    limbs: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class TrackingErrors:
+    """How far each of N robots is from its reference.
+
+    Attributes:
+        joints: Root mean square over hinges, rad.
+        joint_speed: Root mean square over hinges, rad/s.
+        sites: Root mean square over sites relative to the pelvis, m.
+        hands: The same over hands and head, m.
+        site_mean: Mean distance of the sites relative to the pelvis, m.
+        orientation: Of the root, rad.
+        velocity: Of the root, m/s.
+        limb_speed: Root mean square over the limb ends' velocity differences, m/s.
+        height: Of the root, signed, m.
+        drift: Of the root over the floor, m.
+    """
+
+    joints: Float[np.ndarray, " N"]
+    joint_speed: Float[np.ndarray, " N"]
+    sites: Float[np.ndarray, " N"]
+    hands: Float[np.ndarray, " N"]
+    site_mean: Float[np.ndarray, " N"]
+    orientation: Float[np.ndarray, " N"]
+    velocity: Float[np.ndarray, " N"]
+    limb_speed: Float[np.ndarray, " N"]
+    height: Float[np.ndarray, " N"]
+    drift: Float[np.ndarray, " N"]
+
+
+def tracking_errors(
+    qpos: Float[np.ndarray, "N nq"],
+    qvel: Float[np.ndarray, "N nv"],
+    points: Float[np.ndarray, "N K 3"],
+    moved: Float[np.ndarray, "N K 3"],
+    target: ClipStep,
+    which: TrackedPoints,
+) -> TrackingErrors:
+    """Compare states with their reference; `moved` is the velocity of the points, m/s."""
+    relative = points - points[:, which.pelvis, None]
+    wanted = target.points - target.points[:, which.pelvis, None]
+    squared = _squares(relative - wanted)
+    hurry = _squares((moved - target.moved).take(which.limbs, 1))
+    place, speed = qpos - target.qpos, qvel - target.qvel
+    return TrackingErrors(
+        joints=np.sqrt(_mean(place[:, 7:] ** 2)),
+        joint_speed=np.sqrt(_mean(speed[:, 6:] ** 2)),
+        sites=np.sqrt(_mean(squared)),
+        hands=np.sqrt(_mean(squared.take(which.hands, 1))),
+        site_mean=_mean(np.sqrt(squared)),
+        orientation=quat_angle(qpos[:, 3:7], target.qpos[:, 3:7]),
+        velocity=np.sqrt(_squares(speed[:, :3])),
+        limb_speed=np.sqrt(_mean(hurry)),
+        height=place[:, 2],
+        drift=np.sqrt(_squares(place[:, :2])),
+    )
+
+
+def reward_terms(
+    errors: TrackingErrors, action_change: Float[np.ndarray, " N"], config: RewardConfig
+) -> dict[str, Float[np.ndarray, " N"]]:
+    """Named terms whose sum is the reward; `action_change` is the mean squared change."""
+    error = np.array([getattr(errors, name) for name in BELLS])
+    width = np.array([[getattr(config, f"{name}_width")] for name in BELLS])
+    weight = np.array([[getattr(config, name)] for name in BELLS])
+    square, fine = (error / width) ** 2, config.fine
+    bells = (1 - fine) * np.exp(-square) + fine * np.exp(-square / config.narrow**2)
+    terms = dict(zip(BELLS, weight * bells, strict=True))
+    return terms | {"action_rate": -config.action_rate * action_change}
+
+
+def _squares(vectors: Float[np.ndarray, "*B D"]) -> Float[np.ndarray, "*B"]:
+    """Squared lengths. Here and below `np.add.reduce`: `np.sum` and `np.mean` cost several times
+    as much for the few numbers of a control step."""
+    return np.asarray(np.add.reduce(vectors**2, -1))
+
+
+def _mean(values: Float[np.ndarray, "*B K"]) -> Float[np.ndarray, "*B"]:
+    """Mean over the last axis."""
+    return np.asarray(np.add.reduce(values, -1) / values.shape[-1])
+
+
+def fallen(qpos: Float[np.ndarray, "N nq"], config: TerminationConfig) -> Bool[np.ndarray, " N"]:
+    """The paper's fall rule: the torso below 0.7 m or tilted over 60 degrees."""
+    _, x, y, _ = qpos[:, 3:7].T
+    upright = 1 - 2 * (x * x + y * y)
+    return (qpos[:, 2] < config.fall_height) | (upright < np.cos(config.fall_tilt))
+
+
+def lost(errors: TrackingErrors, config: TerminationConfig) -> Bool[np.ndarray, " N"]:
+    """Early termination of training: too far from the reference to learn from."""
+    return (
+        (errors.orientation > config.orientation)
+        | (np.abs(errors.height) > config.height)
+        | (errors.site_mean > config.sites)
+        | (errors.drift > config.drift)
+    )

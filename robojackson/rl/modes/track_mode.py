@@ -1,0 +1,149 @@
+"""The method that dances: residuals on PD targets, local tracking reward, starts all over the clip.
+
+Action: residual joint angles in actuator order, -1..1, times `Simulation.residual` radians, added
+to the reference's next hinge angles and followed by the PD law of `Simulation`. Observation:
+`observation.observe`. Reward: `rewards.reward_terms`. Episodes start as `starts` says.
+"""
+
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.rl.config.paper_config import BETA
+from robojackson.rl.config.train_config import RewardConfig, TrackConfig
+from robojackson.rl.modes.mode import Beginning, Score
+from robojackson.rl.modes.observation import observation_size, observe
+from robojackson.rl.modes.reset_states import (
+    SettledStates,
+    StartPhases,
+    default_stand,
+    noisy,
+    stand_at,
+)
+from robojackson.rl.modes.rewards import (
+    TrackedPoints,
+    TrackingErrors,
+    fallen,
+    lost,
+    reward_terms,
+    tracking_errors,
+)
+from robojackson.rl.sim.reference_clip import Clip, ClipStep
+from robojackson.rl.sim.simulation import Simulation
+from robojackson.robot.model import Robot
+
+SETTLED_STATES_NEEDED = 32
+PERFECT_OF_THE_PAPER = 5.0
+"""What a perfect step earns by the paper's reward; by ours, `RewardConfig.perfect`."""
+PELVIS = "pelvis"
+FEET = ("left_foot", "right_foot")
+EXTREMITIES = ("left_hand", "right_hand", "head")
+
+
+class TrackMode:
+    """Tracking of one reference motion by N robots (`Mode` protocol)."""
+
+    repeats = 1
+
+    def __init__(
+        self, robot: Robot, reference: ReferenceMotion, config: TrackConfig, n: int, seed: int
+    ) -> None:
+        self._config, self.clip = config, Clip(reference)
+        names = robot.keypoint_names
+        self._which = tracked_points(names)
+        self.sim = Simulation(robot, config.control, n, config.threads, config.random, seed)
+        self.starts = StartPhases(self.clip, config.reset.failure_share)
+        self._settled = SettledStates(robot.model.nq, robot.model.nv)
+        self._stand = default_stand(robot.model)
+        self.limit = round(config.episode_seconds / self.clip.dt)
+        self.observation_size = observation_size(robot.model.nq - 7, robot.model.nu, len(names))
+
+    def command(self, following: ClipStep, action: np.ndarray) -> np.ndarray:
+        return self.sim.follow(following) + self.sim.residual * action
+
+    def observe(self, following: ClipStep, action: np.ndarray) -> Float[np.ndarray, "N D"]:
+        return observe(self.sim.qpos, self.sim.qvel, self.sim.points, following, action)
+
+    def after(self, command: np.ndarray) -> None:
+        """Nothing is counted within a step."""
+
+    def score(self, at: ClipStep, before: np.ndarray, change: np.ndarray, episode: int) -> Score:
+        sim, rules = self.sim, self._config.termination
+        moved = (sim.points - before) / self.clip.dt
+        errors, terms = judged(sim, moved, at, change, self._which, self._config.reward)
+        failed = fallen(sim.qpos, rules) | lost(errors, rules) | sim.broken
+        return Score(terms, failed, errors.site_mean)
+
+    def begin(self, count: int, rng: np.random.Generator) -> Beginning:
+        reset = self._config.reset
+        phase = self.starts.draw(count, rng)
+        at = self.clip.at(phase)
+        qpos, qvel = noisy(at.qpos, at.qvel, reset, rng)
+        kind = rng.random(count)
+        for row in np.flatnonzero(kind < reset.stand_share):
+            qpos[row], qvel[row] = stand_at(self._stand, at.qpos[row, :7]), 0.0
+        if len(self._settled) >= SETTLED_STATES_NEEDED:
+            chosen = (kind >= reset.stand_share) & (kind < reset.stand_share + reset.settled_share)
+            for row in np.flatnonzero(chosen):
+                qpos[row], qvel[row], phase[row] = self._settled.draw(rng)
+                qpos[row, :2] += self.clip.at(phase[row : row + 1]).qpos[0, :2]
+        return Beginning(phase, qpos, qvel)
+
+    def ended(
+        self, start: Int[np.ndarray, " I"], failed: np.ndarray, age: Int[np.ndarray, " I"]
+    ) -> dict[str, float]:
+        self.starts.record(start, failed)
+        return {}
+
+    def keep(self, indices: Int[np.ndarray, " I"], step: Int[np.ndarray, " I"]) -> None:
+        """Keep the last states of episodes that reached the time limit of a cyclic clip."""
+        if not self.clip.cyclic:
+            return
+        for i, at in zip(indices, step, strict=True):
+            qpos = self.sim.qpos[i].copy()
+            qpos[:2] -= self.clip.at(np.array([at])).qpos[0, :2]
+            self._settled.add(qpos, self.sim.qvel[i], int(at % self.clip.steps))
+
+    def forget(self) -> None:
+        self.starts.forget()
+        self._settled.forget()
+
+    def state(self) -> dict[str, Any]:
+        return {"failures": self.starts.failures, **self._settled.state()}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        self.starts.failures = np.array(state["failures"])
+        self._settled.restore(state)
+
+
+def judged(
+    sim: Simulation,
+    moved: Float[np.ndarray, "N K 3"],
+    at: ClipStep,
+    change: Float[np.ndarray, " N"],
+    which: TrackedPoints,
+    reward: RewardConfig,
+) -> tuple[TrackingErrors, dict[str, Float[np.ndarray, " N"]]]:
+    """Errors of every robot and the terms of its reward, the bonus for curiosity with them.
+
+    Args:
+        moved: Velocity of the points, m/s.
+        change: Mean squared change of the action.
+    """
+    errors = tracking_errors(sim.qpos, sim.qvel, sim.points, moved, at, which)
+    terms = reward_terms(errors, change, reward)
+    if reward.curiosity != "off":
+        beta = BETA[reward.curiosity] * reward.perfect / PERFECT_OF_THE_PAPER
+        terms["curiosity"] = beta * np.abs(sim.qvel[:, 6:]).sum(-1)
+    return errors, terms
+
+
+def tracked_points(names: tuple[str, ...]) -> TrackedPoints:
+    """The special ones of a robot's keypoints."""
+    return TrackedPoints(
+        pelvis=names.index(PELVIS),
+        hands=tuple(names.index(name) for name in EXTREMITIES),
+        limbs=tuple(names.index(name) for name in (*FEET, *EXTREMITIES)),
+    )

@@ -1,0 +1,60 @@
+"""Motors of a robot: which hinge each one drives, how strongly, and how far a policy may move it.
+
+Radians, newton-metres; actuator order.
+"""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from jaxtyping import Float, Int
+
+from robojackson.rl.config.train_config import ControlConfig
+from robojackson.robot.model import Robot
+
+
+@dataclass(frozen=True)
+class Motors:
+    """Actuators of the robot: which hinge each one drives and how strongly.
+
+    Attributes:
+        hinge: Index of the driven hinge among `qpos[7:]`, one an actuator.
+        gear: Torque per unit of control, N m.
+        limit: Largest torque, N m (gear x the control range).
+    """
+
+    hinge: Int[np.ndarray, " nu"]
+    gear: Float[np.ndarray, " nu"]
+    limit: Float[np.ndarray, " nu"]
+
+    @staticmethod
+    def of(model: mujoco.MjModel) -> "Motors":
+        """Read the motors of a model whose first joint is free and whose others are hinges."""
+        gear = model.actuator_gear[:, 0].copy()
+        return Motors(
+            hinge=model.jnt_qposadr[model.actuator_trnid[:, 0]] - 7,
+            gear=gear,
+            limit=gear * model.actuator_ctrlrange[:, 1],
+        )
+
+
+def residual_scale(robot: Robot, control: ControlConfig) -> Float[np.ndarray, " nu"]:
+    """Radians that a full action moves each motor's target: less for the arms."""
+    model = robot.model
+    arms = _moved_by(robot, ("left_hand", "right_hand")) - _moved_by(robot, ("head",))
+    legs = _moved_by(robot, ("left_foot", "right_foot"))
+    joints = model.actuator_trnid[:, 0]
+    is_arm = [int(joint) in arms - legs for joint in joints]
+    return np.where(is_arm, control.arm_residual, control.residual)
+
+
+def _moved_by(robot: Robot, keypoints: tuple[str, ...]) -> set[int]:
+    """Joints between the root and the bodies that carry the keypoints."""
+    model, found = robot.model, set()
+    for name in keypoints:
+        body = model.site_bodyid[robot.keypoint_sites[robot.keypoint_names.index(name)]]
+        while body > 0:
+            first = model.body_jntadr[body]
+            found |= set(range(first, first + model.body_jntnum[body]))
+            body = model.body_parentid[body]
+    return found

@@ -1,0 +1,113 @@
+"""A few copies of a robot stepped together, with the law of control as array code between them.
+
+Few, so that the cache of the processor still holds a robot when its next substep comes: a bare loop
+over 8 robots at a time is 5 % faster than one over 32. Radians, seconds, newton-metres; actuator
+order.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from jaxtyping import Bool, Float
+
+from robojackson.rl.config.train_config import ControlConfig
+from robojackson.rl.sim.motors import Motors
+
+SIZE = 8
+"""Robots of a batch."""
+
+
+@dataclass(frozen=True)
+class Views:
+    """MuJoCo's own memory of every copy as lists of arrays, made once: asking for it costs more
+    than reading it.
+
+    Attributes:
+        qpos, qvel: The whole state.
+        sites: Positions of all sites, world, m.
+        warnings: How often each kind was raised.
+    """
+
+    qpos: list[np.ndarray]
+    qvel: list[np.ndarray]
+    sites: list[np.ndarray]
+    warnings: list[np.ndarray]
+
+    @staticmethod
+    def of(datas: Sequence[mujoco.MjData]) -> "Views":
+        """Views of the copies' memory."""
+        return Views(
+            qpos=[data.qpos for data in datas],
+            qvel=[data.qvel for data in datas],
+            sites=[data.site_xpos for data in datas],
+            warnings=[data.warning.number for data in datas],
+        )
+
+
+class Batch:
+    """Robots whose first joint is free and whose others are hinges.
+
+    Args:
+        kp, kd: Gains of the PD law, N m/rad and N m s/rad, one row for all robots or one each.
+    """
+
+    def __init__(
+        self,
+        models: Sequence[mujoco.MjModel],
+        datas: Sequence[mujoco.MjData],
+        motors: Motors,
+        control: ControlConfig,
+        kp: Float[np.ndarray, "..."],
+        kd: Float[np.ndarray, "..."],
+    ) -> None:
+        self._motors, self._law, self._substeps = motors, control.law, control.substeps
+        self._robots = [(m, d, d.ctrl) for m, d in zip(models, datas, strict=True)]
+        self._state = [d.qpos[7:] for d in datas] + [d.qvel[6:] for d in datas]
+        self._gains = np.stack(np.broadcast_arrays(np.atleast_2d(kp), kd))
+        shape = (2, len(datas), len(self._state[0]))
+        self._hinges = np.zeros(shape)
+        self._flat = self._hinges.reshape(-1)
+        self._driven = np.zeros((2, len(datas), len(motors.hinge)))
+        self._least = -motors.limit
+
+    def advance(
+        self,
+        targets: Float[np.ndarray, "B nu"],
+        active: Bool[np.ndarray, " B"],
+        com: Float[np.ndarray, "B 3"],
+    ) -> None:
+        """One control step of the robots that are active; law `torque` writes their `com`."""
+        live = [(*self._robots[i], i) for i in np.flatnonzero(active)]
+        step = mujoco.mj_step
+        for substep in range(self._substeps):
+            if substep == 0 or self._law == "pd":
+                told = self.controls(targets)
+            for model, data, ctrl, i in live:
+                ctrl[:] = told[i]
+                step(model, data)
+        for model, data, _, i in live:
+            if self._law == "torque":
+                mujoco.mj_rnePostConstraint(model, data)
+                com[i] = centre_of_mass(model, data)
+            mujoco.mj_kinematics(model, data)
+
+    def controls(self, targets: Float[np.ndarray, "B nu"]) -> Float[np.ndarray, "B nu"]:
+        """What is written to `ctrl`, from the states as they are; overwritten by the next call."""
+        if self._law == "torque":
+            return targets
+        motors, (torque, braking) = self._motors, self._driven
+        np.concatenate(self._state, out=self._flat)
+        self._hinges.take(motors.hinge, 2, out=self._driven, mode="clip")
+        np.subtract(targets, torque, out=torque)
+        np.multiply(self._driven, self._gains, out=self._driven)
+        np.subtract(torque, braking, out=torque)
+        np.maximum(torque, self._least, out=torque)
+        np.minimum(torque, motors.limit, out=torque)
+        return np.divide(torque, motors.gear, out=torque)
+
+
+def centre_of_mass(model: mujoco.MjModel, data: mujoco.MjData) -> Float[np.ndarray, "3"]:
+    """Of the whole robot, from the poses that MuJoCo computed last, metres, world."""
+    return np.asarray(model.body_mass @ data.xipos / model.body_mass.sum())

@@ -1,0 +1,176 @@
+"""Many copies of one stock robot, stepped in threads, with the law of control outside the model.
+
+Stock physics (architecture page): the model as gymnasium ships it. The torque of the PD law is
+computed once a substep from the state at its beginning, clipped to the stock limit and written to
+`ctrl`; a servo inside the model would be evaluated within the stages of RK4, which is another
+robot. The law `torque` does what `Humanoid-v5.step` does, to the bit.
+
+World frame, metres, radians, seconds, newton-metres. MuJoCo releases the interpreter lock in
+`mj_step`, so two threads keep two cores busy.
+"""
+
+import copy
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+
+import mujoco
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from robojackson.errors import BadPolicy
+from robojackson.rl.config.train_config import ControlConfig, RandomConfig
+from robojackson.rl.sim.motors import Motors, residual_scale
+from robojackson.rl.sim.reference_clip import ClipStep
+from robojackson.rl.sim.robot_batch import SIZE, Batch, Views, centre_of_mass
+from robojackson.robot.model import Robot
+
+BAD_STATE = [
+    int(kind)
+    for kind in (
+        mujoco.mjtWarning.mjWARN_BADQPOS,
+        mujoco.mjtWarning.mjWARN_BADQVEL,
+        mujoco.mjtWarning.mjWARN_BADQACC,
+    )
+]
+"""Warnings at which MuJoCo resets a state by itself."""
+
+
+def require_same_clock(simulation_dt: float, reference_dt: float) -> None:
+    """Refuse a reference motion for another control rate.
+
+    Raises:
+        BadPolicy: the control step of the policy or the robot is not the reference's.
+    """
+    if abs(simulation_dt - reference_dt) > 1e-9:
+        raise BadPolicy(
+            f"the control step is {1e3 * simulation_dt:g} ms and the reference motion's "
+            f"{1e3 * reference_dt:g} ms: retarget for this robot, or mend track.control.substeps"
+        )
+
+
+class Simulation:
+    """N copies of a robot.
+
+    Attributes:
+        control: The law of control.
+        residual: Radians that a full action moves each motor's target.
+        qpos, qvel: State of every copy after the last `step` or `place`.
+        broken: Copies whose state blew up since they were placed, so that MuJoCo reset them.
+        points: Positions of the keypoint sites, world, in step with `qpos`.
+        com: Centres of mass as `Humanoid-v5` sees them, one substep behind; law `torque` only.
+        datas: MuJoCo's own state of every copy.
+        chunks: Of every thread, its batches: first copy, past the last, and the batch.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        control: ControlConfig,
+        n: int,
+        threads: int = 1,
+        random: RandomConfig | None = None,
+        seed: int = 0,
+    ) -> None:
+        model = robot.model
+        self.model, self.n, self._sites, self.control = model, n, robot.keypoint_sites, control
+        self.motors = Motors.of(model)
+        self.kp = control.stiffness * self.motors.limit
+        self.kd = control.damping * self.kp
+        self._models = [model] * n
+        if random is not None and random != RandomConfig():
+            self._vary(random, np.random.default_rng(seed))
+        self.datas = [mujoco.MjData(own) for own in self._models]
+        self._views = Views.of(self.datas)
+        self.residual = residual_scale(robot, control)
+        bounds = np.linspace(0, n, min(threads, n) + 1).astype(int)
+        self.chunks = [self._batches(lo, hi) for lo, hi in pairwise(bounds)]
+        self._pool = ThreadPoolExecutor(len(self.chunks)) if len(self.chunks) > 1 else None
+        self.qpos = np.zeros((n, model.nq))
+        self.qvel = np.zeros((n, model.nv))
+        self.points = np.zeros((n, len(robot.keypoint_names), 3))
+        self.com = np.zeros((n, 3))
+        self.broken = np.zeros(n, bool)
+        self.dt = control.substeps * model.opt.timestep
+
+    def place(
+        self,
+        indices: Int[np.ndarray, " I"],
+        qpos: Float[np.ndarray, "I nq"],
+        qvel: Float[np.ndarray, "I nv"],
+    ) -> None:
+        """Put some copies into a state, forgetting their past (contacts, warm start, time)."""
+        for row, i in enumerate(indices):
+            data = self.datas[i]
+            mujoco.mj_resetData(self.model, data)
+            data.qpos[:], data.qvel[:] = qpos[row], qvel[row]
+            mujoco.mj_forward(self._models[i], data)
+            self.com[i] = centre_of_mass(self.model, data)
+        self._gather(indices)
+
+    def step(
+        self, targets: Float[np.ndarray, "N nu"], active: Bool[np.ndarray, " N"] | None = None
+    ) -> None:
+        """One control step towards target hinge angles, rad, in actuator order; controls, shares
+        of the gear, where the law is `torque`.
+
+        Copies that are not `active` stay as they are; None steps all of them.
+        """
+        rows = np.ones(self.n, bool) if active is None else active
+        if self._pool is None:
+            self._advance(self.chunks[0], targets, rows)
+        else:
+            jobs = [self._pool.submit(self._advance, c, targets, rows) for c in self.chunks]
+            for job in jobs:
+                job.result()
+        raised = np.concatenate(self._views.warnings).reshape(self.n, -1)
+        self.broken = np.any(raised[:, BAD_STATE] > 0, axis=1)
+        self._gather_all()
+
+    def follow(self, step: ClipStep) -> Float[np.ndarray, "N nu"]:
+        """Target hinge angles that follow a reference step with nothing learnt, rad."""
+        return step.qpos[:, 7:][:, self.motors.hinge]
+
+    def close(self) -> None:
+        """Stop the threads."""
+        if self._pool is not None:
+            self._pool.shutdown()
+
+    def _vary(self, random: RandomConfig, rng: np.random.Generator) -> None:
+        """Give every copy a model and gains of its own."""
+        self._models = [copy.copy(self.model) for _ in range(self.n)]
+        for i, model in enumerate(self._models):
+            model.geom_friction[:] *= 1 + random.friction * rng.uniform(-1, 1)
+            chosen = random.integrators[i % len(random.integrators)]
+            model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{chosen.upper()}")
+        factor = 1 + random.gains * rng.uniform(-1, 1, (self.n, 1))
+        self.kp, self.kd = self.kp * factor, self.kd * factor
+
+    def _batches(self, lo: int, hi: int) -> list[tuple[int, int, Batch]]:
+        """The copies of one thread, a batch at a time."""
+        found = []
+        for first in range(lo, hi, SIZE):
+            past = min(first + SIZE, hi)
+            kp, kd = (k[first:past] if k.ndim > 1 else k for k in (self.kp, self.kd))
+            models, datas = self._models[first:past], self.datas[first:past]
+            found.append((first, past, Batch(models, datas, self.motors, self.control, kp, kd)))
+        return found
+
+    def _advance(
+        self, batches: list[tuple[int, int, Batch]], targets: np.ndarray, rows: np.ndarray
+    ) -> None:
+        for lo, hi, batch in batches:
+            batch.advance(targets[lo:hi], rows[lo:hi], self.com[lo:hi])
+
+    def _gather(self, indices: np.ndarray) -> None:
+        for i in indices:
+            data = self.datas[i]
+            self.qpos[i], self.qvel[i] = data.qpos, data.qvel
+            self.points[i] = data.site_xpos[self._sites]
+
+    def _gather_all(self) -> None:
+        """The same for all copies, at the price of few calls."""
+        views, n = self._views, self.n
+        np.concatenate(views.qpos, out=self.qpos.reshape(-1))
+        np.concatenate(views.qvel, out=self.qvel.reshape(-1))
+        sites = np.concatenate(views.sites).reshape(n, -1, 3)
+        sites.take(self._sites, 1, out=self.points)

@@ -1,0 +1,1 @@
+"""The algorithm: networks, replay, updates and the trainers."""

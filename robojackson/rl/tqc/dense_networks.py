@@ -1,0 +1,107 @@
+"""Actor and critics of sbx as plain functions of their parameters, gradients laid out for a CPU.
+
+The same numbers as flax computes but for the rounding. XLA takes longer over a product whose left
+side is transposed: three times as long where the other side is narrow, a third longer where the
+rows lie a multiple of the cache's sets apart. So the slope of a narrow kernel is computed the other
+way round, and that of a wide one from a transposed copy. The actor's loss asks a critic for its
+slope by the action alone: an observation is no input of that product.
+"""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import tensorflow_probability.substrates.jax as tfp
+from jaxtyping import Array, Float
+from sbx.common.distributions import TanhTransformedDistribution
+
+from robojackson.rl.config.tqc_config import NORM_EPSILON
+
+NARROW = 128
+"""Outputs of a kernel below which its slope is computed transposed."""
+LOG_STD_RANGE = (-20.0, 2.0)
+Parameters = Any
+
+
+@jax.custom_vjp
+def dense(
+    x: Float[Array, "B I"], kernel: Float[Array, "I O"], bias: Float[Array, " O"]
+) -> Float[Array, "B O"]:
+    """A layer without its activation."""
+    return x @ kernel + bias
+
+
+def _forward(x: Array, kernel: Array, bias: Array) -> tuple[Array, tuple[Array, Array]]:
+    return dense(x, kernel, bias), (x, kernel)
+
+
+def _backward(kept: tuple[Array, Array], slope: Array) -> tuple[Array, Array, Array]:
+    x, kernel = kept
+    as_it_stands = jax.lax.optimization_barrier  # or XLA turns the product round again
+    if slope.shape[1] < NARROW:
+        by_kernel = as_it_stands(slope.T @ x).T
+    elif x.shape[1] % NARROW == 0:
+        by_kernel = as_it_stands(x.T) @ slope
+    else:
+        by_kernel = x.T @ slope
+    return slope @ kernel.T, by_kernel, slope.sum(0)
+
+
+dense.defvjp(_forward, _backward)
+
+
+def quantiles(
+    params: Parameters, observations: Float[Array, "B O"], actions: Float[Array, "B A"]
+) -> Float[Array, "B Q"]:
+    """A critic's quantiles."""
+    return _rest(params, dense(jnp.concatenate([observations, actions], 1), *_layer(params, 0)))
+
+
+def quantiles_of_actions(
+    params: Parameters, observations: Float[Array, "B O"], actions: Float[Array, "B A"]
+) -> Float[Array, "B Q"]:
+    """The same where only the slope by the action is asked for."""
+    kernel, bias = _layer(params, 0)
+    seen = observations @ kernel[: observations.shape[1]]
+    return _rest(params, seen + dense(actions, kernel[observations.shape[1] :], bias))
+
+
+def actions_of(params: Parameters, observations: Float[Array, "B O"]) -> Any:
+    """The actor's distribution over actions: a Gaussian squashed by tanh."""
+    hidden, last = observations, len(params["params"]) - 2
+    for i in range(last):
+        hidden = jax.nn.relu(dense(hidden, *_layer(params, i)))
+    heads = (_layer(params, last), _layer(params, last + 1))
+    kernel, bias = (jnp.concatenate(pair, -1) for pair in zip(*heads, strict=True))
+    mean, log_std = jnp.split(dense(hidden, kernel, bias), 2, 1)
+    spread = jnp.exp(jnp.clip(log_std, *LOG_STD_RANGE))
+    return TanhTransformedDistribution(
+        tfp.distributions.MultivariateNormalDiag(loc=mean, scale_diag=spread)
+    )
+
+
+def dense_count(params: Parameters) -> int:
+    """Dense layers among a network's layers."""
+    return sum(name.startswith("Dense_") for name in params["params"])
+
+
+def _layer(params: Parameters, i: int) -> tuple[Array, Array]:
+    layer = params["params"][f"Dense_{i}"]
+    return layer["kernel"], layer["bias"]
+
+
+def _rest(params: Parameters, first: Array) -> Array:
+    """What follows a critic's first layer."""
+    value, normal = first, "LayerNorm_0" in params["params"]
+    for i in range(1, dense_count(params)):
+        value = _normal(params, i - 1, value) if normal else value
+        value = dense(jax.nn.relu(value), *_layer(params, i))
+    return value
+
+
+def _normal(params: Parameters, i: int, value: Array) -> Array:
+    """Layer normalisation (Ba et al. 2016)."""
+    layer = params["params"][f"LayerNorm_{i}"]
+    centred = value - value.mean(1, keepdims=True)
+    spread = jnp.square(centred).mean(1, keepdims=True)
+    return centred * jax.lax.rsqrt(spread + NORM_EPSILON) * layer["scale"] + layer["bias"]

@@ -1,0 +1,191 @@
+"""Actor and critics of a TQC run as named arrays, the same names for every trainer, in safetensors.
+
+`actor.0.weight` (in, out), `actor.0.bias`, ..., `mean.*`, `log_std.*`, `critic1.0.weight`, ...,
+`target1.0.weight`, ..., `log_alpha`; with layer normalisation
+`critic1.norm.0.scale`, `critic1.norm.0.offset`, ... as well. Reading a file executes nothing.
+"""
+
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import count, pairwise, takewhile
+from pathlib import Path
+
+import numpy as np
+from safetensors import SafetensorError, safe_open
+from safetensors.numpy import save
+
+from robojackson.errors import BadPolicy
+from robojackson.rl.config.tqc_config import TqcConfig
+
+FORMAT = "robojackson-networks-1"
+CRITICS = ("critic1", "critic2")
+TARGETS = ("target1", "target2")
+Tensors = dict[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Networks:
+    """Weights to start from.
+
+    Attributes:
+        tensors: By name; critics and log_std may be missing.
+        facts: Where they come from.
+    """
+
+    tensors: Mapping[str, np.ndarray]
+    facts: Mapping[str, object]
+
+    @property
+    def observation_size(self) -> int:
+        """Length of the observation that the actor takes."""
+        first = "actor.0.weight" if "actor.0.weight" in self.tensors else "mean.weight"
+        return int(self.tensors[first].shape[0])
+
+    @property
+    def action_size(self) -> int:
+        """Length of the action."""
+        return int(self.tensors["mean.weight"].shape[1])
+
+    @property
+    def has_critics(self) -> bool:
+        """Whether both critics are there."""
+        return all(f"{critic}.0.weight" in self.tensors for critic in CRITICS)
+
+    def widths(self, part: str) -> tuple[int, ...]:
+        """Units of every layer of a part."""
+        names = (f"{part}.{i}.weight" for i in count())
+        return tuple(self.tensors[n].shape[1] for n in takewhile(self.tensors.__contains__, names))
+
+    @property
+    def layer_norm(self) -> bool:
+        """Whether the critics' layers are normalised."""
+        return f"{CRITICS[0]}.norm.0.scale" in self.tensors
+
+    def to_bytes(self) -> bytes:
+        """The content of the file."""
+        arrays = {n: np.array(t, np.float32, order="C") for n, t in self.tensors.items()}
+        return save(arrays, {FORMAT: json.dumps(dict(self.facts), sort_keys=True)})
+
+
+def load_networks(path: Path) -> Networks:
+    """Read a networks file.
+
+    Raises:
+        BadPolicy: the file is missing, foreign or not whole.
+    """
+    try:
+        with safe_open(path, framework="np") as file:
+            header = file.metadata() or {}
+            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+        facts = json.loads(header.get(FORMAT, "{}"))
+    except (OSError, SafetensorError, TypeError, ValueError) as error:
+        raise BadPolicy(f"{path} is not a networks file of ours ({error})") from error
+    if FORMAT not in header:
+        raise BadPolicy(
+            f"{path} is not a {FORMAT} file; `robojackson train` writes networks.safetensors"
+        )
+    return whole(Networks(tensors, facts), path)
+
+
+def whole(networks: Networks, path: Path) -> Networks:
+    """The networks, if every array is there, measures what its neighbours ask for and is finite.
+
+    Raises:
+        BadPolicy: with the first array that does not.
+    """
+    tensors = networks.tensors
+    weights = {"mean.weight", *(name for name in tensors if name.endswith(".weight"))}
+    if flat := sorted(n for n in weights if n not in tensors or tensors[n].ndim != 2):
+        raise BadPolicy(f"{path} is not whole: {flat[0]} is missing or no matrix")
+    needed = _shapes(networks)
+    if missing := sorted(needed.keys() - tensors.keys()):
+        raise BadPolicy(f"{path} is not whole: {missing[0]} is missing")
+    if foreign := sorted(tensors.keys() - needed.keys()):
+        raise BadPolicy(f"{path} holds {foreign[0]}, which belongs to none of its layers")
+    for name, array in tensors.items():
+        if array.shape != needed[name]:
+            raise BadPolicy(
+                f"{path}: {name} has the shape {array.shape}, its layers ask for {needed[name]}"
+            )
+        if not np.isfinite(array).all():
+            raise BadPolicy(f"{path}: {name} holds values that are no numbers")
+    return networks
+
+
+def _shapes(networks: Networks) -> dict[str, tuple[int, ...]]:
+    """Name and shape of every array that networks with such layers have."""
+    tensors, seen, acts = networks.tensors, networks.observation_size, networks.action_size
+    actor = (seen, *_units(tensors, "actor"))
+    shapes = _chain("actor", actor) | _layer("mean", actor[-1], acts)
+    if any(name.startswith("log_std.") for name in tensors):
+        shapes |= _layer("log_std", actor[-1], acts)
+    critic = max((_units(tensors, part) for part in (*CRITICS, *TARGETS)), key=len)
+    normed = any(".norm." in name for name in tensors)
+    for part in (*CRITICS, *TARGETS):
+        shapes |= _chain(part, (seen + acts, *critic)) if critic else {}
+        for i, units in enumerate(critic[:-1] if normed else ()):
+            shapes |= {f"{part}.norm.{i}.{kind}": (units,) for kind in ("scale", "offset")}
+    return shapes | ({"log_alpha": ()} if "log_alpha" in tensors else {})
+
+
+def _units(tensors: Mapping[str, np.ndarray], part: str) -> tuple[int, ...]:
+    """Units of every layer of which there is anything."""
+    found = {m[1] for name in tensors if (m := re.fullmatch(rf"{part}\.(\d+)\.\w+", name))}
+    biases = (tensors.get(f"{part}.{i}.bias", np.empty(0)) for i in range(len(found)))
+    return tuple(bias.size for bias in biases)
+
+
+def _chain(part: str, sizes: tuple[int, ...]) -> dict[str, tuple[int, ...]]:
+    shapes: dict[str, tuple[int, ...]] = {}
+    for i, (taken, given) in enumerate(pairwise(sizes)):
+        shapes |= _layer(f"{part}.{i}", taken, given)
+    return shapes
+
+
+def _layer(name: str, taken: int, given: int) -> dict[str, tuple[int, ...]]:
+    return {f"{name}.weight": (taken, given), f"{name}.bias": (given,)}
+
+
+def fitted(config: TqcConfig, networks: Networks, critics: bool) -> TqcConfig:
+    """The configuration with the layers that the networks have.
+
+    Raises:
+        BadPolicy: the critics have no more quantiles than are dropped.
+    """
+    shaped = replace(config, actor=networks.widths("actor"))
+    if not (critics and networks.has_critics):
+        return shaped
+    *hidden, quantiles = networks.widths(CRITICS[0])
+    if quantiles <= config.top_quantiles_to_drop:
+        raise BadPolicy(
+            f"the critics to start from have {quantiles} quantiles, of which "
+            f"{config.top_quantiles_to_drop} are dropped; start_critics=false takes the actor alone"
+        )
+    return replace(
+        shaped, critic=tuple(hidden), layer_norm=networks.layer_norm, quantiles=quantiles
+    )
+
+
+def chosen(networks: Networks, critics: bool) -> Networks:
+    """The networks, or the actor alone."""
+    if critics and networks.has_critics:
+        return networks
+    kept = {
+        n: t for n, t in networks.tensors.items() if n.split(".")[0] in ("actor", "mean", "log_std")
+    }
+    return replace(networks, tensors=kept)
+
+
+def widened(networks: Networks, observation_size: int) -> Networks:
+    """The same networks for a longer observation that begins with theirs: new inputs weigh zero."""
+    old = networks.observation_size
+    gap = np.zeros((observation_size - old, 1), np.float32)
+    tensors = dict(networks.tensors)
+    for part in ("actor", *CRITICS, *TARGETS):
+        first = tensors.get(f"{part}.0.weight")
+        if first is not None:
+            filling = np.repeat(gap, first.shape[1], 1)
+            tensors[f"{part}.0.weight"] = np.concatenate([first[:old], filling, first[old:]])
+    return replace(networks, tensors=tensors)

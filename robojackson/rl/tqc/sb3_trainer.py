@@ -1,0 +1,153 @@
+"""TQC of sb3-contrib (torch): the reference that the fast trainer is compared with."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from sb3_contrib import TQC
+from sb3_contrib.tqc.policies import Critic, TQCPolicy
+from stable_baselines3.common.type_aliases import RolloutReturn
+from stable_baselines3.common.vec_env.base_vec_env import VecEnv
+
+from robojackson.rl.config.tqc_config import NORM_EPSILON
+from robojackson.rl.config.train_config import TqcConfig
+from robojackson.rl.tqc.network_arrays import CRITICS, TARGETS, Tensors
+from robojackson.rl.tqc.off_policy import OffPolicyTrainer, arguments, patient
+from robojackson.rl.tqc.trainer import Layers
+
+
+class NormalisedCritic(Critic):
+    """TQC's critics with layer normalisation after every hidden layer."""
+
+    def __init__(self, *args: Any, **named: Any) -> None:
+        super().__init__(*args, **named)
+        for i, plain in enumerate(self.q_networks):
+            *hidden, last = plain
+            normalised: list[torch.nn.Module] = []
+            for layer in hidden:
+                normalised.append(layer)
+                if isinstance(layer, torch.nn.Linear):
+                    norm = torch.nn.LayerNorm(layer.out_features, eps=NORM_EPSILON)
+                    normalised.append(norm)
+            self.q_networks[i] = torch.nn.Sequential(*normalised, last)
+            self.add_module(f"qf{i}", self.q_networks[i])
+
+
+class NormalisedPolicy(TQCPolicy):
+    """TQC's policy with such critics."""
+
+    def make_critic(self, features_extractor: Any = None) -> Critic:
+        """Critics, or their targets."""
+        given = self._update_features_extractor(self.critic_kwargs, features_extractor)
+        return NormalisedCritic(**given).to(self.device)
+
+
+class PatientTQC(TQC):
+    """TQC that does not learn from a nearly empty replay buffer.
+
+    Attributes:
+        random: State of torch's generator between two rounds, before gSDE draws for the next one.
+    """
+
+    warmup = 0
+    random: torch.Tensor | None = None
+
+    def collect_rollouts(self, *args: Any, **named: Any) -> RolloutReturn:
+        """A round of steps."""
+        self.random = torch.get_rng_state()
+        return super().collect_rollouts(*args, **named)
+
+    def train(self, gradient_steps: int, batch_size: int = 64) -> None:
+        """A round of updates, unless the buffer has still to be filled."""
+        if not patient(self, self.warmup):
+            super().train(gradient_steps, batch_size)
+
+
+class Sb3Trainer(OffPolicyTrainer):
+    """The torch trainer (`Trainer` protocol). It updates the actor with every critic update."""
+
+    def __init__(self, env: VecEnv, config: TqcConfig, seed: int) -> None:
+        torch.set_num_threads(1)
+        given = arguments(config, seed, env)
+        if config.gsde:
+            given["use_sde"] = True
+            given["policy_kwargs"] |= {"clip_mean": 0.0}  # the policy file knows no clipped mean
+        if config.layer_norm:
+            given["policy"] = NormalisedPolicy
+        model = PatientTQC(env=env, device="cpu", **given)
+        model.warmup = config.warmup
+        super().__init__(model, generators={})
+
+    def layers(self) -> Layers:
+        actor = self.model.actor
+        modules = [*actor.latent_pi.children(), actor.mu]
+        linear = [m for m in modules if isinstance(m, torch.nn.Linear)]
+        return tuple(
+            (m.weight.detach().numpy().T.copy(), m.bias.detach().numpy().copy()) for m in linear
+        )
+
+    def acting(self) -> tuple[Layers, int]:
+        return self.layers(), self.updates()
+
+    def networks(self) -> Tensors:
+        tensors: Tensors = {}
+        for name, parameter in self._named().items():
+            tensors[name] = parameter.detach().numpy().T.copy()
+        return tensors | {"log_alpha": self.model.log_ent_coef.detach().numpy().reshape(()).copy()}
+
+    def start_from(self, tensors: Mapping[str, np.ndarray]) -> None:
+        with torch.no_grad():
+            for name, parameter in self._named().items():
+                if name in tensors:
+                    parameter.copy_(torch.from_numpy(np.array(tensors[name].T)))
+            if "log_alpha" in tensors:
+                self.model.log_ent_coef.fill_(float(np.reshape(tensors["log_alpha"], ())))
+        self._act_at_once()
+
+    def save(self, folder: Path, replay: Path) -> None:
+        state = {name: part.state_dict() for name, part in self._parts().items()}
+        random = torch.get_rng_state() if self.model.random is None else self.model.random
+        state |= {"log_ent_coef": self.model.log_ent_coef.detach(), "random": random}
+        torch.save(state, folder / "networks.pt")
+        self._save_rest(folder, replay)
+
+    def load(self, folder: Path, replay: Path, steps: int, updates: int) -> None:
+        state = torch.load(folder / "networks.pt", weights_only=True)
+        for name, part in self._parts().items():
+            part.load_state_dict(state[name])
+        self.model.log_ent_coef.data.copy_(state["log_ent_coef"])
+        torch.set_rng_state(state["random"])
+        self._load_rest(folder, replay, steps, updates)
+
+    def _named(self) -> dict[str, torch.Tensor]:
+        """The parameters by our names; matrices are transposed there."""
+        policy = self.model.policy
+        chains = {"actor": policy.actor.latent_pi}
+        chains |= {c: policy.critic.q_networks[i] for i, c in enumerate(CRITICS)}
+        chains |= {t: policy.critic_target.q_networks[i] for i, t in enumerate(TARGETS)}
+        heads = {"mean": policy.actor.mu, "log_std": policy.actor.log_std}
+        layers = {n: m for n, m in heads.items() if isinstance(m, torch.nn.Linear)}
+        norms: dict[str, Any] = {}
+        for name, chain in chains.items():
+            layers |= _numbered(f"{name}.", chain, torch.nn.Linear)
+            norms |= _numbered(f"{name}.norm.", chain, torch.nn.LayerNorm)
+        named = {f"{name}.weight": layer.weight for name, layer in layers.items()}
+        named |= {f"{name}.bias": layer.bias for name, layer in layers.items()}
+        named |= {f"{name}.scale": layer.weight for name, layer in norms.items()}
+        return named | {f"{name}.offset": layer.bias for name, layer in norms.items()}
+
+    def _parts(self) -> dict[str, Any]:
+        return {
+            "policy": self.model.policy,
+            "actor_optimizer": self.model.actor.optimizer,
+            "critic_optimizer": self.model.critic.optimizer,
+            "entropy_optimizer": self.model.ent_coef_optimizer,
+        }
+
+
+def _numbered(prefix: str, chain: torch.nn.Module, kind: type[Any]) -> dict[str, Any]:
+    """The layers of a kind in the order in which they are passed."""
+    found = [module for module in chain.modules() if isinstance(module, kind)]
+    return {f"{prefix}{i}": module for i, module in enumerate(found)}

@@ -1,0 +1,243 @@
+"""TQC in JAX (SBX), with learning and acting at the same time.
+
+SBX dispatches a round of updates to XLA, which computes in its own thread; meanwhile the
+simulations step with the actor of the round before, as numpy arrays. Acting lags by one round and
+the result is still determined by the seed.
+"""
+
+import os
+
+os.environ.setdefault("JAX_PLATFORMS", "cpu")
+os.environ.setdefault(
+    "XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1"
+)
+
+import logging
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import flax.serialization
+import jax
+import numpy as np
+from sbx import TQC
+from sbx.common.type_aliases import ReplayBufferSamplesNp
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.vec_env.base_vec_env import VecEnv
+
+from robojackson.rl.config.train_config import TqcConfig
+from robojackson.rl.tqc.dense_networks import LOG_STD_RANGE, dense_count
+from robojackson.rl.tqc.network_arrays import CRITICS, TARGETS, Tensors
+from robojackson.rl.tqc.off_policy import OffPolicyTrainer, arguments, patient
+from robojackson.rl.tqc.replay_files import buffer_of
+from robojackson.rl.tqc.trainer import Layers
+from robojackson.rl.tqc.updates import Learnt, round_of_updates
+
+log = logging.getLogger(__name__)
+
+
+class OverlappedTQC(TQC):
+    """TQC whose updates run while the environments step."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.warmup = 0
+        self.noise = np.random.default_rng(self.seed)
+        self._acting = dense_layers(self.policy.actor_state.params)
+
+    def predict(  # type: ignore[override]
+        self,
+        observation: np.ndarray,
+        state: Any = None,
+        episode_start: Any = None,
+        deterministic: bool = False,
+    ) -> tuple[np.ndarray, Any]:
+        """Sample actions from the actor of the round before."""
+        hidden = observation
+        for weight, bias in self._acting[:-2]:
+            hidden = np.maximum(hidden @ weight + bias, 0.0)
+        (mean_w, mean_b), (std_w, std_b) = self._acting[-2:]
+        mean = hidden @ mean_w + mean_b
+        if not deterministic:
+            log_std = np.clip(hidden @ std_w + std_b, *LOG_STD_RANGE)
+            noise = self.noise.standard_normal(mean.shape, np.float32)
+            mean = mean + np.exp(log_std) * noise
+        return np.tanh(mean), state
+
+    def train(self, gradient_steps: int, batch_size: int) -> None:
+        """Wait for the round before, take its actor, and dispatch the next round."""
+        if patient(self, self.warmup):
+            return
+        self._acting = dense_layers(self.policy.actor_state.params)
+        samples = buffer_of(self).sample(batch_size * gradient_steps)
+        data = ReplayBufferSamplesNp(
+            samples.observations.numpy(),
+            samples.actions.numpy(),
+            samples.next_observations.numpy(),
+            samples.dones.numpy().flatten(),
+            samples.rewards.numpy().flatten(),
+            np.full(batch_size * gradient_steps, self.gamma, np.float32),
+        )
+        policy = self.policy
+        learnt = round_of_updates(
+            Learnt(
+                policy.actor_state,
+                (policy.qf1_state, policy.qf2_state),
+                self.ent_coef_state,
+                self.key,
+            ),
+            data,
+            self.tau,
+            self.target_entropy,
+            kept=policy.n_target_quantiles,
+            count=gradient_steps,
+            delay=self.policy_delay,
+        )
+        policy.actor_state, self.ent_coef_state, self.key = learnt.actor, learnt.entropy, learnt.key
+        policy.qf1_state, policy.qf2_state = learnt.critics
+        self._n_updates += gradient_steps
+
+
+def dense_layers(params: Any) -> Layers:
+    """Dense layers in their order as numpy arrays; an actor's last two are mean and log std."""
+    tree = jax.device_get(params)["params"]
+    names = [f"Dense_{i}" for i in range(dense_count(params))]
+    return tuple((np.asarray(tree[n]["kernel"]), np.asarray(tree[n]["bias"])) for n in names)
+
+
+class SbxTrainer(OffPolicyTrainer):
+    """The JAX trainer (`Trainer` protocol)."""
+
+    def __init__(self, env: VecEnv, config: TqcConfig, seed: int) -> None:
+        given = arguments(config, seed, env)
+        given["policy_kwargs"] |= {"layer_norm": config.layer_norm}
+        model = OverlappedTQC(env=env, policy_delay=config.policy_delay, **given)
+        model.warmup = config.warmup
+        model.ent_coef_state = jax.tree_util.tree_map(_strong, model.ent_coef_state)
+        if config.gsde:
+            log.warning("trainer sbx has no gSDE: it explores with plain Gaussian noise")
+        if config.log_std_init:
+            _raise_noise(model, config.log_std_init)
+        super().__init__(model, {"noise": model.noise})
+
+    def learn(self, callback: BaseCallback) -> None:
+        try:
+            super().learn(callback)
+        finally:  # a round that XLA still computes when Python ends would crash it
+            jax.block_until_ready(self._state())
+
+    def layers(self) -> Layers:
+        layers = dense_layers(self.model.policy.actor_state.params)
+        return layers[:-1]
+
+    def acting(self) -> tuple[Layers, int]:
+        return self.model._acting[:-1], max(0, self.updates() - self.model.gradient_steps)
+
+    def networks(self) -> Tensors:
+        policy = self.model.policy
+        tensors = _tensors(policy.actor_state.params, "actor")
+        for name, params in self._critics().items():
+            tensors |= _tensors(params, name)
+        alpha = self.model.ent_coef_state.params["log_ent_coef"]
+        return tensors | {"log_alpha": np.array(jax.device_get(alpha)).reshape(())}
+
+    def start_from(self, tensors: Mapping[str, np.ndarray]) -> None:
+        policy = self.model.policy
+        policy.actor_state = policy.actor_state.replace(
+            params=_filled(policy.actor_state.params, tensors, "actor")
+        )
+        for i, (critic, target) in enumerate(zip(CRITICS, TARGETS, strict=True), 1):
+            state = getattr(policy, f"qf{i}_state")
+            params = _filled(state.params, tensors, critic)
+            aimed = _filled(state.target_params, tensors, target)
+            setattr(policy, f"qf{i}_state", state.replace(params=params, target_params=aimed))
+        if "log_alpha" in tensors:
+            alpha = _strong(np.float32(tensors["log_alpha"])).reshape(())
+            state = self.model.ent_coef_state
+            self.model.ent_coef_state = state.replace(params={"log_ent_coef": alpha})
+        self.model._acting = dense_layers(policy.actor_state.params)
+        self._act_at_once()
+
+    def save(self, folder: Path, replay: Path) -> None:
+        state = flax.serialization.to_bytes(self._state())
+        (folder / "networks.msgpack").write_bytes(state)
+        self._save_rest(folder, replay)
+
+    def load(self, folder: Path, replay: Path, steps: int, updates: int) -> None:
+        saved = (folder / "networks.msgpack").read_bytes()
+        state = flax.serialization.from_bytes(self._state(), saved)
+        policy = self.model.policy
+        policy.actor_state, policy.qf1_state = state["actor"], state["critic1"]
+        policy.qf2_state, self.model.ent_coef_state = state["critic2"], state["entropy"]
+        self.model.key = jax.numpy.asarray(state["key"])
+        acting = state["acting"]
+        self.model._acting = tuple(
+            (acting[f"{i}w"], acting[f"{i}b"]) for i in range(len(acting) // 2)
+        )
+        self._load_rest(folder, replay, steps, updates)
+
+    def _critics(self) -> dict[str, Any]:
+        policy = self.model.policy
+        states = (policy.qf1_state, policy.qf2_state)
+        learnt = {name: state.params for name, state in zip(CRITICS, states, strict=True)}
+        return learnt | {n: s.target_params for n, s in zip(TARGETS, states, strict=True)}
+
+    def _state(self) -> dict[str, Any]:
+        policy = self.model.policy
+        return {  # everything that a round of updates computes
+            "actor": policy.actor_state,
+            "critic1": policy.qf1_state,
+            "critic2": policy.qf2_state,
+            "entropy": self.model.ent_coef_state,
+            "key": self.model.key,
+            "acting": {
+                f"{i}{kind}": array
+                for i, layer in enumerate(self.model._acting)
+                for kind, array in zip("wb", layer, strict=True)
+            },
+        }
+
+
+def _strong(leaf: Any) -> jax.Array:
+    """An array of a type that stays: a weak one would have the updates compiled again and again."""
+    return jax.numpy.asarray(np.asarray(leaf))
+
+
+def _places(params: Any, part: str) -> dict[str, tuple[str, str]]:
+    """Module and leaf of flax's tree in which each of our tensors of a part stands."""
+    dense = dense_count(params)
+    heads = {dense - 2: "mean", dense - 1: "log_std"} if part == "actor" else {}
+    places: dict[str, tuple[str, str]] = {}
+    for i in range(dense):
+        name, module = heads.get(i, f"{part}.{i}"), f"Dense_{i}"
+        places |= {f"{name}.weight": (module, "kernel"), f"{name}.bias": (module, "bias")}
+    for i in range(len(params["params"]) - dense):
+        name, module = f"{part}.norm.{i}", f"LayerNorm_{i}"
+        places |= {f"{name}.scale": (module, "scale"), f"{name}.offset": (module, "bias")}
+    return places
+
+
+def _tensors(params: Any, part: str) -> Tensors:
+    """The parameters of a part by our names."""
+    tree = jax.device_get(params)["params"]
+    places = _places(params, part).items()
+    return {name: np.array(tree[module][leaf]) for name, (module, leaf) in places}
+
+
+def _filled(params: Any, tensors: Mapping[str, np.ndarray], part: str) -> Any:
+    """The parameters with named arrays in the places where there are any."""
+    tree = jax.tree_util.tree_map(lambda leaf: leaf, params)
+    for name, (module, leaf) in _places(params, part).items():
+        if name in tensors:
+            tree["params"][module][leaf] = jax.numpy.asarray(tensors[name], jax.numpy.float32)
+    return tree
+
+
+def _raise_noise(model: OverlappedTQC, log_std: float) -> None:
+    """Begin with another exploration noise: the bias of the head that tells it."""
+    state = model.policy.actor_state
+    head = f"Dense_{len(state.params['params']) - 1}"
+    tree = jax.tree_util.tree_map(lambda leaf: leaf, state.params)
+    tree["params"][head]["bias"] = jax.numpy.full_like(tree["params"][head]["bias"], log_std)
+    model.policy.actor_state = state.replace(params=tree)
+    model._acting = dense_layers(tree)

@@ -1,0 +1,78 @@
+"""Training: one function for both modes and every trainer, resumable at any moment.
+
+`out/checkpoint/` and `out/replay/` are the only state; the same call with the same configuration
+continues from it, and ends as if it had never stopped. `out/policy.safetensors` is always the
+newest whole policy. What happens during training reaches the caller as rows (episodes) and progress
+dictionaries; writing tables is the caller's affair.
+"""
+
+import logging
+from pathlib import Path
+
+from robojackson.errors import BadConfiguration, BadPolicy
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.rl.config.train_config import TqcConfig, TrainConfig
+from robojackson.rl.env.tracking_core import TrackingCore
+from robojackson.rl.env.vec_env import TrackingVecEnv
+from robojackson.rl.pretrained import pretrained
+from robojackson.rl.tqc.network_arrays import Networks, chosen, fitted
+from robojackson.rl.tqc.trainer import make_trainer
+from robojackson.rl.training_hooks import Enough, Hooks
+from robojackson.rl.training_run import Run
+from robojackson.rl.training_task import Task, TrainResult
+from robojackson.robot.model import Robot
+
+__all__ = ["Hooks", "TrainResult", "train"]
+
+log = logging.getLogger(__name__)
+
+
+def train(
+    reference: ReferenceMotion,
+    robot: Robot,
+    config: TrainConfig,
+    out: Path,
+    hooks: Hooks | None = None,
+) -> TrainResult:
+    """Teach the robot to follow a reference motion.
+
+    Raises:
+        BadConfiguration: it has no budget.
+        BadPolicy: the networks to start from do not fit.
+        KeyboardInterrupt: after a checkpoint was written.
+    """
+    if not config.has_budget:
+        raise BadConfiguration("training needs a budget: steps, minutes or cpu_minutes")
+    networks = pretrained(config.start, config.mode)
+    out.mkdir(parents=True, exist_ok=True)
+    core = TrackingCore(robot, reference, config.environment, config.tqc.n_envs, config.seed)
+    run = Run(out, config, core, Task.of(reference, robot), hooks or Hooks())
+    env = TrackingVecEnv(core, run.episodes)
+    tqc = config.tqc if networks is None else _shaped(networks, core, config)
+    trainer = make_trainer(config.trainer, env, tqc, config.seed)
+    if networks is not None:
+        trainer.start_from(chosen(networks, config.start_critics).tensors)
+    run.bind(trainer)
+    try:
+        if not run.finished():
+            trainer.learn(run.callback)
+    except Enough:
+        run.checkpoint()
+    finally:
+        env.close()
+    return run.result()
+
+
+def _shaped(networks: Networks, core: TrackingCore, config: TrainConfig) -> TqcConfig:
+    """TQC with the layers of the networks, which must be for the same observation and action."""
+    found = (networks.observation_size, networks.action_size)
+    needed = (core.observation_size, core.action_size)
+    if found != needed:
+        raise BadPolicy(
+            f"start {config.start!r} takes {found[0]} observations and gives {found[1]} actions; "
+            f"mode {config.mode} has {needed[0]} and {needed[1]}"
+        )
+    tqc = fitted(config.tqc, networks, config.start_critics)
+    if tqc != config.tqc:
+        log.info("layers as in %s: actor %s, critics %s", config.start, tqc.actor, tqc.critic)
+    return tqc

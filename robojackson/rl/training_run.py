@@ -1,0 +1,305 @@
+"""The bookkeeping of one training run: what is learnt, budget, checkpoints, episodes, progress.
+
+No clock stands in the rows of episodes: a run in steps that is repeated gives the same table.
+"""
+
+import json
+import logging
+import os
+import shutil
+import time
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+from stable_baselines3.common.callbacks import BaseCallback
+
+from robojackson.errors import BadConfiguration, StoreError, TrainingDiverged
+from robojackson.rl.config.train_config import TrainConfig
+from robojackson.rl.env.tracking_core import TrackingCore
+from robojackson.rl.policy import Policy
+from robojackson.rl.tensorboard_log import ScalarLog
+from robojackson.rl.tqc.actor_average import ActorAverage
+from robojackson.rl.tqc.network_arrays import Networks, Tensors
+from robojackson.rl.tqc.trainer import Trainer
+from robojackson.rl.training_hooks import Enough, Hooks, Row
+from robojackson.rl.training_task import Task, TrainResult
+
+log = logging.getLogger(__name__)
+
+RECENT_EPISODES = 100
+RESULTS = ("policy.safetensors", "networks.safetensors")
+CHECKPOINT, OLD_CHECKPOINT = "checkpoint", "checkpoint.old"
+NOT_OF_THE_RUN = (
+    *("steps", "minutes", "cpu_minutes", "checkpoint_seconds", "progress_seconds", "tensorboard"),
+)
+"""What may differ between two sittings."""
+
+
+class Run:
+    """The bookkeeping of one training run: budget, checkpoints, episodes, progress.
+
+    Everything happens between two rounds of updates, where the state of the trainer and of the
+    environment is whole: a run that is killed and resumed ends as one that was not.
+    """
+
+    def __init__(
+        self, out: Path, config: TrainConfig, core: TrackingCore, task: Task, hooks: Hooks
+    ) -> None:
+        self.out, self.config, self.core, self.task = out, config, core, task
+        self._hooks, self._replay = hooks, out / "replay"
+        self._recent: deque[Row] = deque(maxlen=RECENT_EPISODES)
+        self._before, self._has_learnt = 0.0, False
+        self._began = self._saved = self._told = time.monotonic()
+        self._cpu_before, self._cpu_began = 0.0, time.process_time()
+        self._board = ScalarLog(out / "tensorboard") if config.tensorboard else None
+        self.callback = _Callback(self)
+        self._average = ActorAverage(config.tqc.actor_average)
+
+    def bind(self, trainer: Trainer) -> None:
+        """Attach the trainer; continue from a checkpoint when there is one."""
+        self.trainer, self._first_step, self._saved_updates = trainer, 0, 0
+        folder = newest_checkpoint(self.out)
+        if folder is None:  # what is there without one is another training's
+            shutil.rmtree(self._replay, ignore_errors=True)
+            self._set_aside()
+            return
+        state = json.loads((folder / "run.json").read_text())
+        if state["configuration"] != self._identity():
+            raise BadConfiguration(
+                f"{folder} belongs to another configuration, reference motion or robot; "
+                "remove it or choose another folder"
+            )
+        trainer.load(folder, self._replay, state["steps"], state["updates"])
+        with np.load(folder / "environment.npz", allow_pickle=False) as arrays:
+            self.core.restore(dict(arrays))
+        self._average.load(folder)
+        self.core.rng.bit_generator.state = state["random"]
+        self._before, self._first_step = state["seconds"], state["steps"]
+        self._cpu_before = state["cpu_seconds"]
+        self._saved_updates = state["updates"]
+        log.info("resuming at %d steps", state["steps"])
+
+    def seconds(self) -> float:
+        return self._before + time.monotonic() - self._began
+
+    def cpu_seconds(self) -> float:
+        return self._cpu_before + time.process_time() - self._cpu_began
+
+    def finished(self) -> str:
+        """The budget that is used up, or an empty string."""
+        if self.config.steps is not None and self.trainer.steps() >= self.config.steps:
+            return "steps"
+        if self.config.minutes is not None and self.seconds() >= 60 * self.config.minutes:
+            return "minutes"
+        if self.config.cpu_minutes and self.cpu_seconds() >= 60 * self.config.cpu_minutes:
+            return "cpu_minutes"
+        return ""
+
+    def episodes(self, rows: list[Row]) -> None:
+        steps, first = self.trainer.steps() + self.core.n, self.core.episode - len(rows) + 1
+        for number, row in enumerate(rows, first):
+            row |= {"step": steps, "episode": number}
+        self._recent.extend(rows)
+        self._hooks.sink(rows)
+
+    def tick(self) -> None:
+        """Called between two rounds.
+
+        Raises:
+            Enough: the budget is used up.
+            TrainingDiverged: the actor's weights are no numbers any more.
+            KeyboardInterrupt: the caller wants to stop; a checkpoint was written.
+        """
+        now = time.monotonic()
+        layers, updates = self.trainer.acting()
+        self._require_finite(array for layer in layers for array in layer)
+        self._average.add(layers, updates)
+        if not self._has_learnt and self.trainer.updates() > self._saved_updates:
+            self._has_learnt = True
+            self._hooks.learnt()
+        try:
+            started = self.trainer.steps() > self._first_step
+            if started and now - self._told >= self.config.progress_seconds:
+                self._told = now
+                self._tell()
+            if self._hooks.stop():
+                raise KeyboardInterrupt
+        except KeyboardInterrupt:
+            self.checkpoint()
+            raise
+        if self.finished():
+            raise Enough
+        if now - self._saved >= self.config.checkpoint_seconds:
+            self.checkpoint()
+            self._saved = time.monotonic()
+
+    def checkpoint(self) -> None:
+        """Write the policy and everything needed to go on, whole or not at all.
+
+        Raises:
+            TrainingDiverged: weights are no numbers any more; nothing is written.
+            StoreError: the folder takes no more.
+        """
+        networks = self.trainer.networks()
+        self._require_finite(networks.values())
+        fresh, final = self.out / "checkpoint.new", self.out / CHECKPOINT
+        shutil.rmtree(fresh, ignore_errors=True)
+        self._hooks.saving()
+        try:
+            fresh.mkdir()
+            self.trainer.save(fresh, self._replay)
+            np.savez(fresh / "environment.npz", **self.core.state())
+            self._average.save(fresh)
+            (fresh / "run.json").write_text(json.dumps(self._state()))
+            for name, content in self._results(networks).items():
+                (self.out / f"{name}.part").write_bytes(content)
+            for file in (*fresh.iterdir(), *self.out.glob("*.safetensors.part")):
+                _to_disk(file)
+        except OSError as error:
+            shutil.rmtree(fresh, ignore_errors=True)
+            for part in self.out.glob("*.safetensors.part"):
+                part.unlink(missing_ok=True)
+            raise StoreError(f"{self.out}: the checkpoint cannot be written ({error})") from error
+        # First, since a checkpoint whose budget is used up is not written again.
+        for name in RESULTS:
+            os.replace(self.out / f"{name}.part", self.out / name)
+        old = self.out / OLD_CHECKPOINT
+        if final.exists():
+            shutil.rmtree(old, ignore_errors=True)
+            final.rename(old)
+        fresh.rename(final)
+        shutil.rmtree(old, ignore_errors=True)
+        self.trainer.saved()
+
+    def result(self) -> TrainResult:
+        return TrainResult(
+            self.out / "policy.safetensors",
+            self.trainer.steps(),
+            self.trainer.updates(),
+            self.seconds(),
+            self.finished(),
+        )
+
+    def _identity(self) -> dict[str, object]:
+        """The configuration without the budget: what a checkpoint must share to be continued."""
+        fields = asdict(self.config)
+        for free in NOT_OF_THE_RUN:
+            del fields[free]
+        return json.loads(json.dumps(fields | {"task": asdict(self.task)}))
+
+    def _state(self) -> dict[str, object]:
+        return {
+            "configuration": self._identity(),
+            "steps": self.trainer.steps(),
+            "updates": self.trainer.updates(),
+            "seconds": self.seconds(),
+            "cpu_seconds": self.cpu_seconds(),
+            "random": self.core.rng.bit_generator.state,
+        }
+
+    def _results(self, networks: Tensors) -> dict[str, bytes]:
+        """What a run leaves beside its tables: the policy, and networks to start others from."""
+        facts = self._facts()
+        layers = self._average.layers(self.trainer.layers(), self.trainer.updates())
+        return {
+            "policy.safetensors": Policy(layers, facts).to_bytes(),
+            "networks.safetensors": Networks(networks, facts).to_bytes(),
+        }
+
+    def _set_aside(self) -> None:
+        """Keep the networks of another training that this one's would replace."""
+        for name in RESULTS:
+            if (self.out / name).is_file():
+                os.replace(self.out / name, self.out / f"before-{name}")
+                log.warning("%s was here before; it is before-%s now", name, name)
+
+    def _require_finite(self, arrays: Iterable[np.ndarray]) -> None:
+        if all(np.isfinite(array).all() for array in arrays):
+            return
+        kept = newest_checkpoint(self.out)
+        where = f"{kept} is of before" if kept else "no checkpoint was written before"
+        raise TrainingDiverged(
+            f"{self.out}: the training diverged: after {self.trainer.steps()} steps its networks "
+            f"hold values that are no numbers ({where}); take a lower tqc.learning_rate or another "
+            "seed, in another folder"
+        )
+
+    def _facts(self) -> dict[str, object]:
+        """What the policy was trained for."""
+        config = self.config
+        return {
+            "robot": self.task.robot,
+            "model_sha256": self.task.model_sha256,
+            "reference_sha256": self.task.reference_sha256,
+            "mode": config.mode,
+            "trainer": config.trainer,
+            "seed": config.seed,
+            "setup": self._hooks.setup,
+            "start": Path(config.start).name,
+            "curiosity": config.curiosity,
+            "steps": self.trainer.steps(),
+            "control": asdict(self.core.sim.control),
+            "repeats": self.core.mode.repeats,
+            "environment": json.loads(json.dumps(asdict(config.environment))),
+        }
+
+    def _tell(self) -> None:
+        status = self._status()
+        if self._board is not None:
+            rewards = {
+                k for row in self._recent for k in row if k.startswith(("reward_", "train_"))
+            }
+            means = {key: float(np.mean([r[key] for r in self._recent])) for key in sorted(rewards)}
+            self._board.add(int(status["steps"]), status | means)
+        self._hooks.progress(status)
+
+    def _status(self) -> Row:
+        steps, seconds = self.trainer.steps(), self.seconds()
+        rate = (steps - self._first_step) / max(seconds - self._before, 1e-9)
+        left = [60 * self.config.minutes - seconds] if self.config.minutes else []
+        if self.config.cpu_minutes:
+            left.append(60 * self.config.cpu_minutes - self.cpu_seconds())
+        if self.config.steps:
+            left.append((self.config.steps - steps) / max(rate, 1e-9))
+        recent = list(self._recent)
+        mean = lambda key: float(np.mean([row[key] for row in recent])) if recent else np.nan  # noqa: E731
+        return {
+            "steps": steps,
+            "updates": self.trainer.updates(),
+            "seconds": seconds,
+            "steps_per_s": rate,
+            "seconds_left": max(0.0, min(left)),
+            "survived_s": mean("survived_s"),
+            "episode_return": mean("episode_return"),
+            "site_error_m": mean("site_error_m"),
+        }
+
+
+def newest_checkpoint(out: Path) -> Path | None:
+    """The last whole checkpoint: the one before when a crash came between two renames."""
+    for name in (CHECKPOINT, OLD_CHECKPOINT):
+        if (out / name / "run.json").exists():
+            return out / name
+    return None
+
+
+def _to_disk(path: Path) -> None:
+    with path.open("rb") as file:
+        os.fsync(file.fileno())
+
+
+class _Callback(BaseCallback):
+    """Stable-Baselines3's hook: one call a round."""
+
+    def __init__(self, run: Run) -> None:
+        super().__init__()
+        self._run = run
+
+    def _on_rollout_start(self) -> None:
+        self._run.tick()
+
+    def _on_step(self) -> bool:
+        return True

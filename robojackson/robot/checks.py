@@ -1,0 +1,76 @@
+"""What a robot must be: a free root with limited hinges, mirrored sides, level soles at rest."""
+
+import mujoco
+import numpy as np
+
+from robojackson.errors import BadConfiguration
+from robojackson.robot.description import RobotDescription
+from robojackson.robot.names import known, matching, where
+
+_SYMMETRY_M = 1e-3
+_LEVEL_M = 0.005
+_BONES = (("hip", "knee"), ("knee", "foot"), ("shoulder", "elbow"), ("elbow", "hand"))
+_LABELS = ("left", "right")
+
+
+def check_joints(model: mujoco.MjModel, description: RobotDescription) -> None:
+    """One free joint, first, on the root body; every other joint a limited hinge."""
+    bodies = [model.body(index).name for index in range(model.nbody)]
+    root = known("body", description.root_body, bodies, where(description, "root_body"))
+    free = int(mujoco.mjtJoint.mjJNT_FREE)
+    hinge = int(mujoco.mjtJoint.mjJNT_HINGE)
+    if model.jnt_type[0] != free or model.jnt_bodyid[0] != model.body(root).id:
+        raise BadConfiguration(f"{where(description, 'root_body')}: {root!r} has no free joint")
+    for index in range(1, model.njnt):
+        if model.jnt_type[index] != hinge or not model.jnt_limited[index]:
+            name = model.joint(index).name
+            raise BadConfiguration(f"{where(description, 'mjcf')}: {name!r} is no limited hinge")
+
+
+def check_names(
+    description: RobotDescription, bodies: tuple[str, ...], joints: tuple[str, ...]
+) -> None:
+    """Every body, joint and keypoint of contacts, weights and poses is known."""
+    if not description.contacts:
+        raise BadConfiguration(f"{where(description, 'contacts')}: a robot needs feet")
+    for name, point in description.contacts.items():
+        place = where(description, f"contacts.{name}")
+        known("body", point.body, bodies, f"{place}.body")
+        known("keypoint", point.site, description.sites, f"{place}.site")
+        known("side", point.side, _LABELS, f"{place}.side")
+        carrier = description.sites[point.site][0]
+        if carrier != point.body:
+            raise BadConfiguration(f"{place}: {point.site} is on {carrier!r}, not {point.body!r}")
+    for key in description.weights:
+        known("keypoint", key, description.sites, where(description, "weights"))
+    for joint in description.rest_pose:
+        matching("joint", joint, joints, where(description, "rest_pose"))
+
+
+def check_symmetry(description: RobotDescription, lengths: dict[tuple[str, str], float]) -> None:
+    """Limbs of the same length on both sides."""
+    for a, b in _BONES:
+        left = lengths[f"left_{a}", f"left_{b}"]
+        right = lengths[f"right_{a}", f"right_{b}"]
+        if abs(left - right) > _SYMMETRY_M:
+            raise BadConfiguration(
+                f"{where(description, 'sites')}: left_{a} to left_{b} is {left:.4f} m on the left "
+                f"and {right:.4f} m on the right; they must be mirrored"
+            )
+
+
+def check_soles(description: RobotDescription, soles: np.ndarray) -> None:
+    """In the rest pose all soles are at one height, or the rest pose or the balls are wrong.
+
+    Args:
+        soles: Heights of the lowest points of the balls in the rest pose, metres.
+    """
+    if np.ptp(soles) > _LEVEL_M:
+        heights = ", ".join(
+            f"{name} {1e3 * height:.0f}"
+            for name, height in zip(description.contacts, soles - soles.min(), strict=True)
+        )
+        raise BadConfiguration(
+            f"{where(description, 'contacts')}: in the rest pose the soles are not level; "
+            f"heights over the lowest, mm: {heights}"
+        )

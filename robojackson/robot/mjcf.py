@@ -1,0 +1,150 @@
+"""The MuJoCo model of a robot description: the MJCF, keypoint sites, and a floor if it has none.
+
+The sites have no mass, so the dynamics of the MJCF stay untouched. Where the MJCF has a site of the
+same name already, ours is `keypoint/NAME`.
+"""
+
+import hashlib
+import importlib.util
+import os
+from pathlib import Path
+from xml.etree import ElementTree
+
+import mujoco
+
+from robojackson.errors import BadConfiguration
+from robojackson.robot.description import KEYPOINTS, TOES, RobotDescription
+from robojackson.robot.names import known, where
+
+STORE = "ROBOJACKSON_STORE"
+ADDED = "store"
+"""Prefix of an `mjcf` that `robojackson robots add` unpacks."""
+_OURS = "keypoint/"
+FOLDERS = ("assetdir", "meshdir", "texturedir")
+PARTS = ("include", "model")
+"""Elements whose file is MJCF again."""
+
+
+def site_of(model: mujoco.MjModel, key: str) -> int:
+    """Index of a keypoint's site."""
+    ours = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, f"{_OURS}{key}")
+    return int(model.site(key).id if ours < 0 else ours)
+
+
+def robots_folder() -> Path:
+    """Where added robots are kept: inside the store, or in the cache where that is no folder."""
+    root = os.environ.get(STORE) or "store"
+    if "://" in root:
+        cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+        return Path(cache) / "robojackson" / "robots"
+    return Path(root) / "robots"
+
+
+def mjcf_path(description: RobotDescription) -> Path:
+    """The file of a description.
+
+    Raises:
+        BadConfiguration: It is not there, or not the one that was pinned.
+    """
+    package, colon, inside = description.mjcf.partition(":")
+    if not colon or len(package) == 1:
+        path = Path(description.mjcf)
+    elif package == ADDED:
+        return _added(description, inside)
+    else:
+        path = _in_package(description, package, inside)
+    if not path.is_file():
+        raise BadConfiguration(f"{where(description, 'mjcf')}: no such file: {path}")
+    return path
+
+
+def _added(description: RobotDescription, inside: str) -> Path:
+    name, path = description.name, robots_folder() / description.name / inside
+    if not path.is_file():
+        raise BadConfiguration(
+            f"robot {name!r}: its model is not here ({path}); run: robojackson robots add {name}"
+        )
+    pinned = description.source and description.source.model_sha256
+    if pinned and hashlib.sha256(path.read_bytes()).hexdigest() != pinned:
+        raise BadConfiguration(
+            f"robot {name!r}: {path} has been altered; run: robojackson robots add {name}"
+        )
+    return path
+
+
+def _in_package(description: RobotDescription, package: str, inside: str) -> Path:
+    found = importlib.util.find_spec(package)
+    if found is None or found.origin is None:
+        raise BadConfiguration(
+            f"{where(description, 'mjcf')}: package {package!r} is not installed"
+        )
+    return Path(found.origin).parent / inside
+
+
+def compiled(description: RobotDescription, path: Path) -> mujoco.MjModel:
+    """The model with the keypoint sites, a floor, and scaled motors."""
+    spec = _read(path, description)
+    bodies = [body.name for body in spec.bodies if body.name != "world"]
+    _add_sites(spec, description, bodies)
+    planes = (geom.type == mujoco.mjtGeom.mjGEOM_PLANE for geom in spec.worldbody.geoms)
+    if not any(planes):
+        plane = mujoco.mjtGeom.mjGEOM_PLANE
+        spec.worldbody.add_geom(name="floor", type=plane, size=[40, 40, 1], rgba=[0.5] * 3 + [1])
+    try:
+        model = spec.compile()
+    except ValueError as error:
+        raise _unreadable(description, error) from error
+    model.actuator_gear[:] *= description.gear_scale
+    return model
+
+
+def model_sha256(path: Path) -> str:
+    """Digest of an MJCF; where it includes other files or has meshes, of all of them."""
+    digests = [hashlib.sha256(file.read_bytes()) for file in _files(path)]
+    if len(digests) == 1:
+        return digests[0].hexdigest()
+    return hashlib.sha256(b"".join(digest.digest() for digest in digests)).hexdigest()
+
+
+def _files(path: Path) -> list[Path]:
+    """The MJCF and every file that it names, as MuJoCo finds them."""
+    found, folders, texts = [path], [path.parent], [path]
+    for text in texts:  # grows while it is read
+        try:
+            tree = ElementTree.parse(text)
+        except ElementTree.ParseError:  # MuJoCo reads what is no strict XML, too
+            continue
+        for compiler in tree.iter("compiler"):
+            folders += [path.parent / compiler.get(name, "") for name in FOLDERS]
+        for element in tree.iter():
+            places = [folder / element.get("file", "") for folder in folders]
+            file = next((place for place in places if place.is_file()), None)
+            if file is not None and file not in found:
+                found.append(file)
+                texts += [file] if element.tag in PARTS else []
+    return found
+
+
+def _read(path: Path, description: RobotDescription) -> mujoco.MjSpec:
+    try:
+        return mujoco.MjSpec.from_file(str(path))
+    except ValueError as error:
+        raise _unreadable(description, error) from error
+
+
+def _unreadable(description: RobotDescription, error: ValueError) -> BadConfiguration:
+    return BadConfiguration(f"{where(description, 'mjcf')}: {str(error).splitlines()[0]}")
+
+
+def _add_sites(spec: mujoco.MjSpec, description: RobotDescription, bodies: list[str]) -> None:
+    missing = [key for key in KEYPOINTS if key not in description.sites]
+    if set(TOES) & set(description.sites):
+        missing += [toe for toe in TOES if toe not in description.sites]
+    if missing:
+        raise BadConfiguration(f"{where(description, 'sites')}: missing {', '.join(missing)}")
+    taken = {site.name for site in spec.sites}
+    for key, (body, position) in description.sites.items():
+        known("keypoint", key, KEYPOINTS + TOES, where(description, "sites"))
+        known("body", body, bodies, where(description, f"sites.{key}"))
+        name = f"{_OURS}{key}" if key in taken else key
+        spec.body(body).add_site(name=name, pos=list(position), size=[0.02, 0.02, 0.02])

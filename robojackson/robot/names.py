@@ -1,0 +1,29 @@
+"""Names in a robot description: every one is known, or the error lists those that are."""
+
+from collections.abc import Iterable
+from fnmatch import fnmatchcase
+
+from robojackson.errors import UnknownName
+from robojackson.robot.description import RobotDescription
+
+
+def where(description: RobotDescription, key: str) -> str:
+    """The place in the configuration that an error message names."""
+    return f"configs/robots/{description.name}.yaml: {key}"
+
+
+def known(kind: str, name: str, names: Iterable[str], place: str) -> str:
+    """The name itself, or UnknownName."""
+    names = list(names)
+    if name not in names:
+        raise UnknownName(kind, name, place, names)
+    return name
+
+
+def matching(kind: str, pattern: str, names: Iterable[str], place: str) -> list[str]:
+    """The names that a pattern with `*` means, at least one, or UnknownName."""
+    names = list(names)
+    found = [name for name in names if fnmatchcase(name, pattern)]
+    if not found:
+        raise UnknownName(kind, pattern, place, names)
+    return found

@@ -1,0 +1,61 @@
+"""A robot's motion at the frame rate that another project's files have.
+
+qpos in MuJoCo's order: root xyz (metres, world), root quaternion wxyz, hinges (radians). A cyclic
+reference gives one lap: no format of the field can say that a motion repeats.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.robot.resampling import resample
+from robojackson.robot.tree_kinematics import difference
+
+XYZW, WXYZ = [1, 2, 3, 0], [3, 0, 1, 2]
+"""Places of a quaternion wxyz in xyzw, and of one in xyzw in wxyz."""
+_HALF_WIDTH = 0.05
+"""Steps to each side of a frame over which its velocity is taken."""
+
+
+@dataclass(frozen=True)
+class SampledMotion:
+    """Frames at an even rate.
+
+    Attributes:
+        fps: Frames a second; frame t is at t / fps seconds.
+        qpos: MuJoCo positions, root quaternion wxyz.
+        qvel: MuJoCo velocities: root linear in the world, root angular in the body, hinges; None
+            where a file does not say.
+    """
+
+    fps: float
+    qpos: Float[np.ndarray, "T nq"]
+    qvel: Float[np.ndarray, "T nv"] | None = None
+
+    def __len__(self) -> int:
+        return len(self.qpos)
+
+
+def sampled(reference: ReferenceMotion, fps: float | None = None) -> SampledMotion:
+    """The reference motion at `fps`, by the splines of the solver; None keeps its control steps."""
+    if fps is None:
+        return SampledMotion(1.0 / reference.dt, reference.qpos, reference.qvel)
+    qpos = np.asarray(reference.qpos, float)
+    steps = _steps(reference, fps)
+    before, after = steps - _HALF_WIDTH, steps + _HALF_WIDTH
+    if not reference.cyclic:
+        before, after = np.clip([before, after], 0, len(reference) - 1)
+    lap = np.asarray(reference.lap_offset, float) if reference.cyclic else None
+    moved = difference(resample(qpos, before, lap), resample(qpos, after, lap))
+    qvel = moved / ((after - before) * reference.dt)[:, None]
+    return SampledMotion(float(fps), resample(qpos, steps, lap), qvel)
+
+
+def _steps(reference: ReferenceMotion, fps: float) -> Float[np.ndarray, " T"]:
+    """Fractional steps of the frames: up to the last step, or all before the next lap begins."""
+    per_frame = 1.0 / (fps * reference.dt)
+    if reference.cyclic:
+        return np.arange(int(np.ceil(len(reference) / per_frame - 1e-6))) * per_frame
+    return np.arange(int((len(reference) - 1) / per_frame + 1e-6) + 1) * per_frame

@@ -1,0 +1,216 @@
+"""The catalogue of every video that was ever judged: a row a judgement, never changed, only added.
+
+Each refresh writes its rows as one new Parquet file under a name that no other can have, so two
+refreshes at once never touch the same file, on a disk or in an object store. Compaction writes what
+it read into one file and only then takes the read ones away: between the two a row stands in two
+files, and a reader counts it once by its `record_id`. DuckDB answers questions.
+"""
+
+import uuid
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import UTC, datetime
+from typing import Any
+
+import pyarrow as pa
+
+from robojackson.errors import BadTable, StoreError
+from robojackson.pipeline import tables
+from robojackson.pipeline.table_schemas import (
+    F64,
+    I32,
+    STABILITY_SCORE,
+    TEXT,
+    VIDEO_CANDIDATE,
+    Column,
+    TableSchema,
+)
+from storage.artifact import Artifact
+from storage.store import Store
+
+FOLDER = "candidates"
+COMPACT_FROM = 32
+"""Files from which on a compaction is worth its while."""
+ATTEMPTS = 5
+"""Readings that may lose a file to a compaction in between."""
+TIME = pa.timestamp("us", tz="UTC")
+
+QUALITY = (
+    Column("detected_share", F64, "1", nullable=True),
+    Column("full_body_share", F64, "1", nullable=True),
+    Column("person_height_px", F64, "px", nullable=True),
+    Column("people", I32, nullable=True),
+    Column("cuts", I32, nullable=True),
+    Column("static_share", F64, "1", nullable=True),
+    Column("moving_share", F64, "1", nullable=True),
+    Column("flat_share", F64, "1", nullable=True),
+)
+CANDIDATE_RECORD = TableSchema(
+    "CandidateRecord",
+    "judgement of a video",
+    (
+        Column("record_id", TEXT),
+        Column("run_id", TEXT),
+        Column("dance", TEXT),
+        Column("source", TEXT),
+        *VIDEO_CANDIDATE.columns,
+        Column("thumbnail", TEXT, nullable=True),
+        *(Column(c.name, c.type, c.unit, nullable=True) for c in STABILITY_SCORE.columns),
+        *QUALITY,
+        # chosen, accepted, rejected (a filter says why) or failed (could not be downloaded or read)
+        Column("decision", TEXT),
+        Column("reason", TEXT, nullable=True),
+        Column("decided_at", TIME),
+        Column("video_key", TEXT, nullable=True),
+        Column("video_sha256", TEXT, nullable=True),
+    ),
+)
+Row = Mapping[str, Any]
+
+
+def append(store: Store, rows: Iterable[Row]) -> Artifact | None:
+    """Add judgements; a `record_id` is made for each. None when there are no rows.
+
+    Raises:
+        BadTable: a row lacks a column or has one too many.
+        StoreError: the store refuses the file; nothing of it is left.
+    """
+    named = [{**row, "record_id": uuid.uuid4().hex} for row in rows]
+    return _write(store, "rows", named) if named else None
+
+
+def records(store: Store, dance: str | None = None) -> list[dict[str, Any]]:
+    """All judgements, or those of one dance, the oldest first."""
+    where = "" if dance is None else "WHERE lower(dance) = lower($dance)"
+    given = {} if dance is None else {"dance": dance}
+    ordered = "ORDER BY decided_at, run_id, decision, stability_score, record_id"
+    return query(store, f"SELECT * FROM candidates {where} {ordered}", given)
+
+
+def query(store: Store, sql: str, given: Mapping[str, Any] | None = None) -> list[dict[str, Any]]:
+    """Rows of a question in DuckDB's SQL about the table `candidates`; it reaches no other file.
+
+    Raises:
+        BadTable: the question is not SQL, or names what is not there.
+    """
+    import duckdb
+
+    whole = _without_zones(_whole(store))
+    with duckdb.connect(":memory:") as connection:
+        connection.register("parts", whole)
+        unique = "SELECT DISTINCT ON (record_id) * FROM parts"
+        connection.execute(f"CREATE TABLE candidates AS {unique}")
+        connection.unregister("parts")
+        connection.execute("SET enable_external_access = false")
+        try:
+            connection.execute(sql, dict(given or {}))
+            names = [column[0] for column in connection.description or ()]
+            tables.require_distinct(names)
+            return [
+                dict(zip(names, map(_in_utc, row), strict=True)) for row in connection.fetchall()
+            ]
+        except duckdb.Error as cause:
+            raise BadTable(f"catalogue: {' '.join(str(cause).split())}") from cause
+
+
+def compact(store: Store, least: int = COMPACT_FROM) -> Artifact | None:
+    """Write all rows into one file, if there are `least` files or more; any time, beside anything.
+
+    Two compactions at once leave rows in two files, which the next one puts together.
+    """
+    keys = _keys(store)
+    if len(keys) < max(least, 2):
+        return None
+    read = {key: rows for key in keys if (rows := _read(store, key)) is not None}
+    unique = {row["record_id"]: row for rows in read.values() for row in rows.to_pylist()}
+    made = _write(store, "compact", list(unique.values()))
+    for key in read:
+        store.remove(key)
+    return made
+
+
+def champion(store: Store, dance: str, kind: str = "") -> dict[str, Any] | None:
+    """The judgement of the video that was chosen last for a dance, if its file is still there and
+    it has not failed since.
+
+    Args:
+        kind: Beginning of the ids of the runs that count, such as `refresh`.
+    """
+    gone: set[tuple[str, str]] = set()
+    for row in reversed(_of(store, dance, kind)):
+        if row["decision"] == "failed":
+            gone.add(_key_of(row))
+        is_chosen = row["decision"] == "chosen" and _key_of(row) not in gone
+        if is_chosen and row["video_key"] and store.exists(row["video_key"]):
+            return row
+    return None
+
+
+def known(store: Store, dance: str, kind: str = "") -> set[tuple[str, str]]:
+    """Source and id of every video that was judged for a dance; a failed one may be tried again."""
+    return _judged(_of(store, dance, kind))
+
+
+def failed(store: Store, dance: str, kind: str = "") -> set[tuple[str, str]]:
+    """Source and id of every video that could never be judged for a dance."""
+    found = _of(store, dance, kind)
+    return {_key_of(row) for row in found} - _judged(found)
+
+
+def _of(store: Store, dance: str, kind: str) -> list[dict[str, Any]]:
+    return [row for row in records(store, dance) if row["run_id"].startswith(kind)]
+
+
+def _judged(found: Iterable[Row]) -> set[tuple[str, str]]:
+    return {_key_of(row) for row in found if row["decision"] != "failed"}
+
+
+def _key_of(row: Row) -> tuple[str, str]:
+    return row["source"], row["video_id"]
+
+
+def _write(store: Store, kind: str, rows: Sequence[Row]) -> Artifact:
+    when = datetime.now(UTC).strftime("%Y%m%dT%H%M%S%f")
+    key = f"{FOLDER}/{kind}-{when}-{uuid.uuid4().hex[:12]}.parquet"
+    return store.put(key, tables.encode_rows(CANDIDATE_RECORD, rows))
+
+
+def _keys(store: Store) -> list[str]:
+    return [key for key in store.list(FOLDER) if key.endswith(".parquet")]
+
+
+def _whole(store: Store) -> pa.Table:
+    """All files in one table; read anew when a compaction took one away meanwhile."""
+    for _ in range(ATTEMPTS):
+        parts = [_read(store, key) for key in _keys(store)]
+        whole = [part for part in parts if part is not None]
+        if len(whole) == len(parts):
+            return pa.concat_tables([_empty(), *whole])
+    raise StoreError(f"{store.address(FOLDER)}: is compacted again and again while it is read")
+
+
+def _read(store: Store, key: str) -> pa.Table | None:
+    """One file, None when it is gone."""
+    try:
+        data = store.read(key)
+    except StoreError:
+        if store.exists(key):
+            raise
+        return None
+    return tables.decode_table(CANDIDATE_RECORD, data, store.address(key))
+
+
+def _without_zones(table: pa.Table) -> pa.Table:
+    """Times as DuckDB takes them without its extension for time zones; they all are UTC."""
+    columns = [
+        column.cast(pa.timestamp("us")) if column.type == TIME else column
+        for column in table.itercolumns()
+    ]
+    return pa.table(columns, names=table.column_names)
+
+
+def _in_utc(value: Any) -> Any:
+    return value.replace(tzinfo=UTC) if isinstance(value, datetime) else value
+
+
+def _empty() -> pa.Table:
+    return tables.decode_table(CANDIDATE_RECORD, tables.encode_rows(CANDIDATE_RECORD, []), "")

@@ -1,0 +1,240 @@
+"""The tables of the studies: episodes and evaluations of every cell, one file a cell and table.
+
+    metrics/episodes/study=S/move=M/setup=P/seed=N/<run_id>.parquet
+    metrics/evaluations/study=S/move=M/setup=P/seed=N/<run_id>.parquet
+    metrics/runs/<run_id>-<study>.json           where the numbers come from
+
+The run id is a digest of the configuration and the inputs, so a cell that is done again writes the
+same bytes under the same key, two writers never touch one file, and no clock stands in a table;
+when and where a cell ran is in the file beside it. DuckDB answers questions about all of them.
+"""
+
+import json
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import pyarrow as pa
+
+from robojackson.errors import BadTable, StoreError
+from robojackson.pipeline import tables
+from robojackson.pipeline.table_schemas import EPISODE_RECORD, EVALUATION_RECORD, TableSchema
+from storage.artifact import Artifact, sha256_of
+from storage.store import Store
+
+if TYPE_CHECKING:
+    from duckdb import DuckDBPyConnection
+
+Ask = Callable[..., list[dict[str, Any]]]
+"""A question in SQL and its parameters to rows."""
+FOLDER = "metrics"
+TABLES: Mapping[str, TableSchema] = {"episodes": EPISODE_RECORD, "evaluations": EVALUATION_RECORD}
+RUNS = f"{FOLDER}/runs"
+ALWAYS = ("run_id", "study", "move", "setup", "config")
+"""Columns of `runs`, whatever is known."""
+OVERVIEW = """
+SELECT study, move, setup, seed, count(*) AS rollouts, round(avg(survived_s), 2) AS survived_s,
+       round(avg(strict_success), 3) AS strict_success, round(avg(skill), 3) AS skill
+FROM evaluations WHERE policy = 'trained' GROUP BY ALL ORDER BY ALL
+"""
+"""A line a cell."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the rows of a cell stand.
+
+    Attributes:
+        study, move, setup, seed: The partition.
+        run_id: Of the training.
+    """
+
+    study: str
+    move: str
+    setup: str
+    seed: int
+    run_id: str
+
+    def key(self, table: str) -> str:
+        """The key of one of its tables."""
+        partition = f"study={self.study}/move={self.move}/setup={self.setup}/seed={self.seed}"
+        return f"{FOLDER}/{table}/{partition}/{self.run_id}.parquet"
+
+
+def write(store: Store, place: Place, given: Mapping[str, Artifact]) -> dict[str, Artifact]:
+    """Put the tables of a cell where questions find them; another run of that cell makes room.
+
+    A table that is there already is not written again.
+
+    Args:
+        given: `episodes` and `evaluations`, as the stages left them.
+    Raises:
+        BadTable: one is not what its schema says.
+        StoreError: the store refuses it; nothing half-written is left.
+    """
+    made = {}
+    for table, schema in TABLES.items():
+        key = given[table].key
+        rows = tables.decode_rows(schema, store.read(key), store.address(key))
+        made[table] = _put(store, place.key(table), tables.encode_rows(schema, _named(place, rows)))
+    for key in _outdated(store, place):
+        for old in (key, note_key(replace(place, run_id=_run(key)))):
+            if store.exists(old):
+                store.remove(old)
+    return made
+
+
+def note_key(place: Place) -> str:
+    """The key of what is known of a cell's origin."""
+    return f"{RUNS}/{place.run_id}-{place.study}.json"
+
+
+def noted(store: Store, place: Place) -> dict[str, Any]:
+    """What is known of a cell's origin; nothing where it is not there or cannot be read."""
+    try:
+        return dict(json.loads(store.read(note_key(place))))
+    except (StoreError, ValueError):
+        return {}
+
+
+def note(store: Store, place: Place, facts: Mapping[str, Any]) -> Artifact:
+    """Keep where the numbers of a cell come from."""
+    text = json.dumps(facts, indent=1, sort_keys=True, default=str)
+    return store.put(note_key(place), text.encode())
+
+
+def query(store: Store, sql: str, given: Mapping[str, Any] | None = None) -> list[dict[str, Any]]:
+    """Rows of a question in DuckDB's SQL about `episodes`, `evaluations` and `runs`.
+
+    It reaches no other file.
+
+    Raises:
+        BadTable: the question is not SQL, or names what is not there.
+    """
+    with opened(store) as ask:
+        return ask(sql, given)
+
+
+@contextmanager
+def opened(
+    store: Store, study: str | None = None, runs: Collection[str] | None = None
+) -> Iterator[Ask]:
+    """The tables, all or those of a study or of some runs of it, read once for any number of
+    questions.
+    """
+    import duckdb
+
+    with duckdb.connect(":memory:") as connection:
+        for table in TABLES:
+            _create(connection, table, read(store, table, study, runs))
+        _create(connection, "runs", _runs(store, study, runs))
+        connection.execute("SET enable_external_access = false")
+
+        def ask(sql: str, given: Mapping[str, Any] | None = None) -> list[dict[str, Any]]:
+            try:
+                connection.execute(sql, dict(given or {}))
+                names = [column[0] for column in connection.description or ()]
+                tables.require_distinct(names)
+                return [dict(zip(names, row, strict=True)) for row in connection.fetchall()]
+            except duckdb.Error as cause:
+                raise BadTable(f"metrics: {' '.join(str(cause).split())}") from cause
+
+        yield ask
+
+
+def kept(store: Store, study: str, runs: Collection[str] | None = None) -> list[Artifact]:
+    """All files of a study, or of some runs of it: its tables and where they come from."""
+    keys = [key for table in TABLES for key in store.list(f"{FOLDER}/{table}/study={study}")]
+    keys = [key for key in keys if runs is None or _run(key) in runs]
+    return [Artifact(key=k, sha256=store.sha256(k)) for k in [*keys, *_notes(store, study, runs)]]
+
+
+def runs_of(files: Iterable[Artifact]) -> set[str]:
+    """Ids of the runs whose tables are among the files."""
+    return {_run(file.key) for file in files if file.key.endswith(".parquet")}
+
+
+def read(
+    store: Store, table: str, study: str | None = None, runs: Collection[str] | None = None
+) -> pa.Table:
+    """All rows of a table, with the column `study`, or those of one study or of some runs."""
+    schema = TABLES[table]
+    prefix = f"{FOLDER}/{table}" + (f"/study={study}" if study else "")
+    parts = [
+        _with_study(tables.decode_table(schema, store.read(key), store.address(key)), key)
+        for key in store.list(prefix)
+        if key.endswith(".parquet") and (runs is None or _run(key) in runs)
+    ]
+    return pa.concat_tables([_empty(schema), *parts], promote_options="default")
+
+
+def _named(place: Place, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Rows under the names of this cell: a cached table may have been made under others."""
+    names = {"run_id": place.run_id, "move": place.move, "setup": place.setup, "seed": place.seed}
+    return [{**row, **names} for row in rows]
+
+
+def _with_study(table: pa.Table, key: str) -> pa.Table:
+    study = key.split("study=", 1)[1].split("/", 1)[0]
+    bare = table.replace_schema_metadata(None)
+    return bare.add_column(0, "study", pa.array([study] * len(table), pa.string()))
+
+
+def _empty(schema: TableSchema) -> pa.Table:
+    whole = tables.decode_table(schema, tables.encode_rows(schema, []), "")
+    bare = whole.replace_schema_metadata(None)
+    return bare.add_column(0, "study", pa.array([], pa.string()))
+
+
+def _put(store: Store, key: str, content: bytes) -> Artifact:
+    digest = sha256_of(content)
+    there = store.exists(key) and store.sha256(key) == digest
+    return Artifact(key=key, sha256=digest) if there else store.put(key, content)
+
+
+def _create(connection: "DuckDBPyConnection", name: str, rows: pa.Table) -> None:
+    connection.register("given", rows)
+    connection.execute(f"CREATE TABLE {name} AS SELECT * FROM given")
+    connection.unregister("given")
+
+
+def _run(key: str) -> str:
+    return key.rpartition("/")[2].removesuffix(".parquet")
+
+
+def _notes(store: Store, study: str | None, runs: Collection[str] | None) -> list[str]:
+    """Keys of what is known of the cells' origin; one of another study may be among them."""
+    found = [key for key in store.list(RUNS) if study is None or key.endswith(f"-{study}.json")]
+    if runs is None:
+        return found
+    wanted = {f"{run}-{study}.json" for run in runs}
+    return [key for key in found if key.rpartition("/")[2] in wanted]
+
+
+def _runs(store: Store, study: str | None, runs: Collection[str] | None) -> pa.Table:
+    """Provenance, a row a cell: what is not a plain value stands as JSON."""
+    rows = []
+    for key in _notes(store, study, runs):
+        try:
+            facts = json.loads(store.read(key))
+        except (StoreError, ValueError) as cause:
+            raise BadTable(f"{store.address(key)}: not JSON: {cause}") from cause
+        rows.append({name: _plain(value) for name, value in facts.items()})
+    names = dict.fromkeys([*ALWAYS, *(n for row in rows for n in row)])
+    return pa.table({n: pa.array([row.get(n) for row in rows], pa.string()) for n in names})
+
+
+def _plain(value: Any) -> str | None:
+    if value is None or isinstance(value, str):
+        return value
+    return json.dumps(value, sort_keys=True, default=str)
+
+
+def _outdated(store: Store, place: Place) -> list[str]:
+    """Files of the same cell under another run id: an earlier configuration or code."""
+    found = []
+    for table in TABLES:
+        folder = place.key(table).rsplit("/", 1)[0]
+        found += [key for key in store.list(folder) if key != place.key(table)]
+    return found

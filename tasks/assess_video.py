@@ -1,0 +1,36 @@
+"""Everything that is measured on a candidate, in a process of its own."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+from robojackson.clips.pose_detector import model_path
+from robojackson.clips.quality.assessment import JudgeConfig, Judgement
+from robojackson.clips.quality.assessment import judge as measure
+from robojackson.pipeline import tables
+from storage.artifact import Artifact, sha256_of_file
+from storage.store import Store
+from tasks.runtime.stage import stage
+from tasks.runtime.worker_processes import in_worker
+
+
+def _models(parameters: Mapping[str, Any]) -> list[str]:
+    return [sha256_of_file(model_path(parameters["config"].detector))]
+
+
+@stage(models=_models)
+def judge(video: Artifact, config: JudgeConfig) -> dict[str, Artifact]:
+    """`landmarks`: LandmarkTrack; `stability`: StabilityScore; `quality`, `info`: JSON."""
+    store = Store.from_environment()
+    with store.local(video) as path:
+        found: Judgement = in_worker(measure, path, config)
+    info = {key: value for key, value in asdict(found.info).items() if key != "path"}
+    return {
+        "landmarks": tables.keep(store, "landmarks", "landmarks.parquet", found.track),
+        "stability": tables.keep(store, "stability", "stability.parquet", found.stability),
+        "quality": store.keep(
+            "quality", "quality.json", json.dumps(asdict(found.quality)).encode()
+        ),
+        "info": store.keep("video", "info.json", json.dumps(info).encode()),
+    }

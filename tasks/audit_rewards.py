@@ -1,0 +1,25 @@
+"""What the rewards of a study pay to bodies that do not dance."""
+
+import json
+
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.pipeline import tables
+from robojackson.rl.config.train_config import PaperConfig, TrackConfig
+from robojackson.robot.model import RobotDescription, load_robot
+from storage.artifact import Artifact
+from storage.store import Store
+from tasks.runtime.robot_digests import robot_models
+from tasks.runtime.stage import stage
+
+
+@stage(models=robot_models)
+def payments(
+    reference: Artifact, robot: RobotDescription, rewards: dict[str, TrackConfig | PaperConfig]
+) -> Artifact:
+    """JSON: by name of the reward, the share of a perfect dance that each body earns."""
+    from robojackson.rl.evaluation.reward_audit import shares
+
+    store = Store.from_environment()
+    motion, machine = tables.read(ReferenceMotion, store, reference), load_robot(robot)
+    paid = {name: shares(machine, motion, reward).of for name, reward in rewards.items()}
+    return store.keep("payments", "payments.json", json.dumps(paid, indent=1).encode())

@@ -1,0 +1,140 @@
+"""Bring a video into the store: from the web in one format, or from a folder as it is.
+
+A download is cached by the video's id and format: by the task's record, and where that is lost by a
+note in the store, so that a file comes over the net once, also when two runs want it at once: one
+waits for the other. What an interrupted download left is continued.
+"""
+
+import hashlib
+import json
+import logging
+import shutil
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from prefect.artifacts import create_progress_artifact, update_progress_artifact
+from prefect.context import TaskRunContext
+from prefect.logging import get_run_logger
+
+from robojackson.clips.video import VideoLimits, probe
+from robojackson.clips.web.download_formats import FormatConfig, Purpose
+from robojackson.clips.web.untrusted_text import clean_text, in_markdown, safe_name
+from robojackson.clips.web.yt_dlp_client import Offer, WebConfig, fetch, offer
+from robojackson.errors import StoreError, UnreadableVideo
+from robojackson.pipeline.folder_lock import FOR_EVER, locked
+from storage.artifact import Artifact
+from storage.store import Store
+from tasks.probe_video import SourceFile
+from tasks.runtime.stage import stage
+
+FOLDER = "downloads"
+STEP = 0.1
+"""Share of a file between two lines of progress."""
+
+
+@dataclass(frozen=True)
+class WebVideo:
+    """A video of the web.
+
+    Attributes:
+        source, video_id: What it is.
+        url, title: Where it is and what it is called; these may change.
+    """
+
+    source: str
+    video_id: str
+    url: str = field(compare=False)
+    title: str = field(compare=False)
+
+    @property
+    def folder(self) -> str:
+        """Where it is kept; both parts are made safe once more, whoever made the object."""
+        return f"{FOLDER}/{safe_name(self.source)}/{safe_name(self.video_id)}"
+
+
+@stage(unkeyed=("web", "limits"))
+def download(
+    video: WebVideo, purpose: Purpose, formats: FormatConfig, web: WebConfig, limits: VideoLimits
+) -> Artifact:
+    """A video file, in the format that serves the purpose."""
+    store = Store.from_environment()
+    chosen = offer(video.url, purpose, formats, web)
+    had = _had(store, video, chosen)
+    return had if had is not None else _bring(store, video, chosen, web, limits)
+
+
+@stage()
+def take(file: SourceFile) -> Artifact:
+    """A video of a folder."""
+    suffix = safe_name(file.path.suffix.lstrip(".").lower() or "mp4")
+    return Store.from_environment().keep("video", f"clip.{suffix}", file.path)
+
+
+def _had(store: Store, video: WebVideo, chosen: Offer) -> Artifact | None:
+    """The file of an earlier download, if it is there unaltered."""
+    note = f"{video.folder}/{chosen.name}.json"
+    if not store.exists(note):
+        return None
+    try:
+        return Artifact(**json.loads(store.read(note))).verify(store)
+    except (StoreError, ValueError, TypeError):
+        return None
+
+
+def _bring(
+    store: Store, video: WebVideo, chosen: Offer, web: WebConfig, limits: VideoLimits
+) -> Artifact:
+    """The file that another run has brought meanwhile, or else from the web."""
+    folder = store.work(f"{video.folder}.{chosen.name}")
+    with locked(folder, patience_s=FOR_EVER):
+        had = _had(store, video, chosen)
+        made = had if had is not None else _fetched(store, video, chosen, folder, web, limits)
+        shutil.rmtree(folder, ignore_errors=True)
+    return made
+
+
+def _fetched(
+    store: Store, video: WebVideo, chosen: Offer, folder: Path, web: WebConfig, limits: VideoLimits
+) -> Artifact:
+    path = fetch(chosen, folder, web, _Progress(video, chosen.name))
+    try:
+        probe(path, limits)
+    except UnreadableVideo:
+        path.unlink()
+        raise
+    made = store.keep("video", f"clip.{chosen.name.rsplit('.', 1)[-1]}", path)
+    store.put(f"{video.folder}/{chosen.name}.json", json.dumps(asdict(made)).encode())
+    return made
+
+
+class _Progress:
+    """Bytes on the way as lines in the log and, inside a run, as a progress artifact."""
+
+    def __init__(self, video: WebVideo, name: str) -> None:
+        self._what = f"{clean_text(video.title, 60) or video.video_id} ({name})"
+        self._key = "download-" + hashlib.sha256(video.folder.encode()).hexdigest()[:12]
+        self._artifact: Any = None
+        self._told = 0.0
+        self._in_run = TaskRunContext.get() is not None
+
+    def __call__(self, done: int, total: int | None) -> None:
+        share = min(done / total, 1.0) if total else 0.0
+        if share < self._told + STEP and share < 1.0:
+            return
+        if share >= 1.0 and self._told >= 1.0:
+            return
+        self._told = share
+        self._log().info("%s: %.0f %% of %.1f MB", self._what, 100 * share, (total or 0) / 1e6)
+        if self._in_run:
+            self._show(100 * share)
+
+    def _show(self, percent: float) -> None:
+        if self._artifact is None:
+            told = in_markdown(self._what)
+            self._artifact = create_progress_artifact(percent, key=self._key, description=told)
+        else:
+            update_progress_artifact(self._artifact, percent)
+
+    def _log(self) -> Any:
+        return get_run_logger() if self._in_run else logging.getLogger(__name__)

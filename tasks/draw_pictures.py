@@ -1,0 +1,42 @@
+"""Pictures: of a move (the paper's Figures 2-4), and of the film of a dance."""
+
+from robojackson.motion.landmark_track import LandmarkTrack
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.smpl_sequence import SmplSequence
+from robojackson.pipeline import tables
+from robojackson.report.video.still_picture import middle_of
+from robojackson.report.video.still_picture import still as draw
+from robojackson.robot.model import RobotDescription, load_robot
+from storage.artifact import Artifact
+from storage.store import Store
+from tasks.runtime.robot_digests import robot_models
+from tasks.runtime.stage import stage
+
+
+@stage(models=robot_models)
+def still(
+    source: Artifact,
+    landmarks: Artifact,
+    sequence: Artifact,
+    reference: Artifact,
+    robot: RobotDescription,
+) -> Artifact:
+    """A PNG."""
+    store = Store.from_environment()
+    with store.local(source) as path:
+        picture = draw(
+            path,
+            tables.read(LandmarkTrack, store, landmarks),
+            tables.read(SmplSequence, store, sequence),
+            tables.read(ReferenceMotion, store, reference),
+            load_robot(robot).model,
+        )
+    return store.keep("still", "still.png", picture)
+
+
+@stage()
+def snapshot(film: Artifact) -> Artifact:
+    """Keep a PNG of the middle of a film."""
+    store = Store.from_environment()
+    with store.local(film) as path:
+        return store.keep("still", "still.png", middle_of(path))

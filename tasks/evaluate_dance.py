@@ -1,0 +1,44 @@
+"""The verdict on a policy, on stock physics, beside its baselines."""
+
+import json
+
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.pipeline import tables
+from robojackson.pipeline.table_codecs import Rollout
+from robojackson.pipeline.table_schemas import EVALUATION_RECORD
+from robojackson.rl.config.train_config import EvaluateConfig
+from robojackson.robot.model import RobotDescription, load_robot
+from storage.artifact import Artifact
+from storage.store import Store
+from tasks.runtime.robot_digests import robot_models
+from tasks.runtime.stage import stage
+from tasks.train_policy import RunLabels
+
+
+@stage(models=robot_models, unkeyed=("labels",))
+def evaluate(
+    policy: Artifact,
+    reference: Artifact,
+    robot: RobotDescription,
+    config: EvaluateConfig,
+    labels: RunLabels,
+) -> dict[str, Artifact]:
+    """`evaluations`: EvaluationRecord; `evaluation`: means, as JSON; `rollout`: Rollout."""
+    from robojackson.rl.evaluation.policy_evaluation import evaluate as judge
+    from robojackson.rl.policy import load_policy
+
+    store = Store.from_environment()
+    motion = tables.read(ReferenceMotion, store, reference)
+    with store.local(policy) as path:
+        trained = load_policy(path)
+    verdict = judge(trained, motion, load_robot(robot), config)
+    run_id = f"{labels.move}-{labels.setup}-s{trained.training['seed']}"
+    common = {"run_id": run_id, "move": labels.move, "setup": labels.setup, **trained.training}
+    rows = tables.encode_rows(EVALUATION_RECORD, [{**common, **r} for r in verdict.rows])
+    summary = json.dumps(verdict.summary, indent=1).encode()
+    rollout = Rollout(motion.dt, verdict.rollout_qpos)
+    return {
+        "evaluations": store.keep("evaluate", "evaluations.parquet", rows),
+        "evaluation": store.keep("evaluate", "evaluation.json", summary),
+        "rollout": tables.keep(store, "evaluate", "rollout.parquet", rollout),
+    }

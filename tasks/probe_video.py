@@ -1,0 +1,60 @@
+"""A user's file becomes a video of the store, trimmed on request, and what is known of it."""
+
+import json
+import math
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+
+from robojackson.clips.time_range import span
+from robojackson.clips.trim import trim as trim_file
+from robojackson.clips.video import VideoInfo, VideoLimits
+from robojackson.clips.video import probe as probe_file
+from storage.artifact import Artifact, sha256_of_file
+from storage.store import Store
+from tasks.runtime.stage import stage
+
+
+@dataclass(frozen=True)
+class SourceFile:
+    """A file outside the store.
+
+    Attributes:
+        path: Where it is; not part of what it is.
+        sha256: Digest of its content.
+    """
+
+    path: Path = field(compare=False)
+    sha256: str
+
+    @classmethod
+    def at(cls, path: Path) -> "SourceFile":
+        """The file at a path."""
+        return cls(path, sha256_of_file(path))
+
+
+@stage()
+def probe(
+    source: SourceFile, limits: VideoLimits, start_s: float | None, end_s: float | None
+) -> dict[str, Artifact]:
+    """`video`: the file, or its range; `info`: size, rate and frames, as JSON."""
+    store = Store.from_environment()
+    if start_s is None and end_s is None:
+        return _keep(store, source.path, probe_file(source.path, limits))
+    whole = probe_file(source.path, replace(limits, max_duration_s=math.inf))
+    begin, end = span(whole, limits, start_s, end_s)
+    with store.scratch() as folder:
+        clip = trim_file(source.path, begin, end, folder / f"{source.path.stem}.mp4")
+        return _keep(store, clip, probe_file(clip, limits))
+
+
+def info_of(store: Store, info: Artifact, path: Path) -> VideoInfo:
+    """What `probe` found, with the path at which the video is now."""
+    return VideoInfo(path=path, **json.loads(store.read(info.key)))
+
+
+def _keep(store: Store, path: Path, info: VideoInfo) -> dict[str, Artifact]:
+    facts = {key: value for key, value in asdict(info).items() if key != "path"}
+    return {
+        "video": store.keep("video", path.name, path),
+        "info": store.keep("video", "info.json", json.dumps(facts).encode()),
+    }

@@ -1,0 +1,116 @@
+"""The tables of a cell, put where questions find them, with where they come from beside them."""
+
+import json
+import os
+import platform
+import subprocess
+from collections.abc import Mapping
+from dataclasses import asdict
+from datetime import UTC, datetime
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from robojackson.errors import StoreError
+from storage import study_tables
+from storage.artifact import Artifact
+from storage.store import Store
+from tasks.study_cell import Cell
+
+Result = dict[str, Artifact]
+RESULT = "result"
+"""Under which the note of a cell keeps its artifacts, keys and digests."""
+CHECKOUT = Path(__file__).parent.parent
+COMMIT = "ROBOJACKSON_COMMIT"
+TOLD = ("robojackson", "mujoco", "gymnasium", "torch", "jax", "sbx-rl", "sb3-contrib", "prefect")
+"""Packages whose version is written down."""
+
+
+def publish(cell: Cell, run_id: str, made: Mapping[str, Artifact]) -> Result:
+    """Write the cell's rows and where these come from; the same call again writes nothing.
+
+    Args:
+        run_id: Of the training.
+        made: What its stages left.
+    Returns:
+        What the stages left, with the tables under their keys among the metrics.
+    """
+    store = Store.from_environment()
+    place = _place(cell, run_id)
+    written = {**made, **study_tables.write(store, place, made)}
+    noted = study_tables.noted(store, place)
+    known = {"artifacts": _digests(made), RESULT: _plain(written)}
+    if {name: noted.get(name) for name in known} != known:
+        study_tables.note(store, place, {**provenance(cell, place, made), **known})
+    return written
+
+
+def published(cell: Cell, run_id: str) -> Result:
+    """Return what `publish` returned, on whatever machine that was.
+
+    Raises:
+        StoreError: this store has nothing of that run.
+    """
+    store = Store.from_environment()
+    try:
+        found = study_tables.noted(store, _place(cell, run_id))[RESULT]
+        return {name: Artifact(**artifact) for name, artifact in found.items()}
+    except (KeyError, TypeError, ValueError, AttributeError) as cause:
+        raise StoreError(
+            f"{cell.name}: its worker ended well, but {store.root} has no result of run {run_id}: "
+            "the worker uses another store or another version of the code; give it the same "
+            "ROBOJACKSON_STORE (an absolute path, or an address) and the same checkout"
+        ) from cause
+
+
+def provenance(
+    cell: Cell, place: study_tables.Place, made: Mapping[str, Artifact]
+) -> dict[str, Any]:
+    """Where the numbers of a cell come from: code, configuration, inputs, machine, time."""
+    return {
+        **asdict(place),
+        "mode": cell.train.mode,
+        "git_commit": _commit(),
+        "config": asdict(cell.train),
+        "evaluate": asdict(cell.evaluate),
+        "robot": cell.robot,
+        "reference_sha256": cell.reference.sha256,
+        "versions": {name: _version(name) for name in TOLD},
+        "machine": f"{platform.node()} {platform.machine()} {os.cpu_count()} cores",
+        "python": platform.python_version(),
+        "finished_at": datetime.now(UTC).isoformat(timespec="seconds"),
+        "training": json.loads(Store.from_environment().read(made["training"].key)),
+    }
+
+
+def _place(cell: Cell, run_id: str) -> study_tables.Place:
+    return study_tables.Place(cell.study, cell.move, cell.setup, cell.seed, run_id)
+
+
+def _plain(made: Mapping[str, Artifact]) -> dict[str, dict[str, str]]:
+    return {name: asdict(artifact) for name, artifact in made.items()}
+
+
+def _digests(made: Mapping[str, Artifact]) -> dict[str, str]:
+    return {name: artifact.sha256 for name, artifact in sorted(made.items())}
+
+
+@cache
+def _commit() -> str:
+    """Of the checkout, `-dirty` where files differ from it; without git, as in a container, what
+    ROBOJACKSON_COMMIT says.
+    """
+    command = ["git", "-C", str(CHECKOUT), "describe", "--always", "--dirty", "--abbrev=40"]
+    try:
+        run = subprocess.run(command, capture_output=True, text=True, timeout=10, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return os.environ.get(COMMIT, "")
+    return run.stdout.strip() if run.returncode == 0 else os.environ.get(COMMIT, "")
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None

@@ -1,0 +1,25 @@
+"""From landmarks to the motion of the person."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from robojackson.mocap.recover import MocapConfig, recover
+from robojackson.motion.landmark_track import LandmarkTrack
+from robojackson.pipeline import tables
+from storage.artifact import Artifact, sha256_of_file
+from storage.store import Store
+from tasks.runtime.stage import stage
+
+
+def _models(parameters: Mapping[str, Any]) -> list[str]:
+    """Digest of the temporal network's weights, if it is used; the stage misses a missing file."""
+    config = parameters["config"].temporal
+    return [sha256_of_file(config.file)] if config.enabled and config.file.is_file() else []
+
+
+@stage(models=_models)
+def mocap(landmarks: Artifact, config: MocapConfig) -> Artifact:
+    """SmplSequence."""
+    store = Store.from_environment()
+    track = tables.read(LandmarkTrack, store, landmarks)
+    return tables.keep(store, "mocap", "smpl.parquet", recover(track, config))

@@ -1,0 +1,39 @@
+"""The video that proves it: source, skeleton, reference robot and trained robot side by side."""
+
+from robojackson.motion.landmark_track import LandmarkTrack
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.smpl_sequence import SmplSequence
+from robojackson.pipeline import tables
+from robojackson.pipeline.table_codecs import Rollout
+from robojackson.report.video.side_by_side import VideoConfig, side_by_side
+from robojackson.robot.model import RobotDescription, load_robot
+from storage.artifact import Artifact
+from storage.store import Store
+from tasks.runtime.robot_digests import robot_models
+from tasks.runtime.stage import stage
+
+
+@stage(models=robot_models)
+def video(
+    source: Artifact,
+    landmarks: Artifact,
+    sequence: Artifact,
+    reference: Artifact,
+    rollout: Artifact,
+    robot: RobotDescription,
+    config: VideoConfig,
+) -> Artifact:
+    """An mp4."""
+    store = Store.from_environment()
+    with store.local(source) as path, store.scratch() as folder:
+        film = side_by_side(
+            path,
+            tables.read(LandmarkTrack, store, landmarks),
+            tables.read(SmplSequence, store, sequence),
+            tables.read(ReferenceMotion, store, reference),
+            tables.read(Rollout, store, rollout).qpos,
+            folder / "dance.mp4",
+            model=load_robot(robot).model,
+            config=config,
+        )
+        return store.keep("dance", film.name, film)

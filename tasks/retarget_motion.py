@@ -1,0 +1,29 @@
+"""From the motion of a person to the reference motion of a robot."""
+
+import json
+
+from robojackson.motion.smpl_sequence import SmplSequence
+from robojackson.pipeline import tables
+from robojackson.retarget.retargeting import RetargetConfig
+from robojackson.retarget.retargeting import retarget as to_robot
+from robojackson.retarget.scorecard import told
+from robojackson.robot.model import RobotDescription, load_robot
+from storage.artifact import Artifact
+from storage.store import Store
+from tasks.runtime.robot_digests import robot_models
+from tasks.runtime.stage import stage
+
+
+@stage(models=robot_models)
+def retarget(
+    sequence: Artifact, robot: RobotDescription, config: RetargetConfig
+) -> dict[str, Artifact]:
+    """`reference`: ReferenceMotion; `scorecard`: its figures, as JSON."""
+    store = Store.from_environment()
+    motion = tables.read(SmplSequence, store, sequence)
+    reference = to_robot(motion, load_robot(robot), config)
+    scorecard = json.dumps(told(reference), indent=1).encode()
+    return {
+        "reference": tables.keep(store, "retarget", "reference.parquet", reference),
+        "scorecard": store.keep("retarget", "scorecard.json", scorecard),
+    }

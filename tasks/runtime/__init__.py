@@ -1,0 +1,1 @@
+"""How a stage becomes a cached task, and how its process is run."""

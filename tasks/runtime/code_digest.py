@@ -1,0 +1,177 @@
+"""What a stage computes, as one digest: the syntax trees of the modules that it reaches.
+
+Imports are followed statically, also those inside functions. Comments, docstrings and layout are
+not in a syntax tree, so they change nothing; a changed formula does.
+"""
+
+import ast
+import hashlib
+import threading
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import resources
+from importlib.util import find_spec
+from pathlib import Path
+
+PACKAGE = "robojackson"
+ONE_PARSER = threading.Lock()
+"""CPython 3.11 counts the depth of its parser wrongly when several threads parse at once."""
+NEVER_CHANGE_A_RESULT = frozenset(("robojackson.errors",))
+"""Modules whose text decides only what a person is told."""
+
+
+def digest(roots: Iterable[str], package: str = PACKAGE, folder: Path | None = None) -> str:
+    """Digest of all modules of `package` that the root modules reach.
+
+    Args:
+        roots: Dotted names of modules; those outside the package count nothing.
+        package: The package whose modules count.
+        folder: Where the package is; found by its name when not given.
+    """
+    wanted = (tuple(roots), package, folder)
+    known = _known.get(wanted)
+    if known is None or not known.holds():
+        known = _known[wanted] = _made(*wanted)
+    return known.digest
+
+
+def drawn_by(task: str, templates: Iterable[str]) -> list[str]:
+    """Digests of what makes a page besides the modules that every stage is keyed by.
+
+    Args:
+        task: Name of the module of the stage, which puts the page's content together.
+        templates: Files of `robojackson.report.pages`.
+    """
+    here = resources.files(f"{PACKAGE}.report.pages")
+    files = [hashlib.sha256(here.joinpath(name).read_bytes()).hexdigest() for name in templates]
+    return [digest((task,), task.partition(".")[0]), *files]
+
+
+@dataclass(frozen=True)
+class _Made:
+    """A digest and the versions of the files that it was made of."""
+
+    digest: str
+    files: tuple[tuple[Path, int, int], ...]
+
+    def holds(self) -> bool:
+        """Whether no file has changed since: a thousand cells ask the same, so it is cheap."""
+        try:
+            return all(_version(path) == (path, *rest) for path, *rest in self.files)
+        except OSError:
+            return False
+
+
+_known: dict[tuple[tuple[str, ...], str, Path | None], _Made] = {}
+
+
+def _made(roots: tuple[str, ...], package: str, folder: Path | None) -> _Made:
+    base = folder or _folder_of(package)
+    total = hashlib.sha256()
+    files = []
+    for name in reached(roots, package, base):
+        files.append(_version(_file_of(name, package, base)))
+        if name not in NEVER_CHANGE_A_RESULT:
+            total.update(f"{name}\0{_parsed(*files[-1])[0]}\0".encode())
+    return _Made(total.hexdigest(), tuple(files))
+
+
+def reached(roots: Iterable[str], package: str, folder: Path) -> list[str]:
+    """The modules of a package that are reached from the roots, the roots included, sorted."""
+    found: set[str] = set()
+    waiting = list(roots)
+    while waiting:
+        name = waiting.pop()
+        if name in found or not _is_module(name, package, folder):
+            continue
+        found.add(name)
+        waiting.extend(_parents(name))
+        waiting.extend(imports_of(_file_of(name, package, folder), name))
+    return sorted(found)
+
+
+def imports_of(path: Path, module: str = "") -> tuple[str, ...]:
+    """Every name that a file imports, dotted; `from a import b` gives `a` and `a.b`."""
+    names = _parsed(*_version(path))[1]
+    is_package = path.name == "__init__.py"
+    return tuple(_absolute(name, level, module, is_package) for name, level in names)
+
+
+def bare_tree(source: str) -> str:
+    """The syntax tree of a source without docstrings and version, as text."""
+    return _bared(ast.parse(source))
+
+
+def _bared(tree: ast.AST) -> str:
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        if isinstance(body, list):
+            node.body = [s for s in body if not _is_silent(s)]  # type: ignore[attr-defined]
+    return ast.dump(tree)
+
+
+def _is_silent(statement: ast.stmt) -> bool:
+    """A string that stands alone, or the version: neither is a formula."""
+    if isinstance(statement, ast.Expr):
+        return isinstance(statement.value, ast.Constant) and isinstance(statement.value.value, str)
+    if isinstance(statement, ast.Assign):
+        return any(isinstance(t, ast.Name) and t.id == "__version__" for t in statement.targets)
+    return False
+
+
+@lru_cache(maxsize=1024)
+def _parsed(path: Path, changed_ns: int, size: int) -> tuple[str, tuple[tuple[str, int], ...]]:
+    """Digest of a file's bare tree, and its imports as (name, level); read once a version."""
+    source = path.read_text(encoding="utf-8")
+    with ONE_PARSER:
+        tree = ast.parse(source)
+        names = tuple(_imports(tree))
+        return hashlib.sha256(_bared(tree).encode()).hexdigest(), names
+
+
+def _version(path: Path) -> tuple[Path, int, int]:
+    stat = path.stat()
+    return path, stat.st_mtime_ns, stat.st_size
+
+
+def _imports(tree: ast.AST) -> Iterator[tuple[str, int]]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from ((alias.name, 0) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = node.module or ""
+            yield base, node.level
+            for alias in node.names:
+                yield (f"{base}.{alias.name}" if base else alias.name), node.level
+
+
+def _absolute(name: str, level: int, module: str, is_package: bool) -> str:
+    if not level:
+        return name
+    parts = module.split(".")
+    kept = parts[: len(parts) - level + (1 if is_package else 0)]
+    return ".".join([*kept, name] if name else kept)
+
+
+def _parents(name: str) -> list[str]:
+    parts = name.split(".")
+    return [".".join(parts[:i]) for i in range(1, len(parts))]
+
+
+def _is_module(name: str, package: str, folder: Path) -> bool:
+    inside = name == package or name.startswith(f"{package}.")
+    return inside and _file_of(name, package, folder).is_file()
+
+
+def _file_of(name: str, package: str, folder: Path) -> Path:
+    inner = name.removeprefix(package).strip(".").replace(".", "/")
+    path = folder / inner if inner else folder
+    return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+
+
+def _folder_of(package: str) -> Path:
+    spec = find_spec(package)
+    if spec is None or spec.origin is None:
+        raise ModuleNotFoundError(package)
+    return Path(spec.origin).parent

@@ -1,0 +1,80 @@
+"""A stage as a cached Prefect task: where Prefect keeps and finds its records.
+
+Prefect keeps results where `PREFECT_LOCAL_STORAGE_PATH` or a block of its server says: elsewhere
+for the command line than for workers. `Records` keeps them in the store, wherever that is.
+"""
+
+import asyncio
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+
+from prefect import Task, task
+from prefect.cache_policies import CacheKeyFnPolicy
+from prefect.context import TaskRunContext
+from prefect.filesystems import WritableFileSystem
+from prefect.serializers import JSONSerializer
+
+from storage import stage_records as records
+from storage.store import Store
+
+if TYPE_CHECKING:
+    from tasks.runtime.stage import Stage
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+class Records(WritableFileSystem):
+    """The store of the environment as a place for Prefect's records."""
+
+    _block_type_name = "RoboJackson records"
+    _block_type_slug = "robojackson-records"
+
+    def read_path(self, path: str, _sync: bool = True) -> bytes:  # type: ignore[override]
+        """Return the content of a record."""
+        return Store.from_environment().read(records.address(path))
+
+    def write_path(self, path: str, content: bytes, _sync: bool = True) -> None:  # type: ignore[override]
+        """Write a record, whole or not at all."""
+        Store.from_environment().put(records.address(path), content)
+
+    async def aread_path(self, path: str) -> bytes:
+        """Return the content of a record without blocking the flow."""
+        return await asyncio.to_thread(self.read_path, path)
+
+    async def awrite_path(self, path: str, content: bytes) -> None:
+        """Write a record without blocking the flow."""
+        await asyncio.to_thread(self.write_path, path, content)
+
+    def _resolve_path(self, path: str) -> None:
+        """Leave keys as they are: without this, Prefect makes them relative to a folder."""
+
+
+class ArtifactSerializer(JSONSerializer):
+    """JSON whose artifacts are verified when read: Prefect takes an unreadable record for none."""
+
+    type: str = "robojackson-artifact"
+
+    def dumps(self, obj: Any) -> bytes:
+        """Serialise what a stage returned."""
+        return records.encode(obj)
+
+    def loads(self, blob: bytes) -> Any:
+        """Parse it and verify that every artifact in it is in the store, unaltered."""
+        return records.decode(blob, Store.from_environment())
+
+
+def cached_task(stage: "Stage[P, R]") -> Task[P, R]:
+    """Make a stage a Prefect task that is cached in the store."""
+
+    def key(context: TaskRunContext, parameters: dict[str, Any]) -> str:
+        return stage.recipe.key(parameters)
+
+    made: Task[P, R] = task(
+        name=stage.name,
+        task_run_name=stage.run_name,
+        cache_policy=CacheKeyFnPolicy(cache_key_fn=key),
+        persist_result=True,
+        result_serializer=ArtifactSerializer(),
+    )(stage.fn)
+    made.result_storage = Records()  # the decorator takes saved blocks only; this one has no state
+    return made

@@ -1,0 +1,17 @@
+"""Ask a source for videos of a dance. Never cached: tomorrow's answer is another one."""
+
+from datetime import UTC, datetime
+
+from prefect import task
+
+from robojackson.clips.sources import source
+from robojackson.clips.web.video_candidate import VideoCandidate
+from robojackson.clips.web.yt_dlp_client import WebConfig
+
+
+@task(name="search", persist_result=False, task_run_name="search-{name}")
+def search(
+    name: str, query: str, address: str, count: int, web: WebConfig
+) -> tuple[VideoCandidate, ...]:
+    """Candidates in the source's own order."""
+    return tuple(source(name).search(query, address, count, web, datetime.now(UTC)))

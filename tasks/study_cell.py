@@ -1,0 +1,36 @@
+"""One training of a study and its judgement, as data that can go to a worker."""
+
+from pydantic.dataclasses import dataclass
+
+from configs.study_config import STRICT, Name, Seed, Setup
+from robojackson.rl.config.train_config import EvaluateConfig, TrainConfig
+from storage.artifact import Artifact
+
+
+@dataclass(frozen=True, config=STRICT)
+class Cell:
+    """A cell of the grid moves x setups x seeds.
+
+    Attributes:
+        study, move, setup, seed: What its rows are known by.
+        reference: The motion.
+        robot, pipeline: Names of configurations.
+        train, evaluate: Whole configurations.
+        timeout_minutes, retries: As in `Study`.
+    """
+
+    study: Name
+    move: Name
+    setup: Setup
+    seed: Seed
+    reference: Artifact
+    robot: str
+    train: TrainConfig
+    evaluate: EvaluateConfig
+    timeout_minutes: float = 240.0
+    retries: int = 2
+
+    @property
+    def name(self) -> str:
+        """As runs and tables call it."""
+        return f"{self.setup}-{self.move}-s{self.seed}"

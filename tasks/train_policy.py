@@ -1,0 +1,162 @@
+"""Training as an operating-system process of its own, which never imports Prefect.
+
+Its folder stays until it has succeeded, so that the same call goes on from the last checkpoint.
+"""
+
+import hashlib
+import json
+import math
+import os
+import shutil
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from robojackson.pipeline.folder_lock import A_MOMENT, locked
+from robojackson.rl.config.train_config import TrainConfig
+from robojackson.rl.pretrained import start_file
+from robojackson.robot.model import RobotDescription
+from storage.artifact import Artifact, sha256_of_file
+from storage.store import Store
+from tasks.runtime.child_process import run_process
+from tasks.runtime.code_digest import digest
+from tasks.runtime.stage import identity, stage
+from tasks.runtime.training_progress import shown
+
+CODE = ("robojackson.rl.training",)
+"""Module of what the process runs."""
+DIGITS = 12
+"""Of the digest in a run id."""
+WHOLE = 0.9
+"""Share of its minutes with which a training counts as whole."""
+OVERTIME_S = 300.0
+"""What a training may take beyond its budget: start, compilation, last checkpoint."""
+
+
+@dataclass(frozen=True)
+class RunLabels:
+    """What the rows of a run are known by.
+
+    Attributes:
+        move: Name of the dance.
+        setup: Name of the training setup.
+    """
+
+    move: str
+    setup: str
+
+
+def _models(parameters: Mapping[str, Any]) -> list[str]:
+    """Of the networks to start from; and whether the clock cuts it short, to how many tenths: with
+    more time the same call then trains for longer.
+    """
+    config = parameters["config"]
+    granted = _minutes(config, parameters.get("deadline"))
+    if config.minutes is None or granted is None or granted >= WHOLE * config.minutes:
+        return _start(config)
+    return [*_start(config), f"cut short to {math.floor(10 * granted / config.minutes)} tenths"]
+
+
+@stage(models=_models, reaches=CODE, unkeyed=("labels", "deadline", "limit_s"))
+async def train(
+    reference: Artifact,
+    robot: RobotDescription,
+    config: TrainConfig,
+    labels: RunLabels,
+    deadline: float | None = None,
+    limit_s: float | None = None,
+) -> dict[str, Artifact]:
+    """`policy`: safetensors; `episodes`: EpisodeRecord; `training`: steps, seconds, as JSON.
+
+    Args:
+        deadline: Unix time at which the budget ends in any case, seconds.
+        limit_s: Time after which it has failed, seconds; a budget in minutes sets one by itself.
+    Raises:
+        StoreError: the same training is running already.
+    """
+    store = Store.from_environment()
+    run_id = run_id_of(reference, robot, config, labels)
+    work = store.work(f"train-{run_id[-DIGITS:]}")
+    minutes = _minutes(config, deadline)
+    if minutes is not None:
+        limit_s = min(limit_s or math.inf, 60 * minutes + OVERTIME_S)
+    with locked(work, "task.lock", A_MOMENT), store.local(reference) as path:
+        command = _command(path, work, config, labels, run_id, minutes)
+        async with shown(work, f"{labels.setup}-{labels.move}-s{config.seed}"):
+            answer = await run_process(command, run_id, work, limit_s)
+        kept = {
+            "training": store.keep("train", "training.json", _facts(answer, labels)),
+            "policy": store.keep("train", "policy.safetensors", work / "policy.safetensors"),
+            "episodes": store.keep("train", "episodes.parquet", work / "episodes.parquet"),
+        }
+        shutil.rmtree(work, ignore_errors=True)
+    return kept
+
+
+def run_id_of(
+    reference: Artifact, robot: RobotDescription, config: TrainConfig, labels: RunLabels
+) -> str:
+    """Names and a digest of all that makes the training what it is, its code too; no clock, no
+    machine.
+    """
+    parts = [identity([reference, robot, config]), _start(config), digest(CODE)]
+    facts = json.dumps(parts, sort_keys=True)
+    short = hashlib.sha256(facts.encode()).hexdigest()[:DIGITS]
+    return f"{labels.move}-{labels.setup}-s{config.seed}-{short}"
+
+
+def _start(config: TrainConfig) -> list[str]:
+    """The digest of the networks that it starts from, if it does."""
+    path = start_file(config.start, config.mode)
+    return [] if path is None else [sha256_of_file(path)]
+
+
+def _minutes(config: TrainConfig, deadline: float | None) -> float | None:
+    if config.minutes is None or deadline is None:
+        return config.minutes
+    return max(0.5, min(config.minutes, (deadline - time.time()) / 60))
+
+
+def _command(
+    reference: Path,
+    work: Path,
+    config: TrainConfig,
+    labels: RunLabels,
+    run_id: str,
+    minutes: float | None,
+) -> list[str]:
+    setup = work / f"{labels.setup}.yaml"
+    setup.write_text(yaml.safe_dump(json.loads(json.dumps(asdict(config)))))
+    options = {
+        "--out": work,
+        "--setup": setup,
+        "--run-id": run_id,
+        "--move": labels.move,
+        "--parent": os.getpid(),
+    }
+    if minutes is not None:
+        options["--minutes"] = f"{minutes:.3f}"
+    words = [str(word) for pair in options.items() for word in pair]
+    return [
+        sys.executable,
+        "-m",
+        "robojackson.cli.app",
+        "train",
+        str(reference),
+        *words,
+        "--force",
+        "--json",
+    ]
+
+
+def _facts(answer: bytes, labels: RunLabels) -> bytes:
+    """What is told of a training, without the paths of this machine."""
+    said = json.loads(answer)
+    told = ("trainer", "seed", "steps", "updates", "stopped", "episodes")
+    facts = {key: said[key] for key in told} | {"training_s": said["seconds"]}
+    return json.dumps({"setup": labels.setup, **facts}, indent=1).encode()

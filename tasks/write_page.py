@@ -1,0 +1,71 @@
+"""The folder of a run that a person opens: the page, the video and every table, side by side."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from robojackson.clips.quality.stability import Stability
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.smpl_sequence import SmplSequence
+from robojackson.pipeline import tables
+from robojackson.pipeline.table_codecs import Rollout
+from robojackson.pipeline.table_schemas import EPISODE_RECORD, EVALUATION_RECORD
+from storage.artifact import Artifact
+from storage.store import Store
+from tasks.probe_video import info_of
+from tasks.runtime.code_digest import drawn_by
+from tasks.runtime.stage import stage
+
+if TYPE_CHECKING:
+    from robojackson.report.pages.page_content import Results
+
+TEMPLATES = ("page.html", "page.css")
+LEFT_OUT = ("video", "info")
+"""Artifacts that stay where they are: the user has the video already."""
+
+
+@stage(models=lambda parameters: drawn_by(__name__, TEMPLATES))
+def page(made: dict[str, Artifact], move: str, file: str) -> dict[str, Artifact]:
+    """Everything under `dances/<move>-<digest>/`, and `page`, which shows it.
+
+    Args:
+        made: What the other stages made, by name.
+        move: Name of the dance, for the folder.
+        file: Name of the file that is danced; the same video may be stored under another.
+    """
+    from robojackson.report.pages.page_content import page_content
+    from robojackson.report.pages.run_page import render  # matplotlib
+
+    store = Store.from_environment()
+    text = render(page_content(_results(store, made, Path(file)), made["dance"].name))
+    digest = hashlib.sha256("".join(a.sha256 for a in made.values()).encode()).hexdigest()
+    folder = f"dances/{move}-{digest[:8]}"
+    kept = {
+        name: store.put(f"{folder}/{artifact.name}", store.read(artifact.key))
+        for name, artifact in made.items()
+        if name not in LEFT_OUT
+    }
+    return {**kept, "page": store.put(f"{folder}/index.html", text.encode())}
+
+
+def _results(store: Store, made: Mapping[str, Artifact], file: Path) -> "Results":
+    from robojackson.report.pages.page_content import Results
+
+    return Results(
+        title=file.stem.replace("_", " "),
+        info=info_of(store, made["info"], file),
+        stability=tables.read(Stability, store, made["stability"]),
+        sequence=tables.read(SmplSequence, store, made["smpl"]),
+        reference=tables.read(ReferenceMotion, store, made["reference"]),
+        training=_json(store, made["training"]),
+        episodes=tables.read_rows(EPISODE_RECORD, store, made["episodes"]),
+        evaluation=_json(store, made["evaluation"]),
+        evaluations=tables.read_rows(EVALUATION_RECORD, store, made["evaluations"]),
+        rollout_qpos=tables.read(Rollout, store, made["rollout"]).qpos,
+    )
+
+
+def _json(store: Store, artifact: Artifact) -> dict[str, Any]:
+    return json.loads(store.read(artifact.key))

@@ -1,0 +1,273 @@
+"""The results of a study out of its tables: numbers, figures, and a page that says what they show.
+
+Drawing takes seconds, so it is done again only when the rows, or the code that reads them, are
+others.
+"""
+
+import csv
+import io
+import json
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from configs.study_config import Move, Study
+from robojackson.errors import RoboJacksonError
+from robojackson.metrics import ablation_statistics as statistics
+from robojackson.report.pages import study_page as page
+from robojackson.report.pages.run_page import Plot
+from robojackson.rl.pretrained import pretrained
+from storage import study_tables
+from storage.artifact import Artifact
+from storage.store import Store
+from tasks.runtime.code_digest import digest, drawn_by
+from tasks.runtime.stage import stage
+from tasks.study_results import (
+    JUDGED,
+    Figures,
+    Key,
+    Seeds,
+    grid_of,
+    learning,
+    of_baselines,
+    of_judgement,
+    of_learning,
+)
+
+FOLDER = "studies"
+TEMPLATES = ("study.html", "page.css")
+PRIMARY = "return_own"
+"""The figure that the claims are about, chosen before any run (docs/ablation.md)."""
+
+
+def _models(parameters: Mapping[str, Any]) -> list[str]:
+    return [*drawn_by(__name__, TEMPLATES), digest(("storage.study_tables",), "storage")]
+
+
+@stage(models=_models)
+def results_page(
+    study: Study,
+    moves: dict[str, Move],
+    rows: list[Artifact],
+    pictures: dict[str, Artifact],
+    payments: dict[str, Artifact],
+) -> dict[str, Artifact]:
+    """The files of `report`.
+
+    Args:
+        rows: Files of the tables of the cells that count (`storage.study_tables.kept`).
+        pictures, payments: By move, as in `report`; the second as JSON.
+    """
+    store = Store.from_environment()
+    shown = {name: store.read(png.key) for name, png in pictures.items()}
+    paid = {name: json.loads(store.read(told.key)) for name, told in payments.items()}
+    return report(study, moves, shown, study_tables.runs_of(rows), paid)
+
+
+def report(
+    study: Study,
+    moves: Mapping[str, Move],
+    pictures: Mapping[str, bytes] | None = None,
+    runs: Collection[str] | None = None,
+    payments: Mapping[str, page.Payments] | None = None,
+) -> dict[str, Artifact]:
+    """Write `studies/<name>/` anew: `page`, `table` (CSV), `results` (JSON) and the figures.
+
+    Args:
+        moves: Of the study, by name.
+        pictures: By move, its video frame, recovered body and robot side by side, as PNG.
+        runs: Ids of the trainings that count; all that the tables have under its name if absent.
+        payments: By move, what the rewards of the setups pay to bodies that do not dance it.
+    """
+    store, rng = Store.from_environment(), np.random.default_rng(0)
+    with study_tables.opened(store, study.name, runs) as ask:
+        curves = learning(ask, study)
+        figures = {**of_learning(curves, study), **of_judgement(ask, study)}
+        baselines, facts = of_baselines(ask, study), _facts(ask, study)
+        notes = [*_few(study), *_starts(ask, study)]
+    walking = {name: move.walking for name, move in moves.items()}
+    claims = statistics.claims(figures[PRIMARY], walking, rng)
+    compared = statistics.comparisons(figures[PRIMARY], study.moves, rng)
+    lines = table(figures, baselines, study, rng)
+    plots = _plots(curves, figures, baselines, study)
+    content = page.StudyContent(
+        title=study.name,
+        facts=facts,
+        claims=claims,
+        lines=lines,
+        comparisons=compared,
+        payments=payments or {},
+        moves=[_picture(name, moves[name], png) for name, png in (pictures or {}).items()],
+        curves=plots["curves"],
+        judged=plots["judged"],
+        notes=notes,
+    )
+    folder = f"{FOLDER}/{study.name}"
+    made = {
+        "page": store.put(f"{folder}/index.html", page.render(content).encode()),
+        "table": store.put(f"{folder}/table.csv", _csv(lines)),
+        "results": store.put(f"{folder}/results.json", _json(claims, compared, lines)),
+    }
+    for plot in (*content.curves, *content.judged, *content.moves):
+        made[plot.title] = store.put(f"{folder}/{_file(plot.title)}.png", plot.png)
+    return made
+
+
+def table(
+    figures: Figures,
+    baselines: Mapping[str, Mapping[str, Mapping[str, float]]],
+    study: Study,
+    rng: np.random.Generator,
+) -> list[page.Line]:
+    """Table II: a line a setup and move, then what the baselines do."""
+    lines = []
+    for move in study.moves:
+        for setup in study.setups:
+            seeds = {name: by_key.get((move, setup), {}) for name, by_key in figures.items()}
+            values = {
+                name: statistics.estimate(list(by_seed.values()), rng)
+                for name, by_seed in seeds.items()
+            }
+            count = max((len(by_seed) for by_seed in seeds.values()), default=0)
+            lines.append(page.Line(move, setup, count, values))
+        for policy, known in baselines.get(move, {}).items():
+            values = {n: statistics.Estimate(v, np.nan, np.nan, 1) for n, v in known.items()}
+            lines.append(page.Line(move, policy, 0, values, baseline=True))
+    return lines
+
+
+def _plots(
+    curves: Mapping[Key, Seeds],
+    figures: Figures,
+    baselines: Mapping[str, Mapping[str, Mapping[str, float]]],
+    study: Study,
+) -> dict[str, list[Plot]]:
+    from robojackson.report.plots.run_plots import png  # matplotlib: only when something is drawn
+    from robojackson.report.plots.study_plots import Curves, judged, learning_curves
+
+    grid = grid_of(study)
+    middle = (grid[1:] + grid[:-1]) / 2
+    made: dict[str, list[Plot]] = {"curves": [], "judged": []}
+    for move in study.moves:
+        drawn: dict[str, Curves] = {
+            setup: Curves(
+                middle,
+                np.array([seed["episode_return"] for seed in curves[move, setup].values()]),
+                np.array([seed["episode_length"] for seed in curves[move, setup].values()]),
+            )
+            for setup in study.setups
+            if (move, setup) in curves
+        }
+        if drawn:
+            told = "Training episodes: return, bonuses in, and length. Mean and range over seeds."
+            made["curves"].append(Plot(f"Learning {move}", told, png(learning_curves(drawn))))
+    for name in JUDGED:
+        by_move: dict[str, dict[str, list[float]]] = {
+            move: {
+                setup: list(figures[name].get((move, setup), {}).values()) for setup in study.setups
+            }
+            for move in study.moves
+        }
+        lines = {
+            move: {p: known[name] for p, known in found.items() if name in known}
+            for move, found in baselines.items()
+        }
+        if any(values for setups in by_move.values() for values in setups.values()):
+            title, _, _ = page.FIGURES[name]
+            told = "A dot a seed, the bar their mean; lines are policies that learnt nothing."
+            made["judged"].append(Plot(title, told, png(judged(by_move, lines, title))))
+    return made
+
+
+def _facts(ask: study_tables.Ask, study: Study) -> dict[str, Any]:
+    sql = "SELECT DISTINCT git_commit FROM runs WHERE study = $study"
+    commits = [row["git_commit"] or "?" for row in ask(sql, {"study": study.name})]
+    return {
+        "mode": study.mode,
+        "trainer": study.trainer,
+        "steps": f"{study.steps:,}",
+        "seeds": ", ".join(map(str, study.seeds)),
+        "code": ", ".join(sorted(commit[:10] for commit in commits)),
+    }
+
+
+def _few(study: Study) -> list[str]:
+    pairs = len(study.seeds)
+    if pairs >= 6:
+        return []
+    least = 2.0 ** (1 - pairs)
+    return [
+        f"{pairs} seed{'s' if pairs != 1 else ''}: no difference can have a p below {least:.2g}, "
+        "so nothing here is a statement; ten seeds are."
+    ]
+
+
+def _starts(ask: study_tables.Ask, study: Study) -> list[str]:
+    """What was learnt before the first step of a cell: it belongs to the price of pretraining."""
+    sql = "SELECT DISTINCT setup, config FROM runs WHERE config IS NOT NULL ORDER BY ALL"
+    setups: dict[str, set[str]] = {}
+    for row in ask(sql):
+        setups.setdefault(json.loads(row["config"])["start"], set()).add(row["setup"])
+    setups.pop("scratch", None)
+    return [
+        f"{', '.join(sorted(names))} begin with networks ({start}) that had learnt for "
+        f"{_steps_of(start, study)} control steps before; curves and steps here do not count them."
+        for start, names in setups.items()
+    ]
+
+
+def _steps_of(start: str, study: Study) -> str:
+    try:
+        networks = pretrained(start, study.mode)
+    except RoboJacksonError:
+        networks = None
+    steps = networks.facts.get("steps") if networks else None
+    return f"{steps:,}" if isinstance(steps, int) else "an unknown number of"
+
+
+def _picture(name: str, move: Move, png: bytes) -> Plot:
+    stands = f" (for the paper's {move.paper})" if move.paper else ""
+    told = "The video, the body recovered from it, and the same moment on the robot."
+    return Plot(f"{name}{stands}", told, png)
+
+
+def _csv(lines: Sequence[page.Line]) -> bytes:
+    out = io.StringIO()
+    rows = csv.writer(out)
+    parts = [f"{name}{part}" for name in page.FIGURES for part in ("", "_low", "_high")]
+    rows.writerow(["move", "setup", "seeds", *parts])
+    for line in lines:
+        found = [line.values.get(name) for name in page.FIGURES]
+        flat = [v for e in found for v in ((e.mean, e.low, e.high) if e else ("", "", ""))]
+        rows.writerow([line.move, line.setup, line.seeds, *flat])
+    return out.getvalue().encode()
+
+
+def _json(
+    claims: Sequence[statistics.Claim],
+    compared: Sequence[statistics.Comparison],
+    lines: Sequence[page.Line],
+) -> bytes:
+    told = {
+        "primary": PRIMARY,
+        "claims": [{**asdict(claim), "words": page.sentence(claim)} for claim in claims],
+        "comparisons": [asdict(comparison) for comparison in compared],
+        "lines": [asdict(line) for line in lines],
+    }
+    return json.dumps(_plain(told), indent=1, allow_nan=False).encode()
+
+
+def _plain(value: Any) -> Any:
+    """The same for JSON, which has no words for what is not finite."""
+    if isinstance(value, Mapping):
+        return {name: _plain(inner) for name, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(inner) for inner in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _file(title: str) -> str:
+    return "".join(c if c.isalnum() else "-" for c in title.lower()).strip("-")

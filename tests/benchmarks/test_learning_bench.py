@@ -1,0 +1,115 @@
+"""The arithmetic of `make bench-learning`, on numbers whose answers are known."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.learning import policies, races
+from benchmarks.learning.policies import MOVES, Folders, source_of
+from benchmarks.learning.summary import LIMBS, bars, cluster_interval, line, summary
+from benchmarks.learning.training_curve import area, first_at
+
+
+def rollouts(strict: float, gain: float) -> list[dict[str, object]]:
+    common = {"survived_s": 10.0, "strict_success": strict, "skill": 0.7, "velocity_score": 0.6}
+    limbs = {f"limb_gain_{limb}": gain for limb in LIMBS} | {
+        f"limb_r2_{limb}": 0.8 for limb in LIMBS
+    }
+    speeds = {f"excess_speed_{limb}": 0.1 for limb in LIMBS}
+    return [{"policy": "trained", **common, **limbs, **speeds}, {"policy": "statue", **common}]
+
+
+def test_the_area_of_a_straight_rise_is_its_mean() -> None:
+    assert area([(0.0, 0, 0.0), (10.0, 100, 4.0)], 10.0) == pytest.approx(2.0, rel=1e-3)
+
+
+def test_nothing_survives_before_the_first_episode_ends() -> None:
+    assert area([(5.0, 1, 2.0), (10.0, 2, 2.0)], 10.0) == pytest.approx(1.0, rel=2e-3)
+
+
+def test_a_level_is_reached_once() -> None:
+    points = [(1.0, 1, 0.5), (2.0, 2, 1.5), (3.0, 3, 1.0)]
+    assert first_at(points, 1.0) == 2.0
+    assert first_at(points, 9.0) is None
+
+
+def test_a_walker_that_halves_the_time_saves_the_other_half() -> None:
+    slow = [(float(t), t, 0.1 * t) for t in range(101)]
+    quick = [(0.5 * t, t, 0.1 * t) for t in range(101)]
+    found = races.compared(slow, quick, 100.0)
+    assert found["saved_cpu_s"] == pytest.approx(0.5 * 95, abs=1.5)
+    assert found["pretrain_s"] > found["scratch_s"]
+
+
+def test_a_walker_pays_after_its_cost_over_what_it_saves() -> None:
+    pairs = [{"seed": 0, "scratch_s": 1.0, "pretrain_s": 2.0, "level_s": 2.0, "saved_cpu_s": 50.0}]
+    told = races.concluded(pairs, minutes=5, cost_s=400.0)
+    assert told["pays_after_dances"] == pytest.approx(8)
+    assert told["gain_95"] == [1.0, 1.0]
+
+
+def test_a_line_tells_the_mean_and_the_worst_seed() -> None:
+    told = line("hip_shake", MOVES["hip_shake"], 10.0, [rollouts(1.0, 1.0), rollouts(0.9, 1.0)])
+    assert told["strict_success"] == pytest.approx(0.95)
+    assert told["worst_seed"] == pytest.approx(0.9)
+    assert told["holds"]
+    assert told["beside"]["statue"]["survived_s"] == 10.0
+
+
+def test_steps_are_told_only_where_every_seed_tells_them() -> None:
+    first, second = rollouts(1.0, 1.0), rollouts(1.0, 1.0)
+    first[0]["step"], second[0]["step"] = 1000, None
+    assert line("walk", MOVES["walk"], 10.0, [first])["steps"] == 1000
+    assert line("walk", MOVES["walk"], 10.0, [first, second])["steps"] is None
+
+
+def test_a_limb_that_flails_misses_its_own_bar_alone() -> None:
+    rows = rollouts(1.0, 1.0)
+    rows[0]["limb_gain_left_hand"] = 2.0
+    told = line("hip_shake", MOVES["hip_shake"], 10.0, [rows])
+    assert [bar for bar, held in told["bars"].items() if not held] == ["gain left_hand 0.8-1.2"]
+
+
+def test_of_the_authors_clips_limbs_are_told_and_not_asked_for() -> None:
+    told = line("authors_apt1", MOVES["authors_apt1"], 10.0, [rollouts(1.0, 3.0)])
+    assert not any("gain" in bar for bar in bars(told, MOVES["authors_apt1"]))
+    assert told["limb_gain"]["head"] == 3.0
+
+
+def test_the_interval_of_equal_seeds_is_a_point() -> None:
+    np.testing.assert_allclose(cluster_interval([0.9, 0.9, 0.9]), (0.9, 0.9))
+
+
+def test_without_the_authors_files_their_rows_are_left_out(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.delenv(policies.PAPER, raising=False)
+    policies.policies(["authors_apt1"], [0], None, 1, Folders.at(tmp_path))
+    assert source_of(MOVES["authors_apt1"]) is None
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_rows_of_another_budget_are_told_apart(tmp_path: Path) -> None:
+    folders = Folders.at(tmp_path)
+    own, brief = folders.row("walk", 0, 10.0), folders.row("walk", 0, 10.0, 1.0)
+    assert (own.name, brief.name) == ("walk-s0.parquet", "walk-1min-s0.parquet")
+    folders.rows.mkdir(parents=True)
+    brief.write_bytes(b"read by no table")
+    assert summary(folders) == []
+
+
+def test_a_peer_that_does_not_arrive_took_all_of_its_time(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    curves = iter(
+        [
+            {"points": [(100.0, 1, 5.1)], "reached": True},
+            {"points": [(998.0, 1, 2.2)], "reached": False},
+        ]
+    )
+    monkeypatch.setattr(races, "curve_of", lambda *given: next(curves))
+    monkeypatch.setattr(races, "reference_of", lambda *given: tmp_path)
+    found = races.survival(Folders.at(tmp_path), 10)
+    assert (found["ratio"], found["holds"]) == (pytest.approx(0.1), True)
+    assert found["peer_is_lower_bound"]

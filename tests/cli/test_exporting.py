@@ -1,0 +1,102 @@
+"""`robojackson.cli.exporting`: a reference of the real pipeline, written for others from file to
+file."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import get_args, get_type_hints
+
+import numpy as np
+import pytest
+
+from robojackson.cli import format_commands
+from robojackson.cli.exporting import FORMATS, HUMAN_FORMATS, export
+from robojackson.errors import BadTable, RejectedReference, StoreError, UnknownName
+from robojackson.formats import beyondmimic, gmr, keyframes, locomujoco, omniretarget, unitree_csv
+from robojackson.pipeline import tables
+from tests.fixtures.commands import Said, robojackson
+from tests.fixtures.robots import robot_motion
+
+READERS = {
+    "gmr": gmr.read,
+    "csv": unitree_csv.read,
+    "beyondmimic": beyondmimic.read,
+    "locomujoco": locomujoco.read,
+    "omniretarget": omniretarget.read,
+    "keyframes": keyframes.read,
+}
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The hip shake, as `robojackson retarget` leaves it."""
+    path = tmp_path_factory.mktemp("export") / "reference.parquet"
+    path.write_bytes(tables.encode(robot_motion("hip_shake")))
+    return path
+
+
+@pytest.mark.parametrize("to", FORMATS)
+def test_every_format_starts_with_the_first_pose(to: str, reference: Path, tmp_path: Path) -> None:
+    out = tmp_path / "motion"
+    export(reference, to, out)
+    first = READERS[to](out.read_bytes()).qpos[0]
+    wanted = robot_motion("hip_shake").qpos[0]
+    sign = np.sign(first[3:7] @ wanted[3:7])
+    np.testing.assert_allclose(first, [*wanted[:3], *sign * wanted[3:7], *wanted[7:]], atol=1e-5)
+
+
+def test_the_answer_tells_what_was_written(reference: Path, tmp_path: Path) -> None:
+    out = tmp_path / "motion.csv"
+    told = export(reference, "csv", out)
+    assert (told["file"], told["bytes"]) == (str(out), out.stat().st_size)
+
+
+def test_an_unknown_format_lists_those_there_are(reference: Path, tmp_path: Path) -> None:
+    with pytest.raises(UnknownName, match="Known: beyondmimic, csv, gmr, keyframes, locomujoco"):
+        export(reference, "fbx", tmp_path / "motion.fbx")
+
+
+def test_a_format_for_persons_does_not_fit_a_robot(reference: Path, tmp_path: Path) -> None:
+    with pytest.raises(UnknownName, match=r"holds a robot's motion.*Known: beyondmimic, csv, gmr"):
+        export(reference, "bvh", tmp_path / "motion.bvh")
+    assert not (tmp_path / "motion.bvh").exists()
+
+
+def test_a_reference_of_another_model_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "reference.parquet"
+    path.write_bytes(tables.encode(replace(robot_motion("hip_shake"), model_sha256="0" * 64)))
+    with pytest.raises(RejectedReference):
+        export(path, "csv", tmp_path / "motion.csv")
+
+
+def test_a_missing_reference_is_told(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match="no such file"):
+        export(tmp_path / "reference.parquet", "csv", tmp_path / "motion.csv")
+
+
+def test_a_policy_is_told_its_format(tmp_path: Path) -> None:
+    (tmp_path / "policy.safetensors").write_bytes(b"")
+    with pytest.raises(BadTable, match=r"a policy and no motion; its format is `--to onnx`"):
+        export(tmp_path / "policy.safetensors", "bvh", tmp_path / "motion.bvh")
+
+
+@pytest.fixture(scope="module")
+def said(reference: Path) -> Said:
+    """The command, in a process of its own."""
+    out = reference.parent / "motion.pkl"
+    return robojackson("export", reference, "--to", "gmr", "-o", out, "--json")
+
+
+def test_the_command_writes_the_file_it_names(said: Said) -> None:
+    assert said.code == 0, said.err
+    assert len(gmr.read(Path(said.answer["file"]).read_bytes())) > 1
+
+
+def test_the_command_loads_no_prefect(said: Said) -> None:
+    assert not said.loaded_prefect
+
+
+def test_the_command_offers_every_format() -> None:
+    offered = get_args(
+        get_args(get_type_hints(format_commands.export, include_extras=True)["to"])[0]
+    )
+    assert set(offered) == {*FORMATS, *HUMAN_FORMATS, "onnx"}

@@ -1,0 +1,38 @@
+"""`robojackson retarget` refuses what training could not follow, keeps it; --force goes on."""
+
+from pathlib import Path
+
+import pytest
+
+from robojackson.pipeline import tables
+from tests.fixtures.commands import robojackson
+from tests.fixtures.robots import human
+
+SMOKE = ("--config", "smoke", "--json")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A walk, as `robojackson mocap` leaves it."""
+    out = tmp_path_factory.mktemp("gate")
+    (out / "smpl.parquet").write_bytes(tables.encode(human("walk")))
+    return out
+
+
+def test_a_bad_motion_is_refused_in_one_line_and_kept(folder: Path, tmp_path: Path) -> None:
+    said = robojackson(
+        *("retarget", folder / "smpl.parquet", "-o", tmp_path, "--method", "paper", *SMOKE)
+    )
+    (line,) = [line for line in said.err.splitlines() if "reference refused" in line]
+    assert said.code == 1
+    assert "--force" in line
+    assert str(tmp_path) in line
+    assert (tmp_path / "reference.parquet").exists()
+
+
+def test_force_goes_on_with_it(folder: Path, tmp_path: Path) -> None:
+    words = ("retarget", folder / "smpl.parquet", "-o", tmp_path, "--method", "paper")
+    said = robojackson(*words, "--force", *SMOKE)
+    assert said.code == 0
+    assert said.answer["scorecard"]["passed"] == 0.0
+    assert said.answer["scorecard"]["findings"]

@@ -1,0 +1,52 @@
+"""`robojackson.cli.retarget_pictures`: the pictures that `robojackson retarget --video` leaves
+beside its tables."""
+
+from pathlib import Path
+
+import av
+import pytest
+
+from robojackson.cli.retarget_pictures import look
+from robojackson.errors import StoreError
+from robojackson.pipeline import tables
+from tests.fixtures.commands import robojackson
+from tests.fixtures.robots import human, robot_motion
+
+TINY = {"show.max_seconds": 0.3, "show.panel_width": 96, "show.panel_height": 128}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """The hip shake, as `robojackson retarget` leaves it."""
+    (tmp_path / "smpl.parquet").write_bytes(tables.encode(human("hip_shake")))
+    (tmp_path / "reference.parquet").write_bytes(tables.encode(robot_motion("hip_shake")))
+    return tmp_path
+
+
+def test_the_video_has_two_panels_and_the_asked_length(folder: Path) -> None:
+    told = look(folder / "smpl.parquet", folder, "base", TINY)
+    with av.open(told["video"]) as container:
+        frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+    assert (len(frames), frames[0].shape) == (9, (128, 2 * 96 + 2, 3))
+
+
+def test_both_plots_are_pictures(folder: Path) -> None:
+    told = look(folder / "smpl.parquet", folder, "base", TINY)
+    heads = [Path(told[name]).read_bytes()[:4] for name in ("contacts", "torques")]
+    assert heads == [b"\x89PNG"] * 2
+
+
+def test_a_motion_that_is_not_there_is_told(folder: Path) -> None:
+    (folder / "reference.parquet").unlink()
+    with pytest.raises(StoreError, match="no such file"):
+        look(folder / "smpl.parquet", folder, "base", TINY)
+
+
+def test_the_command_draws_when_it_is_asked_to(folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    said = robojackson(
+        *("retarget", folder / "smpl.parquet", "-o", out, "--video", "--config=smoke", "--json")
+    )
+    drawn = {name: Path(said.answer[name]).exists() for name in ("video", "contacts", "torques")}
+    assert drawn == {"video": True, "contacts": True, "torques": True}
+    assert not said.loaded_prefect

@@ -1,0 +1,180 @@
+"""What the training process says, takes for granted and leaves behind."""
+
+import os
+import signal
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from robojackson.cli import stages, training_process
+from robojackson.cli.lifetime.interruption import UNSAVED
+from robojackson.cli.lifetime.orphans import VARIABLE, holding
+from robojackson.errors import RejectedReference
+from robojackson.pipeline.yaml_loader import load
+from robojackson.rl import training as learning
+from robojackson.rl.config.train_config import TrainConfig
+from robojackson.rl.evaluation import reward_audit
+from robojackson.rl.training_hooks import Hooks
+from robojackson.robot.model import RobotDescription, load_robot
+
+NAN = float("nan")
+ROW = {"steps": 1000, "steps_per_s": 500.0, "survived_s": NAN, "site_error_m": NAN}
+ROW |= {"episode_return": NAN, "seconds_left": 65.0}
+
+
+@pytest.fixture
+def budgets(monkeypatch: pytest.MonkeyPatch) -> list[TrainConfig]:
+    """The configurations of trainings that are all refused."""
+    seen: list[TrainConfig] = []
+
+    def refuse(motion, robot, config: TrainConfig, *rest, **more) -> None:
+        seen.append(config)
+        raise RejectedReference("no")
+
+    monkeypatch.setattr(stages, "read_table", lambda cls, path: None)
+    humanoid = load_robot(load(RobotDescription, "robots/humanoid"))
+    monkeypatch.setattr(stages, "robot_of", lambda motion: humanoid)
+    monkeypatch.setattr(learning, "train", refuse)
+    monkeypatch.setattr(reward_audit, "both_readings", lambda *what: {})
+    monkeypatch.setattr(training_process.signal, "signal", lambda *wish: None)
+    return seen
+
+
+def test_before_the_first_episode_there_are_dashes() -> None:
+    said = "    1,000 steps  500/s  survived - s  error - cm  return -  1:05 left"
+    assert training_process.status(ROW) == said
+
+
+def test_a_refused_training_leaves_nothing(budgets: list, tmp_path: Path) -> None:
+    with pytest.raises(RejectedReference):
+        training_process.train(
+            tmp_path / "reference.parquet", tmp_path / "a" / "b", None, {}, force=True
+        )
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_motion_that_nobody_has_looked_at_is_not_trained_on(
+    budgets: list, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """The gate of `dance` holds for `train` alone, too; --force goes on."""
+    unseen = SimpleNamespace(scorecard={}, certificate=None)
+    monkeypatch.setattr(stages, "read_table", lambda cls, path: unseen)
+    with pytest.raises(RejectedReference, match=r"no score card.*--force"):
+        training_process.train(tmp_path / "reference.parquet", tmp_path / "a", None, {})
+    assert budgets == []
+
+
+@pytest.mark.parametrize(
+    ("given", "budget"),
+    [({}, (None, 9.0)), ({"steps": 10}, (10, None)), ({"minutes": 2.0}, (None, 2.0))],
+)
+def test_a_training_without_a_budget_gets_the_usual_one(
+    given: dict, budget: tuple, budgets: list[TrainConfig], tmp_path: Path
+) -> None:
+    with pytest.raises(RejectedReference):
+        training_process.train(tmp_path / "reference.parquet", tmp_path, None, given, force=True)
+    assert [(config.steps, config.minutes) for config in budgets] == [budget]
+
+
+def test_what_the_reward_can_ask_for_is_one_line() -> None:
+    found = {"root": {"perfect_step": 4.9, "statue": 1.002, "flail": 0.978}}
+    assert (
+        training_process.asks(found)
+        == "of a perfect dance's reward: (root) statue 100 %, flail 98 %"
+    )
+
+
+@pytest.mark.parametrize(
+    ("given", "found"),
+    [("pretrain", "setups/pretrain"), ("setups/x", "setups/x"), ("a.yaml", "a.yaml"), (None, None)],
+)
+def test_a_bare_name_is_one_of_the_setups(given: str | None, found: str | None) -> None:
+    assert training_process._setup(given) == found
+
+
+@pytest.mark.parametrize(
+    ("given", "setup", "name"),
+    [
+        ({}, None, "scratch"),
+        ({"start": "walker"}, None, "pretrain"),
+        ({"start": "walker", "curiosity": "formula"}, None, "curiosity"),
+        ({"curiosity": "formula"}, None, "scratch-curiosity"),
+        ({"start": "walker"}, "mine/slow.yaml", "slow"),
+    ],
+)
+def test_a_run_is_called_by_its_file_or_by_what_it_does(
+    given: dict[str, str], setup: str | None, name: str
+) -> None:
+    common = training_process._common(TrainConfig(**given), "walk", setup, "")  # type: ignore[arg-type]
+    assert (common["setup"], common["run_id"]) == (name, f"walk-{name}-s0")
+
+
+def test_after_a_training_signals_are_what_they_were(tmp_path: Path) -> None:
+    request, before = training_process._StopRequest(tmp_path), signal.getsignal(signal.SIGINT)
+    with request.listening():
+        assert signal.getsignal(signal.SIGINT) == request.receive
+        request.unsaved.set()
+    assert signal.getsignal(signal.SIGINT) is before
+    assert not request.unsaved.is_set
+
+
+def test_a_second_signal_does_not_wait_for_a_checkpoint(tmp_path: Path) -> None:
+    request = training_process._StopRequest(tmp_path)
+    assert not request()
+    request.receive(2, None)
+    assert request()
+    with pytest.raises(KeyboardInterrupt):
+        request.receive(2, None)
+
+
+def test_under_a_supervisor_a_second_signal_does_not_cut_a_checkpoint_short(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The supervisor and the task each send one; ending at once is the supervisor's part."""
+    monkeypatch.setenv(VARIABLE, "mark")
+    request = training_process._StopRequest(tmp_path)
+    request.receive(15, None)
+    request.receive(15, None)
+    assert request()
+
+
+def test_what_is_first_learnt_after_the_signal_does_not_delay_the_end(tmp_path: Path) -> None:
+    request = training_process._StopRequest(tmp_path)
+    request.receive(2, None)
+    request.learnt()
+    assert not request.unsaved.is_set
+
+
+@pytest.mark.parametrize("has_learnt", [False, True])
+def test_a_checkpoint_is_announced_where_there_is_learning_to_save(
+    has_learnt: bool, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    request = training_process._StopRequest(tmp_path)
+    if has_learnt:
+        request.learnt()
+    request.receive(2, None)
+    request.unsaved.clear()
+    assert (f"with a checkpoint in {tmp_path}" in capfd.readouterr().err) == has_learnt
+
+
+def test_a_signal_before_any_learning_finds_the_flag_down(
+    budgets: list, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The flag is what the supervisor waits for: the training's hook sets it, the end clears it."""
+    flags: list[tuple[bool, set[int]]] = []
+    ours = {os.getpid()}
+
+    def learn(motion, robot, config: TrainConfig, out: Path, hooks: Hooks) -> None:
+        flags.append((False, holding(UNSAVED, ours)))
+        hooks.learnt()
+        flags.append((True, holding(UNSAVED, ours)))
+        raise RejectedReference("no")
+
+    monkeypatch.setattr(learning, "train", learn)
+    with pytest.raises(RejectedReference):
+        training_process.train(
+            tmp_path / "reference.parquet", tmp_path / "out", None, {}, force=True
+        )
+    assert flags == [(False, set()), (True, ours)]
+    assert holding(UNSAVED, ours) == set()

@@ -1,0 +1,129 @@
+"""The folder of difficult clips, judged once: the ranking is what a person would choose."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robojackson.clips.quality import candidate_ranking
+from robojackson.clips.quality.assessment import JudgeConfig, Judgement, judge
+from robojackson.clips.quality.candidate_ranking import FilterConfig, Ranked
+from robojackson.clips.quality.duplicates import CopyConfig, copies
+from tests.fixtures.difficult_clips import DANCERS, REAL
+
+GOOD = {*DANCERS, REAL}
+REASONS = {
+    "two_people": "2 people in view",
+    "slideshow": "a slideshow",
+    "cartoon": "a drawing",
+    "stick_figure": "no person found in 60 of 60 frames",
+    "cut": "1 cut",
+    "shaken": "the camera moves",
+    "black": "no person found in 45 of 45 frames",
+    "mirrored": "a mirrored copy of hip_shake",
+}
+Judged = dict[str, Judgement]
+
+
+@pytest.fixture(scope="module")
+def judged(difficult: Path) -> Judged:
+    config = JudgeConfig()
+    return {path.stem: judge(path, config) for path in sorted(difficult.glob("*.mp4"))}
+
+
+@pytest.fixture(scope="module")
+def ranking(judged: Judged) -> list[Ranked]:
+    config = FilterConfig()
+    order = candidate_ranking.order({name: j.stability for name, j in judged.items()}, config)
+    against = {
+        n: candidate_ranking.objections(j.stability, j.quality, config) for n, j in judged.items()
+    }
+    fit = [name for name in order if not against[name]]
+    fit.sort(key=lambda name: -judged[name].quality.person_height_px)
+    copied = copies({name: judged[name].track for name in fit}, CopyConfig())
+    return candidate_ranking.rank(order, against, copied)
+
+
+def test_the_steadiest_dancer_is_chosen(ranking: list[Ranked]) -> None:
+    assert (ranking[0].name, ranking[0].decision) == ("hip_shake", "chosen")
+
+
+def test_the_good_clips_stand_before_all_others(ranking: list[Ranked]) -> None:
+    assert {place.name for place in ranking if place.place} == GOOD
+
+
+@pytest.mark.parametrize("name", REASONS)
+def test_a_bad_clip_is_rejected_for_what_is_wrong_with_it(ranking: list[Ranked], name: str) -> None:
+    reason = next(place.reason for place in ranking if place.name == name)
+    assert REASONS[name] in reason
+    assert ";" not in reason
+
+
+def test_the_cartoon_loses_though_algorithm_1_likes_it(
+    judged: Judged, ranking: list[Ranked]
+) -> None:
+    """The paper's own example: a character that dances is steadier than a dancer."""
+    scores = {name: j.stability.stability_score for name, j in judged.items()}
+    assert scores["cartoon"] < scores["dance_b"]
+    assert "cartoon" not in {place.name for place in ranking if place.place}
+
+
+def test_the_score_is_algorithm_1(judged: Judged) -> None:
+    """Worked out once more, landmark by landmark, without numpy's arithmetic."""
+    for name in ("hip_shake", "slideshow", "black"):
+        track = judged[name].track
+        missing, jitter = 0, 0.0
+        before = None
+        for points, seen in zip(track.landmarks.tolist(), track.visibility.tolist(), strict=True):
+            missing += sum(1 for v in seen if math.isnan(v) or v < 0.5)
+            now = None if math.isnan(points[0][0]) else points
+            if now and before:
+                steps = [
+                    math.hypot(a[0] - b[0], a[1] - b[1]) for a, b in zip(now, before, strict=True)
+                ]
+                jitter += sum(steps) / 33
+            before = now
+        assert judged[name].stability.stability_score == pytest.approx(missing + jitter, abs=1e-9)
+
+
+def test_a_shaken_camera_hardly_ever_stands_still(judged: Judged) -> None:
+    assert judged["shaken"].quality.static_share < 0.2
+    assert judged["hip_shake"].quality.static_share == 1.0
+
+
+def test_the_person_is_as_tall_as_the_drawing(judged: Judged) -> None:
+    """The clip that is 7/8 as large shows a person who is."""
+    ratio = (
+        judged["mirrored"].quality.person_height_px / judged["hip_shake"].quality.person_height_px
+    )
+    assert ratio == pytest.approx(7 / 8, rel=0.02)
+
+
+def test_every_dancer_is_in_full_view(judged: Judged) -> None:
+    assert min(judged[name].quality.full_body_share for name in DANCERS) > 0.95
+
+
+def test_filters_can_be_switched_off(judged: Judged) -> None:
+    off = FilterConfig(people=None, cuts=None, static_share=None, flat_share=None)
+    for name in ("two_people", "cut", "shaken", "cartoon"):
+        assert candidate_ranking.objections(judged[name].stability, judged[name].quality, off) == []
+
+
+def test_by_frame_the_order_does_not_favour_short_clips(judged: Judged) -> None:
+    scores = {name: judged[name].stability for name in GOOD}
+    by_frame = candidate_ranking.order(scores, FilterConfig(rank_by="frame"))
+    expected = sorted(
+        GOOD, key=lambda n: scores[n].jitter_per_frame + scores[n].missing_joints_per_frame
+    )
+    assert by_frame == expected
+
+
+def test_a_clip_without_a_person_comes_last_however_low_its_score(judged: Judged) -> None:
+    order = candidate_ranking.order({n: j.stability for n, j in judged.items()}, FilterConfig())
+    assert set(order[-2:]) == {"black", "stick_figure"}
+
+
+def test_figures_are_plain_numbers(judged: Judged) -> None:
+    values = [v for j in judged.values() for v in vars(j.quality).values()]
+    assert all(type(v) in (int, float) and np.isfinite(v) for v in values)

@@ -1,0 +1,71 @@
+"""A flow that is started from the command line ends in a moment, with its temporary server."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.fixtures.commands import environment
+from tools.stack.interrupted_command import living_with
+
+FLOW = """
+import asyncio, sys, typer
+from flows.runtime.environment import prepare
+from robojackson.cli.lifetime.supervisor import guarded
+from storage.store import Store
+from robojackson.cli.console import Answer, command
+
+@command
+def start(as_json=False):
+    prepare(Store.from_environment())
+    from prefect import flow
+    from flows.runtime.launch import launch
+
+    @flow
+    async def long():
+        print("under way", flush=True)
+        await asyncio.sleep(600)
+
+    return Answer(launch(long))
+
+app = typer.Typer()
+app.command()(start)
+sys.exit(guarded(lambda: app(standalone_mode=False)))
+"""
+ENDED_S = 10.0
+"""A generous multiple of 3 s, for a busy machine."""
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("send", [os.kill, os.killpg])
+def test_an_interrupted_flow_ends_at_once_and_says_how_to_resume(
+    send: Callable[[int, int], None], how: signal.Signals, tmp_path: Path
+) -> None:
+    script, store = tmp_path / "long.py", tmp_path / "store"
+    script.write_text(FLOW)
+    with subprocess.Popen(
+        [sys.executable, str(script)],
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment(ROBOJACKSON_STORE=str(store)),
+        start_new_session=True,
+    ) as process:
+        assert process.stderr is not None
+        for line in process.stderr:
+            if "under way" in line:
+                break
+        began = time.monotonic()
+        send(process.pid, how)
+        rest = process.stderr.read()
+    assert process.returncode == 130
+    assert rest.splitlines() == [
+        "robojackson: interrupted, ending ...",
+        "robojackson: interrupted: resume: robojackson",
+    ]
+    assert time.monotonic() - began < ENDED_S
+    assert living_with(f"ROBOJACKSON_STORE={store}") == {}

@@ -1,0 +1,185 @@
+"""BVH: an independent reader sees the same joints; skeletons of others are understood."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pybvh
+import pytest
+
+from robojackson.body.skeleton import JOINT_NAMES, keypoint
+from robojackson.errors import BadTable
+from robojackson.formats import bvh, bvh_tree
+from robojackson.mocap.imported_motion import place
+from tests.fixtures.person import person
+
+CENTIMETRE = 0.01
+
+
+def test_an_independent_reader_sees_the_same_joints(tmp_path: Path) -> None:
+    sequence = person()
+    path = tmp_path / "motion.bvh"
+    path.write_bytes(bvh.write(sequence))
+    other = pybvh.read_bvh_file(path)
+    names = [node.name for node in other.nodes]
+    places = other.node_positions()[:, [names.index(name) for name in JOINT_NAMES]] * CENTIMETRE
+    in_our_world = places[..., [2, 0, 1]]
+    np.testing.assert_allclose(in_our_world, sequence.joints, atol=1e-5)
+    assert other.fps == pytest.approx(sequence.fps, abs=1e-3)
+
+
+STICK = """HIERARCHY
+ROOT Hips
+{
+ OFFSET 0 0 0
+ CHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation Xrotation
+ JOINT LeftUpLeg
+ { OFFSET 9 -9 0 CHANNELS 3 Zrotation Yrotation Xrotation
+  JOINT LeftLeg
+  { OFFSET 0 -40 0 CHANNELS 3 Zrotation Yrotation Xrotation
+   JOINT LeftFoot
+   { OFFSET 0 -41 0 CHANNELS 3 Zrotation Yrotation Xrotation
+    End Site { OFFSET 0 -6 18 } } } }
+ JOINT RightUpLeg
+ { OFFSET -9 -9 0 CHANNELS 3 Zrotation Yrotation Xrotation
+  JOINT RightLeg
+  { OFFSET 0 -40 0 CHANNELS 3 Zrotation Yrotation Xrotation
+   JOINT RightFoot
+   { OFFSET 0 -41 0 CHANNELS 3 Zrotation Yrotation Xrotation
+    End Site { OFFSET 0 -6 18 } } } }
+ JOINT LowerBack
+ { OFFSET 0 10 0 CHANNELS 3 Zrotation Yrotation Xrotation
+  JOINT Spine
+  { OFFSET 0 40 0 CHANNELS 3 Zrotation Yrotation Xrotation
+   JOINT Neck
+   { OFFSET 0 5 0 CHANNELS 3 Zrotation Yrotation Xrotation
+    JOINT Head
+    { OFFSET 0 10 0 CHANNELS 3 Zrotation Yrotation Xrotation
+     End Site { OFFSET 0 18 0 } } }
+   JOINT LeftShoulder
+   { OFFSET 2 0 0 CHANNELS 3 Zrotation Yrotation Xrotation
+    JOINT LeftArm
+    { OFFSET 16 0 0 CHANNELS 3 Zrotation Yrotation Xrotation
+     JOINT LeftForeArm
+     { OFFSET 28 0 0 CHANNELS 3 Zrotation Yrotation Xrotation
+      JOINT LeftHand
+      { OFFSET 25 0 0 CHANNELS 3 Zrotation Yrotation Xrotation
+       End Site { OFFSET 8 0 0 } } } } }
+   JOINT RightShoulder
+   { OFFSET -2 0 0 CHANNELS 3 Zrotation Yrotation Xrotation
+    JOINT RightArm
+    { OFFSET -16 0 0 CHANNELS 3 Zrotation Yrotation Xrotation
+     JOINT RightForeArm
+     { OFFSET -28 0 0 CHANNELS 3 Zrotation Yrotation Xrotation
+      JOINT RightHand
+      { OFFSET -25 0 0 CHANNELS 3 Zrotation Yrotation Xrotation
+       End Site { OFFSET -8 0 0 } } } } } } }
+}
+MOTION
+Frames: 3
+Frame Time: 0.02
+"""
+NODES = STICK.count("CHANNELS")
+ELBOW_BENT = 90.0
+
+
+def stick(scale: float = 1.0, prefix: str = "", twisted: bool = False) -> bytes:
+    """Three frames of a skeleton like CMU's; in the last one the left elbow points forward.
+
+    Twisted, it also turns its chest and lifts a leg.
+    """
+    rows = np.zeros((3, 6 + 3 * (NODES - 1)))
+    rows[:, 1] = 96.0 * scale
+    order = [line.split()[1] for line in STICK.splitlines() if "JOINT" in line or "ROOT" in line]
+    rows[2, 6 + 3 * (order.index("LeftForeArm") - 1) + 1] = -ELBOW_BENT
+    if twisted:
+        rows[1, 6 + 3 * (order.index("Spine") - 1) + 1] = 25.0
+        rows[1, 6 + 3 * (order.index("RightUpLeg") - 1) + 2] = -30.0
+        rows[:, 4] = [0.0, 40.0, 90.0]
+    text = STICK
+    for name in order:
+        text = text.replace(f"T {name}\n", f"T {prefix}{name}\n")
+    words = []
+    for line in text.splitlines():
+        parts = line.split()
+        for at, word in enumerate(parts):
+            if word == "OFFSET":
+                parts[at + 1 : at + 4] = [str(scale * float(n)) for n in parts[at + 1 : at + 4]]
+        words.append(" ".join(parts))
+    table = "\n".join(" ".join(map(str, row)) for row in rows)
+    head = "\n".join(words) + "\n"
+    for word in ("{", "}", "OFFSET", "CHANNELS"):
+        head = head.replace(word, f"\n{word}" if word.isalpha() else f"\n{word}\n")
+    lines = [line for line in head.splitlines() if line.strip()]
+    return ("\n".join(lines) + "\n" + table).encode()
+
+
+@pytest.mark.parametrize("scale", [0.01, 1.0, 0.01 / 0.0254, 0.01 * 0.45 / 0.0254])
+def test_another_skeleton_is_read_in_any_usual_unit(scale: float) -> None:
+    sequence = place(bvh.read(stick(scale)), 50.0)
+    elbow, wrist = keypoint("left_elbow"), keypoint("left_wrist")
+    forearm = sequence.joints[:, wrist] - sequence.joints[:, elbow]
+    np.testing.assert_allclose(forearm[0], [0.0, 0.25, 0.0], atol=2e-3)
+    np.testing.assert_allclose(forearm[2], [0.25, 0.0, 0.0], atol=2e-3)
+
+
+LIMBS = {
+    "left_hip": "LeftUpLeg", "left_ankle": "LeftFoot", "left_shoulder": "LeftArm",
+    "left_wrist": "LeftHand", "right_hip": "RightUpLeg", "right_knee": "RightLeg",
+    "right_shoulder": "RightArm", "right_elbow": "RightForeArm", "right_wrist": "RightHand",
+}  # fmt: skip
+
+
+def test_another_skeletons_limbs_are_where_an_independent_reader_sees_them(tmp_path: Path) -> None:
+    path = tmp_path / "stick.bvh"
+    path.write_bytes(stick(twisted=True))
+    other = pybvh.read_bvh_file(path)
+    names = [node.name for node in other.nodes]
+    places = other.node_positions()[:, [names.index(name) for name in LIMBS.values()]]
+    wanted = places[..., [2, 0, 1]] * CENTIMETRE
+    found = place(bvh.read(path.read_bytes()), 50.0).joints[:, [keypoint(n) for n in LIMBS]]
+    shift = np.median(found - wanted, axis=(0, 1))
+    assert np.abs(shift[:2]).max() < 1e-3
+    np.testing.assert_allclose(found - shift, wanted, atol=5e-3)
+
+
+def test_names_with_a_prefix_are_known() -> None:
+    sequence = place(bvh.read(stick(prefix="mixamorig:")), 50.0)
+    knee, ankle = keypoint("right_knee"), keypoint("right_ankle")
+    shin = np.linalg.norm(sequence.joints[0, knee] - sequence.joints[0, ankle])
+    assert shin == pytest.approx(0.41, abs=2e-3)
+
+
+def test_an_unknown_unit_is_scaled_to_a_person_and_told() -> None:
+    motion = bvh.read(stick(3.0))
+    assert "unknown unit" in " ".join(motion.notes)
+    ankle, hip = keypoint("left_ankle"), keypoint("left_hip")
+    assert np.linalg.norm(motion.rest_joints[ankle] - motion.rest_joints[hip]) > 0.5
+
+
+def test_a_skeleton_without_legs_is_refused_with_its_joints() -> None:
+    data = stick().replace(b"LeftUpLeg", b"Tentacle")
+    with pytest.raises(BadTable, match=r"left_hip.*Tentacle"):
+        bvh.read(data)
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda text: text.replace("Frames: 3", "Frames: 900000000"),
+        lambda text: text.replace("Frame Time: 0.02", "Frame Time: 0"),
+        lambda text: text.replace("HIERARCHY", "NOTHING"),
+        lambda text: text.replace("CHANNELS 3", "CHANNELS 99999999"),
+        lambda text: text.replace("Zrotation", "Wrotation"),
+        lambda text: text.replace("96.0", "nan"),
+        lambda text: re.sub("OFFSET [^ ]+", "OFFSET nan", text),
+        lambda text: re.sub("OFFSET [^ ]+", "OFFSET 1e300", text),
+        lambda text: text.replace("Frame Time: 0.02", "Frame Time: 1e-320"),
+        lambda text: text[: text.index("MOTION")],
+        lambda text: text.replace("{", "}", 1),
+        lambda text: "HIERARCHY\nROOT a\n{" + "JOINT b {" * 5000,
+    ],
+)
+def test_a_damaged_file_is_told(damage: object) -> None:
+    with pytest.raises(BadTable, match="BVH"):
+        bvh_tree.parse(damage(stick().decode()).encode())  # type: ignore[operator]

@@ -1,0 +1,119 @@
+"""Laws of gravity, floor and smoothing."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from robojackson.body.forward_kinematics import forward
+from robojackson.body.skeleton import REST_JOINTS, keypoint, pair
+from robojackson.body.smoothing import lowpass
+from robojackson.geometry.frames import CAMERA_TO_WORLD
+from robojackson.mocap.grounding import floor as ground
+from robojackson.mocap.grounding.feet import foot_points
+
+FRAMES = 60
+CONFIG = ground.GravityConfig()
+
+
+def standing_in_camera(tilt: Rotation) -> tuple[np.ndarray, np.ndarray]:
+    """Points and feet of a person at rest before a camera that is turned by `tilt`."""
+    local = np.broadcast_to(np.eye(3), (FRAMES, 24, 3, 3)).copy()
+    pose = forward(local, REST_JOINTS[None], np.zeros((FRAMES, 3)))
+    upright = Rotation.from_matrix(np.diag([1.0, -1.0, -1.0]))
+    turn = (tilt * upright).as_matrix()
+    feet = foot_points(pose, REST_JOINTS)
+    return pose.points @ turn.T + [0, 0, 4], feet @ turn.T + [0, 0, 4]
+
+
+@pytest.mark.parametrize("axis", ["x", "z"])
+@pytest.mark.parametrize("degrees", [-20.0, 0.0, 12.0])
+def test_up_is_found_for_a_tilted_camera(axis: str, degrees: float) -> None:
+    tilt = Rotation.from_euler(axis, degrees, degrees=True)
+    points, feet = standing_in_camera(tilt)
+    found = ground.find_up(points, feet, 30.0, CONFIG)
+    error = np.degrees(np.arccos(np.clip(found.up @ tilt.apply(ground.CAMERA_UP), -1, 1)))
+    assert error < 3.5
+
+
+def test_an_absurd_up_gives_way_to_the_camera() -> None:
+    points, feet = standing_in_camera(Rotation.from_euler("z", 80, degrees=True))
+    found = ground.find_up(points, feet, 30.0, CONFIG)
+    assert found.source == "camera"
+    assert np.array_equal(found.up, ground.CAMERA_UP)
+
+
+def test_level_camera_gives_the_projects_frame_change() -> None:
+    assert np.allclose(ground.camera_to_world(ground.CAMERA_UP), CAMERA_TO_WORLD)
+
+
+def test_camera_to_world_is_a_rotation_that_lifts_up_to_z() -> None:
+    up = Rotation.from_euler("xz", [15, -25], degrees=True).apply(ground.CAMERA_UP)
+    turn = ground.camera_to_world(up)
+    assert np.allclose(turn @ turn.T, np.eye(3))
+    assert np.linalg.det(turn) == pytest.approx(1.0)
+    assert np.allclose(turn @ up, [0, 0, 1])
+
+
+def test_centre_of_mass_is_inside_a_standing_person() -> None:
+    mass = ground.centre_of_mass(REST_JOINTS[None])[0]
+    assert mass[0] == pytest.approx(0.0)
+    assert REST_JOINTS[pair("hip")[0], 1] < mass[1] < REST_JOINTS[keypoint("spine3"), 1]
+
+
+def test_centre_of_mass_moves_with_the_body() -> None:
+    shift = np.array([1.0, -2.0, 3.0])
+    moved = ground.centre_of_mass(REST_JOINTS[None] + shift)
+    assert np.allclose(moved, ground.centre_of_mass(REST_JOINTS[None]) + shift)
+
+
+def test_a_thrown_body_falls_freely_and_a_standing_one_does_not() -> None:
+    time = np.arange(30) / 30.0
+    assert ground.free_fall(1.0 + 3.0 * time - 4.905 * time**2, 30.0)[5:-5].all()
+    assert not ground.free_fall(np.full(30, 0.9), 30.0).any()
+
+
+def test_floor_follows_the_lowest_foot() -> None:
+    lowest = np.linspace(0.2, 0.4, FRAMES)
+    floor = ground.floor_height(lowest, np.zeros(FRAMES, bool), 30.0, 3.0)
+    assert np.allclose(floor, lowest, atol=1e-6)
+
+
+def test_floor_does_not_rise_with_a_jump() -> None:
+    lowest = np.zeros(FRAMES)
+    falling = np.zeros(FRAMES, bool)
+    lowest[25:35], falling[25:35] = 0.4, True
+    assert np.abs(ground.floor_height(lowest, falling, 30.0, 3.0)).max() < 1e-9
+
+
+def test_flight_reaches_from_the_last_to_the_first_touch() -> None:
+    lowest = np.array([0.0, 0.0, 0.1, 0.3, 0.4, 0.3, 0.1, 0.0, 0.0])
+    falling = np.zeros(9, bool)
+    falling[3:6] = True
+    height = -4.905 * ((np.arange(9) - 4) / 30.0) ** 2
+    assert np.flatnonzero(ground.flight(lowest, height, falling, 30.0)).tolist() == [2, 3, 4, 5, 6]
+
+
+def test_feet_that_rise_while_the_body_does_not_fall_are_no_flight() -> None:
+    lowest = np.array([0.0, 0.0, 0.1, 0.3, 0.4, 0.3, 0.1, 0.0, 0.0])
+    falling = np.zeros(9, bool)
+    falling[4] = True
+    found = ground.flight(lowest, np.zeros(9), falling, 30.0)
+    assert np.flatnonzero(found).tolist() == [4]
+
+
+def test_lowpass_keeps_lines_and_slow_waves_and_removes_fast_ones() -> None:
+    time = np.arange(300) / 30.0
+    slow, fast = np.sin(2 * np.pi * 0.5 * time), np.sin(2 * np.pi * 12.0 * time)
+    smooth = lowpass(2.0 * time + slow + fast, 30.0, 4.0)
+    assert np.abs(smooth - 2.0 * time - slow)[15:-15].max() < 0.02
+
+
+def test_lowpass_has_no_lag() -> None:
+    pulse = np.exp(-(((np.arange(101) - 50) / 4.0) ** 2))
+    smooth = lowpass(pulse, 30.0, 3.0)
+    assert np.allclose(smooth, smooth[::-1], atol=1e-3)
+    assert smooth.argmax() == 50
+
+
+def test_lowpass_leaves_a_clip_of_two_frames() -> None:
+    assert np.array_equal(lowpass(np.array([[1.0], [2.0]]), 30.0, 4.0), [[1.0], [2.0]])

@@ -1,0 +1,124 @@
+"""Laws of the repair of a track: gaps are bridged, swapped sides put back, nobody is an error."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from robojackson.errors import NoPersonFound, TrackTooShort, UnknownName
+from robojackson.mocap.landmarks.blazepose import (
+    HIPS,
+    LANDMARK_NAMES,
+    MIRROR,
+    SHOULDERS,
+    fill_gaps,
+    landmark,
+    repair,
+    track_landmarks,
+)
+from robojackson.motion.landmark_track import LandmarkTrack
+
+
+def without(track: LandmarkTrack, frames: list[int]) -> LandmarkTrack:
+    """The track with nobody found in some frames."""
+    arrays = [np.array(a) for a in (track.landmarks, track.world_landmarks, track.visibility)]
+    for array in arrays:
+        array[frames] = np.nan
+    landmarks, world, visibility = arrays
+    return replace(track, landmarks=landmarks, world_landmarks=world, visibility=visibility)
+
+
+def swapped(track: LandmarkTrack, frames: list[int]) -> LandmarkTrack:
+    """The track with left and right exchanged in some frames."""
+    arrays = [np.array(a) for a in (track.landmarks, track.world_landmarks, track.visibility)]
+    for array in arrays:
+        array[frames] = array[frames][:, MIRROR]
+    landmarks, world, visibility = arrays
+    return replace(track, landmarks=landmarks, world_landmarks=world, visibility=visibility)
+
+
+def test_gap_inside_is_bridged_linearly() -> None:
+    values = np.array([[0.0], [np.nan], [np.nan], [3.0]])
+    found = np.array([True, False, False, True])
+    assert np.allclose(fill_gaps(values, found)[:, 0], [0, 1, 2, 3])
+
+
+def test_gap_at_an_end_holds_the_nearest_frame() -> None:
+    values = np.array([[np.nan], [5.0], [6.0], [np.nan]])
+    assert np.allclose(fill_gaps(values, ~np.isnan(values[:, 0]))[:, 0], [5, 5, 6, 6])
+
+
+def test_mirror_pairs_left_with_right() -> None:
+    assert (MIRROR[MIRROR] == np.arange(33)).all()
+    assert LANDMARK_NAMES[MIRROR[landmark("mouth_left")]] == "mouth_right"
+
+
+def test_a_clean_track_is_left_alone(hip_shake: LandmarkTrack) -> None:
+    repaired = repair(hip_shake)
+    assert repaired.swapped == 0
+    others = [i for i in range(33) if i not in HIPS]
+    assert np.array_equal(repaired.local[:, others], hip_shake.world_landmarks[:, others])
+
+
+@pytest.mark.parametrize("frames", [[50], list(range(30, 60)), [10, 11, 12, 90]])
+def test_exchanged_sides_are_put_back(hip_shake: LandmarkTrack, frames: list[int]) -> None:
+    repaired = repair(swapped(hip_shake, frames))
+    assert repaired.swapped == len(frames)
+    assert np.allclose(repaired.image, repair(hip_shake).image)
+
+
+def test_undetected_frames_are_invalid_and_invisible(hip_shake: LandmarkTrack) -> None:
+    repaired = repair(without(hip_shake, [20, 21]))
+    assert np.flatnonzero(~repaired.valid).tolist() == [20, 21]
+    assert (repaired.visibility[20:22] == 0.0).all()
+    assert not np.isnan(repaired.local).any()
+
+
+def test_nobody_in_the_clip_names_the_frames(hip_shake: LandmarkTrack) -> None:
+    with pytest.raises(NoPersonFound, match="no person found in 120 of 120 frames"):
+        repair(without(hip_shake, list(range(120))))
+
+
+def test_one_frame_is_too_short(hip_shake: LandmarkTrack) -> None:
+    one = replace(
+        hip_shake,
+        landmarks=hip_shake.landmarks[:1],
+        world_landmarks=hip_shake.world_landmarks[:1],
+        visibility=hip_shake.visibility[:1],
+    )
+    with pytest.raises(TrackTooShort, match="at least 2 frames"):
+        repair(one)
+
+
+def test_unknown_landmark_names_the_known_ones() -> None:
+    with pytest.raises(UnknownName, match="left_shoulder"):
+        landmark("left_sholder")
+
+
+def test_hip_joints_lie_on_the_trunk_above_the_detectors_hips(hip_shake: LandmarkTrack) -> None:
+    before, after = track_landmarks(hip_shake), repair(hip_shake)
+    for was, now in ((before.image, after.image), (before.local, after.local)):
+        trunk = was[:, SHOULDERS].mean(1) - was[:, HIPS].mean(1)
+        step = now[:, HIPS] - was[:, HIPS]
+        assert np.allclose(step, 0.06 * trunk[:, None], atol=1e-9)
+
+
+def test_landmarks_of_a_moved_camera_are_laid_onto_the_first_frame(
+    hip_shake: LandmarkTrack,
+) -> None:
+    to_first = np.tile(np.eye(3), (len(hip_shake), 1, 1))
+    to_first[:, 0, 2] = np.arange(len(hip_shake))
+    moved = track_landmarks(replace(hip_shake, to_first=to_first)).image
+    shift = moved - track_landmarks(hip_shake).image
+    assert np.allclose(shift[..., 0], np.arange(len(hip_shake))[:, None])
+    assert np.allclose(shift[..., 1], 0.0)
+
+
+def test_a_turn_at_eight_frames_a_second_is_not_taken_for_an_exchange(
+    hip_shake: LandmarkTrack,
+) -> None:
+    mirrored = hip_shake.landmarks.copy()
+    mirrored[60:] = mirrored[60:, MIRROR]
+    slow = replace(hip_shake, fps=8.0, landmarks=mirrored)
+    assert repair(slow).swapped == 0
+    assert repair(replace(slow, fps=30.0)).swapped > 0

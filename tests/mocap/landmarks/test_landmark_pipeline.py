@@ -1,0 +1,62 @@
+"""What a motion is made from: the models of a quality, one progress for all, the camera's path."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robojackson.clips.people.dancer import DancerConfig
+from robojackson.clips.video import VideoLimits, probe
+from robojackson.mocap.landmarks import pipeline
+from robojackson.motion.landmark_track import LandmarkTrack
+
+CLIP = Path(__file__).parents[3] / "clips" / "hip_shake.mp4"
+
+
+@pytest.fixture
+def followed(hip_shake: LandmarkTrack, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The pose models that were asked, each of which sees the recorded track."""
+    asked: list[str] = []
+
+    def follow(path, info, size, dancer, progress=None) -> LandmarkTrack:
+        asked.append(size)
+        for done in (60, 120):
+            if progress:
+                progress(done, 120)
+        return hip_shake
+
+    monkeypatch.setattr(pipeline, "follow", follow)
+    return asked
+
+
+def look(quality: str, progress=None) -> LandmarkTrack:
+    info = probe(CLIP, VideoLimits())
+    return pipeline.see(CLIP, info, quality, DancerConfig(), progress)
+
+
+def test_best_asks_both_larger_models_and_they_vote(
+    followed: list[str], hip_shake: LandmarkTrack
+) -> None:
+    found = look("best")
+    assert followed == ["full", "heavy"]
+    assert np.allclose(found.landmarks, hip_shake.landmarks)
+
+
+def test_one_model_is_asked_once_and_its_track_is_kept(
+    followed: list[str], hip_shake: LandmarkTrack
+) -> None:
+    found = look("full")
+    assert followed == ["full"]
+    assert np.array_equal(found.world_landmarks, hip_shake.world_landmarks)
+
+
+def test_progress_of_two_models_runs_once_from_nothing_to_all(followed: list[str]) -> None:
+    told: list[tuple[int, int]] = []
+    look("best", lambda done, total: told.append((done, total)))
+    assert told == [(30, 120), (60, 120), (90, 120), (120, 120)]
+
+
+def test_a_camera_that_stands_leaves_the_track_without_a_note(followed: list[str]) -> None:
+    found = look("full")
+    assert found.to_first is None
+    assert found.notes == ()

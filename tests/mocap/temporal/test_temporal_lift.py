@@ -1,0 +1,133 @@
+"""Laws of step 3: what goes in, what comes out, what a mirror and a hidden limb do to it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from safetensors.numpy import load_file, save_file
+
+from robojackson.errors import BadWeights
+from robojackson.mocap.landmarks import pinhole_camera
+from robojackson.mocap.landmarks.blazepose import BODY, Landmarks, landmark, repair
+from robojackson.mocap.temporal import features, temporal_lift, temporal_network
+from robojackson.mocap.temporal.temporal_lift import WEIGHTS, Lifted, TemporalConfig
+from robojackson.motion.landmark_track import LandmarkTrack
+
+MOST_BYTES = 10_000_000
+
+
+@pytest.fixture(scope="module")
+def seen(hip_shake: LandmarkTrack) -> Landmarks:
+    return repair(hip_shake)
+
+
+@pytest.fixture(scope="module")
+def placed(seen: Landmarks, hip_shake: LandmarkTrack) -> np.ndarray:
+    focal = pinhole_camera.guess_focal(hip_shake.width, hip_shake.height)
+    lens = pinhole_camera.Pinhole(focal, hip_shake.width, hip_shake.height)
+    return pinhole_camera.place(seen, lens, hip_shake.fps, 1.5)
+
+
+def lifted(seen: Landmarks, placed: np.ndarray, **settings: object) -> Lifted:
+    return temporal_lift.lift(placed, seen.local, seen.visibility, 30.0, TemporalConfig(**settings))
+
+
+def masked(seen: Landmarks) -> Landmarks:
+    visibility = np.array(seen.visibility)
+    columns = [landmark(f"left_{n}") for n in ("elbow", "wrist", "pinky", "index", "thumb")]
+    visibility[40:60, columns] = 0.0
+    return Landmarks(seen.image, seen.local, visibility, seen.valid)
+
+
+def test_the_weights_that_ship_are_small() -> None:
+    assert WEIGHTS.stat().st_size <= MOST_BYTES
+
+
+def test_the_weights_that_ship_load() -> None:
+    assert temporal_network.load(WEIGHTS)["mean"].shape == (features.COUNT,)
+
+
+def test_lifting_twice_gives_the_same(seen: Landmarks, placed: np.ndarray) -> None:
+    assert np.array_equal(lifted(seen, placed).points, lifted(seen, placed).points)
+
+
+def test_no_trust_changes_nothing_of_the_body(seen: Landmarks, placed: np.ndarray) -> None:
+    image = lifted(seen, placed, trust=0.0).points[:, BODY]
+    assert np.allclose(image[..., :2] / image[..., 2:], _rays(placed), atol=2e-3)
+
+
+def test_the_mirrored_person_is_lifted_to_the_mirror_image(
+    seen: Landmarks, placed: np.ndarray
+) -> None:
+    weights = temporal_network.load(WEIGHTS)
+    sight = features.look(placed, seen.local, seen.visibility)
+    plain, spread, _ = temporal_lift.correct(sight, weights)
+    other, other_spread, _ = temporal_lift.correct(features.mirror(sight), weights)
+    assert np.allclose(features.mirror_body(other) * [-1.0, 1.0, 1.0], plain, atol=1e-4)
+    assert np.allclose(features.mirror_body(other_spread), spread, rtol=1e-3)
+
+
+def test_a_hidden_limb_is_less_certain(seen: Landmarks, placed: np.ndarray) -> None:
+    wrist = list(BODY).index(landmark("left_wrist"))
+    hidden = lifted(masked(seen), placed).spread[45:55, wrist]
+    assert (hidden.mean(0) > 1.1 * lifted(seen, placed).spread[45:55, wrist].mean(0)).all()
+
+
+def test_hypotheses_differ_only_where_a_limb_is_hidden(seen: Landmarks, placed: np.ndarray) -> None:
+    first, second = (
+        lifted(masked(seen), placed, hypothesis=number).points[:, BODY] for number in (1, 2)
+    )
+    moved = np.linalg.norm(first - second, axis=-1)
+    wrist, knee = (list(BODY).index(landmark(f"left_{name}")) for name in ("wrist", "knee"))
+    assert moved[45:55, wrist].max() > 0.005
+    assert moved[:, knee].max() < 1e-6
+    assert moved[:30].max() < 1e-6
+
+
+def test_a_hypothesis_is_told_by_its_number_and_seed(seen: Landmarks, placed: np.ndarray) -> None:
+    once, again, other = (
+        lifted(masked(seen), placed, hypothesis=1, seed=seed).points for seed in (3, 3, 4)
+    )
+    assert np.array_equal(once, again)
+    assert not np.array_equal(once, other)
+
+
+@pytest.mark.parametrize("fps", [8.0, 24.0, 30.0, 60.0])
+def test_any_frame_rate_gives_a_row_a_frame(
+    seen: Landmarks, placed: np.ndarray, fps: float
+) -> None:
+    out = temporal_lift.lift(placed, seen.local, seen.visibility, fps, TemporalConfig())
+    assert out.points.shape == placed.shape
+    assert np.isfinite(out.points).all()
+
+
+@pytest.mark.parametrize("frames", [2, 3])
+def test_very_short_clips_are_lifted(seen: Landmarks, placed: np.ndarray, frames: int) -> None:
+    args = (placed[:frames], seen.local[:frames], seen.visibility[:frames])
+    assert np.isfinite(temporal_lift.lift(*args, 30.0, TemporalConfig()).points).all()
+
+
+def test_a_file_that_is_no_weights_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "notes.safetensors"
+    path.write_text("not weights")
+    with pytest.raises(BadWeights, match=r"notes\.safetensors: not a weights file"):
+        temporal_network.load(path)
+
+
+def test_weights_of_another_network_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "other.safetensors"
+    save_file({"layer.weight": np.zeros((3, 3), np.float32)}, path)
+    with pytest.raises(BadWeights, match="mean"):
+        temporal_network.load(path)
+
+
+def test_weights_for_other_numbers_are_refused(tmp_path: Path) -> None:
+    arrays = load_file(WEIGHTS)
+    arrays["mean"] = np.zeros(7, np.float32)
+    save_file(arrays, tmp_path / "old.safetensors")
+    with pytest.raises(BadWeights, match="reads 7 numbers"):
+        temporal_network.load(tmp_path / "old.safetensors")
+
+
+def _rays(placed: np.ndarray) -> np.ndarray:
+    return placed[:, BODY, :2] / placed[:, BODY, 2:]

@@ -1,0 +1,217 @@
+"""The loader reads what YAML says and refuses what it does not know."""
+
+import math
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import pytest
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass
+
+from robojackson.errors import BadConfiguration, UnknownName
+from robojackson.pipeline import yaml_loader
+from robojackson.pipeline.pipeline_config import PipelineConfig
+from robojackson.rl.config.train_config import TrainConfig
+
+STRICT = ConfigDict(extra="forbid")
+
+
+@dataclass(frozen=True, config=STRICT)
+class Inner:
+    """A section."""
+
+    width: float = 0.5
+    cyclic: Literal["auto", "yes", "no"] = "auto"
+
+
+@dataclass(frozen=True, config=STRICT)
+class Outer:
+    """A configuration."""
+
+    seed: int = Field(0, ge=0)
+    inner: Inner = Field(default_factory=Inner)
+    maybe: Inner | None = None
+    sites: dict[str, Inner] = Field(default_factory=dict)
+    speed: Literal["auto"] | Annotated[float, Field(ge=0.25)] = "auto"
+
+
+@pytest.fixture
+def write(tmp_path: Path):
+    def _write(text: str) -> Path:
+        path = tmp_path / "given.yaml"
+        path.write_text(text)
+        return path
+
+    return _write
+
+
+def test_a_file_changes_only_what_it_names(write) -> None:
+    assert yaml_loader.load(Outer, write("inner: {width: 0.25}")) == Outer(inner=Inner(width=0.25))
+
+
+def test_an_empty_file_is_all_defaults(write) -> None:
+    assert yaml_loader.load(Outer, write("# nothing\n")) == Outer()
+
+
+@pytest.mark.parametrize(
+    ("text", "path", "close"),
+    [
+        ("sed: 3", "sed", "seed"),
+        ("inner: {widht: 0.1}", "inner.widht", "width"),
+        ("maybe: {cylic: no}", "maybe.cylic", "cyclic"),
+        ("sites: {hand: {wdth: 1}}", "sites.hand.wdth", ""),
+    ],
+)
+def test_an_unknown_key_is_refused_with_file_and_path(write, text, path, close) -> None:
+    given = write(text)
+    with pytest.raises(BadConfiguration) as caught:
+        yaml_loader.load(Outer, given)
+    message = str(caught.value)
+    assert str(given) in message
+    assert f"unknown key '{path}'" in message
+    assert not close or f"Did you mean '{close}'?" in message
+    assert "\n" not in message
+
+
+def test_a_wrong_value_is_refused_with_its_path_and_itself(write) -> None:
+    with pytest.raises(BadConfiguration, match=r"'inner\.width' is 'wide'"):
+        yaml_loader.load(Outer, write("inner: {width: wide}"))
+
+
+def test_a_value_out_of_its_range_is_refused(write) -> None:
+    with pytest.raises(BadConfiguration, match="greater than or equal to 0"):
+        yaml_loader.load(Outer, write("seed: -1"))
+
+
+def test_a_value_that_fits_no_alternative_is_told_all_of_them(write) -> None:
+    told = r"'speed' is -1: Input should be 'auto' or greater than or equal to 0\.25$"
+    with pytest.raises(BadConfiguration, match=told):
+        yaml_loader.load(Outer, write("speed: -1"))
+
+
+@pytest.mark.parametrize("key", ["sed", "inner.widht", "inner.widht.more"])
+def test_a_bad_override_is_blamed_on_itself_and_not_on_the_file(write, key: str) -> None:
+    with pytest.raises(BadConfiguration) as caught:
+        yaml_loader.load(Outer, write("seed: 1"), {"inner.cyclic": "no", key: "3"})
+    assert str(caught.value).startswith(f"--set {key}: unknown key")
+
+
+@pytest.mark.parametrize(("cls", "within"), [(TrainConfig, ""), (PipelineConfig, "train.")])
+def test_values_that_do_not_go_together_are_named_and_no_others(cls: type, within: str) -> None:
+    given = {"seed": "2", "tqc.policy_delay": "2", "tqc.updates_per_round": "25"}
+    with pytest.raises(BadConfiguration) as caught:
+        yaml_loader.load(cls, None, {within + key: value for key, value in given.items()})
+    message = str(caught.value)
+    blamed = f"{within}tqc.policy_delay, {within}tqc.updates_per_round"
+    assert message.startswith(f"--set {blamed}: ")
+    assert message.endswith("25, must be a multiple of tqc.policy_delay, 2")
+
+
+def test_a_bad_file_is_blamed_though_an_override_was_given(write) -> None:
+    given = write("sed: 1")
+    with pytest.raises(BadConfiguration) as caught:
+        yaml_loader.load(Outer, given, {"inner.cyclic": "no"})
+    assert str(caught.value).startswith(f"{given}: ")
+
+
+def test_yes_and_no_are_words(write) -> None:
+    assert yaml_loader.load(Outer, write("inner: {cyclic: yes}")).inner.cyclic == "yes"
+
+
+@pytest.mark.parametrize("text", ["1e-4", "1.0e-4", "0.0001"])
+def test_a_number_may_be_written_with_an_exponent(write, text) -> None:
+    assert yaml_loader.load(Outer, write(f"inner: {{width: {text}}}")).inner.width == 1e-4
+
+
+def test_a_key_that_stands_twice_is_refused(write) -> None:
+    with pytest.raises(BadConfiguration, match="'seed' stands twice"):
+        yaml_loader.load(Outer, write("seed: 1\nseed: 2\n"))
+
+
+@pytest.mark.parametrize("text", ["- 1\n- 2\n", "just words", "inner: [", "\tseed: 1"])
+def test_what_is_not_keys_and_values_is_refused_in_one_line(write, text) -> None:
+    given = write(text)
+    with pytest.raises(BadConfiguration) as caught:
+        yaml_loader.load(Outer, given)
+    assert str(given) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_an_override_wins_over_the_file(write) -> None:
+    loaded = yaml_loader.load(Outer, write("seed: 1"), {"seed": "7", "inner.width": "0.125"})
+    assert (loaded.seed, loaded.inner.width) == (7, 0.125)
+
+
+def test_an_override_with_an_unknown_key_is_refused(write) -> None:
+    with pytest.raises(BadConfiguration, match=r"inner\.hight"):
+        yaml_loader.load(Outer, write(""), {"inner.hight": "1"})
+
+
+def test_an_unknown_name_lists_the_known_ones() -> None:
+    with pytest.raises(UnknownName, match=r"unknown robot 'c3po'.*humanoid"):
+        yaml_loader.load(Outer, "robots/c3po")
+
+
+@pytest.mark.parametrize(("folder", "kind"), [("studies", "study"), ("moves", "move")])
+def test_what_is_unknown_is_called_what_it_is(folder: str, kind: str) -> None:
+    with pytest.raises(UnknownName, match=f"unknown {kind} 'nosuch'"):
+        yaml_loader.find(f"{folder}/nosuch")
+
+
+def test_a_name_does_not_lead_out_of_the_package() -> None:
+    with pytest.raises(UnknownName):
+        yaml_loader.find("../tests/configs/given")
+
+
+def test_names_are_found_from_any_folder(monkeypatch, tmp_path) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert yaml_loader.find("robots/humanoid").is_file()
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"tqc.quantiles": 2}, "must leave some of the 2 quantiles"),
+        ({"tqc.buffer": 2000}, "room for 1984 transitions .* begin after 2000: raise buffer"),
+        ({"mode": "paper", "paper.curiosity": "formula"}, "say curiosity=formula instead"),
+        ({"track.reward.curiosity": "formula"}, "say curiosity=formula instead"),
+        ({"track.random.integrators": []}, "integrators"),
+        ({"mode": "paper", "paper.weights": {}}, "one at least must count"),
+    ],
+)
+def test_numbers_with_which_nothing_would_be_learnt_are_refused(
+    given: dict[str, Any], told: str
+) -> None:
+    with pytest.raises(BadConfiguration, match=told):
+        yaml_loader.load(TrainConfig, None, given)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        *[("evaluate.threads", 0), ("evaluate.joint_noise", -1.0), ("evaluate.seed", -1)],
+        *[("evaluate.max_lag", -0.1), ("evaluate.seconds", math.inf)],
+        *[("mocap.cutoff_hz", -1.0), ("mocap.depth_cutoff_hz", 0.0), ("mocap.focal_px", -5.0)],
+        *[("mocap.bone_trust", math.nan), ("mocap.focal_px", math.inf), ("mocap.bone_trust", 5.0)],
+        *[("retarget.seed", -1), ("retarget.solver.damping", math.inf)],
+        *[("retarget.weights.height", math.inf), ("train.seed", 2**32), ("train.seed", 2**31)],
+        *[("train.track.episode_seconds", math.inf), ("train.track.reward.joints", math.nan)],
+        *[("train.track.reward.sites_width", 0.0), ("train.tqc.learning_rate", math.inf)],
+    ],
+)
+def test_numbers_that_no_stage_can_use_are_refused(key: str, value: float) -> None:
+    with pytest.raises(BadConfiguration, match=key.rpartition(".")[2]):
+        yaml_loader.load(PipelineConfig, None, {key: value})
+
+
+@pytest.mark.parametrize(
+    ("text", "seed"), [("010", 10), ("0o10", 8), ("0x10", 16), ("+7", 7), ("1000", 1000)]
+)
+def test_whole_numbers_are_those_of_yaml_1_2(text: str, seed: int) -> None:
+    assert yaml_loader.load(Outer, None, {"seed": text}).seed == seed
+
+
+@pytest.mark.parametrize("text", ["1:30", "2024-13-45", "{[1]: 2}", "9" * 5000, "[" * 3000])
+def test_what_is_no_value_is_told_with_its_key(text: str) -> None:
+    with pytest.raises(BadConfiguration, match="seed"):
+        yaml_loader.load(Outer, None, {"seed": text})

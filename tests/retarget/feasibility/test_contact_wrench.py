@@ -1,0 +1,133 @@
+"""Pushes and torques are the best there are; their smooth version has the derivatives it claims."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear
+
+from robojackson.retarget.feasibility import contact_wrench, inverse_dynamics
+from robojackson.retarget.feasibility.contact_wrench import Demand, Tolerance
+from robojackson.robot.model import Robot
+from robojackson.robot.tree_kinematics import integrate, pose, tree
+from tests.fixtures.robots import robot_motion
+
+BARRIER = 0.05
+
+
+def _demand(robot: Robot, hurry: float = 1.0) -> Demand:
+    """Some steps of the walk, played `hurry` times as fast: too fast for some motors."""
+    motion = robot_motion("walk")
+    force = inverse_dynamics.free_space(robot, motion.qpos, motion.dt, motion.lap_offset).at(hurry)
+    near = inverse_dynamics.touching(robot, motion.qpos)
+    return inverse_dynamics.demand(robot, motion.qpos, force, near, Tolerance())
+
+
+def _scipy_slack(asked: Demand, step: int) -> float:
+    """The same least squares by scipy's bounded solver, torques as unknowns."""
+    use = asked.usable[step]
+    edges, hinges = int(use.sum()), len(asked.ease)
+    matrix = np.zeros((6 + hinges, edges + hinges))
+    matrix[:, :edges] = asked.scale[:, None] * asked.columns[step][:, use]
+    matrix[6:, edges:] = np.diag(asked.scale[6:])
+    lower = np.concatenate([np.zeros(edges), asked.lower[step]])
+    upper = np.concatenate([np.full(edges, np.inf), asked.upper[step]])
+    target = asked.scale * asked.force[step]
+    found = lsq_linear(matrix, target, bounds=(lower, upper), tol=1e-13, max_iter=500)
+    return float(np.linalg.norm(found.fun))
+
+
+@pytest.mark.parametrize("hurry", [1.0, 2.0])
+def test_no_bounded_solver_leaves_less(hurry: float, robot: Robot):
+    asked = _demand(robot, hurry)
+    slack = contact_wrench.supply(asked).slack
+    for step in range(0, len(slack), 9):
+        assert slack[step] <= _scipy_slack(asked, step) + 1e-4
+
+
+def test_pushes_pull_nothing_and_use_no_sole_in_the_air(robot: Robot):
+    asked = _demand(robot)
+    pushes = contact_wrench.supply(asked).pushes
+    assert pushes.min() >= 0.0
+    np.testing.assert_array_equal(pushes[~asked.usable], 0.0)
+
+
+def test_a_sharper_barrier_comes_near_to_the_least(robot: Robot):
+    asked = _demand(robot, 2.0)
+    least = 0.5 * contact_wrench.supply(asked).slack ** 2
+    soft, sharp = (
+        np.abs(contact_wrench.relaxed(asked, mu).value - least).max() for mu in (1e-2, 1e-4)
+    )
+    assert sharp < 0.1 * soft
+
+
+def test_slope_is_the_derivative_of_the_value(robot: Robot, rng: np.random.Generator):
+    asked = _demand(robot)
+    way = rng.normal(size=asked.force.shape) / asked.scale
+    ahead, back = (
+        contact_wrench.relaxed(replace(asked, force=asked.force + s * 1e-4 * way), BARRIER).value
+        for s in (1, -1)
+    )
+    slope = np.sum(contact_wrench.relaxed(asked, BARRIER).slope * way, axis=1)
+    np.testing.assert_allclose((ahead - back) / 2e-4, slope, rtol=1e-4, atol=1e-4)
+
+
+def test_the_roots_square_is_the_second_derivative(robot: Robot, rng: np.random.Generator):
+    asked = _demand(robot)
+    way = rng.normal(size=asked.force.shape) / asked.scale
+    ahead, back = (
+        contact_wrench.relaxed(replace(asked, force=asked.force + s * 1e-4 * way), BARRIER).slope
+        for s in (1, -1)
+    )
+    root = contact_wrench.relaxed(asked, BARRIER).root
+    bend = (root.swapaxes(1, 2) @ (root @ way[..., None]))[..., 0]
+    np.testing.assert_allclose((ahead - back) / 2e-4 / asked.scale, bend / asked.scale, atol=2e-3)
+
+
+def test_the_residual_leads_to_the_slope(robot: Robot):
+    found = contact_wrench.relaxed(_demand(robot), BARRIER)
+    slope = (found.root.swapaxes(1, 2) @ found.residual[..., None])[..., 0]
+    np.testing.assert_allclose(slope, found.slope, rtol=1e-6, atol=1e-9)
+
+
+def test_a_hinge_on_its_stop_needs_no_motor_to_stay_there(robot: Robot):
+    qpos = np.tile(robot.standing, (5, 1))
+    knee = robot.joint_names.index("left_knee")
+    qpos[:, 7 + knee] = robot.upper[knee]  # straight: the stop pushes back, towards bending
+    force = np.zeros((5, robot.model.nv))
+    asked = inverse_dynamics.demand(robot, qpos, force, np.zeros((5, 2), bool), Tolerance())
+    assert np.isinf(asked.lower[:, knee]).all()
+    np.testing.assert_allclose(asked.upper[:, knee], robot.torque_limit[knee])
+
+
+@pytest.mark.parametrize("tempo", [0.5, 0.8])
+def test_the_force_at_another_tempo_is_that_of_the_slower_motion(tempo: float, robot: Robot):
+    """mj_inverse with velocities times k and accelerations times k^2."""
+    motion = robot_motion("walk")
+    parts = inverse_dynamics.free_space(robot, motion.qpos, motion.dt, motion.lap_offset)
+    from robojackson.robot.resampling import accelerations, velocities
+
+    speed = tempo * velocities(motion.qpos, motion.dt, motion.lap_offset)
+    rate = tempo**2 * accelerations(motion.qpos, motion.dt, motion.lap_offset)
+    slower = inverse_dynamics.inverse(
+        inverse_dynamics.unconstrained(robot), motion.qpos, speed, rate
+    )
+    np.testing.assert_allclose(parts.at(tempo), slower, atol=1e-6)
+
+
+def test_edges_are_forces_on_the_lowest_points(robot: Robot, poses: np.ndarray):
+    """Virtual work: moving a sole's point by J dq against a push is the generalised force."""
+    posed = pose(tree(robot), poses)
+    columns = inverse_dynamics.edges(robot, posed)
+    nudge = np.zeros((len(poses), robot.model.nv))
+    nudge[:, 9] = 1e-6
+    moved = pose(tree(robot), integrate(poses, nudge))
+    turn = moved.body_rot[:, robot.contact_bodies] @ posed.body_rot[
+        :, robot.contact_bodies
+    ].swapaxes(2, 3)
+    arm = np.array([0.0, 0.0, -robot.contact_radii[0]])
+    path = moved.ball_pos - posed.ball_pos + (turn @ arm) - arm
+    work = np.einsum("sci,ie->sce", path / 1e-6, inverse_dynamics.directions()).reshape(
+        len(poses), -1
+    )
+    np.testing.assert_allclose(columns[:, 9], work, atol=1e-4)

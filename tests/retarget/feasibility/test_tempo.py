@@ -1,0 +1,120 @@
+"""Warps are smooth, never too slow, keep laps closed, and come only where slowing down helps."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from robojackson.retarget.feasibility.tempo import (
+    GRID,
+    feasible_tempo,
+    smooth_rate,
+    times_at,
+    wanted_rate,
+    warp,
+    warped,
+)
+from robojackson.retarget.retarget_config import RetargetConfig
+from robojackson.retarget.retargeting import retarget
+from robojackson.retarget.targets.cycle import human_clip
+from robojackson.retarget.targets.keypoint_targets import Targets, targets
+from robojackson.robot.model import Robot
+from tests.fixtures.robots import human, robot_motion
+
+DT = 0.015
+
+
+def _rate(count: int, slowest: float) -> np.ndarray:
+    wanted = np.ones(count)
+    wanted[count // 3 : count // 2] = slowest
+    return smooth_rate(wanted, DT, ring=False)
+
+
+def test_a_rate_of_one_changes_nothing():
+    np.testing.assert_allclose(warp(np.ones(50), ring=False), np.arange(50))
+    np.testing.assert_allclose(warp(np.ones(50), ring=True), np.arange(50))
+
+
+@pytest.mark.parametrize("slowest", [0.5, 0.8])
+def test_a_warp_ends_where_the_motion_ends_and_runs_at_the_rate(slowest: float):
+    rate = _rate(200, slowest)
+    steps = warp(rate, ring=False)
+    assert (steps[0], steps[-1]) == pytest.approx((0.0, 199.0))
+    pace = np.diff(steps)
+    np.testing.assert_allclose(pace, np.interp(steps[:-1], np.arange(200), rate), atol=0.02)
+    assert pace.min() >= slowest * 0.99
+    assert pace.max() <= 1.0 + 1e-9
+
+
+def test_a_half_tempo_takes_twice_as_long():
+    assert len(warp(np.full(101, 0.5), ring=False)) == 201
+    assert len(warp(np.full(100, 0.5), ring=True)) == 200
+
+
+def test_the_rate_is_smooth():
+    """A change of tempo of a half takes longer than a tenth of a second."""
+    assert np.abs(np.diff(_rate(200, 0.5))).max() < 0.5 * DT / 0.1
+
+
+def test_a_warped_lap_still_travels_its_lap(robot: Robot):
+    aims = _aims(robot)
+    steps = warp(np.full(len(aims), 0.7), ring=True)
+    slower = warped(aims, steps)
+    assert slower.lap is not None
+    step = slower.keypoints_w[:, 0, 0]
+    closing = step[0] + slower.lap[0] - step[-1]
+    assert closing == pytest.approx(np.diff(step)[-1], abs=0.005)
+
+
+def test_targets_at_whole_steps_are_the_targets(robot: Robot):
+    aims = _aims(robot)
+    same = warped(aims, np.arange(len(aims), dtype=float))
+    np.testing.assert_allclose(same.keypoints_w, aims.keypoints_w, atol=1e-9)
+    np.testing.assert_array_equal(same.contact, aims.contact)
+
+
+def test_source_times_follow_the_warp():
+    time_s = 2.0 + np.arange(10) * 0.03
+    np.testing.assert_allclose(times_at(time_s, np.array([0.0, 2.5, 9.5])), [2.0, 2.075, 2.285])
+
+
+def _slack(*values: float) -> np.ndarray:
+    return np.array(values)[:, None]
+
+
+def test_the_fastest_feasible_tempo_is_chosen():
+    slack = _slack(2.0, 1.2, 0.9, 0.5, 0.4, 0.3)
+    assert feasible_tempo(slack)[0] == GRID[2] == wanted_rate(slack)[0]
+
+
+def test_what_slowing_down_does_not_help_keeps_its_tempo():
+    """A pose on one foot with the weight beside it is no better when it is held longer."""
+    slack = _slack(2.0, 2.0, 2.1, 2.1, 2.2, 2.3)
+    assert feasible_tempo(slack)[0] == 0.0
+    assert wanted_rate(slack)[0] == 1.0
+
+
+def _hurried(robot: Robot, tempo: float | str) -> dict[str, float]:
+    """The hip shake as if it had been filmed at a third of its speed, hardly repaired."""
+    fast = replace(human("hip_shake"), fps=90.0)
+    gentle = replace(RetargetConfig().repair, weights=(1e-5,))
+    config = RetargetConfig(tempo=tempo, repair=gentle)  # type: ignore[arg-type]
+    return dict(retarget(fast, robot, config).scorecard)
+
+
+def test_auto_slows_a_hurried_dance_down_and_says_by_how_much(robot: Robot):
+    kept, slowed = _hurried(robot, 1.0), _hurried(robot, "auto")
+    assert kept["tempo_min"] == pytest.approx(1.0)
+    assert 0.5 <= slowed["tempo_min"] < 0.97
+    assert slowed["seconds"] == pytest.approx(kept["seconds"] / slowed["tempo_mean"], rel=1e-6)
+    assert slowed["infeasible_share"] < 0.5 * kept["infeasible_share"]
+    assert slowed["seam_deg"] < 1.0
+
+
+def test_auto_keeps_a_tempo_that_fits():
+    assert robot_motion("walk").scorecard["tempo_mean"] == 1.0
+
+
+def _aims(robot: Robot) -> Targets:
+    clip, _ = human_clip(human("walk"), DT, "auto", 1.0, RetargetConfig().cycle)
+    return targets(clip, robot)

@@ -1,0 +1,1 @@
+"""How shipped assets and pictures of the documentation are made."""

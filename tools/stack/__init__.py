@@ -1,0 +1,1 @@
+"""The services of docker-compose.yml as processes, for tests and benchmarks."""

@@ -1,0 +1,201 @@
+"""Train the temporal network and its flow, and write the weights that ship.
+
+    python -m tools.pairs MOTIONS... -o pairs          (an hour or more; see there)
+    python -m tools.temporal.train_temporal pairs --motions MOTIONS... -o temporal.safetensors
+
+Reads the pairs, makes truths without pictures from the same motions (kept beside the pairs), fits
+the lifter, then the flow. Seeded; the state is kept beside the weights every 100 steps, and the
+same command goes on from there. Writes the weights (half precision), and REPORT.json and REPORT.png
+with the curve and the validation. Motions outside the list of `tools/pairs/sources.py` are refused
+when the pairs are made; pairs of others are refused here.
+"""
+
+import argparse
+import json
+import logging
+import sys
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import torch
+from safetensors.torch import load_file, save_file
+
+from tools.pairs import sources
+from tools.temporal import fit
+from tools.temporal.examples import Example, Truth, load
+from tools.temporal.fit_flow import fit_flow
+from tools.temporal.net import Flow, Lifter
+
+log = logging.getLogger("train_temporal")
+INVENTED = "invented"
+
+
+def check_motions(examples: list[Example]) -> None:
+    """Refuse pairs of a motion that may not be trained on.
+
+    Raises:
+        RefusedMotion: such a motion.
+    """
+    for name in {example.motion.split("+")[0] for example in examples}:
+        if name != INVENTED:
+            sources.check_allowed(Path(name))
+
+
+def truths_of(folder: Path, motions: list[Path], count: int, seed: int) -> list[Truth]:
+    """The truths without pictures, made once."""
+    path = folder / f"truths-{seed}-{count}.npz"
+    if not path.exists():
+        from tools.temporal import truths  # needs tools/requirements.txt, as the rendering does
+
+        log.info("making %d truths without pictures", count)
+        made = truths.make(motions, count, seed)
+        lengths = [len(item[0]) for item in made]
+        np.savez(
+            path, truth=np.concatenate([m[0] for m in made]),
+            distance=np.concatenate([m[1] for m in made]), wrong=[m[2] for m in made],
+            lengths=lengths,
+        )  # fmt: skip
+    with np.load(path) as data:
+        edges = np.cumsum(data["lengths"])[:-1]
+        parts = (np.split(data["truth"], edges), np.split(data["distance"], edges), data["wrong"])
+        return [(t, d, float(w)) for t, d, w in zip(*parts, strict=True)]
+
+
+def train(
+    pairs: Path, motions: list[Path], out: Path, config: fit.FitConfig, count: int, seed: int,
+    flow_steps: int, first: Path | None = None,
+) -> dict[str, object]:  # fmt: skip
+    """Fit lifter and flow; returns the report."""
+    training, validation = load(pairs)
+    check_motions(training + validation)
+    log.info("%d clips to train on, %d to validate", len(training), len(validation))
+    progress = fit.begin(training, config, seed)
+    if first:
+        begin_with(progress, first)
+    state = out.with_suffix(".state.pt")
+    resume(progress, state)
+
+    def watch(now: fit.Progress, step_s: float) -> None:
+        if now.step % 300 == 0 or now.step == config.steps:
+            now.curve[-1] |= fit.validate(fit.averaged(now), validation)
+        keep(now, state)
+        told = ", ".join(f"{k} {v:.4g}" for k, v in now.curve[-1].items())
+        log.info("%s; %.0f CPU s left", told, (config.steps - now.step) * step_s)
+
+    synthetic = truths_of(pairs, motions, count, seed) if count else []
+    where = fit.source(training, synthetic, seed)
+    fit.fit(progress, where, config, seed, watch)
+    lifter = fit.averaged(progress)
+    flow_curve: list[dict[str, float]] = []
+
+    def watch_flow(step: int, losses: dict[str, float]) -> None:
+        flow_curve.append({"step": step, **losses})
+        log.info("flow %d: %s", step, ", ".join(f"{k} {v:.3g}" for k, v in losses.items()))
+
+    flow = fit_flow(lifter, where, flow_steps, seed, watch_flow)
+    save(lifter, flow, out)
+    return {
+        "clips": len(training), "frames": sum(len(e.truth) for e in training),
+        "validation_clips": len(validation), "truths": len(synthetic), "seed": seed,
+        "config": asdict(config), "curve": progress.curve, "flow": flow_curve,
+        "validation": fit.validate(lifter, validation),
+    }  # fmt: skip
+
+
+def save(lifter: Lifter, flow: Flow, path: Path) -> None:
+    """Both in one file, half precision but for the normalisation of the input."""
+    arrays = dict(lifter.state_dict())
+    arrays |= {f"flow.{name}": value for name, value in flow.state_dict().items()}
+    keep_exact = ("mean", "scale")
+    save_file(
+        {
+            n: v.contiguous() if n in keep_exact else v.half().contiguous()
+            for n, v in arrays.items()
+        },
+        path,
+    )
+
+
+def begin_with(progress: fit.Progress, path: Path) -> None:
+    """Take the lifter of a weights file as the first one."""
+    arrays = {n: v.float() for n, v in load_file(path).items() if not n.startswith("flow.")}
+    progress.net.load_state_dict(arrays)
+    progress.mean.update({name: value.clone() for name, value in arrays.items()})
+
+
+def keep(progress: fit.Progress, path: Path) -> None:
+    """Write the state of the run."""
+    content = {
+        "step": progress.step, "net": progress.net.state_dict(), "mean": progress.mean,
+        "optimiser": progress.optimiser.state_dict(), "curve": progress.curve,
+    }  # fmt: skip
+    torch.save(content, path.with_suffix(".tmp"))
+    path.with_suffix(".tmp").rename(path)
+
+
+def resume(progress: fit.Progress, path: Path) -> None:
+    """Go on from a kept state, if there is one."""
+    if not path.exists():
+        return
+    content = torch.load(path, weights_only=True)
+    progress.step, progress.curve = content["step"], content["curve"]
+    progress.net.load_state_dict(content["net"])
+    progress.mean.update(content["mean"])
+    progress.optimiser.load_state_dict(content["optimiser"])
+    log.info("going on from step %d", progress.step)
+
+
+def draw_curve(report: dict[str, object], path: Path) -> None:
+    """The curve as a picture."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    curve = report["curve"]
+    assert isinstance(curve, list)
+    figure, axes = pyplot.subplots(figsize=(7, 4))
+    axes.plot([c["step"] for c in curve], [1e3 * c["place"] for c in curve], label="training")
+    judged = [c for c in curve if "rr_network" in c]
+    for key, label in (("rr_network", "validation"), ("pa_network", "validation, PA")):
+        axes.plot([c["step"] for c in judged], [c[key] for c in judged], "o-", label=label)
+    for key in ("rr_detector", "pa_detector"):
+        axes.axhline(judged[-1][key], ls=":", c="grey")
+    axes.set(xlabel="step", ylabel="MPJPE, mm (dotted: the detector)", ylim=(0, None))
+    axes.legend()
+    figure.tight_layout()
+    figure.savefig(path, dpi=110)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("pairs", type=Path)
+    parser.add_argument("--motions", type=Path, nargs="*", default=[])
+    parser.add_argument("-o", "--out", type=Path, required=True)
+    parser.add_argument("--report", type=Path, help="path without a suffix; default beside --out")
+    parser.add_argument("--steps", type=int, default=fit.FitConfig().steps)
+    parser.add_argument("--flow-steps", type=int, default=600)
+    parser.add_argument("--first", type=Path, help="weights to begin with, as of a shorter run")
+    parser.add_argument("--rate", type=float, default=fit.FitConfig().rate)
+    parser.add_argument("--truths", type=int, default=2500)
+    parser.add_argument("--seed", type=int, default=7)
+    options = parser.parse_args(arguments)
+    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    torch.set_num_threads(1)
+    config = fit.FitConfig(steps=options.steps, rate=options.rate)
+    report = train(
+        options.pairs, options.motions, options.out, config, options.truths, options.seed,
+        options.flow_steps, options.first,
+    )  # fmt: skip
+    target = options.report or options.out.with_suffix("")
+    target.with_suffix(".json").write_text(json.dumps(report, indent=1) + "\n")
+    draw_curve(report, target.with_suffix(".png"))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
