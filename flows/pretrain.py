@@ -40,7 +40,7 @@ async def pretrain(
     command = [
         sys.executable,
         "-m",
-        "robojackson.cli.app",
+        "robojackson.cli",
         "pretrain",
         "--kind",
         kind,

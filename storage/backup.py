@@ -21,8 +21,7 @@ from pydantic.dataclasses import dataclass
 
 from robojackson.errors import BackupFailed, StoreError
 from robojackson.pipeline.folder_lock import locked
-from storage.artifact import sha256_of, sha256_of_file
-from storage.places import TEMPORARY, Folder
+from robojackson.pipeline.local_folder import TEMPORARY, LocalFolder, sha256_of, sha256_of_file
 
 CONTENTS, MANIFESTS = "contents", "backups"
 HELD = ".writing"
@@ -122,7 +121,7 @@ class Backups:
         plain = MANIFEST.dump_python(manifest, mode="json")
         text = json.dumps({"sha256": _digest(plain), "backup": plain}, indent=1)
         name = self._new_name()
-        Folder(self.root).put(f"{MANIFESTS}/{name}.json", text.encode())
+        LocalFolder(self.root).put(f"{MANIFESTS}/{name}.json", text.encode())
         return name
 
     def path(self, content: Content) -> Path:

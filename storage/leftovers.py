@@ -18,8 +18,8 @@ from pathlib import Path
 
 from robojackson.errors import StoreError
 from robojackson.pipeline.folder_lock import locked
+from robojackson.pipeline.local_folder import TEMPORARY, LocalFolder
 from storage import study_tables
-from storage.places import TEMPORARY, Folder
 from storage.store import HELD, SCRATCH, Store
 
 log = logging.getLogger(__name__)
@@ -49,7 +49,7 @@ def sweep(store: Store, parts: bool = True, work: bool = True) -> list[Path]:
 
 def _parts(store: Store) -> Iterator[Path]:
     """Files whose writing was not finished."""
-    if not isinstance(store.place, Folder):
+    if not isinstance(store.place, LocalFolder):
         return
     for folder, _, names in os.walk(store.place.root):  # a folder may go away while it is read
         for path in (Path(folder, name) for name in names if name.startswith(TEMPORARY)):

@@ -1,9 +1,6 @@
 """The catalogue of runs: one small JSON file a run, so that two runs never write the same file."""
 
-import hashlib
 import json
-import re
-import unicodedata
 from dataclasses import asdict
 from datetime import datetime
 from typing import Annotated, Any
@@ -16,7 +13,6 @@ from storage.artifact import Artifact
 from storage.store import Store
 
 FOLDER = "runs"
-NAME_LENGTH = 60
 
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid"))
@@ -25,7 +21,7 @@ class Run:
 
     Attributes:
         run_id: Unique name, of letters, digits and `_.-`.
-        move: Name of the dance, as `safe_name` leaves it.
+        move: Name of the dance, as `run_name` leaves it.
         robot: Name of the robot description.
         setup: Name of the training setup.
         seed: Of the training.
@@ -42,17 +38,6 @@ class Run:
     finished_at: datetime
     artifacts: dict[str, Artifact] = Field(default_factory=dict)
     summary: dict[str, Any] = Field(default_factory=dict)
-
-
-def safe_name(text: str) -> str:
-    """A file's or a person's name as a part of run ids, folders and command lines.
-
-    ASCII letters, digits and `_.-`, never empty, at most `NAME_LENGTH` long; accents are dropped,
-    and a name of which nothing is left gets a digest, so that two of them stay two.
-    """
-    ascii_only = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
-    name = re.sub(r"[^A-Za-z0-9_.-]+", "-", ascii_only)[:NAME_LENGTH].strip("-._")
-    return name or f"dance-{hashlib.sha256(text.encode(errors='replace')).hexdigest()[:8]}"
 
 
 def record(store: Store, run: Run) -> Artifact:

@@ -77,7 +77,7 @@ def _plain(value: Any) -> Any:
 def _artifacts(value: Any, store: Store) -> Any:
     if isinstance(value, dict):
         if set(value) == {ARTIFACT}:
-            return Artifact(**value[ARTIFACT]).verify(store)
+            return store.verify(Artifact(**value[ARTIFACT]))
         return {key: _artifacts(inner, store) for key, inner in value.items()}
     if isinstance(value, list):
         return [_artifacts(inner, store) for inner in value]

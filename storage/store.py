@@ -12,9 +12,11 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from robojackson.errors import StoreError
+from robojackson.pipeline.file_tree import FileTree, digest_of, in_one_line
 from robojackson.pipeline.folder_lock import A_MOMENT, locked
-from storage.artifact import Artifact, sha256_of, sha256_of_file
-from storage.places import TEMPORARY, Folder, Place, place_at
+from robojackson.pipeline.local_folder import LocalFolder, Place
+from storage.artifact import Artifact
+from storage.places import place_at
 
 VARIABLE = "ROBOJACKSON_STORE"
 DEFAULT_ROOT = "store"
@@ -22,7 +24,7 @@ SCRATCH, HELD = "scratch", ".held"
 """The folder of folders that go away, and the file in each that its process has locked."""
 
 
-class Store:
+class Store(FileTree):
     """Files by key, under one root.
 
     Attributes:
@@ -31,9 +33,9 @@ class Store:
     """
 
     def __init__(self, root: str | Path, place: Place | None = None) -> None:
-        self.root = str(root)
-        with _one_line(f"cannot open the store {self.root}"):
-            self.place: Place = place or place_at(self.root)
+        with in_one_line(f"cannot open the store {root}"):
+            place = place or place_at(str(root))
+        super().__init__(root, place)
 
     @classmethod
     def from_environment(cls) -> "Store":
@@ -42,66 +44,38 @@ class Store:
 
     def create(self) -> "Store":
         """The store itself, its folder or bucket made if it is not there."""
-        with _one_line(f"cannot make the store {self.root}"):
+        with in_one_line(f"cannot make the store {self.root}"):
             self.place.create()
         return self
 
     def put(self, key: str, content: bytes | Path) -> Artifact:
-        """Write bytes, or copy a local file, under a key; replaces what was there.
+        """Write a file as `write` does; return its key and digest."""
+        return Artifact(key=key, sha256=self.write(key, content))
+
+    def verify(self, artifact: Artifact) -> Artifact:
+        """Return the artifact itself, if its file is there and unaltered.
 
         Raises:
-            StoreError: full disk, no permission, connection cut, a device in its place, or a name
-                that is no UTF-8; nothing half-written is left.
+            StoreError: the file is gone or has another content.
         """
-        if not _is_text(key):
-            raise StoreError(f"cannot write {key!a}: the name is no UTF-8; choose another")
-        with _one_line(f"cannot write {self.address(key)}"):
-            digest = _digest(content)
-            self.place.put(key, content)
-        return Artifact(key=key, sha256=digest)
+        found = self.sha256(artifact.key)
+        if found != artifact.sha256:
+            raise StoreError(
+                f"{self.address(artifact.key)} was altered: "
+                f"sha256 {found[:12]}..., expected {artifact.sha256[:12]}..."
+            )
+        return artifact
 
     def keep(self, stage: str, name: str, content: bytes | Path) -> Artifact:
         """Put content under a key made of its digest, so that nothing is ever overwritten."""
-        with _one_line(f"cannot read {content if isinstance(content, Path) else name}"):
-            digest = _digest(content)
+        with in_one_line(f"cannot read {content if isinstance(content, Path) else name}"):
+            digest = digest_of(content)
         return self.put(f"{stage}/{digest[:16]}/{name}", content)
-
-    def read(self, key: str) -> bytes:
-        """The content of a file."""
-        with _one_line(f"cannot read {self.address(key)}"):
-            return self.place.read(key)
-
-    def sha256(self, key: str) -> str:
-        """Digest of a file's content."""
-        with _one_line(f"cannot read {self.address(key)}"):
-            return self.place.sha256(key)
-
-    def exists(self, key: str) -> bool:
-        """Whether there is a file under that key."""
-        with _one_line(f"cannot look at {self.address(key)}"):
-            return self.place.exists(key)
-
-    def remove(self, key: str) -> None:
-        """Take a file away; one that is gone already is no error."""
-        with _one_line(f"cannot remove {self.address(key)}"):
-            try:
-                self.place.remove(key)
-            except FileNotFoundError:
-                return
-
-    def list(self, prefix: str = "") -> list[str]:
-        """Keys under a folder, sorted."""
-        with _one_line(f"cannot list {self.address(prefix)}"):
-            return sorted(self.place.list(prefix))
-
-    def address(self, key: str) -> str:
-        """The path or URL of a key, for people."""
-        return self.place.address(key)
 
     @contextmanager
     def local(self, artifact: Artifact) -> Iterator[Path]:
         """A local file with the content: the file itself on a disk, else a copy that goes away."""
-        if isinstance(self.place, Folder):
+        if isinstance(self.place, LocalFolder):
             yield self.place.root / artifact.key
             return
         with self.scratch() as folder:
@@ -113,7 +87,7 @@ class Store:
     def scratch(self) -> Iterator[Path]:
         """A folder that goes away, for results on their way into the store."""
         base = self.work(SCRATCH)
-        with _one_line(f"cannot write {base}"):
+        with in_one_line(f"cannot write {base}"):
             folder = Path(tempfile.mkdtemp(dir=base))
         try:
             with locked(folder, HELD, patience_s=A_MOMENT):  # of a sweep that looks at it
@@ -124,14 +98,14 @@ class Store:
     def work(self, name: str) -> Path:
         """A local folder that stays: the state of a run that may be resumed."""
         path = self.here / "work" / name
-        with _one_line(f"cannot write {path}"):
+        with in_one_line(f"cannot write {path}"):
             path.mkdir(parents=True, exist_ok=True)
         return path
 
     @property
     def here(self) -> Path:
         """What belongs to this machine alone: the root itself on a disk, else a folder in cache."""
-        if isinstance(self.place, Folder):
+        if isinstance(self.place, LocalFolder):
             return self.place.root
         cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
         return cache / "robojackson" / hashlib.sha256(self.root.encode()).hexdigest()[:12]
@@ -144,44 +118,15 @@ class Store:
         """
         if room_mb:
             self.require_room(room_mb)
-        key = f"{TEMPORARY}{os.getpid()}"
-        with _one_line(f"cannot write the store {self.root}"):
-            self.place.put(key, b"robojackson " * 1024)
-            self.place.remove(key)
+        super().require_writable()
 
     def require_room(self, room_mb: int) -> None:
         """Raise one line where the disk of `here` has less room, millions of bytes."""
         there = next(path for path in (self.here, *self.here.parents) if path.exists())
-        with _one_line(f"cannot look at the disk of {self.here}"):
+        with in_one_line(f"cannot look at the disk of {self.here}"):
             free_mb = shutil.disk_usage(there).free / 1e6
         if free_mb < room_mb:
             raise StoreError(
                 f"the disk of {self.here} has {free_mb:.1f} MB free, {room_mb} MB are needed: "
                 f"make room, or let {VARIABLE} name another folder"
             )
-
-
-def _digest(content: bytes | Path) -> str:
-    return sha256_of(content) if isinstance(content, bytes) else sha256_of_file(content)
-
-
-def _is_text(key: str) -> bool:
-    """Whether a name can be told; a file system takes any bytes."""
-    try:
-        key.encode()
-    except UnicodeEncodeError:
-        return False
-    return True
-
-
-@contextmanager
-def _one_line(what: str) -> Iterator[None]:
-    """Turn whatever a place raises into one line."""
-    try:
-        yield
-    except StoreError:
-        raise
-    except Exception as cause:
-        reason = cause.strerror if isinstance(cause, OSError) and cause.strerror else str(cause)
-        told = " ".join(reason.split()) or type(cause).__name__
-        raise StoreError(f"{what}: {told}") from cause

@@ -9,16 +9,17 @@ import shutil
 import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
 import fsspec
 
-from robojackson.errors import BackupFailed, RoboJacksonError
+from robojackson.errors import BackupFailed
+from robojackson.pipeline.file_tree import in_one_line
+from robojackson.pipeline.local_folder import TEMPORARY, LocalFolder
 from storage.backup import Backups, Content, Dump, Manifest
-from storage.places import TEMPORARY, Folder, Remote
+from storage.places import Remote
 from storage.prefect_database import Database, SQLite
 from storage.store import Store
 
@@ -208,7 +209,7 @@ def entries(
     Raises:
         BackupFailed: the store cannot be listed, or a name in it is no UTF-8.
     """
-    with _one_line(f"cannot list {store.root}"):
+    with in_one_line(f"cannot list {store.root}", BackupFailed):
         try:
             found = _found(store)
         except FileNotFoundError:
@@ -227,7 +228,7 @@ def entries(
 
 
 def _found(store: Store) -> dict[str, str | None]:
-    if isinstance(store.place, Folder):
+    if isinstance(store.place, LocalFolder):
         return _local(store.place.root)
     assert isinstance(store.place, Remote)
     return _remote(store.place.url)
@@ -267,7 +268,7 @@ def _remote(url: str) -> dict[str, str | None]:
 
 def _inside(store: Store, path: Path) -> str | None:
     """Return the key of a path in a local store; None elsewhere."""
-    if isinstance(store.place, Folder) and path.absolute().is_relative_to(store.place.root):
+    if isinstance(store.place, LocalFolder) and path.absolute().is_relative_to(store.place.root):
         return path.absolute().relative_to(store.place.root).as_posix()
     return None
 
@@ -308,9 +309,10 @@ def _dumped(database: Database, backups: Backups) -> Dump | None:
 
 def _taken(store: Store, key: str, stamp: str | None, backups: Backups) -> Content | None:
     """Copy a file of the store; None when it is gone."""
-    with backups.temporary() as path, _one_line(f"cannot copy {store.address(key)}"):
+    what = f"cannot copy {store.address(key)}"
+    with backups.temporary() as path, in_one_line(what, BackupFailed):
         try:
-            if isinstance(store.place, Folder):
+            if isinstance(store.place, LocalFolder):
                 shutil.copyfile(store.place.root / key, path)
             else:
                 assert isinstance(store.place, Remote)
@@ -349,15 +351,3 @@ def _each(work: Callable[[str], T], names: Iterable[str]) -> Iterator[tuple[str,
 
 def _mb(contents: Iterable[Content]) -> float:
     return sum(content.size for content in contents) / 1e6
-
-
-@contextmanager
-def _one_line(what: str) -> Iterator[None]:
-    """Turn whatever a store raises into one line."""
-    try:
-        yield
-    except RoboJacksonError:
-        raise
-    except Exception as cause:
-        reason = cause.strerror if isinstance(cause, OSError) and cause.strerror else str(cause)
-        raise BackupFailed(f"{what}: {' '.join(reason.split()) or type(cause).__name__}") from cause

@@ -19,8 +19,9 @@ import pyarrow as pa
 
 from robojackson.errors import BadTable, StoreError
 from robojackson.pipeline import tables
+from robojackson.pipeline.local_folder import sha256_of
 from robojackson.pipeline.table_schemas import EPISODE_RECORD, EVALUATION_RECORD, TableSchema
-from storage.artifact import Artifact, sha256_of
+from storage.artifact import Artifact
 from storage.store import Store
 
 if TYPE_CHECKING:

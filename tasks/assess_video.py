@@ -8,8 +8,9 @@ from typing import Any
 from robojackson.clips.pose_detector import model_path
 from robojackson.clips.quality.assessment import JudgeConfig, Judgement
 from robojackson.clips.quality.assessment import judge as measure
-from robojackson.pipeline import tables
-from storage.artifact import Artifact, sha256_of_file
+from robojackson.pipeline.local_folder import sha256_of_file
+from storage import artifact_tables
+from storage.artifact import Artifact
 from storage.store import Store
 from tasks.runtime.stage import stage
 from tasks.runtime.worker_processes import in_worker
@@ -27,8 +28,8 @@ def judge(video: Artifact, config: JudgeConfig) -> dict[str, Artifact]:
         found: Judgement = in_worker(measure, path, config)
     info = {key: value for key, value in asdict(found.info).items() if key != "path"}
     return {
-        "landmarks": tables.keep(store, "landmarks", "landmarks.parquet", found.track),
-        "stability": tables.keep(store, "stability", "stability.parquet", found.stability),
+        "landmarks": artifact_tables.keep(store, "landmarks", "landmarks.parquet", found.track),
+        "stability": artifact_tables.keep(store, "stability", "stability.parquet", found.stability),
         "quality": store.keep(
             "quality", "quality.json", json.dumps(asdict(found.quality)).encode()
         ),

@@ -3,9 +3,9 @@
 import json
 
 from robojackson.motion.reference_motion import ReferenceMotion
-from robojackson.pipeline import tables
 from robojackson.rl.config.train_config import PaperConfig, TrackConfig
 from robojackson.robot.model import RobotDescription, load_robot
+from storage import artifact_tables
 from storage.artifact import Artifact
 from storage.store import Store
 from tasks.runtime.robot_digests import robot_models
@@ -20,6 +20,6 @@ def payments(
     from robojackson.rl.evaluation.reward_audit import shares
 
     store = Store.from_environment()
-    motion, machine = tables.read(ReferenceMotion, store, reference), load_robot(robot)
+    motion, machine = artifact_tables.read(ReferenceMotion, store, reference), load_robot(robot)
     paid = {name: shares(machine, motion, reward).of for name, reward in rewards.items()}
     return store.keep("payments", "payments.json", json.dumps(paid, indent=1).encode())

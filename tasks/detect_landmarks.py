@@ -8,8 +8,9 @@ from robojackson.clips.people.dancer import DancerConfig
 from robojackson.clips.people.tracked_people import SCOUT
 from robojackson.clips.pose_detector import detect, model_path
 from robojackson.mocap.landmarks.pipeline import models_of, see
-from robojackson.pipeline import tables
-from storage.artifact import Artifact, sha256_of_file
+from robojackson.pipeline.local_folder import sha256_of_file
+from storage import artifact_tables
+from storage.artifact import Artifact
 from storage.store import Store
 from tasks.probe_video import info_of
 from tasks.runtime.stage import stage
@@ -37,4 +38,4 @@ def landmarks(
     with store.local(video) as path, alone():
         known = info_of(store, info, path)
         track = see(path, known, size, dancer) if dancer else detect(path, known, size)
-    return tables.keep(store, "landmarks", "landmarks.parquet", track)
+    return artifact_tables.keep(store, "landmarks", "landmarks.parquet", track)

@@ -77,7 +77,7 @@ def _had(store: Store, video: WebVideo, chosen: Offer) -> Artifact | None:
     if not store.exists(note):
         return None
     try:
-        return Artifact(**json.loads(store.read(note))).verify(store)
+        return store.verify(Artifact(**json.loads(store.read(note))))
     except (StoreError, ValueError, TypeError):
         return None
 

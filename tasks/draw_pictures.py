@@ -3,10 +3,10 @@
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
-from robojackson.pipeline import tables
 from robojackson.report.video.still_picture import middle_of
 from robojackson.report.video.still_picture import still as draw
 from robojackson.robot.model import RobotDescription, load_robot
+from storage import artifact_tables
 from storage.artifact import Artifact
 from storage.store import Store
 from tasks.runtime.robot_digests import robot_models
@@ -26,9 +26,9 @@ def still(
     with store.local(source) as path:
         picture = draw(
             path,
-            tables.read(LandmarkTrack, store, landmarks),
-            tables.read(SmplSequence, store, sequence),
-            tables.read(ReferenceMotion, store, reference),
+            artifact_tables.read(LandmarkTrack, store, landmarks),
+            artifact_tables.read(SmplSequence, store, sequence),
+            artifact_tables.read(ReferenceMotion, store, reference),
             load_robot(robot).model,
         )
     return store.keep("still", "still.png", picture)

@@ -8,6 +8,7 @@ from robojackson.pipeline.table_codecs import Rollout
 from robojackson.pipeline.table_schemas import EVALUATION_RECORD
 from robojackson.rl.config.train_config import EvaluateConfig
 from robojackson.robot.model import RobotDescription, load_robot
+from storage import artifact_tables
 from storage.artifact import Artifact
 from storage.store import Store
 from tasks.runtime.robot_digests import robot_models
@@ -28,7 +29,7 @@ def evaluate(
     from robojackson.rl.policy import load_policy
 
     store = Store.from_environment()
-    motion = tables.read(ReferenceMotion, store, reference)
+    motion = artifact_tables.read(ReferenceMotion, store, reference)
     with store.local(policy) as path:
         trained = load_policy(path)
     verdict = judge(trained, motion, load_robot(robot), config)
@@ -40,5 +41,5 @@ def evaluate(
     return {
         "evaluations": store.keep("evaluate", "evaluations.parquet", rows),
         "evaluation": store.keep("evaluate", "evaluation.json", summary),
-        "rollout": tables.keep(store, "evaluate", "rollout.parquet", rollout),
+        "rollout": artifact_tables.keep(store, "evaluate", "rollout.parquet", rollout),
     }

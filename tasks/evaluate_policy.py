@@ -52,7 +52,7 @@ async def judge(
         settings.write_text(yaml.safe_dump({"evaluate": _plain(config)}))
         words = ["evaluate", learnt, motion, "--out", work, "--config", settings]
         words += ["--parent", os.getpid(), "--json"]
-        command = [sys.executable, "-m", "robojackson.cli.app", *map(str, words)]
+        command = [sys.executable, "-m", "robojackson.cli", *map(str, words)]
         await run_process(command, name, work, limit_s)
         kept = {
             "evaluations": store.keep("evaluate", TABLE, work / TABLE),

@@ -9,7 +9,8 @@ from robojackson.clips.time_range import span
 from robojackson.clips.trim import trim as trim_file
 from robojackson.clips.video import VideoInfo, VideoLimits
 from robojackson.clips.video import probe as probe_file
-from storage.artifact import Artifact, sha256_of_file
+from robojackson.pipeline.local_folder import sha256_of_file
+from storage.artifact import Artifact
 from storage.store import Store
 from tasks.runtime.stage import stage
 

@@ -5,8 +5,9 @@ from typing import Any
 
 from robojackson.mocap.recover import MocapConfig, recover
 from robojackson.motion.landmark_track import LandmarkTrack
-from robojackson.pipeline import tables
-from storage.artifact import Artifact, sha256_of_file
+from robojackson.pipeline.local_folder import sha256_of_file
+from storage import artifact_tables
+from storage.artifact import Artifact
 from storage.store import Store
 from tasks.runtime.stage import stage
 
@@ -21,5 +22,5 @@ def _models(parameters: Mapping[str, Any]) -> list[str]:
 def mocap(landmarks: Artifact, config: MocapConfig) -> Artifact:
     """SmplSequence."""
     store = Store.from_environment()
-    track = tables.read(LandmarkTrack, store, landmarks)
-    return tables.keep(store, "mocap", "smpl.parquet", recover(track, config))
+    track = artifact_tables.read(LandmarkTrack, store, landmarks)
+    return artifact_tables.keep(store, "mocap", "smpl.parquet", recover(track, config))

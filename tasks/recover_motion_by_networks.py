@@ -12,7 +12,7 @@ from robojackson.mocap.networks.network_motion import network_motion
 from robojackson.mocap.networks.weight_files import sha256_of
 from robojackson.mocap.recover import MocapConfig
 from robojackson.motion.landmark_track import LandmarkTrack
-from robojackson.pipeline import tables
+from storage import artifact_tables
 from storage.artifact import Artifact
 from storage.store import Store
 from tasks.runtime.stage import stage
@@ -32,12 +32,12 @@ def network_mocap(
 ) -> Artifact:
     """SmplSequence."""
     store = Store.from_environment()
-    track = tables.read(LandmarkTrack, store, landmarks)
+    track = artifact_tables.read(LandmarkTrack, store, landmarks)
     networks = load_networks(network)
     with store.local(video) as path:
         images = read_frames(path)
         sequence = network_motion(track, images, networks, config, network, _teller())
-    return tables.keep(store, "mocap", "smpl.parquet", sequence)
+    return artifact_tables.keep(store, "mocap", "smpl.parquet", sequence)
 
 
 def _teller() -> Callable[[int, int], None]:

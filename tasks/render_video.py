@@ -3,10 +3,10 @@
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
-from robojackson.pipeline import tables
 from robojackson.pipeline.table_codecs import Rollout
 from robojackson.report.video.side_by_side import VideoConfig, side_by_side
 from robojackson.robot.model import RobotDescription, load_robot
+from storage import artifact_tables
 from storage.artifact import Artifact
 from storage.store import Store
 from tasks.runtime.robot_digests import robot_models
@@ -28,10 +28,10 @@ def video(
     with store.local(source) as path, store.scratch() as folder:
         film = side_by_side(
             path,
-            tables.read(LandmarkTrack, store, landmarks),
-            tables.read(SmplSequence, store, sequence),
-            tables.read(ReferenceMotion, store, reference),
-            tables.read(Rollout, store, rollout).qpos,
+            artifact_tables.read(LandmarkTrack, store, landmarks),
+            artifact_tables.read(SmplSequence, store, sequence),
+            artifact_tables.read(ReferenceMotion, store, reference),
+            artifact_tables.read(Rollout, store, rollout).qpos,
             folder / "dance.mp4",
             model=load_robot(robot).model,
             config=config,

@@ -3,11 +3,11 @@
 import json
 
 from robojackson.motion.smpl_sequence import SmplSequence
-from robojackson.pipeline import tables
 from robojackson.retarget.retargeting import RetargetConfig
 from robojackson.retarget.retargeting import retarget as to_robot
 from robojackson.retarget.scorecard import told
 from robojackson.robot.model import RobotDescription, load_robot
+from storage import artifact_tables
 from storage.artifact import Artifact
 from storage.store import Store
 from tasks.runtime.robot_digests import robot_models
@@ -20,10 +20,10 @@ def retarget(
 ) -> dict[str, Artifact]:
     """`reference`: ReferenceMotion; `scorecard`: its figures, as JSON."""
     store = Store.from_environment()
-    motion = tables.read(SmplSequence, store, sequence)
+    motion = artifact_tables.read(SmplSequence, store, sequence)
     reference = to_robot(motion, load_robot(robot), config)
     scorecard = json.dumps(told(reference), indent=1).encode()
     return {
-        "reference": tables.keep(store, "retarget", "reference.parquet", reference),
+        "reference": artifact_tables.keep(store, "retarget", "reference.parquet", reference),
         "scorecard": store.keep("retarget", "scorecard.json", scorecard),
     }

@@ -3,7 +3,7 @@
 from robojackson.clips.quality.stability import StabilityConfig
 from robojackson.clips.quality.stability import stability as score
 from robojackson.motion.landmark_track import LandmarkTrack
-from robojackson.pipeline import tables
+from storage import artifact_tables
 from storage.artifact import Artifact
 from storage.store import Store
 from tasks.runtime.stage import stage
@@ -13,5 +13,5 @@ from tasks.runtime.stage import stage
 def stability(landmarks: Artifact, config: StabilityConfig) -> Artifact:
     """StabilityScore."""
     store = Store.from_environment()
-    track = tables.read(LandmarkTrack, store, landmarks)
-    return tables.keep(store, "stability", "stability.parquet", score(track, config))
+    track = artifact_tables.read(LandmarkTrack, store, landmarks)
+    return artifact_tables.keep(store, "stability", "stability.parquet", score(track, config))

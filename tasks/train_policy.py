@@ -18,10 +18,11 @@ from typing import Any
 import yaml
 
 from robojackson.pipeline.folder_lock import A_MOMENT, locked
+from robojackson.pipeline.local_folder import sha256_of_file
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.pretrained import start_file
 from robojackson.robot.model import RobotDescription
-from storage.artifact import Artifact, sha256_of_file
+from storage.artifact import Artifact
 from storage.store import Store
 from tasks.runtime.child_process import run_process
 from tasks.runtime.code_digest import digest
@@ -145,7 +146,7 @@ def _command(
     return [
         sys.executable,
         "-m",
-        "robojackson.cli.app",
+        "robojackson.cli",
         "train",
         str(reference),
         *words,

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 from robojackson.clips.quality.stability import Stability
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
-from robojackson.pipeline import tables
 from robojackson.pipeline.table_codecs import Rollout
 from robojackson.pipeline.table_schemas import EPISODE_RECORD, EVALUATION_RECORD
+from storage import artifact_tables
 from storage.artifact import Artifact
 from storage.store import Store
 from tasks.probe_video import info_of
@@ -56,14 +56,14 @@ def _results(store: Store, made: Mapping[str, Artifact], file: Path) -> "Results
     return Results(
         title=file.stem.replace("_", " "),
         info=info_of(store, made["info"], file),
-        stability=tables.read(Stability, store, made["stability"]),
-        sequence=tables.read(SmplSequence, store, made["smpl"]),
-        reference=tables.read(ReferenceMotion, store, made["reference"]),
+        stability=artifact_tables.read(Stability, store, made["stability"]),
+        sequence=artifact_tables.read(SmplSequence, store, made["smpl"]),
+        reference=artifact_tables.read(ReferenceMotion, store, made["reference"]),
         training=_json(store, made["training"]),
-        episodes=tables.read_rows(EPISODE_RECORD, store, made["episodes"]),
+        episodes=artifact_tables.read_rows(EPISODE_RECORD, store, made["episodes"]),
         evaluation=_json(store, made["evaluation"]),
-        evaluations=tables.read_rows(EVALUATION_RECORD, store, made["evaluations"]),
-        rollout_qpos=tables.read(Rollout, store, made["rollout"]).qpos,
+        evaluations=artifact_tables.read_rows(EVALUATION_RECORD, store, made["evaluations"]),
+        rollout_qpos=artifact_tables.read(Rollout, store, made["rollout"]).qpos,
     )
 
 

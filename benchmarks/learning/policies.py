@@ -93,7 +93,7 @@ def budget(minutes: float | None) -> str:
 
 def command(*words: object, core: int | None = None) -> int:
     """One of our commands on one thread, pinned to a core where one is named; its exit status."""
-    line = [sys.executable, "-m", "robojackson.cli.app", *map(str, words)]
+    line = [sys.executable, "-m", "robojackson", *map(str, words)]
     if core is not None:
         line = ["taskset", "-c", str(core), *line]
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}

@@ -24,7 +24,7 @@ RESULTS = ROOT / "benchmarks" / "results" / "cached_dance.json"
 CLIP = "clips/hip_shake.mp4"
 OVERRIDES = {"train.steps": 300, "train.trainer": "sb3"}
 """The training is short: what is measured does not train."""
-COMMAND = [sys.executable, "-m", "robojackson.cli.app", "dance", CLIP, "--config", "smoke"]
+COMMAND = [sys.executable, "-m", "robojackson", "dance", CLIP, "--config", "smoke"]
 COMMAND += [word for key, value in OVERRIDES.items() for word in ("--set", f"{key}={value}")]
 FLOW = f"""
 from flows.runtime.environment import prepare

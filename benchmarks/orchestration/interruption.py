@@ -65,7 +65,7 @@ def prepare(inputs: Path) -> None:
         ["retarget", smpl, "-o", str(inputs)],
         ["train", reference, "-o", str(inputs), "--steps=600", "--trainer=sb3", "--force"],
     ):
-        subprocess.run([sys.executable, "-m", "robojackson.cli.app", *words], check=True, cwd=ROOT)
+        subprocess.run([sys.executable, "-m", "robojackson", *words], check=True, cwd=ROOT)
 
 
 def interrupted(

@@ -142,7 +142,7 @@ def _command(stack: Stack, wanted: dict[str, Any]) -> float:
     file = stack.folder / "study.yaml"
     file.write_text(yaml.safe_dump(json.loads(json.dumps(wanted))))
     began = time.monotonic()
-    words = [sys.executable, "-m", "robojackson.cli.app", "ablation", str(file), "--json"]
+    words = [sys.executable, "-m", "robojackson", "ablation", str(file), "--json"]
     subprocess.run(words, check=True, capture_output=True)
     return round(time.monotonic() - began, 2)
 

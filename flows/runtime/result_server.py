@@ -26,7 +26,7 @@ from starlette.types import ASGIApp
 from flows.runtime.run_artifacts import OPEN_FOLDERS, RESULTS
 from flows.runtime.sqlite_writers import queued_writers
 from robojackson.errors import DeploymentFailed, StoreError
-from storage.places import Folder
+from robojackson.pipeline.local_folder import LocalFolder
 from storage.store import Store
 
 ISOLATED = {
@@ -115,7 +115,7 @@ def _file(store: Store, key: str) -> Response:
         StoreError: the store has no such file.
     """
     kind = mimetypes.guess_type(key)[0] or UNKNOWN_TYPE
-    if isinstance(store.place, Folder):
+    if isinstance(store.place, LocalFolder):
         path = (store.place.root / key).resolve()
         if not path.is_file() or not path.is_relative_to(store.place.root.resolve()):
             return _missing()

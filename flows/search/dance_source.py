@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robojackson.clips.video import SUFFIXES
-from robojackson.errors import MissingDependency, RoboJacksonError, UnreadableVideo
+from robojackson.errors import RoboJacksonError, UnreadableVideo
 
 if TYPE_CHECKING:
     from robojackson.pipeline.pipeline_config import PipelineConfig
 
-BUNDLED = Path(__file__).parents[2] / "clips"
+from robojackson.pipeline.bundled_clips import bundled
+
 DEFAULT = "hip_shake.mp4"
 LONGEST = 1000
 """Of a path or a name, bytes."""
@@ -90,18 +91,3 @@ def look_at(
         except RoboJacksonError as cause:
             causes.append(cause)
     raise causes[0]
-
-
-def bundled(name: str) -> Path:
-    """A clip of the checkout, wherever the command is given.
-
-    Raises:
-        MissingDependency: the bundled clips are not here.
-    """
-    path = BUNDLED / name
-    if not path.is_file():
-        raise MissingDependency(
-            f"the bundled clip {name} is part of the checkout and not of the installed package: "
-            "give a video file"
-        )
-    return path

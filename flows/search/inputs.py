@@ -24,9 +24,9 @@ from flows.search.search_artifacts import slug_of
 from robojackson.clips.sources import urls
 from robojackson.clips.video import list_videos
 from robojackson.clips.web.untrusted_text import web_address
+from robojackson.pipeline.run_names import run_name
 from robojackson.pipeline.yaml_loader import load
 from storage.artifact import Artifact
-from storage.run_catalogue import safe_name
 from storage.store import Store
 
 Source = Annotated[str, Field(min_length=1, max_length=1000, pattern=r"\S")]
@@ -98,8 +98,8 @@ def name_of(source: str) -> str:
     source = source.strip()
     if web_address(source):
         parts = urlsplit(source)
-        return safe_name(parts.query or parts.path)
-    return safe_name(source if is_name(source) else Path(source).absolute().stem)
+        return run_name(parts.query or parts.path)
+    return run_name(source if is_name(source) else Path(source).absolute().stem)
 
 
 @contextmanager

@@ -11,7 +11,7 @@ from prefect.artifacts import (
 
 from flows.search import ranking_table
 from robojackson.clips.web.untrusted_text import clean_text, in_markdown, web_address
-from storage.run_catalogue import safe_name
+from robojackson.pipeline.run_names import run_name
 
 
 async def show(name: str, rows: list[dict[str, Any]], chosen: dict[str, Any] | None) -> None:
@@ -30,4 +30,4 @@ async def show(name: str, rows: list[dict[str, Any]], chosen: dict[str, Any] | N
 
 def slug_of(name: str) -> str:
     """A name in the letters that a key of Prefect may have."""
-    return re.sub(r"[^a-z0-9]+", "-", safe_name(name).lower()).strip("-")
+    return re.sub(r"[^a-z0-9]+", "-", run_name(name).lower()).strip("-")

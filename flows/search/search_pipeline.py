@@ -26,8 +26,7 @@ from robojackson.clips.web.download_formats import Purpose
 from robojackson.clips.web.untrusted_text import clean_text
 from robojackson.clips.web.video_candidate import VideoCandidate
 from robojackson.motion.landmark_track import LandmarkTrack
-from robojackson.pipeline import tables
-from storage import candidate_catalogue
+from storage import artifact_tables, candidate_catalogue
 from storage.artifact import Artifact
 from storage.store import Store
 from tasks.assess_video import judge
@@ -165,7 +164,7 @@ def _or_reason(result: Any) -> Any:
 def _with_figures(entry: Entry) -> Entry:
     store = Store.from_environment()
     assert entry.made
-    score = tables.read(Stability, store, entry.made["stability"])
+    score = artifact_tables.read(Stability, store, entry.made["stability"])
     return replace(entry, score=score, quality=_quality(store, entry.made["quality"]))
 
 
@@ -180,7 +179,7 @@ def _copied(fit: dict[str, Entry], settings: FindConfig) -> dict[str, str]:
     store = Store.from_environment()
     largest = sorted(fit, key=lambda n: -(q.person_height_px if (q := fit[n].quality) else 0.0))
     tracks = {
-        name: tables.read(LandmarkTrack, store, made["landmarks"])
+        name: artifact_tables.read(LandmarkTrack, store, made["landmarks"])
         for name in largest
         if (made := fit[name].made)
     }

@@ -15,12 +15,12 @@ from typing import Any, TypeVar
 from flows.video_pass.motion_stages import to_reference
 from robojackson.clips.quality.stability import Stability
 from robojackson.errors import NoPersonFound, RoboJacksonError, UnreadableVideo
-from robojackson.pipeline import tables
 from robojackson.pipeline.pipeline_config import PipelineConfig
+from robojackson.pipeline.run_names import run_name
 from robojackson.pipeline.yaml_loader import load
 from robojackson.retarget.scorecard import check
 from robojackson.robot.model import RobotDescription
-from storage import run_catalogue
+from storage import artifact_tables, run_catalogue
 from storage.artifact import Artifact
 from storage.store import Store
 from tasks.detect_landmarks import landmarks
@@ -91,7 +91,7 @@ async def danced(
     began = time.time()  # what a search takes is no part of the budget
     candidates = score_all(paths, settings, start_s, end_s)
     best = choose(candidates)
-    labels = RunLabels(*map(run_catalogue.safe_name, (Path(best.name).stem, settings.setup)))
+    labels = RunLabels(*map(run_name, (Path(best.name).stem, settings.setup)))
     made = await perform(best, robot, settings, labels, began)
     return Danced(conclude(store, made, candidates, settings, labels), made)
 
@@ -117,7 +117,7 @@ def score_all(
     scores = _each(stability, tracks, lambda given: (given[1], settings.stability))
     store = Store.from_environment()
     return [
-        Candidate(path.name, clip, score, tables.read(Stability, store, score))
+        Candidate(path.name, clip, score, artifact_tables.read(Stability, store, score))
         for (((path, _), clip), _), score in scores
     ]
 

@@ -1,23 +1,16 @@
-"""The `robojackson` command.
+"""The commands that run one stage, as one application; `flows.cli.commands` adds the others.
 
-Every command imports what it needs inside itself, so that the one-stage commands run with no
-Prefect in memory and `--help` answers at once.
+Every command imports what it needs inside itself, so that one stage runs with no Prefect in memory
+and `--help` answers at once.
 """
 
-if __name__ == "__main__":  # Ctrl-C while the lines below are imported is told in one line, too
-    from robojackson.cli.start import main as start
-
-    start()
-
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
-from flows.cli.backup_commands import backup, restore
-from flows.cli.search_commands import catalogue, find, refresh
-from flows.cli.study_commands import ablation, deploy, metrics, server
 from robojackson.cli.console import USAGE_ERROR, Answer, command, complain, log_to_stderr, misused
 from robojackson.cli.format_commands import export, import_
 from robojackson.cli.learning_commands import evaluate, pretrain, train
@@ -26,83 +19,17 @@ from robojackson.cli.options import (
     Folder,
     Force,
     Json,
-    Minutes,
     Person,
     Quality,
     Robot,
-    Seed,
     Set,
-    Trainer,
     Weights,
     chosen,
     quoted,
 )
 from robojackson.cli.robot_commands import robots
 
-app = typer.Typer(
-    name="robojackson",
-    help="A video of a dance in, a robot that dances it out.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
 
-
-@app.command()
-@command
-def dance(
-    source: Annotated[
-        str | None,
-        typer.Argument(help="A video, a folder of candidates, or the name of a dance to look for."),
-    ] = None,
-    minutes: Minutes = None,
-    robot: Robot = None,
-    trainer: Trainer = None,
-    seed: Seed = None,
-    person: Person = None,
-    quality: Quality = None,
-    start: Annotated[float | None, typer.Option(min=0, help="Trim: begin here, seconds.")] = None,
-    end: Annotated[float | None, typer.Option(min=0, help="Trim: end here, seconds.")] = None,
-    config: Config = "base",
-    force: Force = False,
-    set_: Set = None,
-    as_json: Json = False,
-) -> Answer:
-    """A video in, a robot that dances it out: every stage, cached, and a page at the end."""
-    from flows.runtime.environment import prepare
-    from flows.search.dance_source import is_name, look_at, resolve, settle
-    from robojackson.cli.stages import verdict_lines
-    from storage.store import Store
-
-    found = None if is_name(source) else resolve(source)
-    given = {"minutes": minutes, "robot": robot, "train.trainer": trainer, "train.seed": seed}
-    overrides = chosen(set_, given | {"dancer.number": person, "detector": quality})
-    if force:
-        overrides["gate"] = False
-    settings = settle(config, overrides)
-    if found is not None:
-        look_at(found, settings, start, end)
-    prepare(Store.from_environment())
-    made = None
-    if found is not None:
-        from flows.video_pass.recorded_dance import replayed
-
-        made = replayed(found, config, overrides, start, end)
-    if made is None:
-        from flows.dance import run
-
-        made = run(str(found or source), config, overrides, start, end)
-    text = [*verdict_lines(made["evaluation"]), f"page   {made['page']}", f"video  {made['video']}"]
-    return Answer(made, text=text)
-
-
-app.add_typer(robots, name="robots")
-for other in (find, refresh, catalogue, ablation, metrics, deploy, backup, restore, server):
-    app.command()(other)
-
-
-@app.command()
 @command
 def score(
     video: Annotated[list[Path], typer.Argument(help="Videos, or folders of them.")],
@@ -123,7 +50,6 @@ def score(
     return Answer(scored, code=1 if unread & set(map(str, video)) else 0)
 
 
-@app.command()
 @command
 def mocap(
     video: Annotated[Path, typer.Argument(help="A video of one person.")],
@@ -156,7 +82,6 @@ def mocap(
     return Answer(single.mocap(video, out, config, overrides, hypotheses))
 
 
-@app.command()
 @command
 def retarget(
     smpl: Annotated[Path, typer.Argument(help="smpl.parquet of `robojackson mocap`.")],
@@ -190,14 +115,6 @@ def retarget(
     return Answer(made)
 
 
-app.command("import")(import_)
-app.command()(export)
-app.command()(train)
-app.command()(pretrain)
-app.command()(evaluate)
-
-
-@app.command()
 @command
 def doctor(as_json: Json = False) -> Answer:
     """What is installed, what is missing, and how to get it."""
@@ -207,8 +124,41 @@ def doctor(as_json: Json = False) -> Answer:
     return Answer(report, code=0 if report["ok"] else 1)
 
 
-def main() -> int:
-    """Run the command that the words of the process ask for; its exit code."""
+STAGES: dict[str, Callable[..., None]] = {
+    "score": score,
+    "mocap": mocap,
+    "retarget": retarget,
+    "import": import_,
+    "export": export,
+    "train": train,
+    "pretrain": pretrain,
+    "evaluate": evaluate,
+    "doctor": doctor,
+}
+"""Commands by name, in the order of `--help`."""
+
+
+def make_app() -> typer.Typer:
+    """Return an application without commands."""
+    return typer.Typer(
+        name="robojackson",
+        help="A video of a dance in, a robot that dances it out.",
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+
+
+def add_stages(app: typer.Typer) -> None:
+    """Add the commands of this module, and the group `robots`."""
+    app.add_typer(robots, name="robots")
+    for name, stage in STAGES.items():
+        app.command(name)(stage)
+
+
+def run(app: typer.Typer) -> int:
+    """Run the command that the words of the process ask for; return its exit code."""
     try:
         return app(standalone_mode=False) or 0
     except USAGE_ERROR as cause:

@@ -28,7 +28,7 @@ from robojackson.formats import (
 )
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
-from storage.store import Store
+from robojackson.pipeline.file_tree import FileTree
 
 if TYPE_CHECKING:
     from mujoco import MjModel
@@ -73,9 +73,9 @@ def export(source: Path, to: str, out: Path) -> dict[str, Any]:
         motion = stages.read_table(ReferenceMotion, source)
         content = FORMATS[to](motion, stages.robot_of(motion).model)
         about = {"robot": motion.robot, "steps": len(motion)}
-    store = Store(out.parent)
-    store.require_writable()
-    store.put(out.name, content)
+    files = FileTree(out.parent)
+    files.require_writable()
+    files.write(out.name, content)
     told = {"file": str(out), "format": to, **about, "bytes": len(content)}
     return told | {"seconds": time.monotonic() - began}
 
@@ -94,9 +94,9 @@ def export_policy(source: Path, out: Path) -> dict[str, Any]:
 
     policy = load_policy(source)
     content = to_onnx(policy)
-    store = Store(out.parent)
-    store.require_writable()
-    store.put(out.name, content)
+    files = FileTree(out.parent)
+    files.require_writable()
+    files.write(out.name, content)
     sizes = {"observations": policy.observation_size, "actions": len(policy.layers[-1][1])}
     return {"file": str(out), "format": "onnx", **sizes, "bytes": len(content)}
 

@@ -63,8 +63,8 @@ def import_motion(
         with _named(file):
             sequence = place(replace(motion, to_world=axes), rate)
     sequence = replace(sequence, notes=(*sequence.notes, *notes))
-    with stages.results_in(out) as store:
-        store.put("smpl.parquet", tables.encode(sequence))
+    with stages.results_in(out) as files:
+        files.write("smpl.parquet", tables.encode(sequence))
     told = {"smpl": str(out / "smpl.parquet"), "file": str(file), "format": kind}
     seconds = time.monotonic() - began
     return told | figures | _figures(sequence) | {"seconds": seconds}

@@ -27,13 +27,13 @@ def list_people(
 
     settings = load(PipelineConfig, config, overrides)
     info = probe(video, settings.video)
-    with stages.results_in(out) as store:
+    with stages.results_in(out) as files:
         with console.bar(f"people of {video.name}") as progress:
             who = settings.dancer
             cast = look_around(video, info, who.crowd, who.identity, progress)
         if not cast.rows:
             raise NoPersonFound(f"{video}: {cast}")
-        store.put(PICTURE, portrait(video, cast))
+        files.write(PICTURE, portrait(video, cast))
     people, picture = cast.people, str(out / PICTURE)
     told = {"video": str(video), "people": [asdict(p) for p in people], "picture": picture}
     return told, [*(f"person {person}" for person in people), f"picture  {picture}"]

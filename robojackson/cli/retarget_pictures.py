@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from robojackson.cli import console, stages
+from robojackson.pipeline.file_tree import FileTree
 from robojackson.pipeline.yaml_loader import load
-from storage.store import Store
 
 VIDEO, CONTACTS, TORQUES = "retarget.mp4", "contacts.png", "torques.png"
 FEASIBILITY = "feasibility.png"
@@ -30,12 +30,12 @@ def look(smpl: Path, out: Path, config: str, overrides: Mapping[str, Any]) -> di
     reference = stages.read_table(ReferenceMotion, out / "reference.parquet")
     robot = stages.robot_of(reference)
     motors = [name for name, moved in zip(robot.joint_names, robot.actuated, strict=True) if moved]
-    store = Store(out)
-    store.put(CONTACTS, run_plots.png(run_plots.contact_strip(sequence, reference)))
-    store.put(TORQUES, run_plots.png(run_plots.torque_heat_map(reference, motors)))
+    files = FileTree(out)
+    files.write(CONTACTS, run_plots.png(run_plots.contact_strip(sequence, reference)))
+    files.write(TORQUES, run_plots.png(run_plots.torque_heat_map(reference, motors)))
     drawn = {"contacts": str(out / CONTACTS), "torques": str(out / TORQUES)}
     if reference.certificate is not None:
-        store.put(FEASIBILITY, run_plots.png(feasibility_strip(reference)))
+        files.write(FEASIBILITY, run_plots.png(feasibility_strip(reference)))
         drawn["feasibility"] = str(out / FEASIBILITY)
     with console.bar("video") as progress:
         human_beside_robot(

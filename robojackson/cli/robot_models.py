@@ -18,10 +18,10 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from robojackson.errors import BadConfiguration, DownloadFailed, RoboJacksonError, StoreError
+from robojackson.pipeline.local_folder import sha256_of_file
 from robojackson.pipeline.yaml_loader import FOLDER, load
 from robojackson.robot.description import RobotDescription, RobotSource
 from robojackson.robot.mjcf import mjcf_path, robots_folder
-from storage.artifact import sha256_of_file
 
 _ROOM_MB = 120
 

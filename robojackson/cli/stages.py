@@ -21,9 +21,9 @@ from robojackson.errors import (
     TrackTooShort,
 )
 from robojackson.pipeline import tables
+from robojackson.pipeline.file_tree import FileTree
+from robojackson.pipeline.run_names import run_name
 from robojackson.pipeline.yaml_loader import load
-from storage.run_catalogue import safe_name
-from storage.store import Store
 
 if TYPE_CHECKING:
     from robojackson.motion.reference_motion import ReferenceMotion
@@ -50,17 +50,17 @@ def mocap(
     names = names_of(settings, hypotheses)
     info = probe(video, settings.video)
     to_motion = mover(video, settings)
-    with results_in(out) as store:
+    with results_in(out) as files:
         with console.bar(f"landmarks of {video.name}") as progress:
             track = see(video, info, settings.detector, settings.dancer, progress)
         try:
             sequence = to_motion(track)
         except (NoPersonFound, TrackTooShort) as cause:
             raise type(cause)(f"{video}: {cause}") from cause
-        store.put("landmarks.parquet", tables.encode(track))
-        store.put("smpl.parquet", tables.encode(sequence))
+        files.write("landmarks.parquet", tables.encode(track))
+        files.write("smpl.parquet", tables.encode(sequence))
         for name, other in imagined(track, settings, hypotheses):
-            store.put(name, tables.encode(other))
+            files.write(name, tables.encode(other))
     return {
         "video": str(video),
         "smpl": str(out / "smpl.parquet"),
@@ -88,14 +88,14 @@ def retarget(smpl: Path, out: Path, config: str, overrides: Overrides) -> Figure
     settings = load(PipelineConfig, config, overrides)
     machine = _robot(settings.robot)
     sequence = read_table(SmplSequence, smpl)
-    with results_in(out) as store:
+    with results_in(out) as files:
         try:
             reference = to_robot(sequence, machine, settings.retarget)
         except TrackTooShort as cause:
             raise TrackTooShort(f"{smpl}: {cause}") from cause
-        store.put("reference.parquet", tables.encode(reference))
+        files.write("reference.parquet", tables.encode(reference))
         scorecard = console.plain(told(reference))
-        store.put("scorecard.json", json.dumps(scorecard, indent=1).encode())
+        files.write("scorecard.json", json.dumps(scorecard, indent=1).encode())
     return {
         "reference": str(out / "reference.parquet"),
         "robot": reference.robot,
@@ -147,16 +147,16 @@ def evaluate(
         setup = trained.setup or settings.setup
         common = labels_of(move_of(reference), setup, trained.training["seed"])
         rows = [{**common, **trained.training, **row} for row in verdict.rows]
-        with results_in(out) as store:
-            store.put("evaluations.parquet", tables.encode_rows(EVALUATION_RECORD, rows))
-            store.put("evaluation.json", json.dumps(summary, indent=1).encode())
-            store.put("rollout.parquet", tables.encode(Rollout(motion.dt, verdict.rollout_qpos)))
+        with results_in(out) as files:
+            files.write("evaluations.parquet", tables.encode_rows(EVALUATION_RECORD, rows))
+            files.write("evaluation.json", json.dumps(summary, indent=1).encode())
+            files.write("rollout.parquet", tables.encode(Rollout(motion.dt, verdict.rollout_qpos)))
     return {"policy": str(policy), "reference": str(reference), **summary}
 
 
 def labels_of(move: str, setup: str, seed: int | None) -> Figures:
     """The columns by which episodes and evaluations of a run are joined."""
-    move, setup = safe_name(move), safe_name(setup)
+    move, setup = run_name(move), run_name(setup)
     return {"run_id": f"{move}-{setup}-s{seed}", "move": move, "setup": setup, "seed": seed}
 
 
@@ -216,16 +216,16 @@ def require_file(path: Path) -> None:
 
 
 @contextmanager
-def results_in(out: Path) -> Iterator[Store]:
+def results_in(out: Path) -> Iterator[FileTree]:
     """A folder for results, told at once when it cannot be written.
 
     After a failure the folders that were made for it and are empty go away again.
     """
     made = [path for path in (out, *out.parents) if not path.exists()]
     try:
-        store = Store(out)
-        store.require_writable()
-        yield store
+        files = FileTree(out)
+        files.require_writable()
+        yield files
     except BaseException:
         with suppress(OSError):
             for path in made:

@@ -1,20 +1,24 @@
-"""Where the command starts: nothing heavy is imported before Ctrl-C is guarded."""
+"""Where a command starts: nothing heavy is imported before Ctrl-C is guarded."""
 
 import sys
+from collections.abc import Callable
+from typing import NoReturn
 
 from robojackson.cli.lifetime.interruption import INTERRUPTED, conclude, same_command
 from robojackson.cli.lifetime.supervisor import guarded
 
 
-def main() -> None:
-    """Run the console script and end the process."""
-    sys.exit(guarded(_command))
+def start(command: Callable[[], int]) -> NoReturn:
+    """Run a command under a supervisor and end the process with its exit code.
+
+    Args:
+        command: Imports what it needs inside itself; returns the exit code.
+    """
+    sys.exit(guarded(lambda: _run(command)))
 
 
-def _command() -> int:
+def _run(command: Callable[[], int]) -> int:
     try:
-        from robojackson.cli.app import main as command
-
         return command()
     except KeyboardInterrupt:
         conclude(f"interrupted: resume: {same_command()}")

@@ -19,11 +19,11 @@ from typing import TYPE_CHECKING, Any
 from robojackson.cli import console, stages
 from robojackson.cli.lifetime.interruption import STOPS, UnsavedFlag, is_guarded
 from robojackson.cli.lifetime.orphans import end_with_parent
+from robojackson.pipeline.file_tree import FileTree
 from robojackson.pipeline.folder_lock import locked
 from robojackson.pipeline.record_log import RecordLog
 from robojackson.pipeline.table_schemas import EPISODE_RECORD
 from robojackson.pipeline.yaml_loader import load
-from storage.store import Store
 
 if TYPE_CHECKING:
     from robojackson.rl.config.train_config import TrainConfig
@@ -82,11 +82,11 @@ def train(
     common = _common(config, move or stages.move_of(reference), setup, run_id)
     with (
         stop.listening(),
-        stages.results_in(out) as store,
+        stages.results_in(out) as files,
         locked(out),
         console.ticker() as tell,
     ):
-        rows = _EpisodeLog(store, common, goes_on=newest_checkpoint(out) is not None)
+        rows = _EpisodeLog(files, common, goes_on=newest_checkpoint(out) is not None)
         try:
             asked = asks_told(both_readings(robot, motion, config.environment))
             if asked:
@@ -204,8 +204,8 @@ class _StopRequest:
 class _EpisodeLog:
     """episodes.parquet, written now and then while rows come in."""
 
-    def __init__(self, store: Store, common: Mapping[str, Any], goes_on: bool) -> None:
-        self._log = RecordLog(store, "episodes.parquet", EPISODE_RECORD, common, goes_on)
+    def __init__(self, files: FileTree, common: Mapping[str, Any], goes_on: bool) -> None:
+        self._log = RecordLog(files, "episodes.parquet", EPISODE_RECORD, common, goes_on)
         self._saved = time.monotonic()
 
     def __len__(self) -> int:

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flows.search.dance_source import bundled
 from robojackson.cli import stages, training_process
 from robojackson.errors import BadConfiguration
 from robojackson.pipeline import tables
+from robojackson.pipeline.bundled_clips import bundled
 from robojackson.pipeline.yaml_loader import load
 
 if TYPE_CHECKING:
@@ -102,8 +102,8 @@ def _reference(kind: str, out: Path, robot: "Robot") -> Path:
     from robojackson.rl.modes.standing_motion import standing
 
     if kind == "paper":
-        with stages.results_in(out) as store:
-            store.put(STANDING, tables.encode(standing(robot)))
+        with stages.results_in(out) as files:
+            files.write(STANDING, tables.encode(standing(robot)))
         return out / STANDING
     folder = out / Path(WALK).stem  # not among what the user may keep in `out`
     made = folder / "reference.parquet"

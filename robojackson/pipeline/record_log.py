@@ -5,9 +5,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from robojackson.pipeline import tables
+from robojackson.pipeline.file_tree import FileTree
 from robojackson.pipeline.table_schemas import TableSchema
-from storage.artifact import Artifact
-from storage.store import Store
 
 
 @dataclass
@@ -15,14 +14,14 @@ class RecordLog:
     """Rows of one table in one file, kept over a resume.
 
     Attributes:
-        store: Where the file is.
+        files: Where the file is.
         key: Of the file.
         schema: Of the table.
         common: Columns that all rows share (run_id, move, setup, seed).
         goes_on: Whether the rows that are there are of this run; else they go when it has its own.
     """
 
-    store: Store
+    files: FileTree
     key: str
     schema: TableSchema
     common: Mapping[str, Any]
@@ -31,8 +30,8 @@ class RecordLog:
     _earlier: bool = True
 
     def __post_init__(self) -> None:
-        if self.goes_on and self.store.exists(self.key):
-            data, where = self.store.read(self.key), self.store.address(self.key)
+        if self.goes_on and self.files.exists(self.key):
+            data, where = self.files.read(self.key), self.files.address(self.key)
             self._rows = tables.decode_rows(self.schema, data, where)
 
     def __len__(self) -> int:
@@ -46,9 +45,9 @@ class RecordLog:
             self._earlier = False
         self._rows.extend(new)
 
-    def save(self) -> Artifact:
+    def save(self) -> None:
         """Write the whole table."""
-        return self.store.put(self.key, tables.encode_rows(self.schema, self._rows))
+        self.files.write(self.key, tables.encode_rows(self.schema, self._rows))
 
     def _drop_from(self, step: int) -> None:
         self._rows = [row for row in self._rows if (row["step"] or 0) < step]

@@ -17,8 +17,6 @@ import pyarrow.parquet as pq
 from robojackson.errors import BadTable
 from robojackson.pipeline.table_codecs import CODECS, Codec, codec_of
 from robojackson.pipeline.table_schemas import VERSION, Column, TableSchema
-from storage.artifact import Artifact
-from storage.store import Store
 
 MAKERS = {"SmplSequence": "mocap", "ReferenceMotion": "retarget"}
 """Which command writes a table that other commands read."""
@@ -53,16 +51,6 @@ def decode(cls: type[Value], data: bytes, where: str) -> Value:
         raise BadTable(f"{where}: metadata of {codec.schema.name} is wrong: {cause}") from cause
 
 
-def keep(store: Store, stage: str, name: str, value: object) -> Artifact:
-    """Keep a dataclass in the store under a key made of its content."""
-    return store.keep(stage, name, encode(value))
-
-
-def read(cls: type[Value], store: Store, artifact: Artifact) -> Value:
-    """The dataclass that an artifact holds."""
-    return decode(cls, store.read(artifact.key), store.address(artifact.key))
-
-
 def encode_rows(schema: TableSchema, rows: Iterable[Row]) -> bytes:
     """Records, one mapping a row, as a Parquet file.
 
@@ -93,11 +81,6 @@ def decode_table(schema: TableSchema, data: bytes, where: str) -> pa.Table:
         BadTable: not Parquet, another table, or a column that is wrong.
     """
     return check(schema, _from_bytes(data, where), where)
-
-
-def read_rows(schema: TableSchema, store: Store, artifact: Artifact) -> list[dict[str, Any]]:
-    """The records that an artifact holds."""
-    return decode_rows(schema, store.read(artifact.key), store.address(artifact.key))
 
 
 def check(schema: TableSchema, table: pa.Table, where: str) -> pa.Table:

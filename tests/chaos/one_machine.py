@@ -22,7 +22,7 @@ from tools.stack.service import ROOT
 DISK_MB = 400
 HANGS_S = 120.0
 """After which a run on a full disk is killed."""
-WORK = ("robojackson.cli.app train", "robojackson.cli.app evaluate")
+WORK = ("robojackson.cli train", "robojackson.cli evaluate")
 CHUNK = b"\0" * (1 << 20)
 
 
@@ -71,7 +71,7 @@ class Alone:
     def start(self, study: dict[str, Any]) -> Any:
         wanted = self._folder / "study.yaml"
         wanted.write_text(yaml.safe_dump(study))
-        command = [sys.executable, "-m", "robojackson.cli.app", "ablation", str(wanted), "--json"]
+        command = [sys.executable, "-m", "robojackson", "ablation", str(wanted), "--json"]
         with self._log.open("ab") as out:
             self._run = subprocess.Popen(
                 command, env=self._environment(), cwd=ROOT, stdout=out, stderr=out

@@ -24,7 +24,7 @@ NEEDED_S = 60.0
 GONE_S = 15.0
 """After which a parent whose process is not there is given up."""
 FLOW, CELL = "flow-worker", "trainer"
-WORK = ("robojackson.cli.app train", "robojackson.cli.app evaluate")
+WORK = ("robojackson.cli train", "robojackson.cli evaluate")
 ENGINE = "prefect.engine"
 
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
+from robojackson.pipeline.local_folder import TEMPORARY
 from storage import study_tables
-from storage.places import TEMPORARY
 from storage.store import SCRATCH, Store
 
 STUDY: dict[str, Any] = {

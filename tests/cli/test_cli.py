@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from robojackson.cli.app import app
+from flows.cli.commands import app
 from robojackson.cli.console import lines, plain
 from robojackson.clips import pose_detector
 from robojackson.errors import TruncatedVideo
@@ -166,7 +166,7 @@ def test_a_video_that_breaks_off_while_it_is_looked_at_loses_no_other_score(
     ],
 )
 def test_an_answer_that_nobody_gets_is_one_line(where: str, reason: str) -> None:
-    command = f"{shlex.quote(sys.executable)} -m robojackson.cli.app robots --json {where}"
+    command = f"{shlex.quote(sys.executable)} -m robojackson robots --json {where}"
     done = subprocess.run(
         command, shell=True, cwd=ROOT, capture_output=True, text=True, check=False
     )
@@ -312,7 +312,7 @@ def test_ctrl_c_in_training_is_resumed_by_the_same_command(tmp_path: Path, short
         *("--trainer=sb3", "--set=tqc.n_envs=4", "--set=tqc.warmup=100", "--set=tqc.batch=32"),
         *("--set=progress_seconds=0.2", "--json"),
     ]
-    command = [sys.executable, "-m", "robojackson.cli.app", *words, "--steps=1000000"]
+    command = [sys.executable, "-m", "robojackson", *words, "--steps=1000000"]
     with subprocess.Popen(
         command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment()
     ) as process:

@@ -156,6 +156,6 @@ def test_the_shipped_g1_pins_its_wheel_and_its_model():
 
 
 def test_the_command_lists_the_robots_as_json(tmp_path: Path):
-    command = [sys.executable, "-m", "robojackson.cli.app", "robots", "--json"]
+    command = [sys.executable, "-m", "robojackson", "robots", "--json"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert '"robot": "humanoid_strong"' in done.stdout

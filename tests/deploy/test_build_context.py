@@ -43,8 +43,7 @@ def watch(event, args):
 sys.addaudithook(watch)
 """
 COMMAND = (
-    WATCH
-    + "import runpy; runpy.run_module('robojackson.cli.app', run_name='__main__', alter_sys=True)"
+    WATCH + "import runpy; runpy.run_module('robojackson', run_name='__main__', alter_sys=True)"
 )
 ENTRIES = (
     WATCH

@@ -70,7 +70,7 @@ class Documented:
         )  # fmt: skip
 
     def robojackson(self, *words: object) -> dict[str, Any]:
-        said = self.run(sys.executable, "-m", "robojackson.cli.app", *words, "--json")
+        said = self.run(sys.executable, "-m", "robojackson", *words, "--json")
         assert said.returncode == 0, said.stderr
         return dict(json.loads(said.stdout))
 
@@ -216,7 +216,7 @@ BROWSER = ("chromium", "--headless", "--no-sandbox", "--disable-gpu", "--no-firs
 def test_the_runs_page_shows_runs_on_any_port_and_host_name(tmp_path: Path) -> None:
     port, environment = free_port(), bare(tmp_path)
     api = f"http://127.0.0.1:{port}/api"
-    command = [sys.executable, "-m", "robojackson.cli.app", "server", "--port", str(port)]
+    command = [sys.executable, "-m", "robojackson", "server", "--port", str(port)]
     server = subprocess.Popen(command, env=environment, cwd=ROOT)
     try:
         environment["PREFECT_API_URL"] = api

@@ -235,7 +235,7 @@ def test_a_backup_reads_from_it_once(bucket: Stack, tmp_path: Path) -> None:
     command = [
         sys.executable,
         "-m",
-        "robojackson.cli.app",
+        "robojackson",
         "backup",
         str(tmp_path / "out"),
         "--json",

@@ -17,7 +17,7 @@ from tools.stack.processes import Found, under
 pytestmark = [pytest.mark.cluster, pytest.mark.timeout(2400)]
 AGAIN_S = 60.0
 """Nine cached cells: a start of Python with all that the study imports, and no worker."""
-WORK = "robojackson.cli.app train"
+WORK = "robojackson.cli train"
 LONG = {"steps": 200_000}
 TRAINERS = 2
 
@@ -43,7 +43,7 @@ def prefect(stack: Stack, *words: str, **more: str) -> subprocess.CompletedProce
 
 
 def ask(stack: Stack, sql: str) -> list[dict[str, Any]]:
-    run = command(stack, "robojackson.cli.app", "metrics", "--sql", sql, "--json")
+    run = command(stack, "robojackson", "metrics", "--sql", sql, "--json")
     assert run.returncode == 0, run.stderr
     return list(json.loads(run.stdout)["rows"])
 

@@ -21,10 +21,9 @@ from flows.video_pass import dance_stages as stages
 from flows.video_pass.dance_stages import Candidate, choose, score_all
 from robojackson.clips.quality.stability import Stability
 from robojackson.errors import NoPersonFound, RejectedReference, UnreadableVideo
-from robojackson.pipeline import tables
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.yaml_loader import load
-from storage import run_catalogue
+from storage import artifact_tables, run_catalogue
 from storage.artifact import Artifact
 from storage.store import Store
 from tests.fixtures.commands import robojackson
@@ -186,7 +185,9 @@ def score(
 
     def stability(track: Artifact, config: Any) -> Artifact:
         score = a_candidate(track.key, 1.0).score
-        return tables.keep(Store.from_environment(), "stability", "stability.parquet", score)
+        return artifact_tables.keep(
+            Store.from_environment(), "stability", "stability.parquet", score
+        )
 
     for played in (probe, landmarks, stability):
         monkeypatch.setattr(stages, played.__name__, Played(played))

@@ -22,6 +22,7 @@ from robojackson.pipeline.table_schemas import (
     LANDMARK_TRACK,
     SMPL_SEQUENCE,
 )
+from storage import artifact_tables
 from storage.store import Store
 
 
@@ -208,8 +209,8 @@ def test_the_path_of_a_camera_survives_with_its_track(moved: bool) -> None:
 
 def test_an_artifact_leads_to_its_value(tmp_path: Path) -> None:
     store, track = Store(tmp_path), a_track(np.random.default_rng(1))
-    artifact = tables.keep(store, "landmarks", "landmarks.parquet", track)
-    assert same(tables.read(LandmarkTrack, store, artifact).landmarks, track.landmarks)
+    artifact = artifact_tables.keep(store, "landmarks", "landmarks.parquet", track)
+    assert same(artifact_tables.read(LandmarkTrack, store, artifact).landmarks, track.landmarks)
 
 
 COMMON = {"run_id": "r", "move": "walk", "setup": "scratch", "seed": 0}

@@ -26,7 +26,7 @@ OPTIONS = (
 
 
 def training(reference: Path, out: Path, trainer: str) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "robojackson.cli.app", "train", reference, "-o", out, *OPTIONS]
+    command = [sys.executable, "-m", "robojackson", "train", reference, "-o", out, *OPTIONS]
     command += [f"--trainer={trainer}", f"--steps={STEPS[trainer]}"]
     words = [str(word) for word in command]
     return subprocess.Popen(

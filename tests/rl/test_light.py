@@ -17,7 +17,7 @@ from tests.fixtures.commands import environment
 
 SPY = """
 import sys
-from robojackson.cli.app import app
+from flows.cli.commands import app
 heavy = {"jax", "torch", "stable_baselines3", "sb3_contrib", "sbx", "prefect"}
 try:
     app(sys.argv[1:])

@@ -14,8 +14,8 @@ import pytest
 
 from robojackson.errors import BackupFailed, RoboJacksonError
 from robojackson.pipeline.folder_lock import locked
+from robojackson.pipeline.local_folder import sha256_of
 from storage import store_backup
-from storage.artifact import sha256_of
 from storage.backup import HELD, Backups
 from storage.prefect_database import SQLite
 from storage.store import Store

@@ -14,7 +14,7 @@ from robojackson.mocap.networks.network_config import NetworkConfig
 from robojackson.mocap.recover import MocapConfig
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.smpl_sequence import SmplSequence
-from robojackson.pipeline import tables
+from storage import artifact_tables
 from storage.store import Store
 from tasks.recover_motion_by_networks import _models, network_mocap
 
@@ -44,10 +44,10 @@ def test_the_task_keeps_the_motion_of_the_networks(store: Store, tmp_path: Path)
     torch.save(network.state_dict(), tmp_path / "r34.pth")
     clip = trim(ROOT / "clips" / "hip_shake.mp4", 0.0, FRAMES / 30.0, tmp_path / "short.mp4")
     video = store.keep("clip", "clip.mp4", clip.read_bytes())
-    seen = tables.keep(store, "landmarks", "landmarks.parquet", track())
+    seen = artifact_tables.keep(store, "landmarks", "landmarks.parquet", track())
     config = NetworkConfig(hybrik=str(tmp_path / "r34.pth"), flip_test=False)
     made = network_mocap.fn(video, seen, config, MocapConfig())
-    found = tables.read(SmplSequence, store, made)
+    found = artifact_tables.read(SmplSequence, store, made)
     assert len(found) == FRAMES
     assert "hybrik_resnet34" in found.notes[0]
 

@@ -1,6 +1,6 @@
 """The ranked table of `robojackson find` as a picture, with a few frames of every video.
 
-python -m robojackson.cli.app find FOLDER --source folder --top 20 --json > found.json
+python -m robojackson find FOLDER --source folder --top 20 --json > found.json
 python -m tools.assets.find_picture found.json docs/images/find.png
 """
 

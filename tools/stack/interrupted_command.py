@@ -49,7 +49,7 @@ class Running:
         self._changed = threading.Condition()
         self.began = time.monotonic()
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "robojackson.cli.app", *words],
+            [sys.executable, "-m", "robojackson", *words],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,

@@ -8,7 +8,7 @@ import pytest
 
 from tests.fixtures.commands import environment
 
-COMMAND = (sys.executable, "-m", "robojackson.cli.app")
+COMMAND = (sys.executable, "-m", "robojackson")
 
 
 @pytest.mark.parametrize(
@@ -46,7 +46,7 @@ def test_ctrl_c_while_the_command_is_imported_is_one_line() -> None:
         "            signal.raise_signal(signal.SIGINT)\n"
         "sys.meta_path.insert(0, Struck())\n"
         "import runpy\n"
-        "runpy.run_module('robojackson.cli.app', run_name='__main__')\n"
+        "runpy.run_module('robojackson', run_name='__main__')\n"
     )
     done = subprocess.run(
         [sys.executable, "-c", code, "dance"],

@@ -13,7 +13,7 @@ import pytest
 
 from robojackson.cli.lifetime.orphans import HALF_WRITTEN
 from robojackson.cli.lifetime.supervisor import SAME_S
-from storage.places import TEMPORARY
+from robojackson.pipeline.local_folder import TEMPORARY
 from tests.fixtures.commands import environment
 from tools.stack.interrupted_command import living_with
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from robojackson.cli.app import app
+from flows.cli.commands import app
 from storage.store import Store
 from tools.stack.service import ROOT
 
@@ -103,7 +103,7 @@ def test_what_cannot_be_is_refused_in_one_line(case: str, store: Store, tmp_path
     words, expected, reason = REFUSED[case]
     (tmp_path / "empty").mkdir()
     (tmp_path / "file").touch()
-    command = [sys.executable, "-m", "robojackson.cli.app", *words]
+    command = [sys.executable, "-m", "robojackson", *words]
     given = {**os.environ, "PYTHONPATH": str(ROOT)}
     run = subprocess.run(
         command, cwd=tmp_path, env=given, capture_output=True, text=True, check=False

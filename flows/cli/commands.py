@@ -1,0 +1,83 @@
+"""All commands of `robojackson`: those that need Prefect or the store, and those of one stage.
+
+Like `robojackson.cli.app`, each imports what it needs inside itself.
+"""
+
+from typing import Annotated
+
+import typer
+
+from flows.cli.backup_commands import backup, restore
+from flows.cli.search_commands import catalogue, find, refresh
+from flows.cli.study_commands import ablation, deploy, metrics, server
+from robojackson.cli.app import add_stages, make_app
+from robojackson.cli.console import Answer, command
+from robojackson.cli.options import (
+    Config,
+    Force,
+    Json,
+    Minutes,
+    Person,
+    Quality,
+    Robot,
+    Seed,
+    Set,
+    Trainer,
+    chosen,
+)
+
+
+@command
+def dance(
+    source: Annotated[
+        str | None,
+        typer.Argument(help="A video, a folder of candidates, or the name of a dance to look for."),
+    ] = None,
+    minutes: Minutes = None,
+    robot: Robot = None,
+    trainer: Trainer = None,
+    seed: Seed = None,
+    person: Person = None,
+    quality: Quality = None,
+    start: Annotated[float | None, typer.Option(min=0, help="Trim: begin here, seconds.")] = None,
+    end: Annotated[float | None, typer.Option(min=0, help="Trim: end here, seconds.")] = None,
+    config: Config = "base",
+    force: Force = False,
+    set_: Set = None,
+    as_json: Json = False,
+) -> Answer:
+    """A video in, a robot that dances it out: every stage, cached, and a page at the end."""
+    from flows.runtime.environment import prepare
+    from flows.search.dance_source import is_name, look_at, resolve, settle
+    from robojackson.cli.stages import verdict_lines
+    from storage.store import Store
+
+    found = None if is_name(source) else resolve(source)
+    given = {"minutes": minutes, "robot": robot, "train.trainer": trainer, "train.seed": seed}
+    overrides = chosen(set_, given | {"dancer.number": person, "detector": quality})
+    if force:
+        overrides["gate"] = False
+    settings = settle(config, overrides)
+    if found is not None:
+        look_at(found, settings, start, end)
+    prepare(Store.from_environment())
+    made = None
+    if found is not None:
+        from flows.video_pass.recorded_dance import replayed
+
+        made = replayed(found, config, overrides, start, end)
+    if made is None:
+        from flows.dance import run
+
+        made = run(str(found or source), config, overrides, start, end)
+    text = [*verdict_lines(made["evaluation"]), f"page   {made['page']}", f"video  {made['video']}"]
+    return Answer(made, text=text)
+
+
+app = make_app()
+for each in (
+    *(dance, find, refresh, catalogue, ablation, metrics),
+    *(deploy, backup, restore, server),
+):
+    app.command()(each)
+add_stages(app)

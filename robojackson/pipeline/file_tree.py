@@ -1,0 +1,117 @@
+"""Files by key under one root, where every failure is one line that names the file.
+
+Commands write their results through it; the store of the flows is one of these, at any address.
+"""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from robojackson.errors import RoboJacksonError, StoreError
+from robojackson.pipeline.local_folder import (
+    TEMPORARY,
+    LocalFolder,
+    Place,
+    sha256_of,
+    sha256_of_file,
+)
+
+
+class FileTree:
+    """Files by key, `/` between the parts of a key.
+
+    Attributes:
+        root: Path or address, as given.
+        place: The folder or whatever else keeps the files.
+    """
+
+    def __init__(self, root: str | Path, place: Place | None = None) -> None:
+        self.root = str(root)
+        with in_one_line(f"cannot open the store {self.root}"):
+            self.place: Place = place or LocalFolder(Path(root))
+
+    def write(self, key: str, content: bytes | Path) -> str:
+        """Write bytes, or copy a local file, under a key, replacing a file; return its sha256.
+
+        Raises:
+            StoreError: full disk, no permission, connection cut, a device in its place, or a name
+                that is no UTF-8; nothing half-written is left.
+        """
+        if not _is_text(key):
+            raise StoreError(f"cannot write {key!a}: the name is no UTF-8; choose another")
+        with in_one_line(f"cannot write {self.address(key)}"):
+            digest = digest_of(content)
+            self.place.put(key, content)
+        return digest
+
+    def read(self, key: str) -> bytes:
+        """The content of a file."""
+        with in_one_line(f"cannot read {self.address(key)}"):
+            return self.place.read(key)
+
+    def sha256(self, key: str) -> str:
+        """Digest of a file's content."""
+        with in_one_line(f"cannot read {self.address(key)}"):
+            return self.place.sha256(key)
+
+    def exists(self, key: str) -> bool:
+        """Whether there is a file under that key."""
+        with in_one_line(f"cannot look at {self.address(key)}"):
+            return self.place.exists(key)
+
+    def remove(self, key: str) -> None:
+        """Take a file away; one that is gone already is no error."""
+        with in_one_line(f"cannot remove {self.address(key)}"):
+            try:
+                self.place.remove(key)
+            except FileNotFoundError:
+                return
+
+    def list(self, prefix: str = "") -> list[str]:
+        """Keys under a folder, sorted."""
+        with in_one_line(f"cannot list {self.address(prefix)}"):
+            return sorted(self.place.list(prefix))
+
+    def address(self, key: str) -> str:
+        """The path or URL of a key, for people."""
+        return self.place.address(key)
+
+    def require_writable(self) -> None:
+        """Raise the one line of a place that is full or refuses a write, before any work."""
+        key = f"{TEMPORARY}{os.getpid()}"
+        with in_one_line(f"cannot write the store {self.root}"):
+            self.place.put(key, b"robojackson " * 1024)
+            self.place.remove(key)
+
+
+def digest_of(content: bytes | Path) -> str:
+    """Digest of bytes, or of a local file, in hexadecimal."""
+    return sha256_of(content) if isinstance(content, bytes) else sha256_of_file(content)
+
+
+@contextmanager
+def in_one_line(what: str, error: type[RoboJacksonError] = StoreError) -> Iterator[None]:
+    """Turn whatever a place raises into one line.
+
+    Args:
+        what: What could not be done, the beginning of the line.
+        error: Class of the error that is raised; an error of ours passes unchanged.
+    """
+    try:
+        yield
+    except RoboJacksonError:
+        raise
+    except Exception as cause:
+        reason = cause.strerror if isinstance(cause, OSError) and cause.strerror else str(cause)
+        line = " ".join(reason.split()) or type(cause).__name__
+        raise error(f"{what}: {line}") from cause
+
+
+def _is_text(key: str) -> bool:
+    """Whether a name can be printed; a file system takes any bytes."""
+    try:
+        key.encode()
+    except UnicodeEncodeError:
+        return False
+    return True

@@ -1,0 +1,18 @@
+"""Names of dances, setups and runs, as parts of folders, tables and command lines."""
+
+import hashlib
+import re
+import unicodedata
+
+NAME_LENGTH = 60
+
+
+def run_name(text: str) -> str:
+    """A file's or a person's name as a part of run ids, folders and command lines.
+
+    ASCII letters, digits and `_.-`, never empty, at most `NAME_LENGTH` long; accents are dropped,
+    and a name of which nothing is left gets a digest, so that two of them stay two.
+    """
+    ascii_only = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
+    name = re.sub(r"[^A-Za-z0-9_.-]+", "-", ascii_only)[:NAME_LENGTH].strip("-._")
+    return name or f"dance-{hashlib.sha256(text.encode(errors='replace')).hexdigest()[:8]}"
