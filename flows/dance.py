@@ -12,9 +12,9 @@ from prefect.runtime import flow_run
 
 from flows.runtime.launch import launch
 from flows.runtime.run_artifacts import show_dance
-from flows.search.inputs import Minutes, Search, Seconds, Source, name_of, videos_of
 from flows.search.scoring_pool import scorers
 from flows.video_pass.dance_stages import danced
+from flows.video_pass.inputs import Minutes, Search, Seconds, Source, name_of, videos_of
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.yaml_loader import load
 from storage.leftovers import sweep

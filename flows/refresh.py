@@ -24,7 +24,7 @@ from flows.find import (
     run_id,
 )
 from flows.runtime.launch import launch
-from flows.search.search_artifacts import show, slug_of
+from flows.search.search_artifacts import show
 from flows.search.search_entries import REASON_LENGTH, Entry, reason_of, rows
 from flows.search.search_pipeline import hunt
 from flows.video_pass.motion_stages import to_reference
@@ -32,6 +32,7 @@ from robojackson.clips.web.untrusted_text import clean_text
 from robojackson.clips.web.video_candidate import VideoCandidate
 from robojackson.errors import BadConfiguration, NoPersonFound, RoboJacksonError, SearchFailed
 from robojackson.pipeline.pipeline_config import PipelineConfig
+from robojackson.pipeline.run_names import slug_of
 from robojackson.pipeline.yaml_loader import build, load
 from robojackson.robot.model import RobotDescription
 from storage import candidate_catalogue

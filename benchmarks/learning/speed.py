@@ -16,7 +16,7 @@ from robojackson.rl.env.vec_env import TrackingVecEnv
 from robojackson.rl.modes.standing_motion import standing
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.rl.tqc.replay_files import buffer_of
-from robojackson.rl.tqc.trainer import make_trainer
+from robojackson.rl.tqc.trainers import make_trainer
 
 Row = dict[str, Any]
 

@@ -10,11 +10,11 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from benchmarks.mocap.truth import HIPS, JOINTS, Truth
+from robojackson.body.feet import foot_points
 from robojackson.body.forward_kinematics import kabsch
 from robojackson.body.skeleton import keypoint
 from robojackson.metrics import motion_quality, pose_error
 from robojackson.mocap.grounding import floor as ground
-from robojackson.mocap.grounding.feet import foot_points
 from robojackson.mocap.pose.posed_body import pose_sequence
 from robojackson.motion.smpl_sequence import AIR, PLANTED, SLIDING, SmplSequence
 

@@ -7,10 +7,10 @@ from urllib.parse import quote
 
 from prefect.artifacts import acreate_markdown_artifact
 
-from flows.search.search_artifacts import slug_of
 from robojackson.clips.web.untrusted_text import in_markdown
-from robojackson.report.pages.quantities import facts
+from robojackson.pipeline.run_names import slug_of
 from robojackson.report.pages.run_page import VERDICT_COLUMNS, headline, verdicts
+from robojackson.report.quantities import facts
 from storage.artifact import Artifact
 from storage.store import Store
 

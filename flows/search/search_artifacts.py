@@ -1,6 +1,5 @@
 """What Prefect's pages show of a search: the table, the pictures, the link to the chosen video."""
 
-import re
 from typing import Any
 
 from prefect.artifacts import (
@@ -11,7 +10,7 @@ from prefect.artifacts import (
 
 from flows.search import ranking_table
 from robojackson.clips.web.untrusted_text import clean_text, in_markdown, web_address
-from robojackson.pipeline.run_names import run_name
+from robojackson.pipeline.run_names import slug_of
 
 
 async def show(name: str, rows: list[dict[str, Any]], chosen: dict[str, Any] | None) -> None:
@@ -26,8 +25,3 @@ async def show(name: str, rows: list[dict[str, Any]], chosen: dict[str, Any] | N
     if chosen and link:
         title = clean_text(chosen["title"])
         await acreate_link_artifact(key=f"chosen-{slug}", link=link, link_text=title)
-
-
-def slug_of(name: str) -> str:
-    """A name in the letters that a key of Prefect may have."""
-    return re.sub(r"[^a-z0-9]+", "-", run_name(name).lower()).strip("-")

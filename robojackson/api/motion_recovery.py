@@ -1,18 +1,29 @@
 """The motion of a tracked person: by the networks whose weights a user brought, or by our own."""
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 
-from robojackson.cli import console
 from robojackson.clips.video import read_frames
 from robojackson.mocap.recover import recover
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.pipeline.pipeline_config import PipelineConfig
 
+Progress = Callable[[int, int], None]
 
-def mover(video: Path, settings: PipelineConfig) -> Callable[[LandmarkTrack], SmplSequence]:
+
+def mover(
+    video: Path,
+    settings: PipelineConfig,
+    progress_bar: Callable[[str], AbstractContextManager[Progress]],
+) -> Callable[[LandmarkTrack], SmplSequence]:
     """What `settings.network` chooses, its weights loaded before the work begins.
+
+    Args:
+        video: The file that the networks look at.
+        settings: Of the whole pass.
+        progress_bar: Shows the progress of a named part.
 
     Raises:
         BadWeights: a file of weights cannot be used.
@@ -26,7 +37,7 @@ def mover(video: Path, settings: PipelineConfig) -> Callable[[LandmarkTrack], Sm
 
     def move(track: LandmarkTrack) -> SmplSequence:
         images = read_frames(video)
-        with console.bar(f"networks on {video.name}") as progress:
+        with progress_bar(f"networks on {video.name}") as progress:
             chosen = (settings.mocap, settings.network)
             return network_motion(track, images, networks, *chosen, progress)
 

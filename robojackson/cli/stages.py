@@ -49,7 +49,7 @@ def mocap(
     settings = load(PipelineConfig, config, overrides)
     names = names_of(settings, hypotheses)
     info = probe(video, settings.video)
-    to_motion = mover(video, settings)
+    to_motion = mover(video, settings, console.bar)
     with results_in(out) as files:
         with console.bar(f"landmarks of {video.name}") as progress:
             track = see(video, info, settings.detector, settings.dancer, progress)

@@ -5,17 +5,38 @@ trained for stands in the file's metadata as JSON.
 """
 
 import json
+from collections.abc import Mapping
+from typing import Protocol
 
 import numpy as np
 
 from robojackson.errors import MissingDependency
-from robojackson.rl.policy import Policy
 
+Layers = tuple[tuple[np.ndarray, np.ndarray], ...]
 OPSET = 17
 IR_VERSION = 8
 
 
-def to_onnx(policy: Policy) -> bytes:
+class PolicyNetwork(Protocol):
+    """What is written of a policy (`rl.policy.Policy` is one).
+
+    Attributes:
+        layers: (weight (in, out), bias (out,)); ReLU between them, tanh at the end.
+        facts: What the policy was trained for.
+        observation_size: Length of an observation.
+    """
+
+    @property
+    def layers(self) -> Layers: ...
+
+    @property
+    def facts(self) -> Mapping[str, object]: ...
+
+    @property
+    def observation_size(self) -> int: ...
+
+
+def to_onnx(policy: PolicyNetwork) -> bytes:
     """The content of the file.
 
     Raises:

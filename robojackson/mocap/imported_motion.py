@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
+from robojackson.body.feet import foot_points
 from robojackson.body.forward_kinematics import Pose, forward, split
 from robojackson.body.skeleton import (
     AIM_CHILD,
@@ -26,7 +27,6 @@ from robojackson.formats.foreign_motion import ForeignMotion, require_person, sk
 from robojackson.formats.hybrik_output import HybrikMotion
 from robojackson.mocap.grounding import contacts as contact_states
 from robojackson.mocap.grounding import floor as ground
-from robojackson.mocap.grounding.feet import foot_points
 from robojackson.mocap.landmarks import pinhole_camera as cameras
 from robojackson.mocap.landmarks.blazepose import fill_gaps
 from robojackson.mocap.pose.known_twist import TurnedBody, pose_keypoints

@@ -16,3 +16,8 @@ def run_name(text: str) -> str:
     ascii_only = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
     name = re.sub(r"[^A-Za-z0-9_.-]+", "-", ascii_only)[:NAME_LENGTH].strip("-._")
     return name or f"dance-{hashlib.sha256(text.encode(errors='replace')).hexdigest()[:8]}"
+
+
+def slug_of(name: str) -> str:
+    """A name in the letters that a key of Prefect may have."""
+    return re.sub(r"[^a-z0-9]+", "-", run_name(name).lower()).strip("-")

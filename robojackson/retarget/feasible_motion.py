@@ -16,8 +16,8 @@ from robojackson.retarget.feasibility import tempo
 from robojackson.retarget.retarget_config import RetargetConfig
 from robojackson.retarget.solver.clip_problem import Problem
 from robojackson.retarget.solver.levenberg_marquardt import clip_to_limits, solve
-from robojackson.retarget.solver.whole_clip import faults, harden
 from robojackson.retarget.targets.keypoint_targets import Targets
+from robojackson.retarget.whole_clip import faults, harden
 from robojackson.robot.model import Robot
 from robojackson.robot.resampling import resample
 from robojackson.robot.tree_kinematics import continuous, pose, tree

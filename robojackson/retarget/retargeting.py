@@ -20,10 +20,10 @@ from robojackson.retarget.feasibility.tempo import times_at, warped
 from robojackson.retarget.feasible_motion import Feasible, make_feasible
 from robojackson.retarget.retarget_config import RetargetConfig
 from robojackson.retarget.scorecard import BARS, hovers, score
-from robojackson.retarget.solver.whole_clip import optimise, polished
 from robojackson.retarget.targets.cycle import Lap, human_clip
 from robojackson.retarget.targets.human_clip import HumanClip
 from robojackson.retarget.targets.keypoint_targets import Targets, targets
+from robojackson.retarget.whole_clip import optimise, polished
 from robojackson.robot.model import Robot
 from robojackson.robot.resampling import velocities
 from robojackson.robot.tree_kinematics import pose, tree

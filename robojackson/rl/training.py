@@ -16,7 +16,7 @@ from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.env.vec_env import TrackingVecEnv
 from robojackson.rl.pretrained import pretrained
 from robojackson.rl.tqc.network_arrays import Networks, chosen, fitted
-from robojackson.rl.tqc.trainer import make_trainer
+from robojackson.rl.tqc.trainers import make_trainer
 from robojackson.rl.training_hooks import Enough, Hooks
 from robojackson.rl.training_run import Run
 from robojackson.rl.training_task import Task, TrainResult

@@ -5,7 +5,8 @@ for the command line than for workers. `Records` keeps them in the store, wherev
 """
 
 import asyncio
-from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+from collections.abc import Callable, Mapping
+from typing import Any, ParamSpec, TypeVar
 
 from prefect import Task, task
 from prefect.cache_policies import CacheKeyFnPolicy
@@ -15,9 +16,6 @@ from prefect.serializers import JSONSerializer
 
 from storage import stage_records as records
 from storage.store import Store
-
-if TYPE_CHECKING:
-    from tasks.runtime.stage import Stage
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -63,18 +61,30 @@ class ArtifactSerializer(JSONSerializer):
         return records.decode(blob, Store.from_environment())
 
 
-def cached_task(stage: "Stage[P, R]") -> Task[P, R]:
-    """Make a stage a Prefect task that is cached in the store."""
+def cached_task(
+    function: Callable[P, R],
+    name: str,
+    run_name: Callable[[], str],
+    cache_key: Callable[[Mapping[str, Any]], str],
+) -> Task[P, R]:
+    """Make a function a Prefect task that is cached in the store.
+
+    Args:
+        function: What the task runs.
+        name: Of the task.
+        run_name: Returns the name of a run, when it begins.
+        cache_key: Returns the key of a call from its parameters.
+    """
 
     def key(context: TaskRunContext, parameters: dict[str, Any]) -> str:
-        return stage.recipe.key(parameters)
+        return cache_key(parameters)
 
     made: Task[P, R] = task(
-        name=stage.name,
-        task_run_name=stage.run_name,
+        name=name,
+        task_run_name=run_name,
         cache_policy=CacheKeyFnPolicy(cache_key_fn=key),
         persist_result=True,
         result_serializer=ArtifactSerializer(),
-    )(stage.fn)
+    )(function)
     made.result_storage = Records()  # the decorator takes saved blocks only; this one has no state
     return made

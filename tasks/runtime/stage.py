@@ -124,7 +124,7 @@ class Stage(Generic[P, R]):
         """The stage as a cached Prefect task."""
         from tasks.runtime.engine import cached_task
 
-        return cached_task(self)
+        return cached_task(self.fn, self.name, self.run_name, self.recipe.key)
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
         """Run as a task, which reads the record where there is one.

@@ -12,7 +12,7 @@ from prefect.utilities.callables import parameter_schema
 from prefect.utilities.schema_tools.validation import validate
 
 from flows.dance import dance
-from flows.search.inputs import Search, videos_of
+from flows.video_pass.inputs import Search, videos_of
 from robojackson.errors import NoPersonFound, RejectedReference, SearchFailed
 from storage import candidate_catalogue
 from storage.store import Store

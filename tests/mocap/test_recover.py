@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from robojackson.body.feet import foot_points
 from robojackson.body.skeleton import keypoint
 from robojackson.errors import NoPersonFound
 from robojackson.metrics.motion_quality import floor_penetration, foot_slide, jerk
-from robojackson.mocap.grounding.feet import foot_points
 from robojackson.mocap.pose.posed_body import pose_sequence
 from robojackson.mocap.recover import MocapConfig, recover
 from robojackson.motion.landmark_track import LandmarkTrack

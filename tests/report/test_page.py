@@ -12,9 +12,9 @@ from robojackson.clips.video import VideoInfo
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.report.pages.page_content import Results, page_content, versions
-from robojackson.report.pages.quantities import fact, written
 from robojackson.report.pages.run_page import PageContent, render, write_page
 from robojackson.report.plots import run_plots
+from robojackson.report.quantities import fact, written
 
 POLICIES = ("trained", "statue")
 SUMMARY = {

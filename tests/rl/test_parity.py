@@ -13,7 +13,7 @@ from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.env.vec_env import TrackingVecEnv
 from robojackson.rl.tqc.network_arrays import Networks, fitted
 from robojackson.rl.tqc.replay_files import buffer_of
-from robojackson.rl.tqc.trainer import make_trainer
+from robojackson.rl.tqc.trainers import make_trainer
 from robojackson.robot.model import Robot
 
 BATCH, UPDATES = 16, 4

@@ -26,7 +26,7 @@ from robojackson.rl.env.vec_env import TrackingVecEnv
 from robojackson.rl.policy import Policy
 from robojackson.rl.pretrained import from_sb3_zip, pretrained
 from robojackson.rl.tqc.network_arrays import Networks, fitted, load_networks, widened
-from robojackson.rl.tqc.trainer import make_trainer
+from robojackson.rl.tqc.trainers import make_trainer
 from robojackson.rl.training import train
 from robojackson.robot.model import Robot
 

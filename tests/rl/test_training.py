@@ -27,7 +27,7 @@ from robojackson.rl.evaluation.policy_evaluation import STAND, evaluate
 from robojackson.rl.policy import Policy, load_policy
 from robojackson.rl.tqc.sb3_trainer import Sb3Trainer
 from robojackson.rl.tqc.sbx_trainer import SbxTrainer
-from robojackson.rl.tqc.trainer import make_trainer
+from robojackson.rl.tqc.trainers import make_trainer
 from robojackson.rl.training import Hooks, TrainResult, train
 from robojackson.rl.training_run import Run
 from robojackson.robot.model import Robot

@@ -15,6 +15,7 @@ from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as configuration
 
 from robojackson.clips.people.identity import IdentityConfig
+from robojackson.clips.people.person_count import People, PeopleConfig
 from robojackson.clips.people.person_detection import CrowdConfig, paint, silhouette
 from robojackson.clips.people.person_extent import stature, trunk
 from robojackson.clips.people.tracked_people import SCOUT, Cast, look_around
@@ -25,7 +26,6 @@ from robojackson.clips.pose_detector import (
     track_of,
     video_landmarker,
 )
-from robojackson.clips.quality.person_count import People, PeopleConfig
 from robojackson.clips.video import VideoInfo, timed_frames
 from robojackson.errors import NoPersonFound
 from robojackson.motion.landmark_track import LandmarkTrack

@@ -14,11 +14,11 @@ from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as configuration
 
 from robojackson.clips.people.camera_motion import CameraConfig, CameraMotion
+from robojackson.clips.people.person_count import People, PeopleConfig
 from robojackson.clips.people.person_extent import full_body, heights_px
 from robojackson.clips.pose_detector import Size, detect, still_landmarker
 from robojackson.clips.quality.cuts import Changes, CutConfig, leaps, together
 from robojackson.clips.quality.drawing import DrawingConfig, Paint
-from robojackson.clips.quality.person_count import People, PeopleConfig
 from robojackson.clips.quality.stability import Stability, StabilityConfig, stability
 from robojackson.clips.video import VideoInfo, VideoLimits, probe
 from robojackson.motion.landmark_track import LandmarkTrack

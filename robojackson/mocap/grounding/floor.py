@@ -13,10 +13,10 @@ from jaxtyping import Float
 from pydantic import ConfigDict
 from pydantic.dataclasses import dataclass
 
+from robojackson.body.feet import stretches
 from robojackson.body.forward_kinematics import unit
 from robojackson.body.skeleton import keypoint, pair
 from robojackson.body.smoothing import lowpass
-from robojackson.mocap.grounding.feet import stretches
 
 GRAVITY = 9.81
 FALL_CUTOFF_HZ = 6.0

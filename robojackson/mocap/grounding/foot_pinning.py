@@ -11,9 +11,9 @@ from pydantic import ConfigDict, PositiveInt
 from pydantic.dataclasses import dataclass
 from scipy.linalg import solveh_banded
 
+from robojackson.body.feet import stretches
 from robojackson.body.skeleton import pair
 from robojackson.body.smoothing import lowpass
-from robojackson.mocap.grounding.feet import stretches
 
 LEASH_ROUNDS, LEASH_POWER = 3, 6
 LARGEST_TIP = np.radians(40.0)

@@ -10,11 +10,12 @@ from jaxtyping import Float, Int
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as config_dataclass
 
+from robojackson.body import feet
 from robojackson.body.smoothing import lowpass
 from robojackson.mocap.grounding import contacts as contact_states
-from robojackson.mocap.grounding import feet, leg_ik
 from robojackson.mocap.grounding import floor as ground
 from robojackson.mocap.grounding import foot_pinning as locks
+from robojackson.mocap.grounding import leg_ik
 from robojackson.mocap.pose.posed_body import Body
 from robojackson.motion.smpl_sequence import AIR, PLANTED, SLIDING
 

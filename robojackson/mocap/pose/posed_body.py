@@ -10,8 +10,8 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from robojackson.body import analytic_solve
+from robojackson.body.feet import foot_points
 from robojackson.body.forward_kinematics import Pose, forward
-from robojackson.mocap.grounding.feet import foot_points
 from robojackson.mocap.pose import twist
 from robojackson.mocap.pose.keypoints import Keypoints, build
 from robojackson.motion.smpl_sequence import SmplSequence

@@ -13,7 +13,7 @@ from typing import Any
 
 import jinja2
 
-from robojackson.report.pages.quantities import POLICY_TITLES, Fact, facts, written
+from robojackson.report.quantities import POLICY_TITLES, Fact, facts, written
 from robojackson.rl.config.evaluate_config import TRAINED
 
 VERDICT_COLUMNS = (

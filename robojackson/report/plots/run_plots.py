@@ -18,7 +18,7 @@ from matplotlib.image import AxesImage
 
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import CONTACT_POINTS, SmplSequence
-from robojackson.report.pages.quantities import POLICY_TITLES, decimal
+from robojackson.report.quantities import POLICY_TITLES, decimal
 from robojackson.rl.config.evaluate_config import TRAINED, VARIANTS
 
 Row = Mapping[str, Any]

@@ -1,8 +1,4 @@
-"""What a trainer is: an algorithm that learns on the environment and hands out its actor.
-
-Two of them exist, `sbx_trainer` (JAX) and `sb3_trainer` (torch); configuration, tables and the
-policy file are the same. Importing this module imports neither.
-"""
+"""What a trainer is: an algorithm that learns on the environment and hands out its actor."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,13 +6,10 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from robojackson.errors import MissingDependency
-from robojackson.rl.config.train_config import TqcConfig
 from robojackson.rl.tqc.network_arrays import Tensors
 
 if TYPE_CHECKING:
     from stable_baselines3.common.callbacks import BaseCallback
-    from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
 Layers = tuple[tuple[np.ndarray, np.ndarray], ...]
 
@@ -54,23 +47,3 @@ class Trainer(Protocol):
 
     def load(self, folder: Path, replay: Path, steps: int, updates: int) -> None:
         """Continue from what `save` wrote."""
-
-
-def make_trainer(name: str, env: "VecEnv", config: TqcConfig, seed: int) -> Trainer:
-    """Build the named trainer.
-
-    Raises:
-        MissingDependency: JAX is not installed; the message says how to get it.
-    """
-    if name == "sb3":
-        from robojackson.rl.tqc.sb3_trainer import Sb3Trainer
-
-        return Sb3Trainer(env, config, seed)
-    try:
-        from robojackson.rl.tqc.sbx_trainer import SbxTrainer
-    except ImportError as error:
-        raise MissingDependency(
-            f"trainer 'sbx' needs JAX ({error}): .venv/bin/pip install -e '.[fast]', "
-            "or choose --trainer sb3"
-        ) from error
-    return SbxTrainer(env, config, seed)

@@ -12,7 +12,7 @@ from prefect.client.orchestration import get_client
 
 from flows.runtime.result_server import results
 from flows.runtime.run_artifacts import RESULTS, of_dance, of_study, show_dance
-from flows.search.inputs import name_of
+from flows.video_pass.inputs import name_of
 from storage.artifact import Artifact
 from storage.store import Store
 from tests.flows.runtime.browser import Web

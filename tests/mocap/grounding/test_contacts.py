@@ -5,9 +5,9 @@ from itertools import product
 import numpy as np
 import pytest
 
+from robojackson.body import feet as soles
 from robojackson.body.forward_kinematics import forward
 from robojackson.body.skeleton import REST_JOINTS, keypoint, pair
-from robojackson.mocap.grounding import feet as soles
 from robojackson.mocap.grounding import foot_pinning, leg_ik
 from robojackson.mocap.grounding.contacts import (
     ContactConfig,

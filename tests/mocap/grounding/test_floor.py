@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from robojackson.body.feet import foot_points
 from robojackson.body.forward_kinematics import forward
 from robojackson.body.skeleton import REST_JOINTS, keypoint, pair
 from robojackson.body.smoothing import lowpass
 from robojackson.geometry.frames import CAMERA_TO_WORLD
 from robojackson.mocap.grounding import floor as ground
-from robojackson.mocap.grounding.feet import foot_points
 
 FRAMES = 60
 CONFIG = ground.GravityConfig()

@@ -10,9 +10,9 @@ from robojackson.retarget.retargeting import retarget
 from robojackson.retarget.solver import dynamics_term
 from robojackson.retarget.solver.block_banded import Normal
 from robojackson.retarget.solver.clip_problem import Problem
-from robojackson.retarget.solver.whole_clip import faults
 from robojackson.retarget.targets.cycle import human_clip
 from robojackson.retarget.targets.keypoint_targets import targets
+from robojackson.retarget.whole_clip import faults
 from robojackson.robot.model import Robot
 from robojackson.robot.tree_kinematics import integrate, pose
 from tests.fixtures.robots import human, robot_motion

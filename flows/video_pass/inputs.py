@@ -20,11 +20,10 @@ from configs.dance_book import DanceBook
 from configs.find_config import FindConfig
 from flows.find import best, of_candidate
 from flows.search.dance_source import is_name, resolve
-from flows.search.search_artifacts import slug_of
 from robojackson.clips.sources import urls
 from robojackson.clips.video import list_videos
 from robojackson.clips.web.untrusted_text import web_address
-from robojackson.pipeline.run_names import run_name
+from robojackson.pipeline.run_names import run_name, slug_of
 from robojackson.pipeline.yaml_loader import load
 from storage.artifact import Artifact
 from storage.store import Store
