@@ -3,7 +3,7 @@
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
-from robojackson.clips.quality.assessment import JudgeConfig
+from robojackson.clips.quality.assessment import AssessmentConfig
 from robojackson.clips.quality.candidate_ranking import FilterConfig
 from robojackson.clips.web.candidate_selection import SelectionConfig
 from robojackson.clips.web.download_formats import FormatConfig
@@ -19,5 +19,5 @@ class FindConfig:
     selection: SelectionConfig = Field(default_factory=SelectionConfig)
     web: WebConfig = Field(default_factory=WebConfig)
     formats: FormatConfig = Field(default_factory=FormatConfig)
-    judge: JudgeConfig = Field(default_factory=JudgeConfig)
+    judge: AssessmentConfig = Field(default_factory=AssessmentConfig)
     filters: FilterConfig = Field(default_factory=FilterConfig)

@@ -21,26 +21,26 @@ from flows.cells import EXECUTORS
 from flows.runtime.launch import launch
 from flows.runtime.run_artifacts import show_study
 from flows.runtime.tracebacks import without_tracebacks
-from flows.study.progress_table import Board
+from flows.study.progress_table import ProgressTable
 from flows.study.study_plan import training
 from flows.video_pass.motion_stages import to_reference
 from robojackson.errors import RejectedReference, StudyFailed
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.yaml_loader import load
-from robojackson.retarget.scorecard import check
+from robojackson.retarget.scorecard_gate import check
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.robot.model import RobotDescription
 from storage import study_tables
 from storage.artifact import Artifact
 from storage.leftovers import sweep
 from storage.store import Store
-from tasks.audit_rewards import payments
-from tasks.draw_pictures import still
-from tasks.probe_video import SourceFile, probe
+from tasks.audit_rewards import audit_rewards
+from tasks.draw_pictures import draw_still
+from tasks.probe_video import SourceFile, probe_video
 from tasks.runtime.stage import labelled
 from tasks.runtime.worker_processes import cores
 from tasks.study_cell import Cell
-from tasks.write_study_page import results_page
+from tasks.write_study_page import write_study_page
 
 Facts = dict[str, Any]
 REASON = 200
@@ -76,7 +76,7 @@ async def ablation(study: Study) -> Facts:
         motions = {name: motion(name, move, study, trainings) for name, move in moves.items()}
     cells = cells_of(study, {n: made["reference"] for n, made in motions.items()}, trainings)
     gate(study, {name: made["scorecard"] for name, made in motions.items()})
-    board = Board(study, cells)
+    board = ProgressTable(study, cells)
     slots = asyncio.Semaphore(study.slots or _slots(study))
     execute = EXECUTORS[study.executor]
 
@@ -112,12 +112,12 @@ def motion(
     robot = load(RobotDescription, f"robots/{study.robot}")
     rewards = {setup: train.environment for setup, train in trainings.items()}
     with labelled(name):
-        clip = probe(SourceFile.at(move.path), settings.video, None, None)
+        clip = probe_video(SourceFile.at(move.path), settings.video, None, None)
         moved = to_reference(clip, robot, settings)
         seen = (clip["video"], moved["landmarks"], moved["smpl"], moved["reference"])
         return {name: moved[name] for name in ("reference", "scorecard")} | {
-            "still": still(*seen, robot),
-            "payments": payments(moved["reference"], robot, rewards),
+            "still": draw_still(*seen, robot),
+            "payments": audit_rewards(moved["reference"], robot, rewards),
         }
 
 
@@ -185,9 +185,9 @@ async def conclude(
     well = [result["episodes"] for n, result in outcomes.items() if n not in failed]
     made = {}
     if well:
-        rows = study_tables.kept(store, study.name, study_tables.runs_of(well))
+        rows = study_tables.files_of(store, study.name, study_tables.runs_of(well))
         stills, paid = ({n: made[w] for n, made in motions.items()} for w in ("still", "payments"))
-        made = results_page(study, moves, rows, stills, paid)
+        made = write_study_page(study, moves, rows, stills, paid)
         await show_study(store, study.name, made)
     if failed:
         named = "; ".join(f"{name}: {reason}" for name, reason in failed.items())

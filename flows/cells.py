@@ -15,23 +15,23 @@ from prefect.deployments import arun_deployment
 from pydantic import TypeAdapter
 
 from flows.runtime.tracebacks import without_tracebacks
-from flows.study.run_watcher import Ending
+from flows.study.run_watcher import RunWatcher
 from robojackson.errors import TrainingCrashed, TrainingFailed
 from robojackson.pipeline.yaml_loader import load
 from robojackson.robot.model import RobotDescription
 from storage.leftovers import sweep
 from storage.store import Store
-from tasks.evaluate_policy import judge
+from tasks.evaluate_policy import evaluate_policy
 from tasks.publish_tables import Result, publish, published
 from tasks.runtime.stage import labelled
 from tasks.study_cell import Cell
-from tasks.train_policy import RunLabels, run_id_of, train
+from tasks.train_policy import RunLabels, run_id_of, train_policy
 
 DEPLOYMENT = "cell/pool"
 SECONDS_BEFORE_RETRY = 2.0
 SHORTEST_S = 1.0
 """What a stage gets after the deadline: nothing can be done in it, but what is cached is read."""
-ENDING = Ending()
+WATCHER = RunWatcher()
 """Of the runs on workers that this process waits for."""
 
 
@@ -51,19 +51,25 @@ async def cell(cell: Cell) -> Result:
     robot = _robot(cell.robot)
     labels = RunLabels(cell.move, cell.setup)
     with labelled(cell.name):
-        trained = await tried(
-            lambda s: train(cell.reference, robot, cell.train, labels, limit_s=s), cell, deadline
+        trained = await with_retries(
+            lambda s: train_policy(cell.reference, robot, cell.train, labels, limit_s=s),
+            cell,
+            deadline,
         )
         policy = trained["policy"]
-        judged = await tried(
-            lambda s: judge(policy, cell.reference, robot, cell.evaluate, limit_s=s), cell, deadline
+        judged = await with_retries(
+            lambda s: evaluate_policy(policy, cell.reference, robot, cell.evaluate, limit_s=s),
+            cell,
+            deadline,
         )
     made = publish(cell, _run_id(cell), {**trained, **judged})
     sweep(store, parts=False)
     return made
 
 
-async def tried(stage: Callable[[float], Awaitable[Result]], cell: Cell, deadline: float) -> Result:
+async def with_retries(
+    stage: Callable[[float], Awaitable[Result]], cell: Cell, deadline: float
+) -> Result:
     """A stage of a cell, again when its process was killed; an attempt gets the time that is left.
 
     Prefect's own retries would give every attempt the time of the first.
@@ -93,7 +99,7 @@ def _robot(name: str) -> RobotDescription:
     return load(RobotDescription, f"robots/{name}")
 
 
-async def here(wanted: Cell) -> Result:
+async def run_locally(wanted: Cell) -> Result:
     """The cell as a subflow of the flow that calls.
 
     Raises:
@@ -102,7 +108,7 @@ async def here(wanted: Cell) -> Result:
     return await cell(wanted)
 
 
-async def anywhere(wanted: Cell) -> Result:
+async def run_on_worker(wanted: Cell) -> Result:
     """The cell as a run that a worker of the pool takes; another one, if the worker dies with it.
 
     One that was done before is read here: a worker would take seconds to start for nothing.
@@ -115,7 +121,7 @@ async def anywhere(wanted: Cell) -> Result:
         StoreError: it ended well and left nothing in this store; the message names why.
     """
     if await asyncio.to_thread(is_recorded, wanted):
-        return await here(wanted)
+        return await run_locally(wanted)
     left_s = 60 * wanted.timeout_minutes
     for _ in range(1 + wanted.retries):
         given = replace(wanted, timeout_minutes=left_s / 60)
@@ -123,7 +129,7 @@ async def anywhere(wanted: Cell) -> Result:
         begun = await arun_deployment(
             DEPLOYMENT, parameters={"cell": plain}, flow_run_name=wanted.name, timeout=0
         )
-        run = await ENDING.of(begun)
+        run = await WATCHER.of(begun)
         left_s -= run.total_run_time.total_seconds()
         if run.state is None or not run.state.is_crashed() or left_s <= 0:
             break
@@ -136,10 +142,10 @@ async def anywhere(wanted: Cell) -> Result:
 def is_recorded(wanted: Cell) -> bool:
     """Return whether everything that takes time was done before and is still in the store."""
     given = (wanted.reference, _robot(wanted.robot))
-    trained = train.recorded(*given, wanted.train)
+    trained = train_policy.recorded(*given, wanted.train)
     if trained is None:
         return False
-    return judge.recorded(trained["policy"], *given, wanted.evaluate) is not None
+    return evaluate_policy.recorded(trained["policy"], *given, wanted.evaluate) is not None
 
 
 def _run_id(wanted: Cell) -> str:
@@ -147,4 +153,4 @@ def _run_id(wanted: Cell) -> str:
     return run_id_of(wanted.reference, _robot(wanted.robot), wanted.train, labels)
 
 
-EXECUTORS: dict[str, Any] = {"local": here, "work-pool": anywhere}
+EXECUTORS: dict[str, Any] = {"local": run_locally, "work-pool": run_on_worker}

@@ -13,7 +13,7 @@ from prefect.runtime import flow_run
 from flows.runtime.launch import launch
 from flows.runtime.run_artifacts import show_dance
 from flows.search.scoring_pool import scorers
-from flows.video_pass.dance_stages import danced
+from flows.video_pass.dance_stages import make_dance
 from flows.video_pass.inputs import Minutes, Search, Seconds, Source, name_of, videos_of
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.yaml_loader import load
@@ -68,7 +68,7 @@ async def dance(
     given = {**(overrides or {}), **({} if minutes is None else {"minutes": minutes})}
     settings = load(PipelineConfig, config, given)
     async with videos_of(source, search) as paths:
-        done = await danced(store, paths, settings, start_s, end_s)
+        done = await make_dance(store, paths, settings, start_s, end_s)
     answer = done.answer
     await show_dance(store, answer["move"], answer["evaluation"], done.made)
     return answer

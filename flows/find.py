@@ -15,9 +15,9 @@ from prefect.task_runners import ThreadPoolTaskRunner
 from configs.dance_book import Dance
 from configs.find_config import FindConfig
 from flows.runtime.launch import launch
-from flows.search.search_artifacts import show
-from flows.search.search_entries import Entry, Hunt, rows, summary
-from flows.search.search_pipeline import bring, hunt
+from flows.search.search_artifacts import publish_search
+from flows.search.search_entries import Entry, SearchResult, rows, summary
+from flows.search.search_pipeline import download_candidates, search_and_rank
 from robojackson.clips.web.video_candidate import VideoCandidate
 from robojackson.errors import NoPersonFound, SearchFailed
 from robojackson.pipeline.yaml_loader import build, load
@@ -48,13 +48,13 @@ async def find(
     """
     sweep(Store.from_environment(), work=False)
     settings = load(FindConfig, config, overrides)
-    found = hunt(build(Dance, dance, "dance"), settings, run_id("find"))
+    found = search_and_rank(build(Dance, dance, "dance"), settings, run_id("find"))
     told = rows(found)
-    await show(found.dance.name, told, told[0] if found.chosen else None)
-    return answer(found)
+    await publish_search(found.dance.name, told, told[0] if found.chosen else None)
+    return summarise(found)
 
 
-def look_for(wanted: Dance, config: str, overrides: Mapping[str, Any]) -> dict[str, Any]:
+def run(wanted: Dance, config: str, overrides: Mapping[str, Any]) -> dict[str, Any]:
     """The flow from the command line.
 
     Raises:
@@ -76,14 +76,14 @@ async def best(
     wanted = build(Dance, dance, "dance")
     store = Store.from_environment()
     try:
-        found = hunt(wanted, settings, run_id("dance"))
+        found = search_and_rank(wanted, settings, run_id("dance"))
     except SearchFailed:
         reigning = candidate_catalogue.champion(store, wanted.name)
         if reigning is None:
             raise
         return {"key": reigning["video_key"], "sha256": reigning["video_sha256"]}
     told = rows(found)
-    await show(wanted.name, told, told[0] if found.chosen else None)
+    await publish_search(wanted.name, told, told[0] if found.chosen else None)
     if found.chosen is None:
         raise NoPersonFound(nothing(found))
     return asdict(in_good_quality(found.chosen, settings))
@@ -102,7 +102,7 @@ def of_candidate(
     Raises:
         SearchFailed: neither is there.
     """
-    ((_, video),) = bring([candidate], "dance", settings)
+    ((_, video),) = download_candidates([candidate], "dance", settings)
     if isinstance(video, Artifact):
         return video
     if scored is None:
@@ -110,7 +110,7 @@ def of_candidate(
     return scored
 
 
-def nothing(found: Hunt) -> str:
+def nothing(found: SearchResult) -> str:
     """Why no video of a search may be danced, in one line."""
     if not found.entries:
         return f"{found.dance.name}: no video is left of the search"
@@ -120,7 +120,7 @@ def nothing(found: Hunt) -> str:
     )
 
 
-def answer(found: Hunt) -> dict[str, Any]:
+def summarise(found: SearchResult) -> dict[str, Any]:
     """What the command says."""
     told = rows(found)
     every = [*found.selection.kept, *(c for c, _ in found.selection.dropped)]

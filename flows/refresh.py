@@ -24,9 +24,9 @@ from flows.find import (
     run_id,
 )
 from flows.runtime.launch import launch
-from flows.search.search_artifacts import show
+from flows.search.search_artifacts import publish_search
 from flows.search.search_entries import REASON_LENGTH, Entry, reason_of, rows
-from flows.search.search_pipeline import hunt
+from flows.search.search_pipeline import search_and_rank
 from flows.video_pass.motion_stages import to_reference
 from robojackson.clips.web.untrusted_text import clean_text
 from robojackson.clips.web.video_candidate import VideoCandidate
@@ -39,7 +39,7 @@ from storage import candidate_catalogue
 from storage.artifact import Artifact
 from storage.leftovers import sweep
 from storage.store import Store
-from tasks.probe_video import SourceFile, probe
+from tasks.probe_video import SourceFile, probe_video
 
 KIND = "refresh"
 """Beginning of the ids of its runs in the catalogue."""
@@ -78,7 +78,7 @@ async def refresh(
     stages = [pipeline, pipeline_overrides or {}]
     done: dict[str, Facts] = {}
     failed: dict[str, str] = {}
-    picked = _told_apart(load(DanceBook, book)).pick(dances)
+    picked = _require_distinct(load(DanceBook, book)).pick(dances)
     due = [dance for dance in picked if dances is not None or _is_due(dance)]
     for dance in due:
         state = await refresh_dance(dance.name, asdict(dance), settings, *stages, return_state=True)
@@ -89,7 +89,7 @@ async def refresh(
             done[dance.name] = result
             _note(dance, result)
     candidate_catalogue.compact(Store.from_environment())
-    await _tell(done, failed)
+    await _log_summary(done, failed)
     if failed and not done:
         raise SearchFailed("; ".join(f"{name}: {reason}" for name, reason in failed.items()))
     waiting = [dance.name for dance in picked if dance not in due]
@@ -122,10 +122,10 @@ async def refresh_dance(
     mine = (store, wanted.name, KIND)  # what `find` judges is nothing to this
     reigning = candidate_catalogue.champion(*mine)
     seen, failing = candidate_catalogue.known(*mine), candidate_catalogue.failed(*mine)
-    found = hunt(wanted, settings, run_id(KIND), seen, reigning, failing)
+    found = search_and_rank(wanted, settings, run_id(KIND), seen, reigning, failing)
     told = rows(found)
     chosen = told[0] if found.chosen else reigning
-    await show(wanted.name, told, chosen)
+    await publish_search(wanted.name, told, chosen)
     if chosen is None:
         raise NoPersonFound(nothing(found))
     try:
@@ -151,7 +151,7 @@ async def refresh_dance(
 def motion(store: Store, video: Artifact, settings: PipelineConfig) -> Facts:
     """Mocap and retargeting of a video: what a training starts from."""
     with store.local(video) as path:
-        clip = probe(SourceFile(path, video.sha256), settings.video, None, None)
+        clip = probe_video(SourceFile(path, video.sha256), settings.video, None, None)
     moved = to_reference(clip, load(RobotDescription, f"robots/{settings.robot}"), settings)
     return {
         "video": store.address(clip["video"].key),
@@ -183,7 +183,7 @@ def _video(chosen: Entry | None, reigning: Facts | None, settings: FindConfig) -
     return of_candidate(candidate, scored, settings)
 
 
-def _told_apart(book: DanceBook) -> DanceBook:
+def _require_distinct(book: DanceBook) -> DanceBook:
     """The book, if no two dances would share what is noted of them."""
     by_slug: dict[str, str] = {}
     for dance in book.dances:
@@ -215,7 +215,7 @@ def _key(dance: Dance) -> str:
     return f"{FOLDER}/{slug_of(dance.name)}.json"
 
 
-async def _tell(done: dict[str, Facts], failed: dict[str, str]) -> None:
+async def _log_summary(done: dict[str, Facts], failed: dict[str, str]) -> None:
     """One table of all dances."""
     table = [
         {"dance": name, "result": "new" if facts["is_new"] else "as before",

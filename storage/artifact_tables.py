@@ -10,7 +10,7 @@ from storage.store import Store
 Value = TypeVar("Value")
 
 
-def keep(store: Store, stage: str, name: str, value: object) -> Artifact:
+def save(store: Store, stage: str, name: str, value: object) -> Artifact:
     """Keep a dataclass in the store under a key made of its content."""
     return store.keep(stage, name, tables.encode(value))
 

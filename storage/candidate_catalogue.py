@@ -94,7 +94,7 @@ def query(store: Store, sql: str, given: Mapping[str, Any] | None = None) -> lis
     """
     import duckdb
 
-    whole = _without_zones(_whole(store))
+    whole = _without_zones(_read_all(store))
     with duckdb.connect(":memory:") as connection:
         connection.register("parts", whole)
         unique = "SELECT DISTINCT ON (record_id) * FROM parts"
@@ -147,20 +147,20 @@ def champion(store: Store, dance: str, kind: str = "") -> dict[str, Any] | None:
 
 def known(store: Store, dance: str, kind: str = "") -> set[tuple[str, str]]:
     """Source and id of every video that was judged for a dance; a failed one may be tried again."""
-    return _judged(_of(store, dance, kind))
+    return _assessed(_of(store, dance, kind))
 
 
 def failed(store: Store, dance: str, kind: str = "") -> set[tuple[str, str]]:
     """Source and id of every video that could never be judged for a dance."""
     found = _of(store, dance, kind)
-    return {_key_of(row) for row in found} - _judged(found)
+    return {_key_of(row) for row in found} - _assessed(found)
 
 
 def _of(store: Store, dance: str, kind: str) -> list[dict[str, Any]]:
     return [row for row in records(store, dance) if row["run_id"].startswith(kind)]
 
 
-def _judged(found: Iterable[Row]) -> set[tuple[str, str]]:
+def _assessed(found: Iterable[Row]) -> set[tuple[str, str]]:
     return {_key_of(row) for row in found if row["decision"] != "failed"}
 
 
@@ -178,7 +178,7 @@ def _keys(store: Store) -> list[str]:
     return [key for key in store.list(FOLDER) if key.endswith(".parquet")]
 
 
-def _whole(store: Store) -> pa.Table:
+def _read_all(store: Store) -> pa.Table:
     """All files in one table; read anew when a compaction took one away meanwhile."""
     for _ in range(ATTEMPTS):
         parts = [_read(store, key) for key in _keys(store)]

@@ -25,7 +25,7 @@ from storage.store import HELD, SCRATCH, Store
 log = logging.getLogger(__name__)
 TASK, PROCESS = "task.lock", "lock"
 """What the flow and the training hold of a folder of work."""
-TRAINING, JUDGEMENT = "train-", "judge-"
+TRAINING, EVALUATION = "train-", "judge-"
 YOUNG_S = 60.0
 """A folder may be younger than the lock in it."""
 
@@ -72,7 +72,7 @@ def _work(store: Store) -> Iterator[Path]:
     left = [f for f in _folders(store, f"{TRAINING}*") if not _is_held(f / TASK)]
     finished = _finished(store) if left else set()
     unneeded = [folder for folder in left if folder.name.removeprefix(TRAINING) in finished]
-    for folder in [*_folders(store, f"{JUDGEMENT}*"), *unneeded]:
+    for folder in [*_folders(store, f"{EVALUATION}*"), *unneeded]:
         try:
             with locked(folder, TASK), locked(folder, PROCESS):
                 shutil.rmtree(folder, ignore_errors=True)

@@ -46,7 +46,7 @@ def record(store: Store, run: Run) -> Artifact:
     return store.put(f"{FOLDER}/{run.run_id}.json", text.encode())
 
 
-def runs(store: Store) -> list[Run]:
+def list_runs(store: Store) -> list[Run]:
     """All runs, the latest last.
 
     Raises:

@@ -65,7 +65,7 @@ Report = Callable[[Progress], None]
 
 
 @dataclass(frozen=True)
-class Made:
+class BackupResult:
     """What a backup did.
 
     Attributes:
@@ -101,7 +101,9 @@ class Restored:
     others: int
 
 
-def back_up(store: Store, database: Database, backups: Backups, keep: int, report: Report) -> Made:
+def back_up(
+    store: Store, database: Database, backups: Backups, keep: int, report: Report
+) -> BackupResult:
     """Add a backup to a folder; contents that are there already are not copied again.
 
     Args:
@@ -125,7 +127,7 @@ def back_up(store: Store, database: Database, backups: Backups, keep: int, repor
             content = before.get(key)
             if content and content.stamp == found[key] is not None and backups.has(content):
                 return content
-            return _taken(store, key, found[key], backups)
+            return _copied(store, key, found[key], backups)
 
         files: dict[str, Content] = {}
         known = {content.sha256 for content in before.values()}
@@ -138,7 +140,7 @@ def back_up(store: Store, database: Database, backups: Backups, keep: int, repor
         manifest = Manifest(store.root, dict(sorted(files.items())), dump)
         name = backups.write(manifest)
         new = [c for c in files.values() if c.sha256 not in known]
-        return Made(
+        return BackupResult(
             name=name,
             files=len(files),
             size_mb=_mb(files.values()),
@@ -307,7 +309,7 @@ def _dumped(database: Database, backups: Backups) -> Dump | None:
         return Dump(database.kind, backups.add(path))
 
 
-def _taken(store: Store, key: str, stamp: str | None, backups: Backups) -> Content | None:
+def _copied(store: Store, key: str, stamp: str | None, backups: Backups) -> Content | None:
     """Copy a file of the store; None when it is gone."""
     what = f"cannot copy {store.address(key)}"
     with backups.temporary() as path, in_one_line(what, BackupFailed):

@@ -27,7 +27,7 @@ from storage.store import Store
 if TYPE_CHECKING:
     from duckdb import DuckDBPyConnection
 
-Ask = Callable[..., list[dict[str, Any]]]
+RunQuery = Callable[..., list[dict[str, Any]]]
 """A question in SQL and its parameters to rows."""
 FOLDER = "metrics"
 TABLES: Mapping[str, TableSchema] = {"episodes": EPISODE_RECORD, "evaluations": EVALUATION_RECORD}
@@ -78,7 +78,9 @@ def write(store: Store, place: Place, given: Mapping[str, Artifact]) -> dict[str
     for table, schema in TABLES.items():
         key = given[table].key
         rows = tables.decode_rows(schema, store.read(key), store.address(key))
-        made[table] = _put(store, place.key(table), tables.encode_rows(schema, _named(place, rows)))
+        made[table] = _put(
+            store, place.key(table), tables.encode_rows(schema, _relabelled(place, rows))
+        )
     for key in _outdated(store, place):
         for old in (key, note_key(replace(place, run_id=_run(key)))):
             if store.exists(old):
@@ -91,7 +93,7 @@ def note_key(place: Place) -> str:
     return f"{RUNS}/{place.run_id}-{place.study}.json"
 
 
-def noted(store: Store, place: Place) -> dict[str, Any]:
+def read_note(store: Store, place: Place) -> dict[str, Any]:
     """What is known of a cell's origin; nothing where it is not there or cannot be read."""
     try:
         return dict(json.loads(store.read(note_key(place))))
@@ -120,7 +122,7 @@ def query(store: Store, sql: str, given: Mapping[str, Any] | None = None) -> lis
 @contextmanager
 def opened(
     store: Store, study: str | None = None, runs: Collection[str] | None = None
-) -> Iterator[Ask]:
+) -> Iterator[RunQuery]:
     """The tables, all or those of a study or of some runs of it, read once for any number of
     questions.
     """
@@ -144,7 +146,7 @@ def opened(
         yield ask
 
 
-def kept(store: Store, study: str, runs: Collection[str] | None = None) -> list[Artifact]:
+def files_of(store: Store, study: str, runs: Collection[str] | None = None) -> list[Artifact]:
     """All files of a study, or of some runs of it: its tables and where they come from."""
     keys = [key for table in TABLES for key in store.list(f"{FOLDER}/{table}/study={study}")]
     keys = [key for key in keys if runs is None or _run(key) in runs]
@@ -170,7 +172,7 @@ def read(
     return pa.concat_tables([_empty(schema), *parts], promote_options="default")
 
 
-def _named(place: Place, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def _relabelled(place: Place, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Rows under the names of this cell: a cached table may have been made under others."""
     names = {"run_id": place.run_id, "move": place.move, "setup": place.setup, "seed": place.seed}
     return [{**row, **names} for row in rows]

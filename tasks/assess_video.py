@@ -6,8 +6,8 @@ from dataclasses import asdict
 from typing import Any
 
 from robojackson.clips.pose_detector import model_path
-from robojackson.clips.quality.assessment import JudgeConfig, Judgement
-from robojackson.clips.quality.assessment import judge as measure
+from robojackson.clips.quality.assessment import Assessment, AssessmentConfig
+from robojackson.clips.quality.assessment import assess_video as measure
 from robojackson.pipeline.local_folder import sha256_of_file
 from storage import artifact_tables
 from storage.artifact import Artifact
@@ -21,15 +21,15 @@ def _models(parameters: Mapping[str, Any]) -> list[str]:
 
 
 @stage(models=_models)
-def judge(video: Artifact, config: JudgeConfig) -> dict[str, Artifact]:
+def assess_video(video: Artifact, config: AssessmentConfig) -> dict[str, Artifact]:
     """`landmarks`: LandmarkTrack; `stability`: StabilityScore; `quality`, `info`: JSON."""
     store = Store.from_environment()
     with store.local(video) as path:
-        found: Judgement = in_worker(measure, path, config)
+        found: Assessment = in_worker(measure, path, config)
     info = {key: value for key, value in asdict(found.info).items() if key != "path"}
     return {
-        "landmarks": artifact_tables.keep(store, "landmarks", "landmarks.parquet", found.track),
-        "stability": artifact_tables.keep(store, "stability", "stability.parquet", found.stability),
+        "landmarks": artifact_tables.save(store, "landmarks", "landmarks.parquet", found.track),
+        "stability": artifact_tables.save(store, "stability", "stability.parquet", found.stability),
         "quality": store.keep(
             "quality", "quality.json", json.dumps(asdict(found.quality)).encode()
         ),

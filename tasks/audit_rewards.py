@@ -13,13 +13,13 @@ from tasks.runtime.stage import stage
 
 
 @stage(models=robot_models)
-def payments(
+def audit_rewards(
     reference: Artifact, robot: RobotDescription, rewards: dict[str, TrackConfig | PaperConfig]
 ) -> Artifact:
     """JSON: by name of the reward, the share of a perfect dance that each body earns."""
-    from robojackson.rl.evaluation.reward_audit import shares
+    from robojackson.rl.evaluation.reward_audit import audit_reward
 
     store = Store.from_environment()
     motion, machine = artifact_tables.read(ReferenceMotion, store, reference), load_robot(robot)
-    paid = {name: shares(machine, motion, reward).of for name, reward in rewards.items()}
+    paid = {name: audit_reward(machine, motion, reward).of for name, reward in rewards.items()}
     return store.keep("payments", "payments.json", json.dumps(paid, indent=1).encode())

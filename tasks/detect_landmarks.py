@@ -7,7 +7,7 @@ from typing import Any
 from robojackson.clips.people.dancer import DancerConfig
 from robojackson.clips.people.tracked_people import SCOUT
 from robojackson.clips.pose_detector import detect, model_path
-from robojackson.mocap.landmarks.pipeline import models_of, see
+from robojackson.mocap.landmarks import pipeline
 from robojackson.pipeline.local_folder import sha256_of_file
 from storage import artifact_tables
 from storage.artifact import Artifact
@@ -19,23 +19,29 @@ ONE_AT_A_TIME = threading.Lock()
 """The detector uses all cores by itself, and redirects the process's stderr while it starts."""
 
 
-def alone() -> threading.Lock:
+def one_at_a_time() -> threading.Lock:
     """The lock, by a name that can be sent to another process, where it is another lock."""
     return ONE_AT_A_TIME
 
 
 def _models(parameters: Mapping[str, Any]) -> list[str]:
-    sizes = [*models_of(parameters["size"]), *([SCOUT] if parameters.get("dancer") else [])]
+    sizes = [
+        *pipeline.models_of(parameters["size"]),
+        *([SCOUT] if parameters.get("dancer") else []),
+    ]
     return [sha256_of_file(model_path(size)) for size in sizes]
 
 
 @stage(models=_models)
-def landmarks(
+def detect_landmarks(
     video: Artifact, info: Artifact, size: str, dancer: DancerConfig | None = None
 ) -> Artifact:
     """LandmarkTrack of one person, or, as Algorithm 1 has it, of whom the detector prefers."""
     store = Store.from_environment()
-    with store.local(video) as path, alone():
+    with store.local(video) as path, one_at_a_time():
         known = info_of(store, info, path)
-        track = see(path, known, size, dancer) if dancer else detect(path, known, size)
-    return artifact_tables.keep(store, "landmarks", "landmarks.parquet", track)
+        if dancer:
+            track = pipeline.detect_landmarks(path, known, size, dancer)
+        else:
+            track = detect(path, known, size)
+    return artifact_tables.save(store, "landmarks", "landmarks.parquet", track)

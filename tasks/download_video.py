@@ -54,24 +54,24 @@ class WebVideo:
 
 
 @stage(unkeyed=("web", "limits"))
-def download(
+def download_video(
     video: WebVideo, purpose: Purpose, formats: FormatConfig, web: WebConfig, limits: VideoLimits
 ) -> Artifact:
     """A video file, in the format that serves the purpose."""
     store = Store.from_environment()
     chosen = offer(video.url, purpose, formats, web)
-    had = _had(store, video, chosen)
-    return had if had is not None else _bring(store, video, chosen, web, limits)
+    had = _earlier_download(store, video, chosen)
+    return had if had is not None else _download_or_reuse(store, video, chosen, web, limits)
 
 
 @stage()
-def take(file: SourceFile) -> Artifact:
+def take_file(file: SourceFile) -> Artifact:
     """A video of a folder."""
     suffix = safe_name(file.path.suffix.lstrip(".").lower() or "mp4")
     return Store.from_environment().keep("video", f"clip.{suffix}", file.path)
 
 
-def _had(store: Store, video: WebVideo, chosen: Offer) -> Artifact | None:
+def _earlier_download(store: Store, video: WebVideo, chosen: Offer) -> Artifact | None:
     """The file of an earlier download, if it is there unaltered."""
     note = f"{video.folder}/{chosen.name}.json"
     if not store.exists(note):
@@ -82,13 +82,13 @@ def _had(store: Store, video: WebVideo, chosen: Offer) -> Artifact | None:
         return None
 
 
-def _bring(
+def _download_or_reuse(
     store: Store, video: WebVideo, chosen: Offer, web: WebConfig, limits: VideoLimits
 ) -> Artifact:
     """The file that another run has brought meanwhile, or else from the web."""
     folder = store.work(f"{video.folder}.{chosen.name}")
     with locked(folder, patience_s=FOR_EVER):
-        had = _had(store, video, chosen)
+        had = _earlier_download(store, video, chosen)
         made = had if had is not None else _fetched(store, video, chosen, folder, web, limits)
         shutil.rmtree(folder, ignore_errors=True)
     return made

@@ -3,8 +3,7 @@
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
-from robojackson.report.video.still_picture import middle_of
-from robojackson.report.video.still_picture import still as draw
+from robojackson.report.video.still_picture import middle_of, still
 from robojackson.robot.model import RobotDescription, load_robot
 from storage import artifact_tables
 from storage.artifact import Artifact
@@ -14,7 +13,7 @@ from tasks.runtime.stage import stage
 
 
 @stage(models=robot_models)
-def still(
+def draw_still(
     source: Artifact,
     landmarks: Artifact,
     sequence: Artifact,
@@ -24,7 +23,7 @@ def still(
     """A PNG."""
     store = Store.from_environment()
     with store.local(source) as path:
-        picture = draw(
+        picture = still(
             path,
             artifact_tables.read(LandmarkTrack, store, landmarks),
             artifact_tables.read(SmplSequence, store, sequence),
@@ -35,7 +34,7 @@ def still(
 
 
 @stage()
-def snapshot(film: Artifact) -> Artifact:
+def draw_snapshot(film: Artifact) -> Artifact:
     """Keep a PNG of the middle of a film."""
     store = Store.from_environment()
     with store.local(film) as path:

@@ -17,7 +17,7 @@ from tasks.train_policy import RunLabels
 
 
 @stage(models=robot_models, unkeyed=("labels",))
-def evaluate(
+def evaluate_dance(
     policy: Artifact,
     reference: Artifact,
     robot: RobotDescription,
@@ -25,14 +25,14 @@ def evaluate(
     labels: RunLabels,
 ) -> dict[str, Artifact]:
     """`evaluations`: EvaluationRecord; `evaluation`: means, as JSON; `rollout`: Rollout."""
-    from robojackson.rl.evaluation.policy_evaluation import evaluate as judge
+    from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
     from robojackson.rl.policy import load_policy
 
     store = Store.from_environment()
     motion = artifact_tables.read(ReferenceMotion, store, reference)
     with store.local(policy) as path:
         trained = load_policy(path)
-    verdict = judge(trained, motion, load_robot(robot), config)
+    verdict = evaluate_policy(trained, motion, load_robot(robot), config)
     run_id = f"{labels.move}-{labels.setup}-s{trained.training['seed']}"
     common = {"run_id": run_id, "move": labels.move, "setup": labels.setup, **trained.training}
     rows = tables.encode_rows(EVALUATION_RECORD, [{**common, **r} for r in verdict.rows])
@@ -41,5 +41,5 @@ def evaluate(
     return {
         "evaluations": store.keep("evaluate", "evaluations.parquet", rows),
         "evaluation": store.keep("evaluate", "evaluation.json", summary),
-        "rollout": artifact_tables.keep(store, "evaluate", "rollout.parquet", rollout),
+        "rollout": artifact_tables.save(store, "evaluate", "rollout.parquet", rollout),
     }

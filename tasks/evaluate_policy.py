@@ -27,7 +27,7 @@ TABLE, SUMMARY, ROLLOUT = "evaluations.parquet", "evaluation.json", "rollout.par
     reaches=("robojackson.rl.evaluation.policy_evaluation",),
     unkeyed=("limit_s",),
 )
-async def judge(
+async def evaluate_policy(
     policy: Artifact,
     reference: Artifact,
     robot: RobotDescription,

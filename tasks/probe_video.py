@@ -6,9 +6,8 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 from robojackson.clips.time_range import span
-from robojackson.clips.trim import trim as trim_file
-from robojackson.clips.video import VideoInfo, VideoLimits
-from robojackson.clips.video import probe as probe_file
+from robojackson.clips.trim import trim
+from robojackson.clips.video import VideoInfo, VideoLimits, probe
 from robojackson.pipeline.local_folder import sha256_of_file
 from storage.artifact import Artifact
 from storage.store import Store
@@ -34,18 +33,18 @@ class SourceFile:
 
 
 @stage()
-def probe(
+def probe_video(
     source: SourceFile, limits: VideoLimits, start_s: float | None, end_s: float | None
 ) -> dict[str, Artifact]:
     """`video`: the file, or its range; `info`: size, rate and frames, as JSON."""
     store = Store.from_environment()
     if start_s is None and end_s is None:
-        return _keep(store, source.path, probe_file(source.path, limits))
-    whole = probe_file(source.path, replace(limits, max_duration_s=math.inf))
+        return _save(store, source.path, probe(source.path, limits))
+    whole = probe(source.path, replace(limits, max_duration_s=math.inf))
     begin, end = span(whole, limits, start_s, end_s)
     with store.scratch() as folder:
-        clip = trim_file(source.path, begin, end, folder / f"{source.path.stem}.mp4")
-        return _keep(store, clip, probe_file(clip, limits))
+        clip = trim(source.path, begin, end, folder / f"{source.path.stem}.mp4")
+        return _save(store, clip, probe(clip, limits))
 
 
 def info_of(store: Store, info: Artifact, path: Path) -> VideoInfo:
@@ -53,7 +52,7 @@ def info_of(store: Store, info: Artifact, path: Path) -> VideoInfo:
     return VideoInfo(path=path, **json.loads(store.read(info.key)))
 
 
-def _keep(store: Store, path: Path, info: VideoInfo) -> dict[str, Artifact]:
+def _save(store: Store, path: Path, info: VideoInfo) -> dict[str, Artifact]:
     facts = {key: value for key, value in asdict(info).items() if key != "path"}
     return {
         "video": store.keep("video", path.name, path),

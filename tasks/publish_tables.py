@@ -23,7 +23,16 @@ RESULT = "result"
 """Under which the note of a cell keeps its artifacts, keys and digests."""
 CHECKOUT = Path(__file__).parent.parent
 COMMIT = "ROBOJACKSON_COMMIT"
-TOLD = ("robojackson", "mujoco", "gymnasium", "torch", "jax", "sbx-rl", "sb3-contrib", "prefect")
+PACKAGES = (
+    "robojackson",
+    "mujoco",
+    "gymnasium",
+    "torch",
+    "jax",
+    "sbx-rl",
+    "sb3-contrib",
+    "prefect",
+)
 """Packages whose version is written down."""
 
 
@@ -39,7 +48,7 @@ def publish(cell: Cell, run_id: str, made: Mapping[str, Artifact]) -> Result:
     store = Store.from_environment()
     place = _place(cell, run_id)
     written = {**made, **study_tables.write(store, place, made)}
-    noted = study_tables.noted(store, place)
+    noted = study_tables.read_note(store, place)
     known = {"artifacts": _digests(made), RESULT: _plain(written)}
     if {name: noted.get(name) for name in known} != known:
         study_tables.note(store, place, {**provenance(cell, place, made), **known})
@@ -54,7 +63,7 @@ def published(cell: Cell, run_id: str) -> Result:
     """
     store = Store.from_environment()
     try:
-        found = study_tables.noted(store, _place(cell, run_id))[RESULT]
+        found = study_tables.read_note(store, _place(cell, run_id))[RESULT]
         return {name: Artifact(**artifact) for name, artifact in found.items()}
     except (KeyError, TypeError, ValueError, AttributeError) as cause:
         raise StoreError(
@@ -76,7 +85,7 @@ def provenance(
         "evaluate": asdict(cell.evaluate),
         "robot": cell.robot,
         "reference_sha256": cell.reference.sha256,
-        "versions": {name: _version(name) for name in TOLD},
+        "versions": {name: _version(name) for name in PACKAGES},
         "machine": f"{platform.node()} {platform.machine()} {os.cpu_count()} cores",
         "python": platform.python_version(),
         "finished_at": datetime.now(UTC).isoformat(timespec="seconds"),

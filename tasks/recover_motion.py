@@ -3,7 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
-from robojackson.mocap.recover import MocapConfig, recover
+from robojackson.mocap import recover
+from robojackson.mocap.recover import MocapConfig
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.pipeline.local_folder import sha256_of_file
 from storage import artifact_tables
@@ -19,8 +20,10 @@ def _models(parameters: Mapping[str, Any]) -> list[str]:
 
 
 @stage(models=_models)
-def mocap(landmarks: Artifact, config: MocapConfig) -> Artifact:
+def recover_motion(landmarks: Artifact, config: MocapConfig) -> Artifact:
     """SmplSequence."""
     store = Store.from_environment()
     track = artifact_tables.read(LandmarkTrack, store, landmarks)
-    return artifact_tables.keep(store, "mocap", "smpl.parquet", recover(track, config))
+    return artifact_tables.save(
+        store, "mocap", "smpl.parquet", recover.recover_motion(track, config)
+    )

@@ -17,7 +17,7 @@ from storage.artifact import Artifact
 from storage.store import Store
 from tasks.runtime.stage import stage
 
-TOLD = 10
+REPORTS = 10
 """Lines of progress in a clip."""
 log = logging.getLogger(__name__)
 
@@ -27,7 +27,7 @@ def _models(parameters: Mapping[str, Any]) -> list[str]:
 
 
 @stage(models=_models)
-def network_mocap(
+def recover_motion_by_networks(
     video: Artifact, landmarks: Artifact, network: NetworkConfig, config: MocapConfig
 ) -> Artifact:
     """SmplSequence."""
@@ -37,7 +37,7 @@ def network_mocap(
     with store.local(video) as path:
         images = read_frames(path)
         sequence = network_motion(track, images, networks, config, network, _teller())
-    return artifact_tables.keep(store, "mocap", "smpl.parquet", sequence)
+    return artifact_tables.save(store, "mocap", "smpl.parquet", sequence)
 
 
 def _teller() -> Callable[[int, int], None]:
@@ -45,8 +45,8 @@ def _teller() -> Callable[[int, int], None]:
 
     def tell(done: int, total: int) -> None:
         nonlocal told
-        if done * TOLD // total > told:
-            told = done * TOLD // total
+        if done * REPORTS // total > told:
+            told = done * REPORTS // total
             log.info("networks: %d of %d frames", done, total)
 
     return tell

@@ -14,7 +14,7 @@ from tasks.runtime.stage import stage
 
 
 @stage(models=robot_models)
-def video(
+def render_video(
     source: Artifact,
     landmarks: Artifact,
     sequence: Artifact,

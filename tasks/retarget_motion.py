@@ -4,8 +4,8 @@ import json
 
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.retarget.retargeting import RetargetConfig
-from robojackson.retarget.retargeting import retarget as to_robot
-from robojackson.retarget.scorecard import told
+from robojackson.retarget.retargeting import retarget_motion as to_robot
+from robojackson.retarget.scorecard_gate import scorecard_record
 from robojackson.robot.model import RobotDescription, load_robot
 from storage import artifact_tables
 from storage.artifact import Artifact
@@ -15,15 +15,15 @@ from tasks.runtime.stage import stage
 
 
 @stage(models=robot_models)
-def retarget(
+def retarget_motion(
     sequence: Artifact, robot: RobotDescription, config: RetargetConfig
 ) -> dict[str, Artifact]:
     """`reference`: ReferenceMotion; `scorecard`: its figures, as JSON."""
     store = Store.from_environment()
     motion = artifact_tables.read(SmplSequence, store, sequence)
     reference = to_robot(motion, load_robot(robot), config)
-    scorecard = json.dumps(told(reference), indent=1).encode()
+    scorecard = json.dumps(scorecard_record(reference), indent=1).encode()
     return {
-        "reference": artifact_tables.keep(store, "retarget", "reference.parquet", reference),
+        "reference": artifact_tables.save(store, "retarget", "reference.parquet", reference),
         "scorecard": store.keep("retarget", "scorecard.json", scorecard),
     }

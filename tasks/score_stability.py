@@ -1,7 +1,6 @@
 """How steady the dancer of a clip is seen."""
 
-from robojackson.clips.quality.stability import StabilityConfig
-from robojackson.clips.quality.stability import stability as score
+from robojackson.clips.quality.stability import StabilityConfig, stability
 from robojackson.motion.landmark_track import LandmarkTrack
 from storage import artifact_tables
 from storage.artifact import Artifact
@@ -10,8 +9,8 @@ from tasks.runtime.stage import stage
 
 
 @stage()
-def stability(landmarks: Artifact, config: StabilityConfig) -> Artifact:
+def score_stability(landmarks: Artifact, config: StabilityConfig) -> Artifact:
     """StabilityScore."""
     store = Store.from_environment()
     track = artifact_tables.read(LandmarkTrack, store, landmarks)
-    return artifact_tables.keep(store, "stability", "stability.parquet", score(track, config))
+    return artifact_tables.save(store, "stability", "stability.parquet", stability(track, config))

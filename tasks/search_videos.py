@@ -10,7 +10,7 @@ from robojackson.clips.web.yt_dlp_client import WebConfig
 
 
 @task(name="search", persist_result=False, task_run_name="search-{name}")
-def search(
+def search_videos(
     name: str, query: str, address: str, count: int, web: WebConfig
 ) -> tuple[VideoCandidate, ...]:
     """Candidates in the source's own order."""

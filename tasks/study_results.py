@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from configs.study_config import Study
-from robojackson.metrics import ablation_statistics as statistics
+from robojackson.metrics import ablation_statistics
 from robojackson.rl.config.evaluate_config import TRAINED, VARIANTS
-from storage.study_tables import Ask
+from storage.study_tables import RunQuery
 
 INTERVALS = 40
 """Of the budget, in the learning curves."""
@@ -16,7 +16,7 @@ THRESHOLD = 0.8
 """Share of the longest mean episode of a move that counts as reached."""
 LAST = 0.1
 """Share of the budget whose episodes are the end."""
-JUDGED = ("return_own", "survived_s", "stand_s", "strict_success", "skill", "limb_gain")
+EVALUATED = ("return_own", "survived_s", "stand_s", "strict_success", "skill", "limb_gain")
 Key = tuple[str, str]
 Seeds = Mapping[int, Mapping[str, np.ndarray]]
 Figures = dict[str, dict[Key, dict[int, float]]]
@@ -27,7 +27,7 @@ def grid_of(study: Study) -> np.ndarray:
     return np.linspace(0, study.steps, INTERVALS + 1)
 
 
-def learning(ask: Ask, study: Study) -> dict[Key, dict[int, dict[str, np.ndarray]]]:
+def learning(ask: RunQuery, study: Study) -> dict[Key, dict[int, dict[str, np.ndarray]]]:
     """By (move, setup) and seed: mean return and length of the episodes of each interval."""
     sql = (
         "SELECT move, setup, seed, step, episode_return, episode_length FROM episodes "
@@ -38,7 +38,9 @@ def learning(ask: Ask, study: Study) -> dict[Key, dict[int, dict[str, np.ndarray
     for (move, setup, seed), rows in _grouped(ask(sql, {"study": study.name})):
         steps = np.array([row["step"] for row in rows], float)
         found.setdefault((move, setup), {})[seed] = {
-            name: statistics.curve(steps, np.array([row[name] for row in rows], float), grid)
+            name: ablation_statistics.curve(
+                steps, np.array([row[name] for row in rows], float), grid
+            )
             for name in ("episode_return", "episode_length")
         }
     return found
@@ -51,49 +53,51 @@ def of_learning(curves: Mapping[Key, Seeds], study: Study) -> Figures:
     goal = {move: _goal(curves, move) for move in study.moves}
     return {
         "final_return": _each(curves, lambda key, seed: seed["episode_return"][-last:].mean()),
-        "area": _each(curves, lambda key, seed: statistics.area(seed["episode_return"])),
+        "area": _each(curves, lambda key, seed: ablation_statistics.area(seed["episode_return"])),
         "steps_to": _each(
             curves,
-            lambda key, seed: statistics.steps_to(grid, seed["episode_length"], goal[key[0]]),
+            lambda key, seed: ablation_statistics.steps_to(
+                grid, seed["episode_length"], goal[key[0]]
+            ),
         ),
     }
 
 
-def of_judgement(ask: Ask, study: Study) -> Figures:
+def of_evaluations(ask: RunQuery, study: Study) -> Figures:
     """Means over the rollouts of every trained policy."""
     sql = f"SELECT move, setup, seed, {_means(ask)} FROM evaluations WHERE study = $study "
     rows = ask(f"{sql} AND policy = 'trained' GROUP BY ALL", {"study": study.name})
-    found: Figures = {name: {} for name in JUDGED}
+    found: Figures = {name: {} for name in EVALUATED}
     for row in rows:
-        for name in JUDGED:
+        for name in EVALUATED:
             if row[name] is not None:
                 by_seed = found[name].setdefault((row["move"], row["setup"]), {})
                 by_seed[row["seed"]] = float(row[name])
     return found
 
 
-def of_baselines(ask: Ask, study: Study) -> dict[str, dict[str, dict[str, float]]]:
+def of_baselines(ask: RunQuery, study: Study) -> dict[str, dict[str, dict[str, float]]]:
     """By move and policy that learnt nothing: the same figures."""
     sql = f"SELECT move, policy, {_means(ask)} FROM evaluations WHERE study = $study "
     given = {"study": study.name, "taught": [TRAINED, *VARIANTS]}
     rows = ask(f"{sql} AND policy NOT IN $taught GROUP BY ALL ORDER BY ALL", given)
     found: dict[str, dict[str, dict[str, float]]] = {move: {} for move in study.moves}
     for row in rows:
-        known = {name: float(row[name]) for name in JUDGED if row[name] is not None}
+        known = {name: float(row[name]) for name in EVALUATED if row[name] is not None}
         found.setdefault(row["move"], {})[row["policy"]] = known
     return found
 
 
-def _means(ask: Ask) -> str:
+def _means(ask: RunQuery) -> str:
     """SQL of the means of the judged figures; one that no table has is null."""
     known = [row["column_name"] for row in ask("DESCRIBE evaluations")]
     gains = [name for name in known if name.startswith("limb_gain_")]
-    terms = {name: f"avg({name})" for name in JUDGED if name in known}
+    terms = {name: f"avg({name})" for name in EVALUATED if name in known}
     # Paper mode learns from this start alone; the others are moments of the motion.
     terms["stand_s"] = "avg(survived_s) FILTER (WHERE phase < 0)"
     if gains:
         terms["limb_gain"] = f"avg(list_avg([{', '.join(gains)}]))"
-    return ", ".join(f"{terms.get(name, 'NULL')} AS {name}" for name in JUDGED)
+    return ", ".join(f"{terms.get(name, 'NULL')} AS {name}" for name in EVALUATED)
 
 
 def _grouped(rows: Sequence[Mapping[str, Any]]) -> list[tuple[tuple[str, str, int], list[Any]]]:

@@ -27,13 +27,13 @@ from storage.store import Store
 from tasks.runtime.child_process import run_process
 from tasks.runtime.code_digest import digest
 from tasks.runtime.stage import identity, stage
-from tasks.runtime.training_progress import shown
+from tasks.runtime.training_progress import show_progress
 
 CODE = ("robojackson.rl.training",)
 """Module of what the process runs."""
 DIGITS = 12
 """Of the digest in a run id."""
-WHOLE = 0.9
+COMPLETE_SHARE = 0.9
 """Share of its minutes with which a training counts as whole."""
 OVERTIME_S = 300.0
 """What a training may take beyond its budget: start, compilation, last checkpoint."""
@@ -58,13 +58,13 @@ def _models(parameters: Mapping[str, Any]) -> list[str]:
     """
     config = parameters["config"]
     granted = _minutes(config, parameters.get("deadline"))
-    if config.minutes is None or granted is None or granted >= WHOLE * config.minutes:
+    if config.minutes is None or granted is None or granted >= COMPLETE_SHARE * config.minutes:
         return _start(config)
     return [*_start(config), f"cut short to {math.floor(10 * granted / config.minutes)} tenths"]
 
 
 @stage(models=_models, reaches=CODE, unkeyed=("labels", "deadline", "limit_s"))
-async def train(
+async def train_policy(
     reference: Artifact,
     robot: RobotDescription,
     config: TrainConfig,
@@ -88,7 +88,7 @@ async def train(
         limit_s = min(limit_s or math.inf, 60 * minutes + OVERTIME_S)
     with locked(work, "task.lock", A_MOMENT), store.local(reference) as path:
         command = _command(path, work, config, labels, run_id, minutes)
-        async with shown(work, f"{labels.setup}-{labels.move}-s{config.seed}"):
+        async with show_progress(work, f"{labels.setup}-{labels.move}-s{config.seed}"):
             answer = await run_process(command, run_id, work, limit_s)
         kept = {
             "training": store.keep("train", "training.json", _facts(answer, labels)),

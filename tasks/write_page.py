@@ -15,7 +15,7 @@ from storage import artifact_tables
 from storage.artifact import Artifact
 from storage.store import Store
 from tasks.probe_video import info_of
-from tasks.runtime.code_digest import drawn_by
+from tasks.runtime.code_digest import template_digests
 from tasks.runtime.stage import stage
 
 if TYPE_CHECKING:
@@ -26,8 +26,8 @@ LEFT_OUT = ("video", "info")
 """Artifacts that stay where they are: the user has the video already."""
 
 
-@stage(models=lambda parameters: drawn_by(__name__, TEMPLATES))
-def page(made: dict[str, Artifact], move: str, file: str) -> dict[str, Artifact]:
+@stage(models=lambda parameters: template_digests(__name__, TEMPLATES))
+def write_page(made: dict[str, Artifact], move: str, file: str) -> dict[str, Artifact]:
     """Everything under `dances/<move>-<digest>/`, and `page`, which shows it.
 
     Args:

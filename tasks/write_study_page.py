@@ -16,24 +16,24 @@ import numpy as np
 
 from configs.study_config import Move, Study
 from robojackson.errors import RoboJacksonError
-from robojackson.metrics import ablation_statistics as statistics
-from robojackson.report.pages import study_page as page
+from robojackson.metrics import ablation_statistics
+from robojackson.report.pages import study_page
 from robojackson.report.pages.run_page import Plot
 from robojackson.rl.pretrained import pretrained
 from storage import study_tables
 from storage.artifact import Artifact
 from storage.store import Store
-from tasks.runtime.code_digest import digest, drawn_by
+from tasks.runtime.code_digest import digest, template_digests
 from tasks.runtime.stage import stage
 from tasks.study_results import (
-    JUDGED,
+    EVALUATED,
     Figures,
     Key,
     Seeds,
     grid_of,
     learning,
     of_baselines,
-    of_judgement,
+    of_evaluations,
     of_learning,
 )
 
@@ -44,11 +44,11 @@ PRIMARY = "return_own"
 
 
 def _models(parameters: Mapping[str, Any]) -> list[str]:
-    return [*drawn_by(__name__, TEMPLATES), digest(("storage.study_tables",), "storage")]
+    return [*template_digests(__name__, TEMPLATES), digest(("storage.study_tables",), "storage")]
 
 
 @stage(models=_models)
-def results_page(
+def write_study_page(
     study: Study,
     moves: dict[str, Move],
     rows: list[Artifact],
@@ -58,7 +58,7 @@ def results_page(
     """The files of `report`.
 
     Args:
-        rows: Files of the tables of the cells that count (`storage.study_tables.kept`).
+        rows: Files of the tables of the cells that count (`storage.study_tables.files_of`).
         pictures, payments: By move, as in `report`; the second as JSON.
     """
     store = Store.from_environment()
@@ -72,7 +72,7 @@ def report(
     moves: Mapping[str, Move],
     pictures: Mapping[str, bytes] | None = None,
     runs: Collection[str] | None = None,
-    payments: Mapping[str, page.Payments] | None = None,
+    payments: Mapping[str, study_page.RewardAudits] | None = None,
 ) -> dict[str, Artifact]:
     """Write `studies/<name>/` anew: `page`, `table` (CSV), `results` (JSON) and the figures.
 
@@ -85,15 +85,15 @@ def report(
     store, rng = Store.from_environment(), np.random.default_rng(0)
     with study_tables.opened(store, study.name, runs) as ask:
         curves = learning(ask, study)
-        figures = {**of_learning(curves, study), **of_judgement(ask, study)}
+        figures = {**of_learning(curves, study), **of_evaluations(ask, study)}
         baselines, facts = of_baselines(ask, study), _facts(ask, study)
         notes = [*_few(study), *_starts(ask, study)]
     walking = {name: move.walking for name, move in moves.items()}
-    claims = statistics.claims(figures[PRIMARY], walking, rng)
-    compared = statistics.comparisons(figures[PRIMARY], study.moves, rng)
+    claims = ablation_statistics.claims(figures[PRIMARY], walking, rng)
+    compared = ablation_statistics.comparisons(figures[PRIMARY], study.moves, rng)
     lines = table(figures, baselines, study, rng)
     plots = _plots(curves, figures, baselines, study)
-    content = page.StudyContent(
+    content = study_page.StudyContent(
         title=study.name,
         facts=facts,
         claims=claims,
@@ -107,7 +107,7 @@ def report(
     )
     folder = f"{FOLDER}/{study.name}"
     made = {
-        "page": store.put(f"{folder}/index.html", page.render(content).encode()),
+        "page": store.put(f"{folder}/index.html", study_page.render(content).encode()),
         "table": store.put(f"{folder}/table.csv", _csv(lines)),
         "results": store.put(f"{folder}/results.json", _json(claims, compared, lines)),
     }
@@ -121,21 +121,23 @@ def table(
     baselines: Mapping[str, Mapping[str, Mapping[str, float]]],
     study: Study,
     rng: np.random.Generator,
-) -> list[page.Line]:
+) -> list[study_page.Line]:
     """Table II: a line a setup and move, then what the baselines do."""
     lines = []
     for move in study.moves:
         for setup in study.setups:
             seeds = {name: by_key.get((move, setup), {}) for name, by_key in figures.items()}
             values = {
-                name: statistics.estimate(list(by_seed.values()), rng)
+                name: ablation_statistics.estimate(list(by_seed.values()), rng)
                 for name, by_seed in seeds.items()
             }
             count = max((len(by_seed) for by_seed in seeds.values()), default=0)
-            lines.append(page.Line(move, setup, count, values))
+            lines.append(study_page.Line(move, setup, count, values))
         for policy, known in baselines.get(move, {}).items():
-            values = {n: statistics.Estimate(v, np.nan, np.nan, 1) for n, v in known.items()}
-            lines.append(page.Line(move, policy, 0, values, baseline=True))
+            values = {
+                n: ablation_statistics.Estimate(v, np.nan, np.nan, 1) for n, v in known.items()
+            }
+            lines.append(study_page.Line(move, policy, 0, values, baseline=True))
     return lines
 
 
@@ -146,7 +148,7 @@ def _plots(
     study: Study,
 ) -> dict[str, list[Plot]]:
     from robojackson.report.plots.run_plots import png  # matplotlib: only when something is drawn
-    from robojackson.report.plots.study_plots import Curves, judged, learning_curves
+    from robojackson.report.plots.study_plots import Curves, evaluation_plot, learning_curves
 
     grid = grid_of(study)
     middle = (grid[1:] + grid[:-1]) / 2
@@ -164,7 +166,7 @@ def _plots(
         if drawn:
             told = "Training episodes: return, bonuses in, and length. Mean and range over seeds."
             made["curves"].append(Plot(f"Learning {move}", told, png(learning_curves(drawn))))
-    for name in JUDGED:
+    for name in EVALUATED:
         by_move: dict[str, dict[str, list[float]]] = {
             move: {
                 setup: list(figures[name].get((move, setup), {}).values()) for setup in study.setups
@@ -176,13 +178,13 @@ def _plots(
             for move, found in baselines.items()
         }
         if any(values for setups in by_move.values() for values in setups.values()):
-            title, _, _ = page.FIGURES[name]
+            title, _, _ = study_page.FIGURES[name]
             told = "A dot a seed, the bar their mean; lines are policies that learnt nothing."
-            made["judged"].append(Plot(title, told, png(judged(by_move, lines, title))))
+            made["judged"].append(Plot(title, told, png(evaluation_plot(by_move, lines, title))))
     return made
 
 
-def _facts(ask: study_tables.Ask, study: Study) -> dict[str, Any]:
+def _facts(ask: study_tables.RunQuery, study: Study) -> dict[str, Any]:
     sql = "SELECT DISTINCT git_commit FROM runs WHERE study = $study"
     commits = [row["git_commit"] or "?" for row in ask(sql, {"study": study.name})]
     return {
@@ -205,7 +207,7 @@ def _few(study: Study) -> list[str]:
     ]
 
 
-def _starts(ask: study_tables.Ask, study: Study) -> list[str]:
+def _starts(ask: study_tables.RunQuery, study: Study) -> list[str]:
     """What was learnt before the first step of a cell: it belongs to the price of pretraining."""
     sql = "SELECT DISTINCT setup, config FROM runs WHERE config IS NOT NULL ORDER BY ALL"
     setups: dict[str, set[str]] = {}
@@ -234,26 +236,26 @@ def _picture(name: str, move: Move, png: bytes) -> Plot:
     return Plot(f"{name}{stands}", told, png)
 
 
-def _csv(lines: Sequence[page.Line]) -> bytes:
+def _csv(lines: Sequence[study_page.Line]) -> bytes:
     out = io.StringIO()
     rows = csv.writer(out)
-    parts = [f"{name}{part}" for name in page.FIGURES for part in ("", "_low", "_high")]
+    parts = [f"{name}{part}" for name in study_page.FIGURES for part in ("", "_low", "_high")]
     rows.writerow(["move", "setup", "seeds", *parts])
     for line in lines:
-        found = [line.values.get(name) for name in page.FIGURES]
+        found = [line.values.get(name) for name in study_page.FIGURES]
         flat = [v for e in found for v in ((e.mean, e.low, e.high) if e else ("", "", ""))]
         rows.writerow([line.move, line.setup, line.seeds, *flat])
     return out.getvalue().encode()
 
 
 def _json(
-    claims: Sequence[statistics.Claim],
-    compared: Sequence[statistics.Comparison],
-    lines: Sequence[page.Line],
+    claims: Sequence[ablation_statistics.Claim],
+    compared: Sequence[ablation_statistics.Comparison],
+    lines: Sequence[study_page.Line],
 ) -> bytes:
     told = {
         "primary": PRIMARY,
-        "claims": [{**asdict(claim), "words": page.sentence(claim)} for claim in claims],
+        "claims": [{**asdict(claim), "words": study_page.sentence(claim)} for claim in claims],
         "comparisons": [asdict(comparison) for comparison in compared],
         "lines": [asdict(line) for line in lines],
     }

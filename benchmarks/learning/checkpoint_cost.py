@@ -15,7 +15,7 @@ from benchmarks.learning.speed import told
 from robojackson.cli.stages import read_table
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import TrainConfig
-from robojackson.rl.training import train
+from robojackson.rl.training import train_policy
 from robojackson.rl.training_run import Run
 
 BAR = "<= 0.02"
@@ -43,7 +43,7 @@ def checkpoints(folders: Folders, minutes: float = 5.0) -> dict[str, Any]:
     motion = read_table(ReferenceMotion, reference_of("hip_shake", folders))
     config, timing = TrainConfig(minutes=minutes), patch.object(Run, "checkpoint", timed)
     with tempfile.TemporaryDirectory(dir=folders.work) as out, timing:
-        train(motion, humanoid(), config, Path(out))
+        train_policy(motion, humanoid(), config, Path(out))
     # The last one ends the training, whenever that is.
     middle, between = float(np.median(spent[:-1])), config.checkpoint_seconds
     return {

@@ -13,7 +13,7 @@ import numpy as np
 from robojackson.pipeline.yaml_loader import load
 from robojackson.rl.config.train_config import TqcConfig, TrackConfig
 from robojackson.rl.env.tracking_core import TrackingCore
-from robojackson.rl.modes.standing_motion import standing
+from robojackson.rl.modes.standing_motion import make_standing_motion
 from robojackson.robot.model import Robot, RobotDescription, load_robot
 
 BLOCK = 10
@@ -81,7 +81,7 @@ def _turns(robot: Robot, script: Script, n: int, steps: int) -> tuple[float, flo
 
 
 def _core(robot: Robot, n: int) -> TrackingCore:
-    return TrackingCore(robot, standing(robot), TrackConfig(threads=1), n, 0)
+    return TrackingCore(robot, make_standing_motion(robot), TrackConfig(threads=1), n, 0)
 
 
 def _action(core: TrackingCore) -> np.ndarray:

@@ -13,7 +13,7 @@ from benchmarks.learning.environment_core import core, humanoid
 from robojackson.rl.config.train_config import ControlConfig, PaperConfig, TqcConfig, TrackConfig
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.env.vec_env import TrackingVecEnv
-from robojackson.rl.modes.standing_motion import standing
+from robojackson.rl.modes.standing_motion import make_standing_motion
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.rl.tqc.replay_files import buffer_of
 from robojackson.rl.tqc.trainers import make_trainer
@@ -53,7 +53,9 @@ def _rounds(
 ) -> Callable[[], int]:
     """A function that does one round (its steps, too, where asked) and tells its updates."""
     robot = humanoid()
-    env = TrackingVecEnv(TrackingCore(robot, standing(robot), environment, tqc.n_envs, 0))
+    env = TrackingVecEnv(
+        TrackingCore(robot, make_standing_motion(robot), environment, tqc.n_envs, 0)
+    )
     trainer = make_trainer(trainer_name, env, tqc, seed=0)
     model: Any = trainer.model  # type: ignore[attr-defined]
     rng = np.random.default_rng(0)
@@ -112,7 +114,7 @@ def told_core(repeats: int) -> Row:
 def threads(repeats: int = 5, n: int = 32, steps: int = 100) -> Row:
     """Environment steps a second of two threads over one, wall time: two cores must be idle."""
     robot = humanoid()
-    motion = standing(robot)
+    motion = make_standing_motion(robot)
     rates: dict[int, list[float]] = {1: [], 2: []}
     for _ in range(repeats):
         for count, found in rates.items():

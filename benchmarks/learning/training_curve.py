@@ -61,7 +61,7 @@ def measure(reference: Path, out: Path, options: list[str], until: float, minute
     from robojackson.motion.reference_motion import ReferenceMotion
     from robojackson.pipeline.yaml_loader import load
     from robojackson.rl.config.train_config import TrainConfig
-    from robojackson.rl.training import Hooks, train
+    from robojackson.rl.training import Hooks, train_policy
 
     fixed = {"cpu_minutes": minutes, "checkpoint_seconds": 1e5, "track.threads": 1}
     config = load(TrainConfig, None, dict(o.split("=", 1) for o in options) | fixed)
@@ -70,7 +70,7 @@ def measure(reference: Path, out: Path, options: list[str], until: float, minute
     with tempfile.TemporaryDirectory() as folder:
         hooks = Hooks(sink=curve.add, stop=curve.reached)
         try:
-            train(motion, stages.robot_of(motion), config, Path(folder), hooks)
+            train_policy(motion, stages.robot_of(motion), config, Path(folder), hooks)
         except KeyboardInterrupt:
             if not curve.reached():
                 raise

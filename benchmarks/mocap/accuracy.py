@@ -28,11 +28,11 @@ from robojackson.body.smoothing import lowpass
 from robojackson.clips.pose_detector import ASSETS, detect
 from robojackson.clips.video import VideoLimits, probe
 from robojackson.mocap.landmarks.blazepose import fill_gaps, landmark
-from robojackson.mocap.landmarks.model_fusion import vote
+from robojackson.mocap.landmarks.model_fusion import fuse_tracks
 from robojackson.mocap.landmarks.pipeline import with_camera
 from robojackson.mocap.landmarks.refinement import RefineConfig
 from robojackson.mocap.pose.twist import prior
-from robojackson.mocap.recover import MocapConfig, recover
+from robojackson.mocap.recover import MocapConfig, recover_motion
 from robojackson.motion.landmark_track import LandmarkTrack
 
 RESULTS = Path(__file__).parents[1] / "results"
@@ -76,7 +76,7 @@ def look(clip: str) -> Seen:
     spent = time.process_time() - began
     if heavy_installed():
         heavy = detect(path, info, "heavy")
-        tracks["best"] = vote([tracks["full"], heavy])
+        tracks["best"] = fuse_tracks([tracks["full"], heavy])
     return Seen(load_truth(clip), tracks, len(tracks["full"]) / spent)
 
 
@@ -129,7 +129,7 @@ def measure(clip: str) -> Row:
 def motion_figures(track: LandmarkTrack, config: MocapConfig, truth: Truth) -> figures.Figures:
     """All figures of the motion that one configuration makes of a track."""
     began = time.process_time()
-    sequence = recover(track, config)
+    sequence = recover_motion(track, config)
     spent = time.process_time() - began
     joints = sequence.joints[:, [keypoint(n) for n in JOINTS]]
     return {

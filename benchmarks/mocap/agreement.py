@@ -27,7 +27,7 @@ from robojackson.metrics import pose_error
 from robojackson.mocap.landmarks.blazepose import repair
 from robojackson.mocap.networks.network_config import NetworkConfig
 from robojackson.mocap.pose.keypoints import build
-from robojackson.mocap.recover import MocapConfig, recover
+from robojackson.mocap.recover import MocapConfig, recover_motion
 from robojackson.motion.landmark_track import LandmarkTrack
 
 ROOT = (keypoint("pelvis"),)
@@ -61,7 +61,7 @@ def rows(
     """Every row of the table."""
     marks = repair(track)
     raw = build(marks.local, marks.visibility).points[:, : len(JOINT_NAMES)]
-    joints = {"raw landmarks": raw, "ours": recover(track, MocapConfig()).joints}
+    joints = {"raw landmarks": raw, "ours": recover_motion(track, MocapConfig()).joints}
     if network.hybrik:
         from robojackson.mocap.networks.inference import load_networks
         from robojackson.mocap.networks.network_motion import network_motion

@@ -35,7 +35,7 @@ from robojackson.clips.pose_detector import detect
 from robojackson.clips.video import VideoLimits, probe
 from robojackson.metrics import pose_error
 from robojackson.mocap.landmarks.blazepose import landmark
-from robojackson.mocap.recover import MocapConfig, recover
+from robojackson.mocap.recover import MocapConfig, recover_motion
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.smpl_sequence import SmplSequence
 
@@ -110,7 +110,11 @@ def figures(case: Case, track: LandmarkTrack, truth: Truth, whole: MocapConfig) 
     """Errors of all rows in mm, and confidences."""
     plain = replace(whole, temporal=replace(whole.temporal, enabled=False))
     hidden = hide(track, case)
-    seen, step_2, step_3 = recover(track, plain), recover(hidden, plain), recover(hidden, whole)
+    seen, step_2, step_3 = (
+        recover_motion(track, plain),
+        recover_motion(hidden, plain),
+        recover_motion(hidden, whole),
+    )
     joints = placed(seen)
     columns = [JOINTS.index(name) for name in case.joints]
     bridge = bridged(joints, columns, case.start, case.end)
@@ -123,7 +127,7 @@ def figures(case: Case, track: LandmarkTrack, truth: Truth, whole: MocapConfig) 
         **{f"{name}_mm": limb_error(row, truth, case) for name, row in rows.items()},
         **{f"{name}_rr_mm": error(row, truth, case) for name, row in rows.items()},
         "confidence_hidden": float(step_3.confidence[span][:, keys].mean()),
-        "confidence_seen": float(recover(track, whole).confidence[span][:, keys].mean()),
+        "confidence_seen": float(recover_motion(track, whole).confidence[span][:, keys].mean()),
     }
 
 

@@ -29,7 +29,7 @@ from robojackson.errors import BadConfiguration, MissingDependency
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.pipeline.yaml_loader import load
 from robojackson.retarget.retarget_config import RepairConfig, RetargetConfig
-from robojackson.retarget.retargeting import assemble, retarget
+from robojackson.retarget.retargeting import assemble, retarget_motion
 from robojackson.retarget.targets.cycle import human_clip
 from robojackson.retarget.targets.keypoint_targets import targets
 from robojackson.robot.description import RobotDescription
@@ -111,7 +111,7 @@ def rows_of(case: Case, robot: Robot, methods: list[str]) -> Iterator[dict[str, 
 
 def _row(case: Case, robot: Robot, method: str, config: RetargetConfig) -> dict[str, Any]:
     started = time.process_time()
-    card = retarget(case.sequence, robot, config).scorecard
+    card = retarget_motion(case.sequence, robot, config).scorecard
     return _told(case, robot, method, card, time.process_time() - started)
 
 
@@ -149,7 +149,7 @@ def speeds(robot: Robot, clip: str = "dance_a") -> dict[str, float]:
         for seconds in LENGTHS_S:
             sequence = lengthened(human, seconds)
             started = time.process_time()
-            retarget(sequence, robot, config)
+            retarget_motion(sequence, robot, config)
             best[seconds] = min(best[seconds], time.process_time() - started)
     short, long = (best[seconds] for seconds in LENGTHS_S)
     frames = round(LENGTHS_S[0] * 30)

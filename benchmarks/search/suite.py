@@ -59,9 +59,9 @@ def scored(path: Path) -> float:
 
 def judged(path: Path) -> float:
     """Algorithm 1 and every filter."""
-    from robojackson.clips.quality.assessment import JudgeConfig, judge
+    from robojackson.clips.quality.assessment import AssessmentConfig, assess_video
 
-    return judge(path, JudgeConfig()).stability.stability_score
+    return assess_video(path, AssessmentConfig()).stability.stability_score
 
 
 WAYS: dict[str, Callable[[Path], float]] = {"bare": bare, "scored": scored, "judged": judged}

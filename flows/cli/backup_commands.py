@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from robojackson.cli.console import Answer, command, ticker
+from robojackson.cli.console import CommandResult, command, ticker
 from robojackson.cli.options import Json
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def backup(
     folder: FolderOfBackups,
     keep: Annotated[int, typer.Option(min=1, help="How many backups stay in the folder.")] = 7,
     as_json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """Copy the store and Prefect's database into a folder; only what is new is copied."""
     from storage.backup import Backups
     from storage.store_backup import back_up
@@ -58,7 +58,7 @@ def backup(
         f"{made.copied:,} files, {made.copied_mb:,.1f} MB copied",
         f"database  {made.database or f'none at {database.address}'}",
     ]
-    return Answer(_plain(made), text=text)
+    return CommandResult(_plain(made), text=text)
 
 
 @command
@@ -69,7 +69,7 @@ def restore(
         bool, typer.Option("--force", help="Replace what is in a store and database in use.")
     ] = False,
     as_json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """Verify a backup, then write it into an empty store and an empty database."""
     from storage.backup import Backups
     from storage.store_backup import restore as write
@@ -83,7 +83,7 @@ def restore(
     ]
     if made.others:
         text.append(f"others    {made.others:,} files that the backup does not have stay")
-    return Answer(_plain(made), text=text)
+    return CommandResult(_plain(made), text=text)
 
 
 def _source() -> tuple["Store", "Database"]:

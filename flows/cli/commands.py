@@ -11,7 +11,7 @@ from flows.cli.backup_commands import backup, restore
 from flows.cli.search_commands import catalogue, find, refresh
 from flows.cli.study_commands import ablation, deploy, metrics, server
 from robojackson.cli.app import add_stages, make_app
-from robojackson.cli.console import Answer, command
+from robojackson.cli.console import CommandResult, command
 from robojackson.cli.options import (
     Config,
     Force,
@@ -23,7 +23,7 @@ from robojackson.cli.options import (
     Seed,
     Set,
     Trainer,
-    chosen,
+    overrides_from,
 )
 
 
@@ -45,33 +45,33 @@ def dance(
     force: Force = False,
     set_: Set = None,
     as_json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """A video in, a robot that dances it out: every stage, cached, and a page at the end."""
     from flows.runtime.environment import prepare
-    from flows.search.dance_source import is_name, look_at, resolve, settle
+    from flows.search.dance_source import is_name, load_settings, require_usable, resolve
     from robojackson.cli.stages import verdict_lines
     from storage.store import Store
 
     found = None if is_name(source) else resolve(source)
     given = {"minutes": minutes, "robot": robot, "train.trainer": trainer, "train.seed": seed}
-    overrides = chosen(set_, given | {"dancer.number": person, "detector": quality})
+    overrides = overrides_from(set_, given | {"dancer.number": person, "detector": quality})
     if force:
         overrides["gate"] = False
-    settings = settle(config, overrides)
+    settings = load_settings(config, overrides)
     if found is not None:
-        look_at(found, settings, start, end)
+        require_usable(found, settings, start, end)
     prepare(Store.from_environment())
     made = None
     if found is not None:
-        from flows.video_pass.recorded_dance import replayed
+        from flows.video_pass.recorded_dance import replay
 
-        made = replayed(found, config, overrides, start, end)
+        made = replay(found, config, overrides, start, end)
     if made is None:
         from flows.dance import run
 
         made = run(str(found or source), config, overrides, start, end)
     text = [*verdict_lines(made["evaluation"]), f"page   {made['page']}", f"video  {made['video']}"]
-    return Answer(made, text=text)
+    return CommandResult(made, text=text)
 
 
 app = make_app()

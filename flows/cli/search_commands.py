@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from robojackson.cli.console import Answer, command, log_to_stderr
-from robojackson.cli.options import Json, SetFind, chosen
+from robojackson.cli.console import CommandResult, command, log_to_stderr
+from robojackson.cli.options import Json, SetFind, overrides_from
 
 
 @command
@@ -22,22 +22,22 @@ def find(
     config: Annotated[str, typer.Option(help="Name or path of a configuration.")] = "finding",
     set_: SetFind = None,
     as_json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """The videos of a dance, ranked: Algorithm 1, and why others are rejected."""
     from configs.find_config import FindConfig
     from flows.runtime.environment import prepare
-    from flows.search import ranking_table as ranking
-    from flows.search.requests import dance_of
+    from flows.search import ranking_table
+    from flows.search.requests import find_dance
     from robojackson.pipeline.yaml_loader import load
     from storage.store import Store
 
-    overrides = chosen(set_)
-    dance = dance_of(query, source, address, top, load(FindConfig, config, overrides))
+    overrides = overrides_from(set_)
+    dance = find_dance(query, source, address, top, load(FindConfig, config, overrides))
     prepare(Store.from_environment())
-    from flows.find import look_for
+    from flows.find import run
 
-    found = look_for(dance, config, overrides)
-    return Answer(found, text=[*ranking.lines(found["candidates"]), found["summary"]])
+    found = run(dance, config, overrides)
+    return CommandResult(found, text=[*ranking_table.lines(found["candidates"]), found["summary"]])
 
 
 @command
@@ -48,19 +48,19 @@ def refresh(
     config: Annotated[str, typer.Option(help="Configuration of the search.")] = "finding",
     set_: SetFind = None,
     as_json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """The nightly run, now: for every dance the best new video, up to the robot's motion."""
     from flows.runtime.environment import prepare
     from flows.search.requests import check_refresh
     from storage.store import Store
 
-    overrides = chosen(set_)
+    overrides = overrides_from(set_)
     check_refresh(dances or None, config, overrides)
     prepare(Store.from_environment())
     from flows.refresh import run
 
     done = run(dances or None, config, overrides)
-    return Answer(done, code=1 if done["failed"] and not done["dances"] else 0)
+    return CommandResult(done, code=1 if done["failed"] and not done["dances"] else 0)
 
 
 @command
@@ -70,9 +70,9 @@ def catalogue(
         str | None, typer.Option(help="A question to DuckDB about the table `candidates`.")
     ] = None,
     as_json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """Every video that was ever judged, and why it was danced or not."""
-    from flows.search import ranking_table as ranking
+    from flows.search import ranking_table
     from robojackson.cli import console
     from storage import candidate_catalogue
     from storage.store import Store
@@ -82,6 +82,8 @@ def catalogue(
     if sql is not None:
         found = candidate_catalogue.query(store, sql)
         named = {str(number): row for number, row in enumerate(found, 1)}
-        return Answer({"rows": found}, text=console.table(named, list(found[0]) if found else []))
+        return CommandResult(
+            {"rows": found}, text=console.table(named, list(found[0]) if found else [])
+        )
     rows = candidate_catalogue.records(store, dance)
-    return Answer({"candidates": rows}, text=ranking.lines(rows))
+    return CommandResult({"candidates": rows}, text=ranking_table.lines(rows))

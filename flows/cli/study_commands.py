@@ -4,8 +4,8 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from robojackson.cli.console import Answer, command, complain, table
-from robojackson.cli.options import Json, SetStudy, chosen
+from robojackson.cli.console import CommandResult, command, complain, table
+from robojackson.cli.options import Json, SetStudy, overrides_from
 
 
 @command
@@ -24,7 +24,7 @@ def ablation(
     slots: Annotated[int | None, typer.Option(min=1, help="Trainings at once.")] = None,
     set_: SetStudy = None,
     as_json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """Moves x setups x seeds, each trained and judged, and a page that compares them."""
     from flows.runtime.environment import prepare
     from flows.study.study_plan import study_of
@@ -32,12 +32,12 @@ def ablation(
 
     given: dict[str, Any] = {"moves": moves, "setups": setups, "seeds": seeds}
     given |= {"steps": steps, "executor": executor, "slots": slots}
-    wanted = study_of(study, chosen(set_, given))
+    wanted = study_of(study, overrides_from(set_, given))
     prepare(Store.from_environment())
     from flows.ablation import run
 
     made = run(wanted)
-    return Answer(made, text=[f"page    {made['page']}", f"tables  {made['tables']}"])
+    return CommandResult(made, text=[f"page    {made['page']}", f"tables  {made['tables']}"])
 
 
 @command
@@ -47,15 +47,15 @@ def metrics(
         typer.Option(help="A question in SQL about `episodes`, `evaluations` and `runs`."),
     ] = None,
     as_json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """The tables of all studies; without a question, a line a cell."""
-    from storage import study_tables as kept
+    from storage import study_tables
     from storage.store import Store
 
-    rows = kept.query(Store.from_environment(), sql or kept.OVERVIEW)
+    rows = study_tables.query(Store.from_environment(), sql or study_tables.OVERVIEW)
     if not rows:
-        return Answer({"rows": []}, text=["no rows; `robojackson ablation` makes some"])
-    return Answer(
+        return CommandResult({"rows": []}, text=["no rows; `robojackson ablation` makes some"])
+    return CommandResult(
         {"rows": rows}, text=table({str(n): row for n, row in enumerate(rows, 1)}, tuple(rows[0]))
     )
 
@@ -66,11 +66,11 @@ def deploy(
         float, typer.Option(min=0, help="Seconds to wait for a server that was just started.")
     ] = 0.0,
     as_json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """Register pools, deployments and automations with the server of PREFECT_API_URL."""
     from flows.runtime.deployments import deploy as register
 
-    return Answer(register(wait))
+    return CommandResult(register(wait))
 
 
 @command
@@ -83,7 +83,7 @@ def server(
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(envvar="PREFECT_SERVER_API_PORT", min=1, max=65535)] = 4200,
     as_json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """Prefect's server and pages, with the results of the store; Ctrl-C ends it."""
     from flows.runtime.environment import prepare_server
     from storage.store import Store
@@ -94,4 +94,4 @@ def server(
 
     complain(f"pages http://{host}:{port}, PREFECT_API_URL=http://{host}:{port}/api")
     serve(store, host, port)
-    return Answer({"store": store.root}, text=[])
+    return CommandResult({"store": store.root}, text=[])

@@ -80,10 +80,10 @@ def automations() -> list[dict[str, Any]]:
             f"{SILENCE}={wanted!r}: whole seconds, {SHORTEST_S} at least; runs say every "
             f"{HEARTBEAT_S} s that they live"
         )
-    return [_patient(facts, int(wanted)) for facts in yaml.safe_load(AUTOMATIONS.read_text())]
+    return [_with_silence(facts, int(wanted)) for facts in yaml.safe_load(AUTOMATIONS.read_text())]
 
 
-def _patient(facts: dict[str, Any], silence_s: int) -> dict[str, Any]:
+def _with_silence(facts: dict[str, Any], silence_s: int) -> dict[str, Any]:
     """An automation as it would be written for another silence."""
     shipped = facts["trigger"]["within"]
     wanted = shipped * silence_s // SILENT_S

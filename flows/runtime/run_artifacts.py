@@ -10,7 +10,7 @@ from prefect.artifacts import acreate_markdown_artifact
 from robojackson.clips.web.untrusted_text import in_markdown
 from robojackson.pipeline.run_names import slug_of
 from robojackson.report.pages.run_page import VERDICT_COLUMNS, headline, verdicts
-from robojackson.report.quantities import facts
+from robojackson.report.quantities import quantities
 from storage.artifact import Artifact
 from storage.store import Store
 
@@ -36,7 +36,7 @@ async def show_dance(
         made: What the pass made, by name; the files lie in an open folder.
     """
     key, text = f"dance-{slug_of(name)}", of_dance(store, name, evaluation, made)
-    figures = ", ".join(f"{f.label} {f.value}" for f in facts(evaluation, FIGURES))
+    figures = ", ".join(f"{f.label} {f.value}" for f in quantities(evaluation, FIGURES))
     await acreate_markdown_artifact(key=key, markdown=text, description=figures)
 
 
@@ -84,7 +84,7 @@ def address(artifact: Artifact) -> str:
 
 def table(evaluation: Mapping[str, Any]) -> str:
     """Return the figures of the policy and its baselines as a Markdown table."""
-    heads = ["policy", *(fact.label for fact in facts(dict.fromkeys(VERDICT_COLUMNS)))]
+    heads = ["policy", *(fact.label for fact in quantities(dict.fromkeys(VERDICT_COLUMNS)))]
     rows = [[verdict.title, *verdict.values] for verdict in verdicts(evaluation)]
     return "\n".join(map(_row, [heads, ["---"] * len(heads), *rows]))
 

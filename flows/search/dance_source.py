@@ -29,7 +29,7 @@ def resolve(source: str | None) -> Path:
     """
     if source is None:
         return bundled(DEFAULT)
-    _require_words(source)
+    _require_name(source)
     path = Path(source)
     if path.exists():
         return path
@@ -44,20 +44,20 @@ def is_name(source: str | None) -> bool:
     """Whether a SOURCE is the name of a dance: no path, and nothing that looks like one."""
     if source is None:
         return False
-    _require_words(source)
+    _require_name(source)
     if Path(source).exists():
         return False
     return os.sep not in source and Path(source).suffix.lower() not in SUFFIXES
 
 
-def _require_words(source: str) -> None:
+def _require_name(source: str) -> None:
     if not source.strip():
         raise UnreadableVideo("SOURCE is empty: give a video, a folder or the name of a dance")
     if len(source.encode(errors="replace")) > LONGEST:
         raise UnreadableVideo(f"{source[:40]}...: too long for a path or the name of a dance")
 
 
-def settle(config: str, overrides: Mapping[str, Any]) -> "PipelineConfig":
+def load_settings(config: str, overrides: Mapping[str, Any]) -> "PipelineConfig":
     """The configuration, checked with its robot before anything costly starts.
 
     Raises:
@@ -73,7 +73,7 @@ def settle(config: str, overrides: Mapping[str, Any]) -> "PipelineConfig":
     return settings
 
 
-def look_at(
+def require_usable(
     source: Path, settings: "PipelineConfig", start_s: float | None, end_s: float | None
 ) -> None:
     """Raise what the flow would raise much later: no video of the source can be danced."""

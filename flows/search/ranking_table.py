@@ -54,7 +54,7 @@ def table(rows: Sequence[Row], width: int = USUAL) -> Table:
         decision = str(row["decision"])
         cells = [_form(row, *figure) for _, figure in shown]
         made.add_row(
-            MARKS[decision], _words(_title(row)), *cells, _words(row.get("reason")),
+            MARKS[decision], _format_value(_title(row)), *cells, _format_value(row.get("reason")),
             style=STYLES[decision],
         )  # fmt: skip
     return made
@@ -98,7 +98,7 @@ def _title(row: Row) -> str:
     return clean_text(row.get("title")) or clean_text(row.get("video_id"))
 
 
-def _words(value: Any) -> Text:
+def _format_value(value: Any) -> Text:
     return Text(isolated(clean_text(value, 200)))
 
 

@@ -18,7 +18,7 @@ LOCAL = (folder.NAME, "urls")
 """Sources that are read from this machine's disk, so that a mistake can be told at once."""
 
 
-def dance_of(query: str, source: str, address: str, top: int | None, config: FindConfig) -> Dance:
+def find_dance(query: str, source: str, address: str, top: int | None, config: FindConfig) -> Dance:
     """The dance to look for; a query that `configs/dances.yaml` knows means that dance.
 
     Raises:

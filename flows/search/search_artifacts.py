@@ -13,7 +13,9 @@ from robojackson.clips.web.untrusted_text import clean_text, in_markdown, web_ad
 from robojackson.pipeline.run_names import slug_of
 
 
-async def show(name: str, rows: list[dict[str, Any]], chosen: dict[str, Any] | None) -> None:
+async def publish_search(
+    name: str, rows: list[dict[str, Any]], chosen: dict[str, Any] | None
+) -> None:
     """Three artifacts under keys that stay the same for a dance, so that there is a history."""
     slug = slug_of(name)
     told = f"Videos judged for {in_markdown(clean_text(name))}"

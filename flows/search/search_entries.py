@@ -41,7 +41,7 @@ class Entry:
 
 
 @dataclass(frozen=True)
-class Hunt:
+class SearchResult:
     """What came out of a search.
 
     Attributes:
@@ -62,7 +62,7 @@ class Hunt:
         return next((entry for entry in self.entries if entry.decision == "chosen"), None)
 
 
-def rows(found: Hunt) -> list[dict[str, Any]]:
+def rows(found: SearchResult) -> list[dict[str, Any]]:
     """The entries as rows of the catalogue."""
     now = datetime.now(UTC)
     labels = {"run_id": found.run_id, "dance": found.dance.name, "decided_at": now}

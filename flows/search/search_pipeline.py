@@ -15,10 +15,10 @@ from prefect.logging import get_run_logger
 
 from configs.dance_book import Dance
 from configs.find_config import FindConfig
-from flows.search.search_entries import REASON_LENGTH, Entry, Hunt, reason_of, rows, summary
+from flows.search.search_entries import REASON_LENGTH, Entry, SearchResult, reason_of, rows, summary
 from robojackson.clips.quality import candidate_ranking
 from robojackson.clips.quality.assessment import Quality
-from robojackson.clips.quality.duplicates import copies
+from robojackson.clips.quality.duplicates import find_duplicates
 from robojackson.clips.quality.stability import Stability
 from robojackson.clips.sources import folder
 from robojackson.clips.web.candidate_selection import select
@@ -29,20 +29,20 @@ from robojackson.motion.landmark_track import LandmarkTrack
 from storage import artifact_tables, candidate_catalogue
 from storage.artifact import Artifact
 from storage.store import Store
-from tasks.assess_video import judge
-from tasks.download_video import WebVideo, download, take
+from tasks.assess_video import assess_video
+from tasks.download_video import WebVideo, download_video, take_file
 from tasks.probe_video import SourceFile
-from tasks.search_videos import search
+from tasks.search_videos import search_videos
 
 
-def hunt(
+def search_and_rank(
     dance: Dance,
     settings: FindConfig,
     run_id: str,
     known: Collection[tuple[str, str]] = (),
     reigning: Mapping[str, Any] | None = None,
     failed: Collection[tuple[str, str]] = (),
-) -> Hunt:
+) -> SearchResult:
     """Find, judge and rank the videos of a dance; every one of them goes into the catalogue.
 
     Args:
@@ -58,17 +58,17 @@ def hunt(
     web = replace(settings.web, language=dance.language or settings.web.language)
     limits = replace(settings.selection, top=dance.top or settings.selection.top)
     source = replace(settings, web=web, selection=limits)
-    found = search(dance.source, dance.asked, dance.address, limits.searched, web)
+    found = search_videos(dance.source, dance.asked, dance.address, limits.searched, web)
     selection = select(found, known, limits, failed)
     get_run_logger().info("%s: %s", dance.name, summary(found, selection))
-    had = bring(selection.kept, "score", source)
-    entries = challenged(ranked(judged(had, source), source), reigning, source)
-    made = Hunt(dance, run_id, tuple(entries), selection)
+    had = download_candidates(selection.kept, "score", source)
+    entries = challenged(ranked(assess_candidates(had, source), source), reigning, source)
+    made = SearchResult(dance, run_id, tuple(entries), selection)
     candidate_catalogue.append(Store.from_environment(), rows(made))
     return made
 
 
-def bring(
+def download_candidates(
     kept: Sequence[VideoCandidate], purpose: Purpose, settings: FindConfig
 ) -> list[tuple[VideoCandidate, Artifact | str]]:
     """The files of candidates in one format; the reason instead of one that cannot be had."""
@@ -78,12 +78,12 @@ def bring(
     return [(c, _outcome(w)) for c, w in zip(kept, waiting, strict=True)]
 
 
-def judged(
+def assess_candidates(
     had: Sequence[tuple[VideoCandidate, Artifact | str]], settings: FindConfig
 ) -> list[Entry]:
     """All candidates with their figures, or with the reason why there are none."""
     there = [video for _, video in had if isinstance(video, Artifact)]
-    outcomes = iter(judge.outcomes([(video, settings.judge) for video in there]))
+    outcomes = iter(assess_video.outcomes([(video, settings.judge) for video in there]))
     entries = []
     for candidate, video in had:
         if isinstance(video, str):
@@ -137,12 +137,12 @@ def _submitted(
     """The task that brings a video; the reason when a local file cannot even be looked at."""
     if candidate.source == folder.NAME:
         try:
-            return take.submit(SourceFile.at(Path(candidate.url)))
+            return take_file.submit(SourceFile.at(Path(candidate.url)))
         except OSError as cause:
             return clean_text(f"cannot be read ({cause.strerror})")
     video = WebVideo(candidate.source, candidate.video_id, candidate.url, candidate.title)
     limits = settings.judge.video
-    return download.submit(video, purpose, settings.formats, settings.web, limits)
+    return download_video.submit(video, purpose, settings.formats, settings.web, limits)
 
 
 def _outcome(future: PrefectFuture[Any] | str) -> Any:
@@ -183,7 +183,7 @@ def _copied(fit: dict[str, Entry], settings: FindConfig) -> dict[str, str]:
         for name in largest
         if (made := fit[name].made)
     }
-    found = copies(tracks, settings.filters.copies)
+    found = find_duplicates(tracks, settings.filters.copies)
     return {name: _titled(reason, fit) for name, reason in found.items()}
 
 

@@ -14,21 +14,21 @@ from storage.artifact import Artifact
 from storage.store import Store
 from tasks.study_cell import Cell
 
-SHOWN = ("survived_s", "strict_success", "skill", "limb_gain")
+COLUMNS = ("survived_s", "strict_success", "skill", "limb_gain")
 SECONDS_A_ROW, SECONDS_BETWEEN = 0.05, (1.0, 60.0)
 """What lies between two versions of the table: longer for a longer one, within bounds."""
 WAITING, RUNNING, DONE, FAILED = "waiting", "running", "done", "failed"
-GIVEN = "with the workers"
+ON_WORKERS = "with the workers"
 
 
-class Board:
+class ProgressTable:
     """The state of every cell, shown on Prefect's pages under one key a study."""
 
     def __init__(self, study: Study, cells: list[Cell]) -> None:
         self.key = f"ablation-{study.name.lower().replace('_', '-').replace('.', '-')}"
         self._told = f"Study {study.name}: {len(cells)} cells of {study.steps:,} steps"
         self._changed = asyncio.Event()
-        self._begun = RUNNING if study.executor == "local" else GIVEN
+        self._begun = RUNNING if study.executor == "local" else ON_WORKERS
         self._rows: dict[str, dict[str, Any]] = {
             c.name: {
                 "cell": c.name,
@@ -36,7 +36,7 @@ class Board:
                 "setup": c.setup,
                 "seed": c.seed,
                 "state": WAITING,
-                **dict.fromkeys(SHOWN, ""),
+                **dict.fromkeys(COLUMNS, ""),
                 "reason": "",
             }
             for c in cells
@@ -49,7 +49,7 @@ class Board:
     def done(self, cell: Cell, made: Mapping[str, Artifact]) -> None:
         """The cell has ended well; its figures go into the table."""
         summary = json.loads(Store.from_environment().read(made["evaluation"].key))
-        figures = {name: _short(summary.get(name)) for name in SHOWN}
+        figures = {name: _short(summary.get(name)) for name in COLUMNS}
         self._change(cell, state=DONE, **figures)
 
     def failed(self, cell: Cell, reason: str) -> None:

@@ -25,7 +25,7 @@ PATIENCE_S = 600.0
 log = logging.getLogger(__name__)
 
 
-class Ending:
+class RunWatcher:
     """The runs that somebody waits for."""
 
     def __init__(self) -> None:

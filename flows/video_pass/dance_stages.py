@@ -18,21 +18,21 @@ from robojackson.errors import NoPersonFound, RoboJacksonError, UnreadableVideo
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.run_names import run_name
 from robojackson.pipeline.yaml_loader import load
-from robojackson.retarget.scorecard import check
+from robojackson.retarget.scorecard_gate import check
 from robojackson.robot.model import RobotDescription
 from storage import artifact_tables, run_catalogue
 from storage.artifact import Artifact
 from storage.store import Store
-from tasks.detect_landmarks import landmarks
-from tasks.draw_pictures import snapshot
-from tasks.evaluate_dance import evaluate
-from tasks.probe_video import SourceFile, probe
-from tasks.render_video import video
+from tasks.detect_landmarks import detect_landmarks
+from tasks.draw_pictures import draw_snapshot
+from tasks.evaluate_dance import evaluate_dance
+from tasks.probe_video import SourceFile, probe_video
+from tasks.render_video import render_video
 from tasks.runtime.run_logger import run_logger
 from tasks.runtime.stage import Stage, labelled
-from tasks.score_stability import stability
-from tasks.train_policy import RunLabels, train
-from tasks.write_page import page
+from tasks.score_stability import score_stability
+from tasks.train_policy import RunLabels, train_policy
+from tasks.write_page import write_page
 
 Artifacts = dict[str, Artifact]
 Facts = dict[str, Any]
@@ -58,7 +58,7 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Danced:
+class DanceResult:
     """A pass that has ended.
 
     Attributes:
@@ -70,13 +70,13 @@ class Danced:
     made: Artifacts
 
 
-async def danced(
+async def make_dance(
     store: Store,
     paths: tuple[Path, ...],
     settings: PipelineConfig,
     start_s: float | None = None,
     end_s: float | None = None,
-) -> Danced:
+) -> DanceResult:
     """Dance the steadiest of some videos.
 
     Args:
@@ -93,7 +93,7 @@ async def danced(
     best = choose(candidates)
     labels = RunLabels(*map(run_name, (Path(best.name).stem, settings.setup)))
     made = await perform(best, robot, settings, labels, began)
-    return Danced(conclude(store, made, candidates, settings, labels), made)
+    return DanceResult(conclude(store, made, candidates, settings, labels), made)
 
 
 def score_all(
@@ -110,11 +110,11 @@ def score_all(
     dancer = settings.dancer if settings.dancer.number else None
     size = settings.scoring_detector
     readable = _readable(paths)
-    clips = _each(probe, readable, lambda given: (given[1], settings.video, start_s, end_s))
+    clips = _each(probe_video, readable, lambda given: (given[1], settings.video, start_s, end_s))
     tracks = _each(
-        landmarks, clips, lambda given: (given[1]["video"], given[1]["info"], size, dancer)
+        detect_landmarks, clips, lambda given: (given[1]["video"], given[1]["info"], size, dancer)
     )
-    scores = _each(stability, tracks, lambda given: (given[1], settings.stability))
+    scores = _each(score_stability, tracks, lambda given: (given[1], settings.stability))
     store = Store.from_environment()
     return [
         Candidate(path.name, clip, score, artifact_tables.read(Stability, store, score))
@@ -155,13 +155,13 @@ async def perform(
         if settings.gate:
             check(json.loads(Store.from_environment().read(moved["scorecard"].key)))
         deadline = began + 60 * (settings.minutes - LAST_STAGES_MINUTES)
-        trained = await train(reference, robot, _budgeted(settings), labels, deadline)
-        judged = evaluate(trained["policy"], reference, robot, settings.evaluate, labels)
+        trained = await train_policy(reference, robot, _budgeted(settings), labels, deadline)
+        judged = evaluate_dance(trained["policy"], reference, robot, settings.evaluate, labels)
         shown = (best.clip["video"], moved["landmarks"], moved["smpl"], reference)
-        film = video(*shown, judged["rollout"], robot, settings.show)
+        film = render_video(*shown, judged["rollout"], robot, settings.show)
         made = {**best.clip, "stability": best.stability, **moved, **trained, **judged}
-        made |= {"dance": film, "still": snapshot(film)}
-        return {**made, **page(made, labels.move, best.name)}
+        made |= {"dance": film, "still": draw_snapshot(film)}
+        return {**made, **write_page(made, labels.move, best.name)}
 
 
 def conclude(

@@ -3,9 +3,9 @@
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.robot.model import RobotDescription
 from storage.artifact import Artifact
-from tasks.detect_landmarks import landmarks
-from tasks.recover_motion import mocap
-from tasks.retarget_motion import retarget
+from tasks.detect_landmarks import detect_landmarks
+from tasks.recover_motion import recover_motion
+from tasks.retarget_motion import retarget_motion
 
 
 def to_reference(
@@ -16,13 +16,19 @@ def to_reference(
     Args:
         clip: `video` and `info`, as `probe` left them.
     """
-    track = landmarks(clip["video"], clip["info"], settings.detector, settings.dancer)
+    track = detect_landmarks(clip["video"], clip["info"], settings.detector, settings.dancer)
     if settings.network.hybrik:
         from tasks.recover_motion_by_networks import (
-            network_mocap,  # PyTorch: only with weights of one's own
+            recover_motion_by_networks,  # PyTorch: only with weights of one's own
         )
 
-        sequence = network_mocap(clip["video"], track, settings.network, settings.mocap)
+        sequence = recover_motion_by_networks(
+            clip["video"], track, settings.network, settings.mocap
+        )
     else:
-        sequence = mocap(track, settings.mocap)
-    return {"landmarks": track, "smpl": sequence, **retarget(sequence, robot, settings.retarget)}
+        sequence = recover_motion(track, settings.mocap)
+    return {
+        "landmarks": track,
+        "smpl": sequence,
+        **retarget_motion(sequence, robot, settings.retarget),
+    }

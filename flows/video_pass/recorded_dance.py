@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from flows.video_pass.dance_stages import danced
+from flows.video_pass.dance_stages import make_dance
 from robojackson.clips.video import list_videos
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.yaml_loader import load
@@ -22,7 +22,7 @@ REFRESH = "PREFECT_TASKS_REFRESH_CACHE"
 TRUE = ("1", "true", "yes", "on", "y", "t")
 
 
-def replayed(
+def replay(
     source: Path,
     config: str,
     overrides: Mapping[str, Any],
@@ -46,6 +46,6 @@ def replayed(
     try:
         with records_only():
             paths = list_videos(source)
-            return asyncio.run(danced(store, paths, settings, start_s, end_s)).answer
+            return asyncio.run(make_dance(store, paths, settings, start_s, end_s)).answer
     except NotRecorded:
         return None

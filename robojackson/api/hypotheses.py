@@ -4,13 +4,13 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from robojackson.errors import BadConfiguration
-from robojackson.mocap.recover import recover
+from robojackson.mocap.recover import recover_motion
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.pipeline.pipeline_config import PipelineConfig
 
 
-def names_of(settings: PipelineConfig, count: int) -> list[str]:
+def hypothesis_files(settings: PipelineConfig, count: int) -> list[str]:
     """`smpl_1.parquet` and so on.
 
     Raises:
@@ -24,10 +24,10 @@ def names_of(settings: PipelineConfig, count: int) -> list[str]:
     return [f"smpl_{number}.parquet" for number in range(1, count + 1)]
 
 
-def imagined(
+def sample_hypotheses(
     track: LandmarkTrack, settings: PipelineConfig, count: int
 ) -> Iterator[tuple[str, SmplSequence]]:
     """Samples of the temporal network, seeded, each with the name of its file."""
-    for number, name in enumerate(names_of(settings, count), 1):
+    for number, name in enumerate(hypothesis_files(settings, count), 1):
         temporal = replace(settings.mocap.temporal, hypothesis=number)
-        yield name, recover(track, replace(settings.mocap, temporal=temporal))
+        yield name, recover_motion(track, replace(settings.mocap, temporal=temporal))

@@ -5,7 +5,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 
 from robojackson.clips.video import read_frames
-from robojackson.mocap.recover import recover
+from robojackson.mocap.recover import recover_motion
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.pipeline.pipeline_config import PipelineConfig
@@ -13,7 +13,7 @@ from robojackson.pipeline.pipeline_config import PipelineConfig
 Progress = Callable[[int, int], None]
 
 
-def mover(
+def motion_recoverer(
     video: Path,
     settings: PipelineConfig,
     progress_bar: Callable[[str], AbstractContextManager[Progress]],
@@ -29,7 +29,7 @@ def mover(
         BadWeights: a file of weights cannot be used.
     """
     if not settings.network.hybrik:
-        return lambda track: recover(track, settings.mocap)
+        return lambda track: recover_motion(track, settings.mocap)
     from robojackson.mocap.networks.inference import load_networks
     from robojackson.mocap.networks.network_motion import network_motion
 

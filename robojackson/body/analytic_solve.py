@@ -80,7 +80,7 @@ def solve_with(
         above = world[:, parents]
         ends = position[:, parents] + apply(above, rest[:, joints] - rest[:, parents])
         bone = rest[:, children] - rest[:, joints]
-        wanted = _wanted(goal[:, children], goal[:, joints], ends, bone, method)
+        wanted = _target_directions(goal[:, children], goal[:, joints], ends, bone, method)
         swung = swing(bone, apply(np.swapaxes(above, -1, -2), wanted))
         ahead = above @ swung
         turns = [twist_rule(int(joint), ahead[:, k]) for k, joint in enumerate(joints)]
@@ -91,7 +91,7 @@ def solve_with(
     return local
 
 
-def _wanted(
+def _target_directions(
     child: np.ndarray, start: np.ndarray, end: np.ndarray, bone: np.ndarray, method: Method
 ) -> np.ndarray:
     """The direction along which the bones of some joints shall lie.

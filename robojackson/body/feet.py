@@ -55,7 +55,7 @@ def pitch_bias(feet: Float[np.ndarray, "T 4 3"], fps: float) -> float:
     return float(np.clip(np.median(pitch(feet)[carrying]), -LARGEST_BIAS, LARGEST_BIAS))
 
 
-def standing(feet: Float[np.ndarray, "T 4 3"], planted: np.ndarray) -> np.ndarray:
+def stands_flat(feet: Float[np.ndarray, "T 4 3"], planted: np.ndarray) -> np.ndarray:
     """Frames in which each foot stands on its whole sole, shape (T, 2).
 
     Heel and toe both stand, or one of them does and the foot is about level.
@@ -64,7 +64,7 @@ def standing(feet: Float[np.ndarray, "T 4 3"], planted: np.ndarray) -> np.ndarra
     return ends.all(2) | (ends.any(2) & (np.abs(pitch(feet)) < FLAT))
 
 
-def hold_flat(
+def level_feet(
     body_points: Float[np.ndarray, "T 29 3"],
     rest_joints: Float[np.ndarray, "29 3"],
     feet: Float[np.ndarray, "T 4 3"],

@@ -11,7 +11,14 @@ from typing import Annotated, Literal
 
 import typer
 
-from robojackson.cli.console import USAGE_ERROR, Answer, command, complain, log_to_stderr, misused
+from robojackson.cli.console import (
+    USAGE_ERROR,
+    CommandResult,
+    command,
+    complain,
+    log_to_stderr,
+    usage_error,
+)
 from robojackson.cli.format_commands import export, import_
 from robojackson.cli.learning_commands import evaluate, pretrain, train
 from robojackson.cli.options import (
@@ -24,8 +31,8 @@ from robojackson.cli.options import (
     Robot,
     Set,
     Weights,
-    chosen,
-    quoted,
+    overrides_from,
+    yaml_text,
 )
 from robojackson.cli.robot_commands import robots
 
@@ -37,7 +44,7 @@ def score(
     config: Config = "base",
     set_: Set = None,
     as_json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """How steady the dancer is seen (Algorithm 1): missing joints plus jitter, lowest is best.
 
     Exit code 1 where a video that is named cannot be read; one inside a folder is only told.
@@ -45,9 +52,9 @@ def score(
     from robojackson.cli import scoring
 
     log_to_stderr()
-    scored = scoring.score(video, config, chosen(set_, {"dancer.number": person}))
+    scored = scoring.score(video, config, overrides_from(set_, {"dancer.number": person}))
     unread = {told["video"] for told in scored["videos"] if "error" in told}
-    return Answer(scored, code=1 if unread & set(map(str, video)) else 0)
+    return CommandResult(scored, code=1 if unread & set(map(str, video)) else 0)
 
 
 @command
@@ -67,19 +74,19 @@ def mocap(
     config: Config = "base",
     set_: Set = None,
     as_json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """The motion of the person in a video: landmarks.parquet and smpl.parquet."""
-    from robojackson.cli import stages as single
+    from robojackson.cli import stages
 
     log_to_stderr()
     if people:
         from robojackson.cli.people_listing import list_people
 
-        told, lines = list_people(video, out, config, chosen(set_))
-        return Answer(told, text=lines)
-    brought = {"network.hybrik": quoted(hybrik), "network.niki": quoted(niki)}
-    overrides = chosen(set_, {**brought, "dancer.number": person, "detector": quality})
-    return Answer(single.mocap(video, out, config, overrides, hypotheses))
+        told, lines = list_people(video, out, config, overrides_from(set_))
+        return CommandResult(told, text=lines)
+    brought = {"network.hybrik": yaml_text(hybrik), "network.niki": yaml_text(niki)}
+    overrides = overrides_from(set_, {**brought, "dancer.number": person, "detector": quality})
+    return CommandResult(stages.mocap(video, out, config, overrides, hypotheses))
 
 
 @command
@@ -98,30 +105,30 @@ def retarget(
     force: Force = False,
     set_: Set = None,
     as_json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """The same motion for a robot: reference.parquet and scorecard.json."""
-    from robojackson.cli import stages as single
+    from robojackson.cli import stages
 
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     log_to_stderr()
-    overrides = chosen(set_, {"retarget.method": method, "robot": robot})
-    made = single.retarget(smpl, out, config, overrides)
+    overrides = overrides_from(set_, {"retarget.method": method, "robot": robot})
+    made = stages.retarget(smpl, out, config, overrides)
     if video:
-        from robojackson.cli.retarget_pictures import look
+        from robojackson.cli.retarget_pictures import draw_retargeting
 
-        made |= look(smpl, out, config, overrides)
+        made |= draw_retargeting(smpl, out, config, overrides)
     if not force:
-        single.gate(made["scorecard"], out, config, overrides)
-    return Answer(made)
+        stages.gate(made["scorecard"], out, config, overrides)
+    return CommandResult(made)
 
 
 @command
-def doctor(as_json: Json = False) -> Answer:
+def doctor(as_json: Json = False) -> CommandResult:
     """What is installed, what is missing, and how to get it."""
     from robojackson.cli.doctor import examine
 
     report = examine()
-    return Answer(report, code=0 if report["ok"] else 1)
+    return CommandResult(report, code=0 if report["ok"] else 1)
 
 
 STAGES: dict[str, Callable[..., None]] = {
@@ -165,5 +172,5 @@ def run(app: typer.Typer) -> int:
         if type(cause).__name__ == "NoArgsIsHelpError":
             cause.show()
         else:
-            complain(misused(cause))
+            complain(usage_error(cause))
         return 2

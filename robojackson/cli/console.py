@@ -33,7 +33,7 @@ log = logging.getLogger("robojackson")
 
 
 @dataclass(frozen=True)
-class Answer:
+class CommandResult:
     """What a command has to say.
 
     Attributes:
@@ -51,7 +51,7 @@ class Interrupted(Exception):
     """Ctrl-C where something can be said about going on; the message is that line."""
 
 
-def command(body: Callable[P, Answer]) -> Callable[P, None]:
+def command(body: Callable[P, CommandResult]) -> Callable[P, None]:
     """A command out of a function: prints its answer, turns errors into one line and a code.
 
     The function has a keyword `as_json`; while it runs, stdout is stderr, so that no library can
@@ -72,7 +72,7 @@ def command(body: Callable[P, Answer]) -> Callable[P, None]:
         except KeyboardInterrupt:
             _leave_interrupted(f"interrupted: resume: {same_command()}")
         try:
-            say(answer, as_json=bool(kwargs.get("as_json")))
+            print_result(answer, as_json=bool(kwargs.get("as_json")))
         except BrokenPipeError:  # whoever reads has enough
             raise
         except OSError as cause:
@@ -84,9 +84,9 @@ def command(body: Callable[P, Answer]) -> Callable[P, None]:
     return run
 
 
-def say(answer: Answer, as_json: bool) -> None:
+def print_result(answer: CommandResult, as_json: bool) -> None:
     """Print an answer: one JSON object, or lines for a person."""
-    data = plain(answer.data)
+    data = to_json_types(answer.data)
     if as_json:
         sys.stdout.write(json.dumps(data) + "\n")
     else:
@@ -107,13 +107,15 @@ def lines(data: Mapping[str, Any], indent: int = 0) -> Iterator[str]:
                 yield head
                 yield from lines(item, indent + 2)
         else:
-            yield f"{head:<{width + indent}}  {_word(value)}"
+            yield f"{head:<{width + indent}}  {_format_value(value)}"
 
 
 def table(rows: Mapping[str, Mapping[str, Any]], columns: Sequence[str]) -> list[str]:
     """Rows by name under a head, columns aligned."""
     cells = [["", *columns]]
-    cells += [[name, *(_word(row.get(key)) for key in columns)] for name, row in rows.items()]
+    cells += [
+        [name, *(_format_value(row.get(key)) for key in columns)] for name, row in rows.items()
+    ]
     widths = [max(len(line[i]) for line in cells) for i in range(len(cells[0]))]
     return [
         "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
@@ -121,16 +123,16 @@ def table(rows: Mapping[str, Mapping[str, Any]], columns: Sequence[str]) -> list
     ]
 
 
-def plain(value: Any) -> Any:
+def to_json_types(value: Any) -> Any:
     """The same in JSON's types; NaN and infinity are null."""
     if is_dataclass(value) and not isinstance(value, type):
-        return plain(asdict(value))
+        return to_json_types(asdict(value))
     if isinstance(value, Mapping):
-        return {str(key): plain(inner) for key, inner in value.items()}
+        return {str(key): to_json_types(inner) for key, inner in value.items()}
     if isinstance(value, np.ndarray | np.generic):
-        return plain(value.tolist())
+        return to_json_types(value.tolist())
     if isinstance(value, list | tuple):
-        return [plain(inner) for inner in value]
+        return [to_json_types(inner) for inner in value]
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     return value if value is None or isinstance(value, str | int | bool) else str(value)
@@ -191,7 +193,7 @@ def stdout_is_stderr() -> Iterator[None]:
         os.close(saved)
 
 
-def misused(cause: Any) -> str:
+def usage_error(cause: Any) -> str:
     """What typer does not understand of the words that were given, with the value in question."""
     message = cause.format_message().rstrip(".")
     if isinstance(cause.__cause__, ValidationError):
@@ -210,15 +212,15 @@ def _leave_interrupted(line: str) -> None:
     raise typer.Exit(INTERRUPTED)
 
 
-def _word(value: Any) -> str:
+def _format_value(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.4g}"
     if isinstance(value, list):
-        return ", ".join(_word(inner) for inner in value)
+        return ", ".join(_format_value(inner) for inner in value)
     return "-" if value is None else str(value)
 
 
-def here(path: Path) -> str:
+def relative_path(path: Path) -> str:
     """A path as short as it can be said from here."""
     try:
         return str(path.relative_to(Path.cwd()))

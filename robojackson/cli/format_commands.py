@@ -5,8 +5,8 @@ from typing import Annotated, Literal
 
 import typer
 
-from robojackson.cli.console import Answer, command, log_to_stderr
-from robojackson.cli.options import Config, Folder, Json, Set, chosen
+from robojackson.cli.console import CommandResult, command, log_to_stderr
+from robojackson.cli.options import Config, Folder, Json, Set, overrides_from
 
 
 @command
@@ -26,14 +26,14 @@ def export(
     ],
     out: Annotated[Path, typer.Option("-o", "--out", help="File for the result.")],
     as_json: Json = False,
-) -> Answer:  # fmt: skip
+) -> CommandResult:  # fmt: skip
     """A robot's or a person's motion, or a policy, in the file format of another project."""
     from robojackson.cli import exporting
 
     log_to_stderr()
     if to == "onnx":
-        return Answer(exporting.export_policy(motion, out))
-    return Answer(exporting.export(motion, to, out))
+        return CommandResult(exporting.export_policy(motion, out))
+    return CommandResult(exporting.export(motion, to, out))
 
 
 @command
@@ -53,9 +53,9 @@ def import_(
     config: Config = "base",
     set_: Set = None,
     as_json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """A human motion of another project, put on the floor: smpl.parquet; runs nothing in a file."""
     from robojackson.cli.importing import import_motion
 
     log_to_stderr()
-    return Answer(import_motion(file, out, fps, up, config, chosen(set_)))
+    return CommandResult(import_motion(file, out, fps, up, config, overrides_from(set_)))

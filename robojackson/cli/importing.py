@@ -41,27 +41,31 @@ def import_motion(
         UnknownName, BadTable: nobody's file, a damaged one, or one that asks to run something.
         BadConfiguration: a frame rate that no file of motion has, or axes that the file has not.
     """
-    from robojackson.mocap.imported_motion import kinematics_error_mm, place, stand_up
+    from robojackson.mocap.imported_motion import (
+        ground_foreign_motion,
+        ground_hybrik_motion,
+        kinematics_error_mm,
+    )
     from robojackson.pipeline.pipeline_config import PipelineConfig
 
     began = time.monotonic()
     settings = load(PipelineConfig, config, overrides)
     data = _bytes_of(file)
     kind = recognise(data, str(file))
-    with _named(file):
+    with _naming_the_file(file):
         motion = READERS[kind](data)
     rate, notes = _rate(motion, kind, fps)
     figures: dict[str, Any] = {}
     if isinstance(motion, HybrikMotion):
         if up:
             raise BadConfiguration("--up is for files with a world; HybrIK's are in camera axes")
-        with _named(file):
-            sequence = stand_up(motion, rate, settings.mocap)
+        with _naming_the_file(file):
+            sequence = ground_hybrik_motion(motion, rate, settings.mocap)
         figures["kinematics_error_mm"] = kinematics_error_mm(motion)
     else:
         axes = motion.to_world if up is None else AXES[up]
-        with _named(file):
-            sequence = place(replace(motion, to_world=axes), rate)
+        with _naming_the_file(file):
+            sequence = ground_foreign_motion(replace(motion, to_world=axes), rate)
     sequence = replace(sequence, notes=(*sequence.notes, *notes))
     with stages.results_in(out) as files:
         files.write("smpl.parquet", tables.encode(sequence))
@@ -71,7 +75,7 @@ def import_motion(
 
 
 @contextmanager
-def _named(file: Path) -> Iterator[None]:
+def _naming_the_file(file: Path) -> Iterator[None]:
     """What is wrong is told with the file's name."""
     try:
         yield

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from robojackson.cli.console import Answer, command, log_to_stderr
+from robojackson.cli.console import CommandResult, command, log_to_stderr
 from robojackson.cli.options import (
     Config,
     Folder,
@@ -21,7 +21,7 @@ from robojackson.cli.options import (
     TablesFolder,
     Trainer,
     TrainMinutes,
-    chosen,
+    overrides_from,
 )
 
 Parent = Annotated[int, typer.Option(hidden=True, help="End with this process.")]
@@ -47,17 +47,19 @@ def train(
     force: Force = False,
     set_: SetTrain = None,
     as_json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """Teach the robot the motion: policy.safetensors and episodes.parquet; resumes by itself."""
     from robojackson.cli import training_process
 
     if parent:
-        training_process.die_with(parent)
+        training_process.end_with(parent)
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     log_to_stderr()
     given = {"mode": mode, "trainer": trainer, "steps": steps, "minutes": minutes, "seed": seed}
-    return Answer(
-        training_process.train(reference, out, setup, chosen(set_, given), run_id, move, force)
+    return CommandResult(
+        training_process.train(
+            reference, out, setup, overrides_from(set_, given), run_id, move, force
+        )
     )
 
 
@@ -77,17 +79,19 @@ def pretrain(
     parent: Parent = 0,
     set_: SetTrain = None,
     as_json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """A robot that walks, for `--setup pretrain`: walker_KIND.safetensors and walker.json."""
     from robojackson.cli import walker_training
-    from robojackson.cli.training_process import die_with
+    from robojackson.cli.training_process import end_with
 
     if parent:
-        die_with(parent)
+        end_with(parent)
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     log_to_stderr()
     given = {"trainer": trainer, "steps": steps, "minutes": minutes, "seed": seed}
-    return Answer(walker_training.pretrain(kind, out, reference, chosen(set_, given)))
+    return CommandResult(
+        walker_training.pretrain(kind, out, reference, overrides_from(set_, given))
+    )
 
 
 @command
@@ -100,15 +104,15 @@ def evaluate(
     parent: Parent = 0,
     set_: Set = None,
     as_json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """Judge a policy on stock physics from many starts, beside baselines that do not dance."""
     from robojackson.cli import stages
-    from robojackson.cli.training_process import die_with
+    from robojackson.cli.training_process import end_with
 
     if parent:
-        die_with(parent)
+        end_with(parent)
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     log_to_stderr()
-    overrides = chosen(set_, {"evaluate.seconds": seconds})
+    overrides = overrides_from(set_, {"evaluate.seconds": seconds})
     judged = stages.evaluate(policy, reference, out, config, overrides)
-    return Answer(judged, text=stages.verdict_lines(judged))
+    return CommandResult(judged, text=stages.verdict_lines(judged))

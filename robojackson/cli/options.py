@@ -69,7 +69,7 @@ TrainMinutes = Annotated[
 ]
 
 
-def chosen(pairs: list[str] | None, given: dict[str, Any] | None = None) -> dict[str, Any]:
+def overrides_from(pairs: list[str] | None, given: dict[str, Any] | None = None) -> dict[str, Any]:
     """`--set key=value` pairs and options that were given, as one mapping."""
     overrides = {key: value for key, value in (given or {}).items() if value is not None}
     for pair in pairs or []:
@@ -80,6 +80,6 @@ def chosen(pairs: list[str] | None, given: dict[str, Any] | None = None) -> dict
     return overrides
 
 
-def quoted(path: Path | None) -> str | None:
+def yaml_text(path: Path | None) -> str | None:
     """A path as a value that YAML reads as text, whatever is in it."""
     return None if path is None else "'" + str(path).replace("'", "''") + "'"

@@ -19,8 +19,8 @@ def list_people(
     Raises:
         NoPersonFound: nobody is there for long enough.
     """
-    from robojackson.clips.people.people_picture import portrait
-    from robojackson.clips.people.tracked_people import look_around
+    from robojackson.clips.people.people_picture import draw_people
+    from robojackson.clips.people.tracked_people import track_people
     from robojackson.clips.video import probe
     from robojackson.errors import NoPersonFound
     from robojackson.pipeline.pipeline_config import PipelineConfig
@@ -30,10 +30,10 @@ def list_people(
     with stages.results_in(out) as files:
         with console.bar(f"people of {video.name}") as progress:
             who = settings.dancer
-            cast = look_around(video, info, who.crowd, who.identity, progress)
+            cast = track_people(video, info, who.crowd, who.identity, progress)
         if not cast.rows:
             raise NoPersonFound(f"{video}: {cast}")
-        files.write(PICTURE, portrait(video, cast))
+        files.write(PICTURE, draw_people(video, cast))
     people, picture = cast.people, str(out / PICTURE)
     told = {"video": str(video), "people": [asdict(p) for p in people], "picture": picture}
     return told, [*(f"person {person}" for person in people), f"picture  {picture}"]

@@ -12,7 +12,9 @@ VIDEO, CONTACTS, TORQUES = "retarget.mp4", "contacts.png", "torques.png"
 FEASIBILITY = "feasibility.png"
 
 
-def look(smpl: Path, out: Path, config: str, overrides: Mapping[str, Any]) -> dict[str, Any]:
+def draw_retargeting(
+    smpl: Path, out: Path, config: str, overrides: Mapping[str, Any]
+) -> dict[str, Any]:
     """Draw what `single.retarget` wrote into a folder, beside the person it was made from.
 
     Raises:

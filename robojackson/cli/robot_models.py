@@ -26,7 +26,7 @@ from robojackson.robot.mjcf import mjcf_path, robots_folder
 _ROOM_MB = 120
 
 
-def listed() -> list[dict[str, Any]]:
+def list_robots() -> list[dict[str, Any]]:
     """Every shipped robot: whether its model is here, and how to get it."""
     names = sorted(path.stem for path in (FOLDER / "robots").glob("*.yaml"))
     return [_entry(load(RobotDescription, f"robots/{name}")) for name in names]
@@ -40,7 +40,7 @@ def _entry(description: RobotDescription) -> dict[str, Any]:
         return {"robot": description.name, "ready": False, "model": "", "note": str(cause)}
 
 
-def add(name: str) -> dict[str, Any]:
+def add_robot(name: str) -> dict[str, Any]:
     """Bring the model of a robot into the store; one that is there already is left alone.
 
     Raises:

@@ -21,7 +21,7 @@ def score(videos: list[Path], config: str, overrides: Overrides) -> Figures:
 
     One that cannot be read is told beside the others' scores, and is an error where it is alone.
     """
-    from robojackson.clips.people.dancer import follow
+    from robojackson.clips.people.dancer import track_dancer
     from robojackson.clips.pose_detector import detect
     from robojackson.clips.quality.stability import stability
     from robojackson.pipeline.pipeline_config import PipelineConfig
@@ -35,7 +35,7 @@ def score(videos: list[Path], config: str, overrides: Overrides) -> Figures:
             with console.bar(video.name) as progress:
                 if settings.dancer.number:
                     which = settings.dancer
-                    track = follow(video, info, settings.scoring_detector, which, progress)
+                    track = track_dancer(video, info, settings.scoring_detector, which, progress)
                 else:
                     track = detect(video, info, settings.scoring_detector, progress)
         except UNREADABLE as cause:

@@ -39,27 +39,27 @@ def mocap(
     video: Path, out: Path, config: str, overrides: Overrides, hypotheses: int = 0
 ) -> Figures:
     """landmarks.parquet and smpl.parquet of a video, smpl_1.parquet... of what else it allows."""
-    from robojackson.api.hypotheses import imagined, names_of
-    from robojackson.api.motion_recovery import mover
+    from robojackson.api.hypotheses import hypothesis_files, sample_hypotheses
+    from robojackson.api.motion_recovery import motion_recoverer
     from robojackson.clips.video import probe
-    from robojackson.mocap.landmarks.pipeline import see
+    from robojackson.mocap.landmarks.pipeline import detect_landmarks
     from robojackson.pipeline.pipeline_config import PipelineConfig
 
     began = time.monotonic()
     settings = load(PipelineConfig, config, overrides)
-    names = names_of(settings, hypotheses)
+    names = hypothesis_files(settings, hypotheses)
     info = probe(video, settings.video)
-    to_motion = mover(video, settings, console.bar)
+    to_motion = motion_recoverer(video, settings, console.bar)
     with results_in(out) as files:
         with console.bar(f"landmarks of {video.name}") as progress:
-            track = see(video, info, settings.detector, settings.dancer, progress)
+            track = detect_landmarks(video, info, settings.detector, settings.dancer, progress)
         try:
             sequence = to_motion(track)
         except (NoPersonFound, TrackTooShort) as cause:
             raise type(cause)(f"{video}: {cause}") from cause
         files.write("landmarks.parquet", tables.encode(track))
         files.write("smpl.parquet", tables.encode(sequence))
-        for name, other in imagined(track, settings, hypotheses):
+        for name, other in sample_hypotheses(track, settings, hypotheses):
             files.write(name, tables.encode(other))
     return {
         "video": str(video),
@@ -81,8 +81,8 @@ def retarget(smpl: Path, out: Path, config: str, overrides: Overrides) -> Figure
     """reference.parquet and scorecard.json of a motion, good or bad; `gate` tells which."""
     from robojackson.motion.smpl_sequence import SmplSequence
     from robojackson.pipeline.pipeline_config import PipelineConfig
-    from robojackson.retarget.retargeting import retarget as to_robot
-    from robojackson.retarget.scorecard import told
+    from robojackson.retarget.retargeting import retarget_motion
+    from robojackson.retarget.scorecard_gate import scorecard_record
 
     began = time.monotonic()
     settings = load(PipelineConfig, config, overrides)
@@ -90,11 +90,11 @@ def retarget(smpl: Path, out: Path, config: str, overrides: Overrides) -> Figure
     sequence = read_table(SmplSequence, smpl)
     with results_in(out) as files:
         try:
-            reference = to_robot(sequence, machine, settings.retarget)
+            reference = retarget_motion(sequence, machine, settings.retarget)
         except TrackTooShort as cause:
             raise TrackTooShort(f"{smpl}: {cause}") from cause
         files.write("reference.parquet", tables.encode(reference))
-        scorecard = console.plain(told(reference))
+        scorecard = console.to_json_types(scorecard_record(reference))
         files.write("scorecard.json", json.dumps(scorecard, indent=1).encode())
     return {
         "reference": str(out / "reference.parquet"),
@@ -115,7 +115,7 @@ def gate(scorecard: Figures, out: Path, config: str, overrides: Overrides) -> No
         RejectedReference: the message names the figure and what would mend it.
     """
     from robojackson.pipeline.pipeline_config import PipelineConfig
-    from robojackson.retarget.scorecard import check
+    from robojackson.retarget.scorecard_gate import check
 
     if not load(PipelineConfig, config, overrides).gate:
         return
@@ -133,7 +133,7 @@ def evaluate(
     from robojackson.pipeline.pipeline_config import PipelineConfig
     from robojackson.pipeline.table_codecs import Rollout
     from robojackson.pipeline.table_schemas import EVALUATION_RECORD
-    from robojackson.rl.evaluation.policy_evaluation import evaluate as judge
+    from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
     from robojackson.rl.policy import load_policy
 
     settings = load(PipelineConfig, config, overrides)
@@ -141,8 +141,8 @@ def evaluate(
     machine = robot_of(motion)
     trained = load_policy(policy)
     with console.stages() as progress:
-        verdict = judge(trained, motion, machine, settings.evaluate, progress)
-    summary = console.plain(verdict.summary)
+        verdict = evaluate_policy(trained, motion, machine, settings.evaluate, progress)
+    summary = console.to_json_types(verdict.summary)
     if out is not None:
         setup = trained.setup or settings.setup
         common = labels_of(move_of(reference), setup, trained.training["seed"])

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 PROGRESS = "progress.json"
 """How far a training is, in its folder."""
-USUAL_MINUTES = 9.0
+DEFAULT_MINUTES = 9.0
 """Wall time of a training for which no budget is given."""
 SETUPS = {
     (False, False): "scratch",
@@ -63,21 +63,19 @@ def train(
         RejectedReference: the motion's own score card says that the robot cannot follow it.
     """
     from robojackson.motion.reference_motion import ReferenceMotion
-    from robojackson.retarget.scorecard import check, told
+    from robojackson.retarget.scorecard_gate import check, scorecard_record
     from robojackson.rl.config.train_config import TrainConfig
-    from robojackson.rl.evaluation.reward_audit import both_readings
-    from robojackson.rl.evaluation.reward_audit import told as asks_told
+    from robojackson.rl.evaluation.reward_audit import audit_both_readings, audit_record
     from robojackson.rl.modes.paper_mode import require_trainable
-    from robojackson.rl.training import Hooks
-    from robojackson.rl.training import train as learn
+    from robojackson.rl.training import Hooks, train_policy
     from robojackson.rl.training_run import newest_checkpoint
 
-    config = _budgeted(load(TrainConfig, _setup(setup), overrides))
+    config = _with_budget(load(TrainConfig, _setup(setup), overrides))
     motion = stages.read_table(ReferenceMotion, reference)
     robot = stages.robot_of(motion)
     require_trainable(robot)
     if not force:
-        check(told(motion))
+        check(scorecard_record(motion))
     stop = _StopRequest(out)
     common = _common(config, move or stages.move_of(reference), setup, run_id)
     with (
@@ -88,12 +86,12 @@ def train(
     ):
         rows = _EpisodeLog(files, common, goes_on=newest_checkpoint(out) is not None)
         try:
-            asked = asks_told(both_readings(robot, motion, config.environment))
+            asked = audit_record(audit_both_readings(robot, motion, config.environment))
             if asked:
-                tell(asks(asked))
-            told_of = partial(_told, out=out, tell=tell)
+                tell(format_reward_audit(asked))
+            told_of = partial(_report_progress, out=out, tell=tell)
             hooks = Hooks(told_of, rows.add, stop.learnt, rows.save, stop, setup=common["setup"])
-            result = learn(motion, robot, config, out, hooks)
+            result = train_policy(motion, robot, config, out, hooks)
         except KeyboardInterrupt:
             there = newest_checkpoint(out)
             kept = f"the checkpoint is in {out}; resume" if there else "nothing learnt yet; again"
@@ -129,7 +127,7 @@ def status(row: Mapping[str, float]) -> str:
     )
 
 
-def asks(found: Mapping[str, Mapping[str, float]]) -> str:
+def format_reward_audit(found: Mapping[str, Mapping[str, float]]) -> str:
     """What the reward pays to bodies that do not dance, as one line."""
     parts = []
     for reading, of in found.items():
@@ -138,7 +136,7 @@ def asks(found: Mapping[str, Mapping[str, float]]) -> str:
     return f"of a perfect dance's reward: {'; '.join(parts)}"
 
 
-def _told(row: Mapping[str, float], out: Path, tell: Callable[[str], None]) -> None:
+def _report_progress(row: Mapping[str, float], out: Path, tell: Callable[[str], None]) -> None:
     """Say how far it is, and leave it for whoever watches the folder."""
     tell(status(row))
     finite = {k: v if math.isfinite(v) else None for k, v in row.items()}
@@ -153,7 +151,7 @@ def _number(value: float, digits: int) -> str:
     return f"{value:.{digits}f}" if math.isfinite(value) else "-"
 
 
-def die_with(parent: int) -> None:
+def end_with(parent: int) -> None:
     """Ask the kernel to end this process when the one that started it ends (Linux only)."""
     if not end_with_parent(parent):
         raise console.Interrupted("the process that started this training is gone")
@@ -227,9 +225,9 @@ def _setup(name: str | None) -> str | None:
     return f"setups/{name}" if bare else name
 
 
-def _budgeted(config: "TrainConfig") -> "TrainConfig":
+def _with_budget(config: "TrainConfig") -> "TrainConfig":
     """With the usual wall time where nothing ends the training."""
-    return config if config.has_budget else replace(config, minutes=USUAL_MINUTES)
+    return config if config.has_budget else replace(config, minutes=DEFAULT_MINUTES)
 
 
 def _common(config: "TrainConfig", move: str, setup: str | None, run_id: str) -> dict[str, Any]:

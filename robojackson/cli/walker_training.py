@@ -61,13 +61,15 @@ def pretrain(kind: str, out: Path, reference: Path | None, overrides: Mapping[st
         model = robot.model
         size = stock_observation_size(model.nq, model.nv, model.nbody)
         networks = widened(networks, size)
-        judged = _walked(policy, robot)
+        judged = _evaluate_walk(policy, robot)
     else:
         judged = stages.evaluate(out / "policy.safetensors", motion, out, PIPELINE, {})
     made = out / f"walker_{kind}.safetensors"
     made.write_bytes(networks.to_bytes())
     facts = {
-        "command": shlex.join(["robojackson", "pretrain", "--kind", kind, *_words(overrides)]),
+        "command": shlex.join(
+            ["robojackson", "pretrain", "--kind", kind, *_command_options(overrides)]
+        ),
         "seed": trained["seed"],
         "steps": trained["steps"],
         "updates": trained["updates"],
@@ -99,11 +101,11 @@ def curve(out: Path) -> list[dict[str, float]]:
 
 def _reference(kind: str, out: Path, robot: "Robot") -> Path:
     """The motion that a walker is trained on: none for `paper`, the bundled walk for `track`."""
-    from robojackson.rl.modes.standing_motion import standing
+    from robojackson.rl.modes.standing_motion import make_standing_motion
 
     if kind == "paper":
         with stages.results_in(out) as files:
-            files.write(STANDING, tables.encode(standing(robot)))
+            files.write(STANDING, tables.encode(make_standing_motion(robot)))
         return out / STANDING
     folder = out / Path(WALK).stem  # not among what the user may keep in `out`
     made = folder / "reference.parquet"
@@ -113,13 +115,13 @@ def _reference(kind: str, out: Path, robot: "Robot") -> Path:
     return made
 
 
-def _walked(policy: Any, robot: "Robot") -> Figures:
+def _evaluate_walk(policy: Any, robot: "Robot") -> Figures:
     from robojackson.rl.evaluation.walking import walk
 
     return asdict(walk(policy, robot))
 
 
-def _words(overrides: Mapping[str, Any]) -> list[str]:
+def _command_options(overrides: Mapping[str, Any]) -> list[str]:
     """The options of a command that override what the setup says."""
     options = {"steps": "--steps", "minutes": "--minutes", "seed": "--seed", "trainer": "--trainer"}
     words: list[str] = []

@@ -14,11 +14,11 @@ from pydantic import ConfigDict
 from pydantic.dataclasses import dataclass
 
 from robojackson.clips.video_container import (
+    declared_rate,
     first_frame,
     opened,
     packet_times,
     rate,
-    told_rate,
     video_stream,
 )
 from robojackson.errors import (
@@ -101,10 +101,10 @@ def probe(path: Path, limits: VideoLimits) -> VideoInfo:
     """
     with opened(path) as container:
         stream = video_stream(container, path)
-        told = told_rate(stream)
+        told = declared_rate(stream)
         promised = stream.frames
     stamps = packet_times(path)
-    _require_whole(path, len(stamps), promised)
+    _require_complete(path, len(stamps), promised)
     with opened(path) as container:
         first = first_frame(container, path)
     if len(stamps) > 1 and stamps[-1] == 0.0:
@@ -162,7 +162,7 @@ def _decoded(path: Path) -> Iterator[tuple[float, VideoFrame]]:
     with opened(path) as container:
         stream = video_stream(container, path)
         stream.thread_type = "NONE"
-        told = told_rate(stream) or 1.0  # where frames have no times
+        told = declared_rate(stream) or 1.0  # where frames have no times
         time_s, good, bad = 0.0, 0, 0
         packets = container.demux(stream)
         while True:
@@ -196,7 +196,7 @@ def _upright(frame: VideoFrame, short_side: int | None) -> np.ndarray:
     return np.ascontiguousarray(np.rot90(image, round(frame.rotation / 90) % 4))
 
 
-def _require_whole(path: Path, frames: int, promised: int) -> None:
+def _require_complete(path: Path, frames: int, promised: int) -> None:
     if frames + MISSING_FRAMES_ALLOWED < promised:
         raise TruncatedVideo(
             f"{path}: holds {frames} of the {promised} frames that its index promises; "

@@ -74,7 +74,7 @@ def packet_times(path: Path) -> Float[np.ndarray, " T"]:
     return stamps - stamps[:1] if len(stamps) else stamps
 
 
-def told_rate(stream: VideoStream) -> float:
+def declared_rate(stream: VideoStream) -> float:
     """Frames a second that the file tells; 0 where it tells none."""
     return float(stream.average_rate or stream.guessed_rate or 0)
 

@@ -24,7 +24,7 @@ from robojackson.formats.foreign_motion import (
 from robojackson.motion.smpl_sequence import SmplSequence
 
 RATES = ("mocap_framerate", "mocap_frame_rate")
-WANTED = {"poses", "trans", "betas", "root_orient", "pose_body", REST_KEY, *RATES}
+KNOWN_ARRAYS = {"poses", "trans", "betas", "root_orient", "pose_body", REST_KEY, *RATES}
 WHERE = "AMASS npz"
 _BODY = 3 * BODY_JOINTS
 
@@ -53,7 +53,7 @@ def read(data: bytes) -> ForeignMotion:
     Raises:
         BadTable: not such a file.
     """
-    content = npz_archive.unpack(data, ("trans",), WHERE, WANTED)
+    content = npz_archive.unpack(data, ("trans",), WHERE, KNOWN_ARRAYS)
     extended = "pose_body" in content
     if extended:
         parts = rows(content, "root_orient", 3, WHERE), rows(content, "pose_body", 63, WHERE)

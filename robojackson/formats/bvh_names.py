@@ -62,7 +62,9 @@ def keypoints_of(tree: Tree) -> Float[np.ndarray, "T 29 3"]:
 
 def _find(tree: Tree) -> dict[str, int]:
     """Node of every keypoint that the file has."""
-    plain = {_plain(node.name): index for index, node in reversed([*enumerate(tree.nodes)])}
+    plain = {
+        _normalised_name(node.name): index for index, node in reversed([*enumerate(tree.nodes)])
+    }
     found: dict[str, int] = {}
     wanted = list(NAMES.items())
     for bare in _ASSIGNED_IN_TURN:
@@ -81,7 +83,7 @@ def _find(tree: Tree) -> dict[str, int]:
     return found
 
 
-def _plain(name: str) -> str:
+def _normalised_name(name: str) -> str:
     """leftupleg of mixamorig:LeftUpLeg and of Left_UpLeg."""
     return "".join(letter for letter in name.rpartition(":")[2].lower() if letter.isalnum())
 

@@ -32,7 +32,7 @@ LARGEST = 1e8
 """Of any number in a file."""
 LEGS_M = (0.2, 3.0)
 """Hip to ankle of whoever may be a person, metres."""
-NAMED = 12
+MAX_LISTED = 12
 """Names of a file's arrays that an error tells."""
 REST_KEY = "rest_joints"
 """Of a skeleton in our own files; other projects do not read it."""
@@ -101,8 +101,8 @@ def number(value: Any) -> float | None:
 
 def listed(names: Collection[Any]) -> str:
     """Some names of a file, for a message."""
-    told = ", ".join(str(name)[:40] for name in islice(names, NAMED))
-    more = len(names) - NAMED
+    told = ", ".join(str(name)[:40] for name in islice(names, MAX_LISTED))
+    more = len(names) - MAX_LISTED
     return (told or "nothing") + (f" and {more} more" if more > 0 else "")
 
 

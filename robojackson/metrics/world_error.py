@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from robojackson.metrics.pose_error import mpjpe, procrustes
 
-PIECE = 100
+SEGMENT_FRAMES = 100
 """Frames."""
 
 
@@ -30,12 +30,12 @@ def align_world(
 
 def w_mpjpe(points: Float[np.ndarray, "T J 3"], truth: Float[np.ndarray, "T J 3"]) -> float:
     """W-MPJPE: pieces of 100 frames, each aligned by its first two."""
-    return _over_pieces(points, truth, 2)
+    return _mean_over_segments(points, truth, 2)
 
 
 def wa_mpjpe(points: Float[np.ndarray, "T J 3"], truth: Float[np.ndarray, "T J 3"]) -> float:
     """WA-MPJPE: pieces of 100 frames, each aligned as a whole."""
-    return _over_pieces(points, truth, None)
+    return _mean_over_segments(points, truth, None)
 
 
 def clip_mpjpe(points: Float[np.ndarray, "T J 3"], truth: Float[np.ndarray, "T J 3"]) -> float:
@@ -56,9 +56,9 @@ def rte(root: Float[np.ndarray, "T 3"], truth: Float[np.ndarray, "T 3"]) -> floa
     return error / length if length > 0.0 else float("inf")
 
 
-def _over_pieces(points: np.ndarray, truth: np.ndarray, frames: int | None) -> float:
+def _mean_over_segments(points: np.ndarray, truth: np.ndarray, frames: int | None) -> float:
     """Mean over all frames; a last piece too short to align joins the one before it."""
-    cuts = [*range(0, max(len(points) - 1, 1), PIECE), len(points)]
+    cuts = [*range(0, max(len(points) - 1, 1), SEGMENT_FRAMES), len(points)]
     moved = [
         align_world(points[start:end], truth[start:end], frames) for start, end in pairwise(cuts)
     ]

@@ -25,9 +25,9 @@ from robojackson.body.skeleton import (
 from robojackson.body.smoothing import lowpass
 from robojackson.formats.foreign_motion import ForeignMotion, require_person, skeleton_under
 from robojackson.formats.hybrik_output import HybrikMotion
-from robojackson.mocap.grounding import contacts as contact_states
+from robojackson.mocap.grounding import contacts
 from robojackson.mocap.grounding import floor as ground
-from robojackson.mocap.landmarks import pinhole_camera as cameras
+from robojackson.mocap.landmarks import pinhole_camera
 from robojackson.mocap.landmarks.blazepose import fill_gaps
 from robojackson.mocap.pose.known_twist import TurnedBody, pose_keypoints
 from robojackson.mocap.recover import MocapConfig, recover_points
@@ -39,7 +39,7 @@ CUTOFF_HZ = 6.0
 """Zero-phase low-pass of HybrIK's joints, which are found frame by frame, hertz."""
 
 
-def place(motion: ForeignMotion, fps: float) -> SmplSequence:
+def ground_foreign_motion(motion: ForeignMotion, fps: float) -> SmplSequence:
     """A motion that has a world, in ours: turned once, its floor at z = 0, contacts found.
 
     Raises:
@@ -63,12 +63,12 @@ def place(motion: ForeignMotion, fps: float) -> SmplSequence:
     if float(np.mean(pose.points[:, keypoint("neck"), 2] - pose.points[:, 0, 2])) < 0.0:
         notes.append("the trunk points down: are the file's axes the usual ones? See --up")
     speed = np.linalg.norm(np.gradient(feet[..., :2], axis=0), axis=-1) * fps
-    config = contact_states.ContactConfig()
-    states = contact_states.contacts(feet[..., 2], speed, falling, fps, config)
+    config = contacts.ContactConfig()
+    states = contacts.contacts(feet[..., 2], speed, falling, fps, config)
     return _sequence(fps, local, pose, motion.rest_joints, states, tuple(notes), motion.betas)
 
 
-def stand_up(
+def ground_hybrik_motion(
     motion: HybrikMotion, fps: float, config: MocapConfig, cutoff_hz: float = CUTOFF_HZ
 ) -> SmplSequence:
     """HybrIK's motion in the world, on the floor.
@@ -97,7 +97,7 @@ def before_camera(
     The place that fits the keypoints in the image best; HybrIK's own follows the box's width.
     """
     rays = _camera(motion, config).rays(motion.pixels)
-    root = cameras.fit_root(motion.points, rays)
+    root = pinhole_camera.fit_root(motion.points, rays)
     root[:, 2:] = lowpass(root[:, 2:], fps, config.depth_cutoff_hz)
     return lowpass(motion.points, fps, cutoff_hz) + lowpass(root, fps, cutoff_hz)[:, None]
 
@@ -114,9 +114,9 @@ def kinematics_error_mm(motion: HybrikMotion) -> float | None:
     return float(1e3 * np.linalg.norm(posed - motion.points, axis=-1).mean())
 
 
-def _camera(motion: HybrikMotion, config: MocapConfig) -> cameras.Pinhole:
-    focal = config.focal_px or cameras.guess_focal(motion.width, motion.height)
-    return cameras.Pinhole(focal, motion.width, motion.height)
+def _camera(motion: HybrikMotion, config: MocapConfig) -> pinhole_camera.Pinhole:
+    focal = config.focal_px or pinhole_camera.guess_focal(motion.width, motion.height)
+    return pinhole_camera.Pinhole(focal, motion.width, motion.height)
 
 
 def _skeleton(motion: HybrikMotion) -> Float[np.ndarray, "29 3"]:

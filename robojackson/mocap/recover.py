@@ -16,10 +16,10 @@ from scipy.spatial.transform import Rotation
 from robojackson.body import analytic_solve
 from robojackson.body.forward_kinematics import apply
 from robojackson.body.smoothing import lowpass
-from robojackson.clips.quality.visibility import weighed
+from robojackson.clips.quality.visibility import weigh_visibility
 from robojackson.mocap.grounding import floor
-from robojackson.mocap.grounding.stance import StandConfig, stand
-from robojackson.mocap.landmarks import pinhole_camera as cameras
+from robojackson.mocap.grounding.stance import GroundingConfig, ground_body
+from robojackson.mocap.landmarks import pinhole_camera
 from robojackson.mocap.landmarks.blazepose import BODY, Landmarks, repair
 from robojackson.mocap.landmarks.bone_lengths import fit_skeleton
 from robojackson.mocap.landmarks.covariance import certainty
@@ -54,21 +54,23 @@ class MocapConfig:
     temporal: TemporalConfig = Field(default_factory=TemporalConfig)
     refine: RefineConfig = Field(default_factory=RefineConfig)
     gravity: floor.GravityConfig = Field(default_factory=floor.GravityConfig)
-    stand: StandConfig = Field(default_factory=StandConfig)
+    stand: GroundingConfig = Field(default_factory=GroundingConfig)
 
 
-def recover(track: LandmarkTrack, config: MocapConfig) -> SmplSequence:
+def recover_motion(track: LandmarkTrack, config: MocapConfig) -> SmplSequence:
     """The motion of the person in a track.
 
     Raises:
         TrackTooShort, NoPersonFound: nothing to recover.
     """
-    track = evenly(weighed(track))
+    track = evenly(weigh_visibility(track))
     landmarks = repair(track)
-    pinhole = cameras.Pinhole(
-        config.focal_px or cameras.guess_focal(track.width, track.height), track.width, track.height
+    pinhole = pinhole_camera.Pinhole(
+        config.focal_px or pinhole_camera.guess_focal(track.width, track.height),
+        track.width,
+        track.height,
     )
-    seen = cameras.place(landmarks, pinhole, track.fps, config.depth_cutoff_hz)
+    seen = pinhole_camera.place(landmarks, pinhole, track.fps, config.depth_cutoff_hz)
     depth_m = None
     if config.temporal.enabled:
         found = lift(seen, landmarks.local, landmarks.visibility, track.fps, config.temporal)
@@ -86,10 +88,12 @@ def recover(track: LandmarkTrack, config: MocapConfig) -> SmplSequence:
 
     sequence = recover_points(seen, posed, landmarks.valid, pinhole, track.fps, config)
     notes = (*track.notes, *sequence.notes, *_swaps(landmarks))
-    return replace(sequence, person=track.person, notes=notes, camera=told(sequence.camera, track))
+    return replace(
+        sequence, person=track.person, notes=notes, camera=camera_facts(sequence.camera, track)
+    )
 
 
-def told(camera: Mapping[str, object], track: LandmarkTrack) -> dict[str, object]:
+def camera_facts(camera: Mapping[str, object], track: LandmarkTrack) -> dict[str, object]:
     """What is known of a camera, which is that of the first frame where it moved."""
     return {**camera, **({} if track.to_first is None else {"moved": True})}
 
@@ -98,7 +102,7 @@ def recover_points(
     points: Float[np.ndarray, "T N 3"],
     posed: Callable[[np.ndarray], Body],
     valid: np.ndarray,
-    pinhole: cameras.Pinhole,
+    pinhole: pinhole_camera.Pinhole,
     fps: float,
     config: MocapConfig,
 ) -> SmplSequence:
@@ -117,7 +121,7 @@ def recover_points(
     to_world = floor.camera_to_world(gravity.up)
     body = posed(apply(to_world, points))
     start = body.pose.points.mean((0, 1))
-    stance = stand(body, fps, config.stand)
+    stance = ground_body(body, fps, config.stand)
     body = stance.body
     start = body.pose.points.mean((0, 1)) - start
     camera = _camera(pinhole, gravity, to_world, start)
@@ -125,7 +129,7 @@ def recover_points(
 
 
 def _camera(
-    pinhole: cameras.Pinhole,
+    pinhole: pinhole_camera.Pinhole,
     gravity: floor.Gravity,
     to_world: np.ndarray,
     origin: np.ndarray,

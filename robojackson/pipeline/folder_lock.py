@@ -14,7 +14,7 @@ from robojackson.errors import StoreError
 FOR_EVER = math.inf
 A_MOMENT = 2.0
 """Seconds for which a folder may be held only in order to see whether it is nobody's."""
-LOOK_S = 0.05
+POLL_S = 0.05
 
 
 @contextmanager
@@ -56,4 +56,4 @@ def _lock(file: IO[str], until: float) -> None:
                     f"{Path(file.name).parent}: another training is running there; wait for it to "
                     "end, then give the same command again"
                 ) from None
-            time.sleep(LOOK_S)
+            time.sleep(POLL_S)

@@ -112,7 +112,7 @@ def _smpl_apart(sequence: SmplSequence) -> tuple[Columns, Facts]:
     columns = _numbered("frame", len(sequence), 1.0 / sequence.fps)
     columns |= {name: np.asarray(getattr(sequence, name)) for name in SMPL_ARRAYS}
     facts = {name: getattr(sequence, name) for name in table_schemas.SMPL_SEQUENCE.metadata}
-    return columns, _plain(facts)
+    return columns, _json_types(facts)
 
 
 def _smpl(columns: Columns, facts: Facts) -> SmplSequence:
@@ -141,7 +141,7 @@ def _reference_apart(reference: ReferenceMotion) -> tuple[Columns, Facts]:
     facts = {name: getattr(reference, name) for name in table_schemas.REFERENCE_MOTION.metadata}
     if reference.certificate is not None:
         facts["certificate"] = asdict(reference.certificate)
-    return columns, _plain(facts)
+    return columns, _json_types(facts)
 
 
 def _certificate(facts: Facts) -> Certificate | None:
@@ -192,7 +192,7 @@ def _numbered(index: str, rows: int, period_s: float) -> Columns:
     return {index: np.arange(rows, dtype=np.int32), "time_s": np.arange(rows) * period_s}
 
 
-def _plain(value: Any) -> Any:
+def _json_types(value: Any) -> Any:
     """The same in JSON's types."""
     return json.loads(json.dumps(value, default=_array))
 

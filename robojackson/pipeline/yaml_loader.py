@@ -44,7 +44,7 @@ def load(
     }
     for key_path, value in given.items():
         _set(values, key_path.split("."), value)
-    where = _told(path) if path else "--set"
+    where = _display_name(path) if path else "--set"
     try:
         return TypeAdapter(cls).validate_python(values)
     except ValidationError as cause:
@@ -85,7 +85,7 @@ def find(name_or_path: str | Path) -> Path:
         return path
     folder = given.parent.name
     kind = re.sub("ies$", "y", folder).removesuffix("s") or "configuration"
-    raise UnknownName(kind, given.name, _told(path), names(folder))
+    raise UnknownName(kind, given.name, _display_name(path), names(folder))
 
 
 def names(folder: str = "") -> tuple[str, ...]:
@@ -93,7 +93,7 @@ def names(folder: str = "") -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in (FOLDER / folder).glob("*.yaml")))
 
 
-def _told(path: Path) -> str:
+def _display_name(path: Path) -> str:
     """What a person calls the file."""
     inside = path.is_relative_to(FOLDER)
     return f"configs/{path.relative_to(FOLDER).as_posix()}" if inside else str(path)
@@ -116,9 +116,9 @@ class _Yaml12(yaml.SafeLoader):
 
 
 BASES = {"0o": 8, "0x": 16}
-ANEW = (":bool", ":float", ":int", ":timestamp")
+REDEFINED = (":bool", ":float", ":int", ":timestamp")
 _Yaml12.yaml_implicit_resolvers = {
-    first: [(tag, pattern) for tag, pattern in rules if not tag.endswith(ANEW)]
+    first: [(tag, pattern) for tag, pattern in rules if not tag.endswith(REDEFINED)]
     for first, rules in yaml.SafeLoader.yaml_implicit_resolvers.items()
 }
 _Yaml12.add_implicit_resolver(
@@ -142,14 +142,14 @@ _Yaml12.add_constructor(
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        values = _parsed(path.read_text(encoding="utf-8"), _told(path))
+        values = _parsed(path.read_text(encoding="utf-8"), _display_name(path))
     except (OSError, UnicodeDecodeError) as cause:
-        raise BadConfiguration(f"{_told(path)}: cannot be read ({cause})") from cause
+        raise BadConfiguration(f"{_display_name(path)}: cannot be read ({cause})") from cause
     if values is None:
         return {}
     if not isinstance(values, dict):
         raise BadConfiguration(
-            f"{_told(path)}: holds {type(values).__name__}, expected keys and values"
+            f"{_display_name(path)}: holds {type(values).__name__}, expected keys and values"
         )
     return values
 
@@ -185,10 +185,10 @@ def _explain(cls: type, cause: ValidationError) -> str:
         return f"key {where!r} is missing"
     if error["type"] == "value_error" and isinstance(error["input"], Mapping):
         return str(error["ctx"]["error"])  # values that do not go together, each right by itself
-    return f"{where!r} is {error['input']!r}: {_wanted(cause)}"
+    return f"{where!r} is {error['input']!r}: {_expected(cause)}"
 
 
-def _wanted(cause: ValidationError) -> str:
+def _expected(cause: ValidationError) -> str:
     """What the first wrong value should be; of a union, every alternative."""
     errors = cause.errors()
     key = errors[0]["loc"]

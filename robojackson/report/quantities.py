@@ -17,7 +17,7 @@ POLICY_TITLES: Mapping[str, tuple[str, str]] = {
 
 
 @dataclass(frozen=True)
-class Fact:
+class Quantity:
     """One line of a table.
 
     Attributes:
@@ -96,13 +96,13 @@ _FORMS: Mapping[str, _Form] = {
 _FLAGS = ("cyclic",)
 
 
-def fact(key: str, value: Any) -> Fact:
+def quantity(key: str, value: Any) -> Quantity:
     """A figure by its key; one that is not known keeps its key as its label."""
     form = _FORMS.get(key, _Form(key.replace("_", " "), digits=3))
-    return Fact(form.label, written(key, value), form.meaning)
+    return Quantity(form.label, format_value(key, value), form.meaning)
 
 
-def written(key: str, value: Any) -> str:
+def format_value(key: str, value: Any) -> str:
     """A value with its unit; a dash where there is none."""
     form = _FORMS.get(key, _Form(key, digits=3))
     if key in _FLAGS or isinstance(value, bool):
@@ -124,7 +124,7 @@ def decimal(value: float, digits: int) -> str:
     return f"\N{MINUS SIGN}{text[1:]}" if text.strip("-0.,") else text[1:]
 
 
-def facts(values: Mapping[str, Any], only: tuple[str, ...] = ()) -> list[Fact]:
+def quantities(values: Mapping[str, Any], only: tuple[str, ...] = ()) -> list[Quantity]:
     """A table of figures, in the order of `only` where it is given."""
     keys = [key for key in only if key in values] if only else list(values)
-    return [fact(key, values[key]) for key in keys]
+    return [quantity(key, values[key]) for key in keys]

@@ -50,9 +50,9 @@ def make_feasible(
     """Repair a motion; slow it down where its tempo is free and that helps."""
     given = Feasible(qpos, aims, np.arange(len(qpos), dtype=float))
     how = config.repair
-    if not how.weights or share(robot, given, config) >= how.enough_share:
+    if not how.weights or feasible_share(robot, given, config) >= how.enough_share:
         return given
-    found = _kept(robot, given, _solved(robot, given, how.weights[0], config), config)
+    found = _accepted(robot, given, _solved(robot, given, how.weights[0], config), config)
     rounds = how.slow_rounds if config.tempo == "auto" else 0
     for _ in range(rounds):
         slower = _slowed(robot, found, config)
@@ -64,7 +64,7 @@ def make_feasible(
     return _repaired(robot, given, found, config)
 
 
-def share(robot: Robot, motion: Feasible, config: RetargetConfig) -> float:
+def feasible_share(robot: Robot, motion: Feasible, config: RetargetConfig) -> float:
     """Share of feasible steps."""
     slack = _slack(robot, motion, config, tempo.GRID[:1])
     return float((slack[0] <= 1.0).mean())
@@ -99,7 +99,7 @@ def _slowed(robot: Robot, motion: Feasible, config: RetargetConfig) -> Feasible 
     slack = _slack(robot, motion, config, tempo.GRID)
     if (slack[0] <= 1.0).mean() >= config.repair.enough_share:
         return None
-    rate = tempo.smooth_rate(tempo.wanted_rate(slack), aims.dt, aims.lap is not None)
+    rate = tempo.smooth_rate(tempo.required_rate(slack), aims.dt, aims.lap is not None)
     so_far = np.gradient(motion.steps).clip(max=1.0)
     rate = np.maximum(rate, np.minimum(_GUARD * config.repair.slowest / so_far, 1.0))
     if rate.min() > _HARDLY_SLOWER:
@@ -112,12 +112,12 @@ def _slowed(robot: Robot, motion: Feasible, config: RetargetConfig) -> Feasible 
         steps=tempo.times_at(motion.steps, steps),
     )
     solved = _solved(robot, slower, config.repair.weights[0], config)
-    kept = _kept(robot, slower, solved, config)
+    kept = _accepted(robot, slower, solved, config)
     # Limbs that passed through each other between two steps are seen to do so when slowed down.
     return kept if _holds(robot, kept, config) else None
 
 
-def _kept(robot: Robot, before: Feasible, after: Feasible, config: RetargetConfig) -> Feasible:
+def _accepted(robot: Robot, before: Feasible, after: Feasible, config: RetargetConfig) -> Feasible:
     """The motion after a repair, or the one before where the repair broke a hard bar or bent it too
     far."""
     dearest = config.repair.dearest_mm + _error_mm(robot, before)
@@ -139,15 +139,15 @@ def _repaired(robot: Robot, given: Feasible, found: Feasible, config: RetargetCo
     """Raise the weight until enough steps are feasible or the motion would be bent too far."""
     how = config.repair
     dearest = how.dearest_mm + _error_mm(robot, given)
-    best, good = found, share(robot, found, config)
+    best, good = found, feasible_share(robot, found, config)
     for weight in how.weights[1:]:
         if good >= how.enough_share:
             break
         found = _solved(robot, found, weight, config)
-        _log.info("weight %g: %.0f %% feasible", weight, 100 * share(robot, found, config))
+        _log.info("weight %g: %.0f %% feasible", weight, 100 * feasible_share(robot, found, config))
         if _error_mm(robot, found) > dearest or not _holds(robot, found, config):
             break
-        best, good = found, share(robot, found, config)
+        best, good = found, feasible_share(robot, found, config)
     return best
 
 

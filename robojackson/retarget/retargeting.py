@@ -19,8 +19,9 @@ from robojackson.retarget.feasibility.contact_wrench import Tolerance
 from robojackson.retarget.feasibility.tempo import times_at, warped
 from robojackson.retarget.feasible_motion import Feasible, make_feasible
 from robojackson.retarget.retarget_config import RetargetConfig
-from robojackson.retarget.scorecard import BARS, hovers, score
-from robojackson.retarget.targets.cycle import Lap, human_clip
+from robojackson.retarget.scorecard import hovers, score
+from robojackson.retarget.scorecard_gate import BARS
+from robojackson.retarget.targets.cycle import Cycle, human_clip
 from robojackson.retarget.targets.human_clip import HumanClip
 from robojackson.retarget.targets.keypoint_targets import Targets, targets
 from robojackson.retarget.whole_clip import optimise, polished
@@ -29,10 +30,12 @@ from robojackson.robot.resampling import velocities
 from robojackson.robot.tree_kinematics import pose, tree
 
 _log = logging.getLogger(__name__)
-__all__ = ["RetargetConfig", "assemble", "retarget"]
+__all__ = ["RetargetConfig", "assemble", "retarget_motion"]
 
 
-def retarget(sequence: SmplSequence, robot: Robot, config: RetargetConfig) -> ReferenceMotion:
+def retarget_motion(
+    sequence: SmplSequence, robot: Robot, config: RetargetConfig
+) -> ReferenceMotion:
     """The reference motion of a human motion, at the robot's control step, score card inside.
 
     Raises:
@@ -113,7 +116,7 @@ def _slowing(able: Feasible, upright: Targets, robot: Robot) -> dict[str, float]
 
 
 def _notes(
-    sequence: SmplSequence, clip: HumanClip, lap: Lap | None, config: RetargetConfig
+    sequence: SmplSequence, clip: HumanClip, lap: Cycle | None, config: RetargetConfig
 ) -> dict[str, float]:
     """What was done to the clip."""
     frames = len(sequence) if lap is None else lap.end - lap.start

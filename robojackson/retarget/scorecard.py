@@ -7,19 +7,17 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from robojackson.geometry.rotations import quat_to_matrix
-from robojackson.metrics import retarget_error as metric
+from robojackson.metrics import retarget_error
 from robojackson.metrics.dance_score import velocity_score
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import AIR, PLANTED
 from robojackson.retarget.feasibility.certification import fallen
-from robojackson.retarget.scorecard_gate import BARS, check, failures, told
+from robojackson.retarget.scorecard_gate import failures
 from robojackson.retarget.solver.collision import Detector
 from robojackson.retarget.targets.keypoint_targets import BONES, Targets
 from robojackson.robot.model import KEYPOINTS, Robot
 from robojackson.robot.resampling import forward_velocities, seam_angle, seam_shift, seam_speed
 from robojackson.robot.tree_kinematics import centre_of_mass, pose, sole_velocities, tree
-
-__all__ = ["BARS", "check", "failures", "hovers", "score", "told"]
 
 
 def score(
@@ -56,7 +54,7 @@ def hovers(robot: Robot, qpos: Float[np.ndarray, "S nq"], dt: float) -> Bool[np.
     """Steps in which the robot neither stands nor falls."""
     posed = pose(tree(robot), qpos)
     soles = posed.ball_pos[..., 2] - robot.contact_radii
-    return metric.unsupported(soles, centre_of_mass(tree(robot), posed)[:, 2], dt)
+    return retarget_error.unsupported(soles, centre_of_mass(tree(robot), posed)[:, 2], dt)
 
 
 def _feasibility(motion: ReferenceMotion, robot: Robot) -> dict[str, float]:
@@ -79,15 +77,15 @@ def _validity(motion: ReferenceMotion, robot: Robot) -> dict[str, float]:
     return {
         "nan_count": float(sum(np.count_nonzero(~np.isfinite(a)) for a in arrays)),
         "limit_violations": float(
-            np.count_nonzero(metric.limit_excess(hinges, robot.lower, robot.upper) > 1e-9)
+            np.count_nonzero(retarget_error.limit_excess(hinges, robot.lower, robot.upper) > 1e-9)
         ),
         "limit_excess_max_deg": float(
-            np.degrees(metric.limit_excess(hinges, robot.lower, robot.upper).max())
+            np.degrees(retarget_error.limit_excess(hinges, robot.lower, robot.upper).max())
         ),
         "quat_error": float(np.abs(np.linalg.norm(motion.qpos[:, 3:7], axis=1) - 1).max()),
         "joint_speed_max_rad_s": fastest,
         "speed_over_limit": fastest / robot.description.max_joint_speed,
-        "hinge_jerk_rms_rad_s3": metric.hinge_jerk_rms(hinges, motion.dt),
+        "hinge_jerk_rms_rad_s3": retarget_error.hinge_jerk_rms(hinges, motion.dt),
     }
 
 
@@ -107,7 +105,7 @@ def _contact(motion: ReferenceMotion, robot: Robot, aims: Targets) -> dict[str, 
     ground[..., 2] -= robot.contact_radii
     lap = motion.lap_offset if motion.cyclic else None
     speed = sole_velocities(robot, posed, motion.dt, lap)
-    slip = metric.slip_cm_s(speed, aims.contact == PLANTED)
+    slip = retarget_error.slip_cm_s(speed, aims.contact == PLANTED)
     height = np.abs(ground[..., 2])
     gap = 1e3 * height[aims.contact != AIR]
     return {
@@ -124,10 +122,10 @@ def _contact(motion: ReferenceMotion, robot: Robot, aims: Targets) -> dict[str, 
 
 def _fidelity(motion: ReferenceMotion, robot: Robot, aims: Targets) -> dict[str, float]:
     weighted = robot.keypoint_weights > 0
-    error = metric.keypoint_error_mm(motion.keypoints_w, aims.keypoints_w, weighted)
+    error = retarget_error.keypoint_error_mm(motion.keypoints_w, aims.keypoints_w, weighted)
     bones = [(KEYPOINTS.index(a), KEYPOINTS.index(b)) for a, b in BONES]
-    angles = metric.bone_angles_deg(motion.keypoints_w, aims.keypoints_w, bones)
-    hips = metric.keypoint_error_mm(
+    angles = retarget_error.bone_angles_deg(motion.keypoints_w, aims.keypoints_w, bones)
+    hips = retarget_error.keypoint_error_mm(
         motion.keypoints_w - motion.keypoints_w[:, :1],
         aims.keypoints_w - aims.keypoints_w[:, :1],
         weighted,
@@ -141,14 +139,16 @@ def _fidelity(motion: ReferenceMotion, robot: Robot, aims: Targets) -> dict[str,
         ),
         "bone_deg": float(angles.mean()),
         "bone_p95_deg": float(np.quantile(angles, 0.95)),
-        "keypoint_jerk_m_s3": metric.jerk(motion.keypoints_w[:, weighted], motion.dt),
-        "source_jerk_m_s3": metric.jerk(aims.keypoints_w[:, weighted], motion.dt),
+        "keypoint_jerk_m_s3": retarget_error.jerk(motion.keypoints_w[:, weighted], motion.dt),
+        "source_jerk_m_s3": retarget_error.jerk(aims.keypoints_w[:, weighted], motion.dt),
     }
 
 
 def _keypoint_error(motion: ReferenceMotion, robot: Robot, aims: Targets) -> float:
     weighted = robot.keypoint_weights > 0
-    return float(metric.keypoint_error_mm(motion.keypoints_w, aims.keypoints_w, weighted).mean())
+    return float(
+        retarget_error.keypoint_error_mm(motion.keypoints_w, aims.keypoints_w, weighted).mean()
+    )
 
 
 def _posture(motion: ReferenceMotion) -> dict[str, float]:

@@ -47,7 +47,7 @@ def failures(card: Mapping[str, float]) -> list[str]:
     return [name for name, bar in BARS.items() if not card.get(name, np.nan) <= bar]
 
 
-def told(motion: ReferenceMotion) -> dict[str, Any]:
+def scorecard_record(motion: ReferenceMotion) -> dict[str, Any]:
     """The card as it is written beside the motion: the figures, and the findings in words."""
     found = motion.certificate
     return {**motion.scorecard, "findings": [str(f) for f in found.findings] if found else []}

@@ -21,7 +21,7 @@ from robojackson.rl.tqc.network_arrays import (
     Networks,
     Tensors,
     load_networks,
-    whole,
+    require_complete,
 )
 
 log = logging.getLogger(__name__)
@@ -105,7 +105,7 @@ def from_sb3_zip(path: Path) -> Networks:
     except (KeyError, ValueError) as error:
         raise BadPolicy(f"{path} does not hold an actor and critics of TQC ({error})") from error
     facts = {"from": path.name, "steps": told.get("num_timesteps")}
-    return whole(Networks(tensors | alpha, facts), path)
+    return require_complete(Networks(tensors | alpha, facts), path)
 
 
 def _alpha(archive: zipfile.ZipFile, torch: object) -> Tensors:

@@ -17,17 +17,17 @@ from robojackson.rl.env.vec_env import TrackingVecEnv
 from robojackson.rl.pretrained import pretrained
 from robojackson.rl.tqc.network_arrays import Networks, chosen, fitted
 from robojackson.rl.tqc.trainers import make_trainer
-from robojackson.rl.training_hooks import Enough, Hooks
+from robojackson.rl.training_hooks import BudgetSpent, Hooks
 from robojackson.rl.training_run import Run
 from robojackson.rl.training_task import Task, TrainResult
 from robojackson.robot.model import Robot
 
-__all__ = ["Hooks", "TrainResult", "train"]
+__all__ = ["Hooks", "TrainResult", "train_policy"]
 
 log = logging.getLogger(__name__)
 
 
-def train(
+def train_policy(
     reference: ReferenceMotion,
     robot: Robot,
     config: TrainConfig,
@@ -56,7 +56,7 @@ def train(
     try:
         if not run.finished():
             trainer.learn(run.callback)
-    except Enough:
+    except BudgetSpent:
         run.checkpoint()
     finally:
         env.close()

@@ -8,7 +8,7 @@ SECONDS_TO_SAVE = 30.0
 """What a training that is stopped gets to write its checkpoint before it is killed, seconds."""
 
 
-class Enough(Exception):
+class BudgetSpent(Exception):
     """The budget of a training is used up."""
 
 

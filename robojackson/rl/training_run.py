@@ -24,7 +24,7 @@ from robojackson.rl.tensorboard_log import ScalarLog
 from robojackson.rl.tqc.actor_average import ActorAverage
 from robojackson.rl.tqc.network_arrays import Networks, Tensors
 from robojackson.rl.tqc.trainer import Trainer
-from robojackson.rl.training_hooks import Enough, Hooks, Row
+from robojackson.rl.training_hooks import BudgetSpent, Hooks, Row
 from robojackson.rl.training_task import Task, TrainResult
 
 log = logging.getLogger(__name__)
@@ -131,7 +131,7 @@ class Run:
             self.checkpoint()
             raise
         if self.finished():
-            raise Enough
+            raise BudgetSpent
         if now - self._saved >= self.config.checkpoint_seconds:
             self.checkpoint()
             self._saved = time.monotonic()

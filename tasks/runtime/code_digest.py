@@ -36,7 +36,7 @@ def digest(roots: Iterable[str], package: str = PACKAGE, folder: Path | None = N
     return known.digest
 
 
-def drawn_by(task: str, templates: Iterable[str]) -> list[str]:
+def template_digests(task: str, templates: Iterable[str]) -> list[str]:
     """Digests of what makes a page besides the modules that every stage is keyed by.
 
     Args:

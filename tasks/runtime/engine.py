@@ -14,7 +14,7 @@ from prefect.context import TaskRunContext
 from prefect.filesystems import WritableFileSystem
 from prefect.serializers import JSONSerializer
 
-from storage import stage_records as records
+from storage import stage_records
 from storage.store import Store
 
 P = ParamSpec("P")
@@ -29,11 +29,11 @@ class Records(WritableFileSystem):
 
     def read_path(self, path: str, _sync: bool = True) -> bytes:  # type: ignore[override]
         """Return the content of a record."""
-        return Store.from_environment().read(records.address(path))
+        return Store.from_environment().read(stage_records.address(path))
 
     def write_path(self, path: str, content: bytes, _sync: bool = True) -> None:  # type: ignore[override]
         """Write a record, whole or not at all."""
-        Store.from_environment().put(records.address(path), content)
+        Store.from_environment().put(stage_records.address(path), content)
 
     async def aread_path(self, path: str) -> bytes:
         """Return the content of a record without blocking the flow."""
@@ -54,11 +54,11 @@ class ArtifactSerializer(JSONSerializer):
 
     def dumps(self, obj: Any) -> bytes:
         """Serialise what a stage returned."""
-        return records.encode(obj)
+        return stage_records.encode(obj)
 
     def loads(self, blob: bytes) -> Any:
         """Parse it and verify that every artifact in it is in the store, unaltered."""
-        return records.decode(blob, Store.from_environment())
+        return stage_records.decode(blob, Store.from_environment())
 
 
 def cached_task(

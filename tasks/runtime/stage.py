@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar
 
 from robojackson.errors import StoreError
-from storage import stage_records as records
+from storage import stage_records
 from storage.artifact import Artifact
 from storage.store import Store
 from tasks.runtime.code_digest import bare_tree, digest, imports_of
@@ -175,7 +175,7 @@ class Stage(Generic[P, R]):
         given.apply_defaults()
         key = self.recipe.key(given.arguments)
         try:
-            return records.read(Store.from_environment(), key)
+            return stage_records.read(Store.from_environment(), key)
         except StoreError as cause:
             raise NotRecorded(key) from cause
 

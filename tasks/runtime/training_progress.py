@@ -17,7 +17,7 @@ EVERY_S, LATER_S, SHARE = 5.0, 30.0, 0.05
 
 
 @asynccontextmanager
-async def shown(work: Path, name: str) -> AsyncIterator[None]:
+async def show_progress(work: Path, name: str) -> AsyncIterator[None]:
     """Show what a training in `work` says of itself for the time of a block, and where it ended."""
     bar = _Bar(work / FILE, name)
     watcher = asyncio.create_task(bar.watch())
@@ -57,7 +57,7 @@ class _Bar:
         with suppress(Exception):
             row = json.loads(self._path.read_text())
             if self._artifact is not None:
-                said = told(self._name, row)
+                said = format_row(self._name, row)
                 await aupdate_progress_artifact(self._artifact, done(row), description=said)
 
 
@@ -67,7 +67,7 @@ def done(row: Mapping[str, Any]) -> float:
     return round(100.0 * used / max(used + left, 1e-9), 1)
 
 
-def told(name: str, row: Mapping[str, Any]) -> str:
+def format_row(name: str, row: Mapping[str, Any]) -> str:
     """A row of progress for a person."""
     minutes, seconds = divmod(int(row["seconds_left"]), 60)
     survived = row.get("survived_s")

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from robojackson.api.hypotheses import imagined, names_of
+from robojackson.api.hypotheses import hypothesis_files, sample_hypotheses
 from robojackson.errors import BadConfiguration
 from robojackson.mocap.landmarks.blazepose import landmark
 from robojackson.motion.landmark_track import LandmarkTrack
@@ -27,11 +27,11 @@ def hidden_arm() -> LandmarkTrack:
 
 
 def test_files_are_numbered_from_one() -> None:
-    assert names_of(PipelineConfig(), 2) == ["smpl_1.parquet", "smpl_2.parquet"]
+    assert hypothesis_files(PipelineConfig(), 2) == ["smpl_1.parquet", "smpl_2.parquet"]
 
 
 def test_none_are_made_unasked() -> None:
-    assert names_of(PipelineConfig(), 0) == []
+    assert hypothesis_files(PipelineConfig(), 0) == []
 
 
 def test_without_the_temporal_network_there_is_nothing_to_sample() -> None:
@@ -39,9 +39,9 @@ def test_without_the_temporal_network_there_is_nothing_to_sample() -> None:
     temporal = replace(settings.mocap.temporal, enabled=False)
     plain = replace(settings, mocap=replace(settings.mocap, temporal=temporal))
     with pytest.raises(BadConfiguration, match="temporal"):
-        names_of(plain, 1)
+        hypothesis_files(plain, 1)
 
 
 def test_hypotheses_of_a_hidden_arm_differ(hidden_arm: LandmarkTrack) -> None:
-    first, second = (motion for _, motion in imagined(hidden_arm, PipelineConfig(), 2))
+    first, second = (motion for _, motion in sample_hypotheses(hidden_arm, PipelineConfig(), 2))
     assert np.abs(first.joints - second.joints).max() > 0.01

@@ -14,7 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 from flows.cli.commands import app
-from robojackson.cli.console import lines, plain
+from robojackson.cli.console import lines, to_json_types
 from robojackson.clips import pose_detector
 from robojackson.errors import TruncatedVideo
 from tests.fixtures.commands import ROOT, environment, robojackson
@@ -293,7 +293,9 @@ def test_what_a_library_prints_does_not_stand_beside_the_answer(tmp_path: Path) 
 
 
 def test_an_answer_for_people_has_one_line_a_figure() -> None:
-    data = plain({"skill": 0.123456, "baselines": {"statue": {"skill": None}}, "names": ["a", "b"]})
+    data = to_json_types(
+        {"skill": 0.123456, "baselines": {"statue": {"skill": None}}, "names": ["a", "b"]}
+    )
     assert list(lines(data)) == [
         "skill      0.1235",
         "baselines",

@@ -21,7 +21,7 @@ from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.pipeline import tables
 from robojackson.pipeline.yaml_loader import load
 from robojackson.retarget.retarget_config import RetargetConfig
-from robojackson.retarget.retargeting import retarget
+from robojackson.retarget.retargeting import retarget_motion
 from robojackson.robot.description import RobotDescription
 from robojackson.robot.model import load_robot
 from tests.fixtures.commands import Said, robojackson
@@ -54,7 +54,7 @@ def test_what_was_imported_can_be_retargeted(smpl: Path, tmp_path: Path) -> None
     import_motion(tmp_path / "motion.bvh", tmp_path, None, None, "base", {})
     robot = load_robot(load(RobotDescription, "robots/humanoid"))
     config = RetargetConfig(starts=1, tempo=1.0)
-    reference = retarget(read(tmp_path / "smpl.parquet"), robot, config)
+    reference = retarget_motion(read(tmp_path / "smpl.parquet"), robot, config)
     assert np.isfinite(reference.qpos).all()
     assert reference.scorecard["limit_violations"] == 0.0
 

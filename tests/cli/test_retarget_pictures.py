@@ -6,7 +6,7 @@ from pathlib import Path
 import av
 import pytest
 
-from robojackson.cli.retarget_pictures import look
+from robojackson.cli.retarget_pictures import draw_retargeting
 from robojackson.errors import StoreError
 from robojackson.pipeline import tables
 from tests.fixtures.commands import robojackson
@@ -24,14 +24,14 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_the_video_has_two_panels_and_the_asked_length(folder: Path) -> None:
-    told = look(folder / "smpl.parquet", folder, "base", TINY)
+    told = draw_retargeting(folder / "smpl.parquet", folder, "base", TINY)
     with av.open(told["video"]) as container:
         frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
     assert (len(frames), frames[0].shape) == (9, (128, 2 * 96 + 2, 3))
 
 
 def test_both_plots_are_pictures(folder: Path) -> None:
-    told = look(folder / "smpl.parquet", folder, "base", TINY)
+    told = draw_retargeting(folder / "smpl.parquet", folder, "base", TINY)
     heads = [Path(told[name]).read_bytes()[:4] for name in ("contacts", "torques")]
     assert heads == [b"\x89PNG"] * 2
 
@@ -39,7 +39,7 @@ def test_both_plots_are_pictures(folder: Path) -> None:
 def test_a_motion_that_is_not_there_is_told(folder: Path) -> None:
     (folder / "reference.parquet").unlink()
     with pytest.raises(StoreError, match="no such file"):
-        look(folder / "smpl.parquet", folder, "base", TINY)
+        draw_retargeting(folder / "smpl.parquet", folder, "base", TINY)
 
 
 def test_the_command_draws_when_it_is_asked_to(folder: Path, tmp_path: Path) -> None:

@@ -70,7 +70,7 @@ def describe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
 
 def test_the_model_is_unpacked_with_its_licence_and_loads(source, describe, tmp_path: Path):
     description = describe(source)
-    told = robot_models.add("machine")
+    told = robot_models.add_robot("machine")
     folder = tmp_path / "store" / "robots" / "machine"
     assert told == {
         "robot": "machine", "model": str(folder / "machine.xml"), "added": True, "licence": "ours",
@@ -83,18 +83,18 @@ def test_the_model_is_unpacked_with_its_licence_and_loads(source, describe, tmp_
 
 def test_a_second_time_changes_nothing_and_needs_no_network(source, describe, monkeypatch):
     describe(source)
-    robot_models.add("machine")
+    robot_models.add_robot("machine")
     monkeypatch.setenv("PIP_FIND_LINKS", "/nowhere")
-    assert robot_models.add("machine")["added"] is False
+    assert robot_models.add_robot("machine")["added"] is False
 
 
 def test_an_altered_model_is_refused_and_added_again(source, describe, tmp_path: Path):
     description = describe(source)
-    model = Path(robot_models.add("machine")["model"])
+    model = Path(robot_models.add_robot("machine")["model"])
     model.write_text("<mujoco/>")
     with pytest.raises(BadConfiguration, match="altered; run: robojackson robots add machine"):
         load_robot(description)
-    assert robot_models.add("machine")["added"] is True
+    assert robot_models.add_robot("machine")["added"] is True
     assert model.read_text() == machine.mjcf()
 
 
@@ -106,7 +106,7 @@ def test_without_the_model_the_error_is_the_command_that_brings_it(source, descr
 def test_another_wheel_than_the_pinned_one_leaves_nothing(source, describe, tmp_path: Path):
     describe(replace(source, wheel_sha256="0" * 64))
     with pytest.raises(DownloadFailed, match=r"sha256 is [0-9a-f]{64}, expected 0{64}"):
-        robot_models.add("machine")
+        robot_models.add_robot("machine")
     assert list((tmp_path / "store" / "robots").iterdir()) == []
 
 
@@ -114,14 +114,14 @@ def test_offline_is_one_line(source, describe, tmp_path: Path, monkeypatch):
     describe(source)
     monkeypatch.setenv("PIP_FIND_LINKS", str(tmp_path / "empty"))
     with pytest.raises(DownloadFailed, match=r"^pip could not download bundle==1.0: .*$"):
-        robot_models.add("machine")
+        robot_models.add_robot("machine")
 
 
 def test_a_full_disk_is_told_before_the_download(source, describe, monkeypatch):
     describe(source)
     monkeypatch.setattr(robot_models, "_ROOM_MB", 10**9)
     with pytest.raises(StoreError, match="make room"):
-        robot_models.add("machine")
+        robot_models.add_robot("machine")
 
 
 def test_a_store_that_cannot_be_written_is_one_line(source, describe, tmp_path, monkeypatch):
@@ -129,22 +129,22 @@ def test_a_store_that_cannot_be_written_is_one_line(source, describe, tmp_path, 
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("ROBOJACKSON_STORE", str(tmp_path / "file"))
     with pytest.raises(StoreError, match="cannot write"):
-        robot_models.add("machine")
+        robot_models.add_robot("machine")
 
 
 def test_a_robot_that_is_here_already_needs_nothing():
     with pytest.raises(BadConfiguration, match="needs nothing"):
-        robot_models.add("humanoid")
+        robot_models.add_robot("humanoid")
 
 
 def test_an_unknown_robot_lists_the_known_ones():
     with pytest.raises(UnknownName, match="g1, humanoid, humanoid_strong"):
-        robot_models.add("g2")
+        robot_models.add_robot("g2")
 
 
 def test_the_list_says_what_is_here(monkeypatch, tmp_path: Path):
     monkeypatch.setenv("ROBOJACKSON_STORE", str(tmp_path))
-    ready = {entry["robot"]: entry["ready"] for entry in robot_models.listed()}
+    ready = {entry["robot"]: entry["ready"] for entry in robot_models.list_robots()}
     assert ready == {"g1": False, "humanoid": True, "humanoid_strong": True}
 
 

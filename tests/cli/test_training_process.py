@@ -12,7 +12,7 @@ from robojackson.cli.lifetime.interruption import UNSAVED
 from robojackson.cli.lifetime.orphans import VARIABLE, holding
 from robojackson.errors import RejectedReference
 from robojackson.pipeline.yaml_loader import load
-from robojackson.rl import training as learning
+from robojackson.rl import training
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.evaluation import reward_audit
 from robojackson.rl.training_hooks import Hooks
@@ -35,8 +35,8 @@ def budgets(monkeypatch: pytest.MonkeyPatch) -> list[TrainConfig]:
     monkeypatch.setattr(stages, "read_table", lambda cls, path: None)
     humanoid = load_robot(load(RobotDescription, "robots/humanoid"))
     monkeypatch.setattr(stages, "robot_of", lambda motion: humanoid)
-    monkeypatch.setattr(learning, "train", refuse)
-    monkeypatch.setattr(reward_audit, "both_readings", lambda *what: {})
+    monkeypatch.setattr(training, "train_policy", refuse)
+    monkeypatch.setattr(reward_audit, "audit_both_readings", lambda *what: {})
     monkeypatch.setattr(training_process.signal, "signal", lambda *wish: None)
     return seen
 
@@ -80,7 +80,7 @@ def test_a_training_without_a_budget_gets_the_usual_one(
 def test_what_the_reward_can_ask_for_is_one_line() -> None:
     found = {"root": {"perfect_step": 4.9, "statue": 1.002, "flail": 0.978}}
     assert (
-        training_process.asks(found)
+        training_process.format_reward_audit(found)
         == "of a perfect dance's reward: (root) statue 100 %, flail 98 %"
     )
 
@@ -171,7 +171,7 @@ def test_a_signal_before_any_learning_finds_the_flag_down(
         flags.append((True, holding(UNSAVED, ours)))
         raise RejectedReference("no")
 
-    monkeypatch.setattr(learning, "train", learn)
+    monkeypatch.setattr(training, "train_policy", learn)
     with pytest.raises(RejectedReference):
         training_process.train(
             tmp_path / "reference.parquet", tmp_path / "out", None, {}, force=True

@@ -18,7 +18,8 @@ import pytest
 import yaml
 from docker.utils import exclude_paths
 
-from flows.search.dance_source import BUNDLED, DEFAULT
+from flows.search.dance_source import DEFAULT
+from robojackson.pipeline.bundled_clips import BUNDLED
 from tools.stack.service import ROOT
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())

@@ -27,7 +27,7 @@ from robojackson.errors import (
     TrainingFailed,
 )
 from robojackson.pipeline.yaml_loader import load
-from robojackson.retarget.scorecard import BARS
+from robojackson.retarget.scorecard_gate import BARS
 from robojackson.rl.config.train_config import EvaluateConfig, TrainConfig
 from storage.artifact import Artifact
 from storage.store import Store
@@ -202,8 +202,8 @@ def on_workers(
     monkeypatch.setattr(cells, "is_recorded", lambda cell: kept)
     monkeypatch.setattr(cells, "published", lambda cell, run_id: {"policy": REFERENCE})
     monkeypatch.setattr(cells, "run_id_of", lambda *given: "walk-scratch-s0-0")
-    monkeypatch.setattr(cells, "here", AsyncMock(return_value={"policy": REFERENCE}))
-    return asyncio.run(cells.anywhere(a_cell()))
+    monkeypatch.setattr(cells, "run_locally", AsyncMock(return_value={"policy": REFERENCE}))
+    return asyncio.run(cells.run_on_worker(a_cell()))
 
 
 def test_a_cell_that_was_done_before_asks_no_worker(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -263,7 +263,7 @@ class Attempts:
             patch.setattr(cells, "SECONDS_BEFORE_RETRY", 0.0)
             patch.setattr(cells, "time", SimpleNamespace(monotonic=lambda: self.now))
             cell = a_cell(timeout_minutes=1.0, retries=2)
-            return asyncio.run(cells.tried(self, cell, deadline=60.0))
+            return asyncio.run(cells.with_retries(self, cell, deadline=60.0))
 
 
 def test_each_attempt_gets_the_time_that_the_one_before_it_left() -> None:

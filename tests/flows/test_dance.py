@@ -17,7 +17,7 @@ from prefect.settings import (
 
 from flows.dance import dance
 from flows.search.dance_source import is_name, resolve
-from flows.video_pass import dance_stages as stages
+from flows.video_pass import dance_stages
 from flows.video_pass.dance_stages import Candidate, choose, score_all
 from robojackson.clips.quality.stability import Stability
 from robojackson.errors import NoPersonFound, RejectedReference, UnreadableVideo
@@ -129,7 +129,7 @@ def test_a_renamed_copy_of_the_clip_trains_nothing(passes: Passes) -> None:
 
 @pytest.mark.slow
 def test_the_catalogue_knows_the_run(passes: Passes) -> None:
-    known = {run.run_id for run in run_catalogue.runs(Store(passes.store))}
+    known = {run.run_id for run in run_catalogue.list_runs(Store(passes.store))}
     assert passes.first["run_id"] in known
 
 
@@ -185,12 +185,12 @@ def score(
 
     def stability(track: Artifact, config: Any) -> Artifact:
         score = a_candidate(track.key, 1.0).score
-        return artifact_tables.keep(
+        return artifact_tables.save(
             Store.from_environment(), "stability", "stability.parquet", score
         )
 
     for played in (probe, landmarks, stability):
-        monkeypatch.setattr(stages, played.__name__, Played(played))
+        monkeypatch.setattr(dance_stages, played.__name__, Played(played))
 
     @flow
     async def scoring(paths: tuple[Path, ...]) -> list[str]:
@@ -240,16 +240,16 @@ def test_a_source_without_words_or_with_too_many_is_refused(source: str) -> None
 
 
 def test_a_training_that_says_its_processor_time_gets_no_clock() -> None:
-    told = stages._budgeted(load(PipelineConfig, "base", {"train.cpu_minutes": 60}))
+    told = dance_stages._budgeted(load(PipelineConfig, "base", {"train.cpu_minutes": 60}))
     assert (told.minutes, told.cpu_minutes) == (None, 60)
 
 
 def test_files_that_cannot_be_read_are_left_out(tmp_path: Path) -> None:
     good, gone = tmp_path / "b.mp4", tmp_path / "a.mp4"
     good.write_bytes(b"x")
-    assert [path for path, _ in stages._readable([gone, good])] == [good]
+    assert [path for path, _ in dance_stages._readable([gone, good])] == [good]
     with pytest.raises(UnreadableVideo, match=r"a\.mp4: cannot be read \(No such file"):
-        stages._readable([gone])
+        dance_stages._readable([gone])
 
 
 @pytest.mark.parametrize("source", ["gone.mp4", "no/such/thing", "moonwalk"])

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from flows import pretrain as flows
+from flows import pretrain
 from robojackson.cli import stages, walker_training
 from storage.store import Store
 from tests.fixtures.commands import robojackson
@@ -24,12 +24,12 @@ def asked(store_folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[list[str]
             (work / name).write_text(f"{name} of {work.name}")
         return b""
 
-    monkeypatch.setattr(flows, "run_process", play)
+    monkeypatch.setattr(pretrain, "run_process", play)
     return commands
 
 
 def train(kind: str = "paper", **given: int) -> str:
-    return asyncio.run(flows.pretrain.fn(kind, **given))
+    return asyncio.run(pretrain.pretrain.fn(kind, **given))
 
 
 def folder_of(command: list[str]) -> Path:
@@ -57,7 +57,7 @@ def test_a_configuration_that_was_changed_begins_anew(
     asked: list[list[str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     train(steps=64)
-    monkeypatch.setattr(flows, "PIPELINE", "smoke")
+    monkeypatch.setattr(pretrain, "PIPELINE", "smoke")
     train(steps=64)
     assert folder_of(asked[0]) != folder_of(asked[1])
 
@@ -72,7 +72,7 @@ def test_a_walker_whose_flow_is_gone_is_not_trained(tmp_path: Path) -> None:
 def test_the_process_is_told_whose_it_is(
     asked: list[list[str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(flows.os, "getpid", lambda: 4321)
+    monkeypatch.setattr(pretrain.os, "getpid", lambda: 4321)
     train(steps=64)
     assert asked[0][asked[0].index("--parent") + 1] == "4321"
 

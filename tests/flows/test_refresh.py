@@ -22,7 +22,7 @@ from prefect.settings import (
 from configs.dance_book import Dance, DanceBook
 from flows import refresh as nightly
 from flows.refresh import refresh
-from flows.search.search_entries import Entry, Hunt, rows
+from flows.search.search_entries import Entry, SearchResult, rows
 from robojackson.clips.web.candidate_selection import Selection
 from robojackson.clips.web.video_candidate import VideoCandidate
 from robojackson.errors import BadConfiguration, SearchFailed, TrackTooShort
@@ -194,9 +194,9 @@ def test_a_choice_of_which_no_motion_can_be_made_leaves_the_one_before(
         "new", "http://host/new", "", "", "site", retrieved_at=datetime.now(UTC)
     )
 
-    def hunt(dance: Dance, *rest: object) -> Hunt:
+    def hunt(dance: Dance, *rest: object) -> SearchResult:
         entry = Entry(candidate, "chosen", video=kept)
-        made = Hunt(dance, "refresh-2", (entry,), Selection((candidate,), ()))
+        made = SearchResult(dance, "refresh-2", (entry,), Selection((candidate,), ()))
         candidate_catalogue.append(store, rows(made))
         return made
 
@@ -232,4 +232,4 @@ def test_a_choice_of_which_no_motion_can_be_made_leaves_the_one_before(
 def test_dances_that_would_share_their_notes_are_refused() -> None:
     book = DanceBook((Dance(name="C", query="c"), Dance(name="C++", query="c plus plus")))
     with pytest.raises(BadConfiguration, match="'C' and 'C\\+\\+' have the same letters"):
-        nightly._told_apart(book)
+        nightly._require_distinct(book)

@@ -10,7 +10,7 @@ import pytest
 from robojackson.body.skeleton import JOINT_NAMES, keypoint
 from robojackson.errors import BadTable
 from robojackson.formats import bvh, bvh_tree
-from robojackson.mocap.imported_motion import place
+from robojackson.mocap.imported_motion import ground_foreign_motion
 from tests.fixtures.person import person
 
 CENTIMETRE = 0.01
@@ -116,7 +116,7 @@ def stick(scale: float = 1.0, prefix: str = "", twisted: bool = False) -> bytes:
 
 @pytest.mark.parametrize("scale", [0.01, 1.0, 0.01 / 0.0254, 0.01 * 0.45 / 0.0254])
 def test_another_skeleton_is_read_in_any_usual_unit(scale: float) -> None:
-    sequence = place(bvh.read(stick(scale)), 50.0)
+    sequence = ground_foreign_motion(bvh.read(stick(scale)), 50.0)
     elbow, wrist = keypoint("left_elbow"), keypoint("left_wrist")
     forearm = sequence.joints[:, wrist] - sequence.joints[:, elbow]
     np.testing.assert_allclose(forearm[0], [0.0, 0.25, 0.0], atol=2e-3)
@@ -137,14 +137,16 @@ def test_another_skeletons_limbs_are_where_an_independent_reader_sees_them(tmp_p
     names = [node.name for node in other.nodes]
     places = other.node_positions()[:, [names.index(name) for name in LIMBS.values()]]
     wanted = places[..., [2, 0, 1]] * CENTIMETRE
-    found = place(bvh.read(path.read_bytes()), 50.0).joints[:, [keypoint(n) for n in LIMBS]]
+    found = ground_foreign_motion(bvh.read(path.read_bytes()), 50.0).joints[
+        :, [keypoint(n) for n in LIMBS]
+    ]
     shift = np.median(found - wanted, axis=(0, 1))
     assert np.abs(shift[:2]).max() < 1e-3
     np.testing.assert_allclose(found - shift, wanted, atol=5e-3)
 
 
 def test_names_with_a_prefix_are_known() -> None:
-    sequence = place(bvh.read(stick(prefix="mixamorig:")), 50.0)
+    sequence = ground_foreign_motion(bvh.read(stick(prefix="mixamorig:")), 50.0)
     knee, ankle = keypoint("right_knee"), keypoint("right_ankle")
     shin = np.linalg.norm(sequence.joints[0, knee] - sequence.joints[0, ankle])
     assert shin == pytest.approx(0.41, abs=2e-3)

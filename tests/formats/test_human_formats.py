@@ -14,7 +14,7 @@ from robojackson.errors import BadTable
 from robojackson.formats import aist, amass, bvh, gvhmr, smpl_csv
 from robojackson.formats.containers import torch_archive
 from robojackson.formats.foreign_motion import PELVIS, ForeignMotion
-from robojackson.mocap.imported_motion import place
+from robojackson.mocap.imported_motion import ground_foreign_motion
 from tests.fixtures.person import FRAMES, UPRIGHT, axis_angles, joints_of, path, person
 
 Y_UP = Rotation.from_matrix([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
@@ -23,7 +23,7 @@ Y_UP = Rotation.from_matrix([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 
 def placed(motion: ForeignMotion) -> np.ndarray:
     """Joints in our world, from the pelvis."""
-    found = place(motion, 30.0).joints
+    found = ground_foreign_motion(motion, 30.0).joints
     return found - found[:, :1]
 
 
@@ -40,7 +40,7 @@ def from_pelvis(joints: np.ndarray) -> np.ndarray:
 def test_a_motion_comes_back_as_it_went(module: Any) -> None:
     wanted = person()
     motion = module.read(module.write(wanted))
-    back = place(motion, motion.fps)
+    back = ground_foreign_motion(motion, motion.fps)
     assert back.fps == pytest.approx(wanted.fps)
     np.testing.assert_allclose(back.joints, wanted.joints, atol=1e-5)
 
@@ -48,7 +48,7 @@ def test_a_motion_comes_back_as_it_went(module: Any) -> None:
 @pytest.mark.parametrize("module", [bvh, smpl_csv])
 def test_formats_with_hands_bring_their_tips_back(module: Any) -> None:
     wanted = person()
-    back = place(module.read(module.write(wanted)), wanted.fps)
+    back = ground_foreign_motion(module.read(module.write(wanted)), wanted.fps)
     np.testing.assert_allclose(back.keypoints_w, wanted.keypoints_w, atol=1e-5)
 
 
@@ -143,7 +143,7 @@ def aist_file(protocol: int = 4, **more: Any) -> bytes:
 def test_a_file_of_aist_is_read(protocol: int) -> None:
     motion = aist.read(aist_file(protocol))
     assert motion.fps == 60.0
-    back = place(motion, 60.0)
+    back = ground_foreign_motion(motion, 60.0)
     np.testing.assert_allclose(
         from_pelvis(back.joints), from_pelvis(joints_of(axis_angles(), path())), atol=1e-5
     )

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from robojackson.metrics import retarget_error as metric
+from robojackson.metrics import retarget_error
 
 DT = 0.015
 TIME = np.arange(40) * DT
@@ -12,25 +12,27 @@ TIME = np.arange(40) * DT
 def test_the_jerk_of_a_cubic_is_six_times_its_coefficient():
     points = np.zeros((40, 3, 3))
     points[..., 0] = 2.0 * TIME[:, None] ** 3
-    assert metric.jerk(points, DT) == pytest.approx(12.0)
-    assert metric.hinge_jerk_rms(points[..., 0], DT) == pytest.approx(12.0)
+    assert retarget_error.jerk(points, DT) == pytest.approx(12.0)
+    assert retarget_error.hinge_jerk_rms(points[..., 0], DT) == pytest.approx(12.0)
 
 
 def test_a_bone_turned_by_a_right_angle_is_ninety_degrees_off():
     wanted = np.array([[[0.0, 0, 0], [1.0, 0, 0]]])
     actual = np.array([[[5.0, 0, 0], [5.0, 2.0, 0]]])
-    np.testing.assert_allclose(metric.bone_angles_deg(actual, wanted, [(0, 1)]), 90.0)
+    np.testing.assert_allclose(retarget_error.bone_angles_deg(actual, wanted, [(0, 1)]), 90.0)
 
 
 def test_keypoint_error_counts_weighted_points_only():
     actual, wanted = np.zeros((2, 3, 3)), np.zeros((2, 3, 3))
     actual[:, 0, 2], actual[:, 1, 0] = 0.01, 9.0
-    error = metric.keypoint_error_mm(actual, wanted, np.array([True, False, True]))
+    error = retarget_error.keypoint_error_mm(actual, wanted, np.array([True, False, True]))
     np.testing.assert_allclose(error, [[10.0, 0.0]] * 2)
 
 
 def test_limit_excess_is_how_far_outside():
-    excess = metric.limit_excess(np.array([[-2.0, 0.0, 3.0]]), np.full(3, -1.0), np.full(3, 1.0))
+    excess = retarget_error.limit_excess(
+        np.array([[-2.0, 0.0, 3.0]]), np.full(3, -1.0), np.full(3, 1.0)
+    )
     np.testing.assert_allclose(excess, [[1.0, 0.0, 2.0]])
 
 
@@ -38,17 +40,17 @@ def test_slip_is_scored_where_both_ends_of_a_step_are_planted():
     velocity = np.zeros((3, 1, 2))
     velocity[:, 0, 0] = [0.1, 0.2, 0.4]
     planted = np.array([[True], [True], [False], [True]])
-    np.testing.assert_allclose(metric.slip_cm_s(velocity, planted), [10.0])
+    np.testing.assert_allclose(retarget_error.slip_cm_s(velocity, planted), [10.0])
 
 
 def test_slip_of_a_lap_counts_the_step_over_the_seam():
     velocity = np.full((4, 1, 2), [0.3, 0.4])
     planted = np.array([[True], [False], [False], [True]])
-    np.testing.assert_allclose(metric.slip_cm_s(velocity, planted), [50.0])
+    np.testing.assert_allclose(retarget_error.slip_cm_s(velocity, planted), [50.0])
 
 
 def test_a_levitating_body_is_unsupported_and_a_falling_one_is_not():
     soles = np.full((40, 2), 0.3)
-    assert metric.unsupported(soles, np.full(40, 1.0), DT).all()
-    assert metric.unsupported(soles, 3.0 - 4.905 * TIME**2, DT).mean() < 0.1
-    assert not metric.unsupported(soles * [0.0, 1.0], np.full(40, 1.0), DT).any()
+    assert retarget_error.unsupported(soles, np.full(40, 1.0), DT).all()
+    assert retarget_error.unsupported(soles, 3.0 - 4.905 * TIME**2, DT).mean() < 0.1
+    assert not retarget_error.unsupported(soles * [0.0, 1.0], np.full(40, 1.0), DT).any()

@@ -89,7 +89,7 @@ def test_the_motion_stands_in_our_world(tilt_deg: float, thetas: bool) -> None:
     content = res_pk(tilt_deg)
     if not thetas:
         del content["pred_thetas"]
-    sequence = imported_motion.stand_up(read(content), 30.0, CONFIG)
+    sequence = imported_motion.ground_hybrik_motion(read(content), 30.0, CONFIG)
     trunk = sequence.joints[:, keypoint("neck")] - sequence.joints[:, 0]
     wanted = WORLD.joints[:, keypoint("neck")] - WORLD.joints[:, 0]
     assert trunk[:, 2].min() > 0.3
@@ -104,7 +104,7 @@ def test_the_motion_stands_in_our_world(tilt_deg: float, thetas: bool) -> None:
 
 
 def test_joints_are_those_of_the_file_but_for_the_feet() -> None:
-    sequence = imported_motion.stand_up(read(res_pk()), 30.0, CONFIG, cutoff_hz=14.9)
+    sequence = imported_motion.ground_hybrik_motion(read(res_pk()), 30.0, CONFIG, cutoff_hz=14.9)
     upper = [keypoint(n) for n in ("left_hip", "right_hip", "neck", "left_elbow", "right_wrist")]
     error = rr_mpjpe(sequence.keypoints_w[:, upper], WORLD.keypoints_w[:, upper], (0, 1))
     assert 1e3 * error < 10.0
@@ -121,7 +121,7 @@ def test_frames_without_a_person_are_filled_and_told() -> None:
         key: [value[i] for i in kept] if isinstance(value, list) else value[kept]
         for key, value in res_pk().items()
     }
-    sequence = imported_motion.stand_up(read(content), 30.0, CONFIG)
+    sequence = imported_motion.ground_hybrik_motion(read(content), 30.0, CONFIG)
     assert len(sequence) == FRAMES
     np.testing.assert_array_equal(np.flatnonzero(~sequence.valid), [6, 7, 8])
     assert (sequence.confidence[6:9] == 0.0).all()
@@ -160,7 +160,7 @@ def test_matrices_that_stretch_are_no_rotations() -> None:
 def test_joints_without_extent_are_no_person() -> None:
     motion = read(res_pk(pred_xyz_29=np.zeros((FRAMES, 29, 3))))
     with pytest.raises(BadTable, match="no person's, its legs are 0 m"):
-        imported_motion.stand_up(motion, 30.0, CONFIG)
+        imported_motion.ground_hybrik_motion(motion, 30.0, CONFIG)
 
 
 @pytest.mark.parametrize("names", [[["a"], ["b", "c"]], {"a": 1}, "x", 3])

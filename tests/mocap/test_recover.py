@@ -10,14 +10,14 @@ from robojackson.body.skeleton import keypoint
 from robojackson.errors import NoPersonFound
 from robojackson.metrics.motion_quality import floor_penetration, foot_slide, jerk
 from robojackson.mocap.pose.posed_body import pose_sequence
-from robojackson.mocap.recover import MocapConfig, recover
+from robojackson.mocap.recover import MocapConfig, recover_motion
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.smpl_sequence import AIR, PLANTED, SmplSequence
 
 
 @pytest.fixture(scope="module")
 def motion(hip_shake: LandmarkTrack) -> SmplSequence:
-    return recover(hip_shake, MocapConfig())
+    return recover_motion(hip_shake, MocapConfig())
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +78,7 @@ def test_bones_keep_their_length(motion: SmplSequence) -> None:
 
 
 def test_same_track_same_motion(motion: SmplSequence, hip_shake: LandmarkTrack) -> None:
-    assert np.array_equal(recover(hip_shake, MocapConfig()).body_pose, motion.body_pose)
+    assert np.array_equal(recover_motion(hip_shake, MocapConfig()).body_pose, motion.body_pose)
 
 
 def test_frames_without_a_person_are_marked_and_noted(hip_shake: LandmarkTrack) -> None:
@@ -86,7 +86,7 @@ def test_frames_without_a_person_are_marked_and_noted(hip_shake: LandmarkTrack) 
     for array in holes:
         array[40:44] = np.nan
     track = replace(hip_shake, landmarks=holes[0], world_landmarks=holes[1])
-    found = recover(track, MocapConfig())
+    found = recover_motion(track, MocapConfig())
     assert np.flatnonzero(~found.valid).tolist() == [40, 41, 42, 43]
     assert (found.confidence[40:44] == 0.0).all()
     assert "no person in 4 of 120 frames" in found.notes[0]
@@ -95,7 +95,7 @@ def test_frames_without_a_person_are_marked_and_noted(hip_shake: LandmarkTrack) 
 def test_a_clip_without_a_person_is_refused(hip_shake: LandmarkTrack) -> None:
     nobody = replace(hip_shake, landmarks=np.full_like(hip_shake.landmarks, np.nan))
     with pytest.raises(NoPersonFound, match="120 of 120"):
-        recover(nobody, MocapConfig())
+        recover_motion(nobody, MocapConfig())
 
 
 def test_two_frames_are_enough(hip_shake: LandmarkTrack) -> None:
@@ -105,7 +105,7 @@ def test_two_frames_are_enough(hip_shake: LandmarkTrack) -> None:
         world_landmarks=hip_shake.world_landmarks[:2],
         visibility=hip_shake.visibility[:2],
     )
-    assert len(recover(short, MocapConfig())) == 2
+    assert len(recover_motion(short, MocapConfig())) == 2
 
 
 def test_camera_in_the_result_sees_the_person_where_the_video_shows_him(
@@ -121,7 +121,7 @@ def test_camera_in_the_result_sees_the_person_where_the_video_shows_him(
 
 @pytest.mark.parametrize("method", ["adaptive", "naive"])
 def test_both_solves_give_a_grounded_motion(hip_shake: LandmarkTrack, method: str) -> None:
-    found = recover(hip_shake, MocapConfig(method=method))
+    found = recover_motion(hip_shake, MocapConfig(method=method))
     points = foot_points(pose_sequence(found), found.rest_joints)
     assert floor_penetration(points) < 0.002
 
@@ -138,7 +138,7 @@ def test_a_jump_leaves_the_floor_and_comes_back(hip_shake: LandmarkTrack) -> Non
         landmarks=still,
         world_landmarks=np.repeat(hip_shake.world_landmarks[:1], len(hip_shake), axis=0),
     )
-    found = recover(track, MocapConfig())
+    found = recover_motion(track, MocapConfig())
     rise = found.joints[:, 0, 2] - found.joints[0, 0, 2]
     top = int(height.argmax())
     assert rise[top] == pytest.approx(0.44, abs=0.12)

@@ -73,17 +73,17 @@ def test_the_catalogue_lists_runs_in_time(tmp_path: Path) -> None:
     store = Store(tmp_path)
     for run in (a_run("b", 2), a_run("a", 3), a_run("c", 1)):
         run_catalogue.record(store, run)
-    assert [run.run_id for run in run_catalogue.runs(store)] == ["c", "b", "a"]
+    assert [run.run_id for run in run_catalogue.list_runs(store)] == ["c", "b", "a"]
 
 
 def test_a_run_is_read_as_it_was_recorded(tmp_path: Path) -> None:
     store, run = Store(tmp_path), a_run("a", 1)
     run_catalogue.record(store, run)
-    assert run_catalogue.runs(store) == [run]
+    assert run_catalogue.list_runs(store) == [run]
 
 
 def test_a_damaged_catalogue_file_is_named(tmp_path: Path) -> None:
     store = Store(tmp_path)
     store.put("runs/a.json", b'{"run_id": 3}')
     with pytest.raises(BadTable, match=r"runs/a\.json: "):
-        run_catalogue.runs(store)
+        run_catalogue.list_runs(store)

@@ -209,7 +209,7 @@ def test_the_path_of_a_camera_survives_with_its_track(moved: bool) -> None:
 
 def test_an_artifact_leads_to_its_value(tmp_path: Path) -> None:
     store, track = Store(tmp_path), a_track(np.random.default_rng(1))
-    artifact = artifact_tables.keep(store, "landmarks", "landmarks.parquet", track)
+    artifact = artifact_tables.save(store, "landmarks", "landmarks.parquet", track)
     assert same(artifact_tables.read(LandmarkTrack, store, artifact).landmarks, track.landmarks)
 
 

@@ -14,7 +14,7 @@ from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.report.pages.page_content import Results, page_content, versions
 from robojackson.report.pages.run_page import PageContent, render, write_page
 from robojackson.report.plots import run_plots
-from robojackson.report.quantities import fact, written
+from robojackson.report.quantities import format_value, quantity
 
 POLICIES = ("trained", "statue")
 SUMMARY = {
@@ -91,7 +91,7 @@ def test_headline_says_when_learning_gained_nothing(success: float, told: str) -
 @pytest.mark.parametrize("figure", ["lean_deg", "keypoint_leaned_mm"])
 def test_the_lean_of_the_targets_is_shown(figure: str) -> None:
     html = render(PageContent(title="x", scorecard={figure: 4.25}))
-    assert f"<dd>{written(figure, 4.25)}</dd>" in html
+    assert f"<dd>{format_value(figure, 4.25)}</dd>" in html
 
 
 @pytest.mark.parametrize(
@@ -138,11 +138,11 @@ def test_written_page_is_whole(results: Results, tmp_path: Path) -> None:
     ],
 )
 def test_figures_are_written_with_their_units(key: str, value: object, text: str) -> None:
-    assert written(key, value) == text
+    assert format_value(key, value) == text
 
 
 def test_unknown_figure_keeps_its_name() -> None:
-    assert fact("some_new_figure", 0.12345).label == "some new figure"
+    assert quantity("some_new_figure", 0.12345).label == "some new figure"
 
 
 def test_versions_leave_out_what_is_not_installed() -> None:

@@ -13,7 +13,7 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import PLANTED
 from robojackson.retarget.paper_mapping import mapped
 from robojackson.retarget.retarget_config import RepairConfig, RetargetConfig
-from robojackson.retarget.retargeting import retarget
+from robojackson.retarget.retargeting import retarget_motion
 from robojackson.robot.actuation import torque_limits
 from robojackson.robot.mjcf import model_sha256
 from robojackson.robot.model import Robot, load_robot
@@ -35,7 +35,7 @@ def small(description) -> Robot:
 @pytest.fixture(scope="module")
 def motion(small: Robot) -> ReferenceMotion:
     config = RetargetConfig(tempo=1.0, repair=RepairConfig(enough_share=0.0))
-    return retarget(human("walk"), small, config)
+    return retarget_motion(human("walk"), small, config)
 
 
 def test_a_site_of_the_mjcf_with_a_keypoints_name_keeps_its_place_and_its_sensor(small: Robot):

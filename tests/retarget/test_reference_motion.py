@@ -8,8 +8,8 @@ import pytest
 
 from robojackson.motion.smpl_sequence import PLANTED
 from robojackson.retarget.retarget_config import RetargetConfig
-from robojackson.retarget.retargeting import retarget
-from robojackson.retarget.scorecard import check, failures
+from robojackson.retarget.retargeting import retarget_motion
+from robojackson.retarget.scorecard_gate import check, failures
 from robojackson.retarget.targets.human_clip import at_steps, labels_at
 from robojackson.robot.model import Robot
 from robojackson.robot.resampling import seam_angle
@@ -87,7 +87,7 @@ def test_velocities_lead_from_step_to_step(robot: Robot):
 
 
 def test_the_same_clip_gives_the_same_motion(robot: Robot):
-    again = retarget(human("hip_shake"), robot, RetargetConfig())
+    again = retarget_motion(human("hip_shake"), robot, RetargetConfig())
     np.testing.assert_array_equal(again.qpos, robot_motion("hip_shake").qpos)
     assert dict(again.scorecard) == dict(robot_motion("hip_shake").scorecard)
 
@@ -95,7 +95,7 @@ def test_the_same_clip_gives_the_same_motion(robot: Robot):
 def test_moving_the_recording_moves_the_motion_and_nothing_else(robot: Robot):
     source = human("hip_shake")
     moved = replace(source, keypoints_w=source.keypoints_w + [1.0, -2.0, 0.0])
-    motion = retarget(moved, robot, RetargetConfig())
+    motion = retarget_motion(moved, robot, RetargetConfig())
     expected = robot_motion("hip_shake")
     np.testing.assert_allclose(motion.qpos[:, 7:], expected.qpos[:, 7:], atol=0.02)
     shift = motion.qpos[:, :2] - expected.qpos[:, :2]
@@ -105,7 +105,7 @@ def test_moving_the_recording_moves_the_motion_and_nothing_else(robot: Robot):
 def test_noise_on_the_keypoints_does_not_break_the_bars(robot: Robot):
     source, rng = human("hip_shake"), np.random.default_rng(11)
     noisy = source.keypoints_w + 0.015 * rng.normal(size=source.keypoints_w.shape)
-    motion = retarget(replace(source, keypoints_w=noisy), robot, RetargetConfig())
+    motion = retarget_motion(replace(source, keypoints_w=noisy), robot, RetargetConfig())
     assert failures(motion.scorecard) == []
 
 
@@ -134,7 +134,7 @@ def test_the_literal_mapping_breaks_joint_limits_and_the_metric_sees_it():
 
 
 def test_a_slower_tempo_needs_less_torque(robot: Robot):
-    slow = retarget(human("walk"), robot, RetargetConfig(tempo=0.5))
+    slow = retarget_motion(human("walk"), robot, RetargetConfig(tempo=0.5))
     fast = robot_motion("walk")
     assert slow.scorecard["torque_ratio_p95"] < fast.scorecard["torque_ratio_p95"]
     assert slow.scorecard["seconds"] == pytest.approx(2 * fast.scorecard["seconds"], rel=0.05)
@@ -153,7 +153,7 @@ def test_the_frame_rate_of_the_source_hardly_matters(robot: Robot):
         body_pose=np.zeros((len(times), 69)),
     )
     config = RetargetConfig(cyclic="no")
-    twice, once = retarget(double, robot, config), retarget(source, robot, config)
+    twice, once = retarget_motion(double, robot, config), retarget_motion(source, robot, config)
     steps = min(len(twice), len(once))
     gap = np.abs(twice.qpos[:steps, 7:] - once.qpos[:steps, 7:])
     assert np.degrees(np.quantile(gap, 0.99)) < 2.0
@@ -163,4 +163,7 @@ def test_every_second_frame_undetected_is_survived(robot: Robot):
     source = human("hip_shake")
     valid = source.valid.copy()
     valid[::2] = False
-    assert failures(retarget(replace(source, valid=valid), robot, RetargetConfig()).scorecard) == []
+    assert (
+        failures(retarget_motion(replace(source, valid=valid), robot, RetargetConfig()).scorecard)
+        == []
+    )

@@ -9,7 +9,8 @@ import pytest
 from robojackson.errors import RejectedReference
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.retarget.retarget_config import RetargetConfig
-from robojackson.retarget.scorecard import check, score
+from robojackson.retarget.scorecard import score
+from robojackson.retarget.scorecard_gate import check
 from robojackson.retarget.targets.cycle import human_clip
 from robojackson.retarget.targets.keypoint_targets import Targets, targets
 from robojackson.robot.model import Robot

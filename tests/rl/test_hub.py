@@ -14,7 +14,7 @@ from robojackson.pipeline.yaml_loader import load
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.pretrained import pretrained
 from robojackson.rl.tqc.network_arrays import load_networks
-from robojackson.rl.training import train
+from robojackson.rl.training import train_policy
 from robojackson.robot.model import Robot
 from tests.fixtures.commands import robojackson
 from tests.fixtures.hub import serving
@@ -55,7 +55,7 @@ def test_training_starts_from_a_repository_of_the_hub(
     with serving({ZIP: theirs}) as (address, asked):
         at(address, tmp_path / "cache", monkeypatch)
         for name in ("first", "second"):
-            train(sway, robot, config, tmp_path / name)
+            train_policy(sway, robot, config, tmp_path / name)
             learnt = load_networks(tmp_path / name / "networks.safetensors")
             assert (learnt.widths("actor"), learnt.widths("critic1")) == ((16, 12), (16, 12, 25))
     assert asked.count(f"GET /{ZIP}") == 1

@@ -27,7 +27,7 @@ from robojackson.rl.policy import Policy
 from robojackson.rl.pretrained import from_sb3_zip, pretrained
 from robojackson.rl.tqc.network_arrays import Networks, fitted, load_networks, widened
 from robojackson.rl.tqc.trainers import make_trainer
-from robojackson.rl.training import train
+from robojackson.rl.training import train_policy
 from robojackson.robot.model import Robot
 
 SMALL = TqcConfig(n_envs=2, warmup=8, batch=8, buffer=1000, actor=(12, 8), critic=(10,))
@@ -104,7 +104,7 @@ def test_training_goes_on_from_a_zip_with_its_layers(
     """Whatever the preset says: the layers are the zip's, and no random action is taken."""
     _, path = zipped(tmp_path)
     config = TrainConfig(mode="paper", trainer="sb3", steps=16, start=str(path), tqc=SMALL)
-    train(sway, robot, config, tmp_path / "run")
+    train_policy(sway, robot, config, tmp_path / "run")
     learnt = load_networks(tmp_path / "run" / "networks.safetensors")
     assert (learnt.widths("actor"), learnt.widths("critic1")) == ((16, 12), (16, 12, 25))
 
@@ -182,7 +182,7 @@ def test_networks_of_another_mode_are_refused(
     _, path = zipped(tmp_path)
     config = TrainConfig(trainer="sb3", steps=16, start=str(path), tqc=SMALL)
     with pytest.raises(BadPolicy, match="takes 348 observations"):
-        train(sway, robot, config, tmp_path / "run")
+        train_policy(sway, robot, config, tmp_path / "run")
 
 
 def test_widened_networks_ignore_what_they_do_not_know(env: VecEnv) -> None:
@@ -236,7 +236,7 @@ def test_networks_that_are_not_whole_are_refused_and_nothing_is_left(
     path.write_bytes(Networks(tensors | ({} if array is None else {name: array}), {}).to_bytes())
     config = TrainConfig(mode="paper", steps=16, start=str(path), tqc=SMALL)
     with pytest.raises(BadPolicy, match=told):
-        train(sway, robot, config, tmp_path / "run")
+        train_policy(sway, robot, config, tmp_path / "run")
     assert not (tmp_path / "run").exists()
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import TqcConfig, TrainConfig
-from robojackson.rl.training import Hooks, train
+from robojackson.rl.training import Hooks, train_policy
 from robojackson.rl.training_run import Run
 from robojackson.robot.model import Robot
 
@@ -37,7 +37,7 @@ def test_learning_is_announced_once_after_the_first_updates(
     """Before, there is nothing to save: whoever stops the training need not wait for it."""
     announced: list[int] = []
     hooks = Hooks(learnt=lambda: announced.append(len(updates)))
-    train(sway, robot, CONFIG, tmp_path, hooks)
+    train_policy(sway, robot, CONFIG, tmp_path, hooks)
     first = next(i for i, count in enumerate(updates, 1) if count > 0)
     assert 1 < first < len(updates)
     assert announced == [first]
@@ -46,10 +46,12 @@ def test_learning_is_announced_once_after_the_first_updates(
 def test_a_resumed_training_announces_only_what_its_checkpoint_lacks(
     robot: Robot, sway: ReferenceMotion, tmp_path: Path, updates: list[int]
 ) -> None:
-    train(sway, robot, CONFIG, tmp_path)
+    train_policy(sway, robot, CONFIG, tmp_path)
     updates.clear()
     announced: list[int] = []
     longer = dataclasses.replace(CONFIG, steps=480)
-    train(sway, robot, longer, tmp_path, Hooks(learnt=lambda: announced.append(len(updates))))
+    train_policy(
+        sway, robot, longer, tmp_path, Hooks(learnt=lambda: announced.append(len(updates)))
+    )
     assert updates[0] > 0
     assert announced == [next(i for i, n in enumerate(updates, 1) if n > updates[0])]

@@ -23,12 +23,12 @@ from robojackson.rl.config.train_config import (
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.env.vec_env import TrackingVecEnv
 from robojackson.rl.evaluation.controllers import drivers
-from robojackson.rl.evaluation.policy_evaluation import STAND, evaluate
+from robojackson.rl.evaluation.policy_evaluation import STAND, evaluate_policy
 from robojackson.rl.policy import Policy, load_policy
 from robojackson.rl.tqc.sb3_trainer import Sb3Trainer
 from robojackson.rl.tqc.sbx_trainer import SbxTrainer
 from robojackson.rl.tqc.trainers import make_trainer
-from robojackson.rl.training import Hooks, TrainResult, train
+from robojackson.rl.training import Hooks, TrainResult, train_policy
 from robojackson.rl.training_run import Run
 from robojackson.robot.model import Robot
 
@@ -49,7 +49,7 @@ def brief(trainer: str, steps: int = 320) -> TrainConfig:
 
 
 def run(robot: Robot, sway: ReferenceMotion, config: TrainConfig, out: Path) -> TrainResult:
-    return train(sway, robot, config, out)
+    return train_policy(sway, robot, config, out)
 
 
 @pytest.fixture(scope="module", params=["sbx", "sb3"])
@@ -61,7 +61,7 @@ def trained(
 ) -> tuple[TrainResult, list[dict[str, float]], list[dict[str, float]], str]:
     episodes: list[dict[str, float]] = []
     progress: list[dict[str, float]] = []
-    result = train(
+    result = train_policy(
         sway,
         robot,
         brief(request.param),
@@ -79,8 +79,10 @@ def test_a_run_in_two_sittings_ends_as_one_that_was_never_stopped(
     rows: list[dict[str, float]] = []
     rounds = iter([False] * 5 + [True])
     with pytest.raises(KeyboardInterrupt):
-        train(sway, robot, brief(name), tmp_path, Hooks(sink=rows.extend, stop=rounds.__next__))
-    result = train(sway, robot, brief(name), tmp_path, Hooks(sink=rows.extend))
+        train_policy(
+            sway, robot, brief(name), tmp_path, Hooks(sink=rows.extend, stop=rounds.__next__)
+        )
+    result = train_policy(sway, robot, brief(name), tmp_path, Hooks(sink=rows.extend))
     assert result.policy.read_bytes() == whole.policy.read_bytes()
     assert rows == episodes
 
@@ -94,7 +96,7 @@ def test_exploration_that_depends_on_the_state_goes_on_to_the_bit(
     whole = run(robot, sway, config, tmp_path / "whole")
     rounds = iter([False] * 5 + [True])
     with pytest.raises(KeyboardInterrupt):
-        train(sway, robot, config, tmp_path / "halves", Hooks(stop=rounds.__next__))
+        train_policy(sway, robot, config, tmp_path / "halves", Hooks(stop=rounds.__next__))
     halves = run(robot, sway, config, tmp_path / "halves")
     assert halves.policy.read_bytes() == whole.policy.read_bytes()
 
@@ -159,7 +161,9 @@ def test_a_finished_run_asked_for_more_steps_goes_on(
     """Episode numbers, steps and time go on, and so do the updates."""
     result, episodes, _, name = trained
     rows: list[dict[str, float]] = []
-    longer = train(sway, robot, brief(name, 640), result.policy.parent, Hooks(sink=rows.extend))
+    longer = train_policy(
+        sway, robot, brief(name, 640), result.policy.parent, Hooks(sink=rows.extend)
+    )
     assert longer.steps == 640
     assert longer.seconds > result.seconds
     assert longer.updates > result.updates
@@ -208,7 +212,7 @@ def test_a_training_that_diverges_says_so_and_keeps_what_it_had(
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(of, "load", spoil)
         with pytest.raises(TrainingDiverged, match=r"160 steps.*checkpoint is of before"):
-            train(sway, robot, brief(name), tmp_path, Hooks(sink=rows.extend))
+            train_policy(sway, robot, brief(name), tmp_path, Hooks(sink=rows.extend))
     assert rows == []
     assert (tmp_path / "policy.safetensors").read_bytes() == kept
 
@@ -228,7 +232,7 @@ def test_a_crash_between_two_renames_loses_nothing(
     run(robot, sway, brief("sb3"), tmp_path)
     (tmp_path / "checkpoint").rename(tmp_path / "checkpoint.old")
     rows: list[dict[str, float]] = []
-    train(sway, robot, brief("sb3", 480), tmp_path, Hooks(sink=rows.extend))
+    train_policy(sway, robot, brief("sb3", 480), tmp_path, Hooks(sink=rows.extend))
     assert all(row["step"] > 320 for row in rows)
 
 
@@ -255,7 +259,9 @@ def test_an_interrupted_run_keeps_its_replay(
     robot: Robot, sway: ReferenceMotion, tmp_path: Path
 ) -> None:
     with pytest.raises(KeyboardInterrupt):
-        train(sway, robot, brief("sb3"), tmp_path, Hooks(stop=iter([False, False, True]).__next__))
+        train_policy(
+            sway, robot, brief("sb3"), tmp_path, Hooks(stop=iter([False, False, True]).__next__)
+        )
     state = json.loads((tmp_path / "checkpoint" / "run.json").read_text())
     files = [path.name for path in (tmp_path / "replay").iterdir()]
     assert state["steps"] == 64
@@ -270,7 +276,7 @@ def test_rows_are_safe_before_the_checkpoint_that_follows_them(
         sink=lambda rows: told.append("row"),
         saving=lambda: told.append("checkpoint" if (tmp_path / "checkpoint").exists() else "safe"),
     )
-    train(sway, robot, brief("sb3"), tmp_path, hooks)
+    train_policy(sway, robot, brief("sb3"), tmp_path, hooks)
     assert told[-1] == "safe"
     assert "row" in told
 
@@ -296,7 +302,7 @@ def test_an_interrupted_run_leaves_no_round_computing(
     slow = dataclasses.replace(SMALL, updates_per_round=2000, batch=256)
     config = dataclasses.replace(brief("sbx"), tqc=slow, progress_seconds=1e-9)
     with pytest.raises(KeyboardInterrupt):
-        train(sway, robot, config, tmp_path, Hooks(progress=interrupt))
+        train_policy(sway, robot, config, tmp_path, Hooks(progress=interrupt))
     arrays = jax.tree_util.tree_leaves(states[0]._state())
     assert all(array.is_ready() for array in arrays if isinstance(array, jax.Array))
 
@@ -312,7 +318,7 @@ def test_the_table_of_an_evaluation_has_every_start_and_baseline(
     trained: tuple, robot: Robot, sway: ReferenceMotion
 ) -> None:
     result, _, _, _ = trained
-    verdict = evaluate(load_policy(result.policy), sway, robot, BRIEF)
+    verdict = evaluate_policy(load_policy(result.policy), sway, robot, BRIEF)
     policies = {row["policy"] for row in verdict.rows}
     assert policies == {"trained", "hold", "statue", "mean_pose", "zero_residual", "random"}
     own = [row for row in verdict.rows if row["policy"] == "trained"]
@@ -345,7 +351,7 @@ def test_a_policy_that_no_robot_can_follow_is_refused(
 def test_an_evaluation_is_repeatable(trained: tuple, robot: Robot, sway: ReferenceMotion) -> None:
     result, _, _, _ = trained
     policy = load_policy(result.policy)
-    first, second = (evaluate(policy, sway, robot, BRIEF) for _ in range(2))
+    first, second = (evaluate_policy(policy, sway, robot, BRIEF) for _ in range(2))
     np.testing.assert_array_equal(first.rollout_qpos, second.rollout_qpos)
 
 
@@ -357,7 +363,7 @@ def test_a_policy_for_another_robot_is_refused(
     (weight, bias), *rest = policy.layers
     other = dataclasses.replace(policy, layers=((weight[:-1], bias), *rest))
     with pytest.raises(BadPolicy, match="trained for"):
-        evaluate(other, sway, robot, BRIEF)
+        evaluate_policy(other, sway, robot, BRIEF)
 
 
 def test_evaluation_needs_neither_jax_nor_torch_nor_prefect() -> None:
@@ -376,7 +382,7 @@ def test_tensorboard_gets_the_terms_of_the_reward(
     from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
     config = dataclasses.replace(brief("sb3"), tensorboard=True)
-    train(sway, robot, config, tmp_path)
+    train_policy(sway, robot, config, tmp_path)
     events = EventAccumulator(str(tmp_path / "tensorboard")).Reload()
     assert {"survived_s", "reward_joints", "steps_per_s"} <= set(events.Tags()["scalars"])
 
@@ -407,7 +413,7 @@ def test_paper_mode_trains_from_the_shipped_walker(
         tqc=TqcConfig(preset="paper", warmup=150, batch=8),
     )
     rows: list[dict[str, float]] = []
-    result = train(sway, robot, config, tmp_path, Hooks(sink=rows.extend))
+    result = train_policy(sway, robot, config, tmp_path, Hooks(sink=rows.extend))
     assert result.steps == 160
     assert load_policy(result.policy).observation_size == 348
     assert {"reward_imitation", "reward_curiosity", "error_world_m2"} <= set(rows[0])

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from robojackson.pipeline.run_names import NAME_LENGTH, run_name
 from storage import run_catalogue
-from storage.run_catalogue import NAME_LENGTH, Run, safe_name
+from storage.run_catalogue import Run
 from storage.store import Store
 
 ODD = [
@@ -25,23 +26,23 @@ ODD = [
 
 @pytest.mark.parametrize("name", ODD)
 def test_a_run_of_an_oddly_named_video_is_in_the_catalogue(name: str, tmp_path: Path) -> None:
-    store, run_id = Store(tmp_path), f"{safe_name(name)}-scratch-s0"
+    store, run_id = Store(tmp_path), f"{run_name(name)}-scratch-s0"
     when = datetime(2026, 1, 1, tzinfo=UTC)
     run_catalogue.record(store, Run(run_id, name, "humanoid", "scratch", 0, when))
-    assert [(run.run_id, run.move) for run in run_catalogue.runs(store)] == [(run_id, name)]
+    assert [(run.run_id, run.move) for run in run_catalogue.list_runs(store)] == [(run_id, name)]
 
 
 @pytest.mark.parametrize("name", ODD)
 def test_a_safe_name_is_no_option_no_path_and_not_long(name: str) -> None:
-    made = safe_name(name)
+    made = run_name(name)
     assert 0 < len(made) <= NAME_LENGTH
     assert made[0].isalnum()
     assert "/" not in made
 
 
 def test_a_plain_name_stays_as_it_is() -> None:
-    assert safe_name("hip_shake.v2-final") == "hip_shake.v2-final"
+    assert run_name("hip_shake.v2-final") == "hip_shake.v2-final"
 
 
 def test_two_names_without_a_latin_letter_stay_two() -> None:
-    assert safe_name("ダンス") != safe_name("舞踊")
+    assert run_name("ダンス") != run_name("舞踊")

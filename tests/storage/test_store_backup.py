@@ -19,7 +19,7 @@ from storage import store_backup
 from storage.backup import HELD, Backups
 from storage.prefect_database import SQLite
 from storage.store import Store
-from storage.store_backup import Made, Progress, Restored, back_up, restore
+from storage.store_backup import BackupResult, Progress, Restored, back_up, restore
 
 FILES = {
     "motion/0a/reference.parquet": b"PAR1" * 1000,
@@ -65,7 +65,7 @@ def database(store: Store) -> SQLite:
     return SQLite(store.here / "prefect" / "prefect.db")
 
 
-def backed_up(store: Store, backups: Backups, keep: int = 7) -> Made:
+def backed_up(store: Store, backups: Backups, keep: int = 7) -> BackupResult:
     return back_up(store, database(store), backups, keep, lambda progress: None)
 
 

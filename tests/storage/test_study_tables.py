@@ -62,7 +62,7 @@ def test_the_files_of_a_study_are_its_tables_and_notes_alone(store: Store) -> No
     for place in (cell(), other):
         study_tables.write(store, place, made(store))
         study_tables.note(store, place, {"run_id": place.run_id})
-    keys = {artifact.key for artifact in study_tables.kept(store, "smoke")}
+    keys = {artifact.key for artifact in study_tables.files_of(store, "smoke")}
     assert keys == {
         cell().key("episodes"),
         cell().key("evaluations"),

@@ -15,7 +15,7 @@ from robojackson.errors import TruncatedVideo
 from storage.artifact import Artifact
 from storage.store import Store
 from tasks import download_video as task
-from tasks.download_video import WebVideo, download
+from tasks.download_video import WebVideo, download_video
 from tests.clips.web.conftest import small_video, web
 from tests.fixtures.web_server import PATIENT, Web
 
@@ -24,7 +24,7 @@ __all__ = ["small_video", "web"]
 
 def bring(web: Web, path: str = "good/clip.mp4", video_id: str = "v1") -> Artifact:
     video = WebVideo("generic", video_id, f"{web.url}/{path}", "A title")
-    return download.fn(video, "score", FormatConfig(), PATIENT, VideoLimits())
+    return download_video.fn(video, "score", FormatConfig(), PATIENT, VideoLimits())
 
 
 def test_the_file_is_in_the_store(web: Web, store_folder: Path) -> None:
@@ -45,7 +45,7 @@ def test_two_runs_that_want_a_video_at_once_fetch_it_once(
     web: Web, store_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Both see that it is not there; then one brings it and the other waits."""
-    both, looks, look, fetch = Barrier(2), count(), task._had, task.fetch
+    both, looks, look, fetch = Barrier(2), count(), task._earlier_download, task.fetch
     fetched: list[Path] = []
 
     def late(store: Store, *what: Any) -> Artifact | None:
@@ -58,7 +58,7 @@ def test_two_runs_that_want_a_video_at_once_fetch_it_once(
         fetched.append(folder)
         return fetch(chosen, folder, *rest)
 
-    monkeypatch.setattr(task, "_had", late)
+    monkeypatch.setattr(task, "_earlier_download", late)
     monkeypatch.setattr(task, "fetch", counted)
     with ThreadPoolExecutor(2) as pool:
         made = list(pool.map(lambda _: bring(web), range(2)))

@@ -16,7 +16,7 @@ from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.smpl_sequence import SmplSequence
 from storage import artifact_tables
 from storage.store import Store
-from tasks.recover_motion_by_networks import _models, network_mocap
+from tasks.recover_motion_by_networks import _models, recover_motion_by_networks
 
 ROOT = Path(__file__).parents[2]
 FRAMES = 6
@@ -44,9 +44,9 @@ def test_the_task_keeps_the_motion_of_the_networks(store: Store, tmp_path: Path)
     torch.save(network.state_dict(), tmp_path / "r34.pth")
     clip = trim(ROOT / "clips" / "hip_shake.mp4", 0.0, FRAMES / 30.0, tmp_path / "short.mp4")
     video = store.keep("clip", "clip.mp4", clip.read_bytes())
-    seen = artifact_tables.keep(store, "landmarks", "landmarks.parquet", track())
+    seen = artifact_tables.save(store, "landmarks", "landmarks.parquet", track())
     config = NetworkConfig(hybrik=str(tmp_path / "r34.pth"), flip_test=False)
-    made = network_mocap.fn(video, seen, config, MocapConfig())
+    made = recover_motion_by_networks.fn(video, seen, config, MocapConfig())
     found = artifact_tables.read(SmplSequence, store, made)
     assert len(found) == FRAMES
     assert "hybrik_resnet34" in found.notes[0]

@@ -11,7 +11,7 @@ from robojackson.rl.config.train_config import EvaluateConfig, TrainConfig
 from storage import study_tables
 from storage.artifact import Artifact
 from storage.store import Store
-from tasks import publish_tables as publishing
+from tasks import publish_tables
 from tasks.study_cell import Cell
 
 CELL = Cell(
@@ -52,8 +52,8 @@ def test_rows_that_are_made_anew_get_the_commit_that_made_them(
     store = Store(store_folder)
     told = []
     for commit, policy in (("a", b"first"), ("b", b"first"), ("c", b"second")):
-        monkeypatch.setattr(publishing, "_commit", lambda commit=commit: commit)
-        publishing.publish(CELL, "r", made(store, policy))
+        monkeypatch.setattr(publish_tables, "_commit", lambda commit=commit: commit)
+        publish_tables.publish(CELL, "r", made(store, policy))
         told.append(commits(store))
     assert told == [["a"], ["a"], ["c"]]
 
@@ -61,22 +61,22 @@ def test_rows_that_are_made_anew_get_the_commit_that_made_them(
 def test_without_git_the_commit_is_what_the_environment_says(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(publishing, "CHECKOUT", tmp_path)
+    monkeypatch.setattr(publish_tables, "CHECKOUT", tmp_path)
     monkeypatch.setenv("ROBOJACKSON_COMMIT", "0123abc")
-    publishing._commit.cache_clear()
-    assert publishing._commit() == "0123abc"
-    publishing._commit.cache_clear()
+    publish_tables._commit.cache_clear()
+    assert publish_tables._commit() == "0123abc"
+    publish_tables._commit.cache_clear()
 
 
 def test_a_study_reads_what_a_cell_left_from_the_store_alone(store_folder: Path) -> None:
-    left = publishing.publish(CELL, "r", made(Store(store_folder), b"p"))
-    assert publishing.published(CELL, "r") == left
+    left = publish_tables.publish(CELL, "r", made(Store(store_folder), b"p"))
+    assert publish_tables.published(CELL, "r") == left
     assert left["episodes"].key.startswith("metrics/episodes/study=s/")
 
 
 def test_a_cell_that_left_nothing_in_this_store_is_named_with_what_to_do(
     store_folder: Path,
 ) -> None:
-    publishing.publish(CELL, "r", made(Store(store_folder), b"p"))
+    publish_tables.publish(CELL, "r", made(Store(store_folder), b"p"))
     with pytest.raises(StoreError, match=r"scratch-walk-s0: .* no result of run other: .* store"):
-        publishing.published(CELL, "other")
+        publish_tables.published(CELL, "other")

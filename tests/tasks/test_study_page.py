@@ -20,7 +20,7 @@ from robojackson.report.pages.study_page import cell
 from storage import study_tables
 from storage.artifact import Artifact
 from storage.store import Store
-from tasks import write_study_page as pages
+from tasks import write_study_page
 from tasks.write_study_page import report
 
 STUDY = Study(
@@ -154,7 +154,9 @@ def test_rows_of_other_runs_under_the_name_of_the_study_do_not_count(
 def test_seeds_that_never_reach_the_threshold_are_counted_apart() -> None:
     rng = np.random.default_rng(0)
     figures = {"steps_to": {("walk", "scratch"): {0: 100.0, 1: 300.0, 2: np.inf, 3: np.inf}}}
-    (line, *_) = pages.table(figures, {}, Study(moves=("walk",), setups=("scratch",)), rng)
+    (line, *_) = write_study_page.table(
+        figures, {}, Study(moves=("walk",), setups=("scratch",)), rng
+    )
     assert cell(line.values["steps_to"], "steps_to", 4) == ("200", ["[100, 300]", "(2 of 4)"])
     never = estimate([np.inf, np.inf], rng)
     assert cell(never, "steps_to", 2) == ("never", [])
@@ -169,12 +171,12 @@ def test_the_page_is_drawn_again_only_when_the_rows_change(
         drawn.append(study.name)
         return {"page": Store(store_folder).put("page.html", b"page")}
 
-    monkeypatch.setattr(pages, "report", draw)
+    monkeypatch.setattr(write_study_page, "report", draw)
 
     @flow(name="pages")
     def page() -> Any:
-        return pages.results_page(
-            STUDY, {}, study_tables.kept(Store(store_folder), "known"), {}, {}
+        return write_study_page.write_study_page(
+            STUDY, {}, study_tables.files_of(Store(store_folder), "known"), {}, {}
         )
 
     publish(Store(store_folder), "walk", "scratch", 0)

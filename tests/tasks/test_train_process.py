@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from robojackson.errors import TrainingFailed
-from tasks.runtime import child_process as task
+from tasks.runtime import child_process
 
 SLEEPER = "import time; print('started', file=__import__('sys').stderr, flush=True); time.sleep(60)"
 STUBBORN = f"import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN); {SLEEPER}"
@@ -18,7 +18,7 @@ STUBBORN = f"import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN); {SLEE
 
 def run(code: str, folder: Path, limit_s: float | None = None) -> None:
     command = [sys.executable, "-c", code]
-    asyncio.run(task.run_process(command, "walk-scratch-s0", folder, limit_s))
+    asyncio.run(child_process.run_process(command, "walk-scratch-s0", folder, limit_s))
 
 
 def is_alive(pid: int) -> bool:
@@ -42,7 +42,7 @@ def ends(pid: int, within_s: float = 10.0) -> bool:
 def test_a_process_that_is_killed_is_told_with_its_run_and_cause(tmp_path: Path) -> None:
     with pytest.raises(TrainingFailed, match=r"run walk-scratch-s0 was killed by SIGKILL") as told:
         run("import os; os.kill(os.getpid(), 9)", tmp_path)
-    assert str(tmp_path / task.LOG) in str(told.value)
+    assert str(tmp_path / child_process.LOG) in str(told.value)
 
 
 def test_a_process_that_fails_is_told_with_its_last_line(tmp_path: Path) -> None:
@@ -52,7 +52,7 @@ def test_a_process_that_fails_is_told_with_its_last_line(tmp_path: Path) -> None
 
 def test_what_the_process_says_is_in_its_log(tmp_path: Path) -> None:
     run("import sys; print('10 steps', file=sys.stderr)", tmp_path)
-    assert (tmp_path / task.LOG).read_text() == "10 steps\n"
+    assert (tmp_path / child_process.LOG).read_text() == "10 steps\n"
 
 
 def test_a_process_that_does_not_end_is_killed(tmp_path: Path) -> None:
@@ -68,13 +68,13 @@ def test_a_process_that_does_not_end_is_killed(tmp_path: Path) -> None:
 def test_a_cancelled_task_leaves_no_process(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: str, grace_s: float, times: int
 ) -> None:
-    monkeypatch.setattr(task, "SECONDS_TO_SAVE", grace_s)
+    monkeypatch.setattr(child_process, "SECONDS_TO_SAVE", grace_s)
     told = f"import os, sys; print(os.getpid(), file=sys.stderr, flush=True); {code}"
 
     async def cancelled() -> None:
         command = [sys.executable, "-c", told]
-        running = asyncio.create_task(task.run_process(command, "run", tmp_path, None))
-        while "started" not in _read(tmp_path / task.LOG):
+        running = asyncio.create_task(child_process.run_process(command, "run", tmp_path, None))
+        while "started" not in _read(tmp_path / child_process.LOG):
             await asyncio.sleep(0.02)
         for _ in range(times):
             running.cancel()
@@ -82,7 +82,7 @@ def test_a_cancelled_task_leaves_no_process(
         await asyncio.gather(running, return_exceptions=True)
 
     asyncio.run(cancelled())
-    assert ends(int(_read(tmp_path / task.LOG).split()[0]), 10.0)
+    assert ends(int(_read(tmp_path / child_process.LOG).split()[0]), 10.0)
 
 
 def test_a_training_ends_when_its_parent_is_killed(tmp_path: Path) -> None:
@@ -99,7 +99,7 @@ def test_a_training_ends_when_its_parent_is_killed(tmp_path: Path) -> None:
     )
     mark = tmp_path / "pid"
     command = [sys.executable, "-c", parent, str(mark)]
-    with subprocess.Popen(command, env=task.environment()) as process:
+    with subprocess.Popen(command, env=child_process.environment()) as process:
         while not _read(mark):
             time.sleep(0.02)
         process.send_signal(signal.SIGKILL)
@@ -109,7 +109,10 @@ def test_a_training_ends_when_its_parent_is_killed(tmp_path: Path) -> None:
 def test_a_training_whose_parent_is_gone_does_not_begin() -> None:
     code = "from robojackson.cli.training_process import die_with; die_with(1)"
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, check=False, env=task.environment()
+        [sys.executable, "-c", code],
+        capture_output=True,
+        check=False,
+        env=child_process.environment(),
     )
     assert b"is gone" in done.stderr
 

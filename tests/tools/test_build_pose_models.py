@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tools.assets import build_pose_models as builder
+from tools.assets import build_pose_models
 
 ASSETS = Path(__file__).resolve().parents[2] / "robojackson" / "assets"
 
@@ -15,15 +15,15 @@ ASSETS = Path(__file__).resolve().parents[2] / "robojackson" / "assets"
 @pytest.mark.parametrize("size", ["lite", "full"])
 def test_shipped_bundle_is_the_one_that_the_tool_builds(size: str) -> None:
     content = (ASSETS / f"pose_landmarker_{size}.task").read_bytes()
-    assert hashlib.sha256(content).hexdigest() == builder.BUNDLE_SHA256[size]
+    assert hashlib.sha256(content).hexdigest() == build_pose_models.BUNDLE_SHA256[size]
 
 
 def test_normalisation_can_be_read_back_from_a_shipped_bundle() -> None:
-    schema, metadata = builder.tflite_schema, builder.metadata_schema
+    schema, metadata = build_pose_models.tflite_schema, build_pose_models.metadata_schema
     with zipfile.ZipFile(ASSETS / "pose_landmarker_lite.task") as bundle:
         network = bundle.read("pose_landmarks_detector.tflite")
     model = schema.ModelT.InitFromObj(schema.Model.GetRootAsModel(network, 0))
-    entry = next(m for m in model.metadata if m.name == builder.METADATA_NAME.encode())
+    entry = next(m for m in model.metadata if m.name == build_pose_models.METADATA_NAME.encode())
     raw = bytes(model.buffers[entry.buffer].data)
     root = metadata.ModelMetadataT.InitFromObj(
         metadata.ModelMetadata.GetRootAsModelMetadata(raw, 0)
@@ -35,9 +35,10 @@ def test_normalisation_can_be_read_back_from_a_shipped_bundle() -> None:
 def test_adding_the_normalisation_twice_leaves_one_entry() -> None:
     with zipfile.ZipFile(ASSETS / "pose_landmarker_lite.task") as bundle:
         network = bundle.read("pose_landmarks_detector.tflite")
-    again = builder.with_normalization(network, 0.0, 255.0)
+    again = build_pose_models.with_normalization(network, 0.0, 255.0)
     lengths = [
-        builder.tflite_schema.Model.GetRootAsModel(m, 0).MetadataLength() for m in (network, again)
+        build_pose_models.tflite_schema.Model.GetRootAsModel(m, 0).MetadataLength()
+        for m in (network, again)
     ]
     assert lengths[0] == lengths[1]
 
@@ -45,14 +46,14 @@ def test_adding_the_normalisation_twice_leaves_one_entry() -> None:
 def test_wrong_tarball_is_refused_before_anything_is_written(tmp_path: Path) -> None:
     fake = tmp_path / "pose.tgz"
     fake.write_bytes(b"not a tarball")
-    with pytest.raises(builder.BuildError, match="expected 8bb349a7"):
-        builder.build(fake, ["lite"], tmp_path / "out")
+    with pytest.raises(build_pose_models.BuildError, match="expected 8bb349a7"):
+        build_pose_models.build(fake, ["lite"], tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
 def test_unknown_size_is_named_with_the_known_ones(tmp_path: Path) -> None:
-    with pytest.raises(builder.BuildError, match=r"'hevy'; sizes: lite, full, heavy"):
-        builder.build(tmp_path / "none.tgz", ["hevy"], tmp_path)
+    with pytest.raises(build_pose_models.BuildError, match=r"'hevy'; sizes: lite, full, heavy"):
+        build_pose_models.build(tmp_path / "none.tgz", ["hevy"], tmp_path)
 
 
 def test_bundle_parts_are_stored_and_not_compressed() -> None:
@@ -64,6 +65,6 @@ def test_bundle_parts_are_stored_and_not_compressed() -> None:
 def test_without_npm_the_way_around_is_told(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(builder.shutil, "which", lambda name: None)
-    with pytest.raises(builder.BuildError, match="pass --tarball"):
-        builder.fetch_tarball(tmp_path)
+    monkeypatch.setattr(build_pose_models.shutil, "which", lambda name: None)
+    with pytest.raises(build_pose_models.BuildError, match="pass --tarball"):
+        build_pose_models.fetch_tarball(tmp_path)

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from robojackson.mocap.temporal import error_flow, features, temporal_network
-from robojackson.mocap.temporal.features import Sight
+from robojackson.mocap.temporal.features import ClipView
 from tools.pairs.sources import RefusedMotion
 from tools.temporal import batches, train_temporal
 from tools.temporal.batches import Batch, Change
@@ -33,7 +33,7 @@ def person(frames: int = 60, motion: str = "jump") -> Example:
     truth = rng.normal(0.0, 0.4, (1, 33, 3)) + 0.05 * rng.normal(size=(frames, 33, 3))
     truth[:, features.HIPS] -= truth[:, features.HIPS].mean(1, keepdims=True)
     distance = np.full(frames, 4.0)
-    sight = Sight(
+    sight = ClipView(
         flat=flattened(truth, distance),
         local=truth,
         visibility=np.ones((frames, 33)),

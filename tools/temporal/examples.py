@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from robojackson.body.forward_kinematics import apply
-from robojackson.clips.quality.visibility import weighed
+from robojackson.clips.quality.visibility import weigh_visibility
 from robojackson.errors import NoPersonFound
 from robojackson.mocap.landmarks import pinhole_camera
 from robojackson.mocap.landmarks.blazepose import BODY, landmark, repair
 from robojackson.mocap.recover import MocapConfig
 from robojackson.mocap.temporal import features
-from robojackson.mocap.temporal.features import Sight
+from robojackson.mocap.temporal.features import ClipView
 from robojackson.motion.landmark_track import LandmarkTrack
 
 FOLLOWED_M = 0.25
@@ -46,7 +46,7 @@ class Example:
         motion: Its name.
     """
 
-    sight: Sight
+    sight: ClipView
     truth: np.ndarray
     good: np.ndarray
     distance: np.ndarray
@@ -81,7 +81,7 @@ def read(path: Path) -> Example | None:
     if track.detected.mean() < LEAST_FOUND:
         return None
     try:
-        sight = sight_of(weighed(track))
+        sight = sight_of(weigh_visibility(track))
     except NoPersonFound:
         return None
     truth, distance = along_rays(truth_c)
@@ -93,13 +93,13 @@ def read(path: Path) -> Example | None:
     return Example(sight, truth * scale, good, distance * scale, motion)
 
 
-def sight_of(track: LandmarkTrack) -> Sight:
+def sight_of(track: LandmarkTrack) -> ClipView:
     """As in `recover`, up to the network."""
     config, landmarks = MocapConfig(), repair(track)
     focal = pinhole_camera.guess_focal(track.width, track.height)
     lens = pinhole_camera.Pinhole(focal, track.width, track.height)
     placed = pinhole_camera.place(landmarks, lens, track.fps, config.depth_cutoff_hz)
-    return features.look(placed, landmarks.local, landmarks.visibility)
+    return features.view_clip(placed, landmarks.local, landmarks.visibility)
 
 
 def load(folder: Path) -> tuple[list[Example], list[Example]]:

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from robojackson.mocap.temporal.features import SEEN, Sight
+from robojackson.mocap.temporal.features import SEEN, ClipView
 from tools.temporal.batches import SWAP, Batch, windows
 from tools.temporal.examples import Example, Truth, body_size, flattened
 
@@ -43,7 +43,7 @@ class Detector:
         points, distance = points * scale, distance * scale
         count = len(points)
         mapped = (_row(points[:, SEEN]) @ self.map).reshape(count, len(SEEN), 5)
-        sight = Sight(
+        sight = ClipView(
             flat=np.zeros((count, 33, 2)),
             local=np.zeros((count, 33, 3)),
             visibility=np.ones((count, 33)),

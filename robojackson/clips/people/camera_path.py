@@ -169,7 +169,7 @@ class _Chain:
         kept = found.ravel() == 1
         steps = np.linalg.norm((moved - self._at)[:, 0], axis=-1) / np.hypot(*self.size)
         start, now = self._from[kept], moved[kept]
-        fit, agreed = _standing(now, start), np.ones(len(now), bool)
+        fit, agreed = _still(now, start), np.ones(len(now), bool)
         if fit is None and kept.sum() >= FEWEST and np.median(steps[kept]) <= JERK:
             fit, agreed = self._moving(now, start)
         if fit is not None:
@@ -198,7 +198,7 @@ class _Chain:
         return bool(len(change) and np.percentile(change, 100 - CHANGED_SHARE) > CHANGED)
 
 
-def _standing(now: np.ndarray, start: np.ndarray) -> np.ndarray | None:
+def _still(now: np.ndarray, start: np.ndarray) -> np.ndarray | None:
     """No motion at all, if enough corners have kept their place."""
     near = np.linalg.norm((now - start)[:, 0], axis=-1) < KEPT
     stands = near.sum() >= max(FEWEST_STANDING, STANDS * len(near))

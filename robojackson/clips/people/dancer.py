@@ -16,9 +16,9 @@ from pydantic.dataclasses import dataclass as configuration
 
 from robojackson.clips.people.identity import IdentityConfig
 from robojackson.clips.people.person_count import People, PeopleConfig
-from robojackson.clips.people.person_detection import CrowdConfig, paint, silhouette
+from robojackson.clips.people.person_detection import PersonDetectionConfig, paint, silhouette
 from robojackson.clips.people.person_extent import stature, trunk
-from robojackson.clips.people.tracked_people import SCOUT, Cast, look_around
+from robojackson.clips.people.tracked_people import SCOUT, TrackedPeople, track_people
 from robojackson.clips.pose_detector import (
     SHORT_SIDE,
     detect,
@@ -48,14 +48,14 @@ class DancerConfig:
 
     number: int | None = Field(default=None, ge=1)
     scouts: PeopleConfig = Field(default_factory=PeopleConfig)
-    crowd: CrowdConfig = Field(default_factory=CrowdConfig)
+    crowd: PersonDetectionConfig = Field(default_factory=PersonDetectionConfig)
     identity: IdentityConfig = Field(default_factory=IdentityConfig)
     astray: float = Field(default=0.3, gt=0)
     crowding: float = Field(default=0.5, gt=0)
     longest_gap_s: float = Field(default=1.0, ge=0)
 
 
-def follow(
+def track_dancer(
     path: Path,
     info: VideoInfo,
     size: str,
@@ -80,7 +80,7 @@ def follow(
             return single
     passes = 3 if config.number in (None, 1) else 2
     later = _shifted(progress, info.frames, passes - 2, passes)
-    cast = look_around(path, info, config.crowd, config.identity, later)
+    cast = track_people(path, info, config.crowd, config.identity, later)
     if len(cast.rows) < 2 and config.number in (None, 1):
         return single
     number = config.number or 1
@@ -109,7 +109,7 @@ def _scouted(
 
 def _followed(
     path: Path,
-    cast: Cast,
+    cast: TrackedPeople,
     chosen: int,
     size: str,
     config: DancerConfig,
@@ -125,7 +125,9 @@ def _followed(
         for index, (time_s, image) in zip(range(len(known)), frames, strict=False):
             if wanted[index]:
                 width = config.crowd.limb_width
-                found[index] = look(alone(image, known[index], others[:, index], width), time_s)
+                found[index] = look(
+                    mask_others(image, known[index], others[:, index], width), time_s
+                )
             if progress:
                 progress(index + 1, len(known))
     size_px = (cast.info.width, cast.info.height)
@@ -140,7 +142,7 @@ def near_known(
     return np.asarray(np.abs(time_s[:, None] - seen).min(1) <= gap_s)
 
 
-def alone(
+def mask_others(
     image: UInt8[np.ndarray, "H W 3"],
     person: Float[np.ndarray, "33 7"],
     others: Float[np.ndarray, "P 33 7"],

@@ -13,9 +13,9 @@ from jaxtyping import Float
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as configuration
 
-from robojackson.clips.people.person_detection import Sighting
+from robojackson.clips.people.person_detection import PersonDetection
 from robojackson.clips.people.person_extent import stature
-from robojackson.clips.people.tracklets import Piece, PieceConfig, find_pieces
+from robojackson.clips.people.tracklets import Tracklet, TrackletConfig, find_tracklets
 
 IMPOSSIBLE = 1e6
 NEAR = 30
@@ -40,7 +40,7 @@ class IdentityConfig:
         shortest_s, least_share: Who is seen for less than either, seconds, is nobody.
     """
 
-    pieces: PieceConfig = Field(default_factory=PieceConfig)
+    pieces: TrackletConfig = Field(default_factory=TrackletConfig)
     shortest_piece_s: float = Field(default=0.1, ge=0)
     shortest_blend_s: float = Field(default=0.35, ge=0)
     memory_s: float = Field(default=0.7, gt=0)
@@ -56,7 +56,7 @@ class IdentityConfig:
 
 
 def identify(
-    frames: Sequence[Sequence[Sighting]],
+    frames: Sequence[Sequence[PersonDetection]],
     time_s: Float[np.ndarray, " T"],
     size: tuple[int, int],
     config: IdentityConfig,
@@ -70,10 +70,10 @@ def identify(
     """
     duration_s = float(time_s[-1] - time_s[0]) if len(time_s) else 0.0
     period_s = max(duration_s / max(len(time_s) - 1, 1), 1e-9)
-    pieces = find_pieces(frames, time_s, size, config.pieces)
+    pieces = find_tracklets(frames, time_s, size, config.pieces)
     clear = [p for p in pieces if not p.blended and _lasts(p, config.shortest_piece_s, period_s)]
     blends = [p for p in pieces if p.blended and _lasts(p, config.shortest_blend_s, period_s)]
-    tracks = [_table(c, len(frames)) for c in given(blends, chains(clear, config), config)]
+    tracks = [_table(c, len(frames)) for c in assign_merged(blends, chains(clear, config), config)]
     shortest_s = max(config.shortest_s, config.least_share * duration_s)
     seen = [track for track in tracks if (~np.isnan(track[:, 0, 0])).sum() * period_s >= shortest_s]
     return by_size(seen, size)
@@ -91,11 +91,11 @@ def by_size(
     return sorted(tracks, key=weight, reverse=True)
 
 
-def _lasts(piece: Piece, shortest_s: float, period_s: float) -> bool:
+def _lasts(piece: Tracklet, shortest_s: float, period_s: float) -> bool:
     return len(piece.frames) * period_s >= min(shortest_s, 10 * period_s)
 
 
-def chains(pieces: list[Piece], config: IdentityConfig) -> list[list[Piece]]:
+def chains(pieces: list[Tracklet], config: IdentityConfig) -> list[list[Tracklet]]:
     """Pieces in order, one list a person."""
     from scipy.optimize import linear_sum_assignment
 
@@ -120,9 +120,9 @@ def chains(pieces: list[Piece], config: IdentityConfig) -> list[list[Piece]]:
     return chains
 
 
-def given(
-    blends: list[Piece], chains: list[list[Piece]], config: IdentityConfig
-) -> list[list[Piece]]:
+def assign_merged(
+    blends: list[Tracklet], chains: list[list[Tracklet]], config: IdentityConfig
+) -> list[list[Tracklet]]:
     """Each piece of two seen as one to the person whom it fits best and who has no other there."""
     told = [list(chain) for chain in chains]
     for blend in sorted(blends, key=lambda piece: -len(piece.frames)):
@@ -132,7 +132,7 @@ def given(
     return told
 
 
-def _fit(piece: Piece, chain: list[Piece], config: IdentityConfig) -> float:
+def _fit(piece: Tracklet, chain: list[Tracklet], config: IdentityConfig) -> float:
     """Cost of a piece in a gap of a chain: the mean of the links to both of its neighbours."""
     first, last = piece.frames[0], piece.frames[-1]
     if any(p.frames[0] <= last and p.frames[-1] >= first for p in chain):
@@ -144,7 +144,7 @@ def _fit(piece: Piece, chain: list[Piece], config: IdentityConfig) -> float:
     return float(np.mean(links)) if links else IMPOSSIBLE
 
 
-def _link(before: Piece, after: Piece, config: IdentityConfig) -> float:
+def _link(before: Tracklet, after: Tracklet, config: IdentityConfig) -> float:
     """Sum of the changes across a gap, each over what it may be."""
     gap_s = after.time_s[0] - before.time_s[-1]
     tall = float(np.median(before.tall[-NEAR:])), float(np.median(after.tall[:NEAR]))
@@ -160,7 +160,7 @@ def _link(before: Piece, after: Piece, config: IdentityConfig) -> float:
     return float(moved + grown + colour / config.colour)
 
 
-def _led(piece: Piece, gap_s: float, config: IdentityConfig, ends: bool) -> np.ndarray:
+def _led(piece: Tracklet, gap_s: float, config: IdentityConfig, ends: bool) -> np.ndarray:
     """Where a piece leads to after its end, or came from before its beginning, pixels."""
     time_s, place = np.array(piece.time_s), np.array(piece.place)
     edge = -1 if ends else 0
@@ -181,7 +181,7 @@ def _mean(colours: list[np.ndarray]) -> np.ndarray:
     return np.where(known.any(0), total / np.maximum(known.sum(0), 1), np.nan)
 
 
-def _table(chain: list[Piece], frames: int) -> Float[np.ndarray, "T 33 7"]:
+def _table(chain: list[Tracklet], frames: int) -> Float[np.ndarray, "T 33 7"]:
     table = np.full((frames, 33, 7), np.nan)
     for piece in chain:
         table[piece.frames] = piece.rows

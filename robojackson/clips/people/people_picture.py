@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from robojackson.clips.people.person_extent import box
-from robojackson.clips.people.tracked_people import Cast
+from robojackson.clips.people.tracked_people import TrackedPeople
 from robojackson.clips.video import timed_frames
 
 COLOURS = ((230, 60, 60), (40, 120, 230), (40, 170, 80), (200, 120, 20), (150, 60, 200))
@@ -14,7 +14,7 @@ LONG_SIDE = 1280
 MARGIN = 0.08
 
 
-def portrait(path: Path, cast: Cast) -> bytes:
+def draw_people(path: Path, cast: TrackedPeople) -> bytes:
     """PNG."""
     wanted = best_frame(cast)
     frames = timed_frames(path, short_side=LONG_SIDE)
@@ -29,7 +29,7 @@ def portrait(path: Path, cast: Cast) -> bytes:
     return cv2.imencode(".png", picture[..., ::-1])[1].tobytes()
 
 
-def best_frame(cast: Cast) -> int:
+def best_frame(cast: TrackedPeople) -> int:
     """The frame with most people in it, and among those the one with the largest distances."""
     places = np.array([rows[:, 0, 0] for rows in cast.rows])
     count = (~np.isnan(places)).sum(0)

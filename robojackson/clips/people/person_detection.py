@@ -30,7 +30,7 @@ FEWEST_PIXELS = 12
 
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid"))
-class CrowdConfig:
+class PersonDetectionConfig:
     """Attributes:
     most: People that are looked for in a picture.
     limb_width: Of the paint over a limb, body heights.
@@ -49,7 +49,7 @@ class CrowdConfig:
 
 
 @dataclass(frozen=True, config=ConfigDict(arbitrary_types_allowed=True))
-class Sighting:
+class PersonDetection:
     """Somebody in one frame.
 
     Attributes:
@@ -61,27 +61,27 @@ class Sighting:
     looks: np.ndarray
 
 
-def everybody(
-    image: UInt8[np.ndarray, "H W 3"], landmarker: Any, config: CrowdConfig
-) -> list[Sighting]:
+def detect_people(
+    image: UInt8[np.ndarray, "H W 3"], landmarker: Any, config: PersonDetectionConfig
+) -> list[PersonDetection]:
     """All people in a picture, the one that the detector likes best first."""
     factor = min(1.0, config.short_side / min(image.shape[:2]))
     small = cv2.resize(image, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
     painted = np.zeros(small.shape[:2], bool)
-    found: list[Sighting] = []
+    found: list[PersonDetection] = []
     for _ in range(config.most):
-        row = look(landmarker, small)
+        row = detect_person(landmarker, small)
         if row is None or row[:, 6].mean() < config.visibility:
             break
         if not any(_same(row, other.row, small.shape, config.apart) for other in found):
-            found.append(Sighting(row, looks(small, row[:, :2], painted)))
+            found.append(PersonDetection(row, mean_colours(small, row[:, :2], painted)))
         mask = silhouette(row[:, :2], small.shape[1], small.shape[0], config.limb_width)
         paint(small, mask)
         painted |= mask
     return _near(found, small.shape[1::-1], config.smallest)
 
 
-def look(landmarker: Any, image: np.ndarray) -> np.ndarray | None:
+def detect_person(landmarker: Any, image: np.ndarray) -> np.ndarray | None:
     """One person in a single picture, (33, 7); None for nobody."""
     import mediapipe
 
@@ -123,7 +123,7 @@ def paint(image: UInt8[np.ndarray, "H W 3"], mask: Bool[np.ndarray, "H W"]) -> N
     image[mask] = cv2.mean(image)[:3]
 
 
-def looks(
+def mean_colours(
     image: UInt8[np.ndarray, "H W 3"], xy: Float[np.ndarray, "33 2"], hidden: np.ndarray
 ) -> Float[np.ndarray, " 6"]:
     """Mean colour of trunk and thighs where nothing hides them."""
@@ -145,7 +145,9 @@ def _colour(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
     return cv2.cvtColor(pixels[None], cv2.COLOR_RGB2LAB)[0].mean(0)
 
 
-def _near(found: list[Sighting], size: tuple[int, ...], smallest: float) -> list[Sighting]:
+def _near(
+    found: list[PersonDetection], size: tuple[int, ...], smallest: float
+) -> list[PersonDetection]:
     """Without the people of the background."""
     tall = [float(stature(other.row[:, :2] * size)) for other in found]
     limit = smallest * max(tall, default=0.0)

@@ -8,7 +8,11 @@ import numpy as np
 from jaxtyping import Float
 
 from robojackson.clips.people.identity import IdentityConfig, identify
-from robojackson.clips.people.person_detection import CrowdConfig, Sighting, everybody
+from robojackson.clips.people.person_detection import (
+    PersonDetection,
+    PersonDetectionConfig,
+    detect_people,
+)
 from robojackson.clips.people.person_extent import stature, trunk
 from robojackson.clips.pose_detector import still_landmarker
 from robojackson.clips.video import VideoInfo, timed_frames
@@ -46,7 +50,7 @@ class Person:
 
 
 @dataclass(frozen=True)
-class Cast:
+class TrackedPeople:
     """Everybody in a clip.
 
     Attributes:
@@ -81,23 +85,23 @@ class Cast:
         )
 
 
-def look_around(
+def track_people(
     path: Path,
     info: VideoInfo,
-    crowd: CrowdConfig,
+    crowd: PersonDetectionConfig,
     identity: IdentityConfig,
     progress: Callable[[int, int], None] | None = None,
-) -> Cast:
+) -> TrackedPeople:
     """Everybody in every frame, told apart."""
-    found: list[list[Sighting]] = []
+    found: list[list[PersonDetection]] = []
     times: list[float] = []
     with still_landmarker(SCOUT) as landmarker:
         frames = timed_frames(path, short_side=crowd.short_side)
         for index, (time_s, image) in enumerate(frames):
-            found.append(everybody(image, landmarker, crowd))
+            found.append(detect_people(image, landmarker, crowd))
             times.append(time_s)
             if progress:
                 progress(index + 1, info.frames)
     when = np.array(times)
     rows = identify(found, when, (info.width, info.height), identity)
-    return Cast(rows, when, info)
+    return TrackedPeople(rows, when, info)

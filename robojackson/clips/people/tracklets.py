@@ -13,12 +13,12 @@ from jaxtyping import Float
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as configuration
 
-from robojackson.clips.people.person_detection import Sighting
+from robojackson.clips.people.person_detection import PersonDetection
 from robojackson.clips.people.person_extent import stature, trunk
 
 
 @configuration(frozen=True, config=ConfigDict(extra="forbid"))
-class PieceConfig:
+class TrackletConfig:
     """Attributes:
     step: Distance of the trunk from one frame to the next, body heights.
     step_speed: The same as a speed, body heights a second: what counts at low frame rates.
@@ -35,7 +35,7 @@ class PieceConfig:
 
 
 @dataclass
-class Piece:
+class Tracklet:
     """A stretch of frames in which one person was followed.
 
     Attributes:
@@ -56,12 +56,12 @@ class Piece:
     looks: list[np.ndarray] = field(default_factory=list)
     blended: bool = False
 
-    def take(self, other: "Piece") -> None:
+    def take(self, other: "Tracklet") -> None:
         """Go on with a single sighting."""
         for name in ("frames", "time_s", "rows", "place", "tall", "looks"):
             getattr(self, name).extend(getattr(other, name))
 
-    def add(self, frame: int, time_s: float, seen: Sighting, size: tuple[int, int]) -> None:
+    def add(self, frame: int, time_s: float, seen: PersonDetection, size: tuple[int, int]) -> None:
         points = seen.row[:, :2] * size
         self.frames.append(frame)
         self.time_s.append(time_s)
@@ -71,20 +71,20 @@ class Piece:
         self.looks.append(seen.looks)
 
 
-def find_pieces(
-    frames: Sequence[Sequence[Sighting]],
+def find_tracklets(
+    frames: Sequence[Sequence[PersonDetection]],
     time_s: Float[np.ndarray, " T"],
     size: tuple[int, int],
-    config: PieceConfig,
-) -> list[Piece]:
+    config: TrackletConfig,
+) -> list[Tracklet]:
     """Stretches without doubt, and those of two seen as one."""
-    done: list[Piece] = []
-    alive: list[Piece] = []
+    done: list[Tracklet] = []
+    alive: list[Tracklet] = []
     for index, sightings in enumerate(frames):
         now = float(time_s[index])
         done += [p for p in alive if now - p.time_s[-1] > config.pause_s + 1e-6]
         alive = [p for p in alive if now - p.time_s[-1] <= config.pause_s + 1e-6]
-        seen = [_piece_of(index, now, sighting, size) for sighting in sightings]
+        seen = [_tracklet_of(index, now, sighting, size) for sighting in sightings]
         goes_on = _claims(alive, seen, config)
         ended, blended = _touches(alive, seen, goes_on, config)
         for old, new in goes_on.items():
@@ -99,13 +99,15 @@ def find_pieces(
     return done + alive
 
 
-def _piece_of(index: int, now: float, seen: Sighting, size: tuple[int, int]) -> Piece:
+def _tracklet_of(index: int, now: float, seen: PersonDetection, size: tuple[int, int]) -> Tracklet:
     points = seen.row[:, :2] * size
     tall = max(float(stature(points)), 1.0)
-    return Piece([index], [now], [seen.row], [points[trunk()].mean(0)], [tall], [seen.looks])
+    return Tracklet([index], [now], [seen.row], [points[trunk()].mean(0)], [tall], [seen.looks])
 
 
-def _claims(alive: Sequence[Piece], seen: Sequence[Piece], config: PieceConfig) -> dict[int, int]:
+def _claims(
+    alive: Sequence[Tracklet], seen: Sequence[Tracklet], config: TrackletConfig
+) -> dict[int, int]:
     """Which piece goes on with which sighting, the least change in all."""
     from scipy.optimize import linear_sum_assignment
 
@@ -117,7 +119,10 @@ def _claims(alive: Sequence[Piece], seen: Sequence[Piece], config: PieceConfig) 
 
 
 def _touches(
-    alive: Sequence[Piece], seen: Sequence[Piece], goes_on: dict[int, int], config: PieceConfig
+    alive: Sequence[Tracklet],
+    seen: Sequence[Tracklet],
+    goes_on: dict[int, int],
+    config: TrackletConfig,
 ) -> tuple[set[int], set[int]]:
     """Pieces that end because people touch, and sightings that may be either of two.
 
@@ -142,12 +147,12 @@ def _touches(
     return ended, blended
 
 
-def _near(one: Piece, other: Piece, config: PieceConfig) -> bool:
+def _near(one: Tracklet, other: Tracklet, config: TrackletConfig) -> bool:
     tall = max(one.tall[-1], other.tall[-1])
     return bool(np.linalg.norm(one.place[-1] - other.place[-1]) < config.crowding * tall)
 
 
-def _step(before: Piece, after: Piece, config: PieceConfig) -> float:
+def _step(before: Tracklet, after: Tracklet, config: TrackletConfig) -> float:
     """How far a sighting is from a piece, 1 is as far as it may be."""
     away_s = after.time_s[0] - before.time_s[-1]
     tall = max(before.tall[-1], after.tall[0])

@@ -25,7 +25,7 @@ from robojackson.motion.landmark_track import LandmarkTrack
 
 
 @configuration(frozen=True, config=ConfigDict(extra="forbid"))
-class JudgeConfig:
+class AssessmentConfig:
     """Attributes:
     detector: Size of the pose model.
     video, stability, cuts, camera, people, drawing: Of the parts.
@@ -70,7 +70,7 @@ class Quality:
 
 
 @dataclass(frozen=True)
-class Judgement:
+class Assessment:
     """All that is known of a clip.
 
     Attributes:
@@ -86,9 +86,9 @@ class Judgement:
     quality: Quality
 
 
-def judge(
-    path: Path, config: JudgeConfig, progress: Callable[[int, int], None] | None = None
-) -> Judgement:
+def assess_video(
+    path: Path, config: AssessmentConfig, progress: Callable[[int, int], None] | None = None
+) -> Assessment:
     """Measure a clip.
 
     Raises:
@@ -100,13 +100,13 @@ def judge(
         eyes = _Eyes(info, config, landmarker)
         track = detect(path, info, config.detector, progress, eyes.see)
     score = stability(track, config.stability)
-    return Judgement(info, track, score, eyes.quality(track))
+    return Assessment(info, track, score, eyes.quality(track))
 
 
 class _Eyes:
     """All that looks at the frames beside the pose detector."""
 
-    def __init__(self, info: VideoInfo, config: JudgeConfig, landmarker: Any) -> None:
+    def __init__(self, info: VideoInfo, config: AssessmentConfig, landmarker: Any) -> None:
         self._info, self._config = info, config
         self._changes = Changes(info.fps, config.cuts)
         self._camera = CameraMotion(info.frames, info.fps, config.camera)

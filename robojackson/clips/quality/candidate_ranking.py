@@ -8,7 +8,7 @@ from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as configuration
 
 from robojackson.clips.quality.assessment import Quality
-from robojackson.clips.quality.duplicates import CopyConfig
+from robojackson.clips.quality.duplicates import DuplicateConfig
 from robojackson.clips.quality.stability import Stability
 
 
@@ -40,7 +40,7 @@ class FilterConfig:
     static_share: float | None = 0.8
     moving_share: float | None = 0.25
     flat_share: float | None = 0.6
-    copies: CopyConfig | None = Field(default_factory=CopyConfig)
+    copies: DuplicateConfig | None = Field(default_factory=DuplicateConfig)
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ Poses = Float[np.ndarray, "N 33 2"]
 
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid"))
-class CopyConfig:
+class DuplicateConfig:
     """Attributes:
     distance: Mean distance of the landmarks below which two clips show the same, body heights.
     rate: Poses a second that are compared.
@@ -34,7 +34,7 @@ class CopyConfig:
     overlap: float = Field(default=0.6, gt=0, le=1)
 
 
-def copies(tracks: Mapping[str, LandmarkTrack], config: CopyConfig) -> dict[str, str]:
+def find_duplicates(tracks: Mapping[str, LandmarkTrack], config: DuplicateConfig) -> dict[str, str]:
     """Which clips are copies, each with the reason, which names the clip that is kept.
 
     Args:
@@ -71,7 +71,7 @@ def mirrored(seen: Poses) -> Poses:
     return seen[:, list(MIRROR)] * np.array([-1.0, 1.0])
 
 
-def distance(one: Poses, two: Poses, config: CopyConfig) -> float:
+def distance(one: Poses, two: Poses, config: DuplicateConfig) -> float:
     """Least mean distance over all delays, which cost a little; infinite when nothing overlaps."""
     shortest = min(len(one), len(two))
     least = max(2, int(config.overlap * shortest))

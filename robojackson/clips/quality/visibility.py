@@ -37,7 +37,7 @@ PARTS = {
 """What is told when it is not seen in a larger share of the frames than `TOLD_SHARE`."""
 
 
-def weighed(track: LandmarkTrack) -> LandmarkTrack:
+def weigh_visibility(track: LandmarkTrack) -> LandmarkTrack:
     """The track with the visibility that the picture allows, and notes of what was not seen.
 
     Raises:

@@ -12,7 +12,7 @@ from pydantic.dataclasses import dataclass
 
 Purpose = Literal["score", "dance"]
 Format = Mapping[str, Any]
-PLAIN = ("http", "https")
+DIRECT_PROTOCOLS = ("http", "https")
 """Protocols that fetch one file, which can be resumed."""
 
 
@@ -54,13 +54,13 @@ def short_side(format_: Format) -> int:
 
 def _cost(format_: Format) -> tuple[int, bool, float]:
     """Least first: the smaller image, one file rather than pieces, fewer bytes."""
-    return short_side(format_), format_.get("protocol") not in PLAIN, _bytes(format_)
+    return short_side(format_), format_.get("protocol") not in DIRECT_PROTOCOLS, _bytes(format_)
 
 
 def _quality(format_: Format) -> tuple[int, bool, float]:
     """Greatest first: the larger image, one file rather than pieces, more frames, more bits."""
     rate = float(format_.get("fps") or 0) + 1e-6 * float(format_.get("tbr") or 0)
-    return short_side(format_), format_.get("protocol") in PLAIN, rate
+    return short_side(format_), format_.get("protocol") in DIRECT_PROTOCOLS, rate
 
 
 def _bytes(format_: Format) -> float:

@@ -10,7 +10,7 @@ PROGRAMS = {"deno": "deno", "node": "node", "bun": "bun", "quickjs": "qjs"}
 """yt-dlp's name of a runtime to its program, the best first."""
 OLDEST = {"deno": (2, 3), "node": (22,), "bun": (1, 2, 11)}
 """Versions that yt-dlp 2026.10 asks for."""
-ANSWER_S = 10.0
+VERSION_TIMEOUT_S = 10.0
 ADVICE = (
     "a JavaScript runtime, without which yt-dlp misses formats of YouTube: "
     ".venv/bin/pip install deno (or node 22 or later)"
@@ -40,7 +40,11 @@ def _version(program: str) -> tuple[int, ...]:
     """(22, 1, 0) of what it says of itself; () when it says nothing."""
     try:
         said = subprocess.run(
-            [program, "--version"], capture_output=True, text=True, timeout=ANSWER_S, check=False
+            [program, "--version"],
+            capture_output=True,
+            text=True,
+            timeout=VERSION_TIMEOUT_S,
+            check=False,
         ).stdout
     except (OSError, subprocess.TimeoutExpired):
         return ()

@@ -16,7 +16,7 @@ ZIP_FAILURES = (
     *(ValueError, TypeError, KeyError, NotImplementedError, RuntimeError),
 )
 """What `zipfile` raises on a damaged file."""
-MOST_TOLD = 12
+MAX_LISTED = 12
 """Names of arrays in a message."""
 MOST_BYTES = 2**29
 """Of one array: ten minutes of AMASS at 120 frames a second have 90 MB."""
@@ -50,7 +50,7 @@ def unpack(
             arrays = {name: _member(archive, found[name]) for name in chosen}
     except ZIP_FAILURES as cause:
         raise BadTable(f"{where}: not an .npz of plain arrays ({cause})") from cause
-    known = ", ".join(list(found)[:MOST_TOLD])
+    known = ", ".join(list(found)[:MAX_LISTED])
     for name in needed:
         if name not in arrays:
             raise BadTable(f"{where}: array {name!r} is missing. It has: {known}")

@@ -12,7 +12,7 @@ import numpy as np
 
 from robojackson.errors import BadTable
 
-PLAIN = "biufUS"
+NUMERIC_KINDS = "biufUS"
 """Kinds of dtypes that may be in a file, numbers and text: an array of objects holds anything."""
 
 
@@ -34,7 +34,7 @@ class NumberType:
     def dtype(self) -> np.dtype:
         """The type, its byte order set."""
         made = np.dtype(self.name)
-        if made.kind not in PLAIN:
+        if made.kind not in NUMERIC_KINDS:
             raise Refused(f"refused, it asks for an array of {made}")
         return made.newbyteorder({"|": "="}.get(self.order, self.order))  # type: ignore[arg-type]
 

@@ -120,7 +120,7 @@ def _read(data: bytes, words: Mapping[tuple[str, str], Any], where: str) -> dict
 def read_with(reader: Reader, where: str) -> dict[str, Any]:
     """The dictionary that a reader makes."""
     try:
-        content = plain(reader.load())
+        content = to_arrays(reader.load())
     except Refused as cause:
         raise Refused(f"{where}: {cause}") from cause
     except Exception as cause:  # a damaged file fails in any way
@@ -130,7 +130,7 @@ def read_with(reader: Reader, where: str) -> dict[str, Any]:
     return content
 
 
-def plain(value: Any) -> Any:
+def to_arrays(value: Any) -> Any:
     """The same with arrays in the place of what stood for them."""
     budget = [MOST_PARTS]
 

@@ -114,7 +114,7 @@ def _refined(
     spread = max(float(spread), np.radians(config.least_sd_deg))
     information = (np.eye(3) - np.outer(mean, mean) / length**2) / spread**2
     information += _between_feet(weight, feet) / total.sum() / config.floor_sd_m**2
-    information += np.diag(_held_level(up, config))
+    information += np.diag(_level_prior(up, config))
     least = np.linalg.eigh(information)[1][:, 0]
     return least * np.sign(least @ mean)
 
@@ -130,7 +130,7 @@ def _carrying(
     return still * np.exp(-above / config.support_height_m) + LEAST_WEIGHT
 
 
-def _held_level(up: np.ndarray, config: GravityConfig) -> Float[np.ndarray, "3"]:
+def _level_prior(up: np.ndarray, config: GravityConfig) -> Float[np.ndarray, "3"]:
     """Information of a camera held about level; the weight of a Cauchy prior where `up` is now."""
     spread = np.radians([config.roll_sd_deg, config.pitch_sd_deg])
     angle = np.arctan2(up[[0, 2]], -up[1])

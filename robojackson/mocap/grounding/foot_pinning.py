@@ -21,7 +21,7 @@ TIP_HZ = 6.0
 
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
-class LockConfig:
+class FootPinningConfig:
     """Weights of the root's path; only their ratios matter.
 
     Attributes:
@@ -48,7 +48,7 @@ def root_correction(
     planted: np.ndarray,
     slope: Float[np.ndarray, " T"],
     fps: float,
-    config: LockConfig,
+    config: FootPinningConfig,
 ) -> Float[np.ndarray, "T 3"]:
     """Horizontal shift of the body, so that planted points keep their place; z stays zero.
 
@@ -80,7 +80,7 @@ def _shift(
     slope: np.ndarray,
     trust: Float[np.ndarray, " T"],
     fps: float,
-    config: LockConfig,
+    config: FootPinningConfig,
 ) -> Float[np.ndarray, "T 2"]:
     """The least squares of `root_correction`; `trust` weighs the depth of the track by frame."""
     held = (planted[1:] & planted[:-1]).astype(float)

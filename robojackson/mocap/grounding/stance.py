@@ -12,10 +12,8 @@ from pydantic.dataclasses import dataclass as config_dataclass
 
 from robojackson.body import feet
 from robojackson.body.smoothing import lowpass
-from robojackson.mocap.grounding import contacts as contact_states
+from robojackson.mocap.grounding import contacts, foot_pinning, leg_ik
 from robojackson.mocap.grounding import floor as ground
-from robojackson.mocap.grounding import foot_pinning as locks
-from robojackson.mocap.grounding import leg_ik
 from robojackson.mocap.pose.posed_body import Body
 from robojackson.motion.smpl_sequence import AIR, PLANTED, SLIDING
 
@@ -26,15 +24,15 @@ ABOVE = np.array([0.0, 0.0, 1.0])
 
 
 @config_dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
-class StandConfig:
+class GroundingConfig:
     """Attributes:
     floor_cutoff_hz: Zero-phase low-pass of the height of the floor under the feet, hertz.
     contact, lock: Of the feet's states and of what holds them.
     """
 
     floor_cutoff_hz: float = 3.0
-    contact: contact_states.ContactConfig = Field(default_factory=contact_states.ContactConfig)
-    lock: locks.LockConfig = Field(default_factory=locks.LockConfig)
+    contact: contacts.ContactConfig = Field(default_factory=contacts.ContactConfig)
+    lock: foot_pinning.FootPinningConfig = Field(default_factory=foot_pinning.FootPinningConfig)
 
 
 @dataclass(frozen=True)
@@ -54,11 +52,11 @@ class _Evidence:
     along: Float[np.ndarray, "T 4"]
     slope: Float[np.ndarray, " T"]
     falling: np.ndarray
-    config: StandConfig
+    config: GroundingConfig
 
     def states(self, body: Body) -> Int[np.ndarray, "T 4"]:
         height = body.feet[..., 2]
-        return contact_states.contacts(
+        return contacts.contacts(
             height, self.speed, self.falling, self.fps, self.config.contact, self.along
         )
 
@@ -69,13 +67,13 @@ class _Evidence:
         return body.shifted(np.outer(-floor, ABOVE))
 
 
-def stand(body: Body, fps: float, config: StandConfig) -> Stance:
+def ground_body(body: Body, fps: float, config: GroundingConfig) -> Stance:
     """The body on the floor, its feet level and pinned where they stand, and the contacts."""
     height = ground.centre_of_mass(body.pose.points)[:, 2]
     falling = ground.free_fall(height, fps)
     flying = ground.flight(body.feet[..., 2].min(1), height, falling, fps)
-    speed, root = contact_states.image_speed(body.feet, fps), body.pose.points[:, 0]
-    along = contact_states.ray_speed(body.feet, fps)
+    speed, root = contacts.image_speed(body.feet, fps), body.pose.points[:, 0]
+    along = contacts.ray_speed(body.feet, fps)
     evidence = _Evidence(fps, speed, along, root[:, 1] / root[:, 0], falling, config)
     bias = np.full((len(falling), 2), feet.pitch_bias(body.feet, fps))
     body = evidence.dropped(body.aimed(feet.turn_feet(body.pose.points, bias)), flying)
@@ -118,14 +116,14 @@ def _pinned(
     """One round: standing feet level, the root moved, toes tipped, legs bent; share of level."""
     fps, lock = evidence.fps, evidence.config.lock
     ramp = lock.ramp_s * fps
-    flat = feet.standing(body.feet, planted)
-    held, share = feet.hold_flat(body.pose.points, body.rest, body.feet, flat, ramp)
+    flat = feet.stands_flat(body.feet, planted)
+    held, share = feet.level_feet(body.pose.points, body.rest, body.feet, flat, ramp)
     body = evidence.dropped(body.aimed(held, share), flying)
-    body = body.shifted(locks.root_correction(body.feet, planted, evidence.slope, fps, lock))
-    tips = locks.tip_angles(body.pose.points, body.feet, planted, fps, ramp)
+    body = body.shifted(foot_pinning.root_correction(body.feet, planted, evidence.slope, fps, lock))
+    tips = foot_pinning.tip_angles(body.pose.points, body.feet, planted, fps, ramp)
     body = body.aimed(feet.turn_feet(body.pose.points, tips), share)
-    pins = locks.pin_offsets(body.feet, planted, lock.fade_s * fps)
-    shared = locks.shared_height(pins, planted)
+    pins = foot_pinning.pin_offsets(body.feet, planted, lock.fade_s * fps)
+    shared = foot_pinning.shared_height(pins, planted)
     settled = lowpass(shared, fps, evidence.config.floor_cutoff_hz)
     body, pins = body.shifted(settled), pins - settled[:, None]
     return body.aimed(leg_ik.move_feet(body.pose.points, pins), share), share

@@ -25,7 +25,7 @@ from robojackson.motion.landmark_track import LandmarkTrack
 ANKLES = [landmark("left_ankle"), landmark("right_ankle")]
 
 
-def vote(tracks: Sequence[LandmarkTrack]) -> LandmarkTrack:
+def fuse_tracks(tracks: Sequence[LandmarkTrack]) -> LandmarkTrack:
     """One track of the same frames: the mean of those models that found the person.
 
     Args:

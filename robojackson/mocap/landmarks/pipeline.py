@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Literal
 
 from robojackson.clips.people.camera_path import camera_path
-from robojackson.clips.people.dancer import DancerConfig, follow
+from robojackson.clips.people.dancer import DancerConfig, track_dancer
 from robojackson.clips.video import VideoInfo, timed_frames
-from robojackson.mocap.landmarks.model_fusion import vote
+from robojackson.mocap.landmarks.model_fusion import fuse_tracks
 from robojackson.motion.landmark_track import LandmarkTrack
 
 Quality = Literal["lite", "full", "heavy", "best"]
@@ -28,7 +28,7 @@ def models_of(quality: str) -> tuple[str, ...]:
     return VOTERS.get(quality, (quality,))
 
 
-def see(
+def detect_landmarks(
     path: Path,
     info: VideoInfo,
     quality: str,
@@ -47,8 +47,8 @@ def see(
     models = models_of(quality)
     tracks = []
     for turn, size in enumerate(models):
-        tracks.append(follow(path, info, size, dancer, _part(progress, turn, len(models))))
-    return with_camera(path, vote(tracks) if len(tracks) > 1 else tracks[0])
+        tracks.append(track_dancer(path, info, size, dancer, _part(progress, turn, len(models))))
+    return with_camera(path, fuse_tracks(tracks) if len(tracks) > 1 else tracks[0])
 
 
 def with_camera(path: Path, track: LandmarkTrack) -> LandmarkTrack:

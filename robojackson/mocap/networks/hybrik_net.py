@@ -33,7 +33,7 @@ MIRROR_23 = mirror_order(23, first=1)
 
 
 @dataclass(frozen=True)
-class Seen:
+class NetworkOutput:
     """What the network says of a batch of crops.
 
     Attributes:
@@ -79,7 +79,7 @@ class HybrikNet(nn.Module):
         """Of the two scales of a flip test; distances average, so the mean is harmonic."""
         return 2.0 / (1.0 / scale + 1.0 / mirrored)
 
-    def forward(self, crop: Float[Tensor, "B 3 256 256"], flip_test: bool = False) -> Seen:
+    def forward(self, crop: Float[Tensor, "B 3 256 256"], flip_test: bool = False) -> NetworkOutput:
         """What is seen in crops, or the mean of that and of what is seen in their mirror images."""
         volume, features = self.look(crop)
         chance = probability(volume)
@@ -90,7 +90,7 @@ class HybrikNet(nn.Module):
             heads = self._averaged(heads, self._heads(features))
         sigma, twist, betas, scale = heads
         uvd, peak = expectation(chance)
-        return Seen(uvd, peak, sigma, twist, betas, scale)
+        return NetworkOutput(uvd, peak, sigma, twist, betas, scale)
 
     def _heads(self, features: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """sigma, twist, betas, scale."""

@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Sighting:
+class ClipPrediction:
     """What HybrIK's network says of a clip, one row a frame; units of `hybrik_net.Seen`.
 
     Attributes:
@@ -138,7 +138,7 @@ def estimate(
     view = crop_to_camera.View(
         person_crop.person_boxes(landmarks.image), camera.width, camera.height
     )
-    seen = sight(images, view, networks.hybrik, config, progress)
+    seen = run_hybrik(images, view, networks.hybrik, config, progress)
     if to_first is not None:
         boxes = person_crop.moved(seen.view.boxes, to_first[: len(seen.uvd)])
         seen = replace(seen, view=replace(seen.view, boxes=boxes))
@@ -162,13 +162,13 @@ def estimate(
     return found if networks.niki is None else refined(found, seen, networks.niki, config)
 
 
-def sight(
+def run_hybrik(
     images: Iterable[np.ndarray],
     view: crop_to_camera.View,
     network: HybrikNet,
     config: NetworkConfig,
     progress: Progress | None = None,
-) -> Sighting:
+) -> ClipPrediction:
     """Every frame through HybrIK's network."""
     total, done = len(view.boxes), 0
     rows: list[tuple[np.ndarray, ...]] = []
@@ -184,12 +184,12 @@ def sight(
             progress(done, total)
     uvd, sigma, twist, betas, scale = (np.concatenate(column) for column in zip(*rows, strict=True))
     shown = crop_to_camera.View(view.boxes[: len(uvd)], view.width, view.height)
-    return Sighting(uvd, sigma, twist, betas, scale, shown)
+    return ClipPrediction(uvd, sigma, twist, betas, scale, shown)
 
 
 def refined(
     found: Estimate,
-    seen: Sighting,
+    seen: ClipPrediction,
     network: niki.OneStage | niki.TwistSwing,
     config: NetworkConfig,
 ) -> Estimate:
@@ -210,7 +210,7 @@ def _crops(images: Iterable[np.ndarray], boxes: np.ndarray, batch: int) -> Itera
         yield np.stack(group)
 
 
-def _rest_joints(seen: Sighting, body: SmplBody | None) -> Float[np.ndarray, "29 3"]:
+def _rest_joints(seen: ClipPrediction, body: SmplBody | None) -> Float[np.ndarray, "29 3"]:
     """SMPL's of the clip's mean shape, or our own with the bones that the network drew."""
     if body is not None:
         return body.rest_joints(seen.betas.mean(0))

@@ -10,13 +10,13 @@ import numpy as np
 from jaxtyping import Float
 
 from robojackson.body.smoothing import lowpass
-from robojackson.clips.quality.visibility import weighed
-from robojackson.mocap.landmarks import pinhole_camera as cameras
+from robojackson.clips.quality.visibility import weigh_visibility
+from robojackson.mocap.landmarks import pinhole_camera
 from robojackson.mocap.landmarks.blazepose import fill_gaps, repair
 from robojackson.mocap.networks.inference import Estimate, Networks, Progress, estimate
 from robojackson.mocap.networks.network_config import NetworkConfig
 from robojackson.mocap.pose.known_twist import TurnedBody, pose_keypoints
-from robojackson.mocap.recover import MocapConfig, recover_points, told
+from robojackson.mocap.recover import MocapConfig, camera_facts, recover_points
 from robojackson.motion.landmark_track import LandmarkTrack, even_times, evenly
 from robojackson.motion.smpl_sequence import SmplSequence
 
@@ -41,9 +41,9 @@ def network_motion(
     Raises:
         TrackTooShort, NoPersonFound: nothing to look at.
     """
-    track = weighed(track)
-    focal = mocap.focal_px or cameras.guess_focal(track.width, track.height)
-    lens = cameras.Pinhole(focal, track.width, track.height)
+    track = weigh_visibility(track)
+    focal = mocap.focal_px or pinhole_camera.guess_focal(track.width, track.height)
+    lens = pinhole_camera.Pinhole(focal, track.width, track.height)
     in_frame = repair(replace(track, to_first=None))
     shown = (in_frame, track.to_first, lens, track.fps, mocap.depth_cutoff_hz)
     found = estimate(images, *shown, networks, config, progress)
@@ -54,7 +54,7 @@ def network_motion(
         found.keypoints, poser(found, mocap), landmarks.valid, lens, even.fps, mocap
     )
     notes = (*found.notes, *track.notes, *sequence.notes)
-    camera = told(sequence.camera, track)
+    camera = camera_facts(sequence.camera, track)
     return replace(sequence, betas=found.betas, person=track.person, notes=notes, camera=camera)
 
 

@@ -28,7 +28,7 @@ SIGNS: Mapping[Kind, tuple[str, ...]] = {
 BODY_PREFIXES = ("smpl.", "regressor.smpl_layer.")
 """Where the official files keep SMPL's tables."""
 WRAPPERS = ("model", "state_dict", "model_state_dict", "net")
-NAMED = 4
+MAX_LISTED = 4
 """Keys that an error names before it only counts."""
 UNREADABLE = (pickle.UnpicklingError, RuntimeError, EOFError, ValueError, KeyError, OSError)
 
@@ -56,7 +56,7 @@ def read_weights(path: Path, family: Literal["hybrik", "niki"]) -> Weights:
     Raises:
         BadWeights: missing, damaged, unsafe, of another network, or not finite.
     """
-    state = _plain_keys(_state_dict(_content(path), path))
+    state = _without_prefix(_state_dict(_content(path), path))
     kind = recognise(state, path)
     if not kind.startswith(family):
         raise BadWeights(f"{path}: holds {kind}, expected weights of {family} here")
@@ -160,7 +160,7 @@ def _state_dict(content: Any, path: Path) -> dict[str, Tensor]:
     return {str(key): value for key, value in content.items() if isinstance(value, Tensor)}
 
 
-def _plain_keys(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
+def _without_prefix(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
     """Keys without the `module.` that parallel training puts before them."""
     return {key.removeprefix("module."): value for key, value in state.items()}
 
@@ -176,5 +176,5 @@ def _cast(value: Tensor, kind: torch.dtype) -> Tensor:
 
 
 def _listed(keys: list[str]) -> str:
-    more = len(keys) - NAMED
-    return ", ".join(keys[:NAMED]) + (f" and {more} more" if more > 0 else "")
+    more = len(keys) - MAX_LISTED
+    return ", ".join(keys[:MAX_LISTED]) + (f" and {more} more" if more > 0 else "")

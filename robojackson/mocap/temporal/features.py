@@ -36,7 +36,7 @@ COUNT = len(SEEN) * 6 + 2 * (len(CHAINS) + len(WIDTHS)) + 1
 
 
 @dataclass(frozen=True)
-class Sight:
+class ClipView:
     """A clip along the rays to the person.
 
     Attributes:
@@ -54,18 +54,18 @@ class Sight:
     root: Float[np.ndarray, "T 3"]
 
 
-def look(
+def view_clip(
     placed: Float[np.ndarray, "T 33 3"],
     local: Float[np.ndarray, "T 33 3"],
     visibility: Float[np.ndarray, "T 33"],
-) -> Sight:
+) -> ClipView:
     """From landmarks that the camera stage has placed, and the detector's own."""
     rays = placed / placed[..., 2:]
     root = placed[:, HIPS].mean(1)
     axes = axes_along(root)
     seen = apply(np.swapaxes(axes, -1, -2)[:, None], rays)
     flat = seen[..., :2] / seen[..., 2:] * np.linalg.norm(root, axis=-1)[:, None, None]
-    return Sight(flat, local * METRES_PER_METRE, visibility, axes, root)
+    return ClipView(flat, local * METRES_PER_METRE, visibility, axes, root)
 
 
 def axes_along(ray: Float[np.ndarray, "T 3"]) -> Float[np.ndarray, "T 3 3"]:
@@ -75,7 +75,7 @@ def axes_along(ray: Float[np.ndarray, "T 3"]) -> Float[np.ndarray, "T 3 3"]:
     return np.stack([right, np.cross(forward, right), forward], -1)
 
 
-def numbers(sight: Sight) -> Float[np.ndarray, "T F"]:
+def numbers(sight: ClipView) -> Float[np.ndarray, "T F"]:
     """The network's input."""
     count = len(sight.flat)
     return np.concatenate(
@@ -89,12 +89,12 @@ def numbers(sight: Sight) -> Float[np.ndarray, "T F"]:
     )
 
 
-def constants(sight: Sight) -> Float[np.ndarray, " C"]:
+def constants(sight: ClipView) -> Float[np.ndarray, " C"]:
     """What is one for the whole clip: proportions of the person, and how near he is."""
     return np.concatenate([proportions(sight), [1.0 / max(sight.root[:, 2].mean(), 0.5)]])
 
 
-def proportions(sight: Sight) -> Float[np.ndarray, " P"]:
+def proportions(sight: ClipView) -> Float[np.ndarray, " P"]:
     """Bones of the clip: longest in the image, which depth cannot shorten, and the detector's."""
     pairs = [[(f"{s}_{a}", f"{s}_{b}") for s in ("left", "right")] for a, b in CHAINS.values()]
     pairs += [[(f"left_{name}", f"right_{name}")] for name in WIDTHS]
@@ -108,27 +108,27 @@ def proportions(sight: Sight) -> Float[np.ndarray, " P"]:
     return np.array(in_image + in_space)
 
 
-def base(sight: Sight) -> Float[np.ndarray, "T 12 3"]:
+def base(sight: ClipView) -> Float[np.ndarray, "T 12 3"]:
     """The body as the detector has it: depth of its own, the image at that depth."""
     depth = sight.local[:, BODY, 2]
     return np.concatenate([at_depth(sight, depth), depth[..., None]], -1)
 
 
-def at_depth(sight: Sight, depth: Float[np.ndarray, "T 12"]) -> Float[np.ndarray, "T 12 2"]:
+def at_depth(sight: ClipView, depth: Float[np.ndarray, "T 12"]) -> Float[np.ndarray, "T 12 2"]:
     """Where the body is across the image if it is that far behind the hips."""
     distance = np.linalg.norm(sight.root, axis=-1)[:, None]
     return sight.flat[:, BODY] * ((distance + depth) / distance)[..., None]
 
 
-def to_camera(sight: Sight, points: Float[np.ndarray, "T N 3"]) -> Float[np.ndarray, "T N 3"]:
+def to_camera(sight: ClipView, points: Float[np.ndarray, "T N 3"]) -> Float[np.ndarray, "T N 3"]:
     """From the axes along the ray to the camera's."""
     return apply(sight.axes[:, None], points) + sight.root[:, None]
 
 
-def mirror(sight: Sight) -> Sight:
+def mirror(sight: ClipView) -> ClipView:
     """The clip in a mirror: left becomes right, x changes its sign."""
     flip = np.array([-1.0, 1.0, 1.0])
-    return Sight(
+    return ClipView(
         flat=sight.flat[:, MIRROR] * flip[:2],
         local=sight.local[:, MIRROR] * flip,
         visibility=sight.visibility[:, MIRROR],

@@ -16,7 +16,7 @@ from pydantic.dataclasses import dataclass
 from robojackson.mocap.landmarks.blazepose import BODY
 from robojackson.mocap.landmarks.refinement import carry_along
 from robojackson.mocap.temporal import error_flow, features
-from robojackson.mocap.temporal.features import Sight
+from robojackson.mocap.temporal.features import ClipView
 from robojackson.mocap.temporal.temporal_network import load, run
 
 WEIGHTS = Path(__file__).parents[2] / "assets" / "temporal.safetensors"
@@ -87,7 +87,7 @@ def lift(
         BadWeights: the weights file is none of this network's.
     """
     weights = load(config.file)
-    sight = features.look(placed, local, visibility)
+    sight = features.view_clip(placed, local, visibility)
     places = features.time_grid(len(placed), fps)
     coarse = at(sight, places)
     change, spread, hidden = correct(coarse, weights)
@@ -101,7 +101,7 @@ def lift(
     return Lifted(carry_along(placed, points), features.resample(spread, back))
 
 
-def corrected(sight: Sight, change: Float[np.ndarray, "T 12 3"]) -> Float[np.ndarray, "T 12 3"]:
+def corrected(sight: ClipView, change: Float[np.ndarray, "T 12 3"]) -> Float[np.ndarray, "T 12 3"]:
     """The body along the rays: depth of detector and correction, the image at that depth."""
     depth = sight.local[:, BODY, 2] + change[..., 2]
     across = features.at_depth(sight, depth) + change[..., :2]
@@ -109,7 +109,7 @@ def corrected(sight: Sight, change: Float[np.ndarray, "T 12 3"]) -> Float[np.nda
 
 
 def correct(
-    sight: Sight, weights: error_flow.Weights
+    sight: ClipView, weights: error_flow.Weights
 ) -> tuple[np.ndarray, Float[np.ndarray, "T 12 2"], np.ndarray]:
     """Correction (T, 12, 3), spread, and the features of the plain view."""
     plain, spread, hidden = run(sight, weights)
@@ -140,7 +140,7 @@ def unseen(visibility: Float[np.ndarray, "T 33"]) -> Float[np.ndarray, "T 12"]:
     return np.clip((HIDDEN_BELOW - visibility[:, BODY]) / HIDDEN_BELOW, 0.0, 1.0)
 
 
-def at(sight: Sight, places: Float[np.ndarray, " S"]) -> Sight:
+def at(sight: ClipView, places: Float[np.ndarray, " S"]) -> ClipView:
     """The sight at other moments; the axes are not blended, nobody needs them there."""
     nearest = np.round(places).astype(int)
     return replace(

@@ -14,14 +14,14 @@ from robojackson.errors import BadWeights
 from robojackson.mocap.landmarks.blazepose import BODY
 from robojackson.mocap.temporal import features
 from robojackson.mocap.temporal.error_flow import Weights
-from robojackson.mocap.temporal.features import Sight
+from robojackson.mocap.temporal.features import ClipView
 
 DILATIONS = (1, 3, 9, 27)
 LOG_SPREAD, SPREAD_RANGE = -3.0, 3.0
 """Middle of the logarithm of the spread, metres, and how far it may go either way."""
 
 
-def run(sight: Sight, weights: Weights) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def run(sight: ClipView, weights: Weights) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """One pass: correction, spread, features."""
     x = (features.numbers(sight) - weights["mean"]) * weights["scale"]
     h = x @ weights["enter.weight"].T + weights["enter.bias"]

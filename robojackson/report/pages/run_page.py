@@ -13,7 +13,7 @@ from typing import Any
 
 import jinja2
 
-from robojackson.report.quantities import POLICY_TITLES, Fact, facts, written
+from robojackson.report.quantities import POLICY_TITLES, Quantity, format_value, quantities
 from robojackson.rl.config.evaluate_config import TRAINED
 
 VERDICT_COLUMNS = (
@@ -78,7 +78,7 @@ class PageContent:
 @dataclass(frozen=True)
 class _Section:
     title: str
-    lines: Sequence[Fact]
+    lines: Sequence[Quantity]
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ def render(content: PageContent) -> str:
         style=here.joinpath("page.css").read_text("utf-8"),
         headline=headline(content.evaluation),
         tiles=_tiles(content.evaluation),
-        columns=[Fact("", "")] + facts(dict.fromkeys(VERDICT_COLUMNS)),
+        columns=[Quantity("", "")] + quantities(dict.fromkeys(VERDICT_COLUMNS)),
         verdicts=verdicts(content.evaluation),
         sections=_sections(content),
         plots=[(plot, base64.b64encode(plot.png).decode()) for plot in content.plots],
@@ -121,8 +121,8 @@ def headline(evaluation: Mapping[str, Any]) -> str:
     if not evaluation:
         return ""
     said = (
-        f"The trained robot finished {written('success', evaluation['success'])} of "
-        f"{written('rollouts', evaluation['rollouts'])} rollouts without a fall"
+        f"The trained robot finished {format_value('success', evaluation['success'])} of "
+        f"{format_value('rollouts', evaluation['rollouts'])} rollouts without a fall"
     )
     baselines = evaluation.get("baselines", {})
     if not baselines:
@@ -131,14 +131,13 @@ def headline(evaluation: Mapping[str, Any]) -> str:
     best = POLICY_TITLES.get(name, (name, ""))[0]
     theirs, ours = baselines[name]["success"], evaluation["success"]
     if theirs < ours:
-        return f"{said}; the best baseline ({best}) {written('success', theirs)}."
+        return f"{said}; the best baseline ({best}) {format_value('success', theirs)}."
     how = "as well" if theirs == ours else "better"
-    return (
-        f"{said}; a baseline that learnt nothing ({best}) does {how}: {written('success', theirs)}."
-    )
+    figure = format_value("success", theirs)
+    return f"{said}; a baseline that learnt nothing ({best}) does {how}: {figure}."
 
 
-def _tiles(evaluation: Mapping[str, Any]) -> list[Fact]:
+def _tiles(evaluation: Mapping[str, Any]) -> list[Quantity]:
     meanings = {
         "success": "no fall in a whole rollout",
         "survived_s": "mean time before a fall",
@@ -148,7 +147,8 @@ def _tiles(evaluation: Mapping[str, Any]) -> list[Fact]:
     }
     found = {key: evaluation[key] for key in meanings if key in evaluation}
     return [
-        Fact(f.label, f.value, meanings[key]) for key, f in zip(found, facts(found), strict=True)
+        Quantity(f.label, f.value, meanings[key])
+        for key, f in zip(found, quantities(found), strict=True)
     ]
 
 
@@ -160,18 +160,20 @@ def verdicts(evaluation: Mapping[str, Any]) -> list[Verdict]:
     rows = []
     for name, figures in policies.items():
         title, meaning = POLICY_TITLES.get(name, (name, ""))
-        values = [written(column, figures.get(column)) for column in VERDICT_COLUMNS]
+        values = [format_value(column, figures.get(column)) for column in VERDICT_COLUMNS]
         rows.append(Verdict(title, meaning, values, name == TRAINED))
     return rows
 
 
 def _sections(content: PageContent) -> list[_Section]:
     found = [
-        _Section("Source clip", facts(content.source)),
-        _Section("Stability", facts(content.stability)),
-        _Section("Motion capture", facts(content.mocap)),
-        _Section("Retargeting", facts(content.scorecard, SCORECARD_LINES)),
-        _Section("Training", facts(content.training)),
-        _Section("Versions", [Fact(name, version) for name, version in content.versions.items()]),
+        _Section("Source clip", quantities(content.source)),
+        _Section("Stability", quantities(content.stability)),
+        _Section("Motion capture", quantities(content.mocap)),
+        _Section("Retargeting", quantities(content.scorecard, SCORECARD_LINES)),
+        _Section("Training", quantities(content.training)),
+        _Section(
+            "Versions", [Quantity(name, version) for name, version in content.versions.items()]
+        ),
     ]
     return [section for section in found if section.lines]

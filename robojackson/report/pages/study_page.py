@@ -38,7 +38,7 @@ BODIES = {
 }
 """Who does not dance, by the names of `robojackson.rl.evaluation.reward_audit`."""
 
-Payments = Mapping[str, Mapping[str, float]]
+RewardAudits = Mapping[str, Mapping[str, float]]
 """By setup: the share of a perfect dance's reward that each body earns, by its name."""
 
 
@@ -82,7 +82,7 @@ class StudyContent:
     claims: Sequence[Claim] = ()
     lines: Sequence[Line] = ()
     comparisons: Sequence[Comparison] = ()
-    payments: Mapping[str, Payments] = field(default_factory=dict)
+    payments: Mapping[str, RewardAudits] = field(default_factory=dict)
     moves: Sequence[Plot] = ()
     curves: Sequence[Plot] = ()
     judged: Sequence[Plot] = ()
@@ -153,7 +153,7 @@ def sentence(claim: Claim) -> str:
     return f"{told}; {100 * claim.effect.improvement:.0f} % chance that one run of it is better."
 
 
-def _by_reward(paid: Payments) -> list[tuple[str, list[str]]]:
+def _by_reward(paid: RewardAudits) -> list[tuple[str, list[str]]]:
     """Setups of one reward together, and its shares in per cent."""
     told = {setup: [f"{100 * of[body]:.0f}" for body in BODIES] for setup, of in paid.items()}
     rewards = dict.fromkeys(map(tuple, told.values()))

@@ -53,7 +53,7 @@ def learning_curves(curves: Mapping[str, Curves]) -> Figure:
     return figure
 
 
-def judged(
+def evaluation_plot(
     figures: Mapping[str, Mapping[str, Sequence[float]]],
     baselines: Mapping[str, Mapping[str, float]],
     label: str,

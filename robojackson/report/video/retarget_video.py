@@ -15,7 +15,7 @@ from robojackson.report.video import canvas
 from robojackson.report.video.encoder import write_video
 from robojackson.report.video.robot_panel import REFERENCE_TINT, RobotView
 from robojackson.report.video.side_by_side import VideoConfig
-from robojackson.report.video.skeleton_panel import follow, skeleton_panel, view_of
+from robojackson.report.video.skeleton_panel import skeleton_panel, smooth_camera_path, view_of
 from robojackson.report.video.timeline import Timeline, reference_qpos, timeline
 
 
@@ -42,7 +42,9 @@ def human_beside_robot(
     size = config.panel_width, config.panel_height
     with RobotView(model, *size, REFERENCE_TINT) as robot:
         pairs = _pairs(sequence, reference_qpos(reference, when), when, robot, config)
-        return write_video(_told(pairs, len(when), progress), config.fps, out, config.quality)
+        return write_video(
+            _with_progress(pairs, len(when), progress), config.fps, out, config.quality
+        )
 
 
 def _pairs(
@@ -53,8 +55,8 @@ def _pairs(
     config: VideoConfig,
 ) -> Iterator[canvas.Picture]:
     size = config.panel_width, config.panel_height
-    person_at = follow(sequence.keypoints_w[when.frame, 0], float(config.fps))
-    robot_at = follow(qpos[:, :3], float(config.fps))
+    person_at = smooth_camera_path(sequence.keypoints_w[when.frame, 0], float(config.fps))
+    robot_at = smooth_camera_path(qpos[:, :3], float(config.fps))
     for index, frame in enumerate(map(int, when.frame)):
         view = view_of(person_at[index], config.azimuth_deg, *size)
         person = skeleton_panel(sequence, frame, view, *size)
@@ -64,7 +66,7 @@ def _pairs(
         yield canvas.side_by_side([person, posed])
 
 
-def _told(
+def _with_progress(
     pictures: Iterator[canvas.Picture], total: int, progress: Callable[[int, int], None] | None
 ) -> Iterator[canvas.Picture]:
     for done, picture in enumerate(pictures, start=1):

@@ -20,7 +20,7 @@ from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.report.video import canvas
 from robojackson.report.video.encoder import write_video
 from robojackson.report.video.robot_panel import REFERENCE_TINT, TRAINED_TINT, RobotView
-from robojackson.report.video.skeleton_panel import follow, skeleton_panel, view_of
+from robojackson.report.video.skeleton_panel import skeleton_panel, smooth_camera_path, view_of
 from robojackson.report.video.source_panel import source_panels
 from robojackson.report.video.timeline import Timeline, reference_qpos, timeline
 
@@ -80,7 +80,7 @@ def side_by_side(
         film.add_robot("reference", reference_qpos(reference, when), model, REFERENCE_TINT)
         if rollout_qpos is not None and steps:
             film.add_robot("trained", rollout_qpos[when.rollout], model, TRAINED_TINT)
-        pictures = _told(film.pictures(), len(when), progress)
+        pictures = _with_progress(film.pictures(), len(when), progress)
         return write_video(pictures, config.fps, out, config.quality)
 
 
@@ -139,10 +139,10 @@ class Film:
         return panel
 
     def _followed(self, points: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "N 2"]:
-        return follow(points, float(self._config.fps))
+        return smooth_camera_path(points, float(self._config.fps))
 
 
-def _told(
+def _with_progress(
     pictures: Iterator[canvas.Picture], total: int, progress: Progress | None
 ) -> Iterator[canvas.Picture]:
     for done, picture in enumerate(pictures, start=1):

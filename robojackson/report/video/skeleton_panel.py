@@ -52,7 +52,7 @@ class View:
         return np.stack([u, self.centre[1] + self.focal * down / depth], -1)
 
 
-def follow(points: Float[np.ndarray, "T 3"], fps: float) -> Float[np.ndarray, "T 2"]:
+def smooth_camera_path(points: Float[np.ndarray, "T 3"], fps: float) -> Float[np.ndarray, "T 2"]:
     """Where on the floor a camera looks that follows a point gently."""
     return gaussian_filter1d(points[:, :2], SMOOTHING_S * fps, axis=0, mode="nearest")
 

@@ -82,7 +82,7 @@ def fallen(robot: Robot, qpos: Float[np.ndarray, "S nq"]) -> Bool[np.ndarray, " 
 def fall_height(robot: Robot) -> float:
     """Height of the root below which the robot has fallen, metres."""
     standing = robot.standing[None]
-    sole = inverse_dynamics.soles(robot, pose(tree(robot), standing))[0, :, 2].min()
+    sole = inverse_dynamics.sole_points(robot, pose(tree(robot), standing))[0, :, 2].min()
     return float(min(FALL_HEIGHT_M, FALL_SHARE * (standing[0, 2] - sole)))
 
 
@@ -162,7 +162,7 @@ def _finding(run: list[tuple[int, _Failure]]) -> Finding:
     usual, slowest = failures[len(failures) // 2], min(failure.tempo for failure in failures)
     if usual.cause in ("torque", "fall rule"):
         usual = failures[-1]
-    what, otherwise = _words(usual)
+    what, otherwise = _describe(usual)
     repair = f"slow to {slowest:.1f}" if slowest > 0 else otherwise
     return Finding(start, end, usual.cause, what, repair)
 
@@ -173,7 +173,7 @@ def _size(failure: _Failure) -> float:
     return sign * failure.amount + GRAVITY * failure.lever_m
 
 
-def _words(worst: _Failure) -> tuple[str, str]:
+def _describe(worst: _Failure) -> tuple[str, str]:
     """What fails, and what mends it where a slower tempo does not."""
     if worst.cause == "torque":
         return (

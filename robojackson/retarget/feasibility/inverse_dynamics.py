@@ -100,7 +100,7 @@ def demand(
     return Demand(force, weight * edges(robot, posed), usable, lower, upper, scale, ease)
 
 
-def soles(robot: Robot, posed: Posed) -> Float[np.ndarray, "S C 3"]:
+def sole_points(robot: Robot, posed: Posed) -> Float[np.ndarray, "S C 3"]:
     """Lowest points of the balls under the feet."""
     ground = posed.ball_pos.copy()
     ground[..., 2] -= robot.contact_radii
@@ -109,13 +109,13 @@ def soles(robot: Robot, posed: Posed) -> Float[np.ndarray, "S C 3"]:
 
 def touching(robot: Robot, qpos: Float[np.ndarray, "S nq"]) -> Bool[np.ndarray, "S C"]:
     """Soles near the floor, whatever their labels."""
-    return np.asarray(soles(robot, pose(tree(robot), qpos))[..., 2] < NEAR_M)
+    return np.asarray(sole_points(robot, pose(tree(robot), qpos))[..., 2] < NEAR_M)
 
 
 def edges(robot: Robot, posed: Posed) -> Float[np.ndarray, "S nv E"]:
     """Generalised force of a unit push along each edge of each sole's friction pyramid."""
     shape = tree(robot)
-    jacobian = point_jacobian(shape, posed, soles(robot, posed), robot.contact_bodies)
+    jacobian = point_jacobian(shape, posed, sole_points(robot, posed), robot.contact_bodies)
     force = jacobian.swapaxes(2, 3) @ directions()
     return np.asarray(force.swapaxes(1, 2).reshape(len(force), force.shape[2], -1))
 

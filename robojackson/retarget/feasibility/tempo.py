@@ -47,7 +47,7 @@ def feasible_tempo(slack: Float[np.ndarray, "K S"], within: float = 1.0) -> Floa
     return np.where(fits.any(axis=0), GRID[fits.argmax(axis=0)], 0.0)
 
 
-def wanted_rate(slack: Float[np.ndarray, "K S"]) -> Float[np.ndarray, " S"]:
+def required_rate(slack: Float[np.ndarray, "K S"]) -> Float[np.ndarray, " S"]:
     """The tempo that each step asks for: 1 where slowing down does not help.
 
     A step that no tempo makes feasible is slowed to the best one, where that is much better.

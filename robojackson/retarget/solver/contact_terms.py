@@ -24,7 +24,7 @@ from robojackson.robot.tree_kinematics import (
 _SETTLING_S = 0.15  # seconds
 
 
-def add_soles(problem: Problem, posed: Posed, out: Normal) -> None:
+def add_contacts(problem: Problem, posed: Posed, out: Normal) -> None:
     """Contact height, floor under feet in the air, and no slip of planted soles."""
     robot, weights, contact = problem.robot, problem.weights, problem.targets.contact
     ground = posed.ball_pos.copy()

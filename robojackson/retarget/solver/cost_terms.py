@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 
 from robojackson.retarget.solver.block_banded import Normal
 from robojackson.retarget.solver.clip_problem import Problem
-from robojackson.retarget.solver.contact_terms import add_balance, add_collisions, add_soles
+from robojackson.retarget.solver.contact_terms import add_balance, add_collisions, add_contacts
 from robojackson.retarget.solver.dynamics_term import add_dynamics
 from robojackson.robot.tree_kinematics import Posed, point_jacobian
 
@@ -25,7 +25,7 @@ def linearise(problem: Problem, qpos: Float[np.ndarray, "N nq"]) -> Normal:
     posed, touches = problem.detector.look(problem.tree, qpos)
     velocity = problem.velocity(qpos)
     keypoint_normal(problem, posed, out)
-    add_soles(problem, posed, out)
+    add_contacts(problem, posed, out)
     add_balance(problem, posed, out)
     add_dynamics(problem, qpos, posed, out)
     add_collisions(problem, posed, touches, out)

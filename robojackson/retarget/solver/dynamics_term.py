@@ -91,7 +91,7 @@ def pushed_slopes(
     by r a_k x z.
     """
     robot, tree = problem.robot, problem.tree
-    points = inverse_dynamics.soles(robot, posed)
+    points = inverse_dynamics.sole_points(robot, posed)
     jacobian = point_jacobian(tree, posed, points, robot.contact_bodies)
     edges = inverse_dynamics.directions() * inverse_dynamics.body_weight(robot)
     force = pushes.reshape(*points.shape[:2], -1) @ edges.T

@@ -16,7 +16,7 @@ from pydantic.dataclasses import dataclass as config_dataclass
 from robojackson.retarget.solver.block_banded import Chain, Normal
 from robojackson.retarget.solver.clip_problem import Problem
 from robojackson.retarget.solver.cost_terms import linearise
-from robojackson.retarget.targets.keypoint_targets import taken
+from robojackson.retarget.targets.keypoint_targets import select_steps
 from robojackson.robot.model import Robot
 from robojackson.robot.tree_kinematics import integrate
 
@@ -78,7 +78,7 @@ def solve(
     windows = _windows(len(qpos)) if not problem.ring else [slice(0, len(qpos))]
     cost = 0.0
     for window in windows:
-        part = replace(problem, targets=taken(problem.targets, window))
+        part = replace(problem, targets=select_steps(problem.targets, window))
         held = _HELD if window.start else 0
         found = _solve_window(part, qpos[window], config, iterations, wanted, held)
         qpos[window] = found.qpos

@@ -53,7 +53,7 @@ class CycleConfig:
 
 
 @dataclass(frozen=True)
-class Lap:
+class Cycle:
     """Frames [start, end) of a lap; `end` may be one past the clip.
 
     Attributes:
@@ -74,7 +74,7 @@ def human_clip(
     cyclic: Literal["auto", "yes", "no"],
     tempo: float,
     config: CycleConfig,
-) -> tuple[HumanClip, Lap | None]:
+) -> tuple[HumanClip, Cycle | None]:
     """The clip at the solver's steps, closed to a lap where it is (or is said to be) cyclic.
 
     Raises:
@@ -85,20 +85,20 @@ def human_clip(
             f"{len(sequence)} frames ({len(sequence) / sequence.fps:.2f} s) are too short to "
             f"retarget: at least {_MIN_STEPS * dt:.2f} s are needed"
         )
-    lap = None if cyclic == "no" else find_lap(sequence, config)
+    lap = None if cyclic == "no" else find_cycle(sequence, config)
     if lap is None and cyclic == "yes":  # whoever turns on with every lap is turned back
-        lap = find_lap(sequence, replace(config, heading_deg=180.0))
+        lap = find_cycle(sequence, replace(config, heading_deg=180.0))
     if lap is None or (cyclic == "auto" and not _nearly_cyclic(lap, config)):
         return _open_clip(sequence, dt, tempo), None
     _log.info("lap: frames %d to %d, seam %.3f m", lap.start, lap.end, lap.seam_m)
     return _closed_clip(sequence, lap, dt, tempo, config), lap
 
 
-def _nearly_cyclic(lap: Lap, config: CycleConfig) -> bool:
+def _nearly_cyclic(lap: Cycle, config: CycleConfig) -> bool:
     return lap.seam_m <= config.tolerance_m and lap.seam_deg <= config.limb_deg
 
 
-def find_lap(sequence: SmplSequence, config: CycleConfig) -> Lap | None:
+def find_cycle(sequence: SmplSequence, config: CycleConfig) -> Cycle | None:
     """The whole clip where it is a loop; else the lap with the smallest seam, longer ones
     preferred when they are as good."""
     pose, speed, yaw = _features(sequence)
@@ -106,8 +106,8 @@ def find_lap(sequence: SmplSequence, config: CycleConfig) -> Lap | None:
     shortest = max(int(np.ceil(config.keep_share * frames)), 4)
     seam, turn = _seams(pose, speed, yaw, 0, np.array([frames]))
     if seam[0] <= _WHOLE_SEAM_M and turn[0] <= np.radians(config.heading_deg):
-        return Lap(0, frames, float(seam[0]), _limb_angle(pose[0], pose[frames]))
-    best: Lap | None = None
+        return Cycle(0, frames, float(seam[0]), _limb_angle(pose[0], pose[frames]))
+    best: Cycle | None = None
     best_score = np.inf
     stride = max(1, frames // 120)
     for start in range(0, frames - shortest + 1, stride):
@@ -119,7 +119,7 @@ def find_lap(sequence: SmplSequence, config: CycleConfig) -> Lap | None:
         if score[index] < best_score:
             best_score = float(score[index])
             angle = _limb_angle(pose[start], pose[ends[index]])
-            best = Lap(start, int(ends[index]), float(seam[index]), angle)
+            best = Cycle(start, int(ends[index]), float(seam[index]), angle)
     return best
 
 
@@ -189,7 +189,7 @@ def _open_clip(sequence: SmplSequence, dt: float, tempo: float) -> HumanClip:
 
 
 def _closed_clip(
-    sequence: SmplSequence, lap: Lap, dt: float, tempo: float, config: CycleConfig
+    sequence: SmplSequence, lap: Cycle, dt: float, tempo: float, config: CycleConfig
 ) -> HumanClip:
     """A lap with an even number of steps; the clock is stretched to fit (under one step a lap)."""
     seconds = (lap.end - lap.start) / sequence.fps

@@ -160,10 +160,10 @@ def _trunk_frame(human: Mapping[str, np.ndarray]) -> Float[np.ndarray, "N 3 3"]:
 
 def every_second(wanted: Targets) -> Targets:
     """The same targets at half the rate."""
-    return replace(taken(wanted, slice(None, None, 2)), dt=2 * wanted.dt)
+    return replace(select_steps(wanted, slice(None, None, 2)), dt=2 * wanted.dt)
 
 
-def taken(wanted: Targets, steps: slice) -> Targets:
+def select_steps(wanted: Targets, steps: slice) -> Targets:
     """Some of the steps."""
     return replace(
         wanted,

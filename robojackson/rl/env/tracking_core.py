@@ -119,7 +119,7 @@ class TrackingCore:
         own = {
             name: getattr(self, name).copy() for name in ("step_index", "_start", "_age", "_last")
         }
-        seen = {f"sim_{name}": getattr(self.sim, name).copy() for name in SEEN}
+        seen = {f"sim_{name}": getattr(self.sim, name).copy() for name in OBSERVED}
         counted = {"episode": np.array(self.episode), "physics": physics}
         return {**own, **seen, **counted, **self._totals.state(), **self.mode.state()}
 
@@ -129,7 +129,7 @@ class TrackingCore:
             mujoco.mj_setState(self.sim.model, data, row, PHYSICS)
         for name in ("step_index", "_start", "_age", "_last"):
             setattr(self, name, np.array(state[name]))
-        for name in SEEN:
+        for name in OBSERVED:
             getattr(self.sim, name)[:] = state[f"sim_{name}"]
         self.episode = int(state["episode"])
         self._totals.restore(state)
@@ -169,7 +169,7 @@ class TrackingCore:
         self._last[indices] = 0.0
 
 
-SEEN = ("qpos", "qvel", "points", "com", "broken")
+OBSERVED = ("qpos", "qvel", "points", "com", "broken")
 """What a simulation shows of its copies."""
 
 

@@ -26,12 +26,12 @@ from robojackson.rl.config.train_config import (
     TrackConfig,
 )
 from robojackson.rl.evaluation.controllers import control_of, drivers, fact, mode_of
-from robojackson.rl.evaluation.reward_audit import Shares, both_readings, told
-from robojackson.rl.evaluation.reward_meter import Meter, yardstick
-from robojackson.rl.evaluation.rollout_records import Judge
+from robojackson.rl.evaluation.reward_audit import RewardAudit, audit_both_readings, audit_record
+from robojackson.rl.evaluation.reward_meter import RewardMeter, without_curiosity
+from robojackson.rl.evaluation.rollout_records import RolloutScorer
 from robojackson.rl.evaluation.rollouts import Rollouts, Starts, roll_out
 from robojackson.rl.modes.paper_mode import facing_ahead
-from robojackson.rl.modes.reset_states import default_stand, noisy, stand_at
+from robojackson.rl.modes.reset_states import default_standing_pose, noisy, standing_pose_at
 from robojackson.rl.policy import Policy
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.simulation import require_same_clock
@@ -63,7 +63,7 @@ class Evaluation:
     rollout_qpos: Float[np.ndarray, "S nq"]
 
 
-def evaluate(
+def evaluate_policy(
     policy: Policy,
     reference: ReferenceMotion,
     robot: Robot,
@@ -77,14 +77,17 @@ def evaluate(
     """
     control = control_of(policy, robot)
     require_same_clock(control.substeps * robot.model.opt.timestep, reference.dt)
-    _tell_strangers(policy, reference)
+    _warn_about_other_motion(policy, reference)
     environment = environment_of(policy, control)
     if isinstance(environment, PaperConfig):
         reference = facing_ahead(reference)
     clip = Clip(reference)
     starts, labels = _starts(robot, clip, config)
     horizon = clip.horizon(starts.step, config.seconds)
-    judge, meter = Judge(robot, reference, config), Meter(robot, reference, clip, environment)
+    judge, meter = (
+        RolloutScorer(robot, reference, config),
+        RewardMeter(robot, reference, clip, environment),
+    )
     rows: list[dict[str, object]] = []
     summaries: dict[str, dict[str, float]] = {}
     qpos = np.zeros((0, robot.model.nq))
@@ -96,7 +99,7 @@ def evaluate(
         rows += judged
         summaries[name] = summarise(judged)
         if name == TRAINED:
-            qpos = _shown(done, starts)
+            qpos = _recorded_rollout(done, starts)
     own = summaries.pop(TRAINED)
     variants = {name: summaries.pop(name) for name in VARIANTS if name in summaries}
     reward = reward_report(robot, reference, environment, own, float(horizon.mean()))
@@ -111,7 +114,7 @@ def environment_of(policy: Policy, control: ControlConfig) -> TrackConfig | Pape
     if not isinstance(held, Mapping):
         return PaperConfig() if paper else TrackConfig(control=control)
     kind: type[PaperConfig | TrackConfig] = PaperConfig if paper else TrackConfig
-    return yardstick(fact(policy, "environment", kind))
+    return without_curiosity(fact(policy, "environment", kind))
 
 
 def reward_report(
@@ -125,16 +128,18 @@ def reward_report(
 
     `flagged` says that a statue carried along would earn over 90 % of the policy's return.
     """
-    asked = both_readings(robot, reference, environment)
+    asked = audit_both_readings(robot, reference, environment)
     reading = environment.relative if isinstance(environment, PaperConfig) else "track"
-    nothing = Shares(float("nan"), {"statue": float("nan")})  # a reward that asks for no motion
+    nothing = RewardAudit(
+        float("nan"), {"statue": float("nan")}
+    )  # a reward that asks for no motion
     known = asked.get(reading, nothing)
     statue = known.statue * steps
     terms = {k.removeprefix("reward_"): v for k, v in own.items() if k.startswith("reward_")}
     total = sum(abs(value) for value in terms.values()) or 1.0
     return {
         "of_terms": {name: value / total for name, value in terms.items()},
-        "asks": told(asked),
+        "asks": audit_record(asked),
         "perfect_return": known.perfect * steps,
         "statue_return": statue,
         "own_return": own["return_own"],
@@ -142,7 +147,7 @@ def reward_report(
     }
 
 
-def _tell_strangers(policy: Policy, reference: ReferenceMotion) -> None:
+def _warn_about_other_motion(policy: Policy, reference: ReferenceMotion) -> None:
     """A policy may be judged on another motion than it learnt, but not without a word."""
     learnt = policy.facts.get("reference_sha256")
     if learnt is not None and learnt != poses_sha256(reference):
@@ -181,11 +186,11 @@ def _starts(
         root_speed_noise=config.root_speed_noise,
     )
     qpos, qvel = noisy(at.qpos, at.qvel, noise, np.random.default_rng(config.seed))
-    qpos[-1], qvel[-1] = stand_at(default_stand(robot.model), at.qpos[-1, :7]), 0.0
+    qpos[-1], qvel[-1] = standing_pose_at(default_standing_pose(robot.model), at.qpos[-1, :7]), 0.0
     return Starts(step, qpos, qvel), labels
 
 
-def _shown(rollouts: Rollouts, starts: Starts) -> np.ndarray:
+def _recorded_rollout(rollouts: Rollouts, starts: Starts) -> np.ndarray:
     """The rollout from the clip's first step, its start first, with its fall if it falls."""
     steps = min(int(rollouts.length[0]) + 1, len(rollouts.qpos))
     return np.concatenate([starts.qpos[:1], rollouts.qpos[:steps, 0]])

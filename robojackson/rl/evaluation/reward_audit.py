@@ -17,7 +17,7 @@ from robojackson.rl.config.train_config import (
     TerminationConfig,
     TrackConfig,
 )
-from robojackson.rl.evaluation.reward_meter import Meter
+from robojackson.rl.evaluation.reward_meter import RewardMeter
 from robojackson.rl.evaluation.rollouts import Driver, Moment, Starts, roll_out
 from robojackson.rl.modes.paper_mode import facing_ahead
 from robojackson.rl.sim.reference_clip import Clip
@@ -30,7 +30,7 @@ FLAIL_RAD, FLAIL_HZ = 0.35, 2.0
 
 
 @dataclass(frozen=True)
-class Shares:
+class RewardAudit:
     """Shares of a perfect dance.
 
     Attributes:
@@ -47,13 +47,13 @@ class Shares:
         return self.perfect * self.of["statue"]
 
 
-def shares(
+def audit_reward(
     robot: Robot, reference: ReferenceMotion, environment: TrackConfig | PaperConfig
-) -> Shares:
+) -> RewardAudit:
     """What the reward of an environment pays to bodies that do not dance."""
     motion = facing_ahead(reference)
     clip = Clip(motion)
-    meter = Meter(robot, motion, clip, environment)
+    meter = RewardMeter(robot, motion, clip, environment)
     earned = {
         name: float(np.mean(_earned(robot, clip, meter, qpos, qvel)))
         for name, (qpos, qvel) in bodies(motion).items()
@@ -61,25 +61,25 @@ def shares(
     perfect = earned.pop("perfect")
     of = {name: value / perfect for name, value in earned.items()}
     of["zero_residual"] = _replayed(robot, clip, meter) / (perfect * _most(clip))
-    return Shares(perfect, of)
+    return RewardAudit(perfect, of)
 
 
-def both_readings(
+def audit_both_readings(
     robot: Robot, reference: ReferenceMotion, environment: TrackConfig | PaperConfig
-) -> dict[str, Shares]:
+) -> dict[str, RewardAudit]:
     """The paper leaves open whether points are compared relative to the root: one answer for each;
     our own reward has one. None where the reward asks for no motion at all."""
     if isinstance(environment, TrackConfig):
-        return {"track": shares(robot, reference, environment)}
+        return {"track": audit_reward(robot, reference, environment)}
     if not environment.imitation:
         return {}
     return {
-        "root": shares(robot, reference, replace(environment, relative="root")),
-        "world": shares(robot, reference, replace(environment, relative="world")),
+        "root": audit_reward(robot, reference, replace(environment, relative="root")),
+        "world": audit_reward(robot, reference, replace(environment, relative="world")),
     }
 
 
-def told(asked: dict[str, Shares]) -> dict[str, dict[str, float]]:
+def audit_record(asked: dict[str, RewardAudit]) -> dict[str, dict[str, float]]:
     """As figures for a table or JSON."""
     return {name: {"perfect_step": s.perfect, **s.of} for name, s in asked.items()}
 
@@ -109,7 +109,7 @@ def bodies(
 
 
 def _earned(
-    robot: Robot, clip: Clip, meter: Meter, qpos: np.ndarray, qvel: np.ndarray
+    robot: Robot, clip: Clip, meter: RewardMeter, qpos: np.ndarray, qvel: np.ndarray
 ) -> Float[np.ndarray, " S"]:
     """What states earn that are put where the reference is."""
     n = len(qpos)
@@ -122,7 +122,7 @@ def _earned(
     return meter(Moment(sim, at, before, still, np.zeros(n, bool)))["return_own"]
 
 
-def _replayed(robot: Robot, clip: Clip, meter: Meter) -> float:
+def _replayed(robot: Robot, clip: Clip, meter: RewardMeter) -> float:
     """What the reference's hinge angles earn as targets, up to the fall."""
     driver = Driver(
         ControlConfig(),

@@ -14,12 +14,12 @@ from robojackson.rl.config.train_config import PaperConfig, RewardConfig, TrackC
 from robojackson.rl.evaluation.rollouts import Moment, Reading
 from robojackson.rl.modes.paper_mode import PaperPoints
 from robojackson.rl.modes.paper_reward import Miss, miss, paper_terms
-from robojackson.rl.modes.track_mode import judged, tracked_points
+from robojackson.rl.modes.track_mode import evaluate_step, tracked_points
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.robot.model import Robot
 
 
-class Meter:
+class RewardMeter:
     """Reads the rewards of a moment.
 
     Args:
@@ -65,11 +65,11 @@ class Meter:
     def _tracked(self, moment: Moment, reward: RewardConfig) -> Reading:
         sim = moment.sim
         moved = (sim.points - moment.before) / self._clip.dt
-        _, terms = judged(sim, moved, moment.at, moment.change, self._which, reward)
+        _, terms = evaluate_step(sim, moved, moment.at, moment.change, self._which, reward)
         return {name: np.where(moment.fell, 0.0, term) for name, term in terms.items()}
 
 
-def yardstick(environment: TrackConfig | PaperConfig) -> TrackConfig | PaperConfig:
+def without_curiosity(environment: TrackConfig | PaperConfig) -> TrackConfig | PaperConfig:
     """The same environment without the bonus for curiosity."""
     if isinstance(environment, PaperConfig):
         return replace(environment, curiosity="off")

@@ -28,7 +28,7 @@ LEAST_TRAVEL_M = 0.5
 """Of the reference, below which no travel ratio is told, metres."""
 
 
-class Judge:
+class RolloutScorer:
     """Turns one rollout into one row of the table."""
 
     def __init__(self, robot: Robot, reference: ReferenceMotion, config: EvaluateConfig) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 
 from robojackson.rl.config.train_config import PaperConfig
 from robojackson.rl.env.tracking_core import TrackingCore
-from robojackson.rl.modes.standing_motion import standing
+from robojackson.rl.modes.standing_motion import make_standing_motion
 from robojackson.rl.policy import Policy
 from robojackson.robot.model import Robot
 
@@ -31,7 +31,7 @@ class Walk:
 def walk(policy: Policy, robot: Robot, episodes: int = 10, seed: int = 0) -> Walk:
     """Let a policy of 348 observations (or of the first 45 of them) walk till it falls."""
     config = PaperConfig(preset="walker")
-    core = TrackingCore(robot, standing(robot), config, episodes, seed)
+    core = TrackingCore(robot, make_standing_motion(robot), config, episodes, seed)
     seen = core.reset()
     total, length, ahead = (np.zeros(episodes) for _ in range(3))
     alive = np.ones(episodes, bool)

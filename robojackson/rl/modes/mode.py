@@ -32,7 +32,7 @@ class Score:
 
 
 @dataclass(frozen=True)
-class Beginning:
+class EpisodeStart:
     """States in which episodes begin, and the clip step that each belongs to."""
 
     step: Int[np.ndarray, " I"]
@@ -76,7 +76,7 @@ class Mode(Protocol):
             episode: Number of episodes that ended before.
         """
 
-    def begin(self, count: int, rng: np.random.Generator) -> Beginning:
+    def begin(self, count: int, rng: np.random.Generator) -> EpisodeStart:
         """States for new episodes."""
 
     def ended(

@@ -17,7 +17,7 @@ from robojackson.geometry.rotations import heading, quat_multiply
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.paper_config import POINT_WEIGHTS
 from robojackson.rl.config.train_config import ControlConfig, PaperConfig
-from robojackson.rl.modes.mode import Beginning, Score
+from robojackson.rl.modes.mode import EpisodeStart, Score
 from robojackson.rl.modes.paper_reward import PaperState, has_fallen, miss, paper_terms, ramp
 from robojackson.rl.sim.reference_clip import Clip, ClipStep
 from robojackson.rl.sim.simulation import Simulation
@@ -79,12 +79,12 @@ class PaperMode:
         errors = {"error_root_m2": apart.root, "error_world_m2": apart.world}
         return Score(terms, fell, self._site_error(at), errors)
 
-    def begin(self, count: int, rng: np.random.Generator) -> Beginning:
+    def begin(self, count: int, rng: np.random.Generator) -> EpisodeStart:
         noise, model = self._config.reset_noise, self.sim.model
         qpos = self._stand + rng.uniform(-noise, noise, (count, model.nq))
         qpos[:, 3:7] /= np.linalg.norm(qpos[:, 3:7], axis=-1, keepdims=True)
         qvel = rng.uniform(-noise, noise, (count, model.nv))
-        return Beginning(np.zeros(count, int), qpos, qvel)
+        return EpisodeStart(np.zeros(count, int), qpos, qvel)
 
     def ended(
         self, start: Int[np.ndarray, " I"], failed: np.ndarray, age: Int[np.ndarray, " I"]

@@ -105,7 +105,7 @@ def noisy(
     return qpos, qvel
 
 
-def default_stand(model: mujoco.MjModel) -> Float[np.ndarray, " nq"]:
+def default_standing_pose(model: mujoco.MjModel) -> Float[np.ndarray, " nq"]:
     """The model's zero pose with its lowest geom on the floor, facing +x at the origin."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -116,7 +116,7 @@ def default_stand(model: mujoco.MjModel) -> Float[np.ndarray, " nq"]:
     return qpos
 
 
-def stand_at(stand: Float[np.ndarray, " nq"], root: Float[np.ndarray, " 7"]) -> np.ndarray:
+def standing_pose_at(stand: Float[np.ndarray, " nq"], root: Float[np.ndarray, " 7"]) -> np.ndarray:
     """The default stand moved to a root pose's place over the floor and its heading."""
     qpos = stand.copy()
     yaw = float(heading(root[3:7]))

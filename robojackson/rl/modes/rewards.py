@@ -133,7 +133,7 @@ def fallen(qpos: Float[np.ndarray, "N nq"], config: TerminationConfig) -> Bool[n
     return (qpos[:, 2] < config.fall_height) | (upright < np.cos(config.fall_tilt))
 
 
-def lost(errors: TrackingErrors, config: TerminationConfig) -> Bool[np.ndarray, " N"]:
+def is_off_track(errors: TrackingErrors, config: TerminationConfig) -> Bool[np.ndarray, " N"]:
     """Early termination of training: too far from the reference to learn from."""
     return (
         (errors.orientation > config.orientation)

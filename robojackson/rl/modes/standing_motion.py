@@ -4,17 +4,17 @@ import mujoco
 import numpy as np
 
 from robojackson.motion.reference_motion import ReferenceMotion
-from robojackson.rl.modes.reset_states import default_stand
+from robojackson.rl.modes.reset_states import default_standing_pose
 from robojackson.robot.model import Robot
 
 STEPS = 20
 
 
-def standing(robot: Robot) -> ReferenceMotion:
+def make_standing_motion(robot: Robot) -> ReferenceMotion:
     """The default stand, held, cyclic."""
     model, dt = robot.model, robot.description.control_dt
     data = mujoco.MjData(model)
-    data.qpos[:] = default_stand(model)
+    data.qpos[:] = default_standing_pose(model)
     mujoco.mj_kinematics(model, data)
     held = lambda value: np.repeat(np.asarray(value, float)[None], STEPS, 0)  # noqa: E731
     return ReferenceMotion(

@@ -13,20 +13,20 @@ from jaxtyping import Float, Int
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.paper_config import BETA
 from robojackson.rl.config.train_config import RewardConfig, TrackConfig
-from robojackson.rl.modes.mode import Beginning, Score
+from robojackson.rl.modes.mode import EpisodeStart, Score
 from robojackson.rl.modes.observation import observation_size, observe
 from robojackson.rl.modes.reset_states import (
     SettledStates,
     StartPhases,
-    default_stand,
+    default_standing_pose,
     noisy,
-    stand_at,
+    standing_pose_at,
 )
 from robojackson.rl.modes.rewards import (
     TrackedPoints,
     TrackingErrors,
     fallen,
-    lost,
+    is_off_track,
     reward_terms,
     tracking_errors,
 )
@@ -56,7 +56,7 @@ class TrackMode:
         self.sim = Simulation(robot, config.control, n, config.threads, config.random, seed)
         self.starts = StartPhases(self.clip, config.reset.failure_share)
         self._settled = SettledStates(robot.model.nq, robot.model.nv)
-        self._stand = default_stand(robot.model)
+        self._stand = default_standing_pose(robot.model)
         self.limit = round(config.episode_seconds / self.clip.dt)
         self.observation_size = observation_size(robot.model.nq - 7, robot.model.nu, len(names))
 
@@ -72,24 +72,24 @@ class TrackMode:
     def score(self, at: ClipStep, before: np.ndarray, change: np.ndarray, episode: int) -> Score:
         sim, rules = self.sim, self._config.termination
         moved = (sim.points - before) / self.clip.dt
-        errors, terms = judged(sim, moved, at, change, self._which, self._config.reward)
-        failed = fallen(sim.qpos, rules) | lost(errors, rules) | sim.broken
+        errors, terms = evaluate_step(sim, moved, at, change, self._which, self._config.reward)
+        failed = fallen(sim.qpos, rules) | is_off_track(errors, rules) | sim.broken
         return Score(terms, failed, errors.site_mean)
 
-    def begin(self, count: int, rng: np.random.Generator) -> Beginning:
+    def begin(self, count: int, rng: np.random.Generator) -> EpisodeStart:
         reset = self._config.reset
         phase = self.starts.draw(count, rng)
         at = self.clip.at(phase)
         qpos, qvel = noisy(at.qpos, at.qvel, reset, rng)
         kind = rng.random(count)
         for row in np.flatnonzero(kind < reset.stand_share):
-            qpos[row], qvel[row] = stand_at(self._stand, at.qpos[row, :7]), 0.0
+            qpos[row], qvel[row] = standing_pose_at(self._stand, at.qpos[row, :7]), 0.0
         if len(self._settled) >= SETTLED_STATES_NEEDED:
             chosen = (kind >= reset.stand_share) & (kind < reset.stand_share + reset.settled_share)
             for row in np.flatnonzero(chosen):
                 qpos[row], qvel[row], phase[row] = self._settled.draw(rng)
                 qpos[row, :2] += self.clip.at(phase[row : row + 1]).qpos[0, :2]
-        return Beginning(phase, qpos, qvel)
+        return EpisodeStart(phase, qpos, qvel)
 
     def ended(
         self, start: Int[np.ndarray, " I"], failed: np.ndarray, age: Int[np.ndarray, " I"]
@@ -118,7 +118,7 @@ class TrackMode:
         self._settled.restore(state)
 
 
-def judged(
+def evaluate_step(
     sim: Simulation,
     moved: Float[np.ndarray, "N K 3"],
     at: ClipStep,

@@ -86,10 +86,10 @@ def load_networks(path: Path) -> Networks:
         raise BadPolicy(
             f"{path} is not a {FORMAT} file; `robojackson train` writes networks.safetensors"
         )
-    return whole(Networks(tensors, facts), path)
+    return require_complete(Networks(tensors, facts), path)
 
 
-def whole(networks: Networks, path: Path) -> Networks:
+def require_complete(networks: Networks, path: Path) -> Networks:
     """The networks, if every array is there, measures what its neighbours ask for and is finite.
 
     Raises:

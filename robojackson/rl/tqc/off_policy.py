@@ -41,7 +41,7 @@ def arguments(config: TqcConfig, seed: int, env: VecEnv) -> dict[str, Any]:
     }
 
 
-def patient(model: OffPolicyAlgorithm, warmup: int) -> bool:
+def is_warming_up(model: OffPolicyAlgorithm, warmup: int) -> bool:
     """Whether the replay buffer holds too little to learn from."""
     return buffer_of(model).size() * model.n_envs < warmup
 

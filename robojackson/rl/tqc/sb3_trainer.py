@@ -14,7 +14,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 from robojackson.rl.config.tqc_config import NORM_EPSILON
 from robojackson.rl.config.train_config import TqcConfig
 from robojackson.rl.tqc.network_arrays import CRITICS, TARGETS, Tensors
-from robojackson.rl.tqc.off_policy import OffPolicyTrainer, arguments, patient
+from robojackson.rl.tqc.off_policy import OffPolicyTrainer, arguments, is_warming_up
 from robojackson.rl.tqc.trainer import Layers
 
 
@@ -44,7 +44,7 @@ class NormalisedPolicy(TQCPolicy):
         return NormalisedCritic(**given).to(self.device)
 
 
-class PatientTQC(TQC):
+class WarmupTQC(TQC):
     """TQC that does not learn from a nearly empty replay buffer.
 
     Attributes:
@@ -61,7 +61,7 @@ class PatientTQC(TQC):
 
     def train(self, gradient_steps: int, batch_size: int = 64) -> None:
         """A round of updates, unless the buffer has still to be filled."""
-        if not patient(self, self.warmup):
+        if not is_warming_up(self, self.warmup):
             super().train(gradient_steps, batch_size)
 
 
@@ -76,7 +76,7 @@ class Sb3Trainer(OffPolicyTrainer):
             given["policy_kwargs"] |= {"clip_mean": 0.0}  # the policy file knows no clipped mean
         if config.layer_norm:
             given["policy"] = NormalisedPolicy
-        model = PatientTQC(env=env, device="cpu", **given)
+        model = WarmupTQC(env=env, device="cpu", **given)
         model.warmup = config.warmup
         super().__init__(model, generators={})
 

@@ -28,10 +28,10 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 from robojackson.rl.config.train_config import TqcConfig
 from robojackson.rl.tqc.dense_networks import LOG_STD_RANGE, dense_count
 from robojackson.rl.tqc.network_arrays import CRITICS, TARGETS, Tensors
-from robojackson.rl.tqc.off_policy import OffPolicyTrainer, arguments, patient
+from robojackson.rl.tqc.off_policy import OffPolicyTrainer, arguments, is_warming_up
 from robojackson.rl.tqc.replay_files import buffer_of
 from robojackson.rl.tqc.trainer import Layers
-from robojackson.rl.tqc.updates import Learnt, round_of_updates
+from robojackson.rl.tqc.updates import LearnerState, round_of_updates
 
 log = logging.getLogger(__name__)
 
@@ -66,7 +66,7 @@ class OverlappedTQC(TQC):
 
     def train(self, gradient_steps: int, batch_size: int) -> None:
         """Wait for the round before, take its actor, and dispatch the next round."""
-        if patient(self, self.warmup):
+        if is_warming_up(self, self.warmup):
             return
         self._acting = dense_layers(self.policy.actor_state.params)
         samples = buffer_of(self).sample(batch_size * gradient_steps)
@@ -80,7 +80,7 @@ class OverlappedTQC(TQC):
         )
         policy = self.policy
         learnt = round_of_updates(
-            Learnt(
+            LearnerState(
                 policy.actor_state,
                 (policy.qf1_state, policy.qf2_state),
                 self.ent_coef_state,

@@ -17,7 +17,7 @@ from robojackson.rl.tqc import dense_networks
 from robojackson.rl.tqc.quantile_loss import lowest, quantile_huber
 
 
-class Learnt(NamedTuple):
+class LearnerState(NamedTuple):
     """All that updates change; states are sbx's.
 
     Attributes:
@@ -34,14 +34,14 @@ class Learnt(NamedTuple):
 
 @partial(jax.jit, static_argnames=("kept", "count", "delay"))
 def round_of_updates(
-    learnt: Learnt,
+    learnt: LearnerState,
     samples: Samples,
     tau: float,
     target_entropy: float,
     kept: int,
     count: int,
     delay: int,
-) -> Learnt:
+) -> LearnerState:
     """`count` updates of the critics, each from its part of the samples, and after every `delay` of
     them one of the actor and the entropy coefficient.
 
@@ -52,7 +52,7 @@ def round_of_updates(
     """
     size = len(samples.rewards) // count
 
-    def step(i: Array, learnt: Learnt) -> Learnt:
+    def step(i: Array, learnt: LearnerState) -> LearnerState:
         for turn in range(delay):
             first = (i * delay + turn) * size
             part = partial(jax.lax.dynamic_slice_in_dim, start_index=first, slice_size=size)
@@ -63,7 +63,7 @@ def round_of_updates(
     return jax.lax.fori_loop(0, count // delay, step, learnt)
 
 
-def _critics(learnt: Learnt, batch: Samples, kept: int, tau: float) -> Learnt:
+def _critics(learnt: LearnerState, batch: Samples, kept: int, tau: float) -> LearnerState:
     """One update of both critics and their targets."""
     key, noise, _, _ = jax.random.split(learnt.key, 4)
     key, _, _ = jax.random.split(key, 3)
@@ -88,7 +88,9 @@ def _critics(learnt: Learnt, batch: Samples, kept: int, tau: float) -> Learnt:
     return learnt._replace(critics=TQC.soft_update(tau, *states), key=key)
 
 
-def _actor(learnt: Learnt, observations: Float[Array, "B O"], target_entropy: float) -> Learnt:
+def _actor(
+    learnt: LearnerState, observations: Float[Array, "B O"], target_entropy: float
+) -> LearnerState:
     """One update of the actor and the entropy coefficient."""
     key, _, _, noise = jax.random.split(learnt.key, 4)
     alpha = learnt.entropy.apply_fn({"params": learnt.entropy.params})

@@ -8,9 +8,15 @@ import numpy as np
 import pytest
 
 from robojackson.clips.people import dancer
-from robojackson.clips.people.dancer import DancerConfig, alone, checked, follow, near_known
+from robojackson.clips.people.dancer import (
+    DancerConfig,
+    checked,
+    mask_others,
+    near_known,
+    track_dancer,
+)
 from robojackson.clips.people.people_picture import best_frame
-from robojackson.clips.people.tracked_people import Cast, look_around
+from robojackson.clips.people.tracked_people import TrackedPeople, track_people
 from robojackson.clips.pose_detector import detect
 from robojackson.clips.trim import trim
 from robojackson.clips.video import VideoInfo, VideoLimits, probe
@@ -31,7 +37,7 @@ class Crossed(NamedTuple):
     path: Path
     info: VideoInfo
     places: np.ndarray
-    cast: Cast
+    cast: TrackedPeople
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +45,7 @@ def crossed(tmp_path_factory: pytest.TempPathFactory) -> Crossed:
     path = tmp_path_factory.mktemp("crossing") / "crossing.mp4"
     places = write_crossing(path, FRAMES)
     info, config = probe(path, VideoLimits()), DancerConfig()
-    return Crossed(path, info, places, look_around(path, info, config.crowd, config.identity))
+    return Crossed(path, info, places, track_people(path, info, config.crowd, config.identity))
 
 
 def gap(rows: np.ndarray, begin: int, end: int) -> np.ndarray:
@@ -74,7 +80,7 @@ def test_a_long_absence_is_not_searched() -> None:
 
 def test_others_are_painted_over_and_the_dancer_is_not() -> None:
     image = np.random.default_rng(0).integers(0, 255, (480, 640, 3), np.uint8)
-    clear = alone(image, row_of(150), row_of(450)[None], 0.07)
+    clear = mask_others(image, row_of(150), row_of(450)[None], 0.07)
     changed = (clear != image).any(-1)
     assert changed[140:340, 430:470].mean() > 0.4
     assert not changed[:, :300].any()
@@ -82,7 +88,7 @@ def test_others_are_painted_over_and_the_dancer_is_not() -> None:
 
 def test_the_picture_shows_the_frame_with_most_people() -> None:
     info = VideoInfo(Path("x.mp4"), *SIZE, 10.0, 10, 1.0, 0)
-    assert best_frame(Cast([FULL, gap(FAR, 0, 7)], TIMES, info)) == 7
+    assert best_frame(TrackedPeople([FULL, gap(FAR, 0, 7)], TIMES, info)) == 7
 
 
 def whose(rows: np.ndarray, places: np.ndarray) -> tuple[set[int], float]:
@@ -101,7 +107,7 @@ def test_two_who_cross_in_the_same_clothes_are_told_apart(crossed: Crossed) -> N
 
 
 def test_the_dancer_is_never_exchanged(crossed: Crossed) -> None:
-    track = follow(crossed.path, crossed.info, "lite", DancerConfig())
+    track = track_dancer(crossed.path, crossed.info, "lite", DancerConfig())
     people, share = whose(track.landmarks, crossed.places)
     assert len(people) == 1
     assert share > 0.85
@@ -113,12 +119,12 @@ def test_an_impossible_number_tells_who_is_there(
 ) -> None:
     monkeypatch.setattr(dancer, "look_around", lambda *_: crossed.cast)
     with pytest.raises(NoPersonFound, match=r"no person 7 among 2: 1 \(\d+ px tall.*; 2 \("):
-        follow(crossed.path, crossed.info, "lite", replace(DancerConfig(), number=7))
+        track_dancer(crossed.path, crossed.info, "lite", replace(DancerConfig(), number=7))
 
 
 def test_one_who_is_alone_is_seen_as_ever(tmp_path: Path) -> None:
     path = trim(CLIPS / "walk.mp4", 0.0, 0.5, tmp_path / "part.mp4")
     info = probe(path, VideoLimits())
-    track = follow(path, info, "lite", DancerConfig())
+    track = track_dancer(path, info, "lite", DancerConfig())
     assert np.array_equal(track.landmarks, detect(path, info, "lite").landmarks, equal_nan=True)
     assert (track.person, track.notes) == (0, ())

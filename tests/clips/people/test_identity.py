@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from robojackson.clips.people.identity import IdentityConfig, identify
-from robojackson.clips.people.person_detection import Sighting
+from robojackson.clips.people.person_detection import PersonDetection
 from tests.fixtures.made_people import BLUE, RED, SIZE, hips_x, seen
 
 FPS = 30.0
 Line = Callable[[float], float]
 
 
-def tracks(frames: Sequence[Sequence[Sighting]]) -> list[np.ndarray]:
+def tracks(frames: Sequence[Sequence[PersonDetection]]) -> list[np.ndarray]:
     return identify(frames, np.arange(len(frames)) / FPS, SIZE, IdentityConfig())
 
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from robojackson.clips.quality import candidate_ranking
-from robojackson.clips.quality.assessment import JudgeConfig, Judgement, judge
+from robojackson.clips.quality.assessment import Assessment, AssessmentConfig, assess_video
 from robojackson.clips.quality.candidate_ranking import FilterConfig, Ranked
-from robojackson.clips.quality.duplicates import CopyConfig, copies
+from robojackson.clips.quality.duplicates import DuplicateConfig, find_duplicates
 from tests.fixtures.difficult_clips import DANCERS, REAL
 
 GOOD = {*DANCERS, REAL}
@@ -23,13 +23,13 @@ REASONS = {
     "black": "no person found in 45 of 45 frames",
     "mirrored": "a mirrored copy of hip_shake",
 }
-Judged = dict[str, Judgement]
+Judged = dict[str, Assessment]
 
 
 @pytest.fixture(scope="module")
 def judged(difficult: Path) -> Judged:
-    config = JudgeConfig()
-    return {path.stem: judge(path, config) for path in sorted(difficult.glob("*.mp4"))}
+    config = AssessmentConfig()
+    return {path.stem: assess_video(path, config) for path in sorted(difficult.glob("*.mp4"))}
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +41,7 @@ def ranking(judged: Judged) -> list[Ranked]:
     }
     fit = [name for name in order if not against[name]]
     fit.sort(key=lambda name: -judged[name].quality.person_height_px)
-    copied = copies({name: judged[name].track for name in fit}, CopyConfig())
+    copied = find_duplicates({name: judged[name].track for name in fit}, DuplicateConfig())
     return candidate_ranking.rank(order, against, copied)
 
 

@@ -8,7 +8,7 @@ from robojackson.clips.people.camera_motion import CameraConfig, CameraMotion, d
 from robojackson.clips.people.person_extent import MIRROR, box, full_body, heights_px
 from robojackson.clips.quality.cuts import Changes, CutConfig, leaps, together
 from robojackson.clips.quality.drawing import flat_share
-from robojackson.clips.quality.duplicates import CopyConfig, copies
+from robojackson.clips.quality.duplicates import DuplicateConfig, find_duplicates
 from robojackson.motion.landmark_track import LandmarkTrack
 
 NOBODY = np.full((33, 2), np.nan)
@@ -152,19 +152,21 @@ def test_a_mirrored_copy_is_found_whatever_its_size_and_place() -> None:
     one, other = track_of(dance()), track_of(dance(seed=9))
     turned = dance()[:, list(MIRROR)] * [-1.0, 1.0] + [1.0, 0.0]
     copy = track_of(0.5 * turned + [0.2, 0.1])
-    found = copies({"one": one, "other": other, "copy": copy}, CopyConfig())
+    found = find_duplicates({"one": one, "other": other, "copy": copy}, DuplicateConfig())
     assert found == {"copy": "a mirrored copy of one"}
 
 
 def test_a_copy_that_starts_later_is_found() -> None:
     whole = dance(90)
-    found = copies({"whole": track_of(whole), "end": track_of(whole[30:])}, CopyConfig())
+    found = find_duplicates(
+        {"whole": track_of(whole), "end": track_of(whole[30:])}, DuplicateConfig()
+    )
     assert found == {"end": "a copy of whole"}
 
 
 def test_clips_without_a_person_are_no_copies_of_one_another() -> None:
     empty = track_of(np.full((30, 33, 2), np.nan))
-    assert copies({"a": empty, "b": empty}, CopyConfig()) == {}
+    assert find_duplicates({"a": empty, "b": empty}, DuplicateConfig()) == {}
 
 
 def test_a_mirror_of_a_mirror_is_the_landmark_itself() -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from robojackson.clips.quality.visibility import turned_away, weighed
+from robojackson.clips.quality.visibility import turned_away, weigh_visibility
 from robojackson.errors import NoPersonFound
 from robojackson.motion.landmark_track import LandmarkTrack
 from tests.fixtures.made_people import SIZE, row_of
@@ -19,43 +19,45 @@ def standing(y: float = 240.0, frames: int = 20) -> np.ndarray:
 
 def test_a_body_in_full_view_keeps_its_visibility() -> None:
     track = track_of(standing())
-    assert np.array_equal(weighed(track).visibility, track.visibility)
-    assert weighed(track).notes == ()
+    assert np.array_equal(weigh_visibility(track).visibility, track.visibility)
+    assert weigh_visibility(track).notes == ()
 
 
 def test_legs_below_the_picture_are_not_seen_and_told() -> None:
-    found = weighed(track_of(standing(y=460.0)))
+    found = weigh_visibility(track_of(standing(y=460.0)))
     assert found.visibility[:, 25:33].max() == 0.0
     assert found.visibility[:, :23].min() == pytest.approx(0.99)
     assert found.notes == ("legs not seen in 100% of the frames: invented",)
 
 
 def test_feet_alone_are_told_as_feet() -> None:
-    found = weighed(track_of(standing(y=410.0)))
+    found = weigh_visibility(track_of(standing(y=410.0)))
     assert found.notes == ("feet not seen in 100% of the frames: invented",)
 
 
 def test_a_share_of_the_frames_is_told_as_it_is() -> None:
     rows = np.concatenate([standing(240.0, 5), standing(460.0, 15)])
-    assert weighed(track_of(rows)).notes == ("legs not seen in 75% of the frames: invented",)
+    assert weigh_visibility(track_of(rows)).notes == (
+        "legs not seen in 75% of the frames: invented",
+    )
 
 
 def test_a_face_is_refused() -> None:
     rows = np.array([row_of(320, 1300, tall=2200.0)] * 5)
     with pytest.raises(NoPersonFound, match=r"only the face is seen: the hips .* in 0% "):
-        weighed(track_of(rows))
+        weigh_visibility(track_of(rows))
 
 
 def test_a_bust_is_refused_as_the_upper_body() -> None:
     rows = np.array([row_of(320, 520, tall=900.0)] * 5)
     with pytest.raises(NoPersonFound, match="only the upper body is seen"):
-        weighed(track_of(rows))
+        weigh_visibility(track_of(rows))
 
 
 def test_a_face_on_the_back_of_a_head_is_not_believed() -> None:
     rows = standing()
     rows[:, :, 0] = 1.0 - rows[:, :, 0]
-    found = weighed(track_of(rows))
+    found = weigh_visibility(track_of(rows))
     assert found.visibility[:, :11].max() < 0.2
     assert found.visibility[:, 11:].min() > 0.7
     assert found.notes == ("seen from behind in 100% of the frames: less certain",)
@@ -73,10 +75,10 @@ def test_lying_and_standing_on_the_head_are_no_backs(turns: int) -> None:
 def test_frames_beside_a_gap_are_less_certain() -> None:
     rows = standing()
     rows[10] = np.nan
-    found = weighed(track_of(rows)).visibility[:, 11]
+    found = weigh_visibility(track_of(rows)).visibility[:, 11]
     assert found[9] < found[5]
     assert np.isnan(found[10])
 
 
 def test_a_clip_without_a_person_is_left_to_the_next_stage() -> None:
-    assert not weighed(track_of(standing() * np.nan)).detected.any()
+    assert not weigh_visibility(track_of(standing() * np.nan)).detected.any()

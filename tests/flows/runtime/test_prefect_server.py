@@ -21,7 +21,7 @@ from tools.stack.service import free_port
 COMMANDS = {
     "dance": lambda: dance.run("clips/hip_shake.mp4", "smoke", {}),
     "ablation": lambda: ablation.run(load(Study, "studies/smoke")),
-    "find": lambda: find.look_for(Dance(name="x", query="x"), "finding", {}),
+    "find": lambda: find.run(Dance(name="x", query="x"), "finding", {}),
     "refresh": lambda: refresh.run(None, "finding", {}),
     "deploy": deploy,
 }

@@ -38,7 +38,7 @@ def versions(monkeypatch: pytest.MonkeyPatch, store: Path, away: bool = False) -
 
     async def run() -> None:
         given = cells()
-        table = progress_table.Board(STUDY, given)
+        table = progress_table.ProgressTable(STUDY, given)
         async with table.shown():
             await asyncio.sleep(0)
             for cell in given[:-1]:

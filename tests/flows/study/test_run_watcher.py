@@ -40,7 +40,7 @@ def wait_for(runs: list[FlowRun], server: Any, patch: pytest.MonkeyPatch) -> lis
     patch.setattr(run_watcher, "_ended", server)
 
     async def all_of() -> list[FlowRun]:
-        ended = run_watcher.Ending()
+        ended = run_watcher.RunWatcher()
         return list(await asyncio.gather(*(ended.of(run) for run in runs)))
 
     return asyncio.run(asyncio.wait_for(all_of(), 20))

@@ -102,7 +102,7 @@ def test_root_correction_undoes_a_drift_that_planted_feet_reveal() -> None:
     feet = four_feet()
     drift = 0.05 * np.arange(FRAMES) / FRAMES
     feet[..., 1] += drift[:, None]
-    config = foot_pinning.LockConfig(track=(0.1, 0.3), slip=0.001)
+    config = foot_pinning.FootPinningConfig(track=(0.1, 0.3), slip=0.001)
     shift = foot_pinning.root_correction(
         feet, np.ones((FRAMES, 4), bool), np.zeros(FRAMES), FPS, config
     )
@@ -112,7 +112,7 @@ def test_root_correction_undoes_a_drift_that_planted_feet_reveal() -> None:
 def test_root_correction_without_contact_is_nothing() -> None:
     planted = np.zeros((FRAMES, 4), bool)
     shift = foot_pinning.root_correction(
-        four_feet(speed=1.0), planted, np.zeros(FRAMES), FPS, foot_pinning.LockConfig()
+        four_feet(speed=1.0), planted, np.zeros(FRAMES), FPS, foot_pinning.FootPinningConfig()
     )
     assert np.allclose(shift, 0.0)
 
@@ -122,7 +122,7 @@ def test_root_correction_minimises_its_cost() -> None:
     rng = np.random.default_rng(0)
     feet, slope = rng.normal(scale=0.1, size=(12, 4, 3)), rng.normal(size=12)
     planted = rng.uniform(size=(12, 4)) < 0.7
-    config = foot_pinning.LockConfig(track=(0.3, 0.7), slip=0.2, wobble=0.4, leash_m=100.0)
+    config = foot_pinning.FootPinningConfig(track=(0.3, 0.7), slip=0.2, wobble=0.4, leash_m=100.0)
     first, second = (np.diff(np.eye(12), order, axis=0) for order in (1, 2))
     rows, goals = [], []
     for axis in range(2):
@@ -148,7 +148,9 @@ def test_who_is_moved_away_from_the_camera_keeps_his_place_in_the_image() -> Non
     feet[..., 0] += drift
     feet[..., 1] -= 0.5 * drift
     slope, planted = np.full(FRAMES, -0.5), np.ones((FRAMES, 4), bool)
-    shift = foot_pinning.root_correction(feet, planted, slope, FPS, foot_pinning.LockConfig())
+    shift = foot_pinning.root_correction(
+        feet, planted, slope, FPS, foot_pinning.FootPinningConfig()
+    )
     assert np.ptp(shift[:, 0]) > 0.1
     assert np.allclose(shift[:, 1], -0.5 * shift[:, 0], atol=2e-3)
 
@@ -245,7 +247,9 @@ def test_sole_of_the_rest_pose_is_flat() -> None:
 def test_a_foot_on_heel_and_toe_is_flat_however_steep_it_was_seen() -> None:
     feet = np.zeros((1, 4, 3))
     feet[:, 1::2] = [0.15, 0.0, 0.15]
-    assert soles.standing(feet, np.array([[True, True, True, False]])).tolist() == [[True, False]]
+    assert soles.stands_flat(feet, np.array([[True, True, True, False]])).tolist() == [
+        [True, False]
+    ]
 
 
 def test_pitch_bias_is_that_of_the_standing_frames() -> None:
@@ -274,7 +278,7 @@ def test_held_feet_keep_one_heading_while_they_stand() -> None:
     feet = np.zeros((FRAMES, 4, 3))
     feet[:, 1::2] = [0.2, 0.0, 0.0] + 0.02 * rng.normal(size=(FRAMES, 2, 3))
     flat = np.ones((FRAMES, 2), bool)
-    held, share = soles.hold_flat(points, REST_JOINTS, feet, flat, 3.0)
+    held, share = soles.level_feet(points, REST_JOINTS, feet, flat, 3.0)
     assert np.allclose(share, 1.0)
     assert np.ptp(held[:, toes], axis=0).max() < 1e-9
 
@@ -307,8 +311,8 @@ def test_feet_wrongly_held_cannot_take_the_body_far_from_where_the_camera_saw_it
     feet[..., 0] += np.linspace(-1.0, 1.0, FRAMES)[:, None]
     held, straight = np.ones((FRAMES, 4), bool), np.zeros(FRAMES)
 
-    def furthest(config: foot_pinning.LockConfig) -> float:
+    def furthest(config: foot_pinning.FootPinningConfig) -> float:
         return float(np.abs(foot_pinning.root_correction(feet, held, straight, FPS, config)).max())
 
-    assert furthest(foot_pinning.LockConfig(leash_m=100.0)) > 0.9
-    assert furthest(foot_pinning.LockConfig()) < 0.5
+    assert furthest(foot_pinning.FootPinningConfig(leash_m=100.0)) > 0.9
+    assert furthest(foot_pinning.FootPinningConfig()) < 0.5

@@ -14,7 +14,7 @@ from robojackson.mocap.landmarks import refinement
 from robojackson.mocap.landmarks.blazepose import BODY
 from robojackson.mocap.landmarks.covariance import covariances, root_relative
 from robojackson.mocap.landmarks.refinement import RefineConfig, gather
-from robojackson.mocap.recover import MocapConfig, recover
+from robojackson.mocap.recover import MocapConfig, recover_motion
 from robojackson.motion.landmark_track import LandmarkTrack
 
 CONFIG = RefineConfig()
@@ -54,8 +54,8 @@ def test_variance_relative_to_the_hips_forgets_what_all_joints_share() -> None:
 def test_a_hidden_arm_is_less_sure_and_the_other_is_not(hip_shake: LandmarkTrack) -> None:
     hidden = np.array(hip_shake.visibility)
     hidden[40:70][:, [13, 15, 17, 19, 21]] = 0.02
-    before = recover(hip_shake, MocapConfig()).confidence
-    after = recover(replace(hip_shake, visibility=hidden), MocapConfig()).confidence
+    before = recover_motion(hip_shake, MocapConfig()).confidence
+    after = recover_motion(replace(hip_shake, visibility=hidden), MocapConfig()).confidence
     left, right = keypoint("left_wrist"), keypoint("right_wrist")
     assert after[45:65, left].max() < 0.7 * before[45:65, left].min()
     assert np.allclose(after[45:65, right], before[45:65, right], atol=0.05)
@@ -65,7 +65,7 @@ def test_a_hidden_arm_is_less_sure_and_the_other_is_not(hip_shake: LandmarkTrack
 @pytest.mark.slow
 def test_what_is_said_to_be_surer_is_nearer_to_the_truth() -> None:
     truth, path = load_truth("dance_a").joints, video_path("dance_a")
-    found = recover(detect(path, probe(path, VideoLimits())), MocapConfig())
+    found = recover_motion(detect(path, probe(path, VideoLimits())), MocapConfig())
     columns = [keypoint(name) for name in JOINTS]
     mine = pose_error.align_clip(found.joints[:, columns], truth, HIPS)
     error = np.linalg.norm(mine - pose_error.root_relative(truth, HIPS), axis=-1)

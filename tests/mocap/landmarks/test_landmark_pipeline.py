@@ -31,7 +31,7 @@ def followed(hip_shake: LandmarkTrack, monkeypatch: pytest.MonkeyPatch) -> list[
 
 def look(quality: str, progress=None) -> LandmarkTrack:
     info = probe(CLIP, VideoLimits())
-    return pipeline.see(CLIP, info, quality, DancerConfig(), progress)
+    return pipeline.detect_landmarks(CLIP, info, quality, DancerConfig(), progress)
 
 
 def test_best_asks_both_larger_models_and_they_vote(

@@ -7,7 +7,7 @@ import numpy as np
 
 from robojackson.clips.people.camera_path import CameraPath, camera_path
 from robojackson.clips.video import read_frames
-from robojackson.mocap.recover import MocapConfig, recover
+from robojackson.mocap.recover import MocapConfig, recover_motion
 from robojackson.motion.landmark_track import LandmarkTrack
 
 ROOT = Path(__file__).parents[3]
@@ -30,8 +30,8 @@ def test_a_swaying_camera_moves_the_root_unless_its_background_is_known(
     hip_shake: LandmarkTrack,
 ) -> None:
     window, camera = panned(hip_shake)
-    still = recover(hip_shake, MocapConfig()).joints[:, 0, :2]
-    told = recover(replace(window, to_first=camera.to_first), MocapConfig()).joints[:, 0, :2]
-    blind = recover(window, MocapConfig()).joints[:, 0, :2]
+    still = recover_motion(hip_shake, MocapConfig()).joints[:, 0, :2]
+    told = recover_motion(replace(window, to_first=camera.to_first), MocapConfig()).joints[:, 0, :2]
+    blind = recover_motion(window, MocapConfig()).joints[:, 0, :2]
     assert np.linalg.norm(told - still, axis=-1).max() < 0.08
     assert np.linalg.norm(blind - still, axis=-1).max() > 0.25

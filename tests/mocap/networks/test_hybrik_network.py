@@ -15,7 +15,7 @@ from robojackson.mocap.networks.hybrik_net import (
     HybrikHRNet,
     HybrikNet,
     HybrikResNet,
-    Seen,
+    NetworkOutput,
     expectation,
     flip_twist,
     flip_volume,
@@ -66,7 +66,7 @@ def resnet_state() -> Mapping[str, Tensor]:
 
 
 @pytest.fixture
-def seen_pair() -> tuple[Seen, Seen]:
+def seen_pair() -> tuple[NetworkOutput, NetworkOutput]:
     """A crop and its mirror image, each with the flip test."""
     network = Painted(points(1))
     crop = torch.zeros(1, 3, 256, 256)
@@ -193,7 +193,9 @@ def test_the_flip_test_of_an_exact_network_returns_its_points() -> None:
     assert (seen.uvd - truth).abs().max() < 1e-5
 
 
-def test_the_flip_test_sees_a_mirrored_crop_mirrored(seen_pair: tuple[Seen, Seen]) -> None:
+def test_the_flip_test_sees_a_mirrored_crop_mirrored(
+    seen_pair: tuple[NetworkOutput, NetworkOutput],
+) -> None:
     plain, mirrored = seen_pair
     opposite = torch.tensor([-1.0, 1.0, 1.0])
     assert (mirrored.uvd - plain.uvd[:, MIRROR_29] * opposite).abs().max() < 1e-5
@@ -203,7 +205,9 @@ def test_the_flip_test_sees_a_mirrored_crop_mirrored(seen_pair: tuple[Seen, Seen
     assert torch.allclose(mirrored.betas, plain.betas)
 
 
-def test_the_scale_of_a_flip_test_is_the_harmonic_mean(seen_pair: tuple[Seen, Seen]) -> None:
+def test_the_scale_of_a_flip_test_is_the_harmonic_mean(
+    seen_pair: tuple[NetworkOutput, NetworkOutput],
+) -> None:
     network = Painted(points(1))
     features = torch.linspace(-0.1, 0.1, 8)[None]
     scales = [network.deccam(sign * features)[0, 0] + 0.9 for sign in (1.0, -1.0)]

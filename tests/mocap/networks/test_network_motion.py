@@ -13,12 +13,12 @@ from robojackson.metrics import pose_error
 from robojackson.mocap.landmarks.blazepose import repair
 from robojackson.mocap.landmarks.pinhole_camera import Pinhole, guess_focal
 from robojackson.mocap.networks import crop_to_camera, niki, person_crop
-from robojackson.mocap.networks.hybrik_net import HybrikNet, Seen
+from robojackson.mocap.networks.hybrik_net import HybrikNet, NetworkOutput
 from robojackson.mocap.networks.inference import Networks, estimate
 from robojackson.mocap.networks.network_config import NetworkConfig
 from robojackson.mocap.networks.network_motion import network_motion, resampled
 from robojackson.mocap.pose.known_twist import pose_keypoints
-from robojackson.mocap.recover import MocapConfig, recover
+from robojackson.mocap.recover import MocapConfig, recover_motion
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.smpl_sequence import SmplSequence
 
@@ -35,12 +35,12 @@ class Exact(HybrikNet):
         self.rows = (uvd, twist, scale)
         self.next = 0
 
-    def forward(self, crops: torch.Tensor, flip_test: bool = False) -> Seen:
+    def forward(self, crops: torch.Tensor, flip_test: bool = False) -> NetworkOutput:
         here = slice(self.next, self.next + len(crops))
         self.next += len(crops)
         uvd, twist, scale = (torch.from_numpy(rows[here]) for rows in self.rows)
         certain = torch.zeros(uvd.shape[:2])
-        return Seen(uvd, certain, certain, twist, torch.zeros(len(uvd), 10), scale)
+        return NetworkOutput(uvd, certain, certain, twist, torch.zeros(len(uvd), 10), scale)
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +57,7 @@ def track(hip_shake: LandmarkTrack) -> LandmarkTrack:
 @pytest.fixture(scope="module")
 def dancer(track: LandmarkTrack) -> SmplSequence:
     """A motion that stands for the truth: what our own mocap makes of the track."""
-    return recover(track, MocapConfig())
+    return recover_motion(track, MocapConfig())
 
 
 @pytest.fixture(scope="module")

@@ -60,7 +60,7 @@ def test_the_mirrored_person_is_lifted_to_the_mirror_image(
     seen: Landmarks, placed: np.ndarray
 ) -> None:
     weights = temporal_network.load(WEIGHTS)
-    sight = features.look(placed, seen.local, seen.visibility)
+    sight = features.view_clip(placed, seen.local, seen.visibility)
     plain, spread, _ = temporal_lift.correct(sight, weights)
     other, other_spread, _ = temporal_lift.correct(features.mirror(sight), weights)
     assert np.allclose(features.mirror_body(other) * [-1.0, 1.0, 1.0], plain, atol=1e-4)

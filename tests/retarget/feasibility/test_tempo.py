@@ -8,14 +8,14 @@ import pytest
 from robojackson.retarget.feasibility.tempo import (
     GRID,
     feasible_tempo,
+    required_rate,
     smooth_rate,
     times_at,
-    wanted_rate,
     warp,
     warped,
 )
 from robojackson.retarget.retarget_config import RetargetConfig
-from robojackson.retarget.retargeting import retarget
+from robojackson.retarget.retargeting import retarget_motion
 from robojackson.retarget.targets.cycle import human_clip
 from robojackson.retarget.targets.keypoint_targets import Targets, targets
 from robojackson.robot.model import Robot
@@ -84,14 +84,14 @@ def _slack(*values: float) -> np.ndarray:
 
 def test_the_fastest_feasible_tempo_is_chosen():
     slack = _slack(2.0, 1.2, 0.9, 0.5, 0.4, 0.3)
-    assert feasible_tempo(slack)[0] == GRID[2] == wanted_rate(slack)[0]
+    assert feasible_tempo(slack)[0] == GRID[2] == required_rate(slack)[0]
 
 
 def test_what_slowing_down_does_not_help_keeps_its_tempo():
     """A pose on one foot with the weight beside it is no better when it is held longer."""
     slack = _slack(2.0, 2.0, 2.1, 2.1, 2.2, 2.3)
     assert feasible_tempo(slack)[0] == 0.0
-    assert wanted_rate(slack)[0] == 1.0
+    assert required_rate(slack)[0] == 1.0
 
 
 def _hurried(robot: Robot, tempo: float | str) -> dict[str, float]:
@@ -99,7 +99,7 @@ def _hurried(robot: Robot, tempo: float | str) -> dict[str, float]:
     fast = replace(human("hip_shake"), fps=90.0)
     gentle = replace(RetargetConfig().repair, weights=(1e-5,))
     config = RetargetConfig(tempo=tempo, repair=gentle)  # type: ignore[arg-type]
-    return dict(retarget(fast, robot, config).scorecard)
+    return dict(retarget_motion(fast, robot, config).scorecard)
 
 
 def test_auto_slows_a_hurried_dance_down_and_says_by_how_much(robot: Robot):

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import nnls
 
 from robojackson.retarget.retarget_config import RetargetConfig
-from robojackson.retarget.retargeting import retarget
+from robojackson.retarget.retargeting import retarget_motion
 from robojackson.retarget.solver.balance import moment_points, support
 from robojackson.retarget.solver.clip_problem import Problem, Weights
 from robojackson.retarget.targets.keypoint_targets import Targets
@@ -59,7 +59,7 @@ def _distance_mm(motion, robot: Robot) -> float:
 
 
 def test_a_standing_dance_is_leaned_over_its_feet(robot: Robot):
-    upright = retarget(human("hip_shake"), robot, RetargetConfig(lean_deg=0.0))
+    upright = retarget_motion(human("hip_shake"), robot, RetargetConfig(lean_deg=0.0))
     leaned = robot_motion("hip_shake")
     assert leaned.scorecard["lean_deg"] > 1.0
     assert _distance_mm(leaned, robot) < 20.0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from robojackson.retarget.retarget_config import RetargetConfig
-from robojackson.retarget.retargeting import retarget
+from robojackson.retarget.retargeting import retarget_motion
 from robojackson.retarget.solver import dynamics_term
 from robojackson.retarget.solver.block_banded import Normal
 from robojackson.retarget.solver.clip_problem import Problem
@@ -67,7 +67,7 @@ def test_the_slopes_of_inverse_dynamics_are_its_differences(robot: Robot):
 
 def test_repair_makes_a_walk_feasible_that_was_not(robot: Robot):
     config = RetargetConfig(repair=UNREPAIRED)
-    before, after = retarget(human("walk"), robot, config), robot_motion("walk")
+    before, after = retarget_motion(human("walk"), robot, config), robot_motion("walk")
     assert before.scorecard["infeasible_share"] > 0.1
     assert after.scorecard["infeasible_share"] <= 0.05
     assert after.scorecard["keypoint_mm"] <= before.scorecard["keypoint_mm"] + 5.0
@@ -76,7 +76,7 @@ def test_repair_makes_a_walk_feasible_that_was_not(robot: Robot):
 def test_a_motion_that_is_feasible_is_left_alone(robot: Robot):
     config = RetargetConfig(repair=UNREPAIRED)
     np.testing.assert_array_equal(
-        retarget(human("hip_shake"), robot, config).qpos, robot_motion("hip_shake").qpos
+        retarget_motion(human("hip_shake"), robot, config).qpos, robot_motion("hip_shake").qpos
     )
 
 

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from robojackson.body.skeleton import KEYPOINT_NAMES
 from robojackson.errors import TrackTooShort
 from robojackson.motion.smpl_sequence import SmplSequence
-from robojackson.retarget.targets.cycle import CycleConfig, close, find_lap, heading, human_clip
+from robojackson.retarget.targets.cycle import CycleConfig, close, find_cycle, heading, human_clip
 from tests.fixtures.robots import human
 
 CONFIG = CycleConfig()
@@ -39,7 +39,7 @@ def _swaying(frames: int, period: int, drift: float = 0.0, yaw: float = 0.0) -> 
 
 
 def test_a_whole_number_of_periods_is_kept():
-    lap = find_lap(_swaying(100, 30), CONFIG)
+    lap = find_cycle(_swaying(100, 30), CONFIG)
     assert lap is not None
     assert (lap.end - lap.start) % 30 in (0, 1, 2, 28, 29)
     assert lap.seam_m < 0.02

@@ -17,7 +17,7 @@ from robojackson.rl.config.train_config import (
 )
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.env.vec_env import TrackingEnv, TrackingVecEnv
-from robojackson.rl.modes.reset_states import StartPhases, default_stand, stand_at
+from robojackson.rl.modes.reset_states import StartPhases, default_standing_pose, standing_pose_at
 from robojackson.rl.modes.rewards import TrackedPoints, fallen, reward_terms, tracking_errors
 from robojackson.rl.modes.track_mode import SETTLED_STATES_NEEDED
 from robojackson.rl.sim.reference_clip import Clip
@@ -176,8 +176,8 @@ def test_a_settled_state_comes_back_at_its_own_step_and_place(
 
 
 def test_the_default_stand_touches_the_floor_and_faces_as_asked(robot: Robot) -> None:
-    stand = default_stand(robot.model)
-    turned = stand_at(stand, np.array([1.0, 2.0, 9.0, np.cos(0.6), 0.0, 0.0, np.sin(0.6)]))
+    stand = default_standing_pose(robot.model)
+    turned = standing_pose_at(stand, np.array([1.0, 2.0, 9.0, np.cos(0.6), 0.0, 0.0, np.sin(0.6)]))
     data = mujoco.MjData(robot.model)
     data.qpos[:] = turned
     mujoco.mj_forward(robot.model, data)

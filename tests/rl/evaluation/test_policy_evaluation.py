@@ -13,8 +13,8 @@ from robojackson.rl.config.train_config import (
     PaperConfig,
     TerminationConfig,
 )
-from robojackson.rl.evaluation.policy_evaluation import evaluate
-from robojackson.rl.evaluation.rollout_records import Judge
+from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
+from robojackson.rl.evaluation.rollout_records import RolloutScorer
 from robojackson.rl.evaluation.rollouts import Driver, Rollouts, Starts, roll_out
 from robojackson.rl.policy import Policy
 from robojackson.rl.sim.reference_clip import Clip
@@ -39,7 +39,7 @@ def perfect(sway: ReferenceMotion) -> Rollouts:
 
 
 def row(robot: Robot, sway: ReferenceMotion, rollouts: Rollouts) -> dict[str, object]:
-    return Judge(robot, sway, EvaluateConfig()).row("trained", (0, 0), rollouts, 0)
+    return RolloutScorer(robot, sway, EvaluateConfig()).row("trained", (0, 0), rollouts, 0)
 
 
 def idle(robot: Robot, sway: ReferenceMotion, control: ControlConfig | None = None) -> Policy:
@@ -167,7 +167,7 @@ def test_the_shown_rollout_begins_with_its_start(robot: Robot, sway: ReferenceMo
     brief = EvaluateConfig(
         seconds=0.15, phases=2, resets=1, joint_noise=0, joint_speed_noise=0, root_speed_noise=0
     )
-    shown = evaluate(idle(robot, sway), sway, robot, brief).rollout_qpos
+    shown = evaluate_policy(idle(robot, sway), sway, robot, brief).rollout_qpos
     np.testing.assert_allclose(shown[0], sway.qpos[0])
     assert len(shown) == 11
 
@@ -176,7 +176,9 @@ def test_a_clip_that_is_not_cyclic_is_danced_to_its_end(
     robot: Robot, sway: ReferenceMotion
 ) -> None:
     open_clip = dataclasses.replace(sway, cyclic=False)
-    verdict = evaluate(idle(robot, sway), open_clip, robot, EvaluateConfig(phases=4, resets=1))
+    verdict = evaluate_policy(
+        idle(robot, sway), open_clip, robot, EvaluateConfig(phases=4, resets=1)
+    )
     phases = [int(r["phase"]) for r in verdict.rows if r["policy"] == "trained"]  # type: ignore[call-overload]
     assert max(phases) < len(sway) // 4
     assert all(0 <= float(r["clip_fraction"]) <= 1 for r in verdict.rows)  # type: ignore[arg-type]
@@ -185,7 +187,7 @@ def test_a_clip_that_is_not_cyclic_is_danced_to_its_end(
 def test_a_policy_with_another_control_rate_is_refused(robot: Robot, sway: ReferenceMotion) -> None:
     hurried = idle(robot, sway, ControlConfig(substeps=1))
     with pytest.raises(BadPolicy, match="control step"):
-        evaluate(hurried, sway, robot, EvaluateConfig())
+        evaluate_policy(hurried, sway, robot, EvaluateConfig())
 
 
 def test_a_policy_for_a_robot_of_another_name_is_refused(
@@ -193,7 +195,7 @@ def test_a_policy_for_a_robot_of_another_name_is_refused(
 ) -> None:
     stranger = dataclasses.replace(idle(robot, sway), facts={"robot": "humanoid_strong"})
     with pytest.raises(BadPolicy, match="humanoid_strong"):
-        evaluate(stranger, sway, robot, EvaluateConfig())
+        evaluate_policy(stranger, sway, robot, EvaluateConfig())
 
 
 def test_a_policy_that_learnt_another_dance_is_judged_with_a_word(
@@ -201,7 +203,7 @@ def test_a_policy_that_learnt_another_dance_is_judged_with_a_word(
 ) -> None:
     policy = idle(robot, sway)
     stranger = dataclasses.replace(policy, facts={**policy.facts, "reference_sha256": "other"})
-    evaluate(stranger, sway, robot, EvaluateConfig(seconds=0.15, phases=1, resets=1))
+    evaluate_policy(stranger, sway, robot, EvaluateConfig(seconds=0.15, phases=1, resets=1))
     assert "another reference motion" in caplog.text
 
 
@@ -226,7 +228,7 @@ def test_a_statue_that_earns_more_than_the_policy_raises_a_flag(
     robot: Robot, sway: ReferenceMotion
 ) -> None:
     """A policy that falls at once earns less than a body that is carried along."""
-    verdict = evaluate(idle(robot, sway), sway, robot, EvaluateConfig(phases=2, resets=1))
+    verdict = evaluate_policy(idle(robot, sway), sway, robot, EvaluateConfig(phases=2, resets=1))
     reward = verdict.summary["reward"]
     assert reward["flagged"] is True  # type: ignore[index]
     assert reward["statue_return"] > reward["own_return"]  # type: ignore[index]
@@ -238,7 +240,7 @@ def test_every_rollout_is_measured_by_the_papers_reward_too(
     robot: Robot, sway: ReferenceMotion
 ) -> None:
     brief = EvaluateConfig(seconds=0.15, phases=1, resets=1)
-    rows = evaluate(idle(robot, sway), sway, robot, brief).rows
+    rows = evaluate_policy(idle(robot, sway), sway, robot, brief).rows
     assert {row["policy"] for row in rows} >= {"trained", "hold", "statue", "zero_residual"}
     for row in rows:
         terms = [value for key, value in row.items() if key.startswith("reward_")]
@@ -257,7 +259,7 @@ def test_the_papers_reward_is_the_same_whatever_a_policy_was_trained_with(
     for preset in ("paper", "released", "walker"):
         asked = dataclasses.asdict(PaperConfig(preset=preset))
         policy = Policy((nothing,), {**facts, "environment": asked})
-        rows = evaluate(policy, sway, robot, brief).rows
+        rows = evaluate_policy(policy, sway, robot, brief).rows
         paid.append([row["return_paper"] for row in rows if row["policy"] == "trained"])
     assert paid[0][0] > 0
     assert paid == [paid[0]] * 3
@@ -270,7 +272,7 @@ def test_a_policy_of_another_version_is_refused_in_words(
     control = {**policy.facts["control"], "jerk": 3}  # type: ignore[dict-item]
     strange = dataclasses.replace(policy, facts={**policy.facts, "control": control})
     with pytest.raises(BadPolicy, match=r"control\.jerk = 3 .*another version of RoboJackson"):
-        evaluate(strange, sway, robot, EvaluateConfig(phases=1, resets=1))
+        evaluate_policy(strange, sway, robot, EvaluateConfig(phases=1, resets=1))
 
 
 def test_the_usage_of_a_joint_is_its_spread_over_the_references(
@@ -292,6 +294,6 @@ def test_a_policy_of_paper_mode_is_judged_on_348_observations(
     control = dataclasses.asdict(ControlConfig(law="torque"))
     facts = {"robot": "humanoid", "mode": "paper", "control": control, "repeats": 4}
     brief = EvaluateConfig(seconds=0.6, phases=1, resets=1)
-    summary = evaluate(Policy((nothing,), facts), sway, robot, brief).summary
+    summary = evaluate_policy(Policy((nothing,), facts), sway, robot, brief).summary
     assert summary["variants"] == {}
     assert set(summary["reward"]["asks"]) == {"root", "world"}  # type: ignore[index]

@@ -15,10 +15,10 @@ from robojackson.pipeline.yaml_loader import load, names
 from robojackson.rl.config.train_config import PaperConfig, TrackConfig, TrainConfig
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.env.vec_env import TrackingEnv
-from robojackson.rl.evaluation.reward_audit import both_readings, shares
+from robojackson.rl.evaluation.reward_audit import audit_both_readings, audit_reward
 from robojackson.rl.modes.paper_mode import facing_ahead, require_trainable
 from robojackson.rl.modes.paper_reward import Miss, PaperState, has_fallen, miss, paper_terms, ramp
-from robojackson.rl.modes.standing_motion import standing
+from robojackson.rl.modes.standing_motion import make_standing_motion
 from robojackson.robot.model import Robot
 
 WALKER = PaperConfig(preset="walker", reset_noise=0.0)
@@ -55,7 +55,7 @@ def test_paper_mode_is_gymnasiums_humanoid_to_the_bit(robot: Robot) -> None:
     """Observation and own reward of five whole steps, torques far from zero."""
     stock = gymnasium.make("Humanoid-v5").unwrapped
     stock.reset(seed=0)
-    ours = TrackingCore(robot, standing(robot), WALKER, 1, 0)
+    ours = TrackingCore(robot, make_standing_motion(robot), WALKER, 1, 0)
     ours.reset()
     stock.set_state(ours.sim.qpos[0], ours.sim.qvel[0])
     stock.data.qacc_warmstart[:] = 0
@@ -70,7 +70,7 @@ def test_four_repeats_are_four_steps_of_gymnasiums_humanoid(robot: Robot) -> Non
     stock = gymnasium.make("Humanoid-v5").unwrapped
     stock.reset(seed=0)
     repeated = dataclasses.replace(WALKER, repeats=4)
-    ours = TrackingCore(robot, standing(robot), repeated, 1, 0)
+    ours = TrackingCore(robot, make_standing_motion(robot), repeated, 1, 0)
     ours.reset()
     stock.set_state(ours.sim.qpos[0], ours.sim.qvel[0])
     stock.data.qacc_warmstart[:] = 0
@@ -259,13 +259,13 @@ def test_the_motion_is_turned_ahead_without_being_bent(robot: Robot, sway: Refer
 def test_a_statue_earns_what_a_dancer_earns_by_the_papers_reward(
     robot: Robot, sway: ReferenceMotion
 ) -> None:
-    asked = both_readings(robot, sway, PaperConfig())
+    asked = audit_both_readings(robot, sway, PaperConfig())
     assert set(asked) == {"root", "world"}
     assert asked["root"].of["statue"] > 0.95
 
 
 def test_a_statue_earns_clearly_less_by_our_reward(robot: Robot, sway: ReferenceMotion) -> None:
-    found = shares(robot, sway, TrackConfig())
+    found = audit_reward(robot, sway, TrackConfig())
     assert found.perfect == pytest.approx(TrackConfig().reward.perfect, abs=0.01)
     assert found.of["statue"] < 0.85
     assert found.of["flail"] < found.of["statue"]
@@ -274,7 +274,7 @@ def test_a_statue_earns_clearly_less_by_our_reward(robot: Robot, sway: Reference
 def test_with_curiosity_flailing_pays_more_than_dancing(
     robot: Robot, sway: ReferenceMotion
 ) -> None:
-    assert shares(robot, sway, PaperConfig(curiosity="formula")).of["flail"] > 1.1
+    assert audit_reward(robot, sway, PaperConfig(curiosity="formula")).of["flail"] > 1.1
 
 
 @pytest.mark.parametrize("mode", ["paper", "track"])

@@ -9,7 +9,7 @@ from uuid import UUID, uuid4
 import pytest
 from prefect import artifacts
 
-from tasks.runtime import training_progress as progress
+from tasks.runtime import training_progress
 
 HALF = {"seconds": 30.0, "seconds_left": 30.0, "steps": 500, "steps_per_s": 16.7, "survived_s": 1.5}
 WHOLE = {**HALF, "seconds": 60.0, "seconds_left": 0.0, "steps": 1000}
@@ -25,24 +25,24 @@ class Page:
     async def create(self, progress: float, key: str, description: str) -> UUID:
         if self.away:
             raise ConnectionError("no server")
-        self.told.append((progress, description))
+        self.told.append((training_progress, description))
         return uuid4()
 
     async def update(self, artifact: UUID, progress: float, description: str) -> None:
-        self.told.append((progress, description))
+        self.told.append((training_progress, description))
 
 
 def train(page: Page, work: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     """A training that writes how far it is, twice."""
     monkeypatch.setattr(artifacts, "acreate_progress_artifact", page.create)
     monkeypatch.setattr(artifacts, "aupdate_progress_artifact", page.update)
-    monkeypatch.setattr(progress, "EVERY_S", 0.01)
+    monkeypatch.setattr(training_progress, "EVERY_S", 0.01)
 
     async def run() -> str:
-        async with progress.shown(work, "scratch-walk-s0"):
-            (work / progress.FILE).write_text(json.dumps(HALF))
+        async with training_progress.show_progress(work, "scratch-walk-s0"):
+            (work / training_progress.FILE).write_text(json.dumps(HALF))
             await asyncio.sleep(0.05)
-            (work / progress.FILE).write_text(json.dumps(WHOLE))
+            (work / training_progress.FILE).write_text(json.dumps(WHOLE))
         return "trained"
 
     return asyncio.run(run())
