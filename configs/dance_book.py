@@ -16,7 +16,7 @@ class Dance:
     Attributes:
         name: What it is called here and in the catalogue.
         query: What is searched for; may be empty where a source needs no more than an address.
-        words: Added to the query.
+        added_words: Added to the query.
         language: Two letters in which titles are asked for; empty is the site's own choice.
         top: How many videos are judged; None is the usual number.
         every_days: Days between two searches.
@@ -26,7 +26,7 @@ class Dance:
 
     name: Annotated[str, Field(min_length=1, max_length=60)]
     query: str
-    words: tuple[str, ...] = ()
+    added_words: tuple[str, ...] = ()
     language: Annotated[str, Field(pattern="^([a-z]{2}(-[A-Za-z]{2,4})?)?$")] = ""
     top: Annotated[int, Field(ge=1)] | None = None
     every_days: Annotated[float, Field(ge=0)] = 1.0
@@ -41,9 +41,9 @@ class Dance:
             )
 
     @property
-    def asked(self) -> str:
+    def full_query(self) -> str:
         """The whole query."""
-        return " ".join((self.query, *self.words))
+        return " ".join((self.query, *self.added_words))
 
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid"))
@@ -72,7 +72,7 @@ class DanceBook:
             return self.dances
         return tuple(self._of(name) for name in names)
 
-    def recall(self, words: str) -> Dance:
+    def find(self, words: str) -> Dance:
         """The dance that a person means by its name or query, or one that is made of the words."""
         for dance in self.dances:
             if words.casefold() in (dance.name.casefold(), dance.query.casefold()):

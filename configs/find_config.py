@@ -19,5 +19,5 @@ class FindConfig:
     selection: SelectionConfig = Field(default_factory=SelectionConfig)
     web: WebConfig = Field(default_factory=WebConfig)
     formats: FormatConfig = Field(default_factory=FormatConfig)
-    judge: AssessmentConfig = Field(default_factory=AssessmentConfig)
+    assessment: AssessmentConfig = Field(default_factory=AssessmentConfig)
     filters: FilterConfig = Field(default_factory=FilterConfig)

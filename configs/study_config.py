@@ -13,7 +13,16 @@ from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
 ROOT = Path(__file__).parent.parent
-OF_THE_STUDY = ("robot", "setup", "minutes", "other_minutes", "gate", "train", "evaluate", "show")
+OF_THE_STUDY = (
+    "robot",
+    "setup",
+    "minutes",
+    "reserved_minutes",
+    "gate",
+    "train",
+    "evaluate",
+    "render",
+)
 """Keys of the pipeline's configuration that are no part of a motion."""
 STRICT = ConfigDict(extra="forbid")
 Setup = Literal["scratch", "pretrain", "curiosity", "scratch-curiosity"]

@@ -123,10 +123,10 @@ def nothing(found: SearchResult) -> str:
 def summarise(found: SearchResult) -> dict[str, Any]:
     """What the command says."""
     told = rows(found)
-    every = [*found.selection.kept, *(c for c, _ in found.selection.dropped)]
+    every = [*found.selection.selected, *(c for c, _ in found.selection.dropped)]
     return {
         "dance": found.dance.name,
-        "query": found.dance.asked,
+        "query": found.dance.full_query,
         "source": found.dance.source,
         "run_id": found.run_id,
         "chosen": told[0] if found.chosen else None,

@@ -52,8 +52,8 @@ async def pretrain(
     with locked(work, "task.lock", A_MOMENT):
         await run_process([*command, *words, "--json"], name, work)
         made = f"walker_{kind}.safetensors"
-        store.keep("pretrain", "walker.json", work / "walker.json")
-        key = store.keep("pretrain", made, work / made).key
+        store.save("pretrain", "walker.json", work / "walker.json")
+        key = store.save("pretrain", made, work / made).key
         shutil.rmtree(work, ignore_errors=True)
     return key
 

@@ -12,7 +12,7 @@ Value = TypeVar("Value")
 
 def save(store: Store, stage: str, name: str, value: object) -> Artifact:
     """Keep a dataclass in the store under a key made of its content."""
-    return store.keep(stage, name, tables.encode(value))
+    return store.save(stage, name, tables.encode(value))
 
 
 def read(cls: type[Value], store: Store, artifact: Artifact) -> Value:

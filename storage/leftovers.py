@@ -25,7 +25,7 @@ from storage.store import HELD, SCRATCH, Store
 log = logging.getLogger(__name__)
 TASK, PROCESS = "task.lock", "lock"
 """What the flow and the training hold of a folder of work."""
-TRAINING, EVALUATION = "train-", "judge-"
+TRAINING, EVALUATION = "train-", "evaluate-"
 YOUNG_S = 60.0
 """A folder may be younger than the lock in it."""
 

@@ -66,7 +66,7 @@ class Store(FileTree):
             )
         return artifact
 
-    def keep(self, stage: str, name: str, content: bytes | Path) -> Artifact:
+    def save(self, stage: str, name: str, content: bytes | Path) -> Artifact:
         """Put content under a key made of its digest, so that nothing is ever overwritten."""
         with in_one_line(f"cannot read {content if isinstance(content, Path) else name}"):
             digest = digest_of(content)

@@ -30,8 +30,8 @@ def assess_video(video: Artifact, config: AssessmentConfig) -> dict[str, Artifac
     return {
         "landmarks": artifact_tables.save(store, "landmarks", "landmarks.parquet", found.track),
         "stability": artifact_tables.save(store, "stability", "stability.parquet", found.stability),
-        "quality": store.keep(
+        "quality": store.save(
             "quality", "quality.json", json.dumps(asdict(found.quality)).encode()
         ),
-        "info": store.keep("video", "info.json", json.dumps(info).encode()),
+        "info": store.save("video", "info.json", json.dumps(info).encode()),
     }

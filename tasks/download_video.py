@@ -68,7 +68,7 @@ def download_video(
 def take_file(file: SourceFile) -> Artifact:
     """A video of a folder."""
     suffix = safe_name(file.path.suffix.lstrip(".").lower() or "mp4")
-    return Store.from_environment().keep("video", f"clip.{suffix}", file.path)
+    return Store.from_environment().save("video", f"clip.{suffix}", file.path)
 
 
 def _earlier_download(store: Store, video: WebVideo, chosen: Offer) -> Artifact | None:
@@ -103,7 +103,7 @@ def _fetched(
     except UnreadableVideo:
         path.unlink()
         raise
-    made = store.keep("video", f"clip.{chosen.name.rsplit('.', 1)[-1]}", path)
+    made = store.save("video", f"clip.{chosen.name.rsplit('.', 1)[-1]}", path)
     store.put(f"{video.folder}/{chosen.name}.json", json.dumps(asdict(made)).encode())
     return made
 

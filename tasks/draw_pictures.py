@@ -30,7 +30,7 @@ def draw_still(
             artifact_tables.read(ReferenceMotion, store, reference),
             load_robot(robot).model,
         )
-    return store.keep("still", "still.png", picture)
+    return store.save("still", "still.png", picture)
 
 
 @stage()
@@ -38,4 +38,4 @@ def draw_snapshot(film: Artifact) -> Artifact:
     """Keep a PNG of the middle of a film."""
     store = Store.from_environment()
     with store.local(film) as path:
-        return store.keep("still", "still.png", middle_of(path))
+        return store.save("still", "still.png", middle_of(path))

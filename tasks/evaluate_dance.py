@@ -39,7 +39,7 @@ def evaluate_dance(
     summary = json.dumps(verdict.summary, indent=1).encode()
     rollout = Rollout(motion.dt, verdict.rollout_qpos)
     return {
-        "evaluations": store.keep("evaluate", "evaluations.parquet", rows),
-        "evaluation": store.keep("evaluate", "evaluation.json", summary),
+        "evaluations": store.save("evaluate", "evaluations.parquet", rows),
+        "evaluation": store.save("evaluate", "evaluation.json", summary),
         "rollout": artifact_tables.save(store, "evaluate", "rollout.parquet", rollout),
     }

@@ -41,7 +41,7 @@ async def evaluate_policy(
     """
     store = Store.from_environment()
     digest = hashlib.sha256(json.dumps(identity([policy, reference, robot, config])).encode())
-    name = f"judge-{digest.hexdigest()[:12]}"
+    name = f"evaluate-{digest.hexdigest()[:12]}"
     work = store.work(name)
     with (
         locked(work, "task.lock", A_MOMENT),
@@ -55,9 +55,9 @@ async def evaluate_policy(
         command = [sys.executable, "-m", "robojackson.cli", *map(str, words)]
         await run_process(command, name, work, limit_s)
         kept = {
-            "evaluations": store.keep("evaluate", TABLE, work / TABLE),
-            "evaluation": store.keep("evaluate", SUMMARY, work / SUMMARY),
-            "rollout": store.keep("evaluate", ROLLOUT, work / ROLLOUT),
+            "evaluations": store.save("evaluate", TABLE, work / TABLE),
+            "evaluation": store.save("evaluate", SUMMARY, work / SUMMARY),
+            "rollout": store.save("evaluate", ROLLOUT, work / ROLLOUT),
         }
         shutil.rmtree(work, ignore_errors=True)
     return kept

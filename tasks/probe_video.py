@@ -55,6 +55,6 @@ def info_of(store: Store, info: Artifact, path: Path) -> VideoInfo:
 def _save(store: Store, path: Path, info: VideoInfo) -> dict[str, Artifact]:
     facts = {key: value for key, value in asdict(info).items() if key != "path"}
     return {
-        "video": store.keep("video", path.name, path),
-        "info": store.keep("video", "info.json", json.dumps(facts).encode()),
+        "video": store.save("video", path.name, path),
+        "info": store.save("video", "info.json", json.dumps(facts).encode()),
     }

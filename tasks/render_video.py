@@ -36,4 +36,4 @@ def render_video(
             model=load_robot(robot).model,
             config=config,
         )
-        return store.keep("dance", film.name, film)
+        return store.save("dance", film.name, film)

@@ -25,5 +25,5 @@ def retarget_motion(
     scorecard = json.dumps(scorecard_record(reference), indent=1).encode()
     return {
         "reference": artifact_tables.save(store, "retarget", "reference.parquet", reference),
-        "scorecard": store.keep("retarget", "scorecard.json", scorecard),
+        "scorecard": store.save("retarget", "scorecard.json", scorecard),
     }

@@ -91,9 +91,9 @@ async def train_policy(
         async with show_progress(work, f"{labels.setup}-{labels.move}-s{config.seed}"):
             answer = await run_process(command, run_id, work, limit_s)
         kept = {
-            "training": store.keep("train", "training.json", _facts(answer, labels)),
-            "policy": store.keep("train", "policy.safetensors", work / "policy.safetensors"),
-            "episodes": store.keep("train", "episodes.parquet", work / "episodes.parquet"),
+            "training": store.save("train", "training.json", _facts(answer, labels)),
+            "policy": store.save("train", "policy.safetensors", work / "policy.safetensors"),
+            "episodes": store.save("train", "episodes.parquet", work / "episodes.parquet"),
         }
         shutil.rmtree(work, ignore_errors=True)
     return kept

@@ -99,10 +99,10 @@ def report(
         claims=claims,
         lines=lines,
         comparisons=compared,
-        payments=payments or {},
+        reward_audits=payments or {},
         moves=[_picture(name, moves[name], png) for name, png in (pictures or {}).items()],
         curves=plots["curves"],
-        judged=plots["judged"],
+        evaluation_plots=plots["judged"],
         notes=notes,
     )
     folder = f"{FOLDER}/{study.name}"
@@ -111,7 +111,7 @@ def report(
         "table": store.put(f"{folder}/table.csv", _csv(lines)),
         "results": store.put(f"{folder}/results.json", _json(claims, compared, lines)),
     }
-    for plot in (*content.curves, *content.judged, *content.moves):
+    for plot in (*content.curves, *content.evaluation_plots, *content.moves):
         made[plot.title] = store.put(f"{folder}/{_file(plot.title)}.png", plot.png)
     return made
 

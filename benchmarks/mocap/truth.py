@@ -18,7 +18,7 @@ REAL = ("person_cam1", "person_cam2", "person_cam3", "person_cam4")
 HELD_OUT = ("kick", "spin", "dance_a_aside", "dance_b_aside", "walk_aside")
 """Never tuned on: other motions, sides and bodies, in `clips/heldout`."""
 SEAMS = {"dance_a": (49,), "dance_a_aside": (49,), "walk": (39,), "walk_aside": (39,)}
-"""First frames of the second lap of the clips that loop with a jump."""
+"""First frames of the second cycle of the clips that loop with a jump."""
 JOINTS = tuple(
     f"{side}_{name}"
     for name in ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
@@ -41,7 +41,7 @@ class Truth:
     joints: `JOINTS`, metres, world.
     up_c: Direction against gravity in the camera frame.
     feet: Soles under heels and toes, metres; None where the truth has no toes.
-    seams: First frame of every further lap.
+    seams: First frame of every further cycle.
     """
 
     clip: str

@@ -73,8 +73,8 @@ def motionless() -> Iterator[None]:
     def motion(name: str, move: Any, study: Any, trainings: Any) -> dict[str, Artifact]:
         store = Store.from_environment()
         names = ("reference", "scorecard", "still")
-        made = {name: store.keep("played", name, move.clip.encode()) for name in names}
-        return made | {"payments": store.keep("played", "payments", b"{}")}
+        made = {name: store.save("played", name, move.clip.encode()) for name in names}
+        return made | {"payments": store.save("played", "payments", b"{}")}
 
     with (
         patch.object(ablation, "motion", motion),

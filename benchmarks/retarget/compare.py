@@ -40,7 +40,7 @@ TRUTH = ("walk", "dance_a", "dance_b", "spin")
 METHODS = ("optimise", "mink", "auto", "paper", "framefix")
 PAPER = "ROBOJACKSON_PAPER"
 LENGTHS_S = (10.0, 60.0)
-PLAIN: dict[str, Any] = {"tempo": 1.0, "repair": RepairConfig(enough_share=0.0)}
+PLAIN: dict[str, Any] = {"tempo": 1.0, "repair": RepairConfig(target_share=0.0)}
 COLUMNS = {
     "keypoint_mm": "keypoints mm",
     "keypoint_leaned_mm": "leaned mm",

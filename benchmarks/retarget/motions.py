@@ -34,12 +34,12 @@ _SOLES = np.array([[-0.0435, -0.05, 0.0], [0.1335, -0.05, 0.0]])
 
 
 def truth_motion(clip: str) -> SmplSequence:
-    """The motion of the body that a bundled clip shows, from its bones; the first lap alone."""
+    """The motion of the body that a bundled clip shows, from its bones; the first cycle alone."""
     path = video_path(clip)
     with np.load(path.with_name(f"{clip}_gt.npz")) as data:
         bones = data["bone_names"].tolist()
-        lap = data["all_bones"][: SEAMS.get(clip, (None,))[0]].astype(float)
-        at = dict(zip(bones, np.moveaxis(lap, 1, 0), strict=True))
+        cycle = data["all_bones"][: SEAMS.get(clip, (None,))[0]].astype(float)
+        at = dict(zip(bones, np.moveaxis(cycle, 1, 0), strict=True))
         fps = float(data["fps"])
     points = {
         f"{side}_{name}": at[f"{bone}.{side[0].upper()}"]

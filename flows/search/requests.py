@@ -31,7 +31,7 @@ def find_dance(query: str, source: str, address: str, top: int | None, config: F
     words = {"name": clean_text(query, 60) or source, "query": query}
     dance = build(Dance, words | {"source": source, "address": address}, "find")
     if source == "youtube":
-        dance = replace(load(DanceBook, "dances").recall(query), source=source, address=address)
+        dance = replace(load(DanceBook, "dances").find(query), source=source, address=address)
     if source in LOCAL:
         search(query, address, 1, config.web, datetime.now(UTC))
     return replace(dance, top=top or (ALL if source == folder.NAME else None))

@@ -76,7 +76,7 @@ def summary(found: Sequence[VideoCandidate], selection: Selection) -> str:
         kind = "too long" if "long, the limit" in reason else reason
         reasons[kind] = reasons.get(kind, 0) + 1
     told = ", ".join(f"{count} {reason}" for reason, count in reasons.items())
-    return f"{len(found)} found, {len(selection.kept)} kept" + (f" ({told})" if told else "")
+    return f"{len(found)} found, {len(selection.selected)} kept" + (f" ({told})" if told else "")
 
 
 def reason_of(error: BaseException) -> str:

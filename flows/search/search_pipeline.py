@@ -58,10 +58,10 @@ def search_and_rank(
     web = replace(settings.web, language=dance.language or settings.web.language)
     limits = replace(settings.selection, top=dance.top or settings.selection.top)
     source = replace(settings, web=web, selection=limits)
-    found = search_videos(dance.source, dance.asked, dance.address, limits.searched, web)
+    found = search_videos(dance.source, dance.full_query, dance.address, limits.searched, web)
     selection = select(found, known, limits, failed)
     get_run_logger().info("%s: %s", dance.name, summary(found, selection))
-    had = download_candidates(selection.kept, "score", source)
+    had = download_candidates(selection.selected, "score", source)
     entries = challenged(ranked(assess_candidates(had, source), source), reigning, source)
     made = SearchResult(dance, run_id, tuple(entries), selection)
     candidate_catalogue.append(Store.from_environment(), rows(made))
@@ -83,7 +83,7 @@ def assess_candidates(
 ) -> list[Entry]:
     """All candidates with their figures, or with the reason why there are none."""
     there = [video for _, video in had if isinstance(video, Artifact)]
-    outcomes = iter(assess_video.outcomes([(video, settings.judge) for video in there]))
+    outcomes = iter(assess_video.outcomes([(video, settings.assessment) for video in there]))
     entries = []
     for candidate, video in had:
         if isinstance(video, str):
@@ -141,7 +141,7 @@ def _submitted(
         except OSError as cause:
             return clean_text(f"cannot be read ({cause.strerror})")
     video = WebVideo(candidate.source, candidate.video_id, candidate.url, candidate.title)
-    limits = settings.judge.video
+    limits = settings.assessment.video
     return download_video.submit(video, purpose, settings.formats, settings.web, limits)
 
 

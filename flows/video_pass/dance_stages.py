@@ -158,7 +158,7 @@ async def perform(
         trained = await train_policy(reference, robot, _budgeted(settings), labels, deadline)
         judged = evaluate_dance(trained["policy"], reference, robot, settings.evaluate, labels)
         shown = (best.clip["video"], moved["landmarks"], moved["smpl"], reference)
-        film = render_video(*shown, judged["rollout"], robot, settings.show)
+        film = render_video(*shown, judged["rollout"], robot, settings.render)
         made = {**best.clip, "stability": best.stability, **moved, **trained, **judged}
         made |= {"dance": film, "still": draw_snapshot(film)}
         return {**made, **write_page(made, labels.move, best.name)}

@@ -71,7 +71,7 @@ async def of_name(words: str, search: Search) -> tuple[str, Artifact]:
 
     When the search fails, the video that an earlier one chose is taken.
     """
-    dance = load(DanceBook, search.book).recall(words)
+    dance = load(DanceBook, search.book).find(words)
     chosen = await best(dance.name, asdict(dance), search.config)
     return slug_of(dance.name), Artifact(**chosen)
 

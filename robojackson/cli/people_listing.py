@@ -30,7 +30,7 @@ def list_people(
     with stages.results_in(out) as files:
         with console.bar(f"people of {video.name}") as progress:
             who = settings.dancer
-            cast = track_people(video, info, who.crowd, who.identity, progress)
+            cast = track_people(video, info, who.detection, who.identity, progress)
         if not cast.rows:
             raise NoPersonFound(f"{video}: {cast}")
         files.write(PICTURE, draw_people(video, cast))

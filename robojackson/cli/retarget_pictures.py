@@ -41,7 +41,7 @@ def draw_retargeting(
         drawn["feasibility"] = str(out / FEASIBILITY)
     with console.bar("video") as progress:
         human_beside_robot(
-            sequence, reference, out / VIDEO, model=robot.model, config=settings.show,
+            sequence, reference, out / VIDEO, model=robot.model, config=settings.render,
             progress=progress,
         )  # fmt: skip
     return {"video": str(out / VIDEO), **drawn}

@@ -84,7 +84,7 @@ def train(
         locked(out),
         console.ticker() as tell,
     ):
-        rows = _EpisodeLog(files, common, goes_on=newest_checkpoint(out) is not None)
+        rows = _EpisodeLog(files, common, resumes=newest_checkpoint(out) is not None)
         try:
             asked = audit_record(audit_both_readings(robot, motion, config.environment))
             if asked:
@@ -202,8 +202,8 @@ class _StopRequest:
 class _EpisodeLog:
     """episodes.parquet, written now and then while rows come in."""
 
-    def __init__(self, files: FileTree, common: Mapping[str, Any], goes_on: bool) -> None:
-        self._log = RecordLog(files, "episodes.parquet", EPISODE_RECORD, common, goes_on)
+    def __init__(self, files: FileTree, common: Mapping[str, Any], resumes: bool) -> None:
+        self._log = RecordLog(files, "episodes.parquet", EPISODE_RECORD, common, resumes)
         self._saved = time.monotonic()
 
     def __len__(self) -> int:

@@ -51,7 +51,7 @@ def slip_cm_s(
     """Speed of the soles that should stand still, cm/s, over steps planted at both ends.
 
     Args:
-        sole_velocity: Horizontal, from each step to the next, m/s; M is S for a lap, else S - 1.
+        sole_velocity: Horizontal, from each step to the next, m/s; M is S for a cycle, else S - 1.
         planted: Labels at the steps.
     """
     both = (planted & np.roll(planted, -1, axis=0))[: len(sole_velocity)]

@@ -43,7 +43,7 @@ class MocapConfig:
         temporal: Of the network that corrects the detector.
         refine: Of the whole-clip refinement.
         gravity: Of the direction of up.
-        stand: Of the floor and the feet.
+        grounding: Of the floor and the feet.
     """
 
     method: analytic_solve.Method = "adaptive"
@@ -54,7 +54,7 @@ class MocapConfig:
     temporal: TemporalConfig = Field(default_factory=TemporalConfig)
     refine: RefineConfig = Field(default_factory=RefineConfig)
     gravity: floor.GravityConfig = Field(default_factory=floor.GravityConfig)
-    stand: GroundingConfig = Field(default_factory=GroundingConfig)
+    grounding: GroundingConfig = Field(default_factory=GroundingConfig)
 
 
 def recover_motion(track: LandmarkTrack, config: MocapConfig) -> SmplSequence:
@@ -121,7 +121,7 @@ def recover_points(
     to_world = floor.camera_to_world(gravity.up)
     body = posed(apply(to_world, points))
     start = body.pose.points.mean((0, 1))
-    stance = ground_body(body, fps, config.stand)
+    stance = ground_body(body, fps, config.grounding)
     body = stance.body
     start = body.pose.points.mean((0, 1)) - start
     camera = _camera(pinhole, gravity, to_world, start)

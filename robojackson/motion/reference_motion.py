@@ -17,15 +17,15 @@ from robojackson.motion.certificate import Certificate
 class ReferenceMotion:
     """What the robot shall do, at its own control rate.
 
-    A cyclic motion has `len(self)` steps a lap and continues with its first step, moved by
-    `lap_offset`; a motion that is not cyclic ends at its last step.
+    A cyclic motion has `len(self)` steps a cycle and continues with its first step, moved by
+    `cycle_offset`; a motion that is not cyclic ends at its last step.
 
     Attributes:
         robot: Name of the robot description (`configs/robots/<robot>.yaml`).
         model_sha256: Digest of the MJCF that the motion was made for.
         dt: Seconds a control step (Humanoid-v5: 0.015).
         cyclic: Whether the motion may be looped.
-        lap_offset: Root displacement of one lap, metres, world; zero unless cyclic.
+        cycle_offset: Root displacement of one cycle, metres, world; zero unless cyclic.
         qpos: MuJoCo positions, root quaternion wxyz.
         qvel: MuJoCo velocities: root linear in the world, root angular in the body, hinges.
         body_pos_w: Origins of the bodies, metres, world.
@@ -42,7 +42,7 @@ class ReferenceMotion:
     model_sha256: str
     dt: float
     cyclic: bool
-    lap_offset: Float[np.ndarray, "3"]
+    cycle_offset: Float[np.ndarray, "3"]
     qpos: Float[np.ndarray, "S nq"]
     qvel: Float[np.ndarray, "S nv"]
     body_pos_w: Float[np.ndarray, "S nbody 3"]

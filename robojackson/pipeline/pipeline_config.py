@@ -23,19 +23,19 @@ class PipelineConfig:
         robot: Name of the robot description (`configs/robots/<robot>.yaml`).
         setup: Name under which the training is recorded.
         minutes: Wall time of the whole pass, minutes.
-        other_minutes: Share of it that the stages other than training get, minutes.
+        reserved_minutes: Share of it that the stages other than training get, minutes.
         scoring_detector: Size of the pose model that scores candidates.
         detector: Pose model that feeds mocap; best lets two vote.
         dancer: Who of several people is danced.
         gate: Refuse to train on a reference motion that breaks a hard bar of its score card.
         network: Published networks whose weights the user brings; none by default.
-        video, stability, mocap, retarget, train, evaluate, show: Of the stages.
+        video, stability, mocap, retarget, train, evaluate, render: Of the stages.
     """
 
     robot: str = "humanoid"
     setup: str = "scratch"
     minutes: float = Field(default=12.0, gt=0)
-    other_minutes: float = Field(default=3.0, ge=0)
+    reserved_minutes: float = Field(default=3.0, ge=0)
     scoring_detector: Size = "lite"
     detector: Quality = "full"
     dancer: DancerConfig = Field(default_factory=DancerConfig)
@@ -47,9 +47,9 @@ class PipelineConfig:
     retarget: RetargetConfig = Field(default_factory=RetargetConfig)
     train: TrainConfig = Field(default_factory=TrainConfig)
     evaluate: EvaluateConfig = Field(default_factory=EvaluateConfig)
-    show: VideoConfig = Field(default_factory=VideoConfig)
+    render: VideoConfig = Field(default_factory=VideoConfig)
 
     @property
     def train_minutes(self) -> float:
         """What is left for training, at least half a minute."""
-        return max(0.5, self.minutes - self.other_minutes)
+        return max(0.5, self.minutes - self.reserved_minutes)

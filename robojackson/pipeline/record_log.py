@@ -18,19 +18,19 @@ class RecordLog:
         key: Of the file.
         schema: Of the table.
         common: Columns that all rows share (run_id, move, setup, seed).
-        goes_on: Whether the rows that are there are of this run; else they go when it has its own.
+        resumes: Whether the rows that are there are of this run; else they go when it has its own.
     """
 
     files: FileTree
     key: str
     schema: TableSchema
     common: Mapping[str, Any]
-    goes_on: bool = True
+    resumes: bool = True
     _rows: list[dict[str, Any]] = field(default_factory=list)
     _earlier: bool = True
 
     def __post_init__(self) -> None:
-        if self.goes_on and self.files.exists(self.key):
+        if self.resumes and self.files.exists(self.key):
             data, where = self.files.read(self.key), self.files.address(self.key)
             self._rows = tables.decode_rows(self.schema, data, where)
 

@@ -40,13 +40,13 @@ class Codec:
 
     Attributes:
         schema: Of the table.
-        take_apart: Value to columns and metadata.
-        put_together: Columns and metadata to value.
+        to_columns: Value to columns and metadata.
+        from_columns: Columns and metadata to value.
     """
 
     schema: TableSchema
-    take_apart: Callable[[Any], tuple[Columns, Facts]]
-    put_together: Callable[[Columns, Facts], Any]
+    to_columns: Callable[[Any], tuple[Columns, Facts]]
+    from_columns: Callable[[Columns, Facts], Any]
 
 
 def codec_of(cls: type) -> Codec:
@@ -162,7 +162,7 @@ def _reference(columns: Columns, facts: Facts) -> ReferenceMotion:
         model_sha256=str(facts["model_sha256"]),
         dt=float(facts["dt"]),
         cyclic=bool(facts["cyclic"]),
-        lap_offset=np.array(facts["lap_offset"], float),
+        cycle_offset=np.array(facts["cycle_offset"], float),
         source_time_s=columns["source_time_s"],
         scorecard=dict(facts["scorecard"]),
         certificate=_certificate(facts),

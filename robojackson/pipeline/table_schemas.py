@@ -159,7 +159,7 @@ REFERENCE_MOTION = TableSchema(
         "model_sha256",
         "dt",
         "cyclic",
-        "lap_offset",
+        "cycle_offset",
         "joint_names",
         "body_names",
         "keypoint_names",

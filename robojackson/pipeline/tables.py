@@ -27,7 +27,7 @@ Row = Mapping[str, Any]
 def encode(value: object) -> bytes:
     """A stage's dataclass as a Parquet file."""
     codec = codec_of(type(value))
-    columns, metadata = codec.take_apart(value)
+    columns, metadata = codec.to_columns(value)
     arrays = [_vector_column(c, columns[c.name]) for c in codec.schema.columns]
     fields = [
         column.field(array.type.list_size if column.is_vector else None)
@@ -46,7 +46,7 @@ def decode(cls: type[Value], data: bytes, where: str) -> Value:
     table = check(codec.schema, _from_bytes(data, where), where)
     columns = {c.name: _numbers(c, table.column(c.name)) for c in codec.schema.columns}
     try:
-        return codec.put_together(columns, metadata_of(table))
+        return codec.from_columns(columns, metadata_of(table))
     except (KeyError, ValueError, TypeError) as cause:
         raise BadTable(f"{where}: metadata of {codec.schema.name} is wrong: {cause}") from cause
 

@@ -80,7 +80,7 @@ _FORMS: Mapping[str, _Form] = {
     "fallen_share": _Form("steps that count as a fall", "%", 1, 100.0, "must be 0"),
     "tempo_mean": _Form("tempo beside the clip, mean", "", 2),
     "tempo_min": _Form("tempo beside the clip, slowest", "", 2),
-    "seam_deg": _Form("jump at the seam of a lap", "deg", 2),
+    "seam_deg": _Form("jump at the seam of a cycle", "deg", 2),
     "updates": _Form("gradient updates"),
     "training_s": _Form("training time", "min", 1, 1 / 60),
     "survived_s": _Form("survival", "s", 1),

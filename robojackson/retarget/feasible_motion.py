@@ -50,7 +50,7 @@ def make_feasible(
     """Repair a motion; slow it down where its tempo is free and that helps."""
     given = Feasible(qpos, aims, np.arange(len(qpos), dtype=float))
     how = config.repair
-    if not how.weights or feasible_share(robot, given, config) >= how.enough_share:
+    if not how.weights or feasible_share(robot, given, config) >= how.target_share:
         return given
     found = _accepted(robot, given, _solved(robot, given, how.weights[0], config), config)
     rounds = how.slow_rounds if config.tempo == "auto" else 0
@@ -78,7 +78,7 @@ def _excess(robot: Robot, motion: Feasible, config: RetargetConfig) -> float:
 
 def _slack(robot: Robot, motion: Feasible, config: RetargetConfig, grid: np.ndarray) -> np.ndarray:
     aims, tolerance = motion.aims, config.weights.tolerance
-    return tempo.slacks(robot, motion.qpos, aims.dt, aims.lap, tolerance, grid)
+    return tempo.slacks(robot, motion.qpos, aims.dt, aims.cycle_offset, tolerance, grid)
 
 
 def _solved(robot: Robot, motion: Feasible, weight: float, config: RetargetConfig) -> Feasible:
@@ -97,17 +97,17 @@ def _slowed(robot: Robot, motion: Feasible, config: RetargetConfig) -> Feasible 
     """
     aims = motion.aims
     slack = _slack(robot, motion, config, tempo.GRID)
-    if (slack[0] <= 1.0).mean() >= config.repair.enough_share:
+    if (slack[0] <= 1.0).mean() >= config.repair.target_share:
         return None
-    rate = tempo.smooth_rate(tempo.required_rate(slack), aims.dt, aims.lap is not None)
+    rate = tempo.smooth_rate(tempo.required_rate(slack), aims.dt, aims.cycle_offset is not None)
     so_far = np.gradient(motion.steps).clip(max=1.0)
     rate = np.maximum(rate, np.minimum(_GUARD * config.repair.slowest / so_far, 1.0))
     if rate.min() > _HARDLY_SLOWER:
         return None
-    steps = tempo.warp(rate, aims.lap is not None)
+    steps = tempo.warp(rate, aims.cycle_offset is not None)
     _log.info("slowed down to %.2f at the slowest", rate.min())
     slower = Feasible(
-        qpos=clip_to_limits(robot, resample(motion.qpos, steps, aims.lap)),
+        qpos=clip_to_limits(robot, resample(motion.qpos, steps, aims.cycle_offset)),
         aims=tempo.warped(aims, steps),
         steps=tempo.times_at(motion.steps, steps),
     )
@@ -120,7 +120,7 @@ def _slowed(robot: Robot, motion: Feasible, config: RetargetConfig) -> Feasible 
 def _accepted(robot: Robot, before: Feasible, after: Feasible, config: RetargetConfig) -> Feasible:
     """The motion after a repair, or the one before where the repair broke a hard bar or bent it too
     far."""
-    dearest = config.repair.dearest_mm + _error_mm(robot, before)
+    dearest = config.repair.max_added_error_mm + _error_mm(robot, before)
     good = _error_mm(robot, after) <= dearest and _holds(robot, after, config)
     return after if good else before
 
@@ -138,10 +138,10 @@ def _holds(robot: Robot, motion: Feasible, config: RetargetConfig) -> bool:
 def _repaired(robot: Robot, given: Feasible, found: Feasible, config: RetargetConfig) -> Feasible:
     """Raise the weight until enough steps are feasible or the motion would be bent too far."""
     how = config.repair
-    dearest = how.dearest_mm + _error_mm(robot, given)
+    dearest = how.max_added_error_mm + _error_mm(robot, given)
     best, good = found, feasible_share(robot, found, config)
     for weight in how.weights[1:]:
-        if good >= how.enough_share:
+        if good >= how.target_share:
             break
         found = _solved(robot, found, weight, config)
         _log.info("weight %g: %.0f %% feasible", weight, 100 * feasible_share(robot, found, config))

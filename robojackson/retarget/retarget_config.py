@@ -15,20 +15,20 @@ class RepairConfig:
     """How far a motion may be bent and slowed down so that the robot can do it.
 
     Attributes:
-        enough_share: Share of feasible steps from which nothing more is done; 0 repairs nothing.
+        target_share: Share of feasible steps from which nothing more is done; 0 repairs nothing.
         weights: Of the dynamics term, tried in turn.
         iterations: Most Newton steps with each of them.
         tolerance: Relative decrease of the cost at which they stop.
-        dearest_mm: Largest keypoint error that repair may add, millimetres.
+        max_added_error_mm: Largest keypoint error that repair may add, millimetres.
         slow_rounds: How often a motion with `tempo: auto` may be slowed down and solved again.
         slowest: Smallest tempo that `auto` may choose.
     """
 
-    enough_share: float = Field(default=0.95, ge=0, le=1)
+    target_share: float = Field(default=0.95, ge=0, le=1)
     weights: tuple[float, ...] = (0.01, 0.03, 0.1, 0.3)
     iterations: int = Field(default=12, ge=1)
     tolerance: float = Field(default=1e-4, gt=0)
-    dearest_mm: float = Field(default=25.0, ge=0)
+    max_added_error_mm: float = Field(default=25.0, ge=0)
     slow_rounds: int = Field(default=2, ge=0)
     slowest: float = Field(default=0.5, ge=0.25, le=1)
 
@@ -39,7 +39,7 @@ class RetargetConfig:
 
     Attributes:
         method: optimise (ours), paper (Table I literally) or framefix (its signs corrected).
-        cyclic: Whether to close the clip to a lap; auto decides by the seam.
+        cyclic: Whether to close the clip to a cycle; auto decides by the seam.
         tempo: Speed of the motion beside the clip's, below 1 slower; auto slows it down where that
             lets the robot do it.
         seed: Seed of the random starts of the per-frame solver.

@@ -43,9 +43,9 @@ def retarget_motion(
     """
     dt = robot.description.control_dt
     cyclic = config.cyclic if config.method == "optimise" else "no"
-    clip, lap = human_clip(sequence, dt, cyclic, config.fixed_tempo, config.cycle)
+    clip, cycle = human_clip(sequence, dt, cyclic, config.fixed_tempo, config.cycle)
     upright = aims = targets(clip, robot)
-    extra = _notes(sequence, clip, lap, config)
+    extra = _notes(sequence, clip, cycle, config)
     if config.method == "optimise":
         found, floor_mm = optimise(aims, robot, config)
         hovering = hovers(robot, found.qpos, aims.dt)
@@ -80,15 +80,15 @@ def assemble(
     `aims` are what the solver followed, perhaps leaned; `upright` is the dancer's own motion.
     """
     posed = pose(tree(robot), qpos)
-    certified = certify(robot, qpos, aims.dt, aims.lap, tolerance)
+    certified = certify(robot, qpos, aims.dt, aims.cycle_offset, tolerance)
     parts = {
         "robot": robot.description.name,
         "model_sha256": robot.sha256,
         "dt": aims.dt,
-        "cyclic": aims.lap is not None,
-        "lap_offset": np.zeros(3) if aims.lap is None else aims.lap,
+        "cyclic": aims.cycle_offset is not None,
+        "cycle_offset": np.zeros(3) if aims.cycle_offset is None else aims.cycle_offset,
         "qpos": qpos,
-        "qvel": velocities(qpos, aims.dt, aims.lap),
+        "qvel": velocities(qpos, aims.dt, aims.cycle_offset),
         "body_pos_w": posed.body_pos[:, 1:],
         "keypoints_w": posed.site_pos,
         "contact": aims.contact,
@@ -116,21 +116,23 @@ def _slowing(able: Feasible, upright: Targets, robot: Robot) -> dict[str, float]
 
 
 def _notes(
-    sequence: SmplSequence, clip: HumanClip, lap: Cycle | None, config: RetargetConfig
+    sequence: SmplSequence, clip: HumanClip, cycle: Cycle | None, config: RetargetConfig
 ) -> dict[str, float]:
     """What was done to the clip."""
-    frames = len(sequence) if lap is None else lap.end - lap.start
+    frames = len(sequence) if cycle is None else cycle.end - cycle.start
     stretch = 1.0
-    if lap is not None:
+    if cycle is not None:
         stretch = len(clip.time_s) * clip.dt * config.fixed_tempo * sequence.fps / frames
     return {
         "source_frames": float(len(sequence)),
         "source_fps": float(sequence.fps),
         "tempo": config.fixed_tempo,
-        "cyclic": float(lap is not None),
+        "cyclic": float(cycle is not None),
         "trimmed_s": max(0.0, (len(sequence) - frames) / sequence.fps),
         "time_scale": stretch,
-        "seam_source_mm": 0.0 if lap is None else 1e3 * lap.seam_m,
-        "seam_source_deg": 0.0 if lap is None else lap.seam_deg,
-        "lap_travel_m": 0.0 if clip.lap is None else float(np.linalg.norm(clip.lap)),
+        "seam_source_mm": 0.0 if cycle is None else 1e3 * cycle.seam_m,
+        "seam_source_deg": 0.0 if cycle is None else cycle.seam_deg,
+        "cycle_travel_m": 0.0
+        if clip.cycle_offset is None
+        else float(np.linalg.norm(clip.cycle_offset)),
     }

@@ -39,10 +39,16 @@ def score(
         "keypoint_leaned_mm": _keypoint_error(motion, robot, aims),
         **_posture(motion),
     }
-    lap = motion.lap_offset if motion.cyclic else None
-    card["seam_deg"] = 0.0 if lap is None else seam_angle(motion.qpos, motion.dt, lap)
-    card["seam_mm"] = 0.0 if lap is None else 1e3 * seam_shift(motion.qpos, motion.dt, lap)
-    card["seam_speed_rad_s"] = 0.0 if lap is None else seam_speed(motion.qpos, motion.dt, lap)
+    cycle_offset = motion.cycle_offset if motion.cyclic else None
+    card["seam_deg"] = (
+        0.0 if cycle_offset is None else seam_angle(motion.qpos, motion.dt, cycle_offset)
+    )
+    card["seam_mm"] = (
+        0.0 if cycle_offset is None else 1e3 * seam_shift(motion.qpos, motion.dt, cycle_offset)
+    )
+    card["seam_speed_rad_s"] = (
+        0.0 if cycle_offset is None else seam_speed(motion.qpos, motion.dt, cycle_offset)
+    )
     card["torque_ratio_p95"] = float(np.quantile(motion.torque_ratio, 0.95))
     card["torque_over_share"] = float((motion.torque_ratio > 1).any(axis=1).mean())
     card |= _feasibility(motion, robot)
@@ -69,9 +75,9 @@ def _feasibility(motion: ReferenceMotion, robot: Robot) -> dict[str, float]:
 
 
 def _validity(motion: ReferenceMotion, robot: Robot) -> dict[str, float]:
-    lap = motion.lap_offset if motion.cyclic else None
+    cycle_offset = motion.cycle_offset if motion.cyclic else None
     hinges = motion.qpos[:, 7:]
-    steps = forward_velocities(motion.qpos, motion.dt, lap)[:, 6:]
+    steps = forward_velocities(motion.qpos, motion.dt, cycle_offset)[:, 6:]
     fastest = max(float(np.abs(steps).max()), float(np.abs(motion.qvel[:, 6:]).max()))
     arrays = (motion.qpos, motion.qvel, motion.body_pos_w, motion.keypoints_w, motion.torque_ratio)
     return {
@@ -103,8 +109,8 @@ def _contact(motion: ReferenceMotion, robot: Robot, aims: Targets) -> dict[str, 
     posed = pose(shape, motion.qpos)
     ground = posed.ball_pos.copy()
     ground[..., 2] -= robot.contact_radii
-    lap = motion.lap_offset if motion.cyclic else None
-    speed = sole_velocities(robot, posed, motion.dt, lap)
+    cycle_offset = motion.cycle_offset if motion.cyclic else None
+    speed = sole_velocities(robot, posed, motion.dt, cycle_offset)
     slip = retarget_error.slip_cm_s(speed, aims.contact == PLANTED)
     height = np.abs(ground[..., 2])
     gap = 1e3 * height[aims.contact != AIR]

@@ -85,7 +85,7 @@ def _sketch(coarse: Problem) -> Problem:
 
 def _refined(coarse: Problem, drawn: Solution, config: RetargetConfig) -> Solution:
     """A sketch at twice its rate."""
-    start = resample(drawn.qpos, np.arange(len(coarse.targets)) / 2, coarse.targets.lap)
+    start = resample(drawn.qpos, np.arange(len(coarse.targets)) / 2, coarse.targets.cycle_offset)
     how = config.solver
     return solve(coarse, start, how, how.polish_iterations, how.rough_tolerance)
 
@@ -95,7 +95,7 @@ def _finish(
 ) -> Optimised:
     """Lean, polish at the control rate, and raise weights until the bars hold."""
     shift, upright = _stand_upright(coarse, solution, config)
-    start = resample(upright.qpos, np.arange(len(aims)) / 2, coarse.targets.lap)
+    start = resample(upright.qpos, np.arange(len(aims)) / 2, coarse.targets.cycle_offset)
     return polished(aims, start, shift, coarse.robot, config)
 
 
@@ -218,10 +218,10 @@ def harden(problem: Problem, solution: Solution, config: RetargetConfig) -> Solu
 
 
 def _acceleration(points: Float[np.ndarray, "T K 3"], aims: Targets) -> float:
-    """Largest acceleration of a keypoint, m/s2, over a lap's seam as well: a limb that has come out
-    on another's far side has passed through it between two steps."""
-    if aims.lap is not None:
-        points = np.concatenate([points, points[:2] + aims.lap])
+    """Largest acceleration of a keypoint, m/s2, over a cycle's seam as well: a limb that has come
+    out on another's far side has passed through it between two steps."""
+    if aims.cycle_offset is not None:
+        points = np.concatenate([points, points[:2] + aims.cycle_offset])
     change = np.linalg.norm(np.diff(points, 2, axis=0), axis=-1) / aims.dt**2
     return float(change.max(initial=0.0))
 
@@ -229,6 +229,6 @@ def _acceleration(points: Float[np.ndarray, "T K 3"], aims: Targets) -> float:
 def _slip(problem: Problem, posed: Posed) -> tuple[float, float]:
     """Speed of the soles that are planted in two successive steps: mean, 95th percentile, m/s."""
     aims = problem.targets
-    speed = sole_velocities(problem.robot, posed, aims.dt, aims.lap)
+    speed = sole_velocities(problem.robot, posed, aims.dt, aims.cycle_offset)
     slip = slip_cm_s(speed, aims.contact == PLANTED) / 100
     return (float(slip.mean()), float(np.quantile(slip, 0.95))) if len(slip) else (0.0, 0.0)

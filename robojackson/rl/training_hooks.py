@@ -19,7 +19,7 @@ class Hooks:
     Attributes:
         progress: Called every few seconds with steps, rate, survival and the time left.
         sink: Called with one row for each episode that ended.
-        learnt: Called once, when the networks first hold learning that no checkpoint does.
+        on_learning: Called once, when the networks first hold learning that no checkpoint does.
         saving: Called before a checkpoint is written: the rows so far should then be safe.
         stop: Asked between two rounds; True ends the run with a checkpoint.
         setup: What the caller calls the configuration; the policy's file tells it.
@@ -27,7 +27,7 @@ class Hooks:
 
     progress: Callable[[Row], None] = lambda row: None
     sink: Callable[[list[Row]], None] = lambda rows: None
-    learnt: Callable[[], None] = lambda: None
+    on_learning: Callable[[], None] = lambda: None
     saving: Callable[[], None] = lambda: None
     stop: Callable[[], bool] = lambda: False
     setup: str = ""

@@ -119,7 +119,7 @@ class Run:
         self._average.add(layers, updates)
         if not self._has_learnt and self.trainer.updates() > self._saved_updates:
             self._has_learnt = True
-            self._hooks.learnt()
+            self._hooks.on_learning()
         try:
             started = self.trainer.steps() > self._first_step
             if started and now - self._told >= self.config.progress_seconds:

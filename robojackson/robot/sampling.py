@@ -1,7 +1,7 @@
 """A robot's motion at the frame rate that another project's files have.
 
 qpos in MuJoCo's order: root xyz (metres, world), root quaternion wxyz, hinges (radians). A cyclic
-reference gives one lap: no format of the field can say that a motion repeats.
+reference gives one cycle: no format of the field can say that a motion repeats.
 """
 
 from dataclasses import dataclass
@@ -47,14 +47,14 @@ def sampled(reference: ReferenceMotion, fps: float | None = None) -> SampledMoti
     before, after = steps - _HALF_WIDTH, steps + _HALF_WIDTH
     if not reference.cyclic:
         before, after = np.clip([before, after], 0, len(reference) - 1)
-    lap = np.asarray(reference.lap_offset, float) if reference.cyclic else None
-    moved = difference(resample(qpos, before, lap), resample(qpos, after, lap))
+    cycle_offset = np.asarray(reference.cycle_offset, float) if reference.cyclic else None
+    moved = difference(resample(qpos, before, cycle_offset), resample(qpos, after, cycle_offset))
     qvel = moved / ((after - before) * reference.dt)[:, None]
-    return SampledMotion(float(fps), resample(qpos, steps, lap), qvel)
+    return SampledMotion(float(fps), resample(qpos, steps, cycle_offset), qvel)
 
 
 def _steps(reference: ReferenceMotion, fps: float) -> Float[np.ndarray, " T"]:
-    """Fractional steps of the frames: up to the last step, or all before the next lap begins."""
+    """Fractional steps of the frames: up to the last step, or all before the next cycle begins."""
     per_frame = 1.0 / (fps * reference.dt)
     if reference.cyclic:
         return np.arange(int(np.ceil(len(reference) / per_frame - 1e-6))) * per_frame

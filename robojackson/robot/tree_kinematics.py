@@ -133,23 +133,23 @@ def _cross(a: Float[np.ndarray, "T 3 N"], b: Float[np.ndarray, "T 3 N"]) -> np.n
 
 
 def sole_velocities(
-    robot: Robot, posed: Posed, dt: float, lap: Float[np.ndarray, "3"] | None
+    robot: Robot, posed: Posed, dt: float, cycle_offset: Float[np.ndarray, "3"] | None
 ) -> Float[np.ndarray, "M C 2"]:
     """Horizontal velocity of each ball's ground point from each step to the next, m/s.
 
     (c_next - c) / dt - r (w_y, -w_x), with w from the turn of the foot between the steps: a ball
-    that rolls without slip has none. A lap has one more than an open motion.
+    that rolls without slip has none. A cycle has one more than an open motion.
     """
     centre = posed.ball_pos
     move = np.roll(centre, -1, axis=0) - centre
-    if lap is not None:
-        move[-1] += lap
+    if cycle_offset is not None:
+        move[-1] += cycle_offset
     turn = posed.body_rot[:, robot.contact_bodies]
     relative = np.roll(turn, -1, axis=0) @ turn.swapaxes(-1, -2)
     spin = _small_turns(relative)
     rolled = robot.contact_radii[:, None] * np.stack([spin[..., 1], -spin[..., 0]], -1)
     out = (move[..., :2] - rolled) / dt
-    return np.asarray(out if lap is not None else out[:-1])
+    return np.asarray(out if cycle_offset is not None else out[:-1])
 
 
 def integrate(

@@ -12,7 +12,7 @@ from robojackson.pipeline import tables
 from tests.fixtures.commands import robojackson
 from tests.fixtures.robots import human, robot_motion
 
-TINY = {"show.max_seconds": 0.3, "show.panel_width": 96, "show.panel_height": 128}
+TINY = {"render.max_seconds": 0.3, "render.panel_width": 96, "render.panel_height": 128}
 
 
 @pytest.fixture

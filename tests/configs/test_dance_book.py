@@ -24,16 +24,16 @@ def test_every_dance_has_a_source_that_exists(book: DanceBook) -> None:
 
 
 def test_the_words_are_added_to_the_query(book: DanceBook) -> None:
-    assert book.pick(["APT"])[0].asked == "APT dance rose bruno mars shorts"
+    assert book.pick(["APT"])[0].full_query == "APT dance rose bruno mars shorts"
 
 
 def test_a_dance_is_known_by_its_name_or_query_however_written(book: DanceBook) -> None:
-    assert [book.recall(words).name for words in ("apt", "APT DANCE", "Apt dance")] == ["APT"] * 3
+    assert [book.find(words).name for words in ("apt", "APT DANCE", "Apt dance")] == ["APT"] * 3
 
 
 def test_other_words_are_a_dance_of_their_own(book: DanceBook) -> None:
-    made = book.recall("tango")
-    assert (made.name, made.asked, made.source) == ("tango", "tango", "youtube")
+    made = book.find("tango")
+    assert (made.name, made.full_query, made.source) == ("tango", "tango", "youtube")
 
 
 def test_an_unknown_dance_is_refused_with_the_known_ones(book: DanceBook) -> None:

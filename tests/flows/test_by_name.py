@@ -89,7 +89,7 @@ def test_without_a_net_the_video_that_was_chosen_last_is_danced(
     records: None, store_folder: Path, config: str
 ) -> None:
     store = Store(store_folder)
-    kept = store.keep("video", "clip.mp4", b"the last one")
+    kept = store.save("video", "clip.mp4", b"the last one")
     facts = {"run_id": "r", "source": "youtube", "video_id": "v", "url": "https://host/v"}
     times = {"retrieved_at": NOW, "decided_at": NOW}
     chosen = {"decision": "chosen", "video_key": kept.key, "video_sha256": kept.sha256}

@@ -180,7 +180,7 @@ def test_a_choice_of_which_no_motion_can_be_made_leaves_the_one_before(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     store = Store(tmp_path)
-    kept, now = store.keep("video", "clip.mp4", b"x"), datetime.now(UTC)
+    kept, now = store.save("video", "clip.mp4", b"x"), datetime.now(UTC)
     row = {
         "dance": "APT",
         "source": "site",

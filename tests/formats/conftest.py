@@ -14,7 +14,7 @@ from robojackson.motion.reference_motion import ReferenceMotion
 STEPS, DT = 100, 0.015
 PERIOD_S = STEPS * DT
 TRAVEL = np.array([0.6, -0.2, 0.0])
-"""Metres a lap."""
+"""Metres a cycle."""
 YAW, SWAY, TILT = np.pi / 2, 0.3, 0.2
 """Radians."""
 MJCF = Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets" / "humanoid.xml"
@@ -53,7 +53,7 @@ def model() -> mujoco.MjModel:
 
 @pytest.fixture(scope="session")
 def swaying(model: mujoco.MjModel) -> ReferenceMotion:
-    """One lap of `poses`."""
+    """One cycle of `poses`."""
     time_s = np.arange(STEPS) * DT
     qpos = poses(time_s)
     following = poses(time_s + 1e-6)
@@ -65,7 +65,7 @@ def swaying(model: mujoco.MjModel) -> ReferenceMotion:
         model_sha256="0" * 64,
         dt=DT,
         cyclic=True,
-        lap_offset=TRAVEL,
+        cycle_offset=TRAVEL,
         qpos=qpos,
         qvel=qvel,
         body_pos_w=np.zeros((STEPS, model.nbody - 1, 3)),
@@ -86,4 +86,4 @@ def turned(swaying: ReferenceMotion) -> ReferenceMotion:
     qpos = np.zeros_like(swaying.qpos)
     qpos[:, :7] = [0.0, 0.0, 1.3, ROOT_HALF, 0.0, 0.0, ROOT_HALF]
     still = np.zeros_like(swaying.qvel)
-    return replace(swaying, qpos=qpos, qvel=still, cyclic=False, lap_offset=np.zeros(3))
+    return replace(swaying, qpos=qpos, qvel=still, cyclic=False, cycle_offset=np.zeros(3))

@@ -79,8 +79,8 @@ def test_hip_shake_feet_stay_planted(joint: str) -> None:
 
 def test_hip_shake_continues_over_the_seam_with_its_velocity() -> None:
     joints = truth("hip_shake")["joints"]
-    lap = np.concatenate([joints, joints, joints])
-    second_difference = np.linalg.norm(np.diff(lap, n=2, axis=0), axis=-1).max(1)
+    cycle_offset = np.concatenate([joints, joints, joints])
+    second_difference = np.linalg.norm(np.diff(cycle_offset, n=2, axis=0), axis=-1).max(1)
     seam = second_difference[len(joints) - 2 : len(joints) + 1].max()
     inside = second_difference[: len(joints) - 2].max()
     assert seam <= inside

@@ -57,7 +57,7 @@ def test_a_log_that_begins_anew_has_no_rows_of_the_one_before(tmp_path: Path) ->
     first = a_log(store)
     first.append(episodes(10, 20, 30))
     first.save()
-    second = RecordLog(store, "episodes.parquet", EPISODE_RECORD, COMMON, goes_on=False)
+    second = RecordLog(store, "episodes.parquet", EPISODE_RECORD, COMMON, resumes=False)
     assert saved_steps(store) == [10, 20, 30]
     second.append(episodes(25))
     second.save()

@@ -63,7 +63,7 @@ def a_reference(rng: np.random.Generator) -> ReferenceMotion:
         model_sha256="0" * 64,
         dt=0.015,
         cyclic=True,
-        lap_offset=rng.normal(size=3),
+        cycle_offset=rng.normal(size=3),
         qpos=rng.normal(size=(6, 24)),
         qvel=rng.normal(size=(6, 23)),
         body_pos_w=f32(rng, 6, 13, 3),

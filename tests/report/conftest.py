@@ -66,7 +66,7 @@ def reference(model: mujoco.MjModel) -> ReferenceMotion:
         model_sha256="0" * 64,
         dt=DT,
         cyclic=True,
-        lap_offset=np.array([0.5, 0.0, 0.0]),
+        cycle_offset=np.array([0.5, 0.0, 0.0]),
         qpos=qpos,
         qvel=np.zeros((STEPS, model.nv)),
         body_pos_w=np.zeros((STEPS, model.nbody - 1, 3)),

@@ -1,4 +1,4 @@
-"""All panels show the same moment, over laps and past the end."""
+"""All panels show the same moment, over cycles and past the end."""
 
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ def test_cyclic_reference_starts_again_after_a_lap(reference: ReferenceMotion) -
 
 def test_laps_are_counted(reference: ReferenceMotion) -> None:
     when = timeline(reference, 30.0, 12, 2 * len(reference), 1 / reference.dt, 99.0)
-    np.testing.assert_array_equal(when.lap, np.repeat([0, 1], 27))
+    np.testing.assert_array_equal(when.cycle, np.repeat([0, 1], 27))
 
 
 def test_motion_that_is_not_cyclic_holds_its_last_step(reference: ReferenceMotion) -> None:
@@ -47,4 +47,4 @@ def test_video_is_no_longer_than_asked(reference: ReferenceMotion) -> None:
 def test_reference_moves_on_by_a_lap(reference: ReferenceMotion) -> None:
     when = timeline(reference, 30.0, 12, 2 * len(reference), 1 / reference.dt, 99.0)
     qpos = reference_qpos(reference, when)
-    np.testing.assert_allclose(qpos[27, :3] - qpos[0, :3], reference.lap_offset)
+    np.testing.assert_allclose(qpos[27, :3] - qpos[0, :3], reference.cycle_offset)

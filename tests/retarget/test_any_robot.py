@@ -34,7 +34,7 @@ def small(description) -> Robot:
 
 @pytest.fixture(scope="module")
 def motion(small: Robot) -> ReferenceMotion:
-    config = RetargetConfig(tempo=1.0, repair=RepairConfig(enough_share=0.0))
+    config = RetargetConfig(tempo=1.0, repair=RepairConfig(target_share=0.0))
     return retarget_motion(human("walk"), small, config)
 
 

@@ -60,15 +60,15 @@ def test_keypoints_and_bodies_are_the_forward_kinematics_of_qpos(clip: str, robo
 def test_the_lap_closes_in_pose_and_velocity(clip: str):
     motion = robot_motion(clip)
     assert motion.cyclic
-    assert seam_angle(motion.qpos, motion.dt, motion.lap_offset) < 5.0
+    assert seam_angle(motion.qpos, motion.dt, motion.cycle_offset) < 5.0
     over = np.abs(motion.qvel[0, 6:] - motion.qvel[-1, 6:]).max()
     inside = np.abs(np.diff(motion.qvel[:, 6:], axis=0)).max()
     assert over <= 1.5 * inside
 
 
 def test_the_dance_stays_on_the_spot_and_the_walk_walks():
-    np.testing.assert_array_equal(robot_motion("hip_shake").lap_offset, 0.0)
-    travel = robot_motion("walk").lap_offset
+    np.testing.assert_array_equal(robot_motion("hip_shake").cycle_offset, 0.0)
+    travel = robot_motion("walk").cycle_offset
     assert np.linalg.norm(travel) > 0.8
     assert travel[2] == 0.0
 

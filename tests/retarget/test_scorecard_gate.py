@@ -35,7 +35,7 @@ def _spoilt(change: Callable[[np.ndarray], None]) -> ReferenceMotion:
     return replace(
         motion,
         qpos=qpos,
-        qvel=velocities(qpos, motion.dt, motion.lap_offset),
+        qvel=velocities(qpos, motion.dt, motion.cycle_offset),
         keypoints_w=posed.site_pos,
         body_pos_w=posed.body_pos[:, 1:],
     )

@@ -64,7 +64,7 @@ def make_reference(
         model_sha256=robot.sha256,
         dt=DT,
         cyclic=cyclic,
-        lap_offset=np.zeros(3),
+        cycle_offset=np.zeros(3),
         qpos=qpos,
         qvel=qvel,
         body_pos_w=bodies[:, 1:],

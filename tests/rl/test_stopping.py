@@ -36,7 +36,7 @@ def test_learning_is_announced_once_after_the_first_updates(
 ) -> None:
     """Before, there is nothing to save: whoever stops the training need not wait for it."""
     announced: list[int] = []
-    hooks = Hooks(learnt=lambda: announced.append(len(updates)))
+    hooks = Hooks(on_learning=lambda: announced.append(len(updates)))
     train_policy(sway, robot, CONFIG, tmp_path, hooks)
     first = next(i for i, count in enumerate(updates, 1) if count > 0)
     assert 1 < first < len(updates)
@@ -51,7 +51,7 @@ def test_a_resumed_training_announces_only_what_its_checkpoint_lacks(
     announced: list[int] = []
     longer = dataclasses.replace(CONFIG, steps=480)
     train_policy(
-        sway, robot, longer, tmp_path, Hooks(learnt=lambda: announced.append(len(updates)))
+        sway, robot, longer, tmp_path, Hooks(on_learning=lambda: announced.append(len(updates)))
     )
     assert updates[0] > 0
     assert announced == [next(i for i, n in enumerate(updates, 1) if n > updates[0])]

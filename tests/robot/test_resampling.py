@@ -1,4 +1,4 @@
-"""Resampling goes through its samples, and a lap continues over its seam."""
+"""Resampling goes through its samples, and a cycle continues over its seam."""
 
 import mujoco
 import numpy as np
@@ -12,7 +12,7 @@ COUNT = 40
 
 
 def _turning(robot: Robot, turns: int) -> np.ndarray:
-    """A lap in which the root turns about z, the hinges swing, and the root travels along x."""
+    """A cycle in which the root turns about z, the hinges swing, and the root travels along x."""
     phase = 2 * np.pi * np.arange(COUNT) / COUNT
     qpos = np.tile(robot.standing, (COUNT, 1))
     qpos[:, 0] += 0.4 * np.arange(COUNT) / COUNT
@@ -21,21 +21,21 @@ def _turning(robot: Robot, turns: int) -> np.ndarray:
     return qpos
 
 
-LAP = np.array([0.4, 0.0, 0.0])
+CYCLE_OFFSET = np.array([0.4, 0.0, 0.0])
 
 
-@pytest.mark.parametrize("lap", [None, LAP])
+@pytest.mark.parametrize("cycle_offset", [None, CYCLE_OFFSET])
 @pytest.mark.parametrize("turns", [0, 1])
-def test_the_samples_come_back(robot: Robot, lap, turns):
+def test_the_samples_come_back(robot: Robot, cycle_offset, turns):
     qpos = _turning(robot, turns)
-    np.testing.assert_allclose(resample(qpos, np.arange(COUNT), lap), qpos, atol=1e-9)
+    np.testing.assert_allclose(resample(qpos, np.arange(COUNT), cycle_offset), qpos, atol=1e-9)
 
 
 @pytest.mark.parametrize("turns", [0, 1])
 def test_a_lap_continues_with_its_first_step_moved(robot: Robot, turns):
     qpos = _turning(robot, turns)
-    halves = resample(qpos, np.arange(2 * COUNT) / 2, LAP)
-    assert seam_angle(halves, 0.015, LAP) < 0.05
+    halves = resample(qpos, np.arange(2 * COUNT) / 2, CYCLE_OFFSET)
+    assert seam_angle(halves, 0.015, CYCLE_OFFSET) < 0.05
     exact = np.sin(2 * np.pi * (COUNT - 0.5) / COUNT) * 0.3 + qpos[0, 7]
     assert halves[-1, 7] == pytest.approx(exact, abs=1e-4)
 
@@ -59,4 +59,4 @@ def test_a_broken_seam_is_measured(robot: Robot, rng: np.random.Generator):
     qpos = _turning(robot, 0)
     broken = integrate(qpos, 0.0 * rng.normal(size=(COUNT, robot.model.nv)))
     broken[0, 9] += np.radians(20.0)
-    assert seam_angle(broken, 0.015, LAP) > 15.0
+    assert seam_angle(broken, 0.015, CYCLE_OFFSET) > 15.0

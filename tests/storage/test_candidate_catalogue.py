@@ -163,7 +163,7 @@ def test_a_question_that_is_none_is_one_line(store: Store, sql: str) -> None:
 
 
 def test_the_video_that_was_chosen_last_reigns(store: Store) -> None:
-    kept = store.keep("video", "clip.mp4", b"x")
+    kept = store.save("video", "clip.mp4", b"x")
     chosen = {"decision": "chosen", "video_key": kept.key, "video_sha256": kept.sha256}
     for day, name in enumerate(("first", "second")):
         candidate_catalogue.append(
@@ -189,7 +189,7 @@ def test_a_video_that_failed_may_be_tried_again(store: Store) -> None:
 
 
 def test_a_choice_that_failed_since_does_not_reign(store: Store) -> None:
-    kept = store.keep("video", "clip.mp4", b"x")
+    kept = store.save("video", "clip.mp4", b"x")
     chosen = {"decision": "chosen", "video_key": kept.key, "video_sha256": kept.sha256}
     for hour, name in enumerate(("first", "second")):
         candidate_catalogue.append(
@@ -204,7 +204,7 @@ def test_a_choice_that_failed_since_does_not_reign(store: Store) -> None:
 
 
 def test_what_a_person_looked_for_is_nothing_to_the_nightly_runs(store: Store) -> None:
-    kept = store.keep("video", "clip.mp4", b"x")
+    kept = store.save("video", "clip.mp4", b"x")
     chosen = {"decision": "chosen", "video_key": kept.key, "video_sha256": kept.sha256}
     candidate_catalogue.append(store, [row("steady", run_id="refresh-1", **chosen)])
     later = NOW + timedelta(hours=1)

@@ -68,8 +68,8 @@ def test_what_was_put_is_read(store: Store) -> None:
 
 def test_a_local_file_is_put_like_bytes(store: Store, tmp_path: Path) -> None:
     (tmp_path / "clip.mp4").write_bytes(b"frames")
-    artifact = store.keep("video", "clip.mp4", tmp_path / "clip.mp4")
-    assert artifact == store.keep("video", "clip.mp4", b"frames")
+    artifact = store.save("video", "clip.mp4", tmp_path / "clip.mp4")
+    assert artifact == store.save("video", "clip.mp4", b"frames")
 
 
 def test_a_second_put_replaces_the_first(store: Store) -> None:
@@ -107,7 +107,7 @@ def test_a_missing_artifact_does_not_verify(store: Store) -> None:
 
 
 def test_different_content_is_kept_under_different_keys(store: Store) -> None:
-    assert store.keep("s", "x", b"1").key != store.keep("s", "x", b"2").key
+    assert store.save("s", "x", b"1").key != store.save("s", "x", b"2").key
 
 
 def test_local_gives_a_file_with_the_content(store: Store) -> None:

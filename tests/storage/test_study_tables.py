@@ -32,7 +32,7 @@ def made(store: Store, survived: float = 1.0) -> dict[str, Artifact]:
     rollout |= {"clip_fraction": 1.0, "success": 1.0, "strict_success": 0.0}
     rows = {"episodes": (EPISODE_RECORD, episode), "evaluations": (EVALUATION_RECORD, rollout)}
     return {
-        name: store.keep("stage", f"{name}.parquet", tables.encode_rows(schema, [{**NAMES, **row}]))
+        name: store.save("stage", f"{name}.parquet", tables.encode_rows(schema, [{**NAMES, **row}]))
         for name, (schema, row) in rows.items()
     }
 

@@ -35,10 +35,10 @@ def made(store: Store, policy: bytes) -> dict[str, Artifact]:
     episodes = tables.encode_rows(EPISODE_RECORD, [{**NAMES, **episode}])
     evaluations = tables.encode_rows(EVALUATION_RECORD, [{**NAMES, **rollout}])
     return {
-        "policy": store.keep("t", "policy.safetensors", policy),
-        "training": store.keep("t", "training.json", b"{}"),
-        "episodes": store.keep("t", "episodes.parquet", episodes),
-        "evaluations": store.keep("t", "evaluations.parquet", evaluations),
+        "policy": store.save("t", "policy.safetensors", policy),
+        "training": store.save("t", "training.json", b"{}"),
+        "episodes": store.save("t", "episodes.parquet", episodes),
+        "evaluations": store.save("t", "evaluations.parquet", evaluations),
     }
 
 

@@ -45,8 +45,8 @@ def publish(store: Store, move: str, setup: str, seed: int) -> None:
     rows.append(rollout(names, "hold", 0.4))
     rows.append({**rows[1], "phase": -1, "survived_s": 0.9})
     given = {
-        "episodes": store.keep("t", "e.parquet", tables.encode_rows(EPISODE_RECORD, episodes)),
-        "evaluations": store.keep("t", "v.parquet", tables.encode_rows(EVALUATION_RECORD, rows)),
+        "episodes": store.save("t", "e.parquet", tables.encode_rows(EPISODE_RECORD, episodes)),
+        "evaluations": store.save("t", "v.parquet", tables.encode_rows(EVALUATION_RECORD, rows)),
     }
     study_tables.write(store, place, given)
     start = "scratch" if setup == "scratch" else "walker"
@@ -72,7 +72,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
                 for seed in STUDY.seeds:
                     publish(Store(root), move, setup, seed)
         moves = {name: load(Move, f"moves/{name}") for name in STUDY.moves}
-        report(STUDY, moves, payments={"walk": PAID})
+        report(STUDY, moves, reward_audits={"walk": PAID})
     return root / "studies" / "known"
 
 

@@ -1,4 +1,4 @@
-"""The authored dance: planted feet, a lap that closes, limbs that reach."""
+"""The authored dance: planted feet, a cycle that closes, limbs that reach."""
 
 import numpy as np
 import pytest
@@ -42,7 +42,7 @@ def test_sample_rate_does_not_change_the_dance() -> None:
 
 @pytest.mark.parametrize("name", deepmimic.TREE_ORDER)
 def test_every_joint_crosses_the_seam_without_a_jerk(name: str) -> None:
-    """The turn over the seam is no larger than the largest inside the lap."""
+    """The turn over the seam is no larger than the largest inside the cycle."""
     rotation = author(Dance(), BODY).rotations[name]
     turns = (rotation[:-1].inv() * rotation[1:]).magnitude()
     seam = (rotation[-1].inv() * rotation[0]).magnitude()

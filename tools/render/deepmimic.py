@@ -99,9 +99,9 @@ def resampled(motion: Motion, fps: float) -> Motion:
 
 
 def repeated(motion: Motion, loops: int) -> Motion:
-    """`loops` laps, each moved on the floor by the distance that a lap covers."""
-    lap = (motion.root_position[-1] - motion.root_position[0]) * np.array([1.0, 0.0, 1.0])
-    position = np.concatenate([motion.root_position + k * lap for k in range(loops)])
+    """`loops` cycles, each moved on the floor by the distance that a cycle covers."""
+    cycle = (motion.root_position[-1] - motion.root_position[0]) * np.array([1.0, 0.0, 1.0])
+    position = np.concatenate([motion.root_position + k * cycle for k in range(loops)])
     rotations = {n: Rotation.concatenate([r] * loops) for n, r in motion.rotations.items()}
     return Motion(motion.fps, position, rotations)
 

@@ -46,7 +46,7 @@ class CameraMotion:
         self._before: np.ndarray | None = None
         self.displacements: list[float] = []
 
-    def see(self, index: int, image: np.ndarray, xy: Float[np.ndarray, "33 2"]) -> None:
+    def add_frame(self, index: int, image: np.ndarray, xy: Float[np.ndarray, "33 2"]) -> None:
         """Frame number `index`, RGB, with the landmarks of the person in it."""
         if self._before is not None:
             after = self._small(image)

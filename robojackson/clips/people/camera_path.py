@@ -108,7 +108,7 @@ def camera_path(
     """
     chain = _Chain()
     for image, xy in zip(images, landmarks, strict=False):
-        chain.see(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), xy)
+        chain.add_frame(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), xy)
     small = np.array(chain.to_first[: len(landmarks)])
     missing = max(len(landmarks) - len(small), 0)
     small = np.concatenate([small, np.repeat(small[-1:], missing, axis=0)])
@@ -144,7 +144,7 @@ class _Chain:
         self._from = self._at = np.zeros((0, 1, 2), np.float32)
         self._found = 0
 
-    def see(self, grey: UInt8[np.ndarray, "H W"], xy: Float[np.ndarray, "33 2"]) -> None:
+    def add_frame(self, grey: UInt8[np.ndarray, "H W"], xy: Float[np.ndarray, "33 2"]) -> None:
         """The next frame."""
         self.size = (grey.shape[1], grey.shape[0])
         step = self._followed(grey)

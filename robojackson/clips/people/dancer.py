@@ -40,7 +40,7 @@ class DancerConfig:
     Attributes:
         number: Whom to dance: 1 is the largest steady person, None too.
         scouts: The few frames in which somebody else is looked for.
-        crowd, identity: Of everybody in every frame.
+        detection, identity: Of everybody in every frame.
         astray: Body heights; a row further than this from where the person must be is another's.
         crowding: People nearer than this hide one another, body heights.
         longest_gap_s: He is looked for in gaps up to this, seconds.
@@ -48,7 +48,7 @@ class DancerConfig:
 
     number: int | None = Field(default=None, ge=1)
     scouts: PeopleConfig = Field(default_factory=PeopleConfig)
-    crowd: PersonDetectionConfig = Field(default_factory=PersonDetectionConfig)
+    detection: PersonDetectionConfig = Field(default_factory=PersonDetectionConfig)
     identity: IdentityConfig = Field(default_factory=IdentityConfig)
     astray: float = Field(default=0.3, gt=0)
     crowding: float = Field(default=0.5, gt=0)
@@ -80,7 +80,7 @@ def track_dancer(
             return single
     passes = 3 if config.number in (None, 1) else 2
     later = _shifted(progress, info.frames, passes - 2, passes)
-    cast = track_people(path, info, config.crowd, config.identity, later)
+    cast = track_people(path, info, config.detection, config.identity, later)
     if len(cast.rows) < 2 and config.number in (None, 1):
         return single
     number = config.number or 1
@@ -101,7 +101,7 @@ def _scouted(
         scouts = People(info.frames, info.fps, landmarker, config.scouts)
 
         def watch(index: int, image: np.ndarray, row: np.ndarray) -> None:
-            scouts.see(index, image, row[:, :2])
+            scouts.add_frame(index, image, row[:, :2])
 
         track = detect(path, info, size, progress, watch)
     return track, max(scouts.counts, default=0) > 1
@@ -124,7 +124,7 @@ def _followed(
         frames = timed_frames(path, short_side=SHORT_SIDE)
         for index, (time_s, image) in zip(range(len(known)), frames, strict=False):
             if wanted[index]:
-                width = config.crowd.limb_width
+                width = config.detection.limb_width
                 found[index] = look(
                     mask_others(image, known[index], others[:, index], width), time_s
                 )

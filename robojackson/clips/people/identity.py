@@ -27,8 +27,8 @@ class IdentityConfig:
     """How much may change from one sighting of a person to the next.
 
     Attributes:
-        pieces: What a piece is.
-        shortest_piece_s: A piece below this is no one, seconds.
+        tracklets: What a piece is.
+        shortest_tracklet_s: A piece below this is no one, seconds.
         shortest_blend_s: The same for one that may be either of two, seconds.
         memory_s: Of the motion that leads across a gap, seconds.
         foresight_s: A motion is not continued for longer than this, seconds.
@@ -40,8 +40,8 @@ class IdentityConfig:
         shortest_s, least_share: Who is seen for less than either, seconds, is nobody.
     """
 
-    pieces: TrackletConfig = Field(default_factory=TrackletConfig)
-    shortest_piece_s: float = Field(default=0.1, ge=0)
+    tracklets: TrackletConfig = Field(default_factory=TrackletConfig)
+    shortest_tracklet_s: float = Field(default=0.1, ge=0)
     shortest_blend_s: float = Field(default=0.35, ge=0)
     memory_s: float = Field(default=0.7, gt=0)
     foresight_s: float = Field(default=0.5, ge=0)
@@ -70,8 +70,8 @@ def identify(
     """
     duration_s = float(time_s[-1] - time_s[0]) if len(time_s) else 0.0
     period_s = max(duration_s / max(len(time_s) - 1, 1), 1e-9)
-    pieces = find_tracklets(frames, time_s, size, config.pieces)
-    clear = [p for p in pieces if not p.blended and _lasts(p, config.shortest_piece_s, period_s)]
+    pieces = find_tracklets(frames, time_s, size, config.tracklets)
+    clear = [p for p in pieces if not p.blended and _lasts(p, config.shortest_tracklet_s, period_s)]
     blends = [p for p in pieces if p.blended and _lasts(p, config.shortest_blend_s, period_s)]
     tracks = [_table(c, len(frames)) for c in assign_merged(blends, chains(clear, config), config)]
     shortest_s = max(config.shortest_s, config.least_share * duration_s)
@@ -153,7 +153,7 @@ def _link(before: Tracklet, after: Tracklet, config: IdentityConfig) -> float:
     back = _led(after, gap_s, config, ends=False) - np.array(before.place[-1])
     moved = (np.linalg.norm(ahead) + np.linalg.norm(back)) / 2.0 / reach
     grown = abs(np.log(tall[0] / tall[1])) / np.log(config.growth)
-    differ = np.abs(_mean(before.looks) - _mean(after.looks))
+    differ = np.abs(_mean(before.colours) - _mean(after.colours))
     colour = float(differ[~np.isnan(differ)].mean()) if not np.isnan(differ).all() else 0.0
     if moved > 1.0 or grown > 1.0 or colour > config.colour:
         return IMPOSSIBLE

@@ -46,7 +46,7 @@ class People:
         self._chosen = spread(frames, fps, config.samples_per_s, config.fewest)
         self.counts: list[int] = []
 
-    def see(self, index: int, image: np.ndarray, xy: Float[np.ndarray, "33 2"]) -> None:
+    def add_frame(self, index: int, image: np.ndarray, xy: Float[np.ndarray, "33 2"]) -> None:
         """Frame number `index`, RGB, with the landmarks of the person in it."""
         if index in self._chosen:
             self.counts.append(self._count(image, xy))

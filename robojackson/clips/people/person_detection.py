@@ -54,11 +54,11 @@ class PersonDetection:
 
     Attributes:
         row: Image xyz, world xyz, visibility of the landmarks.
-        looks: Mean CIELAB colour of trunk and of thighs, 0..255, NaN where hidden.
+        colours: Mean CIELAB colour of trunk and of thighs, 0..255, NaN where hidden.
     """
 
     row: np.ndarray
-    looks: np.ndarray
+    colours: np.ndarray
 
 
 def detect_people(

@@ -29,14 +29,14 @@ class Person:
     Attributes:
         number: 1 is the largest steady person.
         height_px: Median size in the image, pixels.
-        seen_share: Share of the frames in which he is seen.
+        detected_share: Share of the frames in which he is seen.
         from_s, to_s: When he is seen first and last, seconds.
         place: Median place in the image from the left, 0..1.
     """
 
     number: int
     height_px: float
-    seen_share: float
+    detected_share: float
     from_s: float
     to_s: float
     place: float
@@ -44,8 +44,8 @@ class Person:
     def __str__(self) -> str:
         side = "left" if self.place < LEFT else "right" if self.place > RIGHT else "middle"
         return (
-            f"{self.number} ({self.height_px:.0f} px tall, {side}, seen in {self.seen_share:.0%}, "
-            f"{self.from_s:.1f}-{self.to_s:.1f} s)"
+            f"{self.number} ({self.height_px:.0f} px tall, {side}, "
+            f"seen in {self.detected_share:.0%}, {self.from_s:.1f}-{self.to_s:.1f} s)"
         )
 
 
@@ -78,7 +78,7 @@ class TrackedPeople:
         return Person(
             number=number,
             height_px=float(np.median(stature(points))),
-            seen_share=len(seen) / len(rows),
+            detected_share=len(seen) / len(rows),
             from_s=float(self.time_s[seen[0]]),
             to_s=float(self.time_s[seen[-1]]),
             place=float(np.median(rows[seen][:, trunk(), 0])),

@@ -44,7 +44,7 @@ class Tracklet:
         rows: Landmarks.
         place: Middle of the trunk, pixels.
         tall: Stature, pixels.
-        looks: Colours.
+        colours: Colours.
         blended: Whether it may be either of two who were seen as one.
     """
 
@@ -53,10 +53,10 @@ class Tracklet:
     rows: list[np.ndarray] = field(default_factory=list)
     place: list[np.ndarray] = field(default_factory=list)
     tall: list[float] = field(default_factory=list)
-    looks: list[np.ndarray] = field(default_factory=list)
+    colours: list[np.ndarray] = field(default_factory=list)
     blended: bool = False
 
-    def take(self, other: "Tracklet") -> None:
+    def extend(self, other: "Tracklet") -> None:
         """Go on with a single sighting."""
         for name in ("frames", "time_s", "rows", "place", "tall", "looks"):
             getattr(self, name).extend(getattr(other, name))
@@ -68,7 +68,7 @@ class Tracklet:
         self.rows.append(seen.row)
         self.place.append(points[trunk()].mean(0))
         self.tall.append(max(float(stature(points)), 1.0))
-        self.looks.append(seen.looks)
+        self.colours.append(seen.colours)
 
 
 def find_tracklets(
@@ -85,14 +85,14 @@ def find_tracklets(
         done += [p for p in alive if now - p.time_s[-1] > config.pause_s + 1e-6]
         alive = [p for p in alive if now - p.time_s[-1] <= config.pause_s + 1e-6]
         seen = [_tracklet_of(index, now, sighting, size) for sighting in sightings]
-        goes_on = _claims(alive, seen, config)
-        ended, blended = _touches(alive, seen, goes_on, config)
-        for old, new in goes_on.items():
+        resumes = _claims(alive, seen, config)
+        ended, blended = _touches(alive, seen, resumes, config)
+        for old, new in resumes.items():
             if old in ended:
                 seen[new].blended = new in blended
             else:
-                alive[old].take(seen[new])
-        taken = {new for old, new in goes_on.items() if old not in ended}
+                alive[old].extend(seen[new])
+        taken = {new for old, new in resumes.items() if old not in ended}
         done += [p for old, p in enumerate(alive) if old in ended]
         alive = [p for old, p in enumerate(alive) if old not in ended]
         alive += [p for new, p in enumerate(seen) if new not in taken]
@@ -102,7 +102,7 @@ def find_tracklets(
 def _tracklet_of(index: int, now: float, seen: PersonDetection, size: tuple[int, int]) -> Tracklet:
     points = seen.row[:, :2] * size
     tall = max(float(stature(points)), 1.0)
-    return Tracklet([index], [now], [seen.row], [points[trunk()].mean(0)], [tall], [seen.looks])
+    return Tracklet([index], [now], [seen.row], [points[trunk()].mean(0)], [tall], [seen.colours])
 
 
 def _claims(
@@ -121,7 +121,7 @@ def _claims(
 def _touches(
     alive: Sequence[Tracklet],
     seen: Sequence[Tracklet],
-    goes_on: dict[int, int],
+    resumes: dict[int, int],
     config: TrackletConfig,
 ) -> tuple[set[int], set[int]]:
     """Pieces that end because people touch, and sightings that may be either of two.
@@ -131,9 +131,9 @@ def _touches(
     """
     ended: set[int] = set()
     blended: set[int] = set()
-    lost = [i for i in range(len(alive)) if i not in goes_on]
-    fresh = [j for j in range(len(seen)) if j not in goes_on.values()]
-    for old, new in goes_on.items():
+    lost = [i for i in range(len(alive)) if i not in resumes]
+    fresh = [j for j in range(len(seen)) if j not in resumes.values()]
+    for old, new in resumes.items():
         besides = [i for i in lost if _near(alive[i], alive[old], config)]
         if besides:
             ended |= {old, *besides}
@@ -141,7 +141,7 @@ def _touches(
         if any(_near(seen[j], seen[new], config) for j in fresh):
             ended.add(old)
             blended.discard(new)
-        rivals = [i for i in goes_on if i != old and _step(alive[i], seen[new], config) < 1.0]
+        rivals = [i for i in resumes if i != old and _step(alive[i], seen[new], config) < 1.0]
         if rivals:
             ended |= {old, *rivals}
     return ended, blended

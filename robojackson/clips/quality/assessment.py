@@ -98,7 +98,7 @@ def assess_video(
     info = probe(path, config.video)
     with still_landmarker(config.detector) as landmarker:
         eyes = _Eyes(info, config, landmarker)
-        track = detect(path, info, config.detector, progress, eyes.see)
+        track = detect(path, info, config.detector, progress, eyes.add_frame)
     score = stability(track, config.stability)
     return Assessment(info, track, score, eyes.quality(track))
 
@@ -113,11 +113,11 @@ class _Eyes:
         self._people = People(info.frames, info.fps, landmarker, config.people)
         self._paint = Paint(info.frames, info.fps, config.drawing)
 
-    def see(self, index: int, image: np.ndarray, row: np.ndarray) -> None:
+    def add_frame(self, index: int, image: np.ndarray, row: np.ndarray) -> None:
         """Frame number `index`, RGB, and the landmarks found in it, NaN for nobody."""
-        self._changes.see(image)
+        self._changes.add_frame(image)
         for eye in (self._camera, self._people, self._paint):
-            eye.see(index, image, row[:, :2])
+            eye.add_frame(index, image, row[:, :2])
 
     def quality(self, track: LandmarkTrack) -> Quality:
         """What they saw in the whole clip."""

@@ -51,7 +51,7 @@ class Changes:
         self.moved = 0
         self.cuts: list[int] = []
 
-    def see(self, image: UInt8[np.ndarray, "H W 3"]) -> None:
+    def add_frame(self, image: UInt8[np.ndarray, "H W 3"]) -> None:
         """The next frame, RGB."""
         from scenedetect import FrameTimecode
 

@@ -46,7 +46,7 @@ class Paint:
         self._chosen = spread(frames, fps, config.samples_per_s, config.fewest)
         self._shares: list[float] = []
 
-    def see(self, index: int, image: np.ndarray, xy: Float[np.ndarray, "33 2"]) -> None:
+    def add_frame(self, index: int, image: np.ndarray, xy: Float[np.ndarray, "33 2"]) -> None:
         """Frame number `index`, RGB, with the landmarks of the person in it."""
         if index in self._chosen and not np.isnan(xy).any():
             factor = min(1.0, self._config.short_side / min(image.shape[:2]))

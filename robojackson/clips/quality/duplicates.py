@@ -15,7 +15,7 @@ from robojackson.clips.people.person_extent import MIRROR, heights_px, indices
 from robojackson.motion.landmark_track import LandmarkTrack
 
 DELAY_COST = 0.01
-"""Body heights a second of delay: a cyclic dance is its own mirror half a lap later."""
+"""Body heights a second of delay: a cyclic dance is its own mirror half a cycle later."""
 Poses = Float[np.ndarray, "N 33 2"]
 
 

@@ -29,11 +29,11 @@ class Selection:
     """What is left of a search.
 
     Attributes:
-        kept: The most watched first.
+        selected: The most watched first.
         dropped: The others, in the order of the search, each with the reason.
     """
 
-    kept: tuple[VideoCandidate, ...]
+    selected: tuple[VideoCandidate, ...]
     dropped: tuple[tuple[VideoCandidate, str], ...]
 
 

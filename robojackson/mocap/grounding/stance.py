@@ -32,7 +32,9 @@ class GroundingConfig:
 
     floor_cutoff_hz: float = 3.0
     contact: contacts.ContactConfig = Field(default_factory=contacts.ContactConfig)
-    lock: foot_pinning.FootPinningConfig = Field(default_factory=foot_pinning.FootPinningConfig)
+    foot_pinning: foot_pinning.FootPinningConfig = Field(
+        default_factory=foot_pinning.FootPinningConfig
+    )
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,7 @@ def ground_body(body: Body, fps: float, config: GroundingConfig) -> Stance:
     body = evidence.dropped(body.aimed(feet.turn_feet(body.pose.points, bias)), flying)
     planted = pinned = evidence.states(body) == PLANTED
     share = np.zeros((len(falling), 2))
-    for _ in range(config.lock.rounds):
+    for _ in range(config.foot_pinning.rounds):
         body, share = _pinned(body, planted, evidence, flying)
         states = evidence.states(body)
         pinned, planted = planted, planted | (states == PLANTED)
@@ -114,7 +116,7 @@ def _pinned(
     body: Body, planted: np.ndarray, evidence: _Evidence, flying: np.ndarray
 ) -> tuple[Body, Float[np.ndarray, "T 2"]]:
     """One round: standing feet level, the root moved, toes tipped, legs bent; share of level."""
-    fps, lock = evidence.fps, evidence.config.lock
+    fps, lock = evidence.fps, evidence.config.foot_pinning
     ramp = lock.ramp_s * fps
     flat = feet.stands_flat(body.feet, planted)
     held, share = feet.level_feet(body.pose.points, body.rest, body.feet, flat, ramp)

@@ -44,12 +44,12 @@ class Cue:
 
     Attributes:
         rest: Direction in the rest pose.
-        seen: The same direction as measured, metres or unit.
+        measured: The same direction as measured, metres or unit.
         weight: 0..1, how much the measurement counts against the prior.
     """
 
     rest: Float[np.ndarray, "3"]
-    seen: Float[np.ndarray, "T 3"]
+    measured: Float[np.ndarray, "T 3"]
     weight: Float[np.ndarray, " T"]
 
 
@@ -73,7 +73,7 @@ def level_cues(found: Mapping[str, Cue], level: Float[np.ndarray, "T 2"]) -> dic
     changed = {}
     for side, name in enumerate(("left_ankle", "right_ankle")):
         cue, share = found[name], level[:, side]
-        seen = unit(cue.seen) + share[:, None] * (above - unit(cue.seen))
+        seen = unit(cue.measured) + share[:, None] * (above - unit(cue.measured))
         changed[name] = Cue(cue.rest, seen, cue.weight + share * (1.0 - cue.weight))
     return changed
 
@@ -135,7 +135,7 @@ def _between(first: np.ndarray, second: np.ndarray, share: float) -> Float[np.nd
 def cue_angle(cue: Cue, bone: np.ndarray, swung: np.ndarray) -> Float[np.ndarray, " T"]:
     """Signed turn about the bone that brings the rest direction onto the measured one."""
     axis = unit(bone)
-    measured = apply(np.swapaxes(swung, -1, -2), cue.seen)
+    measured = apply(np.swapaxes(swung, -1, -2), cue.measured)
     flat = cue.rest - (cue.rest @ axis) * axis
     sine = np.sum(np.cross(flat, measured) * axis, -1)
     cosine = np.sum(flat * measured, -1)

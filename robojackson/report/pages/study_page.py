@@ -70,10 +70,10 @@ class StudyContent:
         claims: What the paper says, and what was found.
         lines: The table.
         comparisons: The yardstick's differences between setups, move by move.
-        payments: What the rewards pay to bodies that do not dance, by move.
+        reward_audits: What the rewards pay to bodies that do not dance, by move.
         moves: For each move a picture: frame, recovered body, robot (Figures 2-4).
         curves: Learning curves (Figures 5-13).
-        judged: Pictures of the judgement.
+        evaluation_plots: Pictures of the judgement.
         notes: Warnings for the reader.
     """
 
@@ -82,10 +82,10 @@ class StudyContent:
     claims: Sequence[Claim] = ()
     lines: Sequence[Line] = ()
     comparisons: Sequence[Comparison] = ()
-    payments: Mapping[str, RewardAudits] = field(default_factory=dict)
+    reward_audits: Mapping[str, RewardAudits] = field(default_factory=dict)
     moves: Sequence[Plot] = ()
     curves: Sequence[Plot] = ()
-    judged: Sequence[Plot] = ()
+    evaluation_plots: Sequence[Plot] = ()
     notes: Sequence[str] = ()
 
 
@@ -107,13 +107,13 @@ def render(content: StudyContent) -> str:
         ],
         effects=[(c, [_difference(found) for found in c.effects.values()]) for c in compared],
         compared_on=list(compared[0].effects) if compared else [],
-        paid={move: _by_reward(paid) for move, paid in content.payments.items()},
+        paid={move: _by_reward(paid) for move, paid in content.reward_audits.items()},
         bodies=BODIES,
         claims=[(claim, sentence(claim)) for claim in content.claims],
         groups=[
             ("The moves", _encoded(content.moves)),
             ("While learning", _encoded(content.curves)),
-            ("Judged alike", _encoded(content.judged)),
+            ("Judged alike", _encoded(content.evaluation_plots)),
         ],
     )
 

@@ -141,10 +141,10 @@ def torque_heat_map(reference: ReferenceMotion, motors: Sequence[str]) -> Figure
 
 
 def joint_tracking(
-    reference: ReferenceMotion, rollout_qpos: Float[np.ndarray, "S nq"], laps: int = 1
+    reference: ReferenceMotion, rollout_qpos: Float[np.ndarray, "S nq"], cycles: int = 1
 ) -> Figure:
     """The hinges that move most: the reference and what the robot did, degrees."""
-    shown = min(len(rollout_qpos), laps * len(reference))
+    shown = min(len(rollout_qpos), cycles * len(reference))
     wanted = np.degrees(reference.qpos[np.arange(shown) % len(reference), 7:])
     done = np.degrees(rollout_qpos[:shown, 7:])
     busiest = np.argsort(-np.ptp(wanted, axis=0))[:TRACKED_JOINTS]

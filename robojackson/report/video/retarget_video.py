@@ -28,7 +28,7 @@ def human_beside_robot(
     config: VideoConfig | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
-    """Write the mp4: one lap, or the whole motion, up to the configuration's length.
+    """Write the mp4: one cycle, or the whole motion, up to the configuration's length.
 
     Args:
         model: The robot that the reference was made for.

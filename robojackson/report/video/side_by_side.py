@@ -64,7 +64,7 @@ def side_by_side(
     Args:
         source: The clip that `track` was made from.
         rollout_qpos: The trained robot at the reference's control step, from its first step on;
-            may be longer than a lap, and ends where the robot fell.
+            may be longer than a cycle, and ends where the robot fell.
         model: The robot that qpos belongs to.
         progress: Called with (pictures done, pictures in all).
     Raises:

@@ -64,7 +64,7 @@ def _moments(reference: ReferenceMotion, sequence: SmplSequence) -> Timeline:
     return Timeline(
         time_s=step * reference.dt,
         step=step,
-        lap=np.zeros(len(step), int),
+        cycle=np.zeros(len(step), int),
         frame=np.clip(frame, 0, len(sequence) - 1),
         rollout=np.zeros(len(step), int),
         ended=still_there,

@@ -19,7 +19,7 @@ class Timeline:
     Attributes:
         time_s: Since the first step, seconds.
         step: Of the reference motion.
-        lap: How often the reference was completed before.
+        cycle: How often the reference was completed before.
         frame: Of the source clip.
         rollout: Step of the trained robot's rollout; its last one after the end.
         ended: Whether the rollout is over.
@@ -27,7 +27,7 @@ class Timeline:
 
     time_s: Float[np.ndarray, " N"]
     step: Int[np.ndarray, " N"]
-    lap: Int[np.ndarray, " N"]
+    cycle: Int[np.ndarray, " N"]
     frame: Int[np.ndarray, " N"]
     rollout: Int[np.ndarray, " N"]
     ended: Bool[np.ndarray, " N"]
@@ -44,17 +44,17 @@ def timeline(
     fps: float,
     max_seconds: float,
 ) -> Timeline:
-    """Pictures at `fps` over the rollout or one lap, whichever is longer, up to `max_seconds`."""
+    """Pictures at `fps` over the rollout or one cycle, whichever is longer, up to `max_seconds`."""
     seconds = min(max(rollout_steps, len(reference)) * reference.dt, max_seconds)
     time_s = np.arange(max(1, round(seconds * fps))) / fps
     elapsed = np.floor(time_s / reference.dt + 1e-6).astype(int)
-    lap = elapsed // len(reference) if reference.cyclic else np.zeros_like(elapsed)
-    step = np.minimum(elapsed - lap * len(reference), len(reference) - 1)
+    cycle = elapsed // len(reference) if reference.cyclic else np.zeros_like(elapsed)
+    step = np.minimum(elapsed - cycle * len(reference), len(reference) - 1)
     frame = np.round(np.asarray(reference.source_time_s)[step] * source_fps).astype(int)
     return Timeline(
         time_s=time_s,
         step=step,
-        lap=lap,
+        cycle=cycle,
         frame=np.clip(frame, 0, source_frames - 1),
         rollout=np.clip(elapsed, 0, max(rollout_steps - 1, 0)),
         ended=elapsed >= rollout_steps,
@@ -62,7 +62,7 @@ def timeline(
 
 
 def reference_qpos(reference: ReferenceMotion, when: Timeline) -> Float[np.ndarray, "N nq"]:
-    """The reference's positions at each picture, moved on by the laps before."""
+    """The reference's positions at each picture, moved on by the cycles before."""
     qpos = np.array(reference.qpos, dtype=float)[when.step]
-    qpos[:, :3] += when.lap[:, None] * np.asarray(reference.lap_offset)
+    qpos[:, :3] += when.cycle[:, None] * np.asarray(reference.cycle_offset)
     return qpos

@@ -50,15 +50,15 @@ def certify(
     robot: Robot,
     qpos: Float[np.ndarray, "S nq"],
     dt: float,
-    lap: np.ndarray | None,
+    cycle_offset: np.ndarray | None,
     tolerance: Tolerance,
 ) -> Certified:
     """What the robot can and cannot do of a motion."""
-    force = inverse_dynamics.free_space(robot, qpos, dt, lap).at(1.0)
+    force = inverse_dynamics.free_space(robot, qpos, dt, cycle_offset).at(1.0)
     near = inverse_dynamics.touching(robot, qpos)
     asked = inverse_dynamics.demand(robot, qpos, force, near, tolerance)
     found = contact_wrench.supply(asked)
-    slack = tempo.slacks(robot, qpos, dt, lap, tolerance)
+    slack = tempo.slacks(robot, qpos, dt, cycle_offset, tolerance)
     free = _without_limits(asked)
     failures = [
         _failure(robot, step, found, free, near, slack, tolerance)

@@ -44,11 +44,11 @@ def body_weight(robot: Robot) -> float:
 
 
 def free_space(
-    robot: Robot, qpos: Float[np.ndarray, "S nq"], dt: float, lap: np.ndarray | None
+    robot: Robot, qpos: Float[np.ndarray, "S nq"], dt: float, cycle_offset: np.ndarray | None
 ) -> FreeSpace:
     """The force of a motion, by its parts."""
     model = unconstrained(robot)
-    speed, acceleration = velocities(qpos, dt, lap), accelerations(qpos, dt, lap)
+    speed, acceleration = velocities(qpos, dt, cycle_offset), accelerations(qpos, dt, cycle_offset)
     whole = inverse(model, qpos, speed, acceleration)
     still = inverse(model, qpos, np.zeros_like(speed), np.zeros_like(speed))
     damped = model.dof_damping * speed

@@ -30,12 +30,12 @@ def slacks(
     robot: Robot,
     qpos: Float[np.ndarray, "S nq"],
     dt: float,
-    lap: np.ndarray | None,
+    cycle_offset: np.ndarray | None,
     tolerance: Tolerance,
     grid: Float[np.ndarray, " K"] = GRID,
 ) -> Float[np.ndarray, "K S"]:
     """What is left over at every tempo of the grid, in tolerances."""
-    forces = inverse_dynamics.free_space(robot, qpos, dt, lap)
+    forces = inverse_dynamics.free_space(robot, qpos, dt, cycle_offset)
     near = inverse_dynamics.touching(robot, qpos)
     asked = inverse_dynamics.demand(robot, qpos, forces.at(1.0), near, tolerance)
     return np.stack([contact_wrench.supply(replace(asked, force=forces.at(k))).slack for k in grid])
@@ -84,7 +84,7 @@ def warped(aims: Targets, steps: Float[np.ndarray, " M"]) -> Targets:
     nearest = np.round(steps).astype(int) % len(aims)
     return replace(
         aims,
-        keypoints_w=_between(aims.keypoints_w, steps, aims.lap),
+        keypoints_w=_between(aims.keypoints_w, steps, aims.cycle_offset),
         weights=aims.weights[nearest],
         contact=aims.contact[nearest],
         heading=aims.heading[nearest],
@@ -101,12 +101,12 @@ def times_at(
 
 
 def _between(
-    points: Float[np.ndarray, "S K 3"], steps: np.ndarray, lap: np.ndarray | None
+    points: Float[np.ndarray, "S K 3"], steps: np.ndarray, cycle_offset: np.ndarray | None
 ) -> Float[np.ndarray, "M K 3"]:
     count = len(points)
-    if lap is None:
+    if cycle_offset is None:
         return np.asarray(CubicSpline(np.arange(count), points)(steps))
-    travel = lap / count
+    travel = cycle_offset / count
     flat = points - np.arange(count)[:, None, None] * travel
     spline = CubicSpline(np.arange(count + 1), np.concatenate([flat, flat[:1]]), bc_type="periodic")
     return np.asarray(spline(steps) + steps[:, None, None] * travel)

@@ -20,12 +20,12 @@ from robojackson.robot.tree_kinematics import Posed, centre_of_mass, pose
 
 def moment_points(problem: Problem, posed: Posed) -> Float[np.ndarray, "N 2"]:
     """Zero moment points of the linear inverted pendulum, c - h/g c''; ends repeat neighbours."""
-    com, lap = centre_of_mass(problem.tree, posed), problem.targets.lap
+    com, cycle_offset = centre_of_mass(problem.tree, posed), problem.targets.cycle_offset
     flat, height = com[:, :2], com[:, 2:].mean()
-    if lap is None:
+    if cycle_offset is None:
         inner = flat[1:-1] - height / GRAVITY * np.diff(flat, 2, axis=0) / problem.targets.dt**2
         return np.concatenate([inner[:1], inner, inner[-1:]])
-    joined = np.concatenate([flat[-1:] - lap[:2], flat, flat[:1] + lap[:2]])
+    joined = np.concatenate([flat[-1:] - cycle_offset[:2], flat, flat[:1] + cycle_offset[:2]])
     return flat - height / GRAVITY * np.diff(joined, 2, axis=0) / problem.targets.dt**2
 
 

@@ -75,8 +75,8 @@ class Problem:
     @property
     def ring(self) -> bool:
         """Whether the last frame is followed by the first."""
-        return self.targets.lap is not None
+        return self.targets.cycle_offset is not None
 
     def velocity(self, qpos: Float[np.ndarray, "N nq"]) -> Float[np.ndarray, "M nv"]:
         """Forward differences; a ring has one a frame, an open clip one fewer."""
-        return forward_velocities(qpos, self.targets.dt, self.targets.lap)
+        return forward_velocities(qpos, self.targets.dt, self.targets.cycle_offset)

@@ -55,7 +55,7 @@ def _no_slip(problem: Problem, posed: Posed, rows: np.ndarray, out: Normal) -> N
         return
     following = (now + 1) % len(planted)
     factor = np.sqrt(problem.weights.slip) * both[now]
-    speed = sole_velocities(problem.robot, posed, dt, problem.targets.lap)[now]
+    speed = sole_velocities(problem.robot, posed, dt, problem.targets.cycle_offset)[now]
     residual = factor[..., None] * speed
     before = factor[..., None, None] * rows[now] / -dt
     after = factor[..., None, None] * rows[following] / dt
@@ -102,9 +102,9 @@ def add_balance(problem: Problem, posed: Posed, out: Normal) -> None:
     pull = com[:, 2:].mean() / GRAVITY / dt**2
     flat = com[:, :2]
     ahead, behind = flat[after].copy(), flat[before].copy()
-    if problem.targets.lap is not None:
-        ahead[-1] += problem.targets.lap[:2]
-        behind[0] -= problem.targets.lap[:2]
+    if problem.targets.cycle_offset is not None:
+        ahead[-1] += problem.targets.cycle_offset[:2]
+        behind[0] -= problem.targets.cycle_offset[:2]
     zmp = flat[inner] - pull * (ahead - 2 * flat[inner] + behind)
     feet = posed.ball_pos
     touching = problem.targets.contact != AIR

@@ -39,9 +39,12 @@ def add_dynamics(
     """Add what no contact and no motor can give, of every step that has two neighbours."""
     if problem.weights.dynamics == 0.0:
         return
-    dt, lap = problem.targets.dt, problem.targets.lap
+    dt, cycle_offset = problem.targets.dt, problem.targets.cycle_offset
     inner = np.arange(len(qpos)) if problem.ring else np.arange(1, len(qpos) - 1)
-    speed, rate = velocities(qpos, dt, lap)[inner], accelerations(qpos, dt, lap)[inner]
+    speed, rate = (
+        velocities(qpos, dt, cycle_offset)[inner],
+        accelerations(qpos, dt, cycle_offset)[inner],
+    )
     model = inverse_dynamics.unconstrained(problem.robot)
     slopes = inverse_slopes(model, qpos[inner], speed, rate)
     touching = problem.targets.contact[inner] != AIR

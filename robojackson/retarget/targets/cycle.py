@@ -1,8 +1,9 @@
 """Laps: find where a clip repeats itself, close it, and put it on the robot's clock.
 
 A clip is nearly cyclic when some later frame has the pose and the velocity of an early one, seen
-from the hips and the heading. The lap between them is closed by spreading what is left of the seam
-(heading, pose, height, and for a dance on the spot the drift) evenly over the lap. Metres, seconds.
+from the hips and the heading. The cycle between them is closed by spreading what is left of the
+seam (heading, pose, height, and for a dance on the spot the drift) evenly over the cycle. Metres,
+seconds.
 """
 
 import logging
@@ -27,7 +28,7 @@ _LIMBS = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
 _SEEN = [KEYPOINT_NAMES.index(f"{side}_{a}") for a in _LIMBS for side in ("left", "right")]
 _HIPS, _SHOULDERS = _SEEN[:2], _SEEN[6:8]
 _BONE_STARTS = (0, 1, 2, 3, 6, 7, 8, 9)  # hip, knee, shoulder, elbow: the next joint is two on
-_GOOD_SEAM_M = 0.015  # seams below this are as good as each other: the longest lap wins
+_GOOD_SEAM_M = 0.015  # seams below this are as good as each other: the longest cycle wins
 _WHOLE_SEAM_M = 0.05  # a clip that was cut as a loop stays whole up to this seam
 _SECONDS = 0.1  # velocity differences count over this time beside pose differences
 
@@ -40,21 +41,21 @@ class CycleConfig:
         tolerance_m: Largest seam: mean keypoint distance plus a tenth of a second of the mean
             velocity difference, metres.
         limb_deg: Largest angle of a limb over the seam, degrees.
-        heading_deg: Largest heading change of a lap, whole turns left out, degrees.
-        in_place_m_s: A lap that travels slower than this is closed on the spot, m/s.
-        keep_share: Smallest share of the clip that a lap must keep.
+        heading_deg: Largest heading change of a cycle, whole turns left out, degrees.
+        in_place_m_s: A cycle that travels slower than this is closed on the spot, m/s.
+        least_share: Smallest share of the clip that a cycle must keep.
     """
 
     tolerance_m: float = Field(default=0.09, gt=0)
     limb_deg: float = Field(default=15.0, gt=0)
     heading_deg: float = Field(default=20.0, gt=0)
     in_place_m_s: float = Field(default=0.15, ge=0)
-    keep_share: float = Field(default=0.5, gt=0, le=1)
+    least_share: float = Field(default=0.5, gt=0, le=1)
 
 
 @dataclass(frozen=True)
 class Cycle:
-    """Frames [start, end) of a lap; `end` may be one past the clip.
+    """Frames [start, end) of a cycle; `end` may be one past the clip.
 
     Attributes:
         start, end: Frames.
@@ -75,7 +76,7 @@ def human_clip(
     tempo: float,
     config: CycleConfig,
 ) -> tuple[HumanClip, Cycle | None]:
-    """The clip at the solver's steps, closed to a lap where it is (or is said to be) cyclic.
+    """The clip at the solver's steps, closed to a cycle where it is (or is said to be) cyclic.
 
     Raises:
         TrackTooShort: Fewer steps than the solver needs.
@@ -85,25 +86,25 @@ def human_clip(
             f"{len(sequence)} frames ({len(sequence) / sequence.fps:.2f} s) are too short to "
             f"retarget: at least {_MIN_STEPS * dt:.2f} s are needed"
         )
-    lap = None if cyclic == "no" else find_cycle(sequence, config)
-    if lap is None and cyclic == "yes":  # whoever turns on with every lap is turned back
-        lap = find_cycle(sequence, replace(config, heading_deg=180.0))
-    if lap is None or (cyclic == "auto" and not _nearly_cyclic(lap, config)):
+    cycle = None if cyclic == "no" else find_cycle(sequence, config)
+    if cycle is None and cyclic == "yes":  # whoever turns on with every cycle is turned back
+        cycle = find_cycle(sequence, replace(config, heading_deg=180.0))
+    if cycle is None or (cyclic == "auto" and not _nearly_cyclic(cycle, config)):
         return _open_clip(sequence, dt, tempo), None
-    _log.info("lap: frames %d to %d, seam %.3f m", lap.start, lap.end, lap.seam_m)
-    return _closed_clip(sequence, lap, dt, tempo, config), lap
+    _log.info("cycle: frames %d to %d, seam %.3f m", cycle.start, cycle.end, cycle.seam_m)
+    return _closed_clip(sequence, cycle, dt, tempo, config), cycle
 
 
-def _nearly_cyclic(lap: Cycle, config: CycleConfig) -> bool:
-    return lap.seam_m <= config.tolerance_m and lap.seam_deg <= config.limb_deg
+def _nearly_cyclic(cycle: Cycle, config: CycleConfig) -> bool:
+    return cycle.seam_m <= config.tolerance_m and cycle.seam_deg <= config.limb_deg
 
 
 def find_cycle(sequence: SmplSequence, config: CycleConfig) -> Cycle | None:
-    """The whole clip where it is a loop; else the lap with the smallest seam, longer ones
+    """The whole clip where it is a loop; else the cycle with the smallest seam, longer ones
     preferred when they are as good."""
     pose, speed, yaw = _features(sequence)
     frames = len(sequence)
-    shortest = max(int(np.ceil(config.keep_share * frames)), 4)
+    shortest = max(int(np.ceil(config.least_share * frames)), 4)
     seam, turn = _seams(pose, speed, yaw, 0, np.array([frames]))
     if seam[0] <= _WHOLE_SEAM_M and turn[0] <= np.radians(config.heading_deg):
         return Cycle(0, frames, float(seam[0]), _limb_angle(pose[0], pose[frames]))
@@ -126,7 +127,7 @@ def find_cycle(sequence: SmplSequence, config: CycleConfig) -> Cycle | None:
 def _seams(
     pose: np.ndarray, speed: np.ndarray, yaw: np.ndarray, start: int, ends: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Seam, metres, and heading change, radians, of the laps from one start."""
+    """Seam, metres, and heading change, radians, of the cycles from one start."""
     seam = np.linalg.norm(pose[ends] - pose[start], axis=-1).mean(axis=1)
     seam += _SECONDS * np.linalg.norm(speed[ends] - speed[start], axis=-1).mean(axis=1)
     return seam, np.abs(wrapped(yaw[ends] - yaw[start]))
@@ -184,18 +185,19 @@ def _open_clip(sequence: SmplSequence, dt: float, tempo: float) -> HumanClip:
         contact=labels_at(sequence.contact, sequence.fps, time_s),
         valid=labels_at(sequence.valid, sequence.fps, time_s),
         dt=dt,
-        lap=None,
+        cycle_offset=None,
     )
 
 
 def _closed_clip(
-    sequence: SmplSequence, lap: Cycle, dt: float, tempo: float, config: CycleConfig
+    sequence: SmplSequence, cycle: Cycle, dt: float, tempo: float, config: CycleConfig
 ) -> HumanClip:
-    """A lap with an even number of steps; the clock is stretched to fit (under one step a lap)."""
-    seconds = (lap.end - lap.start) / sequence.fps
+    """A cycle with an even number of steps; the clock is stretched to fit (under one step a
+    cycle)."""
+    seconds = (cycle.end - cycle.start) / sequence.fps
     steps = max(2 * round(seconds / tempo / (2 * dt)), _MIN_STEPS)
     share = np.arange(steps + 1) / steps
-    time_s = (lap.start + share * (lap.end - lap.start)) / sequence.fps
+    time_s = (cycle.start + share * (cycle.end - cycle.start)) / sequence.fps
     points = at_steps(_extended(sequence.keypoints_w), sequence.fps, time_s)
     closed, travel = close(points, config.in_place_m_s * seconds)
     return HumanClip(
@@ -204,7 +206,7 @@ def _closed_clip(
         contact=labels_at(sequence.contact, sequence.fps, time_s[:-1]),
         valid=labels_at(sequence.valid, sequence.fps, time_s[:-1]),
         dt=dt,
-        lap=travel,
+        cycle_offset=travel,
     )
 
 
@@ -213,7 +215,7 @@ def close(
 ) -> tuple[Float[np.ndarray, "N 29 3"], Float[np.ndarray, "3"]]:
     """Make the last pose the first one, moved along the floor; what is left over goes evenly.
 
-    Returns the closed points and the displacement of the lap, zero when it is under `in_place_m`.
+    Returns the closed points and the displacement of the cycle, zero when it is under `in_place_m`.
     """
     share = np.linspace(0.0, 1.0, len(points))
     yaw, ground = heading(points), _ground_point(points)

@@ -27,11 +27,11 @@ def free_fall(human: Mapping[str, np.ndarray], clip: HumanClip) -> Bool[np.ndarr
     """Stretches without contact over which the hips lose speed as fast as a falling body does."""
     hips = (human["left_hip"] + human["right_hip"])[:, 2] / 2
     smooth = gaussian_filter1d(hips, 0.02 / clip.dt, mode=clip.edges)
-    laps = clip.lap is not None
-    around = int(laps)  # steps of the neighbouring laps
+    cycles = clip.cycle_offset is not None
+    around = int(cycles)  # steps of the neighbouring cycles
     rise = np.gradient(np.pad(smooth, around, mode="wrap"), clip.dt)[around : around + len(hips)]
     out = np.zeros(len(hips), bool)
-    for steps in stretches((clip.contact == AIR).all(axis=1), laps):
+    for steps in stretches((clip.contact == AIR).all(axis=1), cycles):
         seconds = len(steps) * clip.dt
         fall = (rise[steps[0]] - rise[steps[-1]]) / max(seconds - clip.dt, clip.dt)
         out[steps] = seconds >= _SHORTEST_FLIGHT and fall > _FREE_FALL * GRAVITY
@@ -39,18 +39,18 @@ def free_fall(human: Mapping[str, np.ndarray], clip: HumanClip) -> Bool[np.ndarr
 
 
 def without(
-    airborne: Bool[np.ndarray, " N"], hovering: np.ndarray, laps: bool
+    airborne: Bool[np.ndarray, " N"], hovering: np.ndarray, cycles: bool
 ) -> Bool[np.ndarray, " N"]:
     """The flights in which the body hovers in less than a third of the steps."""
     out = np.zeros_like(airborne)
-    for steps in stretches(airborne, laps):
+    for steps in stretches(airborne, cycles):
         out[steps] = hovering[steps].mean() < 1 / 3
     return out
 
 
-def stretches(flags: Bool[np.ndarray, " N"], laps: bool) -> list[Int[np.ndarray, " M"]]:
-    """The steps of each stretch of True; one over the seam of a lap is one."""
-    first = int(flags.argmin()) if laps else 0
+def stretches(flags: Bool[np.ndarray, " N"], cycles: bool) -> list[Int[np.ndarray, " M"]]:
+    """The steps of each stretch of True; one over the seam of a cycle is one."""
+    first = int(flags.argmin()) if cycles else 0
     rolled = np.roll(flags, -first)
     return [np.arange(start + first, end + first) % len(flags) for start, end in runs(rolled)]
 
@@ -118,7 +118,7 @@ def ground_shift(
     else:
         lowest = np.where(contact != AIR, soles, np.inf).min(axis=1)
         steps = np.arange(len(soles))
-        period = {"period": len(soles)} if clip.lap is not None else {}
+        period = {"period": len(soles)} if clip.cycle_offset is not None else {}
         shift = np.interp(steps, steps[carried], -lowest[carried], **period)
         mode = clip.edges
         shift = gaussian_filter1d(shift, 0.05 / clip.dt, mode=mode)
@@ -128,7 +128,9 @@ def ground_shift(
 def _speed(path: Float[np.ndarray, "N 3"], clip: HumanClip) -> Float[np.ndarray, " N"]:
     """Horizontal speed, m/s."""
     flat = path[:, :2]
-    if clip.lap is not None:
-        flat = np.concatenate([flat[-1:] - clip.lap[:2], flat, flat[:1] + clip.lap[:2]])
+    if clip.cycle_offset is not None:
+        flat = np.concatenate(
+            [flat[-1:] - clip.cycle_offset[:2], flat, flat[:1] + clip.cycle_offset[:2]]
+        )
         return np.asarray(np.linalg.norm(flat[2:] - flat[:-2], axis=1) / (2 * clip.dt))
     return np.asarray(np.linalg.norm(np.gradient(flat, clip.dt, axis=0), axis=1))

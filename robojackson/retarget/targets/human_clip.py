@@ -17,7 +17,7 @@ class HumanClip:
         contact: States of `CONTACT_POINTS`.
         valid: False where the person was not detected.
         dt: Seconds a step on the robot's clock.
-        lap: Displacement of one lap, metres; None when the clip does not repeat.
+        cycle_offset: Displacement of one cycle, metres; None when the clip does not repeat.
     """
 
     time_s: Float[np.ndarray, " N"]
@@ -25,12 +25,12 @@ class HumanClip:
     contact: Int[np.ndarray, "N 4"]
     valid: Bool[np.ndarray, " N"]
     dt: float
-    lap: Float[np.ndarray, "3"] | None
+    cycle_offset: Float[np.ndarray, "3"] | None
 
     @property
     def edges(self) -> str:
-        """How scipy's filters treat the ends: a lap wraps around."""
-        return "nearest" if self.lap is None else "wrap"
+        """How scipy's filters treat the ends: a cycle wraps around."""
+        return "nearest" if self.cycle_offset is None else "wrap"
 
 
 def at_steps(

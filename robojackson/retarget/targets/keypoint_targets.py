@@ -43,7 +43,7 @@ class Targets:
         contact: AIR, PLANTED or SLIDING for the robot's contact points.
         heading: Rotation matrices of the trunk: x forward, y left, z up along the trunk.
         dt: Seconds a step.
-        lap: Displacement of one lap, metres; None when the clip does not repeat.
+        cycle_offset: Displacement of one cycle, metres; None when the clip does not repeat.
         airborne: Steps in free fall.
     """
 
@@ -52,7 +52,7 @@ class Targets:
     contact: Int[np.ndarray, "N C"]
     heading: Float[np.ndarray, "N 3 3"]
     dt: float
-    lap: Float[np.ndarray, "3"] | None
+    cycle_offset: Float[np.ndarray, "3"] | None
     airborne: Bool[np.ndarray, " N"]
 
     def __len__(self) -> int:
@@ -83,7 +83,7 @@ def targets(
     balls = keypoints[:, robot.contact_keypoints] + arms
     airborne = free_fall(human, clip)
     if hovering is not None:
-        airborne = without(airborne, hovering, clip.lap is not None)
+        airborne = without(airborne, hovering, clip.cycle_offset is not None)
     contact = ball_contact(clip, robot, balls, airborne)
     soles = balls[..., 2] - robot.contact_radii
     keypoints[..., 2] += ground_shift(soles, contact, clip)[:, None]
@@ -94,7 +94,7 @@ def targets(
         contact=contact,
         heading=_trunk_frame(human),
         dt=clip.dt,
-        lap=None if clip.lap is None else clip.lap * scale,
+        cycle_offset=None if clip.cycle_offset is None else clip.cycle_offset * scale,
         airborne=airborne,
     )
 

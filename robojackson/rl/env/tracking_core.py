@@ -152,7 +152,7 @@ class TrackingCore:
         which = np.flatnonzero(done)
         told = self.mode.ended(self._start[which], score.failed[which], self._age[which])
         reached = np.flatnonzero(late)
-        self.mode.keep(reached, self.step_index[reached])
+        self.mode.record_finished(reached, self.step_index[reached])
         rows = self._totals.close(which, self._age, self.mode.repeats)
         self.episode += len(which)
         self._begin(which)

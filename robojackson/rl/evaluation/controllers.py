@@ -101,7 +101,7 @@ def _trained(policy: Policy, robot: Robot, control: ControlConfig) -> Driver:
         sim: Simulation, following: ClipStep, start: np.ndarray, last: np.ndarray
     ) -> np.ndarray:
         seen = observe(sim.qpos, sim.qvel, sim.points, following, last)
-        return sim.follow(following) + sim.residual * policy.act(seen)
+        return sim.reference_angles(following) + sim.residual * policy.act(seen)
 
     return Driver(control, target)
 
@@ -118,9 +118,9 @@ def _baselines(
         "mean_pose": lambda sim, following, start, last: np.repeat(
             poses.mean(0, keepdims=True), sim.n, 0
         ),
-        "zero_residual": lambda sim, following, start, last: sim.follow(following),
+        "zero_residual": lambda sim, following, start, last: sim.reference_angles(following),
         "random": lambda sim, following, start, last: (
-            sim.follow(following) + scale * rng.uniform(-1, 1, (sim.n, len(hinge)))
+            sim.reference_angles(following) + scale * rng.uniform(-1, 1, (sim.n, len(hinge)))
         ),
     }
     return {name: Driver(control, command) for name, command in commands.items()}

@@ -126,7 +126,7 @@ def _replayed(robot: Robot, clip: Clip, meter: RewardMeter) -> float:
     """What the reference's hinge angles earn as targets, up to the fall."""
     driver = Driver(
         ControlConfig(),
-        lambda sim, following, start, last: sim.follow(following),
+        lambda sim, following, start, last: sim.reference_angles(following),
     )
     at = clip.at(np.zeros(1, int))
     starts = Starts(np.zeros(1, int), at.qpos, at.qvel)

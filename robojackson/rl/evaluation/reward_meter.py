@@ -59,7 +59,7 @@ class RewardMeter:
     ) -> tuple[Miss, Reading]:
         """Distances and terms of a reward of the paper's kind, lambda at its largest."""
         state = points.of(moment.sim)
-        apart = miss(state, *points.wanted(self._clip, moment.at.step), points.weights)
+        apart = miss(state, *points.targets(self._clip, moment.at.step), points.weights)
         return apart, paper_terms(state, apart, moment.fell, config.lambda_max, config)
 
     def _tracked(self, moment: Moment, reward: RewardConfig) -> Reading:

@@ -49,11 +49,11 @@ class RolloutScorer:
         span = slice(0, max(length, 1))
         here = heading_frame(rollouts.points[span, i], rollouts.qpos[span, i, 3:7], self._pelvis)
         there = heading_frame(
-            rollouts.wanted[span, i], rollouts.wanted_qpos[span, i, 3:7], self._pelvis
+            rollouts.target[span, i], rollouts.target_qpos[span, i, 3:7], self._pelvis
         )
         error = site_error(here, there)
         knees = rollouts.points[span, i][:, self._knees, 2]
-        wanted_knees = rollouts.wanted[span, i][:, self._knees, 2]
+        wanted_knees = rollouts.target[span, i][:, self._knees, 2]
         low = self._config.kneel_height
         kneels = bool(((knees < low) & (wanted_knees >= low)).any())
         strict = not fell and not kneels and float(error.max()) <= self._config.strict_error
@@ -85,8 +85,8 @@ class RolloutScorer:
         score = heading_score(
             rollouts.points[span, i],
             rollouts.qpos[span, i, 3:7],
-            rollouts.wanted[span, i],
-            rollouts.wanted_qpos[span, i, 3:7],
+            rollouts.target[span, i],
+            rollouts.target_qpos[span, i, 3:7],
         )
         if not rollouts.fell[i]:
             return score
@@ -103,7 +103,7 @@ class RolloutScorer:
     def _usage(self, rollouts: Rollouts, i: int, span: slice) -> dict[str, float]:
         """Every hinge's spread over the rollout, as a multiple of the reference's."""
         own = rollouts.qpos[span, i, 7:].std(0)
-        wanted = rollouts.wanted_qpos[span, i, 7:].std(0)
+        wanted = rollouts.target_qpos[span, i, 7:].std(0)
         moves = wanted > LEAST_SPREAD_RAD
         ratio = np.where(moves, own / np.where(moves, wanted, 1.0), np.nan)
         return {f"usage_{name}": float(r) for name, r in zip(self._joints, ratio, strict=True)}
@@ -112,8 +112,8 @@ class RolloutScorer:
         """What the pelvis-heading frame does not see: where the robot went and which way."""
         end = span.stop - 1
         went = rollouts.points[[0, end], i, self._pelvis, :2]
-        wanted = rollouts.wanted[[0, end], i, self._pelvis, :2]
-        turn = heading(rollouts.qpos[end, i, 3:7]) - heading(rollouts.wanted_qpos[end, i, 3:7])
+        wanted = rollouts.target[[0, end], i, self._pelvis, :2]
+        turn = heading(rollouts.qpos[end, i, 3:7]) - heading(rollouts.target_qpos[end, i, 3:7])
         path = float(np.linalg.norm(wanted[1] - wanted[0]))
         forward = float((went[1] - went[0]) @ (wanted[1] - wanted[0]))
         return {

@@ -69,8 +69,8 @@ class Rollouts:
         horizon: Steps that each was asked for.
         qpos: States after every step.
         points: Keypoint sites, world, metres.
-        wanted: The reference's sites at the same steps, world, metres.
-        wanted_qpos: The reference's state.
+        target: The reference's sites at the same steps, world, metres.
+        target_qpos: The reference's state.
         totals: Sums of what the meter read, up to the end or the fall, which counts itself.
     """
 
@@ -79,8 +79,8 @@ class Rollouts:
     horizon: Int[np.ndarray, " N"]
     qpos: Float[np.ndarray, "H N nq"]
     points: Float[np.ndarray, "H N K 3"]
-    wanted: Float[np.ndarray, "H N K 3"]
-    wanted_qpos: Float[np.ndarray, "H N nq"]
+    target: Float[np.ndarray, "H N K 3"]
+    target_qpos: Float[np.ndarray, "H N nq"]
     totals: Reading
 
 
@@ -107,7 +107,7 @@ def roll_out(
         target, before, change = clip.at(starts.step + t + 1), sim.points.copy(), np.zeros(n)
         if t % driver.repeats == 0:
             command = driver.command(sim, target, starts.step, action)
-            residual = command - sim.follow(target)
+            residual = command - sim.reference_angles(target)
             last, action = action, np.clip(residual / sim.residual, -1, 1)
             change = np.mean((action - last) ** 2, -1)
         sim.step(command, alive)
@@ -122,5 +122,5 @@ def roll_out(
         if not (alive & (t + 1 < horizon)).any():
             break
     sim.close()
-    qpos, points, wanted, wanted_qpos = (np.stack(column) for column in zip(*record, strict=True))
-    return Rollouts(length, length < horizon, horizon, qpos, points, wanted, wanted_qpos, totals)
+    qpos, points, wanted, target_qpos = (np.stack(column) for column in zip(*record, strict=True))
+    return Rollouts(length, length < horizon, horizon, qpos, points, wanted, target_qpos, totals)

@@ -84,7 +84,7 @@ class Mode(Protocol):
     ) -> dict[str, float]:
         """Learn from episodes that ended; columns for their rows."""
 
-    def keep(self, indices: Int[np.ndarray, " I"], step: Int[np.ndarray, " I"]) -> None:
+    def record_finished(self, indices: Int[np.ndarray, " I"], step: Int[np.ndarray, " I"]) -> None:
         """Learn from the states of episodes that reached the time limit."""
 
     def forget(self) -> None:

@@ -70,7 +70,7 @@ class PaperMode:
     def score(self, at: ClipStep, before: np.ndarray, change: np.ndarray, episode: int) -> Score:
         config = self._config
         state = self.points.of(self.sim)
-        apart = miss(state, *self.points.wanted(self.clip, at.step), self.points.weights)
+        apart = miss(state, *self.points.targets(self.clip, at.step), self.points.weights)
         fell = has_fallen(state, config) | self.sim.broken
         terms = paper_terms(state, apart, fell, ramp(episode, config), config)
         if config.own:
@@ -93,7 +93,7 @@ class PaperMode:
         self._early += int(np.sum(failed & (actions < self._config.early_fall)))
         return {"train_early_falls": float(self._early)}
 
-    def keep(self, indices: Int[np.ndarray, " I"], step: Int[np.ndarray, " I"]) -> None:
+    def record_finished(self, indices: Int[np.ndarray, " I"], step: Int[np.ndarray, " I"]) -> None:
         """The paper learns nothing from them."""
 
     def forget(self) -> None:
@@ -166,11 +166,11 @@ class PaperPoints:
             spin=spin_now(sim),
         )
 
-    def wanted(
+    def targets(
         self, clip: Clip, step: Int[np.ndarray, " N"]
     ) -> tuple[Float[np.ndarray, "N P 3"], Float[np.ndarray, "N 3"]]:
         """The reference's points and its pelvis at each robot's step, world."""
-        return clip.take(self._reference, step), clip.take(self._root[:, None], step)[:, 0]
+        return clip.gather(self._reference, step), clip.gather(self._root[:, None], step)[:, 0]
 
     def _named(self, sites: np.ndarray, bodies: np.ndarray) -> Float[np.ndarray, "N P 3"]:
         found = np.concatenate([sites[:, self._sites], bodies[:, self._bodies]], 1)
@@ -194,7 +194,7 @@ def facing_ahead(reference: ReferenceMotion) -> ReferenceMotion:
         qvel=qvel,
         keypoints_w=(np.asarray(reference.keypoints_w, float) - home) @ to_ahead.T,
         body_pos_w=(np.asarray(reference.body_pos_w, float) - home) @ to_ahead.T,
-        lap_offset=to_ahead @ np.asarray(reference.lap_offset, float),
+        cycle_offset=to_ahead @ np.asarray(reference.cycle_offset, float),
     )
 
 

@@ -54,13 +54,13 @@ def ramp(episode: int, config: PaperConfig) -> float:
 
 def miss(
     state: PaperState,
-    wanted: Float[np.ndarray, "N P 3"],
-    wanted_root: Float[np.ndarray, "N 3"],
+    target: Float[np.ndarray, "N P 3"],
+    target_root: Float[np.ndarray, "N 3"],
     weights: Float[np.ndarray, " P"],
 ) -> Miss:
     """How far the points are from where the reference has them."""
-    apart = state.points - wanted
-    carried = apart - (state.root - wanted_root)[:, None]
+    apart = state.points - target
+    carried = apart - (state.root - target_root)[:, None]
     mean = lambda d: np.sum(d**2, -1) @ weights / weights.sum()  # noqa: E731
     return Miss(mean(carried), mean(apart))
 

@@ -22,7 +22,7 @@ def make_standing_motion(robot: Robot) -> ReferenceMotion:
         model_sha256=robot.sha256,
         dt=dt,
         cyclic=True,
-        lap_offset=np.zeros(3),
+        cycle_offset=np.zeros(3),
         qpos=held(data.qpos),
         qvel=np.zeros((STEPS, model.nv)),
         body_pos_w=held(data.xpos[1:]),

@@ -61,7 +61,7 @@ class TrackMode:
         self.observation_size = observation_size(robot.model.nq - 7, robot.model.nu, len(names))
 
     def command(self, following: ClipStep, action: np.ndarray) -> np.ndarray:
-        return self.sim.follow(following) + self.sim.residual * action
+        return self.sim.reference_angles(following) + self.sim.residual * action
 
     def observe(self, following: ClipStep, action: np.ndarray) -> Float[np.ndarray, "N D"]:
         return observe(self.sim.qpos, self.sim.qvel, self.sim.points, following, action)
@@ -97,7 +97,7 @@ class TrackMode:
         self.starts.record(start, failed)
         return {}
 
-    def keep(self, indices: Int[np.ndarray, " I"], step: Int[np.ndarray, " I"]) -> None:
+    def record_finished(self, indices: Int[np.ndarray, " I"], step: Int[np.ndarray, " I"]) -> None:
         """Keep the last states of episodes that reached the time limit of a cyclic clip."""
         if not self.clip.cyclic:
             return

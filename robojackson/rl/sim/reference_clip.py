@@ -1,6 +1,6 @@
 """A reference motion as arrays that a thousand environments can read at their own step.
 
-A cyclic clip goes on for ever: step s is step s mod S of lap s // S, moved by that many lap
+A cyclic clip goes on for ever: step s is step s mod S of cycle s // S, moved by that many cycle
 offsets. A clip that is not cyclic holds its last step. Frames and units as in `ReferenceMotion`.
 """
 
@@ -50,7 +50,7 @@ class Clip:
         self._qpos = np.asarray(reference.qpos, float)
         self._qvel = np.asarray(reference.qvel, float)
         self._points = np.asarray(reference.keypoints_w, float)
-        self._offset = np.asarray(reference.lap_offset, float)
+        self._offset = np.asarray(reference.cycle_offset, float)
         self._moved = self._velocities()
         self._last: ClipStep | None = None
 
@@ -62,8 +62,8 @@ class Clip:
         return self._last
 
     def _read(self, step: Int[np.ndarray, " N"]) -> ClipStep:
-        lap, index = self._split(step)
-        offset = lap[:, None] * self._offset
+        cycle, index = self._split(step)
+        offset = cycle[:, None] * self._offset
         qpos = self._qpos[index].copy()
         qpos[:, :3] += offset
         points = self._points[index] + offset[:, None]
@@ -72,12 +72,12 @@ class Clip:
             array.setflags(write=False)
         return ClipStep(step, *arrays)
 
-    def take(
+    def gather(
         self, values: Float[np.ndarray, "S P 3"], step: Int[np.ndarray, " N"]
     ) -> Float[np.ndarray, "N P 3"]:
         """Other points of the clip's steps, world, at each environment's step."""
-        lap, index = self._split(step)
-        return np.asarray(values[index] + (lap[:, None] * self._offset)[:, None])
+        cycle, index = self._split(step)
+        return np.asarray(values[index] + (cycle[:, None] * self._offset)[:, None])
 
     def ended(self, step: Int[np.ndarray, " N"]) -> np.ndarray:
         """Whether a clip that is not cyclic has been danced to its end."""

@@ -126,7 +126,7 @@ class Simulation:
         self.broken = np.any(raised[:, BAD_STATE] > 0, axis=1)
         self._gather_all()
 
-    def follow(self, step: ClipStep) -> Float[np.ndarray, "N nu"]:
+    def reference_angles(self, step: ClipStep) -> Float[np.ndarray, "N nu"]:
         """Target hinge angles that follow a reference step with nothing learnt, rad."""
         return step.qpos[:, 7:][:, self.motors.hinge]
 

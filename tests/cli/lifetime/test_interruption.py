@@ -92,7 +92,7 @@ def test_a_command_ends_at_once_while_it_is_imported(
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "text"),
-    [("mocap", "landmarks of"), ("retarget", "lap: "), ("pretrain", "landmarks of")],
+    [("mocap", "landmarks of"), ("retarget", "cycle: "), ("pretrain", "landmarks of")],
 )
 def test_a_stage_that_is_interrupted_leaves_no_result_and_is_done_by_the_same_command(
     name: str, text: str, motion: Path, tmp_path: Path

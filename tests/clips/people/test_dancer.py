@@ -45,7 +45,7 @@ def crossed(tmp_path_factory: pytest.TempPathFactory) -> Crossed:
     path = tmp_path_factory.mktemp("crossing") / "crossing.mp4"
     places = write_crossing(path, FRAMES)
     info, config = probe(path, VideoLimits()), DancerConfig()
-    return Crossed(path, info, places, track_people(path, info, config.crowd, config.identity))
+    return Crossed(path, info, places, track_people(path, info, config.detection, config.identity))
 
 
 def gap(rows: np.ndarray, begin: int, end: int) -> np.ndarray:

@@ -62,8 +62,8 @@ def test_two_in_the_same_clothes_who_cross_keep_their_ways(hidden_px: float) -> 
 
 
 def test_a_stranger_who_comes_when_one_left_is_not_the_same() -> None:
-    frames = [[seen(100, looks=RED)] for _ in range(30)] + [[]] * 15
-    frames += [[seen(110, looks=BLUE)] for _ in range(30)]
+    frames = [[seen(100, colours=RED)] for _ in range(30)] + [[]] * 15
+    frames += [[seen(110, colours=BLUE)] for _ in range(30)]
     assert len(tracks(frames)) == 2
 
 

@@ -77,7 +77,7 @@ def test_a_plain_wall_says_nothing_about_the_camera() -> None:
 def test_a_clip_without_background_counts_as_still() -> None:
     motion = CameraMotion(30, 30.0, CameraConfig())
     for index in range(30):
-        motion.see(index, np.zeros((*SHAPE, 3), np.uint8), NOBODY)
+        motion.add_frame(index, np.zeros((*SHAPE, 3), np.uint8), NOBODY)
     assert motion.static_share == 1.0
 
 
@@ -96,7 +96,7 @@ def test_a_short_clip_has_no_frame_twice_and_none_outside(frames: int) -> None:
 def changes_of(images: list[np.ndarray]) -> Changes:
     seen = Changes(30.0, CutConfig())
     for image in images:
-        seen.see(image)
+        seen.add_frame(image)
     return seen
 
 

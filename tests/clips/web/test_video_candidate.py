@@ -113,16 +113,16 @@ def test_empty_entries_of_a_search_are_left_out() -> None:
 )
 def test_what_cannot_be_a_short_is_dropped_with_a_reason(more: dict[str, Any], reason: str) -> None:
     left = select([one(**more)], (), SelectionConfig())
-    assert (left.kept, [why for _, why in left.dropped]) == ((), [reason])
+    assert (left.selected, [why for _, why in left.dropped]) == ((), [reason])
 
 
 def test_a_video_of_unknown_length_is_kept() -> None:
-    assert len(select([one(duration=None)], (), SelectionConfig()).kept) == 1
+    assert len(select([one(duration=None)], (), SelectionConfig()).selected) == 1
 
 
 def test_a_video_that_is_found_twice_is_kept_once() -> None:
     left = select([one(), one(title="again")], (), SelectionConfig())
-    assert ([c.title for c in left.kept], [r for _, r in left.dropped]) == (
+    assert ([c.title for c in left.selected], [r for _, r in left.dropped]) == (
         ["APT dance cover"],
         ["found twice"],
     )
@@ -137,13 +137,13 @@ def test_the_five_most_watched_are_kept_in_order() -> None:
     views = [5, None, 900, 70, 3, 800, 0]
     found = [one(video_id=f"v{i}", view_count=count) for i, count in enumerate(views)]
     left = select(found, (), SelectionConfig())
-    assert [c.view_count for c in left.kept] == [900, 800, 70, 5, 3]
+    assert [c.view_count for c in left.selected] == [900, 800, 70, 5, 3]
     assert len(left.dropped) == 2
 
 
 def test_ties_keep_the_order_of_the_search() -> None:
     found = [one(video_id=f"v{i}", view_count=7) for i in range(4)]
-    assert [c.video_id for c in select(found, (), SelectionConfig()).kept] == [
+    assert [c.video_id for c in select(found, (), SelectionConfig()).selected] == [
         "v0",
         "v1",
         "v2",
@@ -155,4 +155,4 @@ def test_videos_that_failed_before_take_the_places_that_are_left() -> None:
     found = [one(video_id=f"v{i}", view_count=100 - i) for i in range(8)]
     failed = {("youtube", f"v{i}") for i in range(5)}
     left = select(found, (), SelectionConfig(), failed)
-    assert [c.video_id for c in left.kept] == ["v5", "v6", "v7", "v0", "v1"]
+    assert [c.video_id for c in left.selected] == ["v5", "v6", "v7", "v0", "v1"]

@@ -12,11 +12,11 @@ def test_a_list_of_addresses_needs_no_query(tmp_path: Path) -> None:
     (tmp_path / "list.txt").write_text("https://example.org/a.mp4\n")
     listed = str(tmp_path / "list.txt")
     dance = find_dance("", "urls", listed, None, FindConfig())
-    assert (dance.name, dance.asked, dance.address) == ("urls", "", listed)
+    assert (dance.name, dance.full_query, dance.address) == ("urls", "", listed)
 
 
 def test_a_query_that_the_book_knows_is_that_dance() -> None:
-    assert find_dance("apt", "youtube", "", None, FindConfig()).asked.startswith("APT dance")
+    assert find_dance("apt", "youtube", "", None, FindConfig()).full_query.startswith("APT dance")
 
 
 @pytest.mark.parametrize(("top", "judged"), [(None, ALL), (2, 2)])

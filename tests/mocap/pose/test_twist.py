@@ -85,6 +85,6 @@ def test_level_ground_replaces_the_measured_sole() -> None:
     }
     share = np.array([[0.0, 1.0], [0.5, 1.0], [1.0, 1.0]])
     changed = twist.level_cues(found, share)
-    assert np.allclose(changed["right_ankle"].seen, [0.0, 0.0, 1.0])
+    assert np.allclose(changed["right_ankle"].measured, [0.0, 0.0, 1.0])
     assert np.allclose(changed["left_ankle"].weight, [0.5, 0.75, 1.0])
-    assert np.allclose(changed["left_ankle"].seen[0], LEFT)
+    assert np.allclose(changed["left_ankle"].measured[0], LEFT)

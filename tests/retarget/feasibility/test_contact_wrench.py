@@ -18,7 +18,9 @@ BARRIER = 0.05
 def _demand(robot: Robot, hurry: float = 1.0) -> Demand:
     """Some steps of the walk, played `hurry` times as fast: too fast for some motors."""
     motion = robot_motion("walk")
-    force = inverse_dynamics.free_space(robot, motion.qpos, motion.dt, motion.lap_offset).at(hurry)
+    force = inverse_dynamics.free_space(robot, motion.qpos, motion.dt, motion.cycle_offset).at(
+        hurry
+    )
     near = inverse_dynamics.touching(robot, motion.qpos)
     return inverse_dynamics.demand(robot, motion.qpos, force, near, Tolerance())
 
@@ -104,11 +106,11 @@ def test_a_hinge_on_its_stop_needs_no_motor_to_stay_there(robot: Robot):
 def test_the_force_at_another_tempo_is_that_of_the_slower_motion(tempo: float, robot: Robot):
     """mj_inverse with velocities times k and accelerations times k^2."""
     motion = robot_motion("walk")
-    parts = inverse_dynamics.free_space(robot, motion.qpos, motion.dt, motion.lap_offset)
+    parts = inverse_dynamics.free_space(robot, motion.qpos, motion.dt, motion.cycle_offset)
     from robojackson.robot.resampling import accelerations, velocities
 
-    speed = tempo * velocities(motion.qpos, motion.dt, motion.lap_offset)
-    rate = tempo**2 * accelerations(motion.qpos, motion.dt, motion.lap_offset)
+    speed = tempo * velocities(motion.qpos, motion.dt, motion.cycle_offset)
+    rate = tempo**2 * accelerations(motion.qpos, motion.dt, motion.cycle_offset)
     slower = inverse_dynamics.inverse(
         inverse_dynamics.unconstrained(robot), motion.qpos, speed, rate
     )

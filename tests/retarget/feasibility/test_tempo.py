@@ -1,4 +1,4 @@
-"""Warps are smooth, never too slow, keep laps closed, and come only where slowing down helps."""
+"""Warps are smooth, never too slow, keep cycles closed, and come only where slowing down helps."""
 
 from dataclasses import replace
 
@@ -60,9 +60,9 @@ def test_a_warped_lap_still_travels_its_lap(robot: Robot):
     aims = _aims(robot)
     steps = warp(np.full(len(aims), 0.7), ring=True)
     slower = warped(aims, steps)
-    assert slower.lap is not None
+    assert slower.cycle_offset is not None
     step = slower.keypoints_w[:, 0, 0]
-    closing = step[0] + slower.lap[0] - step[-1]
+    closing = step[0] + slower.cycle_offset[0] - step[-1]
     assert closing == pytest.approx(np.diff(step)[-1], abs=0.005)
 
 

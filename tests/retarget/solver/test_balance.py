@@ -79,7 +79,7 @@ def test_the_moment_point_of_a_still_body_is_its_centre_of_mass(robot: Robot):
         contact=np.ones((20, 2), int),
         heading=np.tile(np.eye(3), (20, 1, 1)),
         dt=0.015,
-        lap=None,
+        cycle_offset=None,
         airborne=np.zeros(20, bool),
     )
     points = moment_points(Problem.of(robot, aims, Weights()), posed)

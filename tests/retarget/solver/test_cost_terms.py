@@ -18,7 +18,9 @@ OFF = dict.fromkeys(TERMS, 0.0)
 FRAMES = 12
 
 
-def _problem(robot: Robot, lap: np.ndarray | None, **weights: float) -> tuple[Problem, np.ndarray]:
+def _problem(
+    robot: Robot, cycle_offset: np.ndarray | None, **weights: float
+) -> tuple[Problem, np.ndarray]:
     """A sway near the floor that moves every joint, and targets a little off it."""
     rng = np.random.default_rng(3)
     phase = 2 * np.pi * np.arange(FRAMES)[:, None] / FRAMES
@@ -33,7 +35,7 @@ def _problem(robot: Robot, lap: np.ndarray | None, **weights: float) -> tuple[Pr
         contact=np.full((FRAMES, 2), PLANTED),
         heading=np.tile(np.eye(3), (FRAMES, 1, 1)),
         dt=0.03,
-        lap=lap,
+        cycle_offset=cycle_offset,
         airborne=np.zeros(FRAMES, bool),
     )
     return Problem.of(robot, aims, Weights(**{**OFF, **weights})), qpos
@@ -46,7 +48,7 @@ def _slope(problem: Problem, qpos: np.ndarray, direction: np.ndarray) -> float:
     return (ahead - behind) / (2 * step)
 
 
-@pytest.mark.parametrize("lap", [None, np.zeros(3), np.array([0.3, 0.1, 0.0])])
+@pytest.mark.parametrize("cycle_offset", [None, np.zeros(3), np.array([0.3, 0.1, 0.0])])
 @pytest.mark.parametrize(
     ("term", "weight", "tolerance"),
     [
@@ -57,8 +59,8 @@ def _slope(problem: Problem, qpos: np.ndarray, direction: np.ndarray) -> float:
         ("acceleration", 1e-3, 2e-2),
     ],
 )
-def test_the_gradient_is_the_slope_of_the_cost(robot, lap, term, weight, tolerance, rng):
-    problem, qpos = _problem(robot, lap, **{term: weight})
+def test_the_gradient_is_the_slope_of_the_cost(robot, cycle_offset, term, weight, tolerance, rng):
+    problem, qpos = _problem(robot, cycle_offset, **{term: weight})
     gradient = linearise(problem, qpos).gradient
     direction = rng.normal(size=gradient.shape)
     expected = _slope(problem, qpos, direction)

@@ -27,11 +27,11 @@ def _problem(robot: Robot) -> Problem:
 
 
 def _gliding(problem: Problem) -> np.ndarray:
-    """One pose that goes as far as the lap does."""
-    count, lap = len(problem.targets), problem.targets.lap
-    assert lap is not None
+    """One pose that goes as far as the cycle does."""
+    count, cycle_offset = len(problem.targets), problem.targets.cycle_offset
+    assert cycle_offset is not None
     qpos = np.repeat(robot_motion("walk").qpos[:1], count, 0)
-    qpos[:, :3] += np.arange(count)[:, None] * lap / count
+    qpos[:, :3] += np.arange(count)[:, None] * cycle_offset / count
     return qpos
 
 
@@ -111,5 +111,5 @@ def test_a_limb_that_comes_out_elsewhere_after_a_lap_has_jumped(robot: Robot):
     drifting = _gliding(problem)
     drifting[:, 9] += np.linspace(0.0, np.radians(60), len(drifting))
     assert faults(problem, drifting, RetargetConfig()).jumps
-    open_ended = replace(problem, targets=replace(problem.targets, lap=None))
+    open_ended = replace(problem, targets=replace(problem.targets, cycle_offset=None))
     assert not faults(open_ended, drifting, RetargetConfig()).jumps

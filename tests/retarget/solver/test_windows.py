@@ -24,7 +24,7 @@ def _sway(robot: Robot, steps: int) -> Targets:
         contact=np.zeros((steps, 2), int),
         heading=np.tile(np.eye(3), (steps, 1, 1)),
         dt=0.015,
-        lap=None,
+        cycle_offset=None,
         airborne=np.ones(steps, bool),
     )
 

@@ -26,7 +26,7 @@ def _clip(name: str = "walk", **changes: object) -> HumanClip:
         contact=source.contact,
         valid=source.valid,
         dt=1 / source.fps,
-        lap=None,
+        cycle_offset=None,
     )
     return replace(clip, **changes)  # type: ignore[arg-type]
 
@@ -74,7 +74,7 @@ def test_a_body_that_does_not_fall_stands_on_something_whatever_the_labels_say(r
     assert (targets(bare, robot).contact != AIR).any(axis=1).all()
 
 
-def _jump(laps: bool = False) -> HumanClip:
+def _jump(cycles: bool = False) -> HumanClip:
     """Two seconds of which steps 20 to 34 are a leap."""
     clip = _clip("hip_shake")
     time = np.arange(15) * clip.dt
@@ -82,14 +82,16 @@ def _jump(laps: bool = False) -> HumanClip:
     points[20:35, :, 2] += (4.905 * time * (time[-1] - time))[:, None]
     contact = np.ones((60, 4), int)
     contact[21:34] = AIR
-    lap = np.zeros(3) if laps else None
-    return HumanClip(np.arange(60) * clip.dt, points, contact, np.ones(60, bool), clip.dt, lap)
+    cycle_offset = np.zeros(3) if cycles else None
+    return HumanClip(
+        np.arange(60) * clip.dt, points, contact, np.ones(60, bool), clip.dt, cycle_offset
+    )
 
 
 @pytest.mark.parametrize("shift", [0, 22, 27, 31, 33])
 def test_a_jump_over_the_seam_of_a_lap_is_one_jump(robot: Robot, shift: int):
-    """Wherever the lap begins, the same steps of it are in the air."""
-    whole = _jump(laps=True)
+    """Wherever the cycle begins, the same steps of it are in the air."""
+    whole = _jump(cycles=True)
     turned = replace(
         whole,
         keypoints_w=np.roll(whole.keypoints_w, -shift, 0),

@@ -13,8 +13,8 @@ from robojackson.retarget.targets.cycle import CycleConfig, close, find_cycle, h
 from tests.fixtures.robots import human
 
 CONFIG = CycleConfig()
-STRICT = CycleConfig(keep_share=0.95)
-"""Nearly the whole clip or nothing: no shorter lap inside it is looked for."""
+STRICT = CycleConfig(least_share=0.95)
+"""Nearly the whole clip or nothing: no shorter cycle inside it is looked for."""
 
 
 def _swaying(frames: int, period: int, drift: float = 0.0, yaw: float = 0.0) -> SmplSequence:
@@ -39,16 +39,16 @@ def _swaying(frames: int, period: int, drift: float = 0.0, yaw: float = 0.0) -> 
 
 
 def test_a_whole_number_of_periods_is_kept():
-    lap = find_cycle(_swaying(100, 30), CONFIG)
-    assert lap is not None
-    assert (lap.end - lap.start) % 30 in (0, 1, 2, 28, 29)
-    assert lap.seam_m < 0.02
+    cycle = find_cycle(_swaying(100, 30), CONFIG)
+    assert cycle is not None
+    assert (cycle.end - cycle.start) % 30 in (0, 1, 2, 28, 29)
+    assert cycle.seam_m < 0.02
 
 
 def test_a_clip_of_exactly_one_period_is_kept_whole():
-    _, lap = human_clip(_swaying(60, 60), 0.015, "auto", 1.0, CONFIG)
-    assert lap is not None
-    assert lap.end - lap.start == 60
+    _, cycle = human_clip(_swaying(60, 60), 0.015, "auto", 1.0, CONFIG)
+    assert cycle is not None
+    assert cycle.end - cycle.start == 60
 
 
 def test_one_step_of_a_walk_is_not_cyclic():
@@ -57,26 +57,26 @@ def test_one_step_of_a_walk_is_not_cyclic():
         walk,
         **{k: getattr(walk, k)[:22] for k in ("keypoints_w", "global_orient", "contact", "valid")},
     )
-    clip, lap = human_clip(step, 0.015, "auto", 1.0, CycleConfig(keep_share=0.8))
-    assert lap is None
-    assert clip.lap is None
+    clip, cycle = human_clip(step, 0.015, "auto", 1.0, CycleConfig(least_share=0.8))
+    assert cycle is None
+    assert clip.cycle_offset is None
 
 
 def test_cyclic_no_keeps_the_whole_clip():
     clip, _ = human_clip(_swaying(60, 60), 0.015, "no", 1.0, CONFIG)
-    assert clip.lap is None
+    assert clip.cycle_offset is None
     assert clip.time_s[-1] == pytest.approx(59 / 30, abs=0.03)
 
 
 def test_a_body_that_turns_away_is_not_cyclic():
-    _, lap = human_clip(_swaying(60, 30, yaw=np.pi / 60), 0.015, "auto", 1.0, CONFIG)
-    assert lap is None
+    _, cycle = human_clip(_swaying(60, 30, yaw=np.pi / 60), 0.015, "auto", 1.0, CONFIG)
+    assert cycle is None
 
 
 def test_whoever_turns_on_with_every_lap_is_closed_on_request():
-    clip, lap = human_clip(_swaying(60, 30, yaw=np.pi / 60), 0.015, "yes", 1.0, CONFIG)
-    assert lap is not None
-    assert clip.lap is not None
+    clip, cycle = human_clip(_swaying(60, 30, yaw=np.pi / 60), 0.015, "yes", 1.0, CONFIG)
+    assert cycle is not None
+    assert clip.cycle_offset is not None
 
 
 def _with_an_arm_that_rises(degrees: float) -> SmplSequence:
@@ -94,13 +94,13 @@ def _with_an_arm_that_rises(degrees: float) -> SmplSequence:
 @pytest.mark.parametrize("degrees", [54.0, 108.0])
 def test_a_limb_that_does_not_come_back_makes_no_lap(degrees: float):
     """APT1 and APT2 of the paper: such a jump was once looped and trained on."""
-    clip, lap = human_clip(_with_an_arm_that_rises(degrees), 0.015, "auto", 1.0, STRICT)
-    assert (clip.lap, lap) == (None, None)
+    clip, cycle = human_clip(_with_an_arm_that_rises(degrees), 0.015, "auto", 1.0, STRICT)
+    assert (clip.cycle_offset, cycle) == (None, None)
 
 
 def test_a_limb_that_nearly_comes_back_is_closed():
-    clip, lap = human_clip(_with_an_arm_that_rises(8.0), 0.015, "auto", 1.0, STRICT)
-    assert lap is not None
+    clip, cycle = human_clip(_with_an_arm_that_rises(8.0), 0.015, "auto", 1.0, STRICT)
+    assert cycle is not None
     elbow, wrist = (KEYPOINT_NAMES.index(f"left_{name}") for name in ("elbow", "wrist"))
     arm = clip.keypoints_w[:, wrist] - clip.keypoints_w[:, elbow]
     step = np.linalg.norm(np.diff(arm, axis=0), axis=1)
@@ -110,12 +110,12 @@ def test_a_limb_that_nearly_comes_back_is_closed():
 
 def test_a_slow_drift_is_closed_on_the_spot_and_travel_is_kept():
     still, _ = human_clip(_swaying(60, 30, drift=0.001), 0.015, "auto", 1.0, CONFIG)
-    going, lap = human_clip(_swaying(60, 30, drift=0.02), 0.015, "auto", 1.0, CONFIG)
-    assert still.lap is not None
-    assert lap is not None
-    np.testing.assert_array_equal(still.lap, 0.0)
-    assert going.lap is not None
-    assert going.lap[0] == pytest.approx(0.02 * (lap.end - lap.start), rel=0.02)
+    going, cycle = human_clip(_swaying(60, 30, drift=0.02), 0.015, "auto", 1.0, CONFIG)
+    assert still.cycle_offset is not None
+    assert cycle is not None
+    np.testing.assert_array_equal(still.cycle_offset, 0.0)
+    assert going.cycle_offset is not None
+    assert going.cycle_offset[0] == pytest.approx(0.02 * (cycle.end - cycle.start), rel=0.02)
 
 
 def test_closing_joins_pose_and_heading(rng: np.random.Generator):

@@ -108,7 +108,7 @@ def test_a_reference_with_another_skeleton_is_refused(robot: Robot, sway: Refere
 
 
 def test_a_cyclic_clip_goes_on_with_continuous_state(sway: ReferenceMotion) -> None:
-    moved = dataclasses.replace(sway, lap_offset=np.array([0.5, 0.1, 0.0]))
+    moved = dataclasses.replace(sway, cycle_offset=np.array([0.5, 0.1, 0.0]))
     clip = Clip(moved)
     before, after = clip.at(np.array([79])), clip.at(np.array([80]))
     np.testing.assert_allclose(after.qpos[0, :2], moved.qpos[0, :2] + [0.5, 0.1])
@@ -161,8 +161,8 @@ def test_a_state_that_blows_up_ends_its_episode(robot: Robot, sway: ReferenceMot
 def test_a_settled_state_comes_back_at_its_own_step_and_place(
     robot: Robot, sway: ReferenceMotion
 ) -> None:
-    """A state kept on lap 3 begins anew on lap 0, as far from its reference as it was."""
-    moved = dataclasses.replace(sway, lap_offset=np.array([0.5, 0.0, 0.0]))
+    """A state kept on cycle 3 begins anew on cycle 0, as far from its reference as it was."""
+    moved = dataclasses.replace(sway, cycle_offset=np.array([0.5, 0.0, 0.0]))
     reset = ResetConfig(settled_share=1.0, stand_share=0.0)
     config = TrackConfig(episode_seconds=0.015, reset=reset)
     env = TrackingCore(robot, moved, config, SETTLED_STATES_NEEDED, 0)

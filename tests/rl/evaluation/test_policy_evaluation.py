@@ -24,7 +24,7 @@ STEPS = 160
 
 
 def perfect(sway: ReferenceMotion) -> Rollouts:
-    """A rollout that is the reference itself for two laps."""
+    """A rollout that is the reference itself for two cycles."""
     at = Clip(sway).at(np.arange(STEPS))
     return Rollouts(
         length=np.array([STEPS]),
@@ -32,8 +32,8 @@ def perfect(sway: ReferenceMotion) -> Rollouts:
         horizon=np.array([STEPS]),
         qpos=at.qpos[:, None],
         points=at.points[:, None],
-        wanted=at.points[:, None],
-        wanted_qpos=at.qpos[:, None],
+        target=at.points[:, None],
+        target_qpos=at.qpos[:, None],
         totals={},
     )
 
@@ -76,8 +76,8 @@ def test_of_a_reference_that_stands_still_no_skill_is_told(
     robot: Robot, sway: ReferenceMotion
 ) -> None:
     whole = perfect(sway)
-    still = np.repeat(whole.wanted[:1], STEPS, 0)
-    judged = row(robot, sway, dataclasses.replace(whole, wanted=still, points=still + 0.01))
+    still = np.repeat(whole.target[:1], STEPS, 0)
+    judged = row(robot, sway, dataclasses.replace(whole, target=still, points=still + 0.01))
     assert np.isnan(judged["skill"])
 
 
@@ -141,8 +141,8 @@ def test_marching_on_the_spot_shows_in_drift_and_travel(
 ) -> None:
     """The pelvis-heading frame cannot see it, so the table has columns of its own for it."""
     still = perfect(sway)
-    walked = still.wanted + np.linspace(0, 2, STEPS)[:, None, None, None] * [1.0, 0, 0]
-    judged = row(robot, sway, dataclasses.replace(still, wanted=walked))
+    walked = still.target + np.linspace(0, 2, STEPS)[:, None, None, None] * [1.0, 0, 0]
+    judged = row(robot, sway, dataclasses.replace(still, target=walked))
     assert judged["drift_m"] == pytest.approx(2.0, abs=0.05)
     assert judged["travel_ratio"] == pytest.approx(0.0, abs=0.05)
 

@@ -31,7 +31,7 @@ ran = []
 
 def done(name, value):
     ran.append(name)
-    return Store.from_environment().keep(name, "value.txt", str(value).encode())
+    return Store.from_environment().save(name, "value.txt", str(value).encode())
 
 def value_of(artifact):
     return int(Store.from_environment().read(artifact.key))
