@@ -117,7 +117,7 @@ def motion(
         seen = (clip["video"], moved["landmarks"], moved["smpl"], moved["reference"])
         return {name: moved[name] for name in ("reference", "scorecard")} | {
             "still": draw_still(*seen, robot),
-            "payments": audit_rewards(moved["reference"], robot, rewards),
+            "reward_audits": audit_rewards(moved["reference"], robot, rewards),
         }
 
 
@@ -186,7 +186,7 @@ async def conclude(
     made = {}
     if well:
         rows = study_tables.files_of(store, study.name, study_tables.runs_of(well))
-        stills, paid = ({n: made[w] for n, made in motions.items()} for w in ("still", "payments"))
+        stills, paid = ({n: made[w] for n, made in motions.items()} for w in ("still", "reward_audits"))
         made = write_study_page(study, moves, rows, stills, paid)
         await show_study(store, study.name, made)
     if failed:

@@ -141,7 +141,7 @@ async def refresh_dance(
         made = motion(store, _video(None, reigning, settings), stages)
     return {
         "run_id": found.run_id,
-        "judged": len(told),
+        "assessed": len(told),
         "is_new": chosen is not reigning,
         "chosen": {key: chosen[key] for key in ("video_id", "url", "title", "stability_score")},
         **made,

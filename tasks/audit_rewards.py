@@ -22,4 +22,4 @@ def audit_rewards(
     store = Store.from_environment()
     motion, machine = artifact_tables.read(ReferenceMotion, store, reference), load_robot(robot)
     paid = {name: audit_reward(machine, motion, reward).of for name, reward in rewards.items()}
-    return store.save("payments", "payments.json", json.dumps(paid, indent=1).encode())
+    return store.save("audit_rewards", "reward_audits.json", json.dumps(paid, indent=1).encode())

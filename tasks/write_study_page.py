@@ -102,7 +102,7 @@ def report(
         reward_audits=payments or {},
         moves=[_picture(name, moves[name], png) for name, png in (pictures or {}).items()],
         curves=plots["curves"],
-        evaluation_plots=plots["judged"],
+        evaluation_plots=plots["evaluations"],
         notes=notes,
     )
     folder = f"{FOLDER}/{study.name}"
@@ -152,7 +152,7 @@ def _plots(
 
     grid = grid_of(study)
     middle = (grid[1:] + grid[:-1]) / 2
-    made: dict[str, list[Plot]] = {"curves": [], "judged": []}
+    made: dict[str, list[Plot]] = {"curves": [], "evaluations": []}
     for move in study.moves:
         drawn: dict[str, Curves] = {
             setup: Curves(
@@ -180,7 +180,7 @@ def _plots(
         if any(values for setups in by_move.values() for values in setups.values()):
             title, _, _ = study_page.FIGURES[name]
             told = "A dot a seed, the bar their mean; lines are policies that learnt nothing."
-            made["judged"].append(Plot(title, told, png(evaluation_plot(by_move, lines, title))))
+            made["evaluations"].append(Plot(title, told, png(evaluation_plot(by_move, lines, title))))
     return made
 
 
@@ -255,7 +255,7 @@ def _json(
 ) -> bytes:
     told = {
         "primary": PRIMARY,
-        "claims": [{**asdict(claim), "words": study_page.sentence(claim)} for claim in claims],
+        "claims": [{**asdict(claim), "sentence": study_page.sentence(claim)} for claim in claims],
         "comparisons": [asdict(comparison) for comparison in compared],
         "lines": [asdict(line) for line in lines],
     }

@@ -74,7 +74,7 @@ def motionless() -> Iterator[None]:
         store = Store.from_environment()
         names = ("reference", "scorecard", "still")
         made = {name: store.save("played", name, move.clip.encode()) for name in names}
-        return made | {"payments": store.save("played", "payments", b"{}")}
+        return made | {"reward_audits": store.save("played", "reward_audits", b"{}")}
 
     with (
         patch.object(ablation, "motion", motion),

@@ -56,7 +56,7 @@ def of_study(store: Store, name: str, made: Artifacts) -> str:
     """Return the text about a study: what it shows of each claim, and its pictures."""
     claims = json.loads(store.read(made["results"].key))["claims"]
     parts = [f"# {in_markdown(name)}"]
-    parts += [f"**{in_markdown(c['text'])}** {in_markdown(c['words'])}" for c in claims]
+    parts += [f"**{in_markdown(c['text'])}** {in_markdown(c['sentence'])}" for c in claims]
     parts.append(f"[page with all figures]({address(made['page'])})")
     tables = (f"[{made[key].name}]({address(made[key])})" for key in ("table", "results"))
     parts.append(f"Tables: {', '.join(tables)}")

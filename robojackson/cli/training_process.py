@@ -107,7 +107,7 @@ def train(
         "mode": config.mode,
         "trainer": config.trainer,
         "seed": config.seed,
-        "asks": asked,
+        "reward_audit": asked,
         "steps": result.steps,
         "updates": result.updates,
         "seconds": result.seconds,

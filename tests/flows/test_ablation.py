@@ -69,7 +69,7 @@ def play(
     table = Store(store_folder).put("studies/table.csv", b"")
     results = Store(store_folder).put("studies/results.json", b'{"claims": []}')
     still = Store(store_folder).put("still.png", b"png")
-    motions = {"reference": REFERENCE, "still": still, "payments": still}
+    motions = {"reference": REFERENCE, "still": still, "reward_audits": still}
 
     def motion(name: str, move: object, study: Study, trainings: object) -> dict[str, Artifact]:
         card = json.dumps(dict.fromkeys(BARS, 0.0) | {"infeasible_share": infeasible})

@@ -58,7 +58,7 @@ class Tracklet:
 
     def extend(self, other: "Tracklet") -> None:
         """Go on with a single sighting."""
-        for name in ("frames", "time_s", "rows", "place", "tall", "looks"):
+        for name in ("frames", "time_s", "rows", "place", "tall", "colours"):
             getattr(self, name).extend(getattr(other, name))
 
     def add(self, frame: int, time_s: float, seen: PersonDetection, size: tuple[int, int]) -> None:

@@ -139,7 +139,7 @@ def reward_report(
     total = sum(abs(value) for value in terms.values()) or 1.0
     return {
         "of_terms": {name: value / total for name, value in terms.items()},
-        "asks": audit_record(asked),
+        "audit": audit_record(asked),
         "perfect_return": known.perfect * steps,
         "statue_return": statue,
         "own_return": own["return_own"],

@@ -67,7 +67,7 @@ def test_the_text_of_a_dance_has_its_verdict_and_its_baselines(store_folder: Pat
 
 def test_a_study_shows_what_became_of_its_claims(store_folder: Path) -> None:
     store = Store(store_folder)
-    claims = [{"text": "Pretraining helps", "words": "Holds here: 3."}]
+    claims = [{"text": "Pretraining helps", "sentence": "Holds here: 3."}]
     files = {
         "page": store.put("studies/s/index.html", b"x"),
         "table": store.put("studies/s/table.csv", b"x"),

@@ -296,4 +296,4 @@ def test_a_policy_of_paper_mode_is_judged_on_348_observations(
     brief = EvaluateConfig(seconds=0.6, phases=1, resets=1)
     summary = evaluate_policy(Policy((nothing,), facts), sway, robot, brief).summary
     assert summary["variants"] == {}
-    assert set(summary["reward"]["asks"]) == {"root", "world"}  # type: ignore[index]
+    assert set(summary["reward"]["audit"]) == {"root", "world"}  # type: ignore[index]
