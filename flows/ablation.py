@@ -133,7 +133,7 @@ def gate(study: Study, scorecards: Mapping[str, Artifact]) -> None:
         try:
             check(json.loads(store.read(scorecard.key)))
         except RejectedReference as cause:
-            refused.append(f"{name}: {str(cause).removesuffix(', or --force')}")
+            refused.append(f"{name}: {cause.without_force}")
     if not refused:
         return
     told = f"study {study.name}: {len(refused)} of {len(scorecards)} motions are refused"
@@ -186,7 +186,9 @@ async def conclude(
     made = {}
     if well:
         rows = study_tables.files_of(store, study.name, study_tables.runs_of(well))
-        stills, paid = ({n: made[w] for n, made in motions.items()} for w in ("still", "reward_audits"))
+        stills, paid = (
+            {n: made[w] for n, made in motions.items()} for w in ("still", "reward_audits")
+        )
         made = write_study_page(study, moves, rows, stills, paid)
         await show_study(store, study.name, made)
     if failed:

@@ -132,7 +132,7 @@ def summarise(found: SearchResult) -> dict[str, Any]:
         "chosen": told[0] if found.chosen else None,
         "candidates": told,
         "dropped": [
-            {"title": c.title, "url": c.url, "reason": r} for c, r in found.selection.dropped
+            {"title": c.title, "url": c.url, "reason": str(r)} for c, r in found.selection.dropped
         ],
         "summary": summary(every, found.selection),
     }

@@ -4,11 +4,33 @@ The message names the value, the place, what is allowed and the next step; the c
 it as one line and exits with 1.
 """
 
+import math
 from collections.abc import Iterable
+from typing import Any
 
 
 class RoboJacksonError(Exception):
-    """Base of all errors that are the input's fault and not a bug of ours."""
+    """Base of all errors that are the input's fault and not a bug of ours.
+
+    Attributes:
+        reason: What is wrong and what to do, without the name of the file.
+        source: The file with which it is wrong; None where there is none.
+    """
+
+    def __init__(self, reason: str, source: object = None) -> None:
+        super().__init__(reason if source is None else f"{source}: {reason}")
+        self.reason, self.source = reason, source
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Let an error go to another process with its fields, whatever its arguments are."""
+        return _rebuilt, (type(self), self.args, self.__dict__)
+
+
+def _rebuilt(cls: type[RoboJacksonError], args: tuple[Any, ...], fields: dict[str, Any]) -> Any:
+    error = cls.__new__(cls)
+    error.args = args
+    error.__dict__.update(fields)
+    return error
 
 
 class UnreadableVideo(RoboJacksonError):
@@ -68,7 +90,41 @@ class BadPolicy(RoboJacksonError):
 
 
 class RejectedReference(RoboJacksonError):
-    """A reference motion that the robot cannot follow; the message names the figure that failed."""
+    """A reference motion that the robot cannot follow.
+
+    Attributes:
+        remedy: What may mend it.
+        figure: Name of the figure of the score card that failed; empty where none did.
+        value, limit: Of that figure.
+        forcible: Whether `--force` goes on all the same.
+    """
+
+    def __init__(
+        self,
+        reason: str,
+        remedy: str = "",
+        *,
+        figure: str = "",
+        value: float = math.nan,
+        limit: float = math.nan,
+        forcible: bool = False,
+    ) -> None:
+        parts = [f"{reason}; {remedy}" if remedy else reason, *(["or --force"] if forcible else [])]
+        super().__init__(", ".join(parts))
+        self.reason, self.remedy, self.forcible = reason, remedy, forcible
+        self.figure, self.value, self.limit = figure, value, limit
+
+    @property
+    def without_force(self) -> str:
+        """The message for a caller that has no `--force`."""
+        return f"{self.reason}; {self.remedy}" if self.remedy else self.reason
+
+    def saved_in(self, folder: object) -> "RejectedReference":
+        """Return the error with the place of the motion that was refused."""
+        error = RejectedReference(self.reason, self.remedy, forcible=self.forcible)
+        error.__dict__.update(self.__dict__)
+        error.args = (f"{self}; it is kept in {folder}",)
+        return error
 
 
 class TrainingFailed(RoboJacksonError):

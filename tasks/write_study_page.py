@@ -180,7 +180,9 @@ def _plots(
         if any(values for setups in by_move.values() for values in setups.values()):
             title, _, _ = study_page.FIGURES[name]
             told = "A dot a seed, the bar their mean; lines are policies that learnt nothing."
-            made["evaluations"].append(Plot(title, told, png(evaluation_plot(by_move, lines, title))))
+            made["evaluations"].append(
+                Plot(title, told, png(evaluation_plot(by_move, lines, title)))
+            )
     return made
 
 

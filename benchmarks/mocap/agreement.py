@@ -22,7 +22,7 @@ from robojackson.clips.pose_detector import detect
 from robojackson.clips.video import VideoLimits, probe, read_frames
 from robojackson.errors import BadTable
 from robojackson.formats import hybrik_output
-from robojackson.formats.hybrik_output import HybrikMotion
+from robojackson.formats.foreign_motion import HybrikMotion
 from robojackson.metrics import pose_error
 from robojackson.mocap.landmarks.blazepose import repair
 from robojackson.mocap.networks.network_config import NetworkConfig

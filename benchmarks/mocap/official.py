@@ -16,7 +16,7 @@ from robojackson.body.forward_kinematics import forward
 from robojackson.clips.pose_detector import detect
 from robojackson.clips.video import VideoLimits, probe
 from robojackson.formats import hybrik_output
-from robojackson.formats.hybrik_output import HybrikMotion
+from robojackson.formats.foreign_motion import HybrikMotion
 from robojackson.mocap.networks.network_config import NetworkConfig
 from robojackson.mocap.networks.smpl_body import measured_rest
 from robojackson.mocap.pose.twist import prior

@@ -1,6 +1,6 @@
 """What became of every video of a search, and the same as rows of the catalogue."""
 
-import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
 from datetime import UTC, datetime
@@ -71,19 +71,19 @@ def rows(found: SearchResult) -> list[dict[str, Any]]:
 
 def summary(found: Sequence[VideoCandidate], selection: Selection) -> str:
     """What the selection did, in one line."""
-    reasons: dict[str, int] = {}
-    for _, reason in selection.dropped:
-        kind = "too long" if "long, the limit" in reason else reason
-        reasons[kind] = reasons.get(kind, 0) + 1
-    told = ", ".join(f"{count} {reason}" for reason, count in reasons.items())
-    return f"{len(found)} found, {len(selection.selected)} kept" + (f" ({told})" if told else "")
+    kinds = Counter(rejection.kind for _, rejection in selection.dropped)
+    words = {rejection.kind: str(rejection) for _, rejection in selection.dropped}
+    words["too_long"] = "too long"
+    dropped = ", ".join(f"{count} {words[kind]}" for kind, count in kinds.items())
+    line = f"{len(found)} found, {len(selection.selected)} kept"
+    return f"{line} ({dropped})" if dropped else line
 
 
 def reason_of(error: BaseException) -> str:
     """An error as the reason in a table: one line, without the path of our own copy."""
     if not isinstance(error, RoboJacksonError):
         return clean_text(f"unexpected {type(error).__name__}: {error}", REASON_LENGTH)
-    return clean_text(re.sub(r"^/\S*?: ", "", str(error)), REASON_LENGTH)
+    return clean_text(error.reason, REASON_LENGTH)
 
 
 def _row(entry: Entry) -> dict[str, Any]:

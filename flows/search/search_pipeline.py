@@ -20,6 +20,7 @@ from robojackson.clips.quality import candidate_ranking
 from robojackson.clips.quality.assessment import Quality
 from robojackson.clips.quality.duplicates import find_duplicates
 from robojackson.clips.quality.stability import Stability
+from robojackson.clips.rejection import Rejection
 from robojackson.clips.sources import folder
 from robojackson.clips.web.candidate_selection import select
 from robojackson.clips.web.download_formats import Purpose
@@ -172,8 +173,8 @@ def _quality(store: Store, artifact: Artifact) -> Quality:
     return Quality(**json.loads(store.read(artifact.key)))
 
 
-def _copied(fit: dict[str, Entry], settings: FindConfig) -> dict[str, str]:
-    """Which of the videos are copies of others, by name; the reason names the other's title."""
+def _copied(fit: dict[str, Entry], settings: FindConfig) -> dict[str, Rejection]:
+    """Return the videos that are copies of others, by name; a rejection names the other's title."""
     if settings.filters.copies is None:
         return {}
     store = Store.from_environment()
@@ -184,9 +185,8 @@ def _copied(fit: dict[str, Entry], settings: FindConfig) -> dict[str, str]:
         if (made := fit[name].made)
     }
     found = find_duplicates(tracks, settings.filters.copies)
-    return {name: _titled(reason, fit) for name, reason in found.items()}
+    return {name: replace(copy, other=_title(fit[copy.other])) for name, copy in found.items()}
 
 
-def _titled(reason: str, fit: dict[str, Entry]) -> str:
-    words, name = reason.rsplit(" ", 1)
-    return f"{words} {fit[name].candidate.title or fit[name].candidate.video_id}"
+def _title(entry: Entry) -> str:
+    return entry.candidate.title or entry.candidate.video_id

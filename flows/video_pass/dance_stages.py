@@ -217,7 +217,7 @@ def _readable(paths: Sequence[Path]) -> list[tuple[Path, SourceFile]]:
         try:
             found.append((path, SourceFile.at(path)))
         except OSError as cause:
-            causes.append(UnreadableVideo(f"{path}: cannot be read ({cause.strerror})"))
+            causes.append(UnreadableVideo(f"cannot be read ({cause.strerror})", path))
             run_logger().warning("%s", causes[-1])
     if not found:
         raise causes[0]

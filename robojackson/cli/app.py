@@ -19,7 +19,7 @@ from robojackson.cli.console import (
     log_to_stderr,
     usage_error,
 )
-from robojackson.cli.format_commands import export, import_
+from robojackson.cli.format_commands import ExportCommand, export, import_
 from robojackson.cli.learning_commands import evaluate, pretrain, train
 from robojackson.cli.options import (
     Config,
@@ -161,7 +161,7 @@ def add_stages(app: typer.Typer) -> None:
     """Add the commands of this module, and the group `robots`."""
     app.add_typer(robots, name="robots")
     for name, stage in STAGES.items():
-        app.command(name)(stage)
+        app.command(name, cls=ExportCommand if stage is export else None)(stage)
 
 
 def run(app: typer.Typer) -> int:

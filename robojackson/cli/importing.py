@@ -11,9 +11,14 @@ import numpy as np
 
 from robojackson.cli import stages
 from robojackson.errors import BadConfiguration, BadTable, StoreError
-from robojackson.formats.foreign_motion import Y_UP_TO_WORLD, Z_UP_TO_WORLD, ForeignMotion
-from robojackson.formats.hybrik_output import HybrikMotion
-from robojackson.formats.registry import RATES, READERS, recognise
+from robojackson.formats.foreign_motion import (
+    Y_UP_TO_WORLD,
+    Z_UP_TO_WORLD,
+    ForeignMotion,
+    HybrikMotion,
+)
+from robojackson.formats.format import Importer
+from robojackson.formats.registry import recognise
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.pipeline import tables
 from robojackson.pipeline.yaml_loader import load
@@ -51,10 +56,10 @@ def import_motion(
     began = time.monotonic()
     settings = load(PipelineConfig, config, overrides)
     data = _bytes_of(file)
-    kind = recognise(data, str(file))
+    importer = recognise(data, str(file))
     with _naming_the_file(file):
-        motion = READERS[kind](data)
-    rate, notes = _rate(motion, kind, fps)
+        motion = importer.read(data)
+    rate, notes = _rate(motion, importer, fps)
     figures: dict[str, Any] = {}
     if isinstance(motion, HybrikMotion):
         if up:
@@ -69,7 +74,7 @@ def import_motion(
     sequence = replace(sequence, notes=(*sequence.notes, *notes))
     with stages.results_in(out) as files:
         files.write("smpl.parquet", tables.encode(sequence))
-    told = {"smpl": str(out / "smpl.parquet"), "file": str(file), "format": kind}
+    told = {"smpl": str(out / "smpl.parquet"), "file": str(file), "format": importer.name}
     seconds = time.monotonic() - began
     return told | figures | _figures(sequence) | {"seconds": seconds}
 
@@ -94,14 +99,15 @@ def _bytes_of(file: Path) -> bytes:
 
 
 def _rate(
-    motion: ForeignMotion | HybrikMotion, kind: str, given: float | None
+    motion: ForeignMotion | HybrikMotion, importer: Importer, given: float | None
 ) -> tuple[float, list[str]]:
     """Frames a second, and what the user should know of them."""
     told = motion.fps if isinstance(motion, ForeignMotion) else None
-    usual = RATES.get(kind)
-    rate = given or told or usual
+    rate = given or told or importer.fps
     if rate is None:
-        raise BadConfiguration(f"this {kind} file does not say its frame rate: give it with --fps")
+        raise BadConfiguration(
+            f"this {importer.name} file does not say its frame rate: give it with --fps"
+        )
     if not SLOWEST <= rate <= FASTEST:
         raise BadConfiguration(
             f"{rate:g} frames a second: wanted {SLOWEST:g} to {FASTEST:g}; give it with --fps"

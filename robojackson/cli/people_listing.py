@@ -32,7 +32,7 @@ def list_people(
             who = settings.dancer
             cast = track_people(video, info, who.detection, who.identity, progress)
         if not cast.rows:
-            raise NoPersonFound(f"{video}: {cast}")
+            raise NoPersonFound(f"{cast}", video)
         files.write(PICTURE, draw_people(video, cast))
     people, picture = cast.people, str(out / PICTURE)
     told = {"video": str(video), "people": [asdict(p) for p in people], "picture": picture}

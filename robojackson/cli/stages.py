@@ -56,7 +56,7 @@ def mocap(
         try:
             sequence = to_motion(track)
         except (NoPersonFound, TrackTooShort) as cause:
-            raise type(cause)(f"{video}: {cause}") from cause
+            raise type(cause)(cause.reason, video) from cause
         files.write("landmarks.parquet", tables.encode(track))
         files.write("smpl.parquet", tables.encode(sequence))
         for name, other in sample_hypotheses(track, settings, hypotheses):
@@ -92,7 +92,7 @@ def retarget(smpl: Path, out: Path, config: str, overrides: Overrides) -> Figure
         try:
             reference = retarget_motion(sequence, machine, settings.retarget)
         except TrackTooShort as cause:
-            raise TrackTooShort(f"{smpl}: {cause}") from cause
+            raise TrackTooShort(cause.reason, smpl) from cause
         files.write("reference.parquet", tables.encode(reference))
         scorecard = console.to_json_types(scorecard_record(reference))
         files.write("scorecard.json", json.dumps(scorecard, indent=1).encode())
@@ -122,7 +122,7 @@ def gate(scorecard: Figures, out: Path, config: str, overrides: Overrides) -> No
     try:
         check(scorecard)
     except RejectedReference as cause:
-        raise RejectedReference(f"{cause}; it is kept in {out}") from None
+        raise cause.saved_in(out) from None
 
 
 def evaluate(
@@ -185,8 +185,8 @@ def robot_of(reference: "ReferenceMotion") -> "Robot":
     if machine.sha256 != reference.model_sha256:
         raise RejectedReference(
             f"the reference motion was made for another model of {reference.robot!r} "
-            f"(sha256 {reference.model_sha256[:12]}..., here {machine.sha256[:12]}...); "
-            "retarget the motion again"
+            f"(sha256 {reference.model_sha256[:12]}..., here {machine.sha256[:12]}...)",
+            "retarget the motion again",
         )
     return machine
 

@@ -38,7 +38,7 @@ def trim(path: Path, start_s: float, end_s: float, out: Path) -> Path:
         rate = Fraction(info.fps).limit_denominator(1001)
         times = _encode(frames, rate, info.uneven, written)
         if not times:
-            raise TrackTooShort(f"{path}: no frame between {start_s:g} s and {end_s:g} s")
+            raise TrackTooShort(f"no frame between {start_s:g} s and {end_s:g} s", path)
         if not info.uneven and uneven(np.array(times), info.fps):  # damaged frames are left out
             _encode(timed_frames(path, start_s, end_s), rate, True, written)
         written.replace(out)

@@ -83,11 +83,11 @@ def list_videos(source: Path) -> tuple[Path, ...]:
     if source.is_file():
         return (source,)
     if not source.is_dir():
-        raise UnreadableVideo(f"{source}: no such file or folder")
+        raise UnreadableVideo("no such file or folder", source)
     there = (path for path in sorted(source.iterdir()) if path.is_file())
     found = tuple(path for path in there if path.suffix.lower() in SUFFIXES)
     if not found:
-        raise UnreadableVideo(f"{source}: the folder holds no video ({', '.join(SUFFIXES)})")
+        raise UnreadableVideo(f"the folder holds no video ({', '.join(SUFFIXES)})", source)
     return found
 
 
@@ -109,12 +109,13 @@ def probe(path: Path, limits: VideoLimits) -> VideoInfo:
         first = first_frame(container, path)
     if len(stamps) > 1 and stamps[-1] == 0.0:
         raise UnreadableVideo(
-            f"{path}: all of its {len(stamps)} frames are shown at the same time; write it anew "
-            "with a frame rate (ffmpeg -r 30 -i IN OUT.mp4)"
+            f"all of its {len(stamps)} frames are shown at the same time; write it again "
+            "with a frame rate (ffmpeg -r 30 -i IN OUT.mp4)",
+            path,
         )
     fps = rate(stamps, told)
     if not fps:
-        raise UnreadableVideo(f"{path}: the file tells no frame rate")
+        raise UnreadableVideo("the file tells no frame rate", path)
     rotation = -first.rotation % 360
     size = (first.height, first.width) if rotation % 180 else (first.width, first.height)
     frames = len(stamps)
@@ -172,9 +173,7 @@ def _decoded(path: Path) -> Iterator[tuple[float, VideoFrame]]:
             except av.FFmpegError as cause:
                 bad += 1
                 if bad > max(1.0, DAMAGE_ALLOWED * max(good + bad, stream.frames)):
-                    raise TruncatedVideo(
-                        f"{path}: damaged after {time_s:.2f} s ({cause})"
-                    ) from cause
+                    raise TruncatedVideo(f"damaged after {time_s:.2f} s ({cause})", path) from cause
                 continue
             if packet is None:
                 return
@@ -199,8 +198,9 @@ def _upright(frame: VideoFrame, short_side: int | None) -> np.ndarray:
 def _require_complete(path: Path, frames: int, promised: int) -> None:
     if frames + MISSING_FRAMES_ALLOWED < promised:
         raise TruncatedVideo(
-            f"{path}: holds {frames} of the {promised} frames that its index promises; "
-            "copy or download the file again"
+            f"holds {frames} of the {promised} frames that its index promises; "
+            "copy or download the file again",
+            path,
         )
 
 
@@ -208,10 +208,11 @@ def require_within(info: VideoInfo, limits: VideoLimits) -> None:
     """Raise `VideoTooLong` or `TrackTooShort` where a video is outside the limits."""
     if info.duration_s > limits.max_duration_s:
         raise VideoTooLong(
-            f"{info.path}: {info.duration_s:.1f} s is longer than the limit of "
-            f"{limits.max_duration_s:g} s; trim it or raise video.max_duration_s"
+            f"{info.duration_s:.1f} s is longer than the limit of "
+            f"{limits.max_duration_s:g} s; trim it or raise video.max_duration_s",
+            info.path,
         )
     if info.frames < limits.min_frames:
         raise TrackTooShort(
-            f"{info.path}: {info.frames} frame, at least {limits.min_frames} are needed"
+            f"{info.frames} frame, at least {limits.min_frames} are needed", info.path
         )

@@ -23,26 +23,26 @@ def opened(path: Path) -> av.container.InputContainer:
         TruncatedVideo: the file ends before its index.
     """
     if path.is_dir():
-        raise UnreadableVideo(f"{path}: a folder, expected one video")
+        raise UnreadableVideo("a folder, expected one video", path)
     if not path.is_file():
-        raise UnreadableVideo(f"{path}: no such file")
+        raise UnreadableVideo("no such file", path)
     if path.stat().st_size == 0:
-        raise UnreadableVideo(f"{path}: the file is empty (0 bytes)")
+        raise UnreadableVideo("the file is empty (0 bytes)", path)
     try:
         return av.open(str(path))
     except av.FFmpegError as cause:
         with path.open("rb") as file:
             is_media = ISO_MEDIA_MARK in file.read(32)
         if is_media:
-            message = f"{path}: cut off before its index; copy or download the file again"
-            raise TruncatedVideo(message) from cause
-        raise UnreadableVideo(f"{path}: not a video that FFmpeg can read") from cause
+            message = "cut off before its index; copy or download the file again"
+            raise TruncatedVideo(message, path) from cause
+        raise UnreadableVideo("not a video that FFmpeg can read", path) from cause
 
 
 def video_stream(container: av.container.InputContainer, path: Path) -> VideoStream:
     """The first video stream of a container."""
     if not container.streams.video:
-        raise UnreadableVideo(f"{path}: the file holds no video stream")
+        raise UnreadableVideo("the file holds no video stream", path)
     return container.streams.video[0]
 
 
@@ -51,7 +51,7 @@ def first_frame(container: av.container.InputContainer, path: Path) -> VideoFram
     try:
         return next(iter(container.decode(video=0)))
     except (StopIteration, av.FFmpegError) as cause:
-        raise UnreadableVideo(f"{path}: the file holds no frame that can be decoded") from cause
+        raise UnreadableVideo("the file holds no frame that can be decoded", path) from cause
 
 
 def packet_times(path: Path) -> Float[np.ndarray, " T"]:
@@ -69,7 +69,7 @@ def packet_times(path: Path) -> Float[np.ndarray, " T"]:
                 if packet.size > 0 and not packet.is_discard and not packet.is_corrupt
             ]
         except av.FFmpegError as cause:
-            raise TruncatedVideo(f"{path}: damaged ({cause})") from cause
+            raise TruncatedVideo(f"damaged ({cause})", path) from cause
     stamps = np.sort(np.array(found))
     return stamps - stamps[:1] if len(stamps) else stamps
 

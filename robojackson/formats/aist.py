@@ -16,6 +16,7 @@ from robojackson.formats.foreign_motion import (
     rows,
     same_length,
 )
+from robojackson.formats.format import Importer
 
 FPS = 60.0
 WHERE = "AIST++ pickle"
@@ -40,3 +41,6 @@ def read(data: bytes) -> ForeignMotion:
         pelvis=trans / scaling[0] + PELVIS["smpl"],
         to_world=Y_UP_TO_WORLD.copy(),
     )
+
+
+IMPORT = Importer("aist", read, lambda file: "smpl_poses" in file.pickled)

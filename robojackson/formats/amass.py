@@ -21,6 +21,7 @@ from robojackson.formats.foreign_motion import (
     same_length,
     skeleton_of,
 )
+from robojackson.formats.format import Importer, PersonExporter
 from robojackson.motion.smpl_sequence import SmplSequence
 
 RATES = ("mocap_framerate", "mocap_frame_rate")
@@ -87,3 +88,7 @@ def _rate(content: dict[str, np.ndarray]) -> float | None:
         if (rate := number(content.get(name))) is not None:
             return rate
     return None
+
+
+EXPORT = PersonExporter("amass", write)
+IMPORT = Importer("amass", read, lambda file: bool(file.members) and "data.pkl" not in file.members)

@@ -28,6 +28,7 @@ from robojackson.formats.foreign_motion import (
     skeleton_under,
     turned_root,
 )
+from robojackson.formats.format import Importer, PersonExporter
 from robojackson.motion.smpl_sequence import SmplSequence
 
 CENTIMETRE = 0.01
@@ -181,3 +182,7 @@ def _unit(rest: Float[np.ndarray, "29 3"], ours: bool = False) -> tuple[float, t
             usual = metre in (1.0, CENTIMETRE)
             return metre, () if usual else (f"unknown unit: taken for {1e3 * metre:.4g} mm",)
     return USUAL_LEG / leg, (f"unknown unit: scaled to legs of {USUAL_LEG} m",)
+
+
+EXPORT = PersonExporter("bvh", write)
+IMPORT = Importer("bvh", read, lambda file: file.head.startswith(b"HIERARCHY"))

@@ -11,7 +11,7 @@ from itertools import islice
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.spatial.transform import Rotation
 
 from robojackson.body.forward_kinematics import forward
@@ -62,6 +62,35 @@ class ForeignMotion:
 
     def __len__(self) -> int:
         return len(self.pelvis)
+
+
+@dataclass(frozen=True)
+class HybrikMotion:
+    """What the file says, one row a frame in which a person was found.
+
+    Attributes:
+        points: 29 keypoints relative to the pelvis, metres, camera axes.
+        pixels: The same in the image.
+        twist: cos and sin of joints 1..23.
+        rotations: Of the 24 joints relative to their parents; None in files of NIKI's demo.
+        confidence: 0..1 a keypoint.
+        frame: Number of each row's frame, from 0.
+        betas: SMPL's shape, the clip's mean.
+        width, height: Of the image, pixels.
+    """
+
+    points: Float[np.ndarray, "N 29 3"]
+    pixels: Float[np.ndarray, "N 29 2"]
+    twist: Float[np.ndarray, "N 23 2"]
+    rotations: Float[np.ndarray, "N 24 3 3"] | None
+    confidence: Float[np.ndarray, "N 29"]
+    frame: Int[np.ndarray, " N"]
+    betas: Float[np.ndarray, "10"]
+    width: int
+    height: int
+
+    def __len__(self) -> int:
+        return len(self.points)
 
 
 def rows(content: Mapping[str, Any], name: str, width: int, where: str) -> np.ndarray:

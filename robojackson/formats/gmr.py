@@ -15,6 +15,7 @@ import numpy as np
 
 from robojackson.errors import BadTable
 from robojackson.formats.containers import safe_pickle
+from robojackson.formats.format import RobotExporter
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.robot.body_states import body_states, names, require_same_joints
 from robojackson.robot.sampling import WXYZ, XYZW, SampledMotion, sampled
@@ -69,3 +70,6 @@ class _Portable(pickle.Pickler):
         if type(value) is not np.ndarray:
             return NotImplemented
         return np.ndarray, ((0,),), value.__reduce__()[2]
+
+
+EXPORT = RobotExporter("gmr", write)

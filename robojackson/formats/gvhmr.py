@@ -25,6 +25,7 @@ from robojackson.formats.foreign_motion import (
     skeleton_of,
     turned_root,
 )
+from robojackson.formats.format import Importer, PersonExporter
 from robojackson.motion.smpl_sequence import SmplSequence
 
 FPS = 30.0
@@ -86,3 +87,7 @@ def _parameters(
 def _intrinsics(sequence: SmplSequence) -> np.ndarray:
     width, height, focal = (float(sequence.camera[k]) for k in ("width", "height", "focal_px"))  # type: ignore[arg-type]
     return np.array([[focal, 0.0, width / 2], [0.0, focal, height / 2], [0.0, 0.0, 1.0]])
+
+
+EXPORT = PersonExporter("gvhmr", write)
+IMPORT = Importer("gvhmr", read, lambda file: "data.pkl" in file.members, fps=FPS)

@@ -7,15 +7,14 @@ its number. `pred_thetas` are 24 rotation MATRICES (216 numbers), not axis-angle
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
 
 from robojackson.errors import BadTable
 from robojackson.formats.containers import safe_pickle
-from robojackson.formats.foreign_motion import betas_of, rows, same_length
+from robojackson.formats.foreign_motion import HybrikMotion, betas_of, rows, same_length
+from robojackson.formats.format import Importer
 
 METRE = 2.2
 """Metres a unit of the file."""
@@ -24,35 +23,6 @@ STRETCH = 0.5
 """By which a rotation matrix of a file may stretch."""
 SURE_SIGMA = 0.1
 """Of a joint that counts nothing (HybrIK's weight is 1 - 10 sigma)."""
-
-
-@dataclass(frozen=True)
-class HybrikMotion:
-    """What the file says, one row a frame in which a person was found.
-
-    Attributes:
-        points: 29 keypoints relative to the pelvis, metres, camera axes.
-        pixels: The same in the image.
-        twist: cos and sin of joints 1..23.
-        rotations: Of the 24 joints relative to their parents; None in files of NIKI's demo.
-        confidence: 0..1 a keypoint.
-        frame: Number of each row's frame, from 0.
-        betas: SMPL's shape, the clip's mean.
-        width, height: Of the image, pixels.
-    """
-
-    points: Float[np.ndarray, "N 29 3"]
-    pixels: Float[np.ndarray, "N 29 2"]
-    twist: Float[np.ndarray, "N 23 2"]
-    rotations: Float[np.ndarray, "N 24 3 3"] | None
-    confidence: Float[np.ndarray, "N 29"]
-    frame: Int[np.ndarray, " N"]
-    betas: Float[np.ndarray, "10"]
-    width: int
-    height: int
-
-    def __len__(self) -> int:
-        return len(self.points)
 
 
 def read(data: bytes) -> HybrikMotion:
@@ -130,3 +100,7 @@ def _frames(content: Mapping[str, Any], count: int) -> np.ndarray:
         if (np.diff(numbers) > 0).all() and numbers[-1] < 10 * count:
             return numbers
     return np.arange(count)
+
+
+IMPORT = Importer("hybrik", read, lambda file: "pred_xyz_29" in file.pickled, fps=30.0)
+"""The rate is that of most videos; the file does not say it."""

@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from robojackson.errors import BadTable
+from robojackson.formats.format import RobotExporter
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.robot.sampling import SampledMotion, sampled
 
@@ -46,3 +47,6 @@ def read(data: bytes) -> SampledMotion:
 
 def _numbers(values: np.ndarray) -> str:
     return " ".join(f"{value:.10g}" for value in values)
+
+
+EXPORT = RobotExporter("keyframes", lambda reference, _: write(reference))

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from robojackson.formats.containers import npz_archive
+from robojackson.formats.format import RobotExporter
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.robot.body_states import body_states, names, require_same_joints
 from robojackson.robot.sampling import SampledMotion, sampled
@@ -55,3 +56,6 @@ def _data(motion: SampledMotion, model: mujoco.MjModel) -> dict[str, np.ndarray]
         "site_xmat": states.site_rotation,
         "split_points": np.array([0, len(motion)]),
     }
+
+
+EXPORT = RobotExporter("locomujoco", write)

@@ -5,38 +5,17 @@ trained for stands in the file's metadata as JSON.
 """
 
 import json
-from collections.abc import Mapping
-from typing import Protocol
 
 import numpy as np
 
 from robojackson.errors import MissingDependency
+from robojackson.formats.format import PolicyExporter, PolicyNetwork
 
-Layers = tuple[tuple[np.ndarray, np.ndarray], ...]
 OPSET = 17
 IR_VERSION = 8
 
 
-class PolicyNetwork(Protocol):
-    """What is written of a policy (`rl.policy.Policy` is one).
-
-    Attributes:
-        layers: (weight (in, out), bias (out,)); ReLU between them, tanh at the end.
-        facts: What the policy was trained for.
-        observation_size: Length of an observation.
-    """
-
-    @property
-    def layers(self) -> Layers: ...
-
-    @property
-    def facts(self) -> Mapping[str, object]: ...
-
-    @property
-    def observation_size(self) -> int: ...
-
-
-def to_onnx(policy: PolicyNetwork) -> bytes:
+def write(policy: PolicyNetwork) -> bytes:
     """The content of the file.
 
     Raises:
@@ -68,3 +47,6 @@ def to_onnx(policy: PolicyNetwork) -> bytes:
     model = helper.make_model(graph, opset_imports=opsets, ir_version=IR_VERSION)
     helper.set_model_props(model, {"facts": json.dumps(dict(policy.facts), sort_keys=True)})
     return model.SerializeToString()
+
+
+EXPORT = PolicyExporter("onnx", write)

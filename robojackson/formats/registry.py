@@ -1,26 +1,27 @@
-"""Which project's file this is, by what is in it; suffixes are not asked."""
+"""Every format that a module of this package declares.
 
-import io
-import zipfile
-from collections.abc import Callable, Mapping
+A new format is one file beside this one, with `EXPORT`, `IMPORT` or both (see `format`).
+"""
 
+from collections.abc import Iterator, Mapping
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import TypeVar
+
+from robojackson import formats
 from robojackson.errors import BadTable, UnknownName
-from robojackson.formats import aist, amass, bvh, gvhmr, hybrik_output, smpl_csv
-from robojackson.formats.containers import safe_pickle
-from robojackson.formats.containers.npz_archive import ZIP_FAILURES
-from robojackson.formats.foreign_motion import ForeignMotion
-from robojackson.formats.hybrik_output import HybrikMotion
+from robojackson.formats.format import (
+    Content,
+    Format,
+    Importer,
+    PersonExporter,
+    PolicyExporter,
+    RobotExporter,
+)
 
-READERS: Mapping[str, Callable[[bytes], ForeignMotion | HybrikMotion]] = {
-    "aist": aist.read,
-    "amass": amass.read,
-    "bvh": bvh.read,
-    "csv": smpl_csv.read,
-    "gvhmr": gvhmr.read,
-    "hybrik": hybrik_output.read,
-}
-RATES: Mapping[str, float] = {"gvhmr": gvhmr.FPS, "hybrik": 30.0}
-"""Frames a second where a file does not say: those of GVHMR's demo, and of most videos."""
+Kind = TypeVar("Kind", RobotExporter, PersonExporter, PolicyExporter, Importer)
+DECLARATIONS = ("EXPORT", "IMPORT")
 
 KNOWN_TO_FAIL: Mapping[bytes, str] = {
     b"": "empty",
@@ -32,8 +33,28 @@ KNOWN_TO_FAIL: Mapping[bytes, str] = {
 """Beginnings of files that cannot be read, and what to do."""
 
 
-def recognise(data: bytes, where: str) -> str:
-    """The name of a reader.
+def robot_exporters() -> Mapping[str, RobotExporter]:
+    """Return the formats of robot motions by name."""
+    return _declared(RobotExporter)
+
+
+def person_exporters() -> Mapping[str, PersonExporter]:
+    """Return the formats of human motions by name."""
+    return _declared(PersonExporter)
+
+
+def policy_exporters() -> Mapping[str, PolicyExporter]:
+    """Return the formats of policies by name."""
+    return _declared(PolicyExporter)
+
+
+def importers() -> Mapping[str, Importer]:
+    """Return the formats of human motions that are read, by name."""
+    return _declared(Importer)
+
+
+def recognise(data: bytes, where: str) -> Importer:
+    """Return the importer of a file, by its content; suffixes do not count.
 
     Raises:
         UnknownName: none of them.
@@ -42,28 +63,27 @@ def recognise(data: bytes, where: str) -> str:
     for start, cause in KNOWN_TO_FAIL.items():
         if data.startswith(start) and (start or not data):
             raise BadTable(f"{where}: {cause}")
-    head = data[:64].removeprefix(b"\xef\xbb\xbf").lstrip()
-    if head.startswith(b"HIERARCHY"):
-        return "bvh"
-    if head.startswith(b"time_s,"):
-        return "csv"
-    if data.startswith(b"PK"):
-        members = _members(data, where)
-        return "gvhmr" if "data.pkl" in members else "amass"
-    if data.startswith(b"\x80"):
-        content = safe_pickle.load_joblib(data, where)
-        if "smpl_poses" in content:
-            return "aist"
-        if "pred_xyz_29" in content:
-            return "hybrik"
-        raise UnknownName("keys of a pickle", ", ".join(content)[:200], where, READERS)
-    raise UnknownName("kind of file", data[:16].decode("latin1"), where, READERS)
+    content = Content(data, where)
+    for importer in importers().values():
+        if importer.recognises(content):
+            return importer
+    if content.pickled:
+        raise UnknownName("keys of a pickle", ", ".join(content.pickled)[:200], where, importers())
+    raise UnknownName("kind of file", data[:16].decode("latin1"), where, importers())
 
 
-def _members(data: bytes, where: str) -> set[str]:
-    """Names in a zip, without their folders."""
-    try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            return {name.rpartition("/")[2] for name in archive.namelist()}
-    except ZIP_FAILURES as cause:
-        raise BadTable(f"{where}: cut off or damaged zip ({cause}); copy it again") from cause
+@cache
+def _formats() -> tuple[Format, ...]:
+    """What all modules declare, by the names of the modules."""
+    return tuple(_declarations())
+
+
+def _declarations() -> Iterator[Format]:
+    for module in sorted(iter_modules(formats.__path__), key=lambda found: found.name):
+        if not module.ispkg:
+            loaded = import_module(f"{formats.__name__}.{module.name}")
+            yield from (getattr(loaded, name) for name in DECLARATIONS if hasattr(loaded, name))
+
+
+def _declared(kind: type[Kind]) -> Mapping[str, Kind]:
+    return {each.name: each for each in _formats() if isinstance(each, kind)}

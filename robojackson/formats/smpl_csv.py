@@ -17,6 +17,7 @@ from robojackson.formats.foreign_motion import (
     rows,
     skeleton_under,
 )
+from robojackson.formats.format import Importer, PersonExporter
 from robojackson.motion.smpl_sequence import CONTACT_POINTS, SmplSequence
 
 WHERE = "motion csv"
@@ -66,3 +67,7 @@ def read(data: bytes) -> ForeignMotion:
     rest = skeleton_under(rotations, points)
     fps = round((len(table) - 1) / span, 5)
     return ForeignMotion(fps, rotations, points[:, 0], rest)
+
+
+EXPORT = PersonExporter("csv", write)
+IMPORT = Importer("csv", read, lambda file: file.head.startswith(b"time_s,"))

@@ -9,6 +9,7 @@ import io
 import numpy as np
 
 from robojackson.errors import BadTable
+from robojackson.formats.format import RobotExporter
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.robot.sampling import WXYZ, XYZW, SampledMotion, sampled
 
@@ -40,3 +41,6 @@ def read(data: bytes, fps: float = FPS) -> SampledMotion:
         raise BadTable(f"csv: {rows.shape[1]} columns; a root has 7 and a robot has hinges")
     rows[:, 3:7] = rows[:, 3:7][:, WXYZ]
     return SampledMotion(float(fps), rows)
+
+
+EXPORT = RobotExporter("csv", lambda reference, _: write(reference))

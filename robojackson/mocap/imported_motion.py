@@ -23,8 +23,12 @@ from robojackson.body.skeleton import (
     keypoint,
 )
 from robojackson.body.smoothing import lowpass
-from robojackson.formats.foreign_motion import ForeignMotion, require_person, skeleton_under
-from robojackson.formats.hybrik_output import HybrikMotion
+from robojackson.formats.foreign_motion import (
+    ForeignMotion,
+    HybrikMotion,
+    require_person,
+    skeleton_under,
+)
 from robojackson.mocap.grounding import contacts
 from robojackson.mocap.grounding import floor as ground
 from robojackson.mocap.landmarks import pinhole_camera

@@ -54,7 +54,7 @@ def scorecard_record(motion: ReferenceMotion) -> dict[str, Any]:
 
 
 def check(card: Mapping[str, Any]) -> None:
-    """The gate of training: a card with its figures and findings, as `told` makes it.
+    """The gate of training: a card with its figures and findings, as `scorecard_record` makes it.
 
     Raises:
         RejectedReference: A figure is over its bar; the message names it and what may mend it.
@@ -62,16 +62,23 @@ def check(card: Mapping[str, Any]) -> None:
     if not set(BARS) & set(card):
         raise RejectedReference(
             "reference refused: it has no score card, so nobody knows whether the robot can follow "
-            "it; make one with `robojackson retarget`, or --force"
+            "it",
+            "make one with `robojackson retarget`",
+            forcible=True,
         )
     failed = failures(card)
     if failed:
         name = failed[0]
         others = f" (and {', '.join(failed[1:])})" if failed[1:] else ""
+        value = card.get(name, np.nan)
         raise RejectedReference(
-            f"reference refused: {name} is {card.get(name, np.nan):.4g}, at most {BARS[name]:g} is "
-            f"allowed{others}{_reasons(name, card)}; "
-            f"try {_MENDING.get(name, 'method: optimise')}, or --force"
+            f"reference refused: {name} is {value:.4g}, at most {BARS[name]:g} is "
+            f"allowed{others}{_reasons(name, card)}",
+            f"try {_MENDING.get(name, 'method: optimise')}",
+            figure=name,
+            value=value,
+            limit=BARS[name],
+            forcible=True,
         )
 
 

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.mocap.agreement import agreement
 from robojackson.errors import BadTable
-from robojackson.formats.hybrik_output import HybrikMotion
+from robojackson.formats.foreign_motion import HybrikMotion
 
 GENERATOR = np.random.default_rng(0)
 POINTS = GENERATOR.normal(0.0, 0.4, (20, 29, 3))

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from robojackson.body.skeleton import keypoint
-from robojackson.cli.exporting import HUMAN_FORMATS, export
+from robojackson.cli.exporting import export
 from robojackson.cli.importing import import_motion
 from robojackson.errors import BadConfiguration, BadTable, StoreError, UnknownName
-from robojackson.formats import amass, bvh
+from robojackson.formats import amass, bvh, registry
 from robojackson.formats.containers.npz_archive import pack
 from robojackson.formats.foreign_motion import PELVIS
 from robojackson.motion.smpl_sequence import SmplSequence
@@ -40,7 +40,7 @@ def read(path: Path) -> SmplSequence:
     return tables.decode(SmplSequence, path.read_bytes(), str(path))
 
 
-@pytest.mark.parametrize("to", HUMAN_FORMATS)
+@pytest.mark.parametrize("to", registry.person_exporters())
 def test_a_motion_goes_out_and_comes_back(to: str, smpl: Path, tmp_path: Path) -> None:
     export(smpl, to, tmp_path / "motion")
     told = import_motion(tmp_path / "motion", tmp_path / "back", None, None, "base", {})

@@ -167,7 +167,7 @@ def test_a_signal_before_any_learning_finds_the_flag_down(
 
     def learn(motion, robot, config: TrainConfig, out: Path, hooks: Hooks) -> None:
         flags.append((False, holding(UNSAVED, ours)))
-        hooks.learnt()
+        hooks.on_learning()
         flags.append((True, holding(UNSAVED, ours)))
         raise RejectedReference("no")
 

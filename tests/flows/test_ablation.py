@@ -83,7 +83,7 @@ def play(
 
     infeasible = 0.0
     monkeypatch.setattr(ablation, "motion", motion)
-    monkeypatch.setattr(ablation, "results_page", results_page)
+    monkeypatch.setattr(ablation, "write_study_page", results_page)
 
     def run(executor: Played, infeasible_share: float = 0.0, **given: Any) -> dict[str, Any]:
         nonlocal infeasible
@@ -303,7 +303,7 @@ def test_training_and_judgement_share_the_time_of_a_cell(
         await asyncio.sleep(0.2)
         return {"policy": REFERENCE}
 
-    for name in ("train", "judge"):
+    for name in ("train_policy", "evaluate_policy"):
         monkeypatch.setattr(cells, name, stage)
     monkeypatch.setattr(cells, "run_id_of", lambda *given: "walk-scratch-s0-0")
     monkeypatch.setattr(cells, "publish", lambda *given: {})

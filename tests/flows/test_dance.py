@@ -175,21 +175,21 @@ def score(
 ) -> Callable[..., list[str]]:
     """Names of the candidates that are left when played landmarks of some files fail."""
 
-    def probe(source: Any, limits: Any, start: Any, end: Any) -> dict[str, Artifact]:
+    def probe_video(source: Any, limits: Any, start: Any, end: Any) -> dict[str, Artifact]:
         return dict.fromkeys(("video", "info"), Artifact(source.path.name, source.sha256))
 
-    def landmarks(video: Artifact, info: Artifact, size: str, dancer: Any) -> Artifact:
+    def detect_landmarks(video: Artifact, info: Artifact, size: str, dancer: Any) -> Artifact:
         if video.key.startswith("empty"):
             raise NoPersonFound(f"{video.key}: no person 3")
         return video
 
-    def stability(track: Artifact, config: Any) -> Artifact:
+    def score_stability(track: Artifact, config: Any) -> Artifact:
         score = a_candidate(track.key, 1.0).score
         return artifact_tables.save(
             Store.from_environment(), "stability", "stability.parquet", score
         )
 
-    for played in (probe, landmarks, stability):
+    for played in (probe_video, detect_landmarks, score_stability):
         monkeypatch.setattr(dance_stages, played.__name__, Played(played))
 
     @flow

@@ -210,7 +210,7 @@ def test_a_choice_of_which_no_motion_can_be_made_leaves_the_one_before(
 
     monkeypatch.setenv("ROBOJACKSON_STORE", str(tmp_path))
     for name, stand_in in {
-        "hunt": hunt, "motion": motion, "show": show,
+        "search_and_rank": hunt, "motion": motion, "publish_search": show,
         "in_good_quality": lambda *given: Artifact("new", "0" * 64),
         "of_candidate": lambda *given: Artifact("old", "0" * 64),
         "get_run_logger": lambda: logging.getLogger("refresh"),

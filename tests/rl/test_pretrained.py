@@ -17,7 +17,7 @@ from stable_baselines3 import SAC
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
 from robojackson.errors import BadPolicy, MissingDependency
-from robojackson.formats.onnx_policy import to_onnx
+from robojackson.formats import onnx_policy
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl import pretrained as starting
 from robojackson.rl.config.train_config import PaperConfig, TqcConfig, TrainConfig
@@ -282,7 +282,9 @@ def small_policy() -> Policy:
 
 def test_a_policy_acts_the_same_as_onnx() -> None:
     policy = small_policy()
-    session = onnxruntime.InferenceSession(to_onnx(policy), providers=["CPUExecutionProvider"])
+    session = onnxruntime.InferenceSession(
+        onnx_policy.write(policy), providers=["CPUExecutionProvider"]
+    )
     seen = np.random.default_rng(1).normal(size=(7, 5)).astype(np.float32)
     (action,) = session.run(["action"], {"observation": seen})
     np.testing.assert_allclose(action, policy.act(seen), atol=1e-5)
@@ -291,5 +293,5 @@ def test_a_policy_acts_the_same_as_onnx() -> None:
 def test_the_onnx_file_says_what_the_policy_was_trained_for() -> None:
     import onnx
 
-    model = onnx.load(io.BytesIO(to_onnx(small_policy())))
+    model = onnx.load(io.BytesIO(onnx_policy.write(small_policy())))
     assert json.loads(model.metadata_props[0].value) == {"robot": "humanoid", "seed": 3}

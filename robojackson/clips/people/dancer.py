@@ -85,7 +85,7 @@ def track_dancer(
         return single
     number = config.number or 1
     if number > len(cast.rows):
-        raise NoPersonFound(f"{path}: there is no person {number} among {len(cast.rows)}: {cast}")
+        raise NoPersonFound(f"there is no person {number} among {len(cast.rows)}: {cast}", path)
     rows = _followed(
         path, cast, number - 1, size, config, _shifted(progress, info.frames, passes - 1, passes)
     )

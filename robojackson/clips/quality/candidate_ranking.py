@@ -10,6 +10,7 @@ from pydantic.dataclasses import dataclass as configuration
 from robojackson.clips.quality.assessment import Quality
 from robojackson.clips.quality.duplicates import DuplicateConfig
 from robojackson.clips.quality.stability import Stability
+from robojackson.clips.rejection import Kind, Rejection
 
 
 @configuration(frozen=True, config=ConfigDict(extra="forbid"))
@@ -50,12 +51,17 @@ class Ranked:
     Attributes:
         name: Of the candidate.
         place: 1 is danced; None when it is rejected.
-        reason: Why it is rejected; empty when it is not.
+        rejections: Why it is rejected; empty when it is not.
     """
 
     name: str
     place: int | None
-    reason: str
+    rejections: tuple[Rejection, ...] = ()
+
+    @property
+    def reason(self) -> str:
+        """The rejections in words."""
+        return "; ".join(map(str, self.rejections))
 
     @property
     def decision(self) -> Literal["chosen", "accepted", "rejected"]:
@@ -65,12 +71,11 @@ class Ranked:
         return "chosen" if self.place == 1 else "accepted"
 
 
-def objections(score: Stability, quality: Quality, config: FilterConfig) -> list[str]:
-    """Every reason against a clip; a clip without a person has that one only."""
+def objections(score: Stability, quality: Quality, config: FilterConfig) -> list[Rejection]:
+    """Return every reason against a clip; a clip without a person has that one only."""
     if not score.detected:
-        return [f"no person found in {score.frames} of {score.frames} frames"]
-    found = [*_too_little(quality, config), *_too_much(quality, config)]
-    return [reason for reason in found if reason]
+        return [Rejection("no_person", score.frames)]
+    return [*_too_little(quality, config), *_too_much(quality, config)]
 
 
 def order(scores: Mapping[str, Stability], config: FilterConfig) -> list[str]:
@@ -87,8 +92,8 @@ def order(scores: Mapping[str, Stability], config: FilterConfig) -> list[str]:
 
 def rank(
     ordered: Sequence[str],
-    against: Mapping[str, Sequence[str]],
-    copied: Mapping[str, str],
+    against: Mapping[str, Sequence[Rejection]],
+    copied: Mapping[str, Rejection],
 ) -> list[Ranked]:
     """Places of all clips: those that nothing speaks against first, then the rejected ones.
 
@@ -100,44 +105,42 @@ def rank(
     accepted: list[Ranked] = []
     rejected: list[Ranked] = []
     for name in ordered:
-        reasons = [*against.get(name, ()), *([copied[name]] if name in copied else [])]
-        if reasons:
-            rejected.append(Ranked(name, None, "; ".join(reasons)))
+        found = (*against.get(name, ()), *([copied[name]] if name in copied else []))
+        if found:
+            rejected.append(Ranked(name, None, found))
         else:
-            accepted.append(Ranked(name, len(accepted) + 1, ""))
+            accepted.append(Ranked(name, len(accepted) + 1))
     return [*accepted, *rejected]
 
 
-def _too_little(quality: Quality, config: FilterConfig) -> list[str]:
-    shares = (
-        ("a person in", quality.detected_share, config.detected_share),
-        ("the full body in view in", quality.full_body_share, config.full_body_share),
+def _too_little(quality: Quality, config: FilterConfig) -> list[Rejection]:
+    """Return what a clip has less of than it needs."""
+    measured: tuple[tuple[Kind, float, float | None], ...] = (
+        ("person_missing", quality.detected_share, config.detected_share),
+        ("body_cut_off", quality.full_body_share, config.full_body_share),
+        ("too_short", quality.duration_s, config.shortest_s),
+        ("person_small", quality.person_height_px, config.person_height_px),
+        ("camera_moves", quality.static_share, config.static_share),
     )
-    found = [
-        f"{what} {value:.0%} of the frames, at least {least:.0%} are needed"
-        for what, value, least in shares
+    return [
+        Rejection(kind, value, least)
+        for kind, value, least in measured
         if least is not None and value < least
     ]
-    if config.shortest_s is not None and quality.duration_s < config.shortest_s:
-        found.append(f"{quality.duration_s:.1f} s long, at least {config.shortest_s:g} s")
-    if config.person_height_px is not None and quality.person_height_px < config.person_height_px:
-        tall, least = quality.person_height_px, config.person_height_px
-        found.append(f"the person is {tall:.0f} px tall, at least {least:.0f} px are needed")
-    if config.static_share is not None and quality.static_share < config.static_share:
-        found.append(f"the camera moves: still for {quality.static_share:.0%} of the time")
-    return found
 
 
-def _too_much(quality: Quality, config: FilterConfig) -> list[str]:
-    is_still = config.moving_share is not None and quality.moving_share < config.moving_share
-    if is_still:
-        kind = "a slideshow" if quality.cuts else "a still picture"
-        return [f"{kind}: {quality.moving_share:.0%} of the frames differ from the one before"]
-    found = []
-    if config.people is not None and quality.people > config.people:
-        found.append(f"{quality.people} people in view")
-    if config.cuts is not None and quality.cuts > config.cuts:
-        found.append(f"{quality.cuts} cut{'s' if quality.cuts > 1 else ''}")
-    if config.flat_share is not None and quality.flat_share > config.flat_share:
-        found.append(f"a drawing: {quality.flat_share:.0%} of the body is flat colour")
-    return found
+def _too_much(quality: Quality, config: FilterConfig) -> list[Rejection]:
+    """Return what a clip has more of than it may; one without motion has that reason only."""
+    if config.moving_share is not None and quality.moving_share < config.moving_share:
+        kind: Kind = "slideshow" if quality.cuts else "still_picture"
+        return [Rejection(kind, quality.moving_share, config.moving_share)]
+    measured: tuple[tuple[Kind, float, float | None], ...] = (
+        ("people", quality.people, config.people),
+        ("cuts", quality.cuts, config.cuts),
+        ("drawing", quality.flat_share, config.flat_share),
+    )
+    return [
+        Rejection(kind, value, most)
+        for kind, value, most in measured
+        if most is not None and value > most
+    ]

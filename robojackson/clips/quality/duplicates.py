@@ -12,6 +12,7 @@ from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
 from robojackson.clips.people.person_extent import MIRROR, heights_px, indices
+from robojackson.clips.rejection import Rejection
 from robojackson.motion.landmark_track import LandmarkTrack
 
 DELAY_COST = 0.01
@@ -34,21 +35,23 @@ class DuplicateConfig:
     overlap: float = Field(default=0.6, gt=0, le=1)
 
 
-def find_duplicates(tracks: Mapping[str, LandmarkTrack], config: DuplicateConfig) -> dict[str, str]:
-    """Which clips are copies, each with the reason, which names the clip that is kept.
+def find_duplicates(
+    tracks: Mapping[str, LandmarkTrack], config: DuplicateConfig
+) -> dict[str, Rejection]:
+    """Return the clips that are copies, each with the rejection that names the clip that stays.
 
     Args:
         tracks: By name, the best picture first: of two copies the later one is the copy.
         config: Limits.
     """
-    found: dict[str, str] = {}
+    found: dict[str, Rejection] = {}
     kept: dict[str, Poses] = {}
     for name, track in tracks.items():
         mine = poses(track, config.rate)
         for other, theirs in kept.items():
             same, turned = distance(mine, theirs, config), distance(mirrored(mine), theirs, config)
             if min(same, turned) <= config.distance:
-                found[name] = f"a {'mirrored ' if turned < same else ''}copy of {other}"
+                found[name] = Rejection("mirrored_copy" if turned < same else "copy", other=other)
                 break
         else:
             kept[name] = mine

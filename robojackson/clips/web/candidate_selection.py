@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as configuration
 
+from robojackson.clips.rejection import Rejection
 from robojackson.clips.web.video_candidate import VideoCandidate
 
 
@@ -34,7 +35,7 @@ class Selection:
     """
 
     selected: tuple[VideoCandidate, ...]
-    dropped: tuple[tuple[VideoCandidate, str], ...]
+    dropped: tuple[tuple[VideoCandidate, Rejection], ...]
 
 
 def select(
@@ -57,17 +58,18 @@ def select(
         failed: Keys of videos that could not be had or judged before.
     """
     fit: list[VideoCandidate] = []
-    dropped: list[tuple[VideoCandidate, str]] = []
+    dropped: list[tuple[VideoCandidate, Rejection]] = []
     seen: set[tuple[str, str]] = set()
     for candidate in found:
-        reason = _reason(candidate, seen, known, config)
+        rejection = _rejection(candidate, seen, known, config)
         seen.add(candidate.key)
-        if reason:
-            dropped.append((candidate, reason))
+        if rejection:
+            dropped.append((candidate, rejection))
         else:
             fit.append(candidate)
     ordered = sorted(fit, key=lambda c: (c.key in failed, -_views(c)))
-    spare = [(c, f"not among the {config.top} most watched") for c in ordered[config.top :]]
+    less_watched = Rejection("less_watched", limit=config.top)
+    spare = [(c, less_watched) for c in ordered[config.top :]]
     return Selection(tuple(ordered[: config.top]), (*dropped, *spare))
 
 
@@ -75,17 +77,17 @@ def _views(candidate: VideoCandidate) -> int:
     return -1 if candidate.view_count is None else candidate.view_count
 
 
-def _reason(
+def _rejection(
     candidate: VideoCandidate,
     seen: Collection[tuple[str, str]],
     known: Collection[tuple[str, str]],
     config: SelectionConfig,
-) -> str:
-    """Why a candidate is dropped; empty when it is not."""
+) -> Rejection | None:
+    """Return why a candidate is dropped; None when it is not."""
     if candidate.live:
-        return "a live stream"
+        return Rejection("live")
     if candidate.duration_s is not None and candidate.duration_s >= config.max_duration_s:
-        return f"{candidate.duration_s:g} s long, the limit is {config.max_duration_s:g} s"
+        return Rejection("too_long", candidate.duration_s, config.max_duration_s)
     if candidate.key in seen:
-        return "found twice"
-    return "judged before" if candidate.key in known else ""
+        return Rejection("found_twice")
+    return Rejection("known") if candidate.key in known else None

@@ -14,6 +14,7 @@ from robojackson.body import feet
 from robojackson.body.smoothing import lowpass
 from robojackson.mocap.grounding import contacts, foot_pinning, leg_ik
 from robojackson.mocap.grounding import floor as ground
+from robojackson.mocap.grounding.foot_pinning import FootPinningConfig
 from robojackson.mocap.pose.posed_body import Body
 from robojackson.motion.smpl_sequence import AIR, PLANTED, SLIDING
 
@@ -27,14 +28,12 @@ ABOVE = np.array([0.0, 0.0, 1.0])
 class GroundingConfig:
     """Attributes:
     floor_cutoff_hz: Zero-phase low-pass of the height of the floor under the feet, hertz.
-    contact, lock: Of the feet's states and of what holds them.
+    contact, foot_pinning: Of the feet's states and of what holds them.
     """
 
     floor_cutoff_hz: float = 3.0
     contact: contacts.ContactConfig = Field(default_factory=contacts.ContactConfig)
-    foot_pinning: foot_pinning.FootPinningConfig = Field(
-        default_factory=foot_pinning.FootPinningConfig
-    )
+    foot_pinning: FootPinningConfig = Field(default_factory=FootPinningConfig)
 
 
 @dataclass(frozen=True)
@@ -116,15 +115,17 @@ def _pinned(
     body: Body, planted: np.ndarray, evidence: _Evidence, flying: np.ndarray
 ) -> tuple[Body, Float[np.ndarray, "T 2"]]:
     """One round: standing feet level, the root moved, toes tipped, legs bent; share of level."""
-    fps, lock = evidence.fps, evidence.config.foot_pinning
-    ramp = lock.ramp_s * fps
+    fps, pinning = evidence.fps, evidence.config.foot_pinning
+    ramp = pinning.ramp_s * fps
     flat = feet.stands_flat(body.feet, planted)
     held, share = feet.level_feet(body.pose.points, body.rest, body.feet, flat, ramp)
     body = evidence.dropped(body.aimed(held, share), flying)
-    body = body.shifted(foot_pinning.root_correction(body.feet, planted, evidence.slope, fps, lock))
+    body = body.shifted(
+        foot_pinning.root_correction(body.feet, planted, evidence.slope, fps, pinning)
+    )
     tips = foot_pinning.tip_angles(body.pose.points, body.feet, planted, fps, ramp)
     body = body.aimed(feet.turn_feet(body.pose.points, tips), share)
-    pins = foot_pinning.pin_offsets(body.feet, planted, lock.fade_s * fps)
+    pins = foot_pinning.pin_offsets(body.feet, planted, pinning.fade_s * fps)
     shared = foot_pinning.shared_height(pins, planted)
     settled = lowpass(shared, fps, evidence.config.floor_cutoff_hz)
     body, pins = body.shifted(settled), pins - settled[:, None]

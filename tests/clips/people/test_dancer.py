@@ -117,7 +117,7 @@ def test_the_dancer_is_never_exchanged(crossed: Crossed) -> None:
 def test_an_impossible_number_tells_who_is_there(
     crossed: Crossed, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(dancer, "look_around", lambda *_: crossed.cast)
+    monkeypatch.setattr(dancer, "track_people", lambda *_: crossed.cast)
     with pytest.raises(NoPersonFound, match=r"no person 7 among 2: 1 \(\d+ px tall.*; 2 \("):
         track_dancer(crossed.path, crossed.info, "lite", replace(DancerConfig(), number=7))
 

@@ -9,6 +9,7 @@ from robojackson.clips.people.person_extent import MIRROR, box, full_body, heigh
 from robojackson.clips.quality.cuts import Changes, CutConfig, leaps, together
 from robojackson.clips.quality.drawing import flat_share
 from robojackson.clips.quality.duplicates import DuplicateConfig, find_duplicates
+from robojackson.clips.rejection import Rejection
 from robojackson.motion.landmark_track import LandmarkTrack
 
 NOBODY = np.full((33, 2), np.nan)
@@ -153,7 +154,7 @@ def test_a_mirrored_copy_is_found_whatever_its_size_and_place() -> None:
     turned = dance()[:, list(MIRROR)] * [-1.0, 1.0] + [1.0, 0.0]
     copy = track_of(0.5 * turned + [0.2, 0.1])
     found = find_duplicates({"one": one, "other": other, "copy": copy}, DuplicateConfig())
-    assert found == {"copy": "a mirrored copy of one"}
+    assert found == {"copy": Rejection("mirrored_copy", other="one")}
 
 
 def test_a_copy_that_starts_later_is_found() -> None:
@@ -161,7 +162,7 @@ def test_a_copy_that_starts_later_is_found() -> None:
     found = find_duplicates(
         {"whole": track_of(whole), "end": track_of(whole[30:])}, DuplicateConfig()
     )
-    assert found == {"end": "a copy of whole"}
+    assert found == {"end": Rejection("copy", other="whole")}
 
 
 def test_clips_without_a_person_are_no_copies_of_one_another() -> None:

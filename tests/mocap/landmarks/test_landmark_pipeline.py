@@ -25,7 +25,7 @@ def followed(hip_shake: LandmarkTrack, monkeypatch: pytest.MonkeyPatch) -> list[
                 progress(done, 120)
         return hip_shake
 
-    monkeypatch.setattr(pipeline, "follow", follow)
+    monkeypatch.setattr(pipeline, "track_dancer", follow)
     return asked
 
 

@@ -1,0 +1,55 @@
+"""A format is one file of the package: whatever a module declares is offered and recognised."""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from robojackson import formats
+from robojackson.cli.exporting import names
+from robojackson.formats import registry
+from tests.fixtures.person import person
+
+NEW = """
+from robojackson.formats.format import Importer, PersonExporter
+
+EXPORT = PersonExporter("frames", lambda motion: f"frames {len(motion)}".encode())
+IMPORT = Importer("frames", bytes, lambda file: file.head.startswith(b"frames"), fps=25.0)
+"""
+
+
+@pytest.fixture
+def with_a_new_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """One more module in the package, as a newcomer adds it."""
+    (tmp_path / "frames_format.py").write_text(NEW)
+    monkeypatch.setattr(formats, "__path__", [*formats.__path__, str(tmp_path)])
+    registry._formats.cache_clear()
+    yield
+    registry._formats.cache_clear()
+    sys.modules.pop("robojackson.formats.frames_format", None)
+
+
+def test_a_new_file_is_an_exporter(with_a_new_file: None) -> None:
+    written = registry.person_exporters()["frames"].write(person())
+    assert written == f"frames {len(person())}".encode()
+
+
+def test_a_new_file_is_in_the_help(with_a_new_file: None) -> None:
+    assert any("frames" in line for line in names())
+
+
+def test_a_new_file_recognises_its_own(with_a_new_file: None) -> None:
+    importer = registry.recognise(b"frames 3", "file")
+    assert (importer.name, importer.fps) == ("frames", 25.0)
+
+
+def test_every_exporter_of_persons_is_recognised_by_its_importer() -> None:
+    for name, exporter in registry.person_exporters().items():
+        assert registry.recognise(exporter.write(person()), "file").name == name
+
+
+def test_no_two_modules_declare_the_same_format() -> None:
+    kinds = (registry.robot_exporters, registry.person_exporters, registry.policy_exporters)
+    declared = sum(len(kind()) for kind in (*kinds, registry.importers))
+    assert declared == len(registry._formats())
