@@ -53,17 +53,17 @@ def write_study_page(
     moves: dict[str, Move],
     rows: list[Artifact],
     pictures: dict[str, Artifact],
-    payments: dict[str, Artifact],
+    reward_audits: dict[str, Artifact],
 ) -> dict[str, Artifact]:
     """The files of `report`.
 
     Args:
         rows: Files of the tables of the cells that count (`storage.study_tables.files_of`).
-        pictures, payments: By move, as in `report`; the second as JSON.
+        pictures, reward_audits: By move, as in `report`; the second as JSON.
     """
     store = Store.from_environment()
     shown = {name: store.read(png.key) for name, png in pictures.items()}
-    paid = {name: json.loads(store.read(told.key)) for name, told in payments.items()}
+    paid = {name: json.loads(store.read(told.key)) for name, told in reward_audits.items()}
     return report(study, moves, shown, study_tables.runs_of(rows), paid)
 
 
@@ -72,7 +72,7 @@ def report(
     moves: Mapping[str, Move],
     pictures: Mapping[str, bytes] | None = None,
     runs: Collection[str] | None = None,
-    payments: Mapping[str, study_page.RewardAudits] | None = None,
+    reward_audits: Mapping[str, study_page.RewardAudits] | None = None,
 ) -> dict[str, Artifact]:
     """Write `studies/<name>/` anew: `page`, `table` (CSV), `results` (JSON) and the figures.
 
@@ -80,7 +80,7 @@ def report(
         moves: Of the study, by name.
         pictures: By move, its video frame, recovered body and robot side by side, as PNG.
         runs: Ids of the trainings that count; all that the tables have under its name if absent.
-        payments: By move, what the rewards of the setups pay to bodies that do not dance it.
+        reward_audits: By move, what the rewards of the setups pay to bodies that do not dance it.
     """
     store, rng = Store.from_environment(), np.random.default_rng(0)
     with study_tables.opened(store, study.name, runs) as ask:
@@ -99,7 +99,7 @@ def report(
         claims=claims,
         lines=lines,
         comparisons=compared,
-        reward_audits=payments or {},
+        reward_audits=reward_audits or {},
         moves=[_picture(name, moves[name], png) for name, png in (pictures or {}).items()],
         curves=plots["curves"],
         evaluation_plots=plots["evaluations"],

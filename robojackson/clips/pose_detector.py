@@ -16,7 +16,6 @@ from typing import Any, Literal
 import numpy as np
 from jaxtyping import Float
 
-from robojackson.clips.people.person_detection import best_of
 from robojackson.clips.video import VideoInfo, timed_frames
 from robojackson.errors import MissingDependency, UnknownName
 from robojackson.motion.landmark_track import LANDMARKS, LandmarkTrack, uneven
@@ -139,7 +138,7 @@ def video_landmarker(size: str) -> Iterator[Callable[[np.ndarray, float], np.nda
                 rows = np.ascontiguousarray(image)  # padded rows would be read askew, silently
                 picture = mediapipe.Image(image_format=mediapipe.ImageFormat.SRGB, data=rows)
                 result = landmarker.detect_for_video(picture, last_ms)
-            row = best_of(result)
+            row = first_person(result)
             return np.full((LANDMARKS, 7), np.nan) if row is None else row
 
         yield look
@@ -219,3 +218,14 @@ def _loads(name: str) -> bool:
     except OSError:
         return False
     return True
+
+
+def first_person(result: Any) -> np.ndarray | None:
+    """Return the first person of MediaPipe's answer as (33, 7), None for nobody.
+
+    Columns: image x, y, z; world x, y, z; visibility.
+    """
+    if not result.pose_landmarks:
+        return None
+    pairs = zip(result.pose_landmarks[0], result.pose_world_landmarks[0], strict=True)
+    return np.array([[p.x, p.y, p.z, w.x, w.y, w.z, p.visibility] for p, w in pairs])

@@ -280,11 +280,11 @@ def test_doctor_tells_what_is_there_in_one_object() -> None:
 def test_what_a_library_prints_does_not_stand_beside_the_answer(tmp_path: Path) -> None:
     code = (
         "import os, sys\n"
-        "from flows import console\n"
+        "from robojackson.cli import console\n"
         "@console.command\n"
         "def noisy(as_json=False):\n"
         "    print('chatter'); os.write(1, b'C++ chatter')\n"
-        "    return console.Answer({'x': float('nan')})\n"
+        "    return console.CommandResult({'x': float('nan')})\n"
         "noisy(as_json=True)\n"
     )
     run = [sys.executable, "-c", code]

@@ -208,7 +208,7 @@ def on_workers(
 
 def test_a_cell_that_was_done_before_asks_no_worker(monkeypatch: pytest.MonkeyPatch) -> None:
     pool = Pool()
-    assert on_workers(pool, monkeypatch, selected=True) == {"policy": REFERENCE}
+    assert on_workers(pool, monkeypatch, kept=True) == {"policy": REFERENCE}
     assert pool.names == []
 
 

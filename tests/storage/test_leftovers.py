@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from robojackson.pipeline import local_folder
 from robojackson.pipeline.folder_lock import locked
-from storage import places
 from storage.leftovers import sweep
 from storage.store import Store
 from storage.study_tables import TABLES, Place
@@ -20,13 +20,13 @@ DIES = """
 import os, signal, sys
 from pathlib import Path
 from typing import Any
-from storage import places
+from robojackson.pipeline import local_folder
 from storage.store import Store
 def die(file, source):
     file.write(b"half")
     file.flush()
     os.kill(os.getpid(), signal.SIGKILL)
-places._fill = die
+local_folder._fill = die
 store = Store(sys.argv[1])
 with store.scratch() as folder:
     (folder / "film.mp4").write_bytes(b"frames")
@@ -67,7 +67,7 @@ def test_a_process_killed_while_it_writes_leaves_nothing_for_long(store: Store) 
 
 
 def test_files_and_folders_that_are_held_stay(store: Store) -> None:
-    judging = work(store, "judge-1")
+    judging = work(store, "evaluate-1")
     with store.scratch() as folder, locked(judging, "task.lock"):
         (folder / "film.mp4").write_bytes(b"frames")
         before = files(store)
@@ -76,7 +76,7 @@ def test_files_and_folders_that_are_held_stay(store: Store) -> None:
 
 
 def test_a_judgement_that_nobody_makes_is_taken_away(store: Store) -> None:
-    folder = work(store, "judge-1")
+    folder = work(store, "evaluate-1")
     assert sweep(store) == [folder]
     assert not folder.exists()
 
@@ -108,7 +108,7 @@ def test_a_file_that_is_swept_before_it_is_held_is_begun_anew(
     store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Another process may sweep between the making of a temporary file and its lock."""
-    hold = places.fcntl.flock
+    hold = local_folder.fcntl.flock
     swept: list[Path] = []
 
     def late(file: object, how: int) -> None:
@@ -117,7 +117,7 @@ def test_a_file_that_is_swept_before_it_is_held_is_begun_anew(
             swept.extend(sweep(store))
         hold(file, how)
 
-    monkeypatch.setattr(places.fcntl, "flock", late)
+    monkeypatch.setattr(local_folder.fcntl, "flock", late)
     store.put("mocap/a.bin", b"whole")
     assert (len(swept), files(store)) == (2, ["mocap/a.bin"])
 

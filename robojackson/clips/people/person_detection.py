@@ -15,6 +15,7 @@ from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
 from robojackson.clips.people.person_extent import indices, stature, trunk
+from robojackson.clips.pose_detector import first_person
 
 CHAINS = (
     (19, 15, 13, 11), (20, 16, 14, 12), (23, 25, 27, 29, 31), (24, 26, 28, 30, 32), (27, 31),
@@ -87,15 +88,7 @@ def detect_person(landmarker: Any, image: np.ndarray) -> np.ndarray | None:
 
     rows = np.ascontiguousarray(image)
     picture = mediapipe.Image(image_format=mediapipe.ImageFormat.SRGB, data=rows)
-    return best_of(landmarker.detect(picture))
-
-
-def best_of(result: Any) -> np.ndarray | None:
-    """The first person of MediaPipe's answer as (33, 7); None for nobody."""
-    if not result.pose_landmarks:
-        return None
-    pairs = zip(result.pose_landmarks[0], result.pose_world_landmarks[0], strict=True)
-    return np.array([[p.x, p.y, p.z, w.x, w.y, w.z, p.visibility] for p, w in pairs])
+    return first_person(landmarker.detect(picture))
 
 
 def silhouette(

@@ -18,7 +18,7 @@ import asyncio, sys, typer
 from flows.runtime.environment import prepare
 from robojackson.cli.lifetime.supervisor import guarded
 from storage.store import Store
-from robojackson.cli.console import Answer, command
+from robojackson.cli.console import CommandResult, command
 
 @command
 def start(as_json=False):
@@ -31,7 +31,7 @@ def start(as_json=False):
         print("under way", flush=True)
         await asyncio.sleep(600)
 
-    return Answer(launch(long))
+    return CommandResult(launch(long))
 
 app = typer.Typer()
 app.command()(start)

@@ -25,11 +25,11 @@ class Page:
     async def create(self, progress: float, key: str, description: str) -> UUID:
         if self.away:
             raise ConnectionError("no server")
-        self.told.append((training_progress, description))
+        self.told.append((progress, description))
         return uuid4()
 
     async def update(self, artifact: UUID, progress: float, description: str) -> None:
-        self.told.append((training_progress, description))
+        self.told.append((progress, description))
 
 
 def train(page: Page, work: Path, monkeypatch: pytest.MonkeyPatch) -> str:
