@@ -7,7 +7,7 @@ from typing import Any
 from robojackson.clips.people.dancer import DancerConfig
 from robojackson.clips.people.tracked_people import SCOUT
 from robojackson.clips.pose_detector import detect, model_path
-from robojackson.mocap.landmarks import pipeline
+from robojackson.mocap.landmarks import landmark_pipeline
 from robojackson.pipeline.local_folder import sha256_of_file
 from storage import artifact_tables
 from storage.artifact import Artifact
@@ -26,7 +26,7 @@ def one_at_a_time() -> threading.Lock:
 
 def _models(parameters: Mapping[str, Any]) -> list[str]:
     sizes = [
-        *pipeline.models_of(parameters["size"]),
+        *landmark_pipeline.models_of(parameters["size"]),
         *([SCOUT] if parameters.get("dancer") else []),
     ]
     return [sha256_of_file(model_path(size)) for size in sizes]
@@ -41,7 +41,7 @@ def detect_landmarks(
     with store.local(video) as path, one_at_a_time():
         known = info_of(store, info, path)
         if dancer:
-            track = pipeline.detect_landmarks(path, known, size, dancer)
+            track = landmark_pipeline.detect_landmarks(path, known, size, dancer)
         else:
             track = detect(path, known, size)
     return artifact_tables.save(store, "landmarks", "landmarks.parquet", track)

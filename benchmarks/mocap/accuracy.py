@@ -28,8 +28,8 @@ from robojackson.body.smoothing import lowpass
 from robojackson.clips.pose_detector import ASSETS, detect
 from robojackson.clips.video import VideoLimits, probe
 from robojackson.mocap.landmarks.blazepose import fill_gaps, landmark
+from robojackson.mocap.landmarks.landmark_pipeline import with_camera
 from robojackson.mocap.landmarks.model_fusion import fuse_tracks
-from robojackson.mocap.landmarks.pipeline import with_camera
 from robojackson.mocap.landmarks.refinement import RefineConfig
 from robojackson.mocap.pose.twist import prior
 from robojackson.mocap.recover import MocapConfig, recover_motion

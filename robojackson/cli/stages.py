@@ -42,7 +42,7 @@ def mocap(
     from robojackson.api.hypotheses import hypothesis_files, sample_hypotheses
     from robojackson.api.motion_recovery import motion_recoverer
     from robojackson.clips.video import probe
-    from robojackson.mocap.landmarks.pipeline import detect_landmarks
+    from robojackson.mocap.landmarks.landmark_pipeline import detect_landmarks
     from robojackson.pipeline.pipeline_config import PipelineConfig
 
     began = time.monotonic()

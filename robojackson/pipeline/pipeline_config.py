@@ -7,7 +7,7 @@ from robojackson.clips.people.dancer import DancerConfig
 from robojackson.clips.pose_detector import Size
 from robojackson.clips.quality.stability import StabilityConfig
 from robojackson.clips.video import VideoLimits
-from robojackson.mocap.landmarks.pipeline import Quality
+from robojackson.mocap.landmarks.landmark_pipeline import Quality
 from robojackson.mocap.networks.network_config import NetworkConfig
 from robojackson.mocap.recover import MocapConfig
 from robojackson.report.video.side_by_side import VideoConfig

@@ -18,7 +18,9 @@ PACKAGE = "robojackson"
 ONE_PARSER = threading.Lock()
 """CPython 3.11 counts the depth of its parser wrongly when several threads parse at once."""
 NEVER_CHANGE_A_RESULT = frozenset(("robojackson.errors",))
-"""Modules whose text decides only what a person is told."""
+"""Modules whose text decides only what a person reads."""
+NOT_ON_ALL_PYTHONS = frozenset(("type_params",))
+"""Fields of nodes that came with Python 3.12."""
 
 
 def digest(roots: Iterable[str], package: str = PACKAGE, folder: Path | None = None) -> str:
@@ -99,7 +101,11 @@ def imports_of(path: Path, module: str = "") -> tuple[str, ...]:
 
 
 def bare_tree(source: str) -> str:
-    """The syntax tree of a source without docstrings and version, as text."""
+    """The syntax tree of a source without docstrings and version, as text.
+
+    The text is the same on every Python that we run on, which `ast.dump` is not: fields that are
+    empty are left out, and those that some versions lack.
+    """
     return _bared(ast.parse(source))
 
 
@@ -108,7 +114,29 @@ def _bared(tree: ast.AST) -> str:
         body = getattr(node, "body", None)
         if isinstance(body, list):
             node.body = [s for s in body if not _is_silent(s)]  # type: ignore[attr-defined]
-    return ast.dump(tree)
+    return _text(tree)
+
+
+def _text(value: object) -> str:
+    """Return a node, a list of them or a constant as text; a name in no encoding but ASCII."""
+    if isinstance(value, list):
+        return f"[{', '.join(map(_text, value))}]"
+    if not isinstance(value, ast.AST):
+        return ascii(value)
+    if isinstance(value, ast.JoinedStr):
+        value.values = [each for each in value.values if not _is_empty_text(each)]
+    fields = ((name, getattr(value, name, None)) for name in value._fields)
+    filled = (f"{name}={_text(each)}" for name, each in fields if _counts(name, each))
+    return f"{type(value).__name__}({', '.join(filled)})"
+
+
+def _is_empty_text(value: object) -> bool:
+    """Python 3.12.1 ends a nested format of an f-string with an empty text, others do not."""
+    return isinstance(value, ast.Constant) and value.value == ""
+
+
+def _counts(name: str, value: object) -> bool:
+    return name not in NOT_ON_ALL_PYTHONS and value is not None and value != []
 
 
 def _is_silent(statement: ast.stmt) -> bool:

@@ -1,46 +1,36 @@
 """The rules that hold the house up, read from the imports of every file."""
 
 import ast
+import shutil
+import subprocess
+import sys
 import tomllib
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parents[2]
-MAY_IMPORT = {
-    "robojackson": {"robojackson"},
-    "storage": {"robojackson", "storage"},
-    "configs": {"robojackson", "configs"},
-    "tasks": {"robojackson", "storage", "configs", "tasks"},
-    "flows": {"robojackson", "storage", "configs", "tasks", "flows"},
-}
-LAYERS = tuple(MAY_IMPORT)
-MAY_IMPORT_PREFECT = {"tasks", "flows"}
-WITHOUT_PREFECT = (
-    *("adding", "backups", "bars", "cli", "console", "doctor", "environment", "export", "formats"),
-    *("importing", "interruption", "learning", "look", "network", "options", "orphans", "people"),
-    *("robots", "scoring", "search", "single", "source", "start", "studies", "supervisor"),
-    *("training", "walker"),
+LAYERS = ("robojackson", "storage", "configs", "tasks", "flows")
+FOLDERS = (*LAYERS, "benchmarks", "tools", "tests")
+MOST_FILES = 20
+"""In one folder, `__init__.py` not counted."""
+COMMANDS = (
+    *("flows/cli/commands.py", "flows/cli/search_commands.py", "flows/cli/study_commands.py"),
+    *("flows/cli/backup_commands.py", "robojackson/cli/app.py", "robojackson/cli/options.py"),
+    *("robojackson/cli/format_commands.py", "robojackson/cli/learning_commands.py"),
+    *("robojackson/cli/robot_commands.py",),
 )
-"""Modules of `flows` that the one-stage commands load."""
+"""Modules that define commands."""
 LIGHT = {
-    *(
-        "typer",
-        "robojackson.cli.console",
-        "robojackson.cli.format_commands",
-        "robojackson.cli.learning_commands",
-        "robojackson.cli.options",
-    ),
-    *(
-        "flows.cli.backup_commands",
-        "robojackson.cli.robot_commands",
-        "flows.cli.search_commands",
-        "flows.cli.study_commands",
-        "robojackson.errors",
-    ),
+    *("typer", "typer.core", "robojackson.errors"),
+    *(path.removesuffix(".py").replace("/", ".") for path in COMMANDS),
+    "robojackson.cli.console",
 }
-"""What the command line may import before it knows the command, beside the standard library."""
+"""What they may import before the command is known, beside the standard library."""
+ALIKE = {"__init__", "__main__"}
+"""Names of modules that are the same everywhere."""
 
 
 def files(*folders: str) -> list[Path]:
@@ -60,10 +50,6 @@ def imports(path: Path, only_top: bool = False) -> Iterator[str]:
             yield ".".join(part for part in (start, node.module) if part)
 
 
-def roots(path: Path) -> set[str]:
-    return {name.split(".")[0] for name in imports(path)}
-
-
 def called(path: Path, only_top: bool = False) -> set[str]:
     """Names of the functions that a file calls, or that it calls as it is imported."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
@@ -74,35 +60,90 @@ def called(path: Path, only_top: bool = False) -> set[str]:
     return {*names, *(f.attr for f in calls if isinstance(f, ast.Attribute))}
 
 
+def strings(path: Path) -> Iterator[str]:
+    """Texts in a file, docstrings left out."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    silent = {id(n.value) for n in ast.walk(tree) if isinstance(n, ast.Expr)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and id(node) not in silent:
+            yield from [node.value] if isinstance(node.value, str) else []
+
+
 def relative(path: Path) -> str:
     return path.relative_to(ROOT).as_posix()
 
 
-def test_a_module_imports_only_what_stands_to_its_left() -> None:
-    wrong = []
+def lint_imports(folder: Path) -> subprocess.CompletedProcess[str]:
+    """Check the contracts of pyproject.toml on the packages of a folder."""
+    code = "import sys; sys.path.insert(0, '.'); from importlinter.cli import lint_imports_command"
+    command = [sys.executable, "-c", f"{code}; lint_imports_command(['--no-cache'])"]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+
+
+def test_the_imports_keep_the_order() -> None:
+    done = lint_imports(ROOT)
+    assert done.returncode == 0, done.stdout
+
+
+@pytest.fixture
+def house(tmp_path: Path) -> Path:
+    """A copy of the packages and of their contracts."""
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
     for path in files(*LAYERS):
-        layer = path.relative_to(ROOT).parts[0]
-        ours = {name.split(".")[0] for name in imports(path)} & {*LAYERS, "tests", "tools"}
-        wrong += [f"{relative(path)} imports {name}" for name in ours - MAY_IMPORT[layer]]
-    assert wrong == []
-
-
-def test_only_tasks_and_flows_import_prefect() -> None:
-    others = files(*set(LAYERS) - MAY_IMPORT_PREFECT)
-    assert [relative(path) for path in others if "prefect" in roots(path)] == []
-
-
-@pytest.mark.parametrize("name", WITHOUT_PREFECT)
-def test_what_the_one_stage_commands_load_imports_no_prefect(name: str) -> None:
-    assert not roots(ROOT / "flows" / f"{name}.py") & {"prefect", "tasks"}
+        target = tmp_path / path.relative_to(ROOT)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(path, target)
+    return tmp_path
 
 
 @pytest.mark.parametrize(
-    "name", ["cli", "formats", "learning", "options", "robots", "search", "studies"]
+    ("path", "line", "broken"),
+    [
+        ("robojackson/motion/certificate.py", "import robojackson.rl.policy", "inside the library"),
+        ("robojackson/formats/bvh.py", "import robojackson.clips.video", "inside the library"),
+        ("robojackson/cli/doctor.py", "import flows.dance", "flows decide"),
+        ("storage/places.py", "import tasks.study_cell", "flows decide"),
+        ("robojackson/rl/policy.py", "import prefect", "know Prefect"),
+        ("flows/cli/commands.py", "import prefect", "import it only when they run"),
+        ("robojackson/rl/tqc/trainer.py", "import robojackson.rl.tqc.trainers", "no circle"),
+    ],
 )
-def test_the_command_line_imports_lazily(name: str) -> None:
-    found = set(imports(ROOT / "flows" / f"{name}.py", only_top=True))
-    assert found <= LIGHT | {"os", "pathlib", "typing"}
+def test_an_arrow_up_or_a_circle_is_refused(house: Path, path: str, line: str, broken: str) -> None:
+    """Also one that is taken only when a function runs."""
+    with (house / path).open("a") as file:
+        file.write(f"\n\ndef _planted() -> None:\n    {line}\n")
+    done = lint_imports(house)
+    assert done.returncode == 1, done.stdout
+    assert any(broken in row and "BROKEN" in row for row in done.stdout.splitlines())
+
+
+@pytest.mark.parametrize("layer", ["robojackson", "tasks", "storage"])
+def test_no_child_process_hides_an_arrow_up(layer: str) -> None:
+    """Processes are started as `python -m robojackson.cli`; no layer names a module above it."""
+    above = LAYERS[LAYERS.index(layer) + 1 :]
+    hidden = [
+        f"{relative(path)}: {text}"
+        for path in files(layer)
+        for text in strings(path)
+        if text.split(".")[0] in above and "." in text and " " not in text
+    ]
+    assert hidden == []
+
+
+@pytest.mark.parametrize("path", COMMANDS)
+def test_the_command_line_imports_lazily(path: str) -> None:
+    heavy = set(imports(ROOT / path, only_top=True)) - LIGHT
+    assert {name for name in heavy if name.split(".")[0] not in sys.stdlib_module_names} == set()
+
+
+def test_modules_have_different_names() -> None:
+    names = Counter(path.stem for path in files(*LAYERS) if path.stem not in ALIKE)
+    assert [name for name, count in names.items() if count > 1] == []
+
+
+def test_no_folder_is_a_heap() -> None:
+    heaps = Counter(relative(p.parent) for p in files(*FOLDERS) if p.stem != "__init__")
+    assert {folder: count for folder, count in heaps.items() if count > MOST_FILES} == {}
 
 
 def test_the_project_lists_all_its_packages_by_name() -> None:

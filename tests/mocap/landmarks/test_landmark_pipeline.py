@@ -7,7 +7,7 @@ import pytest
 
 from robojackson.clips.people.dancer import DancerConfig
 from robojackson.clips.video import VideoLimits, probe
-from robojackson.mocap.landmarks import pipeline
+from robojackson.mocap.landmarks import landmark_pipeline
 from robojackson.motion.landmark_track import LandmarkTrack
 
 CLIP = Path(__file__).parents[3] / "clips" / "hip_shake.mp4"
@@ -25,13 +25,13 @@ def followed(hip_shake: LandmarkTrack, monkeypatch: pytest.MonkeyPatch) -> list[
                 progress(done, 120)
         return hip_shake
 
-    monkeypatch.setattr(pipeline, "track_dancer", follow)
+    monkeypatch.setattr(landmark_pipeline, "track_dancer", follow)
     return asked
 
 
 def look(quality: str, progress=None) -> LandmarkTrack:
     info = probe(CLIP, VideoLimits())
-    return pipeline.detect_landmarks(CLIP, info, quality, DancerConfig(), progress)
+    return landmark_pipeline.detect_landmarks(CLIP, info, quality, DancerConfig(), progress)
 
 
 def test_best_asks_both_larger_models_and_they_vote(

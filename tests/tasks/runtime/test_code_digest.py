@@ -1,10 +1,14 @@
 """The digest of a stage follows its imports and sees formulas, not words."""
 
+import hashlib
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
-from tasks.runtime.code_digest import digest, imports_of, reached
+from tasks.runtime.code_digest import bare_tree, digest, imports_of, reached
 
 MODULES = {
     "__init__.py": '"""A package."""\n__version__ = "1"\n',
@@ -87,3 +91,65 @@ def test_a_module_that_moved_changes_the_digest(science: Path) -> None:
 
 def test_a_from_import_names_the_module_and_what_may_be_one(science: Path) -> None:
     assert set(imports_of(science / "late.py")) == {"science", "science.inner"}
+
+
+ROOT = Path(__file__).parents[3]
+SAMPLE = """
+import math as m, os.path
+from . import inner
+class Circle(Shape, metaclass=Meta):
+    radius: float = 1.0
+    async def area(self, /, scale: float = 2e-3, *, unit="µm", **more) -> float:
+        return await self.times(m.pi * self.radius**2, f"{scale!r:>{len(unit)}} {unit}" "tail")
+try:
+    rows = [row for row in table if row] + [*{}, ...]
+except* (OSError, ValueError) as error:
+    raise RuntimeError(b"\\x00") from error
+match rows:
+    case {"a": [first, *_], **rest} if rest: print(first, lambda x=1j: -x)
+    case _: pass
+"""
+SAMPLE_SHA256 = "29a0f2b6d98b1c7a515eaf7b755e1b02d080a10f84383276ecf0239dc3eba85c"
+"""Of the sample's bare tree: the same on every Python."""
+CODE = """
+import hashlib, sys
+from pathlib import Path
+from tasks.runtime.code_digest import bare_tree
+total = hashlib.sha256()
+for path in sorted(Path("robojackson").rglob("*.py")):
+    total.update(bare_tree(path.read_text(encoding="utf-8")).encode())
+print(total.hexdigest())
+"""
+"""The bare trees of the whole library, with nothing but the standard library at hand."""
+
+
+def pythons() -> list[str]:
+    """Every interpreter of a supported version that is installed beside ours."""
+    named = [found for minor in (11, 12, 13) if (found := shutil.which(f"python3.{minor}"))]
+    kept = sorted((Path.home() / ".pyenv" / "versions").glob("3.1[123].*/bin/python"))
+    return [name for name in (*named, *map(str, kept)) if _runs(name)]
+
+
+def _runs(python: str) -> bool:
+    return subprocess.run([python, "-c", ""], capture_output=True, check=False).returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("one", "other"), [('f("")', "f()"), ("[None]", "[]"), ("f'{x:{w}} '", "f'{x:{w}}'")]
+)
+def test_what_is_empty_counts_where_it_means_something(one: str, other: str) -> None:
+    assert bare_tree(one) != bare_tree(other)
+
+
+def test_the_text_of_a_tree_does_not_depend_on_the_python() -> None:
+    assert hashlib.sha256(bare_tree(SAMPLE).encode()).hexdigest() == SAMPLE_SHA256
+
+
+@pytest.mark.parametrize("python", [sys.executable, *pythons()])
+def test_the_library_has_one_digest_on_all_pythons(python: str) -> None:
+    """The tree of a file is the same text, or a worker with another Python would train again."""
+    done = [
+        subprocess.run([each, "-c", CODE], cwd=ROOT, capture_output=True, text=True, check=True)
+        for each in (sys.executable, python)
+    ]
+    assert done[0].stdout == done[1].stdout
