@@ -11,7 +11,7 @@
 #   make bench-orchestration  what Prefect costs around the work (PostgreSQL and a server are started)
 #   make chaos    20 studies whose processes, services, disk and wires are cut at random moments
 #   make deploy   pools, deployments and automations on the server of PREFECT_API_URL
-#   make lint     ruff and mypy
+#   make lint     ruff, mypy and the order of imports (docs/architecture.md)
 #   make doctor   what is installed and what is missing
 #   make clean    remove the environment and all caches; the store stays
 #
@@ -63,6 +63,7 @@ lint: setup
 	@$(PY) -m ruff check .
 	@$(PY) -m ruff format --check .
 	@$(PY) -m mypy
+	@.venv/bin/lint-imports --no-cache
 
 doctor: setup
 	@.venv/bin/robojackson doctor $(ARGS)

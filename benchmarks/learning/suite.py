@@ -2,10 +2,10 @@
 
     python -m benchmarks.learning.suite PART ... [--folder FOLDER]
 
-`speed`, `threads`: our parts beside their peers (`learning_speed`). `policies`: one row a move
-and a seed, trained for the row's CPU minutes and judged on stock physics (`learning_policies`).
-`survival`, `pretraining`: races (`learning_races`). `checkpoints`: what they cost a training
-(`learning_checkpoint`). `table` only prints what there is. What exists is not computed again, so
+`speed`, `threads`: our parts beside their peers (`speed`). `policies`: one row a move
+and a seed, trained for the row's CPU minutes and judged on stock physics (`policies`).
+`survival`, `pretraining`: races (`races`). `checkpoints`: what they cost a training
+(`checkpoint_cost`). `table` only prints what there is. What exists is not computed again, so
 that all of it may take several sittings. The authors' clips are measured where ROBOJACKSON_PAPER
 names their folder.
 """

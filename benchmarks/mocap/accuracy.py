@@ -143,7 +143,7 @@ def motion_figures(track: LandmarkTrack, config: MocapConfig, truth: Truth) -> f
 
 
 def solve_fps() -> float:
-    """Frames a CPU second of `hybrik.solve` in batches of 300."""
+    """Frames a CPU second of `analytic_solve.solve` in batches of 300."""
     rng = np.random.default_rng(0)
     points: Float[np.ndarray, "T 29 3"] = REST_JOINTS + rng.normal(
         scale=0.05, size=(SOLVE_FRAMES, 29, 3)

@@ -15,7 +15,7 @@ FEASIBILITY = "feasibility.png"
 def draw_retargeting(
     smpl: Path, out: Path, config: str, overrides: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Draw what `single.retarget` wrote into a folder, beside the person it was made from.
+    """Draw what `stages.retarget` wrote into a folder, beside the person it was made from.
 
     Raises:
         MissingDependency: no way to draw without a screen.

@@ -48,8 +48,8 @@ def heading_score(
     """`velocity_score` with each motion seen along its own heading: a slow turn costs nothing.
 
     Args:
-        points, truth: World positions, metres; unlike `rollout.heading_frame` the path counts.
-        root, true_root: Root quaternions wxyz.
+        points, truth: World positions, metres; unlike `rollout_score.heading_frame` the path
+        counts. root, true_root: Root quaternions wxyz.
     """
     return moving_score(_along(points, root), _along(truth, true_root))
 

@@ -166,7 +166,7 @@ def test_the_server_writes_no_traceback(documented: Documented) -> None:
 
 
 def test_the_log_names_the_cell_that_a_line_is_about(documented: Documented) -> None:
-    assert "Task run 'train-scratch-walk-s0'" in documented.log.read_text()
+    assert "Task run 'train_policy-scratch-walk-s0'" in documented.log.read_text()
 
 
 def test_the_command_line_reads_what_workers_have_computed(documented: Documented) -> None:

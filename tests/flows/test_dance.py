@@ -40,8 +40,9 @@ FILES = {
     "dance.mp4",
     "index.html",
 }
-ONCE = {"probe": 1, "stability": 1, "landmarks": 2, "mocap": 1, "retarget": 1, "train": 1}
-ONCE |= {"evaluate": 1, "video": 1, "snapshot": 1, "page": 1}
+ONCE = {"probe_video": 1, "score_stability": 1, "detect_landmarks": 2, "recover_motion": 1}
+ONCE |= {"retarget_motion": 1, "train_policy": 1, "evaluate_dance": 1, "render_video": 1}
+ONCE |= {"draw_snapshot": 1, "write_page": 1}
 
 
 class Passes:
@@ -106,7 +107,7 @@ def test_a_deleted_table_runs_its_stage_alone_when_it_comes_back_the_same(passes
     for path in passes.store.glob("retarget/*/reference.parquet"):
         path.unlink()
     passes.run()
-    assert passes.executed() == {"retarget": 1}
+    assert passes.executed() == {"retarget_motion": 1}
 
 
 @pytest.mark.slow
@@ -115,14 +116,14 @@ def test_an_altered_video_in_the_folder_is_put_back(passes: Passes) -> None:
     before = film.read_bytes()
     film.write_bytes(before[:-1])
     passes.run()
-    assert (passes.executed(), film.read_bytes()) == ({"page": 1}, before)
+    assert (passes.executed(), film.read_bytes()) == ({"write_page": 1}, before)
 
 
 @pytest.mark.slow
 def test_a_renamed_copy_of_the_clip_trains_nothing(passes: Passes) -> None:
     (passes.source / "hips.mp4").rename(passes.source / "sway.mp4")
     told = passes.run()
-    assert passes.executed() == {"page": 1}
+    assert passes.executed() == {"write_page": 1}
     shown = Path(told["page"]).read_text()
     assert ("sway.mp4" in shown, "hips.mp4" in shown) == (True, False)
 

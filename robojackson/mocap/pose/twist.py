@@ -79,7 +79,7 @@ def level_cues(found: Mapping[str, Cue], level: Float[np.ndarray, "T 2"]) -> dic
 
 
 def rule(found: Mapping[str, Cue], rest_joints: Float[np.ndarray, "29 3"]) -> TwistRule:
-    """The twist rule of `hybrik.solve_with` that follows the cues."""
+    """The twist rule of `analytic_solve.solve_with` that follows the cues."""
 
     def decide(joint: int, swung: np.ndarray) -> np.ndarray:
         name = JOINT_NAMES[joint]

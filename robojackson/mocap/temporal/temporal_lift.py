@@ -78,7 +78,7 @@ def lift(
     """The landmarks with the body corrected; face, hands and feet follow what they hang on.
 
     Args:
-        placed: Landmarks before the camera (`camera.place`), metres.
+        placed: Landmarks before the camera (`pinhole_camera.place`), metres.
         local: The detector's own, metres.
         visibility: 0..1.
         fps: Frames a second.

@@ -1,7 +1,7 @@
 """The dynamics term of the cost: what neither soles nor motors can give costs its square.
 
-The value of `wrench.relaxed` at F(q_t, v_t, a_t) - G(q_t) p_t: pushes and torques follow every
-change of the motion. F by finite differences of MuJoCo's inverse dynamics, with v and a the
+The value of `contact_wrench.relaxed` at F(q_t, v_t, a_t) - G(q_t) p_t: pushes and torques follow
+every change of the motion. F by finite differences of MuJoCo's inverse dynamics, with v and a the
 differences of three steps. Cauchy's loss: a step that no repair can save must not bend the motion.
 """
 

@@ -86,7 +86,8 @@ class PaperConfig:
         repeats: Control steps for which an action is held.
         seconds: A cyclic clip is danced for that long, and no other for longer, s.
         observe: Humanoid-v5's 348 numbers (`stock`), or only the first 45 of them, positions and
-            velocities (`joints`), which learn faster; `networks.widened` makes up for the rest.
+            velocities (`joints`), which learn faster; `network_arrays.widened` makes up for the
+            rest.
         reset_noise: Uniform noise on the state of the stock reset, m, rad, m/s, rad/s.
         threads: Threads that step the simulations.
     """

@@ -1,6 +1,6 @@
 """What differs between the two ways of learning a motion, `track` and `paper`.
 
-The environment is one class, `tracking.TrackingCore`; a mode tells it how an action becomes a
+The environment is one class, `tracking_core.TrackingCore`; a mode tells it how an action becomes a
 command, what the policy sees, what a step is worth and how an episode begins.
 """
 

@@ -2,7 +2,7 @@
 
 Action: residual joint angles in actuator order, -1..1, times `Simulation.residual` radians, added
 to the reference's next hinge angles and followed by the PD law of `Simulation`. Observation:
-`observation.observe`. Reward: `rewards.reward_terms`. Episodes start as `starts` says.
+`observation.observe`. Reward: `rewards.reward_terms`. Episodes start as `reset_states` says.
 """
 
 from typing import Any

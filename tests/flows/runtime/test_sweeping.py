@@ -28,7 +28,7 @@ def test_a_flow_takes_away_what_killed_ones_left_and_no_work_of_cells(
 ) -> None:
     """The flows are refused for their input right after they have begun."""
     store = Store(store_folder)
-    work = store.work("judge-1") / "evaluate.yaml"
+    work = store.work("evaluate-1") / "evaluate.yaml"
     for path in (work, store_folder / ".part-1", store.work("scratch/dead") / ".held"):
         path.write_bytes(b"half")
     with pytest.raises(RoboJacksonError):
