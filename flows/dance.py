@@ -70,5 +70,5 @@ async def dance(
     async with videos_of(source, search) as paths:
         done = await make_dance(store, paths, settings, start_s, end_s)
     answer = done.answer
-    await show_dance(store, answer["move"], answer["evaluation"], done.made)
+    await show_dance(store, answer["move"], answer["evaluation"], done.artifacts)
     return answer

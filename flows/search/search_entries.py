@@ -27,7 +27,7 @@ class Entry:
         decision: chosen, accepted, rejected or failed.
         reason: Why not; empty for those that may be danced.
         video: Its file, scored; None when it could not be had.
-        made: What the judge made of it.
+        artifacts: What the judge made of it.
         score, quality: The figures; None when it could not be judged.
     """
 
@@ -35,7 +35,7 @@ class Entry:
     decision: str = "failed"
     reason: str = ""
     video: Artifact | None = None
-    made: dict[str, Artifact] | None = None
+    artifacts: dict[str, Artifact] | None = None
     score: Stability | None = None
     quality: Quality | None = None
 

@@ -95,7 +95,7 @@ def assess_candidates(
         entries.append(
             Entry(candidate, reason=made, video=video)
             if is_failed
-            else _with_figures(Entry(candidate, video=video, made=made))
+            else _with_figures(Entry(candidate, video=video, artifacts=made))
         )
     return entries
 
@@ -164,9 +164,9 @@ def _or_reason(result: Any) -> Any:
 
 def _with_figures(entry: Entry) -> Entry:
     store = Store.from_environment()
-    assert entry.made
-    score = artifact_tables.read(Stability, store, entry.made["stability"])
-    return replace(entry, score=score, quality=_quality(store, entry.made["quality"]))
+    assert entry.artifacts
+    score = artifact_tables.read(Stability, store, entry.artifacts["stability"])
+    return replace(entry, score=score, quality=_quality(store, entry.artifacts["quality"]))
 
 
 def _quality(store: Store, artifact: Artifact) -> Quality:
@@ -182,7 +182,7 @@ def _copied(fit: dict[str, Entry], settings: FindConfig) -> dict[str, Rejection]
     tracks = {
         name: artifact_tables.read(LandmarkTrack, store, made["landmarks"])
         for name in largest
-        if (made := fit[name].made)
+        if (made := fit[name].artifacts)
     }
     found = find_duplicates(tracks, settings.filters.copies)
     return {name: replace(copy, other=_title(fit[copy.other])) for name, copy in found.items()}

@@ -42,13 +42,13 @@ class RunWatcher:
             return run
         ended = self._waiting[run.id] = asyncio.get_running_loop().create_future()
         if self._asking is None or self._asking.done():
-            self._asking = asyncio.create_task(self._ask())
+            self._asking = asyncio.create_task(self._poll())
         try:
             return await ended
         finally:
             del self._waiting[run.id]
 
-    async def _ask(self) -> None:
+    async def _poll(self) -> None:
         """Ask until nobody waits; a server that is away for a while is asked again."""
         answered = time.monotonic()
         while self._waiting:

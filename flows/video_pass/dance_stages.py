@@ -63,11 +63,11 @@ class DanceResult:
 
     Attributes:
         answer: What the command says.
-        made: What the stages left, by name.
+        artifacts: What the stages left, by name.
     """
 
     answer: Facts
-    made: Artifacts
+    artifacts: Artifacts
 
 
 async def make_dance(

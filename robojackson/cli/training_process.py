@@ -90,7 +90,9 @@ def train(
             if asked:
                 tell(format_reward_audit(asked))
             told_of = partial(_report_progress, out=out, tell=tell)
-            hooks = Hooks(told_of, rows.add, stop.learnt, rows.save, stop, setup=common["setup"])
+            hooks = Hooks(
+                told_of, rows.add, stop.mark_unsaved, rows.save, stop, setup=common["setup"]
+            )
             result = train_policy(motion, robot, config, out, hooks)
         except KeyboardInterrupt:
             there = newest_checkpoint(out)
@@ -182,7 +184,7 @@ class _StopRequest:
             for number, handler in before:
                 signal.signal(number, handler)
 
-    def learnt(self) -> None:
+    def mark_unsaved(self) -> None:
         """Set the flag; a training that is already to stop does not delay its end by what it has
         only just begun to learn."""
         if not self._received:

@@ -124,7 +124,7 @@ class Run:
             started = self.trainer.steps() > self._first_step
             if started and now - self._told >= self.config.progress_seconds:
                 self._told = now
-                self._tell()
+                self._report()
             if self._hooks.stop():
                 raise KeyboardInterrupt
         except KeyboardInterrupt:
@@ -246,7 +246,7 @@ class Run:
             "environment": json.loads(json.dumps(asdict(config.environment))),
         }
 
-    def _tell(self) -> None:
+    def _report(self) -> None:
         status = self._status()
         if self._board is not None:
             rewards = {

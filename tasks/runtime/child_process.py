@@ -89,7 +89,7 @@ async def _end(process: Process) -> None:
     short."""
     if process.returncode is not None:
         return
-    _tell(process, signal.SIGTERM)
+    _signal(process, signal.SIGTERM)
     try:
         async with asyncio.timeout(SECONDS_TO_SAVE):
             await process.wait()
@@ -101,11 +101,11 @@ async def _end(process: Process) -> None:
 
 
 async def _kill(process: Process) -> None:
-    _tell(process, signal.SIGKILL)
+    _signal(process, signal.SIGKILL)
     await process.wait()
 
 
-def _tell(process: Process, what: signal.Signals) -> None:
+def _signal(process: Process, what: signal.Signals) -> None:
     with suppress(ProcessLookupError):  # it may have ended a moment ago
         os.killpg(process.pid, what)
 

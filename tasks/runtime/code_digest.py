@@ -34,7 +34,7 @@ def digest(roots: Iterable[str], package: str = PACKAGE, folder: Path | None = N
     wanted = (tuple(roots), package, folder)
     known = _known.get(wanted)
     if known is None or not known.holds():
-        known = _known[wanted] = _made(*wanted)
+        known = _known[wanted] = _digested(*wanted)
     return known.digest
 
 
@@ -51,7 +51,7 @@ def template_digests(task: str, templates: Iterable[str]) -> list[str]:
 
 
 @dataclass(frozen=True)
-class _Made:
+class _Digested:
     """A digest and the versions of the files that it was made of."""
 
     digest: str
@@ -65,10 +65,10 @@ class _Made:
             return False
 
 
-_known: dict[tuple[tuple[str, ...], str, Path | None], _Made] = {}
+_known: dict[tuple[tuple[str, ...], str, Path | None], _Digested] = {}
 
 
-def _made(roots: tuple[str, ...], package: str, folder: Path | None) -> _Made:
+def _digested(roots: tuple[str, ...], package: str, folder: Path | None) -> _Digested:
     base = folder or _folder_of(package)
     total = hashlib.sha256()
     files = []
@@ -76,7 +76,7 @@ def _made(roots: tuple[str, ...], package: str, folder: Path | None) -> _Made:
         files.append(_version(_file_of(name, package, base)))
         if name not in NEVER_CHANGE_A_RESULT:
             total.update(f"{name}\0{_parsed(*files[-1])[0]}\0".encode())
-    return _Made(total.hexdigest(), tuple(files))
+    return _Digested(total.hexdigest(), tuple(files))
 
 
 def reached(roots: Iterable[str], package: str, folder: Path) -> list[str]:

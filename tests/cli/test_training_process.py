@@ -142,7 +142,7 @@ def test_under_a_supervisor_a_second_signal_does_not_cut_a_checkpoint_short(
 def test_what_is_first_learnt_after_the_signal_does_not_delay_the_end(tmp_path: Path) -> None:
     request = training_process._StopRequest(tmp_path)
     request.receive(2, None)
-    request.learnt()
+    request.mark_unsaved()
     assert not request.unsaved.is_set
 
 
@@ -152,7 +152,7 @@ def test_a_checkpoint_is_announced_where_there_is_learning_to_save(
 ) -> None:
     request = training_process._StopRequest(tmp_path)
     if has_learnt:
-        request.learnt()
+        request.mark_unsaved()
     request.receive(2, None)
     request.unsaved.clear()
     assert (f"with a checkpoint in {tmp_path}" in capfd.readouterr().err) == has_learnt

@@ -12,11 +12,11 @@ from scipy.spatial.transform import Rotation
 
 from robojackson.mocap.landmarks.blazepose import BODY, MIRROR, landmark
 from robojackson.mocap.temporal import features
-from robojackson.mocap.temporal.features import FPS, SEEN
+from robojackson.mocap.temporal.features import FPS, INPUT_LANDMARKS
 from tools.temporal.examples import Example
 
-ORDER = [int(index) for index in SEEN]
-SWAP = [ORDER.index(int(MIRROR[index])) for index in SEEN]
+ORDER = [int(index) for index in INPUT_LANDMARKS]
+SWAP = [ORDER.index(int(MIRROR[index])) for index in INPUT_LANDMARKS]
 TWELVE = [ORDER.index(int(index)) for index in BODY]
 LIMBS = [
     [ORDER.index(landmark(f"{side}_{name}")) for name in names]
@@ -98,12 +98,12 @@ def table(examples: Sequence[Example]) -> Batch:
     sights = [e.sight for e in examples]
     good = [np.append(e.good, False)[: LONGEST + 1].astype(np.float32) for e in examples]
     return Batch(
-        flat=stack([s.flat[:, SEEN] for s in sights]),
-        local=stack([s.local[:, SEEN] for s in sights]),
-        visibility=stack([s.visibility[:, SEEN] for s in sights]),
+        flat=stack([s.flat[:, INPUT_LANDMARKS] for s in sights]),
+        local=stack([s.local[:, INPUT_LANDMARKS] for s in sights]),
+        visibility=stack([s.visibility[:, INPUT_LANDMARKS] for s in sights]),
         constant=np.stack([features.constants(s) for s in sights]).astype(np.float32),
         distance=stack([np.linalg.norm(s.root, axis=-1) for s in sights]),
-        truth=stack([np.nan_to_num(e.truth[:, SEEN]) for e in examples]),
+        truth=stack([np.nan_to_num(e.truth[:, INPUT_LANDMARKS]) for e in examples]),
         good=stack(good),
     )
 

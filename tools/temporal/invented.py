@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from robojackson.mocap.temporal.features import SEEN, ClipView
+from robojackson.mocap.temporal.features import INPUT_LANDMARKS, ClipView
 from tools.temporal.batches import SWAP, Batch, windows
 from tools.temporal.examples import Example, Truth, body_size, flattened
 
@@ -42,7 +42,9 @@ class Detector:
         scale = self.sizes[rng.integers(len(self.sizes))] / body_size(points)
         points, distance = points * scale, distance * scale
         count = len(points)
-        mapped = (_row(points[:, SEEN]) @ self.map).reshape(count, len(SEEN), 5)
+        mapped = (_row(points[:, INPUT_LANDMARKS]) @ self.map).reshape(
+            count, len(INPUT_LANDMARKS), 5
+        )
         sight = ClipView(
             flat=np.zeros((count, 33, 2)),
             local=np.zeros((count, 33, 3)),
@@ -50,8 +52,10 @@ class Detector:
             axes=np.tile(np.eye(3), (count, 1, 1)),
             root=np.outer(distance * wrong_focal, [0.0, 0.0, 1.0]),
         )
-        sight.local[:, SEEN] = points[:, SEEN] + mapped[..., :3]
-        sight.flat[:, SEEN] = flattened(points, distance)[:, SEEN] + mapped[..., 3:]
+        sight.local[:, INPUT_LANDMARKS] = points[:, INPUT_LANDMARKS] + mapped[..., :3]
+        sight.flat[:, INPUT_LANDMARKS] = (
+            flattened(points, distance)[:, INPUT_LANDMARKS] + mapped[..., 3:]
+        )
         return Example(sight, points, np.ones(count, bool), distance, "invented")
 
     def disturb(self, batch: Batch, rng: np.random.Generator) -> Batch:

@@ -6,7 +6,7 @@ import numpy as np
 
 from robojackson.mocap.landmarks.blazepose import LANDMARK_NAMES
 from robojackson.mocap.landmarks.pinhole_camera import guess_focal
-from robojackson.mocap.temporal.features import SEEN
+from robojackson.mocap.temporal.features import INPUT_LANDMARKS
 from tools.pairs import people, scenery, sources
 from tools.pairs.clips import choose_motion
 from tools.render import deepmimic
@@ -32,7 +32,7 @@ def make(folders: list[Path], count: int, seed: int) -> list[Truth]:
         posed = person.posed(choose_motion(files, cache, rng)[1])
         view = scenery.film(posed, rng)
         truth, distance = along_rays(view.see(person.landmarks(posed, LANDMARK_NAMES)))
-        if distance.min() < NEAREST_M or not np.isfinite(truth[:, SEEN]).all():
+        if distance.min() < NEAREST_M or not np.isfinite(truth[:, INPUT_LANDMARKS]).all():
             continue
         wrong = guess_focal(view.width, view.height) / view.focal
         made.append((np.nan_to_num(truth).astype(np.float32), distance, wrong))

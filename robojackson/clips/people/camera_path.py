@@ -34,7 +34,7 @@ INLIER = 1.5
 """Pixels of the small picture; a corner further off did not move with the background."""
 AGREED = 0.5
 """Least share of the corners that must move together."""
-KEPT = 0.75
+MATCHED_SHARE = 0.75
 """Pixels of the small picture; a corner nearer to where its link began has kept its place."""
 STANDS, FEWEST_STANDING = 0.4, 6
 """Least share and number of corners that keep their place while the camera stands."""
@@ -200,7 +200,7 @@ class _Chain:
 
 def _still(now: np.ndarray, start: np.ndarray) -> np.ndarray | None:
     """No motion at all, if enough corners have kept their place."""
-    near = np.linalg.norm((now - start)[:, 0], axis=-1) < KEPT
+    near = np.linalg.norm((now - start)[:, 0], axis=-1) < MATCHED_SHARE
     stands = near.sum() >= max(FEWEST_STANDING, STANDS * len(near))
     return np.eye(3) if stands else None
 

@@ -24,17 +24,17 @@ FROM_BEHIND, NO_FACE = 0.8, 0.2
 """Times the visibility of a body that is seen from behind, and of its face."""
 BACK_WIDTH = 0.15
 """Trunk lengths between both shoulders, and hips, in the image of somebody who is turned away."""
-SEEN = 0.3
+VISIBLE = 0.3
 """Weighed visibility of a landmark that was seen."""
 TRUNK_SHARE = 0.3
 """Share of the frames with a person in which hips must be seen: a motion hangs on them."""
-TOLD_SHARE = 0.1
+NOTED_SHARE = 0.1
 PARTS = {
     "legs": ("left_knee", "right_knee", "left_ankle", "right_ankle"),
     "feet": ("left_ankle", "right_ankle"),
     "arms": ("left_elbow", "right_elbow", "left_wrist", "right_wrist"),
 }
-"""What is told when it is not seen in a larger share of the frames than `TOLD_SHARE`."""
+"""What is told when it is not seen in a larger share of the frames than `NOTED_SHARE`."""
 
 
 def weigh_visibility(track: LandmarkTrack) -> LandmarkTrack:
@@ -52,7 +52,7 @@ def weigh_visibility(track: LandmarkTrack) -> LandmarkTrack:
         return honest
     _require_trunk(honest)
     notes = (*track.notes, *unseen(honest))
-    if (share := float(away[track.detected].mean())) > TOLD_SHARE:
+    if (share := float(away[track.detected].mean())) > NOTED_SHARE:
         notes = (*notes, f"seen from behind in {share:.0%} of the frames: less certain")
     return replace(honest, notes=notes)
 
@@ -92,18 +92,18 @@ def unseen(track: LandmarkTrack) -> tuple[str, ...]:
     visibility = track.visibility[track.detected]
     told: list[str] = []
     for part, names in PARTS.items():
-        share = float((visibility[:, indices(names)] < SEEN).all(1).mean())
-        if share > TOLD_SHARE and not (part == "feet" and any("legs" in note for note in told)):
+        share = float((visibility[:, indices(names)] < VISIBLE).all(1).mean())
+        if share > NOTED_SHARE and not (part == "feet" and any("legs" in note for note in told)):
             told.append(f"{part} not seen in {share:.0%} of the frames: invented")
     return tuple(told)
 
 
 def _require_trunk(track: LandmarkTrack) -> None:
     visibility = track.visibility[track.detected]
-    hips = visibility[:, indices(("left_hip", "right_hip"))].max(1) >= SEEN
+    hips = visibility[:, indices(("left_hip", "right_hip"))].max(1) >= VISIBLE
     if hips.mean() >= TRUNK_SHARE:
         return
-    elbows = visibility[:, indices(("left_elbow", "right_elbow"))].max(1) >= SEEN
+    elbows = visibility[:, indices(("left_elbow", "right_elbow"))].max(1) >= VISIBLE
     what = "the upper body is" if elbows.mean() >= TRUNK_SHARE else "the face is"
     raise NoPersonFound(
         f"only {what} seen: the hips are in the picture in {hips.mean():.0%} of the frames, "

@@ -26,7 +26,7 @@ FALL_SHARE = 0.35
 FLIGHT_EDGE_S = 0.15
 """Smoothing hides so much of the beginning and of the end of a free fall, seconds."""
 CAMERA_UP = np.array([0.0, -1.0, 0.0])
-SEEN_SPEED = np.array([1.0, 1.0, 0.4])
+AXIS_WEIGHTS = np.array([1.0, 1.0, 0.4])
 """Of a speed in the camera frame; in depth a single camera sees mostly noise."""
 LEAST_WEIGHT = 1e-4
 ROUNDS = 6
@@ -123,7 +123,7 @@ def _carrying(
     up: np.ndarray, feet: np.ndarray, fps: float, config: GravityConfig
 ) -> Float[np.ndarray, "T 4"]:
     """Weight of each foot point: low and still ones carry."""
-    speed = np.linalg.norm(np.gradient(feet, axis=0) * fps * SEEN_SPEED, axis=-1)
+    speed = np.linalg.norm(np.gradient(feet, axis=0) * fps * AXIS_WEIGHTS, axis=-1)
     height = feet @ up
     above = height - height.min(1, keepdims=True)
     still = np.exp(-((speed / config.support_speed_mps) ** 2))

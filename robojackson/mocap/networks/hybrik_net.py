@@ -69,7 +69,7 @@ class HybrikNet(nn.Module):
         self.register_buffer("init_cam", torch.zeros(camera))
         self.knows_doubt = True
 
-    def look(
+    def run_backbone(
         self, crop: Float[Tensor, "B 3 256 256"]
     ) -> tuple[Float[Tensor, "B 29 64 64 64"], Float[Tensor, "B F"]]:
         """Volumes (depth, height, width) before their softmax, and the heads' input."""
@@ -81,11 +81,11 @@ class HybrikNet(nn.Module):
 
     def forward(self, crop: Float[Tensor, "B 3 256 256"], flip_test: bool = False) -> NetworkOutput:
         """What is seen in crops, or the mean of that and of what is seen in their mirror images."""
-        volume, features = self.look(crop)
+        volume, features = self.run_backbone(crop)
         chance = probability(volume)
         heads = self._heads(features)
         if flip_test:
-            volume, features = self.look(crop.flip(3))
+            volume, features = self.run_backbone(crop.flip(3))
             chance = (chance + probability(flip_volume(volume))) / 2.0
             heads = self._averaged(heads, self._heads(features))
         sigma, twist, betas, scale = heads
@@ -114,7 +114,7 @@ class HybrikHRNet(HybrikNet):
         super().__init__(FEATURES, camera=1)
         self.preact = HRNet()
 
-    def look(
+    def run_backbone(
         self, crop: Float[Tensor, "B 3 256 256"]
     ) -> tuple[Float[Tensor, "B 29 64 64 64"], Float[Tensor, "B 2048"]]:
         """Volumes and features."""
@@ -133,7 +133,7 @@ class HybrikResNet(HybrikNet):
         self.final_layer = nn.Conv2d(DECONVOLUTION, 29 * SIDE, 1)
         self.fc1, self.fc2 = nn.Linear(wide, HIDDEN), nn.Linear(HIDDEN, HIDDEN)
 
-    def look(
+    def run_backbone(
         self, crop: Float[Tensor, "B 3 256 256"]
     ) -> tuple[Float[Tensor, "B 29 64 64 64"], Float[Tensor, "B 1024"]]:
         """Volumes and features."""

@@ -25,13 +25,13 @@ CHAINS: Mapping[str, tuple[str, str]] = {
 WIDTHS = ("hip", "shoulder")
 LONGEST = 95.0
 """Percentile of a bone's length in the image that stands for its true length."""
-SEEN = np.array(
+INPUT_LANDMARKS = np.array(
     [landmark("nose"), landmark("left_ear"), landmark("right_ear"), *BODY]
     + [landmark(f"{s}_{n}") for n in ("index", "pinky", "heel", "foot_index")
        for s in ("left", "right")]
 )  # fmt: skip
 """The landmarks that the network reads."""
-COUNT = len(SEEN) * 6 + 2 * (len(CHAINS) + len(WIDTHS)) + 1
+COUNT = len(INPUT_LANDMARKS) * 6 + 2 * (len(CHAINS) + len(WIDTHS)) + 1
 """Numbers a frame."""
 
 
@@ -80,9 +80,9 @@ def numbers(sight: ClipView) -> Float[np.ndarray, "T F"]:
     count = len(sight.flat)
     return np.concatenate(
         [
-            sight.flat[:, SEEN].reshape(count, -1),
-            sight.local[:, SEEN].reshape(count, -1),
-            sight.visibility[:, SEEN],
+            sight.flat[:, INPUT_LANDMARKS].reshape(count, -1),
+            sight.local[:, INPUT_LANDMARKS].reshape(count, -1),
+            sight.visibility[:, INPUT_LANDMARKS],
             np.tile(constants(sight), (count, 1)),
         ],
         1,

@@ -60,11 +60,11 @@ class Support:
 
     Attributes:
         nearest: The point of their convex hull next to a given point, which itself may be in it.
-        shares: Shares of the contacts in the nearest point of the hull's border, zero in the air.
+        weights: Shares of the contacts in the nearest point of the hull's border, zero in the air.
     """
 
     nearest: Float[np.ndarray, "N 2"]
-    shares: Float[np.ndarray, "N C"]
+    weights: Float[np.ndarray, "N C"]
 
 
 def support(

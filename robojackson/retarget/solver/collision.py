@@ -61,7 +61,7 @@ class Detector:
             self._collide(index, found)
         return found.joined(self.model)
 
-    def look(self, tree: Tree, qpos: Float[np.ndarray, "N nq"]) -> tuple[Posed, Touches]:
+    def detect_posed(self, tree: Tree, qpos: Float[np.ndarray, "N nq"]) -> tuple[Posed, Touches]:
         """The same, with the forward kinematics that it takes anyway (`tree_kinematics.pose`)."""
         data, model, found, count = self.data, self.model, _Found([], [], [], [], []), len(qpos)
         now, sources = data.qpos, (data.xpos, data.xmat, data.xanchor, data.xaxis)

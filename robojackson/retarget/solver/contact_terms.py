@@ -109,7 +109,7 @@ def add_balance(problem: Problem, posed: Posed, out: Normal) -> None:
     feet = posed.ball_pos
     touching = problem.targets.contact != AIR
     found = support(zmp, feet[inner, :, :2], touching[inner])
-    share, away = found.shares, zmp - found.nearest
+    share, away = found.weights, zmp - found.nearest
     settled = _settled(touching, dt, problem.ring)[inner]
     weight = _robust_weight(problem, away, settled, out) * (away != 0).any(axis=1)
     feet_rows = point_jacobian(problem.tree, posed, feet, robot.contact_bodies)[inner, :, :2]

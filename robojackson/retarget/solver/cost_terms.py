@@ -22,7 +22,7 @@ _ROOT_ACCELERATION = np.array([8.0] * 3 + [3.0] * 3)  # m/s2 and rad/s2 beside t
 def linearise(problem: Problem, qpos: Float[np.ndarray, "N nq"]) -> Normal:
     """Cost, gradient and Gauss-Newton blocks at a motion."""
     out = Normal.empty(len(qpos), qpos.shape[1] - 1)
-    posed, touches = problem.detector.look(problem.tree, qpos)
+    posed, touches = problem.detector.detect_posed(problem.tree, qpos)
     velocity = problem.velocity(qpos)
     keypoint_normal(problem, posed, out)
     add_contacts(problem, posed, out)

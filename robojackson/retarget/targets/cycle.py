@@ -25,8 +25,8 @@ from robojackson.retarget.targets.human_clip import HumanClip, at_steps, labels_
 _log = logging.getLogger(__name__)
 _MIN_STEPS = 16
 _LIMBS = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
-_SEEN = [KEYPOINT_NAMES.index(f"{side}_{a}") for a in _LIMBS for side in ("left", "right")]
-_HIPS, _SHOULDERS = _SEEN[:2], _SEEN[6:8]
+_COMPARED = [KEYPOINT_NAMES.index(f"{side}_{a}") for a in _LIMBS for side in ("left", "right")]
+_HIPS, _SHOULDERS = _COMPARED[:2], _COMPARED[6:8]
 _BONE_STARTS = (0, 1, 2, 3, 6, 7, 8, 9)  # hip, knee, shoulder, elbow: the next joint is two on
 _GOOD_SEAM_M = 0.015  # seams below this are as good as each other: the longest cycle wins
 _WHOLE_SEAM_M = 0.05  # a clip that was cut as a loop stays whole up to this seam
@@ -146,7 +146,7 @@ def _features(sequence: SmplSequence) -> tuple[np.ndarray, np.ndarray, np.ndarra
     """Limbs seen from hips and heading, their velocities, the heading; one frame past the end."""
     points = _extended(sequence.keypoints_w)
     yaw = heading(points)
-    limbs = _turned(points[:, _SEEN] - _ground_point(points)[:, None], -yaw)
+    limbs = _turned(points[:, _COMPARED] - _ground_point(points)[:, None], -yaw)
     speed = np.gradient(gaussian_filter1d(limbs, 1.0, axis=0), 1 / sequence.fps, axis=0)
     return limbs, speed, yaw
 

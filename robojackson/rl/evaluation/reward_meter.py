@@ -43,7 +43,7 @@ class RewardMeter:
 
     def __call__(self, moment: Moment) -> Reading:
         """Terms, errors and returns of every robot at one control step."""
-        read = [self._asked(moment, *paper) for paper in self._papers]
+        read = [self._paper_reward(moment, *paper) for paper in self._papers]
         (_, paper), (apart, own) = read[0], read[-1]
         if self._track is not None:
             own = self._tracked(moment, self._track)
@@ -54,7 +54,7 @@ class RewardMeter:
             "return_paper": np.sum(list(paper.values()), 0),
         }
 
-    def _asked(
+    def _paper_reward(
         self, moment: Moment, config: PaperConfig, points: PaperPoints
     ) -> tuple[Miss, Reading]:
         """Distances and terms of a reward of the paper's kind, lambda at its largest."""

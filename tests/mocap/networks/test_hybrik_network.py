@@ -50,7 +50,7 @@ class Painted(HybrikNet):
         self.uvd = uvd
         self.init_cam[:] = 0.9
 
-    def look(self, crop: Tensor) -> tuple[Tensor, Tensor]:
+    def run_backbone(self, crop: Tensor) -> tuple[Tensor, Tensor]:
         mirrored = crop[0, 0, 0, 0] < crop[0, 0, 0, -1]
         uvd = self.uvd
         if mirrored:
@@ -130,7 +130,7 @@ def test_hrnet_loads_strictly_and_looks_at_a_crop() -> None:
     state = {key: _filled(key, value) for key, value in empty.items()}
     network = hybrik_network(Weights(Path("w48.pth"), "hybrik_hrnet48", state, {}))
     with torch.inference_mode():
-        volume, features = network.look(torch.zeros(1, 3, 256, 256))
+        volume, features = network.run_backbone(torch.zeros(1, 3, 256, 256))
     assert volume.shape == (1, 29, 64, 64, 64)
     assert features.shape == (1, 2048)
     assert volume.isfinite().all()

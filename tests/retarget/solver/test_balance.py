@@ -28,7 +28,7 @@ BOTH, LEFT = np.array([[True, True]]), np.array([[True, False]])
 def test_the_nearest_support_is_on_the_line_between_the_feet(point, touching, nearest):
     found = support(np.array([point]), FEET, touching)
     np.testing.assert_allclose(found.nearest[0], nearest, atol=1e-12)
-    shared = np.einsum("nc,nci->ni", found.shares, FEET)[0]
+    shared = np.einsum("nc,nci->ni", found.weights, FEET)[0]
     np.testing.assert_allclose(shared, nearest, atol=1e-12)
 
 
@@ -45,7 +45,7 @@ def test_the_nearest_point_of_four_soles_is_that_of_their_convex_hull(rng):
 
 def test_a_body_in_the_air_has_no_support():
     found = support(np.zeros((1, 2)), FEET, np.array([[False, False]]))
-    np.testing.assert_array_equal(found.shares, 0.0)
+    np.testing.assert_array_equal(found.weights, 0.0)
 
 
 def _distance_mm(motion, robot: Robot) -> float:

@@ -54,7 +54,7 @@ def test_the_memory_of_a_solution_does_not_grow_with_the_clip(robot: Robot, monk
 
 def test_one_look_gives_the_kinematics_and_the_contacts(robot: Robot, poses: np.ndarray):
     shape, detector = tree(robot), Detector(robot, 0.002)
-    posed, touches = detector.look(shape, poses)
+    posed, touches = detector.detect_posed(shape, poses)
     expected = pose(shape, poses)
     for name in ("body_pos", "body_rot", "anchor", "axis", "site_pos", "ball_pos"):
         np.testing.assert_allclose(getattr(posed, name), getattr(expected, name), atol=1e-9)
