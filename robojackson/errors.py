@@ -65,6 +65,20 @@ class BadConfiguration(RoboJacksonError):
     """A YAML key or value that is not allowed; the message has the path of the key."""
 
 
+class ConflictingValues(ValueError):
+    """Values of a configuration that do not go together, each right by itself.
+
+    Raised by the validators of configurations; the loader makes a `BadConfiguration` of it.
+
+    Attributes:
+        keys: Paths of the keys in question, from the section that refuses them.
+    """
+
+    def __init__(self, message: str, *keys: str) -> None:
+        super().__init__(message)
+        self.keys = keys
+
+
 class BadTable(RoboJacksonError):
     """A Parquet file that violates its schema; the message has the column and the file."""
 

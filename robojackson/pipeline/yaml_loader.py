@@ -15,7 +15,7 @@ from typing import Any, TypeVar, get_args, get_type_hints
 import yaml
 from pydantic import TypeAdapter, ValidationError
 
-from robojackson.errors import BadConfiguration, UnknownName
+from robojackson.errors import BadConfiguration, ConflictingValues, UnknownName
 
 Config = TypeVar("Config")
 FOLDER = Path(__file__).parents[2] / "configs"
@@ -50,11 +50,11 @@ def load(
     except ValidationError as cause:
         key = ".".join([*_keys(cause), ""])
         blamed = [g for g in given if key.startswith(f"{g}.") or f"{g}.".startswith(key)]
-        why = _explain(cls, cause)
-        if blamed:  # of several values that do not go together, those that the reason names
-            named = [g for g in blamed if g.removeprefix(key) in why]
+        if blamed:  # of several values that do not go together, those in question
+            in_question = tuple(f"{key}{each}" for each in _conflict(cause))
+            named = [g for g in blamed if g.startswith(in_question)]
             where = f"--set {', '.join(named or blamed)}"
-        raise BadConfiguration(f"{where}: {why}") from cause
+        raise BadConfiguration(f"{where}: {_explain(cls, cause)}") from cause
 
 
 def build(cls: type[Config], values: Mapping[str, Any], where: str) -> Config:
@@ -169,6 +169,12 @@ def _set(values: dict[str, Any], keys: list[str], value: Any) -> None:
         values[key] = dict(inner) if isinstance(inner, dict) else {}
         values = values[key]
     values[keys[-1]] = value
+
+
+def _conflict(cause: ValidationError) -> tuple[str, ...]:
+    """The keys of values that do not go together, from the section that refuses them."""
+    error = cause.errors()[0].get("ctx", {}).get("error")
+    return error.keys if isinstance(error, ConflictingValues) else ()
 
 
 def _explain(cls: type, cause: ValidationError) -> str:

@@ -19,6 +19,9 @@ ONE_PARSER = threading.Lock()
 """CPython 3.11 counts the depth of its parser wrongly when several threads parse at once."""
 NEVER_CHANGE_A_RESULT = frozenset(("robojackson.errors",))
 """Modules whose text decides only what a person reads."""
+NOT_FOLLOWED = frozenset(("robojackson.pipeline",))
+"""Packages that carry values and files and compute nothing; a change of the layout of tables is in
+every key by itself (`stage.layout`)."""
 NOT_ON_ALL_PYTHONS = frozenset(("type_params",))
 """Fields of nodes that came with Python 3.12."""
 
@@ -85,12 +88,16 @@ def reached(roots: Iterable[str], package: str, folder: Path) -> list[str]:
     waiting = list(roots)
     while waiting:
         name = waiting.pop()
-        if name in found or not _is_module(name, package, folder):
+        if name in found or _is_not_followed(name) or not _is_module(name, package, folder):
             continue
         found.add(name)
         waiting.extend(_parents(name))
         waiting.extend(imports_of(_file_of(name, package, folder), name))
     return sorted(found)
+
+
+def _is_not_followed(name: str) -> bool:
+    return any(name == package or name.startswith(f"{package}.") for package in NOT_FOLLOWED)
 
 
 def imports_of(path: Path, module: str = "") -> tuple[str, ...]:

@@ -90,12 +90,16 @@ def steady(track: LandmarkTrack) -> Float[np.ndarray, " T"]:
 def unseen(track: LandmarkTrack) -> tuple[str, ...]:
     """Parts of the body that are not seen, and in how many of the frames with a person."""
     visibility = track.visibility[track.detected]
-    told: list[str] = []
-    for part, names in PARTS.items():
-        share = float((visibility[:, indices(names)] < VISIBLE).all(1).mean())
-        if share > NOTED_SHARE and not (part == "feet" and any("legs" in note for note in told)):
-            told.append(f"{part} not seen in {share:.0%} of the frames: invented")
-    return tuple(told)
+    unseen_share = {
+        part: float((visibility[:, indices(names)] < VISIBLE).all(1).mean())
+        for part, names in PARTS.items()
+    }
+    noted = {part: share for part, share in unseen_share.items() if share > NOTED_SHARE}
+    if "legs" in noted:
+        noted.pop("feet", None)
+    return tuple(
+        f"{part} not seen in {share:.0%} of the frames: invented" for part, share in noted.items()
+    )
 
 
 def _require_trunk(track: LandmarkTrack) -> None:

@@ -11,6 +11,7 @@ from typing import Any, Literal
 from pydantic import ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass
 
+from robojackson.errors import ConflictingValues
 from robojackson.rl.config.presets import with_preset
 
 Curiosity = Literal["off", "formula", "algorithm", "released"]
@@ -123,5 +124,7 @@ class PaperConfig:
     @model_validator(mode="after")
     def _weighed(self) -> "PaperConfig":
         if any(weight < 0 for weight in self.weights.values()) or not any(self.weights.values()):
-            raise ValueError("weights: none may be negative, and one at least must count")
+            raise ConflictingValues(
+                "weights: none may be negative, and one at least must count", "weights"
+            )
         return self

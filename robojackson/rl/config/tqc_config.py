@@ -5,6 +5,7 @@ from typing import Any, Literal
 from pydantic import ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass
 
+from robojackson.errors import ConflictingValues
 from robojackson.rl.config.presets import with_preset
 
 PRESETS: dict[str, dict[str, Any]] = {
@@ -109,15 +110,20 @@ class TqcConfig:
     def _learns(self) -> "TqcConfig":
         """Refuse numbers with which a training runs to its end and has learnt nothing."""
         if self.top_quantiles_to_drop >= self.quantiles:
-            raise ValueError(
+            raise ConflictingValues(
                 f"top_quantiles_to_drop, {self.top_quantiles_to_drop}, must leave some of the "
-                f"{self.quantiles} quantiles"
+                f"{self.quantiles} quantiles",
+                "top_quantiles_to_drop",
+                "quantiles",
             )
         room = max(self.buffer // self.n_envs, 1) * self.n_envs
         if self.warmup > room:
-            raise ValueError(
+            raise ConflictingValues(
                 f"the replay buffer has room for {room} transitions ({self.buffer} on "
                 f"{self.n_envs} simulations), and learning would begin after {self.warmup}: "
-                "raise buffer or lower warmup"
+                "raise buffer or lower warmup",
+                "buffer",
+                "n_envs",
+                "warmup",
             )
         return self

@@ -8,6 +8,7 @@ from pydantic import ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import ArgsKwargs
 
+from robojackson.errors import ConflictingValues
 from robojackson.rl.config.evaluate_config import EvaluateConfig
 from robojackson.rl.config.paper_config import Curiosity, PaperConfig
 from robojackson.rl.config.tqc_config import TqcConfig
@@ -234,15 +235,21 @@ class TrainConfig:
         inner = {"paper": self.paper.curiosity, "track.reward": self.track.reward.curiosity}
         for name, said in inner.items():
             if said not in ("off", self.curiosity):
-                raise ValueError(f"{name}.curiosity: say curiosity={said} instead, for either mode")
+                raise ConflictingValues(
+                    f"{name}.curiosity: say curiosity={said} instead, for either mode",
+                    f"{name}.curiosity",
+                )
         return self
 
     @model_validator(mode="after")
     def _whole_delays(self) -> "TrainConfig":
         updates, delay = self.tqc.updates_per_round, self.tqc.policy_delay
         if self.trainer == "sbx" and updates % delay:
-            raise ValueError(
-                f"tqc.updates_per_round, {updates}, must be a multiple of tqc.policy_delay, {delay}"
+            raise ConflictingValues(
+                f"tqc.updates_per_round, {updates}, must be a multiple of tqc.policy_delay, "
+                f"{delay}",
+                "tqc.updates_per_round",
+                "tqc.policy_delay",
             )
         return self
 

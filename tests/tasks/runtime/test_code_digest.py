@@ -1,6 +1,7 @@
 """The digest of a stage follows its imports and sees formulas, not words."""
 
 import hashlib
+import re
 import shutil
 import subprocess
 import sys
@@ -153,3 +154,25 @@ def test_the_library_has_one_digest_on_all_pythons(python: str) -> None:
         for each in (sys.executable, python)
     ]
     assert done[0].stdout == done[1].stdout
+
+
+@pytest.mark.parametrize("task", ["evaluate_dance", "train_policy", "recover_motion"])
+def test_how_values_are_kept_in_files_is_no_part_of_what_a_stage_computes(task: str) -> None:
+    """The layout of tables is in every key by itself; a lock or an atomic write changes nothing."""
+    roots = imports_of(ROOT / "tasks" / f"{task}.py")
+    modules = reached(roots, "robojackson", ROOT / "robojackson")
+    assert [name for name in modules if name.startswith("robojackson.pipeline")] == []
+    assert "robojackson.clips.quality.stability" not in modules
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "tasks").glob("*.py")), ids=lambda p: p.stem)
+def test_the_modules_that_a_stage_reaches_in_another_process_are_there(path: Path) -> None:
+    """A name that is no module would be passed over: the stage would not see its code change."""
+    text = path.read_text()
+    named = re.findall(r'"(robojackson(?:\.\w+)+)"', text)
+    assert [
+        n
+        for n in named
+        if not (ROOT / (n.replace(".", "/") + ".py")).is_file()
+        and not (ROOT / n.replace(".", "/") / "__init__.py").is_file()
+    ] == []
