@@ -26,10 +26,10 @@ from flows.study.study_plan import training
 from flows.video_pass.motion_stages import to_reference
 from robojackson.errors import RejectedReference, StudyFailed
 from robojackson.pipeline.pipeline_config import PipelineConfig
+from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.pipeline.yaml_loader import load
 from robojackson.retarget.scorecard_gate import check
 from robojackson.rl.config.train_config import TrainConfig
-from robojackson.robot.model import RobotDescription
 from storage import study_tables
 from storage.artifact import Artifact
 from storage.leftovers import sweep
@@ -109,7 +109,7 @@ def motion(
         setups pay to bodies that do not dance it.
     """
     settings = load(PipelineConfig, study.pipeline, move.overrides)
-    robot = load(RobotDescription, f"robots/{study.robot}")
+    robot = describe_robot(study.robot)
     rewards = {setup: train.environment for setup, train in trainings.items()}
     with labelled(name):
         clip = probe_video(SourceFile.at(move.path), settings.video, None, None)

@@ -17,7 +17,7 @@ from pydantic import TypeAdapter
 from flows.runtime.tracebacks import without_tracebacks
 from flows.study.run_watcher import RunWatcher
 from robojackson.errors import TrainingCrashed, TrainingFailed
-from robojackson.pipeline.yaml_loader import load
+from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.robot.model import RobotDescription
 from storage.leftovers import sweep
 from storage.store import Store
@@ -96,7 +96,7 @@ async def with_retries(
 @cache
 def _robot(name: str) -> RobotDescription:
     """Read once for all the cells of a process."""
-    return load(RobotDescription, f"robots/{name}")
+    return describe_robot(name)
 
 
 async def run_locally(wanted: Cell) -> Result:

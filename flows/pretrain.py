@@ -12,9 +12,9 @@ from prefect import flow
 from robojackson.cli.walker_training import PIPELINE, ROBOT
 from robojackson.pipeline.folder_lock import A_MOMENT, locked
 from robojackson.pipeline.pipeline_config import PipelineConfig
+from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.pipeline.yaml_loader import load
 from robojackson.rl.config.train_config import TrainConfig
-from robojackson.robot.model import RobotDescription
 from storage.store import Store
 from tasks.runtime.child_process import run_process
 from tasks.runtime.stage import identity
@@ -61,7 +61,7 @@ async def pretrain(
 def name_of(kind: str, steps: int, seed: int) -> str:
     """What a walker's folder of work is called: all that makes its training what it is."""
     config = load(TrainConfig, f"setups/walker-{kind}", {"steps": steps, "seed": seed})
-    robot = load(RobotDescription, f"robots/{ROBOT}")
+    robot = describe_robot(ROBOT)
     facts = json.dumps(identity([config, robot, load(PipelineConfig, PIPELINE)]), sort_keys=True)
     digest = hashlib.sha256(facts.encode()).hexdigest()[:DIGITS]
     return f"walker-{kind}-{steps}-s{seed}-{digest}"

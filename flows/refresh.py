@@ -32,9 +32,9 @@ from robojackson.clips.web.untrusted_text import clean_text
 from robojackson.clips.web.video_candidate import VideoCandidate
 from robojackson.errors import BadConfiguration, NoPersonFound, RoboJacksonError, SearchFailed
 from robojackson.pipeline.pipeline_config import PipelineConfig
+from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.pipeline.run_names import slug_of
 from robojackson.pipeline.yaml_loader import build, load
-from robojackson.robot.model import RobotDescription
 from storage import candidate_catalogue
 from storage.artifact import Artifact
 from storage.leftovers import sweep
@@ -152,7 +152,7 @@ def motion(store: Store, video: Artifact, settings: PipelineConfig) -> Facts:
     """Mocap and retargeting of a video: what a training starts from."""
     with store.local(video) as path:
         clip = probe_video(SourceFile(path, video.sha256), settings.video, None, None)
-    moved = to_reference(clip, load(RobotDescription, f"robots/{settings.robot}"), settings)
+    moved = to_reference(clip, describe_robot(settings.robot), settings)
     return {
         "video": store.address(clip["video"].key),
         "smpl": store.address(moved["smpl"].key),

@@ -27,12 +27,11 @@ from benchmarks.retarget.motions import lengthened, truth_motion
 from robojackson.cli import importing, stages
 from robojackson.errors import BadConfiguration, MissingDependency
 from robojackson.motion.smpl_sequence import SmplSequence
-from robojackson.pipeline.yaml_loader import load
+from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.retarget.retarget_config import RepairConfig, RetargetConfig
 from robojackson.retarget.retargeting import assemble, retarget_motion
 from robojackson.retarget.targets.cycle import human_clip
 from robojackson.retarget.targets.keypoint_targets import targets
-from robojackson.robot.description import RobotDescription
 from robojackson.robot.model import Robot, load_robot
 
 RESULTS = Path(__file__).parents[1] / "results" / "retarget.json"
@@ -179,7 +178,7 @@ def markdown(rows: list[dict[str, Any]]) -> str:
 def _robots(names: list[str], console: Console) -> Iterator[Robot]:
     for name in names:
         try:
-            yield load_robot(load(RobotDescription, f"robots/{name}"))
+            yield load_robot(describe_robot(name))
         except BadConfiguration as cause:
             console.print(f"left out: {cause}")
 

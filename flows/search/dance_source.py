@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from robojackson.clips.video import SUFFIXES
 from robojackson.errors import RoboJacksonError, UnreadableVideo
+from robojackson.pipeline.robot_descriptions import describe_robot
 
 if TYPE_CHECKING:
     from robojackson.pipeline.pipeline_config import PipelineConfig
@@ -66,10 +67,10 @@ def load_settings(config: str, overrides: Mapping[str, Any]) -> "PipelineConfig"
     from robojackson.pipeline.pipeline_config import PipelineConfig
     from robojackson.pipeline.yaml_loader import load
     from robojackson.rl.modes.paper_mode import require_trainable
-    from robojackson.robot.model import RobotDescription, load_robot
+    from robojackson.robot.model import load_robot
 
     settings = load(PipelineConfig, config, overrides)
-    require_trainable(load_robot(load(RobotDescription, f"robots/{settings.robot}")))
+    require_trainable(load_robot(describe_robot(settings.robot)))
     return settings
 
 

@@ -7,15 +7,13 @@ from typing import Any
 
 from configs.dance_book import Dance, DanceBook
 from configs.find_config import FindConfig
-from robojackson.clips.sources import folder
+from robojackson.clips.sources import folder, is_local
 from robojackson.clips.sources import source as source_of
 from robojackson.clips.web.untrusted_text import clean_text
 from robojackson.pipeline.yaml_loader import build, load
 
 ALL = 10_000
 """Files of a folder are all judged: nobody counted who watched them."""
-LOCAL = (folder.NAME, "urls")
-"""Sources that are read from this machine's disk, so that a mistake can be told at once."""
 
 
 def find_dance(query: str, source: str, address: str, top: int | None, config: FindConfig) -> Dance:
@@ -32,7 +30,7 @@ def find_dance(query: str, source: str, address: str, top: int | None, config: F
     dance = build(Dance, words | {"source": source, "address": address}, "find")
     if source == "youtube":
         dance = replace(load(DanceBook, "dances").find(query), source=source, address=address)
-    if source in LOCAL:
+    if is_local(source):
         search(query, address, 1, config.web, datetime.now(UTC))
     return replace(dance, top=top or (ALL if source == folder.NAME else None))
 

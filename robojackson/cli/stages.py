@@ -22,6 +22,7 @@ from robojackson.errors import (
 )
 from robojackson.pipeline import tables
 from robojackson.pipeline.file_tree import FileTree
+from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.pipeline.run_names import run_name
 from robojackson.pipeline.yaml_loader import load
 
@@ -192,9 +193,9 @@ def robot_of(reference: "ReferenceMotion") -> "Robot":
 
 
 def _robot(name: str) -> "Robot":
-    from robojackson.robot.model import RobotDescription, load_robot
+    from robojackson.robot.model import load_robot
 
-    return load_robot(load(RobotDescription, f"robots/{name}"))
+    return load_robot(describe_robot(name))
 
 
 def read_table(cls: type[Value], path: Path) -> Value:

@@ -17,6 +17,7 @@ from robojackson.cli import stages, training_process
 from robojackson.errors import BadConfiguration
 from robojackson.pipeline import tables
 from robojackson.pipeline.bundled_clips import bundled
+from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.pipeline.yaml_loader import load
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ def pretrain(kind: str, out: Path, reference: Path | None, overrides: Mapping[st
     from robojackson.rl.policy import load_policy
     from robojackson.rl.sim.stock_humanoid import stock_observation_size
     from robojackson.rl.tqc.network_arrays import load_networks, widened
-    from robojackson.robot.model import RobotDescription, load_robot
+    from robojackson.robot.model import load_robot
 
     mode = load(TrainConfig, f"setups/walker-{kind}", overrides).mode
     if mode != kind:
@@ -49,7 +50,7 @@ def pretrain(kind: str, out: Path, reference: Path | None, overrides: Mapping[st
             f"--reference {reference}: the walker of kind 'paper' follows no motion; leave it out, "
             "or take --kind track"
         )
-    robot = load_robot(load(RobotDescription, f"robots/{ROBOT}"))
+    robot = load_robot(describe_robot(ROBOT))
     motion = reference or _reference(kind, out, robot)
     stands = kind == "paper"  # a motion that only stands has no score card
     trained = training_process.train(

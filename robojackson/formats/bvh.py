@@ -20,8 +20,8 @@ from robojackson.body.skeleton import (
     pair,
 )
 from robojackson.errors import BadTable
-from robojackson.formats.bvh_names import keypoints_of
-from robojackson.formats.bvh_tree import WHERE, Node, Tree, parse
+from robojackson.formats.containers.bvh_names import keypoints_of
+from robojackson.formats.containers.bvh_tree import WHERE, Node, Tree, parse
 from robojackson.formats.foreign_motion import (
     Y_UP_TO_WORLD,
     ForeignMotion,

@@ -103,6 +103,6 @@ def test_the_command_loads_no_prefect(said: Said) -> None:
 
 
 def test_the_help_lists_every_format() -> None:
-    listed = set(re.findall(r"[a-z]+", robojackson("export", "--help").out))
+    listed = set(re.findall(r"[\w-]+", robojackson("export", "--help").out))
     declared = {*registry.robot_exporters(), *registry.person_exporters()}
     assert listed >= declared | set(registry.policy_exporters())

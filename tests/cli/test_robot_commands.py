@@ -62,7 +62,7 @@ def describe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
 
     def give(source: RobotSource | None) -> RobotDescription:
         told = replace(machine.description(tmp_path), mjcf="store:machine.xml", source=source)
-        monkeypatch.setattr(robot_models, "load", lambda cls, name: told)
+        monkeypatch.setattr(robot_models, "describe_robot", lambda name: told)
         return told
 
     return give

@@ -9,7 +9,8 @@ import pytest
 
 from robojackson.body.skeleton import JOINT_NAMES, keypoint
 from robojackson.errors import BadTable
-from robojackson.formats import bvh, bvh_tree
+from robojackson.formats import bvh
+from robojackson.formats.containers import bvh_tree
 from robojackson.mocap.imported_motion import ground_foreign_motion
 from tests.fixtures.person import person
 

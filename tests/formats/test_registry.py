@@ -44,9 +44,10 @@ def test_a_new_file_recognises_its_own(with_a_new_file: None) -> None:
     assert (importer.name, importer.fps) == ("frames", 25.0)
 
 
-def test_every_exporter_of_persons_is_recognised_by_its_importer() -> None:
-    for name, exporter in registry.person_exporters().items():
-        assert registry.recognise(exporter.write(person()), "file").name == name
+def test_what_an_exporter_writes_is_recognised_by_the_importer_of_its_name() -> None:
+    for name in registry.person_exporters().keys() & registry.importers().keys():
+        written = registry.person_exporters()[name].write(person())
+        assert registry.recognise(written, "file").name == name
 
 
 def test_no_two_modules_declare_the_same_format() -> None:

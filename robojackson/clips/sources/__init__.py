@@ -1,6 +1,7 @@
 """Where videos are looked for. A new source is one new file beside this one.
 
-The file defines `search`, and its name is the name of the source.
+The file defines `search`, and its name is the name of the source. `IS_LOCAL = True` says that it
+reads this machine's disk, so that a mistake is reported before anything is started.
 """
 
 from datetime import datetime
@@ -46,3 +47,12 @@ def source(name: str) -> Source:
     if name not in names():
         raise UnknownName("source", name, "robojackson/clips/sources", names())
     return cast(Source, import_module(f"{__name__}.{name}"))
+
+
+def is_local(name: str) -> bool:
+    """Return whether a source reads this machine's disk.
+
+    Raises:
+        UnknownName: as `source`.
+    """
+    return bool(getattr(source(name), "IS_LOCAL", False))

@@ -10,6 +10,7 @@ from robojackson.clips.web.yt_dlp_client import WebConfig
 from robojackson.errors import SearchFailed, UnreadableVideo
 
 NAME = "folder"
+IS_LOCAL = True
 
 
 def search(

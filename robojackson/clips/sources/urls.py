@@ -10,6 +10,7 @@ from robojackson.clips.web.yt_dlp_client import WebConfig
 from robojackson.errors import SearchFailed
 
 COMMENT = "#"
+IS_LOCAL = True
 log = logging.getLogger(__name__)
 
 

@@ -1,1 +1,1 @@
-"""Archives and pickles, read without running anything in them."""
+"""Archives, pickles and BVH trees, read without running anything in them."""

@@ -1,7 +1,7 @@
 """Every number of training and evaluation, with its unit. A setup file holds only what differs."""
 
 from collections.abc import Mapping
-from dataclasses import field, replace
+from dataclasses import field, fields, replace
 from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, model_validator
@@ -118,11 +118,16 @@ class RewardConfig:
     narrow: float = Field(default=0.35, gt=0, le=1)
     curiosity: Curiosity = "off"
 
+    @classmethod
+    def terms(cls) -> tuple[str, ...]:
+        """Return the names of the terms: the fields that have a width."""
+        names = tuple(field.name for field in fields(cls))
+        return tuple(name for name in names if f"{name}_width" in names)
+
     @property
     def perfect(self) -> float:
         """What a step earns that equals the reference."""
-        places = self.joints + self.sites + self.hands + self.orientation + self.height + self.drift
-        return places + self.velocity + self.joint_speed + self.limb_speed
+        return sum(getattr(self, name) for name in self.terms())
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -15,7 +15,7 @@ from robojackson.metrics.rollout_score import (
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import EvaluateConfig
 from robojackson.rl.evaluation.rollouts import Rollouts
-from robojackson.rl.modes.track_mode import EXTREMITIES, FEET, PELVIS
+from robojackson.rl.modes.rewards import EXTREMITIES, FEET, PELVIS
 from robojackson.robot.model import Robot
 
 KNEES = ("left_knee", "right_knee")

@@ -15,19 +15,11 @@ from robojackson.geometry.rotations import quat_angle
 from robojackson.rl.config.train_config import RewardConfig, TerminationConfig
 from robojackson.rl.sim.reference_clip import ClipStep
 
-BELLS = (
-    "joints",
-    "sites",
-    "hands",
-    "orientation",
-    "velocity",
-    "joint_speed",
-    "limb_speed",
-    "height",
-    "drift",
-)
-"""Terms of the reward that pay for a small error: of the same name in `TrackingErrors`, and in
-`RewardConfig`, where `NAME_width` is its width."""
+BELLS = RewardConfig.terms()
+"""Terms of the reward that pay for a small error: each has the same name in `TrackingErrors`."""
+PELVIS = "pelvis"
+FEET = ("left_foot", "right_foot")
+EXTREMITIES = ("left_hand", "right_hand", "head")
 
 
 @dataclass(frozen=True)
@@ -43,6 +35,15 @@ class TrackedPoints:
     pelvis: int
     hands: tuple[int, ...]
     limbs: tuple[int, ...]
+
+
+def tracked_points(names: tuple[str, ...]) -> TrackedPoints:
+    """The special ones of a robot's keypoints."""
+    return TrackedPoints(
+        pelvis=names.index(PELVIS),
+        hands=tuple(names.index(name) for name in EXTREMITIES),
+        limbs=tuple(names.index(name) for name in (*FEET, *EXTREMITIES)),
+    )
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,7 @@ from robojackson.rl.modes.rewards import (
     fallen,
     is_off_track,
     reward_terms,
+    tracked_points,
     tracking_errors,
 )
 from robojackson.rl.sim.reference_clip import Clip, ClipStep
@@ -37,9 +38,6 @@ from robojackson.robot.model import Robot
 SETTLED_STATES_NEEDED = 32
 PERFECT_OF_THE_PAPER = 5.0
 """What a perfect step earns by the paper's reward; by ours, `RewardConfig.perfect`."""
-PELVIS = "pelvis"
-FEET = ("left_foot", "right_foot")
-EXTREMITIES = ("left_hand", "right_hand", "head")
 
 
 class TrackMode:
@@ -138,12 +136,3 @@ def evaluate_step(
         beta = BETA[reward.curiosity] * reward.perfect / PERFECT_OF_THE_PAPER
         terms["curiosity"] = beta * np.abs(sim.qvel[:, 6:]).sum(-1)
     return errors, terms
-
-
-def tracked_points(names: tuple[str, ...]) -> TrackedPoints:
-    """The special ones of a robot's keypoints."""
-    return TrackedPoints(
-        pelvis=names.index(PELVIS),
-        hands=tuple(names.index(name) for name in EXTREMITIES),
-        limbs=tuple(names.index(name) for name in (*FEET, *EXTREMITIES)),
-    )

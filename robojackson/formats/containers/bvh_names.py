@@ -13,7 +13,7 @@ from jaxtyping import Float
 from robojackson.body.forward_kinematics import unit
 from robojackson.body.skeleton import KEYPOINT_NAMES, REST_OFFSETS, keypoint
 from robojackson.errors import BadTable
-from robojackson.formats.bvh_tree import WHERE, Tree
+from robojackson.formats.containers.bvh_tree import WHERE, Tree
 from robojackson.formats.foreign_motion import listed
 
 NAMES: Mapping[str, tuple[str, ...]] = {
