@@ -1,1 +1,1 @@
-"""Measurements that anyone can run again: `python -m benchmarks.<name>`."""
+"""Measurements that anyone can run again: `python -m benchmarks.<area>.<name>`."""

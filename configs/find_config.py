@@ -13,7 +13,7 @@ from robojackson.clips.web.yt_dlp_client import WebConfig
 @dataclass(frozen=True, config=ConfigDict(extra="forbid"))
 class FindConfig:
     """Attributes:
-    selection, web, formats, judge, filters: Of the steps, in their order.
+    selection, web, formats, assessment, filters: Of the steps, in their order.
     """
 
     selection: SelectionConfig = Field(default_factory=SelectionConfig)

@@ -105,7 +105,7 @@ def motion(
     Args:
         name: Of the move; its task runs are named after it.
     Returns:
-        `reference` and `scorecard`; `still`, its picture; `payments`, what the rewards of the
+        `reference` and `scorecard`; `still`, its picture; `reward_audits`, what the rewards of the
         setups pay to bodies that do not dance it.
     """
     settings = load(PipelineConfig, study.pipeline, move.overrides)

@@ -9,7 +9,7 @@ from robojackson.clips.web.video_candidate import VideoCandidate
 from robojackson.clips.web.yt_dlp_client import WebConfig
 
 
-@task(name="search", persist_result=False, task_run_name="search-{name}")
+@task(name="search_videos", persist_result=False, task_run_name="search_videos-{name}")
 def search_videos(
     name: str, query: str, address: str, count: int, web: WebConfig
 ) -> tuple[VideoCandidate, ...]:

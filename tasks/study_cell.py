@@ -14,7 +14,7 @@ class Cell:
     Attributes:
         study, move, setup, seed: What its rows are known by.
         reference: The motion.
-        robot, pipeline: Names of configurations.
+        robot: Name of a configuration.
         train, evaluate: Whole configurations.
         timeout_minutes, retries: As in `Study`.
     """

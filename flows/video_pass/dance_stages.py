@@ -47,7 +47,7 @@ class Candidate:
 
     Attributes:
         name: Of the file.
-        clip: Its video and what is known of it, as `probe` left them.
+        clip: Its video and what is known of it, as `probe_video` left them.
         stability, score: Of Algorithm 1, as artifact and as value.
     """
 

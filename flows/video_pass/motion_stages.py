@@ -14,7 +14,7 @@ def to_reference(
     """`landmarks`, `smpl`, `reference` and `scorecard` of a clip; every stage cached.
 
     Args:
-        clip: `video` and `info`, as `probe` left them.
+        clip: `video` and `info`, as `probe_video` left them.
     """
     track = detect_landmarks(clip["video"], clip["info"], settings.detector, settings.dancer)
     if settings.network.hybrik:

@@ -61,7 +61,7 @@ SOLE_BELOW_TOE = 0.01
 def keypoint(name: str) -> int:
     """Index of a keypoint; an unknown name raises `UnknownName` with the known ones."""
     if name not in KEYPOINT_NAMES:
-        raise UnknownName("keypoint", name, "mocap.skeleton", KEYPOINT_NAMES)
+        raise UnknownName("keypoint", name, "body.skeleton", KEYPOINT_NAMES)
     return KEYPOINT_NAMES.index(name)
 
 

@@ -45,7 +45,7 @@ def model_path(size: str) -> Path:
         MissingDependency: the bundle is not here; the message is the command that brings it.
     """
     if size not in SIZES:
-        raise UnknownName("pose model", size, "clips.landmarks", SIZES)
+        raise UnknownName("pose model", size, "clips.pose_detector", SIZES)
     path = ASSETS / f"pose_landmarker_{size}.task"
     if not path.is_file():
         raise MissingDependency(

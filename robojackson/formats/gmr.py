@@ -3,7 +3,8 @@
 A dictionary: fps, root_pos (metres, world), root_rot (xyzw), dof_pos (radians), local_body_pos (of
 the bodies, root at the origin and not turned, metres, float32), link_body_list (their names). 30
 fps. NumPy 1 and 2 call their inner functions differently; what is written asks for `numpy.ndarray`
-and `numpy.dtype` alone, so that TWIST's NumPy 1.23 reads it too. `read` runs nothing (`unpickle`).
+and `numpy.dtype` alone, so that TWIST's NumPy 1.23 reads it too. `read` runs nothing
+(`containers.safe_pickle`).
 """
 
 import io

@@ -1,4 +1,4 @@
-"""Whether a motion dances: the headline figure, which no impostor of `red_team` passes.
+"""Whether a motion dances: the headline figure, which no impostor of `impostors` passes.
 
 Millimetres say little of a dance: on a hip-shake whose joints stray 30 mm from their mean, a robot
 that does it half as large is 15 mm wrong, and a good estimate 20 mm. Velocities tell them apart.

@@ -1,7 +1,6 @@
 """What every table looks like: columns with unit and frame, and what its metadata must hold.
 
-A fixed-width list column is one vector a row. Names and contents are those of the architecture
-page; `Column.frame` says in which axes a vector is written (world: x forward, y left, z up).
+A fixed-width list column is one vector a row; `Column.frame` says in which axes a vector is written (world: x forward, y left, z up).
 """
 
 from collections.abc import Mapping
@@ -20,7 +19,7 @@ class Column:
     """One column.
 
     Attributes:
-        name: As in the architecture page.
+        name: Of the column or table.
         type: Of one number (or text).
         unit: SI symbol, `1` for a ratio, `` for what has none.
         frame: Axes of a vector, `` for a scalar.
@@ -53,7 +52,7 @@ class TableSchema:
     """One table.
 
     Attributes:
-        name: As in the architecture page.
+        name: Of the column or table.
         row: What one row is.
         columns: All fixed columns.
         metadata: Keys that the file's metadata must have (JSON values).

@@ -1,4 +1,4 @@
-"""The score card: how good a reference motion is; `gate` refuses a bad one.
+"""The score card: how good a reference motion is; `scorecard_gate` refuses a bad one.
 
 All figures are measured on the motion as the trainer will get it, at the control step.
 """

@@ -1,6 +1,6 @@
 """The description of a robot that a user edits: `configs/robots/<name>.yaml`.
 
-Names are bound to a MuJoCo model by `robot.load_robot`. Metres, radians, seconds.
+Names are bound to a MuJoCo model by `robot.model.load_robot`. Metres, radians, seconds.
 """
 
 from collections.abc import Mapping

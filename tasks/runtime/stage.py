@@ -60,7 +60,7 @@ def records_only() -> Iterator[None]:
 
 @contextmanager
 def labelled(name: str) -> Iterator[None]:
-    """Name the task runs inside after a dance, a clip or a cell: `train-<name>`."""
+    """Name the task runs inside after a dance, a clip or a cell: `train_policy-<name>`."""
     token = _label.set(name)
     try:
         yield

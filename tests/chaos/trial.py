@@ -26,7 +26,7 @@ STUDY: dict[str, Any] = {
 NEXT = {**STUDY, "name": "next", "seeds": [1]}
 """Other cells, none of them cached: every machine has to do something again."""
 MADE = ("train", "evaluate", "studies", study_tables.FOLDER)
-RECORDS = ("records/train", "records/judge")
+RECORDS = ("records/train_policy", "records/evaluate_policy")
 """What a run makes besides the motions, and the records of its stages."""
 QUIET_S, PATIENCE_S = 4.0, 1800.0
 TRIES = 3

@@ -8,12 +8,12 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.report.video.timeline import reference_qpos, timeline
 
 
-def test_cyclic_reference_starts_again_after_a_lap(reference: ReferenceMotion) -> None:
+def test_cyclic_reference_starts_again_after_a_cycle(reference: ReferenceMotion) -> None:
     when = timeline(reference, 30.0, 12, 2 * len(reference), 1 / reference.dt, 99.0)
     np.testing.assert_array_equal(when.step[27:54], when.step[:27])
 
 
-def test_laps_are_counted(reference: ReferenceMotion) -> None:
+def test_cycles_are_counted(reference: ReferenceMotion) -> None:
     when = timeline(reference, 30.0, 12, 2 * len(reference), 1 / reference.dt, 99.0)
     np.testing.assert_array_equal(when.cycle, np.repeat([0, 1], 27))
 
@@ -44,7 +44,7 @@ def test_video_is_no_longer_than_asked(reference: ReferenceMotion) -> None:
     assert len(timeline(reference, 30.0, 12, 4000, 30.0, 2.0)) == 60
 
 
-def test_reference_moves_on_by_a_lap(reference: ReferenceMotion) -> None:
+def test_reference_moves_on_by_a_cycle(reference: ReferenceMotion) -> None:
     when = timeline(reference, 30.0, 12, 2 * len(reference), 1 / reference.dt, 99.0)
     qpos = reference_qpos(reference, when)
     np.testing.assert_allclose(qpos[27, :3] - qpos[0, :3], reference.cycle_offset)

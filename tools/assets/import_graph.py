@@ -1,6 +1,6 @@
 """The import graph of the packages, drawn from the code (pictures of docs/architecture.md).
 
-    python -m tools.assets.import_graph -o docs/images/imports.png
+    python -m tools.assets.import_graph -o docs/images/imports_after.png
     git worktree add OLD COMMIT && python -m tools.assets.import_graph --root OLD -o before.png
 
 A matrix: a row a package that imports, a column one that is imported, in the order in

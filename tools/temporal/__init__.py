@@ -1,1 +1,1 @@
-"""Training of the temporal network (`python -m tools.temporal`)."""
+"""Training of the temporal network (`python -m tools.temporal.train_temporal`)."""

@@ -1,7 +1,7 @@
 """Examples as tables, and the batches that are drawn from them: windows mirrored, rolled, scaled,
 shifted, shaken, and with whole limbs hidden for 0.2 to 1 s.
 
-Axes: B windows, L frames, N landmarks (`features.SEEN`), N's truth beside what was seen.
+Axes: B windows, L frames, N landmarks (`features.INPUT_LANDMARKS`), N's truth beside what was seen.
 """
 
 from collections.abc import Sequence
@@ -32,7 +32,7 @@ class Batch:
     """Windows, or whole examples.
 
     Attributes:
-        flat, local, visibility: As in `features.Sight`, of the landmarks that are read.
+        flat, local, visibility: As in `features.ClipView`, of the landmarks that are read.
         constant: What the network is told of the clip.
         distance: Of the hips as placed, metres.
         truth: Of the same landmarks, NaN-free, metres.

@@ -61,7 +61,7 @@ def along_rays(truth_c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def flattened(truth: np.ndarray, distance: np.ndarray) -> np.ndarray:
-    """What `Sight.flat` would be without an error."""
+    """What `ClipView.flat` would be without an error."""
     away = distance[:, None, None]
     return truth[..., :2] * away / (away + truth[..., 2:])
 
@@ -94,7 +94,7 @@ def read(path: Path) -> Example | None:
 
 
 def sight_of(track: LandmarkTrack) -> ClipView:
-    """As in `recover`, up to the network."""
+    """As in `recover_motion`, up to the network."""
     config, landmarks = MocapConfig(), repair(track)
     focal = pinhole_camera.guess_focal(track.width, track.height)
     lens = pinhole_camera.Pinhole(focal, track.width, track.height)

@@ -17,8 +17,8 @@ from pathlib import Path
 VARIABLE = "ROBOJACKSON_FLOW"
 FAREWELL = b"all is well"
 HALF_WRITTEN = ".part-"
-"""Beginning of the names of files that are being written: `storage.places.TEMPORARY`, whose import
-is heavy."""
+"""Beginning of the names of files that are being written: `pipeline.local_folder.TEMPORARY`; only
+the standard library is imported here."""
 DIE_WITH_PARENT = 1
 """PR_SET_PDEATHSIG of prctl(2)."""
 KILL_S = 0.5

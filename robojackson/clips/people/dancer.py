@@ -1,9 +1,9 @@
 """The dancer of a clip in which there may be others: one person, the same from first to last frame.
 
 A clip of one is looked at once. Where a few frames show somebody else, everybody is looked for in
-every frame (`crowd`) and told apart (`identity`); then the dancer is followed as if he were alone,
-with all others painted over, because the detector sees best whom it follows. The largest steady
-person is number 1 and danced by default.
+every frame (`person_detection`) and told apart (`identity`); then the dancer is followed as if he
+were alone, with all others painted over, because the detector sees best whom it follows. The
+largest steady person is number 1 and danced by default.
 """
 
 from collections.abc import Callable
@@ -115,7 +115,8 @@ def _followed(
     config: DancerConfig,
     progress: Progress | None,
 ) -> Float[np.ndarray, "T 33 7"]:
-    """Rows of one person, the others painted over; what the crowd knows where that goes astray."""
+    """Rows of one person, the others painted over; what is known of everybody where that goes
+    astray."""
     known = cast.rows[chosen]
     others = np.array([rows for number, rows in enumerate(cast.rows) if number != chosen])
     wanted = near_known(known, cast.time_s, config.longest_gap_s)

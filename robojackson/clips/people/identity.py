@@ -1,9 +1,9 @@
-"""Who is who: the sightings of all frames put together to one track a person.
+"""Who is who: the detections of all frames put together to one track a person.
 
-The ends of the pieces in which nobody can be mistaken are linked to the beginnings of later ones,
-all at once (a path cover of least cost, by the Hungarian method): two who cross are told apart by
-where both were going, by their sizes and by their colours. What was seen of the two as one is left
-out when it is short, and goes to whom it fits best when it is long.
+The ends of the tracklets in which nobody can be mistaken are linked to the beginnings of later
+ones, all at once (a path cover of least cost, by the Hungarian method): two who cross are told
+apart by where both were going, by their sizes and by their colours. What was seen of the two as
+one is left out when it is short, and goes to whom it fits best when it is long.
 """
 
 from collections.abc import Sequence
@@ -19,16 +19,16 @@ from robojackson.clips.people.tracklets import Tracklet, TrackletConfig, find_tr
 
 IMPOSSIBLE = 1e6
 NEAR = 30
-"""Frames at the end of a piece whose median size counts."""
+"""Frames at the end of a tracklet whose median size counts."""
 
 
 @configuration(frozen=True, config=ConfigDict(extra="forbid"))
 class IdentityConfig:
-    """How much may change from one sighting of a person to the next.
+    """How much may change from one detection of a person to the next.
 
     Attributes:
-        tracklets: What a piece is.
-        shortest_tracklet_s: A piece below this is no one, seconds.
+        tracklets: What a tracklet is.
+        shortest_tracklet_s: A tracklet below this is no one, seconds.
         shortest_blend_s: The same for one that may be either of two, seconds.
         memory_s: Of the motion that leads across a gap, seconds.
         foresight_s: A motion is not continued for longer than this, seconds.
@@ -64,15 +64,17 @@ def identify(
     """One track a person, NaN where he is not seen, the largest steady one first.
 
     Args:
-        frames: All sightings of every frame.
+        frames: All detections of every frame.
         time_s: When each frame was taken, seconds.
         size: Width and height of the image, pixels.
     """
     duration_s = float(time_s[-1] - time_s[0]) if len(time_s) else 0.0
     period_s = max(duration_s / max(len(time_s) - 1, 1), 1e-9)
-    pieces = find_tracklets(frames, time_s, size, config.tracklets)
-    clear = [p for p in pieces if not p.blended and _lasts(p, config.shortest_tracklet_s, period_s)]
-    blends = [p for p in pieces if p.blended and _lasts(p, config.shortest_blend_s, period_s)]
+    tracklets = find_tracklets(frames, time_s, size, config.tracklets)
+    clear = [
+        p for p in tracklets if not p.blended and _lasts(p, config.shortest_tracklet_s, period_s)
+    ]
+    blends = [p for p in tracklets if p.blended and _lasts(p, config.shortest_blend_s, period_s)]
     tracks = [_table(c, len(frames)) for c in assign_merged(blends, chains(clear, config), config)]
     shortest_s = max(config.shortest_s, config.least_share * duration_s)
     seen = [track for track in tracks if (~np.isnan(track[:, 0, 0])).sum() * period_s >= shortest_s]
@@ -91,21 +93,21 @@ def by_size(
     return sorted(tracks, key=weight, reverse=True)
 
 
-def _lasts(piece: Tracklet, shortest_s: float, period_s: float) -> bool:
-    return len(piece.frames) * period_s >= min(shortest_s, 10 * period_s)
+def _lasts(tracklet: Tracklet, shortest_s: float, period_s: float) -> bool:
+    return len(tracklet.frames) * period_s >= min(shortest_s, 10 * period_s)
 
 
-def chains(pieces: list[Tracklet], config: IdentityConfig) -> list[list[Tracklet]]:
-    """Pieces in order, one list a person."""
+def chains(tracklets: list[Tracklet], config: IdentityConfig) -> list[list[Tracklet]]:
+    """Tracklets in order, one list a person."""
     from scipy.optimize import linear_sum_assignment
 
-    count = len(pieces)
+    count = len(tracklets)
     if not count:
         return []
     cost = np.full((count, 2 * count), IMPOSSIBLE)
     cost[:, count:] = config.parting
-    for i, before in enumerate(pieces):
-        for j, after in enumerate(pieces):
+    for i, before in enumerate(tracklets):
+        for j, after in enumerate(tracklets):
             if after.frames[0] > before.frames[-1]:
                 cost[i, j] = _link(before, after, config)
     chosen = {int(i): int(j) for i, j in zip(*linear_sum_assignment(cost), strict=True)}
@@ -116,31 +118,32 @@ def chains(pieces: list[Tracklet], config: IdentityConfig) -> list[list[Tracklet
         chain = [first]
         while chain[-1] in follower:
             chain.append(follower[chain[-1]])
-        chains.append([pieces[i] for i in chain])
+        chains.append([tracklets[i] for i in chain])
     return chains
 
 
 def assign_merged(
     blends: list[Tracklet], chains: list[list[Tracklet]], config: IdentityConfig
 ) -> list[list[Tracklet]]:
-    """Each piece of two seen as one to the person whom it fits best and who has no other there."""
+    """Each tracklet of two seen as one to the person whom it fits best and who has no other
+    there."""
     told = [list(chain) for chain in chains]
-    for blend in sorted(blends, key=lambda piece: -len(piece.frames)):
+    for blend in sorted(blends, key=lambda tracklet: -len(tracklet.frames)):
         costs = [_fit(blend, chain, config) for chain in told]
         if costs and min(costs) < IMPOSSIBLE:
             told[int(np.argmin(costs))].append(blend)
     return told
 
 
-def _fit(piece: Tracklet, chain: list[Tracklet], config: IdentityConfig) -> float:
-    """Cost of a piece in a gap of a chain: the mean of the links to both of its neighbours."""
-    first, last = piece.frames[0], piece.frames[-1]
+def _fit(tracklet: Tracklet, chain: list[Tracklet], config: IdentityConfig) -> float:
+    """Cost of a tracklet in a gap of a chain: the mean of the links to both of its neighbours."""
+    first, last = tracklet.frames[0], tracklet.frames[-1]
     if any(p.frames[0] <= last and p.frames[-1] >= first for p in chain):
         return IMPOSSIBLE
     before = [p for p in chain if p.frames[-1] < first]
     after = [p for p in chain if p.frames[0] > last]
-    links = [_link(max(before, key=lambda p: p.frames[-1]), piece, config)] if before else []
-    links += [_link(piece, min(after, key=lambda p: p.frames[0]), config)] if after else []
+    links = [_link(max(before, key=lambda p: p.frames[-1]), tracklet, config)] if before else []
+    links += [_link(tracklet, min(after, key=lambda p: p.frames[0]), config)] if after else []
     return float(np.mean(links)) if links else IMPOSSIBLE
 
 
@@ -160,9 +163,9 @@ def _link(before: Tracklet, after: Tracklet, config: IdentityConfig) -> float:
     return float(moved + grown + colour / config.colour)
 
 
-def _led(piece: Tracklet, gap_s: float, config: IdentityConfig, ends: bool) -> np.ndarray:
-    """Where a piece leads to after its end, or came from before its beginning, pixels."""
-    time_s, place = np.array(piece.time_s), np.array(piece.place)
+def _led(tracklet: Tracklet, gap_s: float, config: IdentityConfig, ends: bool) -> np.ndarray:
+    """Where a tracklet leads to after its end, or came from before its beginning, pixels."""
+    time_s, place = np.array(tracklet.time_s), np.array(tracklet.place)
     edge = -1 if ends else 0
     close = np.abs(time_s - time_s[edge]) <= config.memory_s
     if close.sum() < 2:
@@ -183,6 +186,6 @@ def _mean(colours: list[np.ndarray]) -> np.ndarray:
 
 def _table(chain: list[Tracklet], frames: int) -> Float[np.ndarray, "T 33 7"]:
     table = np.full((frames, 33, 7), np.nan)
-    for piece in chain:
-        table[piece.frames] = piece.rows
+    for tracklet in chain:
+        table[tracklet.frames] = tracklet.rows
     return table

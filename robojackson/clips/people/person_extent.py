@@ -34,7 +34,7 @@ def indices(names: Sequence[str]) -> list[int]:
     """Numbers of landmarks by name."""
     for name in names:
         if name not in POINTS:
-            raise UnknownName("landmark", name, "clips.person", POINTS)
+            raise UnknownName("landmark", name, "clips.people.person_extent", POINTS)
     return [POINTS[name] for name in names]
 
 

@@ -88,7 +88,7 @@ class TrackedPeople:
 def track_people(
     path: Path,
     info: VideoInfo,
-    crowd: PersonDetectionConfig,
+    detection: PersonDetectionConfig,
     identity: IdentityConfig,
     progress: Callable[[int, int], None] | None = None,
 ) -> TrackedPeople:
@@ -96,9 +96,9 @@ def track_people(
     found: list[list[PersonDetection]] = []
     times: list[float] = []
     with still_landmarker(SCOUT) as landmarker:
-        frames = timed_frames(path, short_side=crowd.short_side)
+        frames = timed_frames(path, short_side=detection.short_side)
         for index, (time_s, image) in enumerate(frames):
-            found.append(detect_people(image, landmarker, crowd))
+            found.append(detect_people(image, landmarker, detection))
             times.append(time_s)
             if progress:
                 progress(index + 1, info.frames)

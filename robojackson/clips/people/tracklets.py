@@ -1,8 +1,8 @@
 """Stretches of frames in which one person was followed and nobody could be taken for another.
 
 From one frame to the next, people are matched by the Hungarian method. Where they touch (two claim
-one sighting, one vanishes or appears beside another) the pieces of all of them end; what follows
-beside somebody who vanished may be either of the two, and says so. Pixels and seconds.
+one detection, one vanishes or appears beside another) the tracklets of all of them end; what
+follows beside somebody who vanished may be either of the two, and says so. Pixels and seconds.
 """
 
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ class TrackletConfig:
     step_speed: The same as a speed, body heights a second: what counts at low frame rates.
     growth: Change of size from one frame to the next, ratio, that counts half of such a step.
     crowding: People whose trunks are nearer than this touch, body heights.
-    pause_s: A piece outlives so long a gap, seconds.
+    pause_s: A tracklet outlives so long a gap, seconds.
     """
 
     step: float = Field(default=0.12, gt=0)
@@ -57,7 +57,7 @@ class Tracklet:
     blended: bool = False
 
     def extend(self, other: "Tracklet") -> None:
-        """Go on with a single sighting."""
+        """Go on with a single detection."""
         for name in ("frames", "time_s", "rows", "place", "tall", "colours"):
             getattr(self, name).extend(getattr(other, name))
 
@@ -80,11 +80,11 @@ def find_tracklets(
     """Stretches without doubt, and those of two seen as one."""
     done: list[Tracklet] = []
     alive: list[Tracklet] = []
-    for index, sightings in enumerate(frames):
+    for index, detections in enumerate(frames):
         now = float(time_s[index])
         done += [p for p in alive if now - p.time_s[-1] > config.pause_s + 1e-6]
         alive = [p for p in alive if now - p.time_s[-1] <= config.pause_s + 1e-6]
-        seen = [_tracklet_of(index, now, sighting, size) for sighting in sightings]
+        seen = [_tracklet_of(index, now, detection, size) for detection in detections]
         resumes = _claims(alive, seen, config)
         ended, blended = _touches(alive, seen, resumes, config)
         for old, new in resumes.items():
@@ -108,7 +108,7 @@ def _tracklet_of(index: int, now: float, seen: PersonDetection, size: tuple[int,
 def _claims(
     alive: Sequence[Tracklet], seen: Sequence[Tracklet], config: TrackletConfig
 ) -> dict[int, int]:
-    """Which piece goes on with which sighting, the least change in all."""
+    """Which tracklet goes on with which detection, the least change in all."""
     from scipy.optimize import linear_sum_assignment
 
     if not alive or not seen:
@@ -124,9 +124,9 @@ def _touches(
     resumes: dict[int, int],
     config: TrackletConfig,
 ) -> tuple[set[int], set[int]]:
-    """Pieces that end because people touch, and sightings that may be either of two.
+    """Tracklets that end because people touch, and detections that may be either of two.
 
-    Beside somebody who just vanished a sighting may be his; beside somebody who just appeared both
+    Beside somebody who just vanished a detection may be his; beside somebody who just appeared both
     are seen apart again.
     """
     ended: set[int] = set()
@@ -153,7 +153,7 @@ def _near(one: Tracklet, other: Tracklet, config: TrackletConfig) -> bool:
 
 
 def _step(before: Tracklet, after: Tracklet, config: TrackletConfig) -> float:
-    """How far a sighting is from a piece, 1 is as far as it may be."""
+    """How far a detection is from a tracklet, 1 is as far as it may be."""
     away_s = after.time_s[0] - before.time_s[-1]
     tall = max(before.tall[-1], after.tall[0])
     moved = np.linalg.norm(after.place[0] - before.place[-1]) / tall

@@ -1,7 +1,7 @@
 """Pickles of arrays, read without running anything: plain ones and those of joblib.
 
 A pickle is a program; this reader knows the few words of it that make numbers, text and containers
-(`pickle_words`) and calls none of the functions that a file names. Python's own unpickler in C is
+(`pickle_globals`) and calls none of the functions that a file names. Python's own unpickler in C is
 not used, because a file of 20 bytes can make it fill the memory (a memo index of 2^31).
 """
 

@@ -2,7 +2,7 @@
 
 World frame, metres. First the whole body: the horizontal path of the root that fits the camera's
 track and keeps planted points still, by linear least squares over the clip. Then the legs: what is
-left is taken up by hip and knee (`legs`), as an animator pins a foot.
+left is taken up by hip and knee (`leg_ik`), as an animator pins a foot.
 """
 
 import numpy as np

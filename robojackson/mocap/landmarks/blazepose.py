@@ -35,7 +35,7 @@ SWAP_FPS = 15.0
 def landmark(name: str) -> int:
     """Index of a landmark; an unknown name raises `UnknownName` with the known ones."""
     if name not in LANDMARK_NAMES:
-        raise UnknownName("landmark", name, "mocap.blazepose", LANDMARK_NAMES)
+        raise UnknownName("landmark", name, "mocap.landmarks.blazepose", LANDMARK_NAMES)
     return LANDMARK_NAMES.index(name)
 
 

@@ -31,7 +31,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class ClipPrediction:
-    """What HybrIK's network says of a clip, one row a frame; units of `hybrik_net.Seen`.
+    """What HybrIK's network says of a clip, one row a frame; units of `hybrik_net.NetworkOutput`.
 
     Attributes:
         view: Where the crops are in the image.

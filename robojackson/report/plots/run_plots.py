@@ -1,7 +1,7 @@
 """Plots of one run: training, evaluation, contacts, torques and tracking, as matplotlib figures.
 
 Colours and texts are readable on white and on black: the page shows them on either. Rows are
-dictionaries with the columns of EpisodeRecord and EvaluationRecord (architecture page).
+dictionaries with the columns of EpisodeRecord and EvaluationRecord (`pipeline.table_schemas`).
 """
 
 import io

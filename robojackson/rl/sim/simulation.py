@@ -1,6 +1,6 @@
 """Many copies of one stock robot, stepped in threads, with the law of control outside the model.
 
-Stock physics (architecture page): the model as gymnasium ships it. The torque of the PD law is
+Stock physics: the model as gymnasium ships it. The torque of the PD law is
 computed once a substep from the state at its beginning, clipped to the stock limit and written to
 `ctrl`; a servo inside the model would be evaluated within the stages of RK4, which is another
 robot. The law `torque` does what `Humanoid-v5.step` does, to the bit.

@@ -1,7 +1,8 @@
 """The updates of TQC (Kuznetsov et al., 2020, eq. 10-14) in JAX, laid out for a CPU.
 
 The same numbers as in sbx but for the rounding, with two thirds of its time beside the matrix
-products left out (`quantiles`), faster products (`dense`), and no branch that copies all networks.
+products left out (`quantile_loss`), faster products (`dense_networks`), and no branch that copies
+all networks.
 """
 
 from functools import partial

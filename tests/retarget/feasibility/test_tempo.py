@@ -56,7 +56,7 @@ def test_the_rate_is_smooth():
     assert np.abs(np.diff(_rate(200, 0.5))).max() < 0.5 * DT / 0.1
 
 
-def test_a_warped_lap_still_travels_its_lap(robot: Robot):
+def test_a_warped_cycle_still_travels_its_cycle(robot: Robot):
     aims = _aims(robot)
     steps = warp(np.full(len(aims), 0.7), ring=True)
     slower = warped(aims, steps)

@@ -73,7 +73,7 @@ def test_a_body_that_turns_away_is_not_cyclic():
     assert cycle is None
 
 
-def test_whoever_turns_on_with_every_lap_is_closed_on_request():
+def test_whoever_turns_on_with_every_cycle_is_closed_on_request():
     clip, cycle = human_clip(_swaying(60, 30, yaw=np.pi / 60), 0.015, "yes", 1.0, CONFIG)
     assert cycle is not None
     assert clip.cycle_offset is not None
@@ -92,7 +92,7 @@ def _with_an_arm_that_rises(degrees: float) -> SmplSequence:
 
 
 @pytest.mark.parametrize("degrees", [54.0, 108.0])
-def test_a_limb_that_does_not_come_back_makes_no_lap(degrees: float):
+def test_a_limb_that_does_not_come_back_makes_no_cycle(degrees: float):
     """APT1 and APT2 of the paper: such a jump was once looped and trained on."""
     clip, cycle = human_clip(_with_an_arm_that_rises(degrees), 0.015, "auto", 1.0, STRICT)
     assert (clip.cycle_offset, cycle) == (None, None)
