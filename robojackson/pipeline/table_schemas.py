@@ -1,6 +1,7 @@
 """What every table looks like: columns with unit and frame, and what its metadata must hold.
 
-A fixed-width list column is one vector a row; `Column.frame` says in which axes a vector is written (world: x forward, y left, z up).
+A fixed-width list column is one vector a row; `Column.frame` says in which axes a vector is
+written (world: x forward, y left, z up).
 """
 
 from collections.abc import Mapping
