@@ -3,13 +3,13 @@
 from collections.abc import Sequence
 from typing import Annotated
 
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass
+from pydantic import Field
 
+from robojackson.config import config_dataclass
 from robojackson.errors import BadConfiguration, UnknownName
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass
 class Dance:
     """One dance.
 
@@ -46,7 +46,7 @@ class Dance:
         return " ".join((self.query, *self.added_words))
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass
 class DanceBook:
     """All dances.
 

@@ -1,16 +1,16 @@
 """How a dance is found: what is kept of a search, what is downloaded, how it is judged."""
 
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass
+from pydantic import Field
 
 from robojackson.clips.quality.assessment import AssessmentConfig
 from robojackson.clips.quality.candidate_ranking import FilterConfig
 from robojackson.clips.web.candidate_selection import SelectionConfig
 from robojackson.clips.web.download_formats import FormatConfig
 from robojackson.clips.web.yt_dlp_client import WebConfig
+from robojackson.config import config_dataclass
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass
 class FindConfig:
     """Attributes:
     selection, web, formats, assessment, filters: Of the steps, in their order.

@@ -8,9 +8,10 @@ from dataclasses import field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, ConfigDict, Field, model_validator
-from pydantic.dataclasses import dataclass
+from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
+
+from robojackson.config import config_dataclass
 
 ROOT = Path(__file__).parent.parent
 OF_THE_STUDY = (
@@ -24,7 +25,6 @@ OF_THE_STUDY = (
     "render",
 )
 """Keys of the pipeline's configuration that are no part of a motion."""
-STRICT = ConfigDict(extra="forbid")
 Setup = Literal["scratch", "pretrain", "curiosity", "scratch-curiosity"]
 Executor = Literal["local", "work-pool"]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][\w.-]*$", max_length=60)]
@@ -43,7 +43,7 @@ def _each_once(values: tuple[Any, ...]) -> tuple[Any, ...]:
 Distinct = AfterValidator(_each_once)
 
 
-@dataclass(frozen=True, config=STRICT)
+@config_dataclass
 class Move:
     """A dance that robots are taught.
 
@@ -73,7 +73,7 @@ class Move:
         return ROOT / self.clip
 
 
-@dataclass(frozen=True, config=STRICT)
+@config_dataclass
 class Study:
     """One ablation. How its cells are run (the last four fields) is no part of what it is.
 

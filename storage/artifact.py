@@ -2,11 +2,12 @@
 
 from typing import Annotated
 
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass
+from pydantic import Field
+
+from robojackson.config import config_dataclass
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass
 class Artifact:
     """A file in the store.
 

@@ -16,9 +16,9 @@ from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
-from pydantic.dataclasses import dataclass
+from pydantic import Field, TypeAdapter, ValidationError
 
+from robojackson.config import config_dataclass
 from robojackson.errors import BackupFailed, StoreError
 from robojackson.pipeline.folder_lock import locked
 from robojackson.pipeline.local_folder import TEMPORARY, LocalFolder, sha256_of, sha256_of_file
@@ -26,10 +26,9 @@ from robojackson.pipeline.local_folder import TEMPORARY, LocalFolder, sha256_of,
 CONTENTS, MANIFESTS = "contents", "backups"
 HELD = ".writing"
 """The file that is locked while a backup is written."""
-STRICT = ConfigDict(extra="forbid")
 
 
-@dataclass(frozen=True, config=STRICT)
+@config_dataclass
 class Content:
     """Bytes in a folder of backups.
 
@@ -44,7 +43,7 @@ class Content:
     stamp: str | None = None
 
 
-@dataclass(frozen=True, config=STRICT)
+@config_dataclass
 class Dump:
     """A copy of Prefect's database.
 
@@ -57,7 +56,7 @@ class Dump:
     content: Content
 
 
-@dataclass(frozen=True, config=STRICT)
+@config_dataclass
 class Manifest:
     """One backup.
 

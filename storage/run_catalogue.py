@@ -5,9 +5,9 @@ from dataclasses import asdict
 from datetime import datetime
 from typing import Annotated, Any
 
-from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
-from pydantic.dataclasses import dataclass
+from pydantic import Field, TypeAdapter, ValidationError
 
+from robojackson.config import config_dataclass
 from robojackson.errors import BadTable
 from storage.artifact import Artifact
 from storage.store import Store
@@ -15,7 +15,7 @@ from storage.store import Store
 FOLDER = "runs"
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass
 class Run:
     """One pass through the pipeline.
 

@@ -1,7 +1,6 @@
 """A user's file becomes a video of the store, trimmed on request, and what is known of it."""
 
 import json
-import math
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
@@ -40,7 +39,7 @@ def probe_video(
     store = Store.from_environment()
     if start_s is None and end_s is None:
         return _save(store, source.path, probe(source.path, limits))
-    whole = probe(source.path, replace(limits, max_duration_s=math.inf))
+    whole = probe(source.path, replace(limits, max_duration_s=None))
     begin, end = span(whole, limits, start_s, end_s)
     with store.scratch() as folder:
         clip = trim(source.path, begin, end, folder / f"{source.path.stem}.mp4")

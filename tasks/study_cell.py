@@ -1,13 +1,12 @@
 """One training of a study and its judgement, as data that can go to a worker."""
 
-from pydantic.dataclasses import dataclass
-
-from configs.study_config import STRICT, Name, Seed, Setup
+from configs.study_config import Name, Seed, Setup
+from robojackson.config import config_dataclass
 from robojackson.rl.config.train_config import EvaluateConfig, TrainConfig
 from storage.artifact import Artifact
 
 
-@dataclass(frozen=True, config=STRICT)
+@config_dataclass
 class Cell:
     """A cell of the grid moves x setups x seeds.
 

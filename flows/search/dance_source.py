@@ -1,6 +1,5 @@
 """What the SOURCE of a dance means: a file, a folder, or the name of a dance."""
 
-import math
 import os
 from collections.abc import Mapping
 from dataclasses import replace
@@ -83,7 +82,7 @@ def require_usable(
 
     limits = settings.video
     trims = start_s is not None or end_s is not None
-    allowed = replace(limits, max_duration_s=math.inf) if trims else limits
+    allowed = replace(limits, max_duration_s=None) if trims else limits
     causes = []
     for path in list_videos(source):
         try:

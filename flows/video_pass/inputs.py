@@ -13,8 +13,7 @@ from typing import Annotated
 from urllib.parse import urlsplit
 
 from prefect.logging import get_run_logger
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass
+from pydantic import Field
 
 from configs.dance_book import DanceBook
 from configs.find_config import FindConfig
@@ -23,6 +22,7 @@ from flows.search.dance_source import is_name, resolve
 from robojackson.clips.sources import urls
 from robojackson.clips.video import list_videos
 from robojackson.clips.web.untrusted_text import web_address
+from robojackson.config import config_dataclass
 from robojackson.pipeline.run_names import run_name, slug_of
 from robojackson.pipeline.yaml_loader import load
 from storage.artifact import Artifact
@@ -33,7 +33,7 @@ Seconds = Annotated[float, Field(ge=0)]
 Minutes = Annotated[float, Field(gt=0)]
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass
 class Search:
     """How a dance is looked for that is given by its name.
 

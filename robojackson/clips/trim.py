@@ -1,6 +1,5 @@
 """A range of a video as a file of its own."""
 
-import math
 import os
 import tempfile
 from collections.abc import Iterator
@@ -15,7 +14,7 @@ from robojackson.clips.video import VideoLimits, probe, timed_frames
 from robojackson.errors import TrackTooShort
 from robojackson.motion.landmark_track import uneven
 
-ANY = VideoLimits(max_duration_s=math.inf, min_frames=1)
+ANY = VideoLimits(max_duration_s=None, min_frames=1)
 CLOCK = 90_000
 """Ticks a second of a file whose frames are not evenly spaced."""
 

@@ -5,13 +5,13 @@ says so is told apart from one that never was a video. Times in seconds, sizes i
 """
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import av
 import numpy as np
 from av.video.frame import VideoFrame
-from pydantic import ConfigDict
-from pydantic.dataclasses import dataclass
+from pydantic import Field
 
 from robojackson.clips.video_container import (
     declared_rate,
@@ -21,6 +21,7 @@ from robojackson.clips.video_container import (
     rate,
     video_stream,
 )
+from robojackson.config import config_dataclass
 from robojackson.errors import (
     TrackTooShort,
     TruncatedVideo,
@@ -37,17 +38,17 @@ DAMAGE_ALLOWED = 0.2
 """Share of the frames that may be damaged; they are left out."""
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass
 class VideoLimits:
     """What a clip may be.
 
     Attributes:
-        max_duration_s: Longest clip, seconds.
+        max_duration_s: Longest clip, seconds; None is any length.
         min_frames: Fewest frames; motion needs two.
     """
 
-    max_duration_s: float = 60.0
-    min_frames: int = 2
+    max_duration_s: float | None = Field(default=60.0, gt=0)
+    min_frames: int = Field(default=2, ge=1)
 
 
 @dataclass(frozen=True)
@@ -206,7 +207,7 @@ def _require_complete(path: Path, frames: int, promised: int) -> None:
 
 def require_within(info: VideoInfo, limits: VideoLimits) -> None:
     """Raise `VideoTooLong` or `TrackTooShort` where a video is outside the limits."""
-    if info.duration_s > limits.max_duration_s:
+    if limits.max_duration_s is not None and info.duration_s > limits.max_duration_s:
         raise VideoTooLong(
             f"{info.duration_s:.1f} s is longer than the limit of "
             f"{limits.max_duration_s:g} s; trim it or raise video.max_duration_s",

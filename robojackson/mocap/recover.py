@@ -9,14 +9,14 @@ from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass
+from pydantic import Field
 from scipy.spatial.transform import Rotation
 
 from robojackson.body import analytic_solve
 from robojackson.body.forward_kinematics import apply
 from robojackson.body.smoothing import lowpass
 from robojackson.clips.quality.visibility import weigh_visibility
+from robojackson.config import config_dataclass
 from robojackson.mocap.grounding import floor
 from robojackson.mocap.grounding.stance import GroundingConfig, ground_body
 from robojackson.mocap.landmarks import pinhole_camera
@@ -30,7 +30,7 @@ from robojackson.motion.landmark_track import LandmarkTrack, evenly
 from robojackson.motion.smpl_sequence import SmplSequence
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
+@config_dataclass
 class MocapConfig:
     """How landmarks become a motion.
 

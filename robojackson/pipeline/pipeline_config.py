@@ -1,12 +1,12 @@
 """What the whole pipeline does with a video: one section a stage, each defined beside its code."""
 
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass
+from pydantic import Field
 
 from robojackson.clips.people.dancer import DancerConfig
 from robojackson.clips.pose_detector import Size
 from robojackson.clips.quality.stability import StabilityConfig
 from robojackson.clips.video import VideoLimits
+from robojackson.config import config_dataclass
 from robojackson.mocap.landmarks.landmark_pipeline import Quality
 from robojackson.mocap.networks.network_config import NetworkConfig
 from robojackson.mocap.recover import MocapConfig
@@ -15,7 +15,7 @@ from robojackson.retarget.retargeting import RetargetConfig
 from robojackson.rl.config.train_config import EvaluateConfig, TrainConfig
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass
 class PipelineConfig:
     """One pass from a video to a robot that dances.
 

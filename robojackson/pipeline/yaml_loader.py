@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import Any, TypeVar, get_args, get_type_hints
 
 import yaml
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 
+from robojackson.config import validated
 from robojackson.errors import BadConfiguration, ConflictingValues, UnknownName
 
 Config = TypeVar("Config")
@@ -46,7 +47,7 @@ def load(
         _set(values, key_path.split("."), value)
     where = _display_name(path) if path else "--set"
     try:
-        return TypeAdapter(cls).validate_python(values)
+        return validated(cls, values)
     except ValidationError as cause:
         key = ".".join([*_keys(cause), ""])
         blamed = [g for g in given if key.startswith(f"{g}.") or f"{g}.".startswith(key)]
@@ -64,7 +65,7 @@ def build(cls: type[Config], values: Mapping[str, Any], where: str) -> Config:
         BadConfiguration: an unknown key or a wrong value; the message has `where` and the key.
     """
     try:
-        return TypeAdapter(cls).validate_python(dict(values))
+        return validated(cls, dict(values))
     except ValidationError as cause:
         raise BadConfiguration(f"{where}: {_explain(cls, cause)}") from cause
 

@@ -2,15 +2,15 @@
 
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass as config_dataclass
+from pydantic import Field
 
+from robojackson.config import config_dataclass
 from robojackson.retarget.solver.clip_problem import Weights
 from robojackson.retarget.solver.levenberg_marquardt import SolverConfig
 from robojackson.retarget.targets.cycle import CycleConfig
 
 
-@config_dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
+@config_dataclass
 class RepairConfig:
     """How far a motion may be bent and slowed down so that the robot can do it.
 
@@ -33,7 +33,7 @@ class RepairConfig:
     slowest: float = Field(default=0.5, ge=0.25, le=1)
 
 
-@config_dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
+@config_dataclass
 class RetargetConfig:
     """How to retarget.
 

@@ -6,8 +6,9 @@ Names are bound to a MuJoCo model by `robot.model.load_robot`. Metres, radians, 
 from collections.abc import Mapping
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass as config_dataclass
+from pydantic import Field
+
+from robojackson.config import config_dataclass
 
 KEYPOINTS: tuple[str, ...] = (
     "pelvis", "left_hip", "right_hip", "left_knee", "right_knee", "left_foot", "right_foot",
@@ -16,12 +17,11 @@ KEYPOINTS: tuple[str, ...] = (
 )  # fmt: skip
 TOES: tuple[str, ...] = ("left_toe", "right_toe")
 """Keypoints that a robot with ankles may have, too: they aim its feet."""
-_STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
 Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 Offset = tuple[float, float, float]
 
 
-@config_dataclass(frozen=True, config=_STRICT)
+@config_dataclass
 class ContactPoint:
     """A ball under the robot that may touch the floor.
 
@@ -42,7 +42,7 @@ class ContactPoint:
     label: Literal["heel", "toe", "either"] = "either"
 
 
-@config_dataclass(frozen=True, config=_STRICT)
+@config_dataclass
 class RobotSource:
     """A package that bundles the robot's model; `robojackson robots add NAME` unpacks it.
 
@@ -65,7 +65,7 @@ class RobotSource:
     copyright: str = ""
 
 
-@config_dataclass(frozen=True, config=_STRICT)
+@config_dataclass
 class RobotDescription:
     """What `configs/robots/<name>.yaml` holds.
 

@@ -5,18 +5,16 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import pytest
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass
+from pydantic import Field
 
+from robojackson.config import config_dataclass
 from robojackson.errors import BadConfiguration, UnknownName
 from robojackson.pipeline import yaml_loader
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.rl.config.train_config import TrainConfig
 
-STRICT = ConfigDict(extra="forbid")
 
-
-@dataclass(frozen=True, config=STRICT)
+@config_dataclass
 class Inner:
     """A section."""
 
@@ -24,7 +22,7 @@ class Inner:
     cyclic: Literal["auto", "yes", "no"] = "auto"
 
 
-@dataclass(frozen=True, config=STRICT)
+@config_dataclass
 class Outer:
     """A configuration."""
 

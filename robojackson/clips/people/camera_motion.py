@@ -8,10 +8,10 @@ diagonal, a frame.
 import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass
+from pydantic import Field
 
 from robojackson.clips.people.person_extent import box
+from robojackson.config import config_dataclass
 
 PERSON_MARGIN = 0.15
 FEWEST_CORNERS = 8
@@ -20,7 +20,7 @@ LEAST_TEXTURE = 3e-3
 """Share of the best corner; pixels; of Lucas-Kanade: along a plain edge nothing can be followed."""
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass
 class CameraConfig:
     """Attributes:
     samples_per_s: Pairs of frames that are compared, a second.

@@ -11,8 +11,7 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass as configuration
+from pydantic import Field
 
 from robojackson.clips.people.identity import IdentityConfig
 from robojackson.clips.people.person_count import People, PeopleConfig
@@ -27,13 +26,14 @@ from robojackson.clips.pose_detector import (
     video_landmarker,
 )
 from robojackson.clips.video import VideoInfo, timed_frames
+from robojackson.config import config_dataclass
 from robojackson.errors import NoPersonFound
 from robojackson.motion.landmark_track import LandmarkTrack
 
 Progress = Callable[[int, int], None]
 
 
-@configuration(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass
 class DancerConfig:
     """How the dancer is found among others.
 

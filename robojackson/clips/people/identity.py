@@ -10,19 +10,19 @@ from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass as configuration
+from pydantic import Field
 
 from robojackson.clips.people.person_detection import PersonDetection
 from robojackson.clips.people.person_extent import stature
 from robojackson.clips.people.tracklets import Tracklet, TrackletConfig, find_tracklets
+from robojackson.config import config_dataclass
 
 IMPOSSIBLE = 1e6
 NEAR = 30
 """Frames at the end of a tracklet whose median size counts."""
 
 
-@configuration(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass
 class IdentityConfig:
     """How much may change from one detection of a person to the next.
 

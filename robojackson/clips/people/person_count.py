@@ -10,16 +10,16 @@ from typing import Any
 import cv2
 import numpy as np
 from jaxtyping import Float
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass
+from pydantic import Field
 
 from robojackson.clips.people.camera_motion import spread
 from robojackson.clips.people.person_extent import box
+from robojackson.config import config_dataclass
 
 PERSON_MARGIN = 0.15
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass
 class PeopleConfig:
     """Attributes:
     samples_per_s: Frames that are looked at, a second.

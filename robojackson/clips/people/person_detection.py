@@ -6,16 +6,17 @@ overlap. So whoever is found is painted over, limb by limb, and the picture is l
 nobody is left: 94-99 % of two dancers who cross.
 """
 
+from dataclasses import dataclass
 from typing import Any
 
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass
+from pydantic import Field
 
 from robojackson.clips.people.person_extent import indices, stature, trunk
 from robojackson.clips.pose_detector import first_person
+from robojackson.config import config_dataclass
 
 CHAINS = (
     (19, 15, 13, 11), (20, 16, 14, 12), (23, 25, 27, 29, 31), (24, 26, 28, 30, 32), (27, 31),
@@ -30,7 +31,7 @@ SAMPLE_WIDTH = 0.03
 FEWEST_PIXELS = 12
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass
 class PersonDetectionConfig:
     """Attributes:
     most: People that are looked for in a picture.
@@ -49,7 +50,7 @@ class PersonDetectionConfig:
     apart: float = Field(default=0.12, gt=0)
 
 
-@dataclass(frozen=True, config=ConfigDict(arbitrary_types_allowed=True))
+@dataclass(frozen=True)
 class PersonDetection:
     """Somebody in one frame.
 

@@ -10,14 +10,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Float
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass as configuration
+from pydantic import Field
 
 from robojackson.clips.people.person_detection import PersonDetection
 from robojackson.clips.people.person_extent import stature, trunk
+from robojackson.config import config_dataclass
 
 
-@configuration(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass
 class TrackletConfig:
     """Attributes:
     step: Distance of the trunk from one frame to the next, body heights.

@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass as configuration
+from pydantic import Field
 
 from robojackson.clips.people.camera_motion import CameraConfig, CameraMotion
 from robojackson.clips.people.person_count import People, PeopleConfig
@@ -21,10 +20,11 @@ from robojackson.clips.quality.cuts import Changes, CutConfig, leaps, together
 from robojackson.clips.quality.drawing import DrawingConfig, Paint
 from robojackson.clips.quality.stability import Stability, StabilityConfig, stability
 from robojackson.clips.video import VideoInfo, VideoLimits, probe
+from robojackson.config import config_dataclass
 from robojackson.motion.landmark_track import LandmarkTrack
 
 
-@configuration(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass
 class AssessmentConfig:
     """Attributes:
     detector: Size of the pose model.

@@ -2,18 +2,20 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass as configuration
+from pydantic import Field, NonNegativeFloat, NonNegativeInt
 
 from robojackson.clips.quality.assessment import Quality
 from robojackson.clips.quality.duplicates import DuplicateConfig
 from robojackson.clips.quality.stability import Stability
 from robojackson.clips.rejection import Kind, Rejection
+from robojackson.config import config_dataclass
+
+Share = Annotated[float, Field(ge=0, le=1)]
 
 
-@configuration(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass
 class FilterConfig:
     """What a clip must be. None switches a filter off; its figure stays in the table.
 
@@ -32,15 +34,15 @@ class FilterConfig:
     """
 
     rank_by: Literal["sum", "frame"] = "sum"
-    shortest_s: float | None = 1.0
-    detected_share: float | None = 0.9
-    full_body_share: float | None = 0.7
-    person_height_px: float | None = 140.0
-    people: int | None = 1
-    cuts: int | None = 0
-    static_share: float | None = 0.8
-    moving_share: float | None = 0.25
-    flat_share: float | None = 0.6
+    shortest_s: NonNegativeFloat | None = 1.0
+    detected_share: Share | None = 0.9
+    full_body_share: Share | None = 0.7
+    person_height_px: NonNegativeFloat | None = 140.0
+    people: NonNegativeInt | None = 1
+    cuts: NonNegativeInt | None = 0
+    static_share: Share | None = 0.8
+    moving_share: Share | None = 0.25
+    flat_share: Share | None = 0.6
     copies: DuplicateConfig | None = Field(default_factory=DuplicateConfig)
 
 

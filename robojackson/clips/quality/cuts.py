@@ -9,14 +9,14 @@ from typing import Any
 import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass
+from pydantic import Field
 
 from robojackson.clips.people.person_extent import heights_px
+from robojackson.config import config_dataclass
 from robojackson.motion.landmark_track import LandmarkTrack
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass
 class CutConfig:
     """Attributes:
     threshold: PySceneDetect's change of hue, saturation and lightness at a cut, 0..255.

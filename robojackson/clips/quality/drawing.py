@@ -7,11 +7,11 @@ body neighbouring pixels are equal, on skin and cloth light, folds and the camer
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass
+from pydantic import Field
 
 from robojackson.clips.people.camera_motion import spread
 from robojackson.clips.people.person_extent import indices
+from robojackson.config import config_dataclass
 
 LIMBS = (
     ("shoulder", "elbow"),
@@ -23,7 +23,7 @@ LIMB_WIDTH = 0.03
 """Body heights: inside the limb, away from its outline."""
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass
 class DrawingConfig:
     """Attributes:
     samples_per_s: Frames that are looked at, a second.

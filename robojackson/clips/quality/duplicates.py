@@ -8,11 +8,11 @@ from collections.abc import Mapping
 
 import numpy as np
 from jaxtyping import Float
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass
+from pydantic import Field
 
 from robojackson.clips.people.person_extent import MIRROR, heights_px, indices
 from robojackson.clips.rejection import Rejection
+from robojackson.config import config_dataclass
 from robojackson.motion.landmark_track import LandmarkTrack
 
 DELAY_COST = 0.01
@@ -20,7 +20,7 @@ DELAY_COST = 0.01
 Poses = Float[np.ndarray, "N 33 2"]
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass
 class DuplicateConfig:
     """Attributes:
     distance: Mean distance of the landmarks below which two clips show the same, body heights.

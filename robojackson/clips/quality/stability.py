@@ -3,21 +3,23 @@
 Landmarks are normalised image coordinates; scores are unitless and LOWER IS STEADIER.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Float
-from pydantic import ConfigDict
-from pydantic.dataclasses import dataclass
+from pydantic import Field
 
+from robojackson.config import config_dataclass
 from robojackson.motion.landmark_track import LANDMARKS, LandmarkTrack
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass
 class StabilityConfig:
     """Attributes:
     visibility_threshold: A landmark below this visibility (0..1) counts as missing.
     """
 
-    visibility_threshold: float = 0.5
+    visibility_threshold: float = Field(default=0.5, ge=0, le=1)
 
 
 @dataclass(frozen=True)

@@ -3,14 +3,14 @@
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass as configuration
+from pydantic import Field
 
 from robojackson.clips.rejection import Rejection
 from robojackson.clips.web.video_candidate import VideoCandidate
+from robojackson.config import config_dataclass
 
 
-@configuration(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass
 class SelectionConfig:
     """What is kept of a search.
 

@@ -7,8 +7,9 @@ merged. The short side of the image counts: shorts stand upright.
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass
+from pydantic import Field
+
+from robojackson.config import config_dataclass
 
 Purpose = Literal["score", "dance"]
 Format = Mapping[str, Any]
@@ -16,7 +17,7 @@ DIRECT_PROTOCOLS = ("http", "https")
 """Protocols that fetch one file, which can be resumed."""
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass
 class FormatConfig:
     """Attributes:
     score_short_side: Fewest pixels of the short side of the image that is scored.

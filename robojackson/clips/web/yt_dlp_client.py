@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass as configuration
+from pydantic import Field
 
 from robojackson.clips.web.download_formats import FormatConfig, Purpose, choose
 from robojackson.clips.web.javascript_runtimes import runtimes
 from robojackson.clips.web.request_failures import REASON_LENGTH, explain
 from robojackson.clips.web.untrusted_text import clean_text, safe_name
+from robojackson.config import config_dataclass
 from robojackson.errors import DownloadFailed, SearchFailed
 
 Progress = Callable[[int, int | None], None]
@@ -28,7 +28,7 @@ BYTES_A_MEGABYTE = 1_000_000
 log = logging.getLogger(__name__)
 
 
-@configuration(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass
 class WebConfig:
     """Manners towards the servers of others.
 

@@ -12,10 +12,9 @@ from itertools import product
 
 import numpy as np
 from jaxtyping import Float, Int
-from pydantic import ConfigDict
-from pydantic.dataclasses import dataclass
 
 from robojackson.body.forward_kinematics import unit
+from robojackson.config import config_dataclass
 from robojackson.motion.smpl_sequence import AIR, CONTACT_POINTS, PLANTED, SLIDING
 
 STATES = (AIR, PLANTED, SLIDING)
@@ -24,7 +23,7 @@ JOINT = np.array(list(product(STATES, repeat=len(CONTACT_POINTS))))
 IMPOSSIBLE = -1e9
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
+@config_dataclass
 class ContactConfig:
     """What the states look like. Tuned on dance_a, dance_b and walk.
 

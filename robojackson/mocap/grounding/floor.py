@@ -10,13 +10,12 @@ from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
-from pydantic import ConfigDict
-from pydantic.dataclasses import dataclass
 
 from robojackson.body.feet import stretches
 from robojackson.body.forward_kinematics import unit
 from robojackson.body.skeleton import keypoint, pair
 from robojackson.body.smoothing import lowpass
+from robojackson.config import config_dataclass
 
 GRAVITY = 9.81
 FALL_CUTOFF_HZ = 6.0
@@ -32,7 +31,7 @@ LEAST_WEIGHT = 1e-4
 ROUNDS = 6
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
+@config_dataclass
 class GravityConfig:
     """How far balance is believed. Tuned on the nine bundled clips.
 

@@ -7,20 +7,20 @@ left is taken up by hip and knee (`leg_ik`), as an animator pins a foot.
 
 import numpy as np
 from jaxtyping import Float
-from pydantic import ConfigDict, PositiveInt
-from pydantic.dataclasses import dataclass
+from pydantic import PositiveInt
 from scipy.linalg import solveh_banded
 
 from robojackson.body.feet import stretches
 from robojackson.body.skeleton import pair
 from robojackson.body.smoothing import lowpass
+from robojackson.config import config_dataclass
 
 LEASH_ROUNDS, LEASH_POWER = 3, 6
 LARGEST_TIP = np.radians(40.0)
 TIP_HZ = 6.0
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
+@config_dataclass
 class FootPinningConfig:
     """Weights of the root's path; only their ratios matter.
 

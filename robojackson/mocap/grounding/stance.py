@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass as config_dataclass
+from pydantic import Field
 
 from robojackson.body import feet
 from robojackson.body.smoothing import lowpass
+from robojackson.config import config_dataclass
 from robojackson.mocap.grounding import contacts, foot_pinning, leg_ik
 from robojackson.mocap.grounding import floor as ground
 from robojackson.mocap.grounding.foot_pinning import FootPinningConfig
@@ -24,7 +24,7 @@ LIFTS = 3
 ABOVE = np.array([0.0, 0.0, 1.0])
 
 
-@config_dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
+@config_dataclass
 class GroundingConfig:
     """Attributes:
     floor_cutoff_hz: Zero-phase low-pass of the height of the floor under the feet, hertz.

@@ -10,12 +10,11 @@ from dataclasses import dataclass as plain_dataclass
 
 import numpy as np
 from jaxtyping import Float
-from pydantic import ConfigDict
-from pydantic.dataclasses import dataclass
 from scipy.linalg import solveh_banded
 
 from robojackson.body.forward_kinematics import unit
 from robojackson.body.skeleton import keypoint
+from robojackson.config import config_dataclass
 from robojackson.mocap.landmarks.blazepose import BODY, LANDMARK_NAMES, landmark
 
 SHAPE = (len(BODY), 3)
@@ -36,7 +35,7 @@ HIPS = [ORDER.index("left_hip"), ORDER.index("right_hip")]
 LEAST_VISIBILITY = 0.1
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
+@config_dataclass
 class RefineConfig:
     """Standard deviations of the four terms.
 

@@ -3,13 +3,13 @@
 from dataclasses import field
 from typing import Literal
 
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass
+from pydantic import Field
 
+from robojackson.config import config_dataclass
 from robojackson.errors import BadConfiguration
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
+@config_dataclass
 class NetworkConfig:
     """HybrIK's network, and NIKI after it, instead of BlazePose's metres.
 

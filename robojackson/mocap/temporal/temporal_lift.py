@@ -10,9 +10,8 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
-from pydantic import ConfigDict
-from pydantic.dataclasses import dataclass
 
+from robojackson.config import config_dataclass
 from robojackson.mocap.landmarks.blazepose import BODY
 from robojackson.mocap.landmarks.refinement import carry_along
 from robojackson.mocap.temporal import error_flow, features
@@ -24,7 +23,7 @@ HIDDEN_BELOW = 0.35
 """A limb whose landmarks are less visible than this counts as hidden."""
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
+@config_dataclass
 class TemporalConfig:
     """How the temporal network is used.
 

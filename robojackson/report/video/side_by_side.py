@@ -11,9 +11,9 @@ from pathlib import Path
 import mujoco
 import numpy as np
 from jaxtyping import Float
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass
+from pydantic import Field
 
+from robojackson.config import config_dataclass
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
@@ -27,7 +27,7 @@ from robojackson.report.video.timeline import Timeline, reference_qpos, timeline
 Progress = Callable[[int, int], None]
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+@config_dataclass
 class VideoConfig:
     """How the video looks.
 

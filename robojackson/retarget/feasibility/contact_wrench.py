@@ -10,16 +10,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass as config_dataclass
+from pydantic import Field
 
+from robojackson.config import config_dataclass
 from robojackson.retarget.feasibility.interior_point import Box, left_over, solve_box, value
 
 _PUSH_PRICE = 1e-4  # of pushes that leave the same, the smallest are taken
 _TORQUE_PRICE = 1e-4  # ... and those with the smallest torques
 
 
-@config_dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
+@config_dataclass
 class Tolerance:
     """What may be left over in a step that counts as feasible: a tracking robot makes up for it.
 

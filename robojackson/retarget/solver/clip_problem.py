@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass as config_dataclass
+from pydantic import Field
 
+from robojackson.config import config_dataclass
 from robojackson.retarget.feasibility.contact_wrench import Tolerance
 from robojackson.retarget.solver.collision import Detector
 from robojackson.retarget.targets.keypoint_targets import Targets
@@ -15,7 +15,7 @@ from robojackson.robot.resampling import forward_velocities
 from robojackson.robot.tree_kinematics import Tree, tree
 
 
-@config_dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
+@config_dataclass
 class Weights:
     """Weights of the cost; the keypoints' own are in the robot description.
 

@@ -10,9 +10,9 @@ from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Bool, Float
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass as config_dataclass
+from pydantic import Field
 
+from robojackson.config import config_dataclass
 from robojackson.retarget.solver.block_banded import Chain, Normal
 from robojackson.retarget.solver.clip_problem import Problem
 from robojackson.retarget.solver.cost_terms import linearise
@@ -28,7 +28,7 @@ _OVERLAP = 24  # steps that a window looks beyond what is kept of it
 _HELD = 2  # steps of the window before it that an acceleration reaches back to
 
 
-@config_dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
+@config_dataclass
 class SolverConfig:
     """When the solver stops.
 

@@ -12,11 +12,11 @@ from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass as config_dataclass
+from pydantic import Field
 from scipy.ndimage import gaussian_filter1d
 
 from robojackson.body.skeleton import KEYPOINT_NAMES
+from robojackson.config import config_dataclass
 from robojackson.errors import TrackTooShort
 from robojackson.geometry.rotations import wrapped
 from robojackson.motion.smpl_sequence import SmplSequence
@@ -33,7 +33,7 @@ _WHOLE_SEAM_M = 0.05  # a clip that was cut as a loop stays whole up to this sea
 _SECONDS = 0.1  # velocity differences count over this time beside pose differences
 
 
-@config_dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
+@config_dataclass
 class CycleConfig:
     """When a clip counts as cyclic.
 

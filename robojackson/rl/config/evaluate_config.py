@@ -1,13 +1,14 @@
 """Every number of an evaluation, with its unit."""
 
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass
+from pydantic import Field
+
+from robojackson.config import config_dataclass
 
 TRAINED, VARIANTS = "trained", ("hold",)
 """What tables call the trained policy, and the same under another law of its torque."""
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
+@config_dataclass
 class EvaluateConfig:
     """How a policy is judged on stock physics.
 

@@ -8,9 +8,9 @@ alone.
 
 from typing import Any, Literal
 
-from pydantic import ConfigDict, Field, model_validator
-from pydantic.dataclasses import dataclass
+from pydantic import Field, model_validator
 
+from robojackson.config import config_dataclass
 from robojackson.errors import ConflictingValues
 from robojackson.rl.config.presets import with_preset
 
@@ -64,7 +64,7 @@ POINT_WEIGHTS = {
 hand for a wrist."""
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
+@config_dataclass
 class PaperConfig:
     """The paper's task on stock Humanoid-v5: torques, 348 observations, no phase.
 

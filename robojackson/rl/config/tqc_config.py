@@ -2,9 +2,9 @@
 
 from typing import Any, Literal
 
-from pydantic import ConfigDict, Field, model_validator
-from pydantic.dataclasses import dataclass
+from pydantic import Field, model_validator
 
+from robojackson.config import config_dataclass
 from robojackson.errors import ConflictingValues
 from robojackson.rl.config.presets import with_preset
 
@@ -54,7 +54,7 @@ NORM_EPSILON = 1e-6
 """Of layer normalisation: flax's."""
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
+@config_dataclass
 class TqcConfig:
     """TQC and how often it learns.
 

@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from dataclasses import field, fields, replace
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field, model_validator
-from pydantic.dataclasses import dataclass
+from pydantic import Field, model_validator
 from pydantic_core import ArgsKwargs
 
+from robojackson.config import config_dataclass
 from robojackson.errors import ConflictingValues
 from robojackson.rl.config.evaluate_config import EvaluateConfig
 from robojackson.rl.config.paper_config import Curiosity, PaperConfig
@@ -26,10 +26,8 @@ __all__ = [
     "TrainConfig",
 ]
 
-STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
 
-
-@dataclass(frozen=True, config=STRICT)
+@config_dataclass
 class ControlConfig:
     """The law of control outside the model (stock physics).
 
@@ -52,7 +50,7 @@ class ControlConfig:
     arm_residual: float = Field(default=0.25, gt=0)
 
 
-@dataclass(frozen=True, config=STRICT)
+@config_dataclass
 class ResetConfig:
     """Reference-state initialisation (Peng et al., DeepMimic, 2018) with noise.
 
@@ -73,7 +71,7 @@ class ResetConfig:
     failure_share: float = Field(default=0.5, ge=0, le=1)
 
 
-@dataclass(frozen=True, config=STRICT)
+@config_dataclass
 class RewardConfig:
     """Weights and widths of the local tracking reward; a term is weight * exp(-error^2 / width^2).
 
@@ -130,7 +128,7 @@ class RewardConfig:
         return sum(getattr(self, name) for name in self.terms())
 
 
-@dataclass(frozen=True, config=STRICT)
+@config_dataclass
 class TerminationConfig:
     """When an episode ends early. The fall rule is the paper's; the others are for training only.
 
@@ -151,7 +149,7 @@ class TerminationConfig:
     drift: float = 1.5
 
 
-@dataclass(frozen=True, config=STRICT)
+@config_dataclass
 class RandomConfig:
     """Physics that differ a little from robot to robot while training; zero is the stock robot.
 
@@ -168,7 +166,7 @@ class RandomConfig:
     )
 
 
-@dataclass(frozen=True, config=STRICT)
+@config_dataclass
 class TrackConfig:
     """The tracking environment.
 
@@ -186,7 +184,7 @@ class TrackConfig:
     threads: int = Field(default=2, ge=1)
 
 
-@dataclass(frozen=True, config=STRICT)
+@config_dataclass
 class TrainConfig:
     """One training run. It ends at the first of its budgets that is reached.
 

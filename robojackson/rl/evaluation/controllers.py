@@ -5,8 +5,9 @@ from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
-from pydantic import PositiveInt, TypeAdapter, ValidationError
+from pydantic import PositiveInt, ValidationError
 
+from robojackson.config import validated
 from robojackson.errors import BadPolicy
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.evaluate_config import TRAINED
@@ -63,7 +64,7 @@ def fact(policy: Policy, name: str, kind: type[T]) -> T:
         BadPolicy: it holds what this version does not know.
     """
     try:
-        return TypeAdapter(kind).validate_python(policy.facts[name])
+        return validated(kind, policy.facts[name])
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, (name, *first["loc"])))
