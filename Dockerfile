@@ -18,7 +18,7 @@ RUN apt-get update -qq \
 USER jackson
 ARG TORCH_INDEX=""
 COPY --chown=jackson:jackson . .
-RUN TORCH_INDEX="$TORCH_INDEX" EXTRAS=fast,s3 sh tools/bootstrap.sh install
+RUN TORCH_INDEX="$TORCH_INDEX" EXTRAS=app,fast,s3 sh tools/bootstrap.sh install
 
 # Last: it changes with every build. Tables record which commit made them; the image has no git.
 ARG GIT_COMMIT=""

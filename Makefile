@@ -12,6 +12,8 @@
 #   make chaos    20 studies whose processes, services, disk and wires are cut at random moments
 #   make deploy   pools, deployments and automations on the server of PREFECT_API_URL
 #   make lint     ruff, mypy and the order of imports (docs/architecture.md)
+#   make docs     the reference of the Python functions, from their docstrings, in build/site
+#   make wheel    the package, checked as the index would, in dist/
 #   make doctor   what is installed and what is missing
 #   make clean    remove the environment and all caches; the store stays
 #
@@ -22,7 +24,7 @@ PY := .venv/bin/python
 ARGS ?=
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: dance test test-stack bench bench-learning bench-mocap bench-retarget chaos bench-orchestration deploy lint doctor clean setup
+.PHONY: dance test test-stack bench bench-learning bench-mocap bench-retarget chaos bench-orchestration deploy lint doctor docs wheel clean setup
 .DEFAULT_GOAL := dance
 
 setup:
@@ -64,6 +66,13 @@ lint: setup
 	@$(PY) -m ruff format --check .
 	@$(PY) -m mypy
 	@.venv/bin/lint-imports --no-cache
+
+docs: setup
+	@$(PY) -m mkdocs build --strict --quiet
+
+wheel: setup
+	@$(PY) -m build --outdir dist .
+	@$(PY) -m twine check --strict dist/*
 
 doctor: setup
 	@.venv/bin/robojackson doctor $(ARGS)

@@ -12,8 +12,8 @@ from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from robojackson.config import config_dataclass
+from robojackson.pipeline.app_folder import app_folder
 
-ROOT = Path(__file__).parent.parent
 OF_THE_STUDY = (
     "robot",
     "setup",
@@ -48,7 +48,7 @@ class Move:
     """A dance that robots are taught.
 
     Attributes:
-        clip: Path of its video, from the checkout.
+        clip: Path of its video, from the working directory or from where `clips` is.
         paper: What the paper calls it, if it stands for a move of the paper.
         walking: Whether it is walking rather than dancing (the paper's third claim).
         overrides: Values of the pipeline's configuration by key path, of what makes its motion.
@@ -69,8 +69,9 @@ class Move:
 
     @property
     def path(self) -> Path:
-        """The video of this checkout."""
-        return ROOT / self.clip
+        """The video: a path that exists, or one of the bundled clips."""
+        given = Path(self.clip)
+        return given if given.is_file() else app_folder() / given
 
 
 @config_dataclass

@@ -1,20 +1,33 @@
 """The decorator of every configuration: frozen, strict, no unknown keys, no NaN or infinity.
 
-Strict means that no value is converted: `"3"` is no number and `1` is no boolean. `validated` reads
-plain values, as YAML and JSON have them: there a list is a tuple, a mapping a section and text a
-path where the field asks for one.
+Strict means that no number, text or boolean is converted into another: `"3"` is no number, `3.0` no
+integer and `1` no boolean. What YAML and JSON cannot say is taken for what the field asks for: a
+list for a tuple, a mapping for a section, text for a path.
 """
 
-import json
 from dataclasses import field
-from typing import Any, TypeVar, cast, dataclass_transform
+from functools import reduce
+from operator import or_
+from types import UnionType
+from typing import (
+    Annotated,
+    Any,
+    TypeVar,
+    Union,
+    cast,
+    dataclass_transform,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 import pydantic
-from pydantic import ConfigDict, TypeAdapter
+from pydantic import ConfigDict, Strict
 from pydantic.dataclasses import dataclass
 
 Config = TypeVar("Config")
-STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
+CHECKED = ConfigDict(extra="forbid", allow_inf_nan=False)
+SCALARS = (bool, int, float)
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(pydantic.Field, field))
@@ -28,17 +41,20 @@ def config_dataclass(cls: type[Config]) -> type[Config]:
         The class. Making an instance raises `pydantic.ValidationError` for a wrong type, an unknown
         name, a value outside its limits, NaN and infinity.
     """
-    return cast("type[Config]", dataclass(frozen=True, config=STRICT)(cls))
+    hints = get_type_hints(cls, include_extras=True)
+    cls.__annotations__ = {name: _strict(hints[name]) for name in cls.__annotations__}
+    return cast("type[Config]", dataclass(frozen=True, config=CHECKED)(cls))
 
 
-def validated(cls: type[Config], values: Any) -> Config:
-    """A configuration from plain values.
-
-    Args:
-        cls: A configuration, or any type that pydantic knows.
-        values: As `yaml` or `json` return them; anything else goes by its text.
-
-    Raises:
-        pydantic.ValidationError: an unknown key, a wrong type or a value outside its limits.
-    """
-    return TypeAdapter(cls).validate_json(json.dumps(values, default=str))
+def _strict(kind: Any) -> Any:
+    """A type whose numbers and booleans are not converted."""
+    if kind in SCALARS:
+        return Annotated[kind, Strict()]
+    origin, inner = get_origin(kind), get_args(kind)
+    if origin is Annotated:
+        return Annotated[(_strict(inner[0]), *kind.__metadata__)]
+    if origin in (Union, UnionType):
+        return reduce(or_, map(_strict, inner))
+    if origin in (tuple, dict, list):
+        return origin[tuple(each if each is ... else _strict(each) for each in inner)]
+    return kind

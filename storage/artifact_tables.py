@@ -1,16 +1,16 @@
-"""Tables of `robojackson.pipeline.tables` as artifacts of a store."""
+"""Tables of `robojackson.files.tables` as artifacts of a store."""
 
 from typing import Any, TypeVar
 
-from robojackson.pipeline import tables
-from robojackson.pipeline.table_schemas import TableSchema
+from robojackson.files import tables
+from robojackson.files.table_types import TableSchema
 from storage.artifact import Artifact
 from storage.store import Store
 
-Value = TypeVar("Value")
+Value = TypeVar("Value", bound=tables.Tabular)
 
 
-def save(store: Store, stage: str, name: str, value: object) -> Artifact:
+def save(store: Store, stage: str, name: str, value: tables.Tabular) -> Artifact:
     """Keep a dataclass in the store under a key made of its content."""
     return store.save(stage, name, tables.encode(value))
 

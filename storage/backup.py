@@ -20,8 +20,8 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from robojackson.config import config_dataclass
 from robojackson.errors import BackupFailed, StoreError
+from robojackson.files.local_folder import TEMPORARY, LocalFolder, sha256_of, sha256_of_file
 from robojackson.pipeline.folder_lock import locked
-from robojackson.pipeline.local_folder import TEMPORARY, LocalFolder, sha256_of, sha256_of_file
 
 CONTENTS, MANIFESTS = "contents", "backups"
 HELD = ".writing"

@@ -13,17 +13,11 @@ from typing import Any
 
 import pyarrow as pa
 
+from robojackson.clips.quality.stability import STABILITY_SCORE
 from robojackson.errors import BadTable, StoreError
-from robojackson.pipeline import tables
-from robojackson.pipeline.table_schemas import (
-    F64,
-    I32,
-    STABILITY_SCORE,
-    TEXT,
-    VIDEO_CANDIDATE,
-    Column,
-    TableSchema,
-)
+from robojackson.files import tables
+from robojackson.files.table_types import F64, I32, TEXT, Column, TableSchema
+from robojackson.pipeline.table_schemas import VIDEO_CANDIDATE
 from storage.artifact import Artifact
 from storage.store import Store
 

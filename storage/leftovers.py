@@ -17,8 +17,8 @@ from contextlib import suppress
 from pathlib import Path
 
 from robojackson.errors import StoreError
+from robojackson.files.local_folder import TEMPORARY, LocalFolder
 from robojackson.pipeline.folder_lock import locked
-from robojackson.pipeline.local_folder import TEMPORARY, LocalFolder
 from storage import study_tables
 from storage.store import HELD, SCRATCH, Store
 

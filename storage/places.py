@@ -9,7 +9,7 @@ from pathlib import Path
 
 import fsspec
 
-from robojackson.pipeline.local_folder import TEMPORARY, LocalFolder, sha256_of
+from robojackson.files.local_folder import TEMPORARY, LocalFolder, sha256_of
 
 PUT_IS_ATOMIC = frozenset(("s3", "s3a", "gs", "gcs", "abfs", "az", "memory"))
 """fsspec protocols in which a file is there whole or not at all."""

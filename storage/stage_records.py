@@ -32,7 +32,7 @@ def encode(value: Any) -> bytes:
     Raises:
         TypeError: the value holds something else.
     """
-    return json.dumps(_plain(value)).encode()
+    return json.dumps(_with_tagged_artifacts(value)).encode()
 
 
 def decode(data: bytes | str, store: Store) -> Any:
@@ -62,15 +62,16 @@ def read(store: Store, key: str) -> Any:
     return decode(result, store)
 
 
-def _plain(value: Any) -> Any:
+def _with_tagged_artifacts(value: Any) -> Any:
+    """Return a result for `json.dumps`: each artifact as an object whose only key is ARTIFACT."""
     if isinstance(value, Artifact):
         return {ARTIFACT: asdict(value)}
     if isinstance(value, Mapping):
         if set(value) == {ARTIFACT}:
             raise TypeError(f"a mapping whose only key is {ARTIFACT!r} would read as an artifact")
-        return {str(key): _plain(inner) for key, inner in value.items()}
+        return {str(key): _with_tagged_artifacts(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(inner) for inner in value]
+        return [_with_tagged_artifacts(inner) for inner in value]
     return value
 
 

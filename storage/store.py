@@ -12,9 +12,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from robojackson.errors import StoreError
-from robojackson.pipeline.file_tree import FileTree, digest_of, in_one_line
+from robojackson.files.file_tree import FileTree, digest_of, in_one_line
+from robojackson.files.local_folder import LocalFolder, Place
 from robojackson.pipeline.folder_lock import A_MOMENT, locked
-from robojackson.pipeline.local_folder import LocalFolder, Place
 from storage.artifact import Artifact
 from storage.places import place_at
 

@@ -18,9 +18,10 @@ from typing import TYPE_CHECKING, Any
 import pyarrow as pa
 
 from robojackson.errors import BadTable, StoreError
-from robojackson.pipeline import tables
-from robojackson.pipeline.local_folder import sha256_of
-from robojackson.pipeline.table_schemas import EPISODE_RECORD, EVALUATION_RECORD, TableSchema
+from robojackson.files import tables
+from robojackson.files.local_folder import sha256_of
+from robojackson.files.table_types import TableSchema
+from robojackson.pipeline.table_schemas import EPISODE_RECORD, EVALUATION_RECORD
 from storage.artifact import Artifact
 from storage.store import Store
 
@@ -223,12 +224,13 @@ def _runs(store: Store, study: str | None, runs: Collection[str] | None) -> pa.T
             facts = json.loads(store.read(key))
         except (StoreError, ValueError) as cause:
             raise BadTable(f"{store.address(key)}: not JSON: {cause}") from cause
-        rows.append({name: _plain(value) for name, value in facts.items()})
+        rows.append({name: _as_text(value) for name, value in facts.items()})
     names = dict.fromkeys([*ALWAYS, *(n for row in rows for n in row)])
     return pa.table({n: pa.array([row.get(n) for row in rows], pa.string()) for n in names})
 
 
-def _plain(value: Any) -> str | None:
+def _as_text(value: Any) -> str | None:
+    """Return a value of the provenance for a column of text: text itself, all else as JSON."""
     if value is None or isinstance(value, str):
         return value
     return json.dumps(value, sort_keys=True, default=str)

@@ -8,7 +8,7 @@ from typing import Any
 from robojackson.clips.pose_detector import model_path
 from robojackson.clips.quality.assessment import Assessment, AssessmentConfig
 from robojackson.clips.quality.assessment import assess_video as measure
-from robojackson.pipeline.local_folder import sha256_of_file
+from robojackson.files.local_folder import sha256_of_file
 from storage import artifact_tables
 from storage.artifact import Artifact
 from storage.store import Store

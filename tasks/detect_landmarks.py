@@ -7,8 +7,8 @@ from typing import Any
 from robojackson.clips.people.dancer import DancerConfig
 from robojackson.clips.people.tracked_people import SCOUT
 from robojackson.clips.pose_detector import detect, model_path
+from robojackson.files.local_folder import sha256_of_file
 from robojackson.mocap.landmarks import landmark_pipeline
-from robojackson.pipeline.local_folder import sha256_of_file
 from storage import artifact_tables
 from storage.artifact import Artifact
 from storage.store import Store

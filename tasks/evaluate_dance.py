@@ -2,9 +2,9 @@
 
 import json
 
+from robojackson.files import tables
 from robojackson.motion.reference_motion import ReferenceMotion
-from robojackson.pipeline import tables
-from robojackson.pipeline.table_codecs import Rollout
+from robojackson.motion.rollout import Rollout
 from robojackson.pipeline.table_schemas import EVALUATION_RECORD
 from robojackson.rl.config.train_config import EvaluateConfig
 from robojackson.robot.model import RobotDescription, load_robot

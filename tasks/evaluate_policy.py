@@ -5,11 +5,10 @@ import json
 import os
 import shutil
 import sys
-from dataclasses import asdict
-from typing import Any
 
 import yaml
 
+from robojackson.files.json_types import to_json_types
 from robojackson.pipeline.folder_lock import A_MOMENT, locked
 from robojackson.rl.config.train_config import EvaluateConfig
 from robojackson.robot.model import RobotDescription
@@ -49,7 +48,7 @@ async def evaluate_policy(
         store.local(reference) as motion,
     ):
         settings = work / "evaluate.yaml"
-        settings.write_text(yaml.safe_dump({"evaluate": _plain(config)}))
+        settings.write_text(yaml.safe_dump({"evaluate": to_json_types(config)}))
         words = ["evaluate", learnt, motion, "--out", work, "--config", settings]
         words += ["--parent", os.getpid(), "--json"]
         command = [sys.executable, "-m", "robojackson.cli", *map(str, words)]
@@ -61,7 +60,3 @@ async def evaluate_policy(
         }
         shutil.rmtree(work, ignore_errors=True)
     return kept
-
-
-def _plain(config: EvaluateConfig) -> dict[str, Any]:
-    return dict(json.loads(json.dumps(asdict(config))))

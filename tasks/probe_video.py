@@ -7,7 +7,7 @@ from pathlib import Path
 from robojackson.clips.time_range import span
 from robojackson.clips.trim import trim
 from robojackson.clips.video import VideoInfo, VideoLimits, probe
-from robojackson.pipeline.local_folder import sha256_of_file
+from robojackson.files.local_folder import sha256_of_file
 from storage.artifact import Artifact
 from storage.store import Store
 from tasks.runtime.stage import stage

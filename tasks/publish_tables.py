@@ -9,10 +9,11 @@ from dataclasses import asdict
 from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 from typing import Any
 
 from robojackson.errors import StoreError
+from robojackson.files.json_types import to_json_types
+from robojackson.pipeline.app_folder import app_folder, is_checkout
 from storage import study_tables
 from storage.artifact import Artifact
 from storage.store import Store
@@ -21,7 +22,6 @@ from tasks.study_cell import Cell
 Result = dict[str, Artifact]
 RESULT = "result"
 """Under which the note of a cell keeps its artifacts, keys and digests."""
-CHECKOUT = Path(__file__).parent.parent
 COMMIT = "ROBOJACKSON_COMMIT"
 PACKAGES = (
     "robojackson",
@@ -49,7 +49,7 @@ def publish(cell: Cell, run_id: str, made: Mapping[str, Artifact]) -> Result:
     place = _place(cell, run_id)
     written = {**made, **study_tables.write(store, place, made)}
     noted = study_tables.read_note(store, place)
-    known = {"artifacts": _digests(made), RESULT: _plain(written)}
+    known = {"artifacts": _digests(made), RESULT: to_json_types(written)}
     if {name: noted.get(name) for name in known} != known:
         study_tables.note(store, place, {**provenance(cell, place, made), **known})
     return written
@@ -97,10 +97,6 @@ def _place(cell: Cell, run_id: str) -> study_tables.Place:
     return study_tables.Place(cell.study, cell.move, cell.setup, cell.seed, run_id)
 
 
-def _plain(made: Mapping[str, Artifact]) -> dict[str, dict[str, str]]:
-    return {name: asdict(artifact) for name, artifact in made.items()}
-
-
 def _digests(made: Mapping[str, Artifact]) -> dict[str, str]:
     return {name: artifact.sha256 for name, artifact in sorted(made.items())}
 
@@ -110,7 +106,9 @@ def _commit() -> str:
     """Of the checkout, `-dirty` where files differ from it; without git, as in a container, what
     ROBOJACKSON_COMMIT says.
     """
-    command = ["git", "-C", str(CHECKOUT), "describe", "--always", "--dirty", "--abbrev=40"]
+    if not is_checkout():  # the commit of whoever keeps an environment in a repository is not ours
+        return os.environ.get(COMMIT, "")
+    command = ["git", "-C", str(app_folder()), "describe", "--always", "--dirty", "--abbrev=40"]
     try:
         run = subprocess.run(command, capture_output=True, text=True, timeout=10, check=False)
     except (OSError, subprocess.TimeoutExpired):

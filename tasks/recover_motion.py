@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from typing import Any
 
+from robojackson.files.local_folder import sha256_of_file
 from robojackson.mocap import recover
 from robojackson.mocap.recover import MocapConfig
 from robojackson.motion.landmark_track import LandmarkTrack
-from robojackson.pipeline.local_folder import sha256_of_file
 from storage import artifact_tables
 from storage.artifact import Artifact
 from storage.store import Store

@@ -2,8 +2,8 @@
 
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.rollout import Rollout
 from robojackson.motion.smpl_sequence import SmplSequence
-from robojackson.pipeline.table_codecs import Rollout
 from robojackson.report.video.side_by_side import VideoConfig, side_by_side
 from robojackson.robot.model import RobotDescription, load_robot
 from storage import artifact_tables

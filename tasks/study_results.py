@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from configs.study_config import Study
-from robojackson.metrics import ablation_statistics
+from robojackson.metrics import learning_curve
 from robojackson.rl.config.evaluate_config import TRAINED, VARIANTS
 from storage.study_tables import RunQuery
 
@@ -38,9 +38,7 @@ def learning(ask: RunQuery, study: Study) -> dict[Key, dict[int, dict[str, np.nd
     for (move, setup, seed), rows in _grouped(ask(sql, {"study": study.name})):
         steps = np.array([row["step"] for row in rows], float)
         found.setdefault((move, setup), {})[seed] = {
-            name: ablation_statistics.curve(
-                steps, np.array([row[name] for row in rows], float), grid
-            )
+            name: learning_curve.curve(steps, np.array([row[name] for row in rows], float), grid)
             for name in ("episode_return", "episode_length")
         }
     return found
@@ -53,12 +51,10 @@ def of_learning(curves: Mapping[Key, Seeds], study: Study) -> Figures:
     goal = {move: _goal(curves, move) for move in study.moves}
     return {
         "final_return": _each(curves, lambda key, seed: seed["episode_return"][-last:].mean()),
-        "area": _each(curves, lambda key, seed: ablation_statistics.area(seed["episode_return"])),
+        "area": _each(curves, lambda key, seed: learning_curve.area(seed["episode_return"])),
         "steps_to": _each(
             curves,
-            lambda key, seed: ablation_statistics.steps_to(
-                grid, seed["episode_length"], goal[key[0]]
-            ),
+            lambda key, seed: learning_curve.steps_to(grid, seed["episode_length"], goal[key[0]]),
         ),
     }
 

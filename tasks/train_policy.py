@@ -11,14 +11,15 @@ import shutil
 import sys
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import yaml
 
+from robojackson.files.json_types import to_json_types
+from robojackson.files.local_folder import sha256_of_file
 from robojackson.pipeline.folder_lock import A_MOMENT, locked
-from robojackson.pipeline.local_folder import sha256_of_file
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.pretrained import start_file
 from robojackson.robot.model import RobotDescription
@@ -132,7 +133,7 @@ def _command(
     minutes: float | None,
 ) -> list[str]:
     setup = work / f"{labels.setup}.yaml"
-    setup.write_text(yaml.safe_dump(json.loads(json.dumps(asdict(config)))))
+    setup.write_text(yaml.safe_dump(to_json_types(config)))
     options = {
         "--out": work,
         "--setup": setup,

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from robojackson.clips.quality.stability import Stability
 from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.rollout import Rollout
 from robojackson.motion.smpl_sequence import SmplSequence
-from robojackson.pipeline.table_codecs import Rollout
 from robojackson.pipeline.table_schemas import EPISODE_RECORD, EVALUATION_RECORD
 from storage import artifact_tables
 from storage.artifact import Artifact

@@ -4,10 +4,7 @@ Drawing takes seconds, so it is done again only when the rows, or the code that 
 others.
 """
 
-import csv
-import io
 import json
-import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
@@ -16,9 +13,11 @@ import numpy as np
 
 from configs.study_config import Move, Study
 from robojackson.errors import RoboJacksonError
+from robojackson.files.json_types import to_json_types
 from robojackson.metrics import ablation_statistics
-from robojackson.report.pages import study_page
+from robojackson.report.pages import study_page, study_table
 from robojackson.report.pages.run_page import Plot
+from robojackson.report.pages.study_figures import curve_plots, evaluation_plots
 from robojackson.rl.pretrained import pretrained
 from storage import study_tables
 from storage.artifact import Artifact
@@ -27,9 +26,6 @@ from tasks.runtime.code_digest import digest, template_digests
 from tasks.runtime.stage import stage
 from tasks.study_results import (
     EVALUATED,
-    Figures,
-    Key,
-    Seeds,
     grid_of,
     learning,
     of_baselines,
@@ -91,8 +87,8 @@ def report(
     walking = {name: move.walking for name, move in moves.items()}
     claims = ablation_statistics.claims(figures[PRIMARY], walking, rng)
     compared = ablation_statistics.comparisons(figures[PRIMARY], study.moves, rng)
-    lines = table(figures, baselines, study, rng)
-    plots = _plots(curves, figures, baselines, study)
+    lines = study_table.table(figures, baselines, study.moves, study.setups, rng)
+    evaluated = {name: figures[name] for name in EVALUATED}
     content = study_page.StudyContent(
         title=study.name,
         facts=facts,
@@ -101,88 +97,18 @@ def report(
         comparisons=compared,
         reward_audits=reward_audits or {},
         moves=[_picture(name, moves[name], png) for name, png in (pictures or {}).items()],
-        curves=plots["curves"],
-        evaluation_plots=plots["evaluations"],
+        curves=curve_plots(curves, grid_of(study), study.moves, study.setups),
+        evaluation_plots=evaluation_plots(evaluated, baselines, study.moves, study.setups),
         notes=notes,
     )
     folder = f"{FOLDER}/{study.name}"
     made = {
         "page": store.put(f"{folder}/index.html", study_page.render(content).encode()),
-        "table": store.put(f"{folder}/table.csv", _csv(lines)),
+        "table": store.put(f"{folder}/table.csv", study_table.to_csv(lines)),
         "results": store.put(f"{folder}/results.json", _json(claims, compared, lines)),
     }
     for plot in (*content.curves, *content.evaluation_plots, *content.moves):
         made[plot.title] = store.put(f"{folder}/{_file(plot.title)}.png", plot.png)
-    return made
-
-
-def table(
-    figures: Figures,
-    baselines: Mapping[str, Mapping[str, Mapping[str, float]]],
-    study: Study,
-    rng: np.random.Generator,
-) -> list[study_page.Line]:
-    """Table II: a line a setup and move, then what the baselines do."""
-    lines = []
-    for move in study.moves:
-        for setup in study.setups:
-            seeds = {name: by_key.get((move, setup), {}) for name, by_key in figures.items()}
-            values = {
-                name: ablation_statistics.estimate(list(by_seed.values()), rng)
-                for name, by_seed in seeds.items()
-            }
-            count = max((len(by_seed) for by_seed in seeds.values()), default=0)
-            lines.append(study_page.Line(move, setup, count, values))
-        for policy, known in baselines.get(move, {}).items():
-            values = {
-                n: ablation_statistics.Estimate(v, np.nan, np.nan, 1) for n, v in known.items()
-            }
-            lines.append(study_page.Line(move, policy, 0, values, baseline=True))
-    return lines
-
-
-def _plots(
-    curves: Mapping[Key, Seeds],
-    figures: Figures,
-    baselines: Mapping[str, Mapping[str, Mapping[str, float]]],
-    study: Study,
-) -> dict[str, list[Plot]]:
-    from robojackson.report.plots.run_plots import png  # matplotlib: only when something is drawn
-    from robojackson.report.plots.study_plots import Curves, evaluation_plot, learning_curves
-
-    grid = grid_of(study)
-    middle = (grid[1:] + grid[:-1]) / 2
-    made: dict[str, list[Plot]] = {"curves": [], "evaluations": []}
-    for move in study.moves:
-        drawn: dict[str, Curves] = {
-            setup: Curves(
-                middle,
-                np.array([seed["episode_return"] for seed in curves[move, setup].values()]),
-                np.array([seed["episode_length"] for seed in curves[move, setup].values()]),
-            )
-            for setup in study.setups
-            if (move, setup) in curves
-        }
-        if drawn:
-            told = "Training episodes: return, bonuses in, and length. Mean and range over seeds."
-            made["curves"].append(Plot(f"Learning {move}", told, png(learning_curves(drawn))))
-    for name in EVALUATED:
-        by_move: dict[str, dict[str, list[float]]] = {
-            move: {
-                setup: list(figures[name].get((move, setup), {}).values()) for setup in study.setups
-            }
-            for move in study.moves
-        }
-        lines = {
-            move: {p: known[name] for p, known in found.items() if name in known}
-            for move, found in baselines.items()
-        }
-        if any(values for setups in by_move.values() for values in setups.values()):
-            title, _, _ = study_page.FIGURES[name]
-            told = "A dot a seed, the bar their mean; lines are policies that learnt nothing."
-            made["evaluations"].append(
-                Plot(title, told, png(evaluation_plot(by_move, lines, title)))
-            )
     return made
 
 
@@ -238,18 +164,6 @@ def _picture(name: str, move: Move, png: bytes) -> Plot:
     return Plot(f"{name}{stands}", told, png)
 
 
-def _csv(lines: Sequence[study_page.Line]) -> bytes:
-    out = io.StringIO()
-    rows = csv.writer(out)
-    parts = [f"{name}{part}" for name in study_page.FIGURES for part in ("", "_low", "_high")]
-    rows.writerow(["move", "setup", "seeds", *parts])
-    for line in lines:
-        found = [line.values.get(name) for name in study_page.FIGURES]
-        flat = [v for e in found for v in ((e.mean, e.low, e.high) if e else ("", "", ""))]
-        rows.writerow([line.move, line.setup, line.seeds, *flat])
-    return out.getvalue().encode()
-
-
 def _json(
     claims: Sequence[ablation_statistics.Claim],
     compared: Sequence[ablation_statistics.Comparison],
@@ -261,16 +175,7 @@ def _json(
         "comparisons": [asdict(comparison) for comparison in compared],
         "lines": [asdict(line) for line in lines],
     }
-    return json.dumps(_plain(told), indent=1, allow_nan=False).encode()
-
-
-def _plain(value: Any) -> Any:
-    """The same for JSON, which has no words for what is not finite."""
-    if isinstance(value, Mapping):
-        return {name: _plain(inner) for name, inner in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(inner) for inner in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    return json.dumps(to_json_types(told), indent=1, allow_nan=False).encode()
 
 
 def _file(title: str) -> str:

@@ -9,7 +9,7 @@ set -eu
 cd "$(dirname "$0")/.."
 VENV=.venv
 STAMP=$VENV/.stamp
-EXTRAS=${EXTRAS:-fast,s3,dev}
+EXTRAS=${EXTRAS:-app,fast,s3,dev}
 
 is_python() { "$1" -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' 2>/dev/null; }
 has_venv() { "$1" -c 'import venv, ensurepip' 2>/dev/null; }

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.learning.policies import MOVES, Folders, Move, forced
-from robojackson.metrics.ablation_statistics import estimate
-from robojackson.pipeline import tables
+from robojackson.files import tables
+from robojackson.metrics.seed_statistics import estimate
 from robojackson.pipeline.table_schemas import EVALUATION_RECORD
 
 Rows = list[dict[str, Any]]

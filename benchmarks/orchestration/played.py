@@ -14,7 +14,7 @@ from unittest.mock import patch
 from prefect import flow
 
 from flows import ablation, cells
-from robojackson.pipeline import tables
+from robojackson.files import tables
 from robojackson.pipeline.table_schemas import EPISODE_RECORD, EVALUATION_RECORD
 from storage.artifact import Artifact
 from storage.store import Store

@@ -4,8 +4,9 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -58,7 +59,7 @@ def backup(
         f"{made.copied:,} files, {made.copied_mb:,.1f} MB copied",
         f"database  {made.database or f'none at {database.address}'}",
     ]
-    return CommandResult(_plain(made), text=text)
+    return CommandResult(asdict(made), text=text)
 
 
 @command
@@ -72,7 +73,7 @@ def restore(
 ) -> CommandResult:
     """Verify a backup, then write it into an empty store and an empty database."""
     from storage.backup import Backups
-    from storage.store_backup import restore as write
+    from storage.store_restore import restore as write
 
     store, database = _source()
     with _progress() as report:
@@ -83,7 +84,7 @@ def restore(
     ]
     if made.others:
         text.append(f"others    {made.others:,} files that the backup does not have stay")
-    return CommandResult(_plain(made), text=text)
+    return CommandResult(asdict(made), text=text)
 
 
 def _source() -> tuple["Store", "Database"]:
@@ -112,10 +113,6 @@ def _require_known(database: "Database") -> None:
             f"the database of the server of PREFECT_API_URL is not {database.address}; set "
             f"{VARIABLES[0]}, or unset PREFECT_API_URL to copy the store alone"
         )
-
-
-def _plain(made: Any) -> dict[str, Any]:
-    return dict(vars(made))
 
 
 @contextmanager

@@ -9,7 +9,6 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from copy import deepcopy
-from pathlib import Path
 from typing import Any
 
 import yaml
@@ -23,10 +22,10 @@ from prefect.workers.process import ProcessWorker
 from flows.runtime.environment import HEARTBEAT, HEARTBEAT_S
 from flows.runtime.prefect_server import answering, await_server
 from robojackson.errors import DeploymentFailed
+from robojackson.pipeline.app_folder import app_folder
+from robojackson.pipeline.yaml_loader import find
 from storage.store import Store
 
-ROOT = Path(__file__).parents[2]
-AUTOMATIONS = ROOT / "configs" / "automations.yaml"
 POOLS = {
     "flows": "Parents: refresh, dance, ablation. They wait more than they work.",
     "training": "Cells of an ablation and trainings: one at a time and core.",
@@ -80,7 +79,8 @@ def automations() -> list[dict[str, Any]]:
             f"{SILENCE}={wanted!r}: whole seconds, {SHORTEST_S} at least; runs say every "
             f"{HEARTBEAT_S} s that they live"
         )
-    return [_with_silence(facts, int(wanted)) for facts in yaml.safe_load(AUTOMATIONS.read_text())]
+    shipped = yaml.safe_load(find("automations").read_text())
+    return [_with_silence(facts, int(wanted)) for facts in shipped]
 
 
 def _with_silence(facts: dict[str, Any], silence_s: int) -> dict[str, Any]:
@@ -132,9 +132,9 @@ async def _automation(facts: Mapping[str, Any]) -> str:
 def _register() -> list[str]:
     """prefect.yaml by Prefect's own command, from the folder it stands in."""
     command = [sys.executable, "-m", "prefect", "--no-prompt", "deploy", "--all"]
-    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    run = subprocess.run(command, cwd=app_folder(), capture_output=True, text=True, check=False)
     if run.returncode:
         said = (run.stdout + run.stderr).strip().splitlines()
         raise DeploymentFailed(f"prefect deploy failed: {said[-1] if said else 'without a word'}")
-    entries = yaml.safe_load((ROOT / "prefect.yaml").read_text())["deployments"]
+    entries = yaml.safe_load((app_folder() / "prefect.yaml").read_text())["deployments"]
     return [f"{entry['entrypoint'].rsplit('.', 1)[1]}/{entry['name']}" for entry in entries]

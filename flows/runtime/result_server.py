@@ -26,7 +26,7 @@ from starlette.types import ASGIApp
 from flows.runtime.run_artifacts import OPEN_FOLDERS, RESULTS
 from flows.runtime.sqlite_writers import queued_writers
 from robojackson.errors import DeploymentFailed, StoreError
-from robojackson.pipeline.local_folder import LocalFolder
+from robojackson.files.local_folder import LocalFolder
 from storage.store import Store
 
 ISOLATED = {

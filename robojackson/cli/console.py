@@ -3,31 +3,34 @@
 import functools
 import json
 import logging
-import math
 import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, is_dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ParamSpec
 
-import numpy as np
 import typer
 from pydantic import ValidationError
 
+from robojackson.api.progress_bar import bar as bar
 from robojackson.cli.lifetime.interruption import INTERRUPTED, conclude
 from robojackson.cli.lifetime.interruption import complain as complain
 from robojackson.cli.lifetime.interruption import same_command as same_command
-from robojackson.cli.progress_bar import bar as bar
 from robojackson.errors import RoboJacksonError, StoreError
+from robojackson.files.json_types import to_json_types as to_json_types
 
 P = ParamSpec("P")
 SECONDS_BETWEEN_LINES = 15.0
 """Of progress, where every line stays."""
 USAGE_ERROR: Any = typer.BadParameter.__bases__[0]
 """What typer raises for words that it does not understand; it has no public name there."""
+
+APP_PACKAGES = ("prefect", "fastapi", "sqlalchemy", "yt_dlp")
+"""What the extra `app` brings: without it the commands of one stage work and the others do not."""
+INSTALL_APP = "pip install 'robojackson[app]'"
 
 log = logging.getLogger("robojackson")
 
@@ -65,6 +68,10 @@ def command(body: Callable[P, CommandResult]) -> Callable[P, None]:
                 answer = body(*args, **kwargs)
         except RoboJacksonError as cause:
             _leave(1, f"{type(cause).__name__}: {cause}")
+        except ModuleNotFoundError as cause:
+            if (cause.name or "").partition(".")[0] not in APP_PACKAGES:
+                raise
+            _leave(1, f"MissingDependency: {cause.name} is not installed: {INSTALL_APP}")
         except OSError as cause:
             _leave(1, f"StoreError: {cause}")
         except Interrupted as cause:
@@ -121,21 +128,6 @@ def table(rows: Mapping[str, Mapping[str, Any]], columns: Sequence[str]) -> list
         "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
         for line in cells
     ]
-
-
-def to_json_types(value: Any) -> Any:
-    """The same in JSON's types; NaN and infinity are null."""
-    if is_dataclass(value) and not isinstance(value, type):
-        return to_json_types(asdict(value))
-    if isinstance(value, Mapping):
-        return {str(key): to_json_types(inner) for key, inner in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
-        return to_json_types(value.tolist())
-    if isinstance(value, list | tuple):
-        return [to_json_types(inner) for inner in value]
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value if value is None or isinstance(value, str | int | bool) else str(value)
 
 
 def log_to_stderr() -> None:

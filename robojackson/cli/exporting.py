@@ -3,23 +3,15 @@
 What the file holds decides which formats fit: a robot's motion, a person's motion or a policy.
 """
 
-import io
 import time
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
-import pyarrow as pa
-import pyarrow.parquet as pq
-
-from robojackson.cli import stages
-from robojackson.errors import BadTable, StoreError, UnknownName
+from robojackson.files.table_file import require_file
 from robojackson.formats import registry
-from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
-from robojackson.pipeline.file_tree import FileTree
 
-Exporter = TypeVar("Exporter")
 POLICY_SUFFIX = ".safetensors"
 
 
@@ -33,19 +25,27 @@ def export(source: Path, to: str, out: Path) -> dict[str, Any]:
         MissingDependency: the package that writes the format is not installed.
         StoreError: the file cannot be read, or the result not written.
     """
+    from robojackson.api.motions import read_motion, require_another, write_motion
+
     began = time.monotonic()
-    _require_another(source, out)
-    stages.require_file(source)
+    require_another(source, out)
+    require_file(source)
+    about: dict[str, Any]
     if source.suffix == POLICY_SUFFIX:
-        content, about = _policy(source, to)
-    elif holds_a_person(source):
-        content, about = _person(source, to)
+        from robojackson.api.foreign_files import write_policy
+        from robojackson.rl.policy import load_policy
+
+        policy = load_policy(source)
+        write_policy(policy, out, to)
+        about = {"observations": policy.observation_size, "actions": policy.action_size}
     else:
-        content, about = _robot(source, to)
-    files = FileTree(out.parent)
-    files.require_writable()
-    files.write(out.name, content)
-    figures = {"file": str(out), "format": to, **about, "bytes": len(content)}
+        motion = read_motion(source)
+        write_motion(motion, out, to)
+        if isinstance(motion, SmplSequence):
+            about = {"frames": len(motion), "fps": motion.fps}
+        else:
+            about = {"robot": motion.robot, "steps": len(motion)}
+    figures = {"file": str(out), "format": to, **about, "bytes": out.stat().st_size}
     return figures | {"seconds": time.monotonic() - began}
 
 
@@ -57,49 +57,3 @@ def names() -> list[str]:
         "a policy": registry.policy_exporters(),
     }
     return [f"{kind}: {', '.join(sorted(found))}" for kind, found in kinds.items()]
-
-
-def _policy(source: Path, to: str) -> tuple[bytes, dict[str, Any]]:
-    from robojackson.rl.policy import load_policy
-
-    exporter = _fitting(to, registry.policy_exporters(), source, "a policy")
-    policy = load_policy(source)
-    sizes = {"observations": policy.observation_size, "actions": len(policy.layers[-1][1])}
-    return exporter.write(policy), sizes
-
-
-def _person(source: Path, to: str) -> tuple[bytes, dict[str, Any]]:
-    exporter = _fitting(to, registry.person_exporters(), source, "a person's motion")
-    motion = stages.read_table(SmplSequence, source)
-    return exporter.write(motion), {"frames": len(motion), "fps": motion.fps}
-
-
-def _robot(source: Path, to: str) -> tuple[bytes, dict[str, Any]]:
-    exporter = _fitting(to, registry.robot_exporters(), source, "a robot's motion")
-    motion = stages.read_table(ReferenceMotion, source)
-    content = exporter.write(motion, stages.robot_of(motion).model)
-    return content, {"robot": motion.robot, "steps": len(motion)}
-
-
-def holds_a_person(source: Path) -> bool:
-    """Whether a table has SMPL's columns.
-
-    Raises:
-        BadTable: it is no Parquet file.
-    """
-    try:
-        return "global_orient" in pq.read_schema(io.BytesIO(source.read_bytes())).names
-    except pa.ArrowInvalid as cause:
-        raise BadTable(f"{source}: not a Parquet file ({cause})") from cause
-
-
-def _require_another(source: Path, out: Path) -> None:
-    if out.exists() and source.exists() and out.samefile(source):
-        raise StoreError(f"{out}: is the motion itself; write the result to another file")
-
-
-def _fitting(to: str, known: Mapping[str, Exporter], source: Path, what: str) -> Exporter:
-    """Return the exporter of that name, of those that write what the file holds."""
-    if to not in known:
-        raise UnknownName("format", to, f"--to; {source} holds {what}", known)
-    return known[to]

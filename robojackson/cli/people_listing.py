@@ -5,7 +5,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from robojackson.cli import console, stages
+from robojackson.cli import console
+from robojackson.files.file_tree import results_in
 from robojackson.pipeline.yaml_loader import load
 
 PICTURE = "people.png"
@@ -27,7 +28,7 @@ def list_people(
 
     settings = load(PipelineConfig, config, overrides)
     info = probe(video, settings.video)
-    with stages.results_in(out) as files:
+    with results_in(out) as files:
         with console.bar(f"people of {video.name}") as progress:
             who = settings.dancer
             cast = track_people(video, info, who.detection, who.identity, progress)

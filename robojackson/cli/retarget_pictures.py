@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from robojackson.cli import console, stages
-from robojackson.pipeline.file_tree import FileTree
+from robojackson.files.file_tree import FileTree
 from robojackson.pipeline.yaml_loader import load
 
 VIDEO, CONTACTS, TORQUES = "retarget.mp4", "contacts.png", "torques.png"
@@ -20,17 +19,18 @@ def draw_retargeting(
     Raises:
         MissingDependency: no way to draw without a screen.
     """
+    from robojackson.api.arguments import robot_of
+    from robojackson.api.evaluation import render_video
     from robojackson.motion.reference_motion import ReferenceMotion
     from robojackson.motion.smpl_sequence import SmplSequence
     from robojackson.pipeline.pipeline_config import PipelineConfig
     from robojackson.report.plots import run_plots
     from robojackson.report.plots.feasibility_plot import feasibility_strip
-    from robojackson.report.video.retarget_video import human_beside_robot
 
     settings = load(PipelineConfig, config, overrides)
-    sequence = stages.read_table(SmplSequence, smpl)
-    reference = stages.read_table(ReferenceMotion, out / "reference.parquet")
-    robot = stages.robot_of(reference)
+    sequence = SmplSequence.load(smpl)
+    reference = ReferenceMotion.load(out / "reference.parquet")
+    robot = robot_of(reference)
     motors = [name for name, moved in zip(robot.joint_names, robot.actuated, strict=True) if moved]
     files = FileTree(out)
     files.write(CONTACTS, run_plots.png(run_plots.contact_strip(sequence, reference)))
@@ -39,9 +39,7 @@ def draw_retargeting(
     if reference.certificate is not None:
         files.write(FEASIBILITY, run_plots.png(feasibility_strip(reference)))
         drawn["feasibility"] = str(out / FEASIBILITY)
-    with console.bar("video") as progress:
-        human_beside_robot(
-            sequence, reference, out / VIDEO, model=robot.model, config=settings.render,
-            progress=progress,
-        )  # fmt: skip
+    render_video(
+        out / VIDEO, reference, motion=sequence, robot=robot, config=settings.render, progress=True
+    )
     return {"video": str(out / VIDEO), **drawn}

@@ -18,7 +18,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from robojackson.errors import BadConfiguration, DownloadFailed, RoboJacksonError, StoreError
-from robojackson.pipeline.local_folder import sha256_of_file
+from robojackson.files.local_folder import sha256_of_file
 from robojackson.pipeline.robot_descriptions import describe_robot, robot_names
 from robojackson.robot.description import RobotDescription, RobotSource
 from robojackson.robot.mjcf import mjcf_path, robots_folder

@@ -1,5 +1,6 @@
 """Where a command starts: nothing heavy is imported before Ctrl-C is guarded."""
 
+import os
 import sys
 from collections.abc import Callable
 from typing import NoReturn
@@ -11,9 +12,14 @@ from robojackson.cli.lifetime.supervisor import guarded
 def start(command: Callable[[], int]) -> NoReturn:
     """Run a command under a supervisor and end the process with its exit code.
 
+    Where MUJOCO_GL is not set, MuJoCo imports no window library (GLFW starts a process to look for
+    its own, which Ctrl-C would end with a traceback); `report.video` brings its own context.
+
     Args:
         command: Imports what it needs inside itself; returns the exit code.
     """
+    if sys.platform == "linux":
+        os.environ.setdefault("MUJOCO_GL", "disable")
     sys.exit(guarded(lambda: _run(command)))
 
 

@@ -8,40 +8,19 @@ import json
 import math
 import os
 import signal
-import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from robojackson.cli import console, stages
+from robojackson.cli import console
 from robojackson.cli.lifetime.interruption import STOPS, UnsavedFlag, is_guarded
-from robojackson.cli.lifetime.orphans import end_with_parent
-from robojackson.pipeline.file_tree import FileTree
-from robojackson.pipeline.folder_lock import locked
-from robojackson.pipeline.record_log import RecordLog
-from robojackson.pipeline.table_schemas import EPISODE_RECORD
+from robojackson.cli.lifetime.parent_death import end_with_parent
 from robojackson.pipeline.yaml_loader import load
-
-if TYPE_CHECKING:
-    from robojackson.rl.config.train_config import TrainConfig
 
 PROGRESS = "progress.json"
 """How far a training is, in its folder."""
-DEFAULT_MINUTES = 9.0
-"""Wall time of a training for which no budget is given."""
-SETUPS = {
-    (False, False): "scratch",
-    (True, False): "pretrain",
-    (True, True): "curiosity",
-    (False, True): "scratch-curiosity",
-}
-"""What a configuration is called that no file gave: by whether it starts from networks, and whether
-curiosity is paid."""
-SAVE_SECONDS = 20.0
-"""Between two writes of the table of episodes."""
 
 
 def train(
@@ -62,59 +41,41 @@ def train(
         Interrupted: Ctrl-C or SIGTERM, after a checkpoint was written.
         RejectedReference: the motion's own score card says that the robot cannot follow it.
     """
-    from robojackson.motion.reference_motion import ReferenceMotion
-    from robojackson.retarget.scorecard_gate import check, scorecard_record
+    from robojackson.api.policy_training import setup_file, train_policy
+    from robojackson.rl.checkpoint_folder import newest_checkpoint
     from robojackson.rl.config.train_config import TrainConfig
-    from robojackson.rl.evaluation.reward_audit import audit_both_readings, audit_record
-    from robojackson.rl.modes.paper_mode import require_trainable
-    from robojackson.rl.training import Hooks, train_policy
-    from robojackson.rl.training_run import newest_checkpoint
+    from robojackson.rl.training_hooks import Hooks
 
-    config = _with_budget(load(TrainConfig, _setup(setup), overrides))
-    motion = stages.read_table(ReferenceMotion, reference)
-    robot = stages.robot_of(motion)
-    require_trainable(robot)
-    if not force:
-        check(scorecard_record(motion))
+    config = load(TrainConfig, setup_file(setup), overrides)
     stop = _StopRequest(out)
-    common = _common(config, move or stages.move_of(reference), setup, run_id)
-    with (
-        stop.listening(),
-        stages.results_in(out) as files,
-        locked(out),
-        console.ticker() as tell,
-    ):
-        rows = _EpisodeLog(files, common, resumes=newest_checkpoint(out) is not None)
+    with stop.listening(), console.ticker() as tell:
+        hooks = Hooks(
+            progress=partial(_report_progress, out=out, tell=tell),
+            on_learning=stop.mark_unsaved,
+            stop=stop,
+            audited=lambda audit: tell(format_reward_audit(audit)) if audit else None,
+        )
         try:
-            asked = audit_record(audit_both_readings(robot, motion, config.environment))
-            if asked:
-                tell(format_reward_audit(asked))
-            told_of = partial(_report_progress, out=out, tell=tell)
-            hooks = Hooks(
-                told_of, rows.add, stop.mark_unsaved, rows.save, stop, setup=common["setup"]
-            )
-            result = train_policy(motion, robot, config, out, hooks)
+            trained = train_policy(
+                reference, config=config, setup=setup, out=out, move=move, run_id=run_id,
+                force=force, hooks=hooks,
+            )  # fmt: skip
         except KeyboardInterrupt:
             there = newest_checkpoint(out)
             kept = f"the checkpoint is in {out}; resume" if there else "nothing learnt yet; again"
             raise console.Interrupted(f"{kept}: {console.same_command()}") from None
-        finally:
-            if len(rows):
-                rows.save()
-        if not len(rows):
-            rows.save()
     return {
-        "policy": str(result.policy),
+        "policy": str(out / "policy.safetensors"),
         "reference": str(reference),
         "mode": config.mode,
         "trainer": config.trainer,
         "seed": config.seed,
-        "reward_audit": asked,
-        "steps": result.steps,
-        "updates": result.updates,
-        "seconds": result.seconds,
-        "stopped": result.stopped,
-        "episodes": len(rows),
+        "reward_audit": trained.reward_audit,
+        "steps": trained.steps,
+        "updates": trained.updates,
+        "seconds": trained.seconds,
+        "stopped": trained.stopped,
+        "episodes": len(trained.episodes),
     }
 
 
@@ -199,40 +160,3 @@ class _StopRequest:
             os.write(2, f"stopping after this round of updates{checkpoint}\n".encode())
         elif not is_guarded():
             raise KeyboardInterrupt
-
-
-class _EpisodeLog:
-    """episodes.parquet, written now and then while rows come in."""
-
-    def __init__(self, files: FileTree, common: Mapping[str, Any], resumes: bool) -> None:
-        self._log = RecordLog(files, "episodes.parquet", EPISODE_RECORD, common, resumes)
-        self._saved = time.monotonic()
-
-    def __len__(self) -> int:
-        return len(self._log)
-
-    def add(self, rows: list[dict[str, float]]) -> None:
-        self._log.append(rows)
-        if time.monotonic() - self._saved > SAVE_SECONDS:
-            self.save()
-
-    def save(self) -> None:
-        self._log.save()
-        self._saved = time.monotonic()
-
-
-def _setup(name: str | None) -> str | None:
-    """A bare name is one of configs/setups."""
-    bare = name is not None and not {"/", "."} & set(name)
-    return f"setups/{name}" if bare else name
-
-
-def _with_budget(config: "TrainConfig") -> "TrainConfig":
-    """With the usual wall time where nothing ends the training."""
-    return config if config.has_budget else replace(config, minutes=DEFAULT_MINUTES)
-
-
-def _common(config: "TrainConfig", move: str, setup: str | None, run_id: str) -> dict[str, Any]:
-    usual = SETUPS[config.start != "scratch", config.curiosity != "off"]
-    labels = stages.labels_of(move, Path(setup).stem if setup else usual, config.seed)
-    return labels | ({"run_id": run_id} if run_id else {})

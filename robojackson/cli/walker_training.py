@@ -15,7 +15,8 @@ import numpy as np
 
 from robojackson.cli import stages, training_process
 from robojackson.errors import BadConfiguration
-from robojackson.pipeline import tables
+from robojackson.files import tables
+from robojackson.files.file_tree import results_in
 from robojackson.pipeline.bundled_clips import bundled
 from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.pipeline.yaml_loader import load
@@ -105,7 +106,7 @@ def _reference(kind: str, out: Path, robot: "Robot") -> Path:
     from robojackson.rl.modes.standing_motion import make_standing_motion
 
     if kind == "paper":
-        with stages.results_in(out) as files:
+        with results_in(out) as files:
             files.write(STANDING, tables.encode(make_standing_motion(robot)))
         return out / STANDING
     folder = out / Path(WALK).stem  # not among what the user may keep in `out`

@@ -4,8 +4,10 @@ PyAV reads the container itself, so a rotation tag is honoured and a file that e
 says so is told apart from one that never was a video. Times in seconds, sizes in upright pixels.
 """
 
+import json
 from collections.abc import Iterator
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 
 import av
@@ -28,6 +30,8 @@ from robojackson.errors import (
     UnreadableVideo,
     VideoTooLong,
 )
+from robojackson.files.file_tree import FileTree
+from robojackson.files.json_types import to_json_types
 from robojackson.motion.landmark_track import uneven
 
 SUFFIXES = (".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi", ".gif")
@@ -73,6 +77,20 @@ class VideoInfo:
     duration_s: float
     rotation: int
     uneven: bool = False
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write the figures as JSON.
+
+        Returns:
+            The path.
+
+        Raises:
+            StoreError: the file cannot be written.
+        """
+        file = Path(path)
+        content = json.dumps(to_json_types(self), indent=1).encode()
+        FileTree(file.parent).write(file.name, content)
+        return file
 
 
 def list_videos(source: Path) -> tuple[Path, ...]:

@@ -5,13 +5,30 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
+from robojackson.files.table_file import Columns, Facts, TableFile, numbered
+from robojackson.files.table_types import F32, F64, I32, Column, TableSchema
+
 LANDMARKS = 33
+ARRAYS = ("landmarks", "world_landmarks", "visibility")
 EVEN = 0.25
 """Frames that are off their place on an even grid by no more than this are evenly spaced."""
 
+LANDMARK_TRACK = TableSchema(
+    "LandmarkTrack",
+    "frame",
+    (
+        Column("frame", I32),
+        Column("time_s", F64, "s"),
+        Column("landmarks", F32, "1", "image, divided by width and height", 99, nullable=True),
+        Column("world_landmarks", F32, "m", "hips: x right, y down, z away", 99, nullable=True),
+        Column("visibility", F32, "1", width=33, nullable=True),
+    ),
+    ("fps", "width", "height"),
+)
 
-@dataclass(frozen=True)
-class LandmarkTrack:
+
+@dataclass(frozen=True, repr=False)
+class LandmarkTrack(TableFile):
     """BlazePose landmarks of one person through a clip.
 
     Attributes:
@@ -27,6 +44,8 @@ class LandmarkTrack:
             where it stood.
     """
 
+    SCHEMA = LANDMARK_TRACK
+
     fps: float
     width: int
     height: int
@@ -41,6 +60,13 @@ class LandmarkTrack:
     def __len__(self) -> int:
         return len(self.landmarks)
 
+    def __repr__(self) -> str:
+        seen = f"{int(self.detected.sum())} of {len(self)} frames"
+        return (
+            f"LandmarkTrack({seen} at {self.fps:g} fps, {self.width} x {self.height} px, "
+            f"person={self.person})"
+        )
+
     @property
     def detected(self) -> np.ndarray:
         """True in frames where a person was found, shape (T,)."""
@@ -50,6 +76,32 @@ class LandmarkTrack:
     def times(self) -> Float[np.ndarray, " T"]:
         """When each frame was taken, seconds since the first."""
         return np.arange(len(self)) / self.fps if self.time_s is None else self.time_s
+
+    def to_columns(self) -> tuple[Columns, Facts]:
+        columns = numbered("frame", len(self), 1.0 / self.fps) | {"time_s": self.times}
+        columns |= {name: getattr(self, name) for name in ARRAYS}
+        facts = {
+            name: getattr(self, name) for name in ("fps", "width", "height", "person", "notes")
+        }
+        if self.to_first is not None:
+            facts["to_first"] = self.to_first.tolist()
+        return columns, facts
+
+    @classmethod
+    def from_columns(cls, columns: Columns, facts: Facts) -> "LandmarkTrack":
+        time_s, fps = columns["time_s"], float(facts["fps"])
+        return cls(
+            fps=fps,
+            width=int(facts["width"]),
+            height=int(facts["height"]),
+            landmarks=columns["landmarks"].reshape(-1, LANDMARKS, 3),
+            world_landmarks=columns["world_landmarks"].reshape(-1, LANDMARKS, 3),
+            visibility=columns["visibility"],
+            time_s=time_s if uneven(time_s, fps) else None,
+            person=int(facts.get("person", 0)),
+            notes=tuple(facts.get("notes", ())),
+            to_first=np.array(facts["to_first"]) if "to_first" in facts else None,
+        )
 
     def nearest(self, time_s: float) -> int:
         """The frame that was taken next to a time, seconds since the first."""

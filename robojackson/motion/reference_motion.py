@@ -5,16 +5,50 @@ World frame: x forward, y left, z up, metres, the floor at z = 0; quaternions wx
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from robojackson.motion.certificate import Certificate
+from robojackson.files.table_file import Columns, Facts, TableFile, json_facts, numbered
+from robojackson.files.table_types import F32, F64, I32, STATE, WORLD, Column, TableSchema
+from robojackson.motion.certificate import Certificate, Finding
+
+ARRAYS = ("qpos", "qvel", "body_pos_w", "keypoints_w", "contact", "torque_ratio")
+NAMES = ("joint_names", "body_names", "keypoint_names", "contact_names")
+REFERENCE_MOTION = TableSchema(
+    "ReferenceMotion",
+    "step",
+    (
+        Column("step", I32),
+        Column("time_s", F64, "s"),
+        # Not rounded to f32: a joint at its limit would end up beyond it.
+        Column("qpos", F64, "m, wxyz, rad", WORLD, None),
+        Column("qvel", F64, "m/s, rad/s", "root linear: world; root angular: body", None),
+        Column("body_pos_w", F32, "m", WORLD, None),
+        Column("keypoints_w", F32, "m", WORLD, None),
+        Column("contact", STATE, "0 air, 1 planted, 2 sliding", width=None),
+        Column("torque_ratio", F32, "1", width=None),
+        Column("source_time_s", F64, "s"),
+    ),
+    (
+        "robot",
+        "model_sha256",
+        "dt",
+        "cyclic",
+        "cycle_offset",
+        "joint_names",
+        "body_names",
+        "keypoint_names",
+        "contact_names",
+        "scorecard",
+    ),
+)
 
 
-@dataclass(frozen=True)
-class ReferenceMotion:
+@dataclass(frozen=True, repr=False)
+class ReferenceMotion(TableFile):
     """What the robot shall do, at its own control rate.
 
     A cyclic motion has `len(self)` steps a cycle and continues with its first step, moved by
@@ -38,6 +72,8 @@ class ReferenceMotion:
         certificate: What the robot cannot do in it; None where nobody has looked.
     """
 
+    SCHEMA = REFERENCE_MOTION
+
     robot: str
     model_sha256: str
     dt: float
@@ -59,6 +95,48 @@ class ReferenceMotion:
 
     def __len__(self) -> int:
         return len(self.qpos)
+
+    def __repr__(self) -> str:
+        kind = "cyclic" if self.cyclic else "not cyclic"
+        slow = f", tempo={self.scorecard['tempo']:.2f}" if "tempo" in self.scorecard else ""
+        return (
+            f"ReferenceMotion(robot={self.robot!r}, {len(self)} steps of {1000 * self.dt:g} ms, "
+            f"{len(self) * self.dt:.1f} s, {kind}{slow})"
+        )
+
+    def to_columns(self) -> tuple[Columns, Facts]:
+        columns = numbered("step", len(self), self.dt)
+        columns |= {name: np.asarray(getattr(self, name)) for name in (*ARRAYS, "source_time_s")}
+        facts = {name: getattr(self, name) for name in REFERENCE_MOTION.metadata}
+        if self.certificate is not None:
+            facts["certificate"] = asdict(self.certificate)
+        return columns, json_facts(facts)
+
+    @classmethod
+    def from_columns(cls, columns: Columns, facts: Facts) -> "ReferenceMotion":
+        arrays: dict[str, Any] = {name: columns[name] for name in ARRAYS}
+        bodies, points = len(facts["body_names"]), len(facts["keypoint_names"])
+        arrays["body_pos_w"] = arrays["body_pos_w"].reshape(-1, bodies, 3)
+        arrays["keypoints_w"] = arrays["keypoints_w"].reshape(-1, points, 3)
+        return cls(
+            robot=str(facts["robot"]),
+            model_sha256=str(facts["model_sha256"]),
+            dt=float(facts["dt"]),
+            cyclic=bool(facts["cyclic"]),
+            cycle_offset=np.array(facts["cycle_offset"], float),
+            source_time_s=columns["source_time_s"],
+            scorecard=dict(facts["scorecard"]),
+            certificate=_certificate(facts),
+            **(arrays | {name: tuple(facts[name]) for name in NAMES}),
+        )
+
+
+def _certificate(facts: Facts) -> Certificate | None:
+    found = facts.get("certificate")
+    if found is None:
+        return None
+    findings = tuple(Finding(**finding) for finding in found["findings"])
+    return Certificate(np.array(found["slack"]), np.array(found["tempo"]), findings)
 
 
 def poses_sha256(reference: ReferenceMotion) -> str:

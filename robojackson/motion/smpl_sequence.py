@@ -9,12 +9,42 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float, Int
 
+from robojackson.files.table_file import Columns, Facts, TableFile, json_facts, numbered
+from robojackson.files.table_types import F32, F64, FLAG, I32, STATE, WORLD, Column, TableSchema
+
 CONTACT_POINTS: tuple[str, ...] = ("left_heel", "left_toe", "right_heel", "right_toe")
 AIR, PLANTED, SLIDING = 0, 1, 2
+ARRAYS = (
+    "global_orient",
+    "body_pose",
+    "transl",
+    "joints",
+    "keypoints_w",
+    "confidence",
+    "contact",
+    "valid",
+)
+SMPL_SEQUENCE = TableSchema(
+    "SmplSequence",
+    "frame",
+    (
+        Column("frame", I32),
+        Column("time_s", F64, "s"),
+        Column("global_orient", F32, "rad", WORLD, 3),
+        Column("body_pose", F32, "rad", "parent joint", 69),
+        Column("transl", F32, "m", WORLD, 3),
+        Column("joints", F32, "m", WORLD, 72),
+        Column("keypoints_w", F32, "m", WORLD, 87),
+        Column("confidence", F32, "1", width=29),
+        Column("contact", STATE, "0 air, 1 planted, 2 sliding", width=4),
+        Column("valid", FLAG),
+    ),
+    ("fps", "betas", "rest_joints", "person", "camera", "notes"),
+)
 
 
-@dataclass(frozen=True)
-class SmplSequence:
+@dataclass(frozen=True, repr=False)
+class SmplSequence(TableFile):
     """One person's motion, one row a frame.
 
     Attributes:
@@ -34,6 +64,8 @@ class SmplSequence:
         notes: Warnings for the user, such as a camera that moved.
     """
 
+    SCHEMA = SMPL_SEQUENCE
+
     fps: float
     global_orient: Float[np.ndarray, "T 3"]
     body_pose: Float[np.ndarray, "T 69"]
@@ -51,3 +83,31 @@ class SmplSequence:
 
     def __len__(self) -> int:
         return len(self.global_orient)
+
+    def __repr__(self) -> str:
+        planted = (self.contact == PLANTED).any(1).mean() if len(self) else 0.0
+        return (
+            f"SmplSequence({len(self)} frames at {self.fps:g} fps, {len(self) / self.fps:.1f} s, "
+            f"{int(np.sum(self.valid))} detected, foot planted in {planted:.0%}, "
+            f"person={self.person})"
+        )
+
+    def to_columns(self) -> tuple[Columns, Facts]:
+        columns = numbered("frame", len(self), 1.0 / self.fps)
+        columns |= {name: np.asarray(getattr(self, name)) for name in ARRAYS}
+        return columns, json_facts({name: getattr(self, name) for name in SMPL_SEQUENCE.metadata})
+
+    @classmethod
+    def from_columns(cls, columns: Columns, facts: Facts) -> "SmplSequence":
+        arrays = {name: columns[name] for name in ARRAYS}
+        arrays["joints"] = arrays["joints"].reshape(-1, 24, 3)
+        arrays["keypoints_w"] = arrays["keypoints_w"].reshape(-1, 29, 3)
+        return cls(
+            fps=float(facts["fps"]),
+            betas=np.array(facts["betas"], float),
+            rest_joints=np.array(facts["rest_joints"], float).reshape(29, 3),
+            person=int(facts["person"]),
+            camera=dict(facts["camera"]),
+            notes=tuple(facts["notes"]),
+            **arrays,
+        )

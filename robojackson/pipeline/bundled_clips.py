@@ -1,22 +1,20 @@
-"""The clips that are part of the checkout."""
+"""The clips that are shipped: `clips/` of a checkout and of an installed package."""
 
 from pathlib import Path
 
 from robojackson.errors import MissingDependency
-
-BUNDLED = Path(__file__).parents[2] / "clips"
+from robojackson.pipeline.app_folder import app_folder
 
 
 def bundled(name: str) -> Path:
-    """A clip of the checkout, wherever the command is given.
+    """The path of a bundled clip, whatever the working directory.
 
     Raises:
-        MissingDependency: the bundled clips are not here.
+        MissingDependency: it is not there.
     """
-    path = BUNDLED / name
+    path = app_folder() / "clips" / name
     if not path.is_file():
         raise MissingDependency(
-            f"the bundled clip {name} is part of the checkout and not of the installed package: "
-            "give a video file"
+            f"{path}: the bundled clip is missing; install robojackson again, or give a video file"
         )
     return path

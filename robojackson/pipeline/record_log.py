@@ -4,9 +4,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from robojackson.pipeline import tables
-from robojackson.pipeline.file_tree import FileTree
-from robojackson.pipeline.table_schemas import TableSchema
+from robojackson.files import tables
+from robojackson.files.file_tree import FileTree
+from robojackson.files.table_types import TableSchema
 
 
 @dataclass
@@ -36,6 +36,11 @@ class RecordLog:
 
     def __len__(self) -> int:
         return len(self._rows)
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """A copy of all rows."""
+        return list(self._rows)
 
     def append(self, rows: Iterable[Mapping[str, Any]]) -> None:
         """Add rows. What an interrupted run wrote after its last checkpoint is dropped first."""

@@ -1,4 +1,6 @@
-"""The robots of `configs/robots`, by name."""
+"""The robots of `configs/robots`, by name, and those of a user's files."""
+
+from pathlib import Path
 
 from robojackson.errors import BadConfiguration
 from robojackson.pipeline.yaml_loader import load, names
@@ -27,3 +29,13 @@ def describe_robot(name: str) -> RobotDescription:
             f"{name!r}"
         )
     return found
+
+
+def read_description(file: Path) -> RobotDescription:
+    """Return the description of a robot in a YAML file anywhere.
+
+    Raises:
+        UnknownName: there is no such file.
+        BadConfiguration: a wrong key or value.
+    """
+    return load(RobotDescription, file)

@@ -3,6 +3,9 @@
 import hashlib
 import re
 import unicodedata
+from os import PathLike
+from pathlib import Path
+from typing import Any
 
 NAME_LENGTH = 60
 
@@ -21,3 +24,15 @@ def run_name(text: str) -> str:
 def slug_of(name: str) -> str:
     """A name in the letters that a key of Prefect may have."""
     return re.sub(r"[^a-z0-9]+", "-", run_name(name).lower()).strip("-")
+
+
+def run_labels(move: str, setup: str, seed: int | None) -> dict[str, Any]:
+    """The columns by which episodes and evaluations of a run are joined."""
+    move, setup = run_name(move), run_name(setup)
+    return {"run_id": f"{move}-{setup}-s{seed}", "move": move, "setup": setup, "seed": seed}
+
+
+def motion_name(reference: str | PathLike[str]) -> str:
+    """A reference motion is called by its folder when its own name says nothing."""
+    path = Path(reference).absolute()
+    return path.parent.name if path.stem == "reference" else path.stem

@@ -1,11 +1,13 @@
 """YAML to frozen dataclasses: unknown keys are refused with the file and the path of the key.
 
-A name such as `smoke` or `robots/humanoid` is a file of `configs`; whatever has a YAML suffix is
-a path. YAML is read as version 1.2 does it: `yes`, `no`, `on` and `off` are words, and a key that
-stands twice is an error.
+A name such as `smoke` or `robots/humanoid` is a file of the user's `./configs` (or of the folder
+that ROBOJACKSON_CONFIGS names), else of the shipped ones; whatever has a YAML suffix is a path.
+YAML is read as version 1.2 does it: `yes`, `no`, `on` and `off` are words, and a key that stands
+twice is an error.
 """
 
 import difflib
+import os
 import re
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
@@ -13,14 +15,13 @@ from pathlib import Path
 from typing import Any, TypeVar, get_args, get_type_hints
 
 import yaml
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
-from robojackson.config import validated
 from robojackson.errors import BadConfiguration, ConflictingValues, UnknownName
+from robojackson.pipeline.app_folder import CONFIGS, app_folder
 
 Config = TypeVar("Config")
-FOLDER = Path(__file__).parents[2] / "configs"
-"""Of the shipped YAML, in the checkout and where the package is installed."""
+SHIPPED = app_folder() / "configs"
 SUFFIXES = (".yaml", ".yml")
 
 
@@ -47,7 +48,7 @@ def load(
         _set(values, key_path.split("."), value)
     where = _display_name(path) if path else "--set"
     try:
-        return validated(cls, values)
+        return TypeAdapter(cls).validate_python(values)
     except ValidationError as cause:
         key = ".".join([*_keys(cause), ""])
         blamed = [g for g in given if key.startswith(f"{g}.") or f"{g}.".startswith(key)]
@@ -65,7 +66,7 @@ def build(cls: type[Config], values: Mapping[str, Any], where: str) -> Config:
         BadConfiguration: an unknown key or a wrong value; the message has `where` and the key.
     """
     try:
-        return validated(cls, dict(values))
+        return TypeAdapter(cls).validate_python(dict(values))
     except ValidationError as cause:
         raise BadConfiguration(f"{where}: {_explain(cls, cause)}") from cause
 
@@ -81,23 +82,31 @@ def find(name_or_path: str | Path) -> Path:
         if given.is_file():
             return given
         raise UnknownName("configuration file", str(given), "as a path", names())
-    path = FOLDER / f"{given}.yaml"
-    if path.is_file() and path.resolve().is_relative_to(FOLDER.resolve()):
-        return path
+    for base in folders():
+        path = base / f"{given}.yaml"
+        if path.is_file() and path.resolve().is_relative_to(base.resolve()):
+            return path
     folder = given.parent.name
     kind = re.sub("ies$", "y", folder).removesuffix("s") or "configuration"
-    raise UnknownName(kind, given.name, _display_name(path), names(folder))
+    raise UnknownName(kind, given.name, f"configs/{given}.yaml", names(folder))
+
+
+def folders() -> list[Path]:
+    """Where named configurations are looked for: the user's folder first, then the shipped one."""
+    own = Path(os.environ.get(CONFIGS) or "configs").absolute()
+    return [own, SHIPPED] if own != SHIPPED and own.is_dir() else [SHIPPED]
 
 
 def names(folder: str = "") -> tuple[str, ...]:
-    """The configurations of this package, or of one folder of it."""
-    return tuple(sorted(path.stem for path in (FOLDER / folder).glob("*.yaml")))
+    """The names of all configurations, or of those of one kind, such as `robots`."""
+    found = {path.stem for base in folders() for path in (base / folder).glob("*.yaml")}
+    return tuple(sorted(found))
 
 
 def _display_name(path: Path) -> str:
     """What a person calls the file."""
-    inside = path.is_relative_to(FOLDER)
-    return f"configs/{path.relative_to(FOLDER).as_posix()}" if inside else str(path)
+    inside = path.is_relative_to(SHIPPED)
+    return f"configs/{path.relative_to(SHIPPED).as_posix()}" if inside else str(path)
 
 
 class _Yaml12(yaml.SafeLoader):

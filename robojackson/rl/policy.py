@@ -8,6 +8,7 @@ torch.
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 
 import numpy as np
@@ -16,11 +17,12 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
 from robojackson.errors import BadPolicy
+from robojackson.files.file_tree import FileTree
 
 FORMAT = "robojackson-policy-1"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Policy:
     """A deterministic policy.
 
@@ -32,6 +34,23 @@ class Policy:
     layers: tuple[tuple[np.ndarray, np.ndarray], ...]
     facts: Mapping[str, object]
 
+    def __repr__(self) -> str:
+        sizes = " -> ".join(str(size) for size in (self.observation_size, *self._widths))
+        return f"Policy({sizes}, robot={self.facts.get('robot', '?')!r}, setup={self.setup!r})"
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write the policy's file (safetensors).
+
+        Returns:
+            The path.
+
+        Raises:
+            StoreError: the file cannot be written.
+        """
+        file = Path(path)
+        FileTree(file.parent).write(file.name, self.to_bytes())
+        return file
+
     def act(self, observation: Float[np.ndarray, "N D"]) -> Float[np.ndarray, "N nu"]:
         """The mean action, -1..1, of each observation."""
         hidden = np.asarray(observation, np.float32)
@@ -39,6 +58,10 @@ class Policy:
             hidden = np.maximum(hidden @ weight + bias, 0.0)
         weight, bias = self.layers[-1]
         return np.tanh(hidden @ weight + bias)
+
+    @property
+    def _widths(self) -> list[int]:
+        return [weight.shape[1] for weight, _ in self.layers]
 
     @property
     def observation_size(self) -> int:

@@ -7,6 +7,7 @@ weights-only reader, and the JSON beside it as text; nothing is unpickled.
 import io
 import json
 import logging
+import pickle
 import re
 import zipfile
 from collections.abc import Mapping
@@ -97,8 +98,14 @@ def from_sb3_zip(path: Path) -> Networks:
             )
             state = {name: np.asarray(value.float()) for name, value in raw.items()}
             alpha = _alpha(archive, torch)
-    except Exception as error:  # torch raises UnpicklingError and others at what it refuses
-        raise BadPolicy(f"{path} is no SB3 zip that can be read safely ({error})") from error
+    except pickle.UnpicklingError as error:  # its text advises to load the file without checks
+        raise BadPolicy(
+            f"{path} is no SB3 zip that can be read safely: its weights hold more than tensors and "
+            "could run code; save the model again with SB3 (model.save)"
+        ) from error
+    except Exception as error:  # a damaged file fails in any way
+        cause = str(error).partition("\n")[0]
+        raise BadPolicy(f"{path} is no SB3 zip that can be read ({cause})") from error
     _require_relu(path, told)
     try:
         tensors = _renamed(state)

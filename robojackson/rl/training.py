@@ -43,10 +43,12 @@ def train_policy(
     """
     if not config.has_budget:
         raise BadConfiguration("training needs a budget: steps, minutes or cpu_minutes")
+    hooks = hooks or Hooks()
     networks = pretrained(config.start, config.mode)
     out.mkdir(parents=True, exist_ok=True)
-    core = TrackingCore(robot, reference, config.environment, config.tqc.n_envs, config.seed)
-    run = Run(out, config, core, Task.of(reference, robot), hooks or Hooks())
+    of_tqc = (config.tqc.n_envs, config.seed)
+    core = TrackingCore(robot, reference, config.environment, *of_tqc, hooks.rewards)
+    run = Run(out, config, core, Task.of(reference, robot), hooks)
     env = TrackingVecEnv(core, run.episodes)
     tqc = config.tqc if networks is None else _shaped(networks, core, config)
     trainer = make_trainer(config.trainer, env, tqc, config.seed)

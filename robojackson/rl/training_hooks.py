@@ -1,11 +1,11 @@
 """What a caller of a training is told while it runs, and how it stops one."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from robojackson.rl.modes.rewards import RewardFunction
 
 Row = dict[str, float]
-SECONDS_TO_SAVE = 30.0
-"""What a training that is stopped gets to write its checkpoint before it is killed, seconds."""
 
 
 class BudgetSpent(Exception):
@@ -23,6 +23,9 @@ class Hooks:
         saving: Called before a checkpoint is written: the rows so far should then be safe.
         stop: Asked between two rounds; True ends the run with a checkpoint.
         setup: What the caller calls the configuration; the policy's file tells it.
+        audited: Called once before it begins, with what the reward pays to bodies that do not dance
+            (`evaluation.reward_audit.audit_record`).
+        rewards: Reward terms of the caller, by name, beside those of the configuration.
     """
 
     progress: Callable[[Row], None] = lambda row: None
@@ -31,3 +34,5 @@ class Hooks:
     saving: Callable[[], None] = lambda: None
     stop: Callable[[], bool] = lambda: False
     setup: str = ""
+    audited: Callable[[Mapping[str, Mapping[str, float]]], None] = lambda audit: None
+    rewards: Mapping[str, RewardFunction] = field(default_factory=dict)

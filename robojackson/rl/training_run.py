@@ -5,7 +5,6 @@ No clock stands in the rows of episodes: a run in steps that is repeated gives t
 
 import json
 import logging
-import os
 import shutil
 import time
 from collections import deque
@@ -16,7 +15,12 @@ from pathlib import Path
 import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 
-from robojackson.errors import BadConfiguration, StoreError, TrainingDiverged
+from robojackson.errors import BadConfiguration, TrainingDiverged
+from robojackson.rl.checkpoint_folder import (
+    newest_checkpoint,
+    set_results_aside,
+    write_checkpoint,
+)
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.policy import Policy
@@ -24,14 +28,13 @@ from robojackson.rl.tensorboard_log import ScalarLog
 from robojackson.rl.tqc.actor_average import ActorAverage
 from robojackson.rl.tqc.network_arrays import Networks, Tensors
 from robojackson.rl.tqc.trainer import Trainer
+from robojackson.rl.training_budget import TrainingBudget
 from robojackson.rl.training_hooks import BudgetSpent, Hooks, Row
 from robojackson.rl.training_task import Task, TrainResult
 
 log = logging.getLogger(__name__)
 
 RECENT_EPISODES = 100
-RESULTS = ("policy.safetensors", "networks.safetensors")
-CHECKPOINT, OLD_CHECKPOINT = "checkpoint", "checkpoint.old"
 NOT_OF_THE_RUN = (
     *("steps", "minutes", "cpu_minutes", "checkpoint_seconds", "progress_seconds", "tensorboard"),
 )
@@ -51,20 +54,19 @@ class Run:
         self.out, self.config, self.core, self.task = out, config, core, task
         self._hooks, self._replay = hooks, out / "replay"
         self._recent: deque[Row] = deque(maxlen=RECENT_EPISODES)
-        self._before, self._has_learnt = 0.0, False
-        self._began = self._saved = self._told = time.monotonic()
-        self._cpu_before, self._cpu_began = 0.0, time.process_time()
+        self._budget, self._has_learnt = TrainingBudget(config), False
+        self._saved = self._told = time.monotonic()
         self._board = ScalarLog(out / "tensorboard") if config.tensorboard else None
         self.callback = _Callback(self)
         self._average = ActorAverage(config.tqc.actor_average)
 
     def bind(self, trainer: Trainer) -> None:
         """Attach the trainer; continue from a checkpoint when there is one."""
-        self.trainer, self._first_step, self._saved_updates = trainer, 0, 0
+        self.trainer, self._saved_updates = trainer, 0
         folder = newest_checkpoint(self.out)
         if folder is None:  # what is there without one is another training's
             shutil.rmtree(self._replay, ignore_errors=True)
-            self._set_aside()
+            set_results_aside(self.out)
             return
         state = json.loads((folder / "run.json").read_text())
         if state["configuration"] != self._identity():
@@ -77,26 +79,13 @@ class Run:
             self.core.restore(dict(arrays))
         self._average.load(folder)
         self.core.rng.bit_generator.state = state["random"]
-        self._before, self._first_step = state["seconds"], state["steps"]
-        self._cpu_before = state["cpu_seconds"]
+        self._budget.resume(state["steps"], state["seconds"], state["cpu_seconds"])
         self._saved_updates = state["updates"]
         log.info("resuming at %d steps", state["steps"])
 
-    def seconds(self) -> float:
-        return self._before + time.monotonic() - self._began
-
-    def cpu_seconds(self) -> float:
-        return self._cpu_before + time.process_time() - self._cpu_began
-
     def finished(self) -> str:
         """The budget that is used up, or an empty string."""
-        if self.config.steps is not None and self.trainer.steps() >= self.config.steps:
-            return "steps"
-        if self.config.minutes is not None and self.seconds() >= 60 * self.config.minutes:
-            return "minutes"
-        if self.config.cpu_minutes and self.cpu_seconds() >= 60 * self.config.cpu_minutes:
-            return "cpu_minutes"
-        return ""
+        return self._budget.used_up(self.trainer.steps())
 
     def episodes(self, rows: list[Row]) -> None:
         steps, first = self.trainer.steps() + self.core.n, self.core.episode - len(rows) + 1
@@ -121,7 +110,7 @@ class Run:
             self._has_learnt = True
             self._hooks.on_learning()
         try:
-            started = self.trainer.steps() > self._first_step
+            started = self._budget.has_advanced(self.trainer.steps())
             if started and now - self._told >= self.config.progress_seconds:
                 self._told = now
                 self._report()
@@ -145,33 +134,8 @@ class Run:
         """
         networks = self.trainer.networks()
         self._require_finite(networks.values())
-        fresh, final = self.out / "checkpoint.new", self.out / CHECKPOINT
-        shutil.rmtree(fresh, ignore_errors=True)
         self._hooks.saving()
-        try:
-            fresh.mkdir()
-            self.trainer.save(fresh, self._replay)
-            np.savez(fresh / "environment.npz", **self.core.state())
-            self._average.save(fresh)
-            (fresh / "run.json").write_text(json.dumps(self._state()))
-            for name, content in self._results(networks).items():
-                (self.out / f"{name}.part").write_bytes(content)
-            for file in (*fresh.iterdir(), *self.out.glob("*.safetensors.part")):
-                _to_disk(file)
-        except OSError as error:
-            shutil.rmtree(fresh, ignore_errors=True)
-            for part in self.out.glob("*.safetensors.part"):
-                part.unlink(missing_ok=True)
-            raise StoreError(f"{self.out}: the checkpoint cannot be written ({error})") from error
-        # First, since a checkpoint whose budget is used up is not written again.
-        for name in RESULTS:
-            os.replace(self.out / f"{name}.part", self.out / name)
-        old = self.out / OLD_CHECKPOINT
-        if final.exists():
-            shutil.rmtree(old, ignore_errors=True)
-            final.rename(old)
-        fresh.rename(final)
-        shutil.rmtree(old, ignore_errors=True)
+        write_checkpoint(self.out, self._save, self._results(networks))
         self.trainer.saved()
 
     def result(self) -> TrainResult:
@@ -179,7 +143,7 @@ class Run:
             self.out / "policy.safetensors",
             self.trainer.steps(),
             self.trainer.updates(),
-            self.seconds(),
+            self._budget.seconds(),
             self.finished(),
         )
 
@@ -190,13 +154,20 @@ class Run:
             del fields[free]
         return json.loads(json.dumps(fields | {"task": asdict(self.task)}))
 
+    def _save(self, folder: Path) -> None:
+        """Write what is needed to go on into a folder."""
+        self.trainer.save(folder, self._replay)
+        np.savez(folder / "environment.npz", **self.core.state())
+        self._average.save(folder)
+        (folder / "run.json").write_text(json.dumps(self._state()))
+
     def _state(self) -> dict[str, object]:
         return {
             "configuration": self._identity(),
             "steps": self.trainer.steps(),
             "updates": self.trainer.updates(),
-            "seconds": self.seconds(),
-            "cpu_seconds": self.cpu_seconds(),
+            "seconds": self._budget.seconds(),
+            "cpu_seconds": self._budget.cpu_seconds(),
             "random": self.core.rng.bit_generator.state,
         }
 
@@ -208,13 +179,6 @@ class Run:
             "policy.safetensors": Policy(layers, facts).to_bytes(),
             "networks.safetensors": Networks(networks, facts).to_bytes(),
         }
-
-    def _set_aside(self) -> None:
-        """Keep the networks of another training that this one's would replace."""
-        for name in RESULTS:
-            if (self.out / name).is_file():
-                os.replace(self.out / name, self.out / f"before-{name}")
-                log.warning("%s was here before; it is before-%s now", name, name)
 
     def _require_finite(self, arrays: Iterable[np.ndarray]) -> None:
         if all(np.isfinite(array).all() for array in arrays):
@@ -257,38 +221,17 @@ class Run:
         self._hooks.progress(status)
 
     def _status(self) -> Row:
-        steps, seconds = self.trainer.steps(), self.seconds()
-        rate = (steps - self._first_step) / max(seconds - self._before, 1e-9)
-        left = [60 * self.config.minutes - seconds] if self.config.minutes else []
-        if self.config.cpu_minutes:
-            left.append(60 * self.config.cpu_minutes - self.cpu_seconds())
-        if self.config.steps:
-            left.append((self.config.steps - steps) / max(rate, 1e-9))
+        steps = self.trainer.steps()
         recent = list(self._recent)
         mean = lambda key: float(np.mean([row[key] for row in recent])) if recent else np.nan  # noqa: E731
         return {
             "steps": steps,
             "updates": self.trainer.updates(),
-            "seconds": seconds,
-            "steps_per_s": rate,
-            "seconds_left": max(0.0, min(left)),
+            **self._budget.progress(steps),
             "survived_s": mean("survived_s"),
             "episode_return": mean("episode_return"),
             "site_error_m": mean("site_error_m"),
         }
-
-
-def newest_checkpoint(out: Path) -> Path | None:
-    """The last whole checkpoint: the one before when a crash came between two renames."""
-    for name in (CHECKPOINT, OLD_CHECKPOINT):
-        if (out / name / "run.json").exists():
-            return out / name
-    return None
-
-
-def _to_disk(path: Path) -> None:
-    with path.open("rb") as file:
-        os.fsync(file.fileno())
 
 
 class _Callback(BaseCallback):

@@ -8,11 +8,14 @@ seconds.
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from os import PathLike
+from pathlib import Path
 
 import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from robojackson.files.file_tree import FileTree
 from robojackson.robot.actuation import torque_limits
 from robojackson.robot.checks import check_joints, check_names, check_soles, check_symmetry
 from robojackson.robot.description import (
@@ -31,7 +34,7 @@ __all__ = [
 ]  # fmt: skip
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Robot:
     """A loaded and validated robot; hinges are in the order of qpos.
 
@@ -74,6 +77,27 @@ class Robot:
     rest: Float[np.ndarray, " J"]
     torque_limit: Float[np.ndarray, " J"]
     lengths: Mapping[tuple[str, str], float] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        motors = int(self.actuated.sum())
+        return (
+            f"Robot({self.description.name!r}, {len(self.joint_names)} hinges, {motors} motors, "
+            f"{self.model.body_mass.sum():.1f} kg)"
+        )
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write the compiled model with its keypoint sites as MuJoCo's binary file (.mjb).
+
+        Returns:
+            The path; MuJoCo's viewer opens it.
+
+        Raises:
+            StoreError: the file cannot be written.
+        """
+        file, content = Path(path), np.zeros(mujoco.mj_sizeModel(self.model), np.uint8)
+        mujoco.mj_saveModel(self.model, None, content)
+        FileTree(file.parent).write(file.name, content.tobytes())
+        return file
 
     @cached_property
     def actuated(self) -> Bool[np.ndarray, " J"]:

@@ -7,17 +7,17 @@ by the kernel when this process is killed.
 import asyncio
 import os
 import signal
-from asyncio.subprocess import PIPE, Process
+from asyncio.subprocess import Process
 from collections import deque
 from collections.abc import AsyncIterator, Callable
-from contextlib import suppress
 from pathlib import Path
 
+from robojackson.cli.lifetime.asyncio_process import running
+from robojackson.cli.lifetime.process_group import SECONDS_TO_SAVE
 from robojackson.errors import TrainingCrashed, TrainingFailed
-from robojackson.rl.training_hooks import SECONDS_TO_SAVE
+from robojackson.pipeline.app_folder import app_folder
 from tasks.runtime.run_logger import run_logger
 
-CHECKOUT = Path(__file__).parents[2]
 LOG = "process.log"
 
 
@@ -36,28 +36,24 @@ async def run_process(
         TrainingCrashed: it was killed; the same again may succeed.
         TrainingFailed: it gave up, or did not end.
     """
-    process = await asyncio.create_subprocess_exec(
-        *command, stdout=PIPE, stderr=PIPE, start_new_session=True, env=environment()
-    )
     last: deque[str] = deque(maxlen=5)
-    try:
-        async with asyncio.timeout(limit_s):
-            forward = _forward(process, work / LOG, last)
-            answer, _ = await asyncio.gather(_read(process), forward)
-            await process.wait()
-    except TimeoutError:
-        raise TrainingFailed(f"run {run_id} did not end within {limit_s:.0f} s") from None
-    finally:
-        await _end(process)
+    async with running(command, environment(), SECONDS_TO_SAVE) as process:
+        try:
+            async with asyncio.timeout(limit_s):
+                forward = _forward(process, work / LOG, last)
+                answer, _ = await asyncio.gather(_read(process), forward)
+                await process.wait()
+        except TimeoutError:
+            raise TrainingFailed(f"run {run_id} did not end within {limit_s:.0f} s") from None
     if process.returncode:
         raise _cause(run_id, process.returncode, work, last)
     return answer
 
 
 def environment() -> dict[str, str]:
-    """Ours, with one OpenMP thread and this checkout importable."""
+    """Ours, with one OpenMP thread; stages of the same checkout or package."""
     found = os.environ.get("PYTHONPATH")
-    path = os.pathsep.join([str(CHECKOUT), *([found] if found else [])])
+    path = os.pathsep.join([str(app_folder()), *([found] if found else [])])
     return {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": path, "PYTHONUNBUFFERED": "1"}
 
 
@@ -82,32 +78,6 @@ async def _lines(process: Process) -> AsyncIterator[str]:
 async def _read(process: Process) -> bytes:
     assert process.stdout is not None
     return await process.stdout.read()
-
-
-async def _end(process: Process) -> None:
-    """Leave nothing of the process group: ask, wait, kill; at once where the waiting, too, is cut
-    short."""
-    if process.returncode is not None:
-        return
-    _signal(process, signal.SIGTERM)
-    try:
-        async with asyncio.timeout(SECONDS_TO_SAVE):
-            await process.wait()
-    except TimeoutError:
-        await _kill(process)
-    except asyncio.CancelledError:
-        await _kill(process)
-        raise
-
-
-async def _kill(process: Process) -> None:
-    _signal(process, signal.SIGKILL)
-    await process.wait()
-
-
-def _signal(process: Process, what: signal.Signals) -> None:
-    with suppress(ProcessLookupError):  # it may have ended a moment ago
-        os.killpg(process.pid, what)
 
 
 def _cause(run_id: str, code: int, work: Path, last: deque[str]) -> TrainingFailed:

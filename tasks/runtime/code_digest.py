@@ -9,8 +9,8 @@ import hashlib
 import threading
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache
-from importlib import resources
+from functools import cache, lru_cache
+from importlib import import_module, resources
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -19,9 +19,15 @@ ONE_PARSER = threading.Lock()
 """CPython 3.11 counts the depth of its parser wrongly when several threads parse at once."""
 NEVER_CHANGE_A_RESULT = frozenset(("robojackson.errors",))
 """Modules whose text decides only what a person reads."""
-NOT_FOLLOWED = frozenset(("robojackson.pipeline",))
+LAYOUT = (
+    "robojackson.files.table_file",
+    "robojackson.files.table_types",
+    "robojackson.pipeline.table_schemas",
+)
+"""Modules that say how results stand in files."""
+NOT_FOLLOWED = frozenset(("robojackson.files", "robojackson.pipeline"))
 """Packages that carry values and files and compute nothing; a change of the layout of tables is in
-every key by itself (`stage.layout`)."""
+every key by itself (`layout`)."""
 NOT_ON_ALL_PYTHONS = frozenset(("type_params",))
 """Fields of nodes that came with Python 3.12."""
 
@@ -210,3 +216,10 @@ def _folder_of(package: str) -> Path:
     if spec is None or spec.origin is None:
         raise ModuleNotFoundError(package)
     return Path(spec.origin).parent
+
+
+@cache
+def layout() -> str:
+    """Digest of how results stand in files: a table of an older layout could not be read."""
+    files = [Path(str(import_module(name).__file__)) for name in LAYOUT]
+    return hashlib.sha256("".join(bare_tree(f.read_text()) for f in files).encode()).hexdigest()

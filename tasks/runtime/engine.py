@@ -11,7 +11,7 @@ from typing import Any, ParamSpec, TypeVar
 from prefect import Task, task
 from prefect.cache_policies import CacheKeyFnPolicy
 from prefect.context import TaskRunContext
-from prefect.filesystems import WritableFileSystem
+from prefect.filesystems import RemoteFileSystem
 from prefect.serializers import JSONSerializer
 
 from storage import stage_records
@@ -19,32 +19,41 @@ from storage.store import Store
 
 P = ParamSpec("P")
 R = TypeVar("R")
+BASE = "robojackson://records"
+"""Base path of the records; the store of the environment decides where they are."""
 
 
-class Records(WritableFileSystem):
-    """The store of the environment as a place for Prefect's records."""
+class Records(RemoteFileSystem):
+    """The store of the environment as a place for Prefect's records.
+
+    Prefect stores a record at an address: the base path of the file system, then the key. Of a
+    file system without a base path it refuses every key that is not in the working directory.
+    """
 
     _block_type_name = "RoboJackson records"
     _block_type_slug = "robojackson-records"
+    basepath: str = BASE
 
     def read_path(self, path: str, _sync: bool = True) -> bytes:  # type: ignore[override]
-        """Return the content of a record."""
-        return Store.from_environment().read(stage_records.address(path))
+        """Return the content of a record, named by its key or its address."""
+        return Store.from_environment().read(_store_key(path))
 
-    def write_path(self, path: str, content: bytes, _sync: bool = True) -> None:  # type: ignore[override]
-        """Write a record, whole or not at all."""
-        Store.from_environment().put(stage_records.address(path), content)
+    def write_path(self, path: str, content: bytes, _sync: bool = True) -> str:  # type: ignore[override]
+        """Write a record, whole or not at all; return its address."""
+        Store.from_environment().put(_store_key(path), content)
+        return path
 
     async def aread_path(self, path: str) -> bytes:
         """Return the content of a record without blocking the flow."""
         return await asyncio.to_thread(self.read_path, path)
 
-    async def awrite_path(self, path: str, content: bytes) -> None:
-        """Write a record without blocking the flow."""
-        await asyncio.to_thread(self.write_path, path, content)
+    async def awrite_path(self, path: str, content: bytes) -> str:
+        """Write a record without blocking the flow; return its address."""
+        return await asyncio.to_thread(self.write_path, path, content)
 
-    def _resolve_path(self, path: str) -> None:
-        """Leave keys as they are: without this, Prefect makes them relative to a folder."""
+
+def _store_key(path: str) -> str:
+    return stage_records.address(path.removeprefix(f"{BASE}/"))
 
 
 class ArtifactSerializer(JSONSerializer):

@@ -19,7 +19,6 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache, cached_property, update_wrapper
-from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar
@@ -28,7 +27,7 @@ from robojackson.errors import StoreError
 from storage import stage_records
 from storage.artifact import Artifact
 from storage.store import Store
-from tasks.runtime.code_digest import bare_tree, digest, imports_of
+from tasks.runtime.code_digest import bare_tree, digest, imports_of, layout
 
 if TYPE_CHECKING:
     from prefect import Task
@@ -37,8 +36,6 @@ if TYPE_CHECKING:
 P = ParamSpec("P")
 R = TypeVar("R")
 Models = Callable[[Mapping[str, Any]], list[str]]
-LAYOUT = ("robojackson.pipeline.table_codecs", "robojackson.pipeline.table_schemas")
-"""Modules that say how results stand in files."""
 VERSIONED = ("mujoco", "mediapipe")
 _records_only: ContextVar[bool] = ContextVar("records_only", default=False)
 _label: ContextVar[str] = ContextVar("label", default="")
@@ -212,13 +209,6 @@ def stage(
 def versions() -> dict[str, str]:
     """Of the packages whose version is part of every key."""
     return {name: version(name) for name in VERSIONED}
-
-
-@cache
-def layout() -> str:
-    """Digest of how results stand in files: a table of an older layout could not be read."""
-    files = [Path(str(import_module(name).__file__)) for name in LAYOUT]
-    return hashlib.sha256("".join(bare_tree(f.read_text()) for f in files).encode()).hexdigest()
 
 
 def identity(value: Any) -> Any:

@@ -7,19 +7,17 @@ its process harms no other: whatever was under way is done again, each in a proc
 import os
 import signal
 import threading
-import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 from typing import ParamSpec, TypeVar
 
+from robojackson.cli.lifetime.parent_death import watch_parent
 from robojackson.errors import UnreadableVideo
 
 P = ParamSpec("P")
 R = TypeVar("R")
-WATCH_S = 2.0
-"""How often a process looks whether its parent is still there, seconds."""
 
 _lock = threading.Lock()
 _pool: ProcessPoolExecutor | None = None
@@ -74,14 +72,7 @@ def _begin(parent: int) -> None:
     """One thread a library, Ctrl-C left to the parent, and no life after its death."""
     os.environ["OMP_NUM_THREADS"] = "1"
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_watch, args=(parent,), daemon=True).start()
+    watch_parent(parent)
     import cv2
 
     cv2.setNumThreads(1)
-
-
-def _watch(parent: int) -> None:
-    """End with the parent. (The kernel's own signal comes when the spawning thread ends.)"""
-    while os.getppid() == parent:
-        time.sleep(WATCH_S)
-    os._exit(1)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
-from robojackson.pipeline.local_folder import TEMPORARY
+from robojackson.files.local_folder import TEMPORARY
 from storage import study_tables
 from storage.store import SCRATCH, Store
 

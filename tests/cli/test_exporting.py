@@ -10,6 +10,7 @@ import pytest
 
 from robojackson.cli.exporting import export
 from robojackson.errors import RejectedReference, StoreError, UnknownName
+from robojackson.files import tables
 from robojackson.formats import (
     beyondmimic,
     gmr,
@@ -19,7 +20,6 @@ from robojackson.formats import (
     registry,
     unitree_csv,
 )
-from robojackson.pipeline import tables
 from tests.fixtures.commands import Said, robojackson
 from tests.fixtures.robots import robot_motion
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from robojackson.pipeline import tables
+from robojackson.files import tables
 from tests.fixtures.commands import robojackson
 from tests.fixtures.robots import human
 

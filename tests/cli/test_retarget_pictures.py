@@ -8,7 +8,7 @@ import pytest
 
 from robojackson.cli.retarget_pictures import draw_retargeting
 from robojackson.errors import StoreError
-from robojackson.pipeline import tables
+from robojackson.files import tables
 from tests.fixtures.commands import robojackson
 from tests.fixtures.robots import human, robot_motion
 

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from robojackson.files import tables
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
-from robojackson.pipeline import tables
 from robojackson.pipeline.table_schemas import EPISODE_RECORD, EVALUATION_RECORD
 from tests.fixtures.commands import Said, robojackson
 

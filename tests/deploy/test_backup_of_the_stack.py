@@ -26,7 +26,7 @@ FILES = {
 """Names with spaces and umlauts, an empty file, and one of several chunks of SeaweedFS (4 MB)."""
 READ_ALL = """
 import json, sys
-from robojackson.pipeline.local_folder import sha256_of
+from robojackson.files.local_folder import sha256_of
 from storage.store import Store
 store = Store.from_environment()
 found = {key: sha256_of(store.read(key)) for key in store.list()}

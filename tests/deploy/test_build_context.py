@@ -19,7 +19,6 @@ import yaml
 from docker.utils import exclude_paths
 
 from flows.search.dance_source import DEFAULT
-from robojackson.pipeline.bundled_clips import BUNDLED
 from tools.stack.service import ROOT
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
@@ -105,7 +104,7 @@ def test_of_the_tools_only_the_one_that_builds_is_in_it(context: set[str]) -> No
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_every_package_is_in_it_with_its_data(package: str, context: set[str]) -> None:
-    folder = ROOT / package.replace(".", "/")
+    folder = ROOT / package.removeprefix("robojackson._app").lstrip(".").replace(".", "/")
     patterns = ["*.py", *PROJECT["tool"]["setuptools"]["package-data"].get(package, [])]
     needed = {path for pattern in patterns for path in folder.glob(pattern) if path.is_file()}
     assert needed
@@ -123,7 +122,7 @@ def test_every_clip_that_a_user_can_name_is_in_it(context: set[str]) -> None:
     named = {yaml.safe_load(path.read_text()).get("clip") for path in moves} - {None}
     entries = yaml.safe_load((ROOT / "prefect.yaml").read_text())["deployments"]
     named |= {str(e.get("parameters", {}).get("source", "")) for e in entries} - {""}
-    named.add((BUNDLED / DEFAULT).relative_to(ROOT).as_posix())
+    named.add(f"clips/{DEFAULT}")
     assert len(named) > 3
     assert named <= context
 

@@ -17,8 +17,8 @@ from prefect.settings import (
 
 from flows.dance import dance
 from flows.search.dance_source import is_name, resolve
-from flows.video_pass import dance_stages
-from flows.video_pass.dance_stages import Candidate, choose, score_all
+from flows.video_pass import dance_stages, scored_candidates
+from flows.video_pass.scored_candidates import Candidate, choose, score_all
 from robojackson.clips.quality.stability import Stability
 from robojackson.errors import NoPersonFound, RejectedReference, UnreadableVideo
 from robojackson.pipeline.pipeline_config import PipelineConfig
@@ -191,7 +191,7 @@ def score(
         )
 
     for played in (probe_video, detect_landmarks, score_stability):
-        monkeypatch.setattr(dance_stages, played.__name__, Played(played))
+        monkeypatch.setattr(scored_candidates, played.__name__, Played(played))
 
     @flow
     async def scoring(paths: tuple[Path, ...]) -> list[str]:
@@ -248,9 +248,9 @@ def test_a_training_that_says_its_processor_time_gets_no_clock() -> None:
 def test_files_that_cannot_be_read_are_left_out(tmp_path: Path) -> None:
     good, gone = tmp_path / "b.mp4", tmp_path / "a.mp4"
     good.write_bytes(b"x")
-    assert [path for path, _ in dance_stages._readable([gone, good])] == [good]
+    assert [path for path, _ in scored_candidates._readable([gone, good])] == [good]
     with pytest.raises(UnreadableVideo, match=r"a\.mp4: cannot be read \(No such file"):
-        dance_stages._readable([gone])
+        scored_candidates._readable([gone])
 
 
 @pytest.mark.parametrize("source", ["gone.mp4", "no/such/thing", "moonwalk"])

@@ -4,7 +4,9 @@ import io
 import os
 import pickle
 import struct
+import tracemalloc
 import zipfile
+from collections import OrderedDict
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -207,6 +209,51 @@ def test_a_tensor_that_repeats_itself_without_end_is_refused() -> None:
     huge = torch.ones(1).expand(10**12)
     with pytest.raises(BadTable, match="refused, it asks for a tensor"):
         torch_archive.load(torch_file({"x": huge}), "file")
+
+
+def peak_bytes(read: Callable[[], Any]) -> int:
+    tracemalloc.start()
+    try:
+        read()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def test_many_tensors_of_the_same_numbers_take_little_more_memory_than_the_file() -> None:
+    """Each alone is small enough; copied, they would fill 8 GB."""
+    one, many = torch.ones(250_000), torch.ones(1).expand(10**8)
+    data = torch_file({"a": {str(i): many for i in range(20)}, "b": [one[i:] for i in range(100)]})
+    assert peak_bytes(lambda: torch_archive.load(data, "file")) < 4 * len(data)
+
+
+def test_a_dictionary_of_an_arrays_rows_is_refused() -> None:
+    """`torch.load(weights_only=True)` makes a tensor of each row; 10**7 of them fill 14 GB."""
+    rows = torch.ones(1).expand(10**6, 2)
+    with pytest.raises(BadTable, match="something else than pairs"):
+        torch_archive.load(torch_file({"x": Trap(OrderedDict, rows)}), "file")
+
+
+def test_pytorchs_own_reader_takes_the_memory_that_a_file_asks_for() -> None:
+    """If this passes no more, PyTorch has mended it and the reader of `torch_archive` can go."""
+    data = torch_file({"x": Trap(bytearray, 10**7)})
+    assert len(torch.load(io.BytesIO(data), weights_only=True)["x"]) > 1000 * len(data)
+    with pytest.raises(BadTable, match=r"refused, it asks for __builtin__\.bytearray"):
+        torch_archive.load(data, "file")
+
+
+def test_a_dictionary_of_pairs_is_read() -> None:
+    back = torch_archive.load(torch_file({"x": Trap(OrderedDict, [("a", 1)])}), "file")
+    assert back == {"x": {"a": 1}}
+
+
+def test_members_that_overlap_are_refused() -> None:
+    """So that one record cannot be read under a thousand names."""
+    data = bytearray(torch_archive.save({"x": np.ones(4), "y": np.ones(4)}))
+    entry = data.rindex(b"archive/data/1") - 46  # of the central directory; sizes at byte 20
+    data[entry + 20 : entry + 28] = struct.pack("<II", len(data), len(data))
+    with pytest.raises(BadTable, match="more bytes than the file"):
+        torch_archive.load(bytes(data), "file")
 
 
 def test_a_tensor_that_reaches_outside_its_storage_is_refused() -> None:

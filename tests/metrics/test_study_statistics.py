@@ -5,27 +5,27 @@ import itertools
 import numpy as np
 import pytest
 
-from robojackson.metrics import ablation_statistics
+from robojackson.metrics import ablation_statistics, learning_curve, seed_statistics
 
 RNG = np.random.default_rng
 
 
 def test_the_interval_of_a_mean_is_close_to_that_of_the_normal_law() -> None:
     samples = RNG(1).normal(5.0, 2.0, 60)
-    found = ablation_statistics.estimate(list(samples), RNG(2))
+    found = seed_statistics.estimate(list(samples), RNG(2))
     half = 1.96 * samples.std(ddof=1) / np.sqrt(60)
     assert found.mean == pytest.approx(samples.mean())
     assert [found.low, found.high] == pytest.approx([found.mean - half, found.mean + half], abs=0.1)
 
 
 def test_one_sample_has_no_interval() -> None:
-    found = ablation_statistics.estimate([3.0], RNG(0))
+    found = seed_statistics.estimate([3.0], RNG(0))
     assert (found.mean, found.count) == (3.0, 1)
     assert np.isnan(found.low)
 
 
 def test_equal_samples_are_certain() -> None:
-    assert ablation_statistics.estimate([2.0, 2.0, 2.0], RNG(0)) == ablation_statistics.Estimate(
+    assert seed_statistics.estimate([2.0, 2.0, 2.0], RNG(0)) == seed_statistics.Estimate(
         2.0, 2.0, 2.0, 3
     )
 
@@ -35,45 +35,43 @@ def test_the_p_of_pairs_is_that_of_all_sign_flips() -> None:
     gaps = np.subtract(treated, control)
     means = [np.mean(gaps * signs) for signs in itertools.product((1, -1), repeat=4)]
     expected = np.mean(np.abs(means) >= abs(gaps.mean()) - 1e-12)
-    assert ablation_statistics.effect(treated, control, RNG(0)).p == pytest.approx(expected)
+    assert seed_statistics.effect(treated, control, RNG(0)).p == pytest.approx(expected)
 
 
 def test_three_pairs_cannot_give_a_smaller_p_than_a_quarter() -> None:
-    found = ablation_statistics.effect([9.0, 8.0, 7.0], [1.0, 1.5, 2.0], RNG(0))
+    found = seed_statistics.effect([9.0, 8.0, 7.0], [1.0, 1.5, 2.0], RNG(0))
     assert found.p == pytest.approx(0.25) == found.smallest_p
 
 
 def test_samples_that_are_no_pairs_are_refused() -> None:
     with pytest.raises(ValueError, match="2 treated and 1 control"):
-        ablation_statistics.effect([1.0, 2.0], [1.0], RNG(0))
+        seed_statistics.effect([1.0, 2.0], [1.0], RNG(0))
 
 
 def test_the_probability_of_improvement_counts_pairs_and_halves_ties() -> None:
     first, second = np.array([1.0, 3.0]), np.array([1.0, 2.0, 4.0])
     wins = [(x > y) + 0.5 * (x == y) for x in first for y in second]
-    found = ablation_statistics.probability_of_improvement(first, second)
+    found = seed_statistics.probability_of_improvement(first, second)
     assert found == pytest.approx(np.mean(wins))
 
 
 def test_a_curve_is_the_mean_of_the_episodes_of_each_interval() -> None:
     steps, values = np.array([5.0, 10.0, 25.0]), np.array([1.0, 3.0, 8.0])
-    found = ablation_statistics.curve(steps, values, np.array([0.0, 10.0, 20.0, 30.0]))
+    found = learning_curve.curve(steps, values, np.array([0.0, 10.0, 20.0, 30.0]))
     assert found.tolist() == [2.0, 2.0, 8.0]
 
 
 def test_before_the_first_episode_a_curve_has_no_value() -> None:
-    found = ablation_statistics.curve(
-        np.array([15.0]), np.array([4.0]), np.array([0.0, 10.0, 20.0])
-    )
+    found = learning_curve.curve(np.array([15.0]), np.array([4.0]), np.array([0.0, 10.0, 20.0]))
     assert np.isnan(found[0])
     assert found[1] == 4.0
 
 
 def test_steps_to_a_threshold_count_until_it_is_kept() -> None:
     grid, values = np.array([0.0, 10, 20, 30, 40]), np.array([1.0, 9.0, 2.0, 9.0])
-    assert ablation_statistics.steps_to(grid, values, 5.0) == 40.0
-    assert ablation_statistics.steps_to(grid, values, 1.0) == 10.0
-    assert ablation_statistics.steps_to(grid, values, 9.5) == np.inf
+    assert learning_curve.steps_to(grid, values, 5.0) == 40.0
+    assert learning_curve.steps_to(grid, values, 1.0) == 10.0
+    assert learning_curve.steps_to(grid, values, 9.5) == np.inf
 
 
 def figures(**setups: float) -> dict[tuple[str, str], dict[int, float]]:

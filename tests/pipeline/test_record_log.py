@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from robojackson.errors import BadTable
-from robojackson.pipeline import tables
+from robojackson.files import tables
 from robojackson.pipeline.record_log import RecordLog
 from robojackson.pipeline.table_schemas import EPISODE_RECORD
 from storage import run_catalogue

@@ -22,9 +22,9 @@ def test_a_copy_with_the_name_of_the_original_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its motions would be taken for those of the other robot."""
-    original = yaml_loader.FOLDER / "robots" / "humanoid.yaml"
+    original = yaml_loader.SHIPPED / "robots" / "humanoid.yaml"
     (tmp_path / "robots").mkdir()
     (tmp_path / "robots" / "strong.yaml").write_text(original.read_text())
-    monkeypatch.setattr(yaml_loader, "FOLDER", tmp_path)
+    monkeypatch.setattr(yaml_loader, "SHIPPED", tmp_path)
     with pytest.raises(BadConfiguration, match=r"strong\.yaml: name is 'humanoid'"):
         describe_robot("strong")

@@ -12,8 +12,7 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.report.plots import run_plots
 from robojackson.report.video import canvas
-from robojackson.report.video.retarget_video import human_beside_robot
-from robojackson.report.video.side_by_side import VideoConfig
+from robojackson.report.video.side_by_side import VideoConfig, side_by_side
 
 SMALL = VideoConfig(fps=10, panel_width=64, panel_height=96, quality=5)
 BLUE_TO_GREY = 20
@@ -25,7 +24,8 @@ def frames(
     sequence: SmplSequence, reference: ReferenceMotion, model: mujoco.MjModel, tmp_path: Path
 ) -> list[np.ndarray]:
     """The small video, decoded."""
-    out = human_beside_robot(sequence, reference, tmp_path / "r.mp4", model=model, config=SMALL)
+    given = (None, None, sequence, reference, None, tmp_path / "r.mp4")
+    out = side_by_side(*given, model=model, config=SMALL)
     with av.open(str(out)) as container:
         return [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
 
@@ -54,8 +54,8 @@ def test_progress_counts_every_picture(
     sequence: SmplSequence, reference: ReferenceMotion, model: mujoco.MjModel, tmp_path: Path
 ) -> None:
     told: list[tuple[int, int]] = []
-    human_beside_robot(
-        sequence, reference, tmp_path / "r.mp4", model=model, config=SMALL,
+    side_by_side(
+        None, None, sequence, reference, None, tmp_path / "r.mp4", model=model, config=SMALL,
         progress=lambda done, total: told.append((done, total)),
     )  # fmt: skip
     assert told == [(count, 4) for count in range(1, 5)]

@@ -8,8 +8,8 @@ import pytest
 from sb3_contrib import TQC
 
 from robojackson.errors import BadPolicy, MissingDependency
+from robojackson.files import tables
 from robojackson.motion.reference_motion import ReferenceMotion
-from robojackson.pipeline import tables
 from robojackson.pipeline.yaml_loader import load
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.pretrained import pretrained

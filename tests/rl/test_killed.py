@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from robojackson.files import tables
 from robojackson.motion.reference_motion import ReferenceMotion
-from robojackson.pipeline import tables
 from robojackson.pipeline.table_schemas import EPISODE_RECORD
 from tests.fixtures.commands import environment
 

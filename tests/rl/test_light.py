@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from robojackson.files import tables
 from robojackson.motion.reference_motion import ReferenceMotion
-from robojackson.pipeline import tables
 from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.modes.observation import observation_size
 from robojackson.rl.policy import Policy

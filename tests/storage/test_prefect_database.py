@@ -7,7 +7,9 @@ from pathlib import Path
 import pytest
 
 from robojackson.errors import BackupFailed, MissingDependency
-from storage.prefect_database import VARIABLES, PostgreSQL, SQLite, database_of
+from storage.postgresql_database import PostgreSQL
+from storage.prefect_database import VARIABLES, database_of
+from storage.sqlite_database import SQLite
 
 URL = "postgresql+asyncpg://prefect:p%40ss@db.example:5433/runs"
 MISMATCH = """pg_dump: error: aborting because of server version mismatch

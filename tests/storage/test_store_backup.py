@@ -13,13 +13,15 @@ import fsspec
 import pytest
 
 from robojackson.errors import BackupFailed, RoboJacksonError
+from robojackson.files.local_folder import sha256_of
 from robojackson.pipeline.folder_lock import locked
-from robojackson.pipeline.local_folder import sha256_of
-from storage import store_backup
+from storage import store_backup, store_listing
 from storage.backup import HELD, Backups
-from storage.prefect_database import SQLite
+from storage.backup_progress import Progress
+from storage.sqlite_database import SQLite
 from storage.store import Store
-from storage.store_backup import BackupResult, Progress, Restored, back_up, restore
+from storage.store_backup import BackupResult, back_up
+from storage.store_restore import Restored, restore
 
 FILES = {
     "motion/0a/reference.parquet": b"PAR1" * 1000,
@@ -105,7 +107,7 @@ def test_a_second_backup_copies_only_what_is_new(store: Store, backups: Backups)
 def test_an_unchanged_file_is_not_read_again(
     local: Store, backups: Backups, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(store_backup, "RECENT_S", 0.0)
+    monkeypatch.setattr(store_listing, "RECENT_S", 0.0)
     backed_up(local, backups)
     monkeypatch.setattr(store_backup.shutil, "copyfile", None)  # calling it is an error
     assert backed_up(local, backups).files == len(FILES)
@@ -114,7 +116,7 @@ def test_an_unchanged_file_is_not_read_again(
 def test_a_file_altered_under_its_old_size_and_time_is_copied(
     local: Store, backups: Backups, target: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(store_backup, "RECENT_S", 0.0)
+    monkeypatch.setattr(store_listing, "RECENT_S", 0.0)
     path = Path(local.root) / "prefect/records/key"
     backed_up(local, backups)
     before = path.stat()
@@ -128,7 +130,7 @@ def test_a_file_altered_under_its_old_size_and_time_is_copied(
 def test_a_content_that_lost_bytes_is_copied_again(
     local: Store, backups: Backups, target: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(store_backup, "RECENT_S", 0.0)
+    monkeypatch.setattr(store_listing, "RECENT_S", 0.0)
     backed_up(local, backups)
     saved(backups)[0].write_bytes(b"cut")
     backed_up(local, backups)
@@ -485,7 +487,7 @@ def test_a_damaged_dump_is_found_before_anything_is_written(
 def test_a_database_that_is_locked_is_one_line(
     local: Store, backups: Backups, target: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("storage.prefect_database.BUSY_S", 0.1)
+    monkeypatch.setattr("storage.sqlite_database.BUSY_S", 0.1)
     made_database(database(local).path, 1).close()
     backed_up(local, backups)
     with closing(made_database(database(target).path, 7)) as live:

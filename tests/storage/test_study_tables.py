@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from robojackson.errors import BadTable
-from robojackson.pipeline import tables
+from robojackson.files import tables
 from robojackson.pipeline.table_schemas import EPISODE_RECORD, EVALUATION_RECORD
 from storage import study_tables
 from storage.artifact import Artifact

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from robojackson.errors import StoreError
-from robojackson.pipeline import tables
+from robojackson.files import tables
 from robojackson.pipeline.table_schemas import EPISODE_RECORD, EVALUATION_RECORD
 from robojackson.rl.config.train_config import EvaluateConfig, TrainConfig
 from storage import study_tables
@@ -61,7 +61,17 @@ def test_rows_that_are_made_anew_get_the_commit_that_made_them(
 def test_without_git_the_commit_is_what_the_environment_says(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(publish_tables, "CHECKOUT", tmp_path)
+    monkeypatch.setattr(publish_tables, "app_folder", lambda: tmp_path)
+    monkeypatch.setenv("ROBOJACKSON_COMMIT", "0123abc")
+    publish_tables._commit.cache_clear()
+    assert publish_tables._commit() == "0123abc"
+    publish_tables._commit.cache_clear()
+
+
+def test_the_repository_around_an_installed_package_is_not_asked(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(publish_tables, "is_checkout", lambda: False)
     monkeypatch.setenv("ROBOJACKSON_COMMIT", "0123abc")
     publish_tables._commit.cache_clear()
     assert publish_tables._commit() == "0123abc"

@@ -12,10 +12,11 @@ from prefect import flow
 from pydantic import ValidationError
 
 from configs.study_config import Move, Study
-from robojackson.metrics.ablation_statistics import estimate
-from robojackson.pipeline import tables
+from robojackson.files import tables
+from robojackson.metrics.seed_statistics import estimate
 from robojackson.pipeline.table_schemas import EPISODE_RECORD, EVALUATION_RECORD
 from robojackson.pipeline.yaml_loader import load
+from robojackson.report.pages import study_table
 from robojackson.report.pages.study_page import cell
 from storage import study_tables
 from storage.artifact import Artifact
@@ -154,9 +155,7 @@ def test_rows_of_other_runs_under_the_name_of_the_study_do_not_count(
 def test_seeds_that_never_reach_the_threshold_are_counted_apart() -> None:
     rng = np.random.default_rng(0)
     figures = {"steps_to": {("walk", "scratch"): {0: 100.0, 1: 300.0, 2: np.inf, 3: np.inf}}}
-    (line, *_) = write_study_page.table(
-        figures, {}, Study(moves=("walk",), setups=("scratch",)), rng
-    )
+    (line, *_) = study_table.table(figures, {}, ["walk"], ["scratch"], rng)
     assert cell(line.values["steps_to"], "steps_to", 4) == ("200", ["[100, 300]", "(2 of 4)"])
     never = estimate([np.inf, np.inf], rng)
     assert cell(never, "steps_to", 2) == ("never", [])

@@ -1,17 +1,16 @@
 """One service of a stack as a process with a health check, a log, and a group of its own."""
 
-import os
 import re
 import signal
 import socket
 import subprocess
 import time
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from robojackson.cli.lifetime.process_group import end_group, signal_group
 from tools.stack.processes import forks
 
 ROOT = Path(__file__).parents[2]
@@ -94,8 +93,7 @@ class Service:
     def kill(self, how: signal.Signals = signal.SIGKILL) -> None:
         """Send a signal to the process and all its children."""
         if self.process is not None and self.process.poll() is None:
-            with suppress(ProcessLookupError):
-                os.killpg(self.process.pid, how)
+            signal_group(self.process.pid, how)
 
     def murder(self) -> bool:
         """SIGKILL; whether it was that which ended the process."""
@@ -106,12 +104,9 @@ class Service:
 
     def stop(self) -> None:
         """End it: ask, wait, kill."""
-        self.kill(signal.SIGINT if self.user else signal.SIGTERM)
         if self.process is not None:
-            with suppress(subprocess.TimeoutExpired):
-                self.process.wait(self.grace_s)
-            self.kill()
-            self.process.wait()
+            request = signal.SIGINT if self.user else signal.SIGTERM
+            end_group(self.process, self.grace_s, request)
 
 
 def interpolate(value: Any, given: Mapping[str, str]) -> Any:

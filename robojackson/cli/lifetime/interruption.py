@@ -9,7 +9,8 @@ import signal
 import sys
 from types import FrameType
 
-from robojackson.cli.lifetime.orphans import VARIABLE, end_with_parent
+from robojackson.cli.lifetime.orphans import VARIABLE
+from robojackson.cli.lifetime.parent_death import end_with_parent
 
 INTERRUPTED = 130
 """Exit code of a command that was interrupted."""

@@ -19,8 +19,6 @@ FAREWELL = b"all is well"
 HALF_WRITTEN = ".part-"
 """Beginning of the names of files that are being written: `pipeline.local_folder.TEMPORARY`; only
 the standard library is imported here."""
-DIE_WITH_PARENT = 1
-"""PR_SET_PDEATHSIG of prctl(2)."""
 KILL_S = 0.5
 """How long killed processes may take to be gone, seconds."""
 
@@ -48,15 +46,6 @@ def none_left() -> Iterator[None]:
         if given is None:
             del os.environ[VARIABLE]
         watch.communicate(FAREWELL)
-
-
-def end_with_parent(parent: int) -> bool:
-    """Have the kernel kill this process when its parent ends; return whether it is still there."""
-    if sys.platform == "linux":
-        import ctypes
-
-        ctypes.CDLL(None).prctl(DIE_WITH_PARENT, signal.SIGKILL, 0, 0, 0)
-    return os.getppid() == parent
 
 
 def marked(mark: str) -> set[int]:

@@ -34,6 +34,7 @@ from robojackson.cli.lifetime.interruption import (
     same_command,
 )
 from robojackson.cli.lifetime.orphans import half_written, holding, kill_all, marked, new_mark
+from robojackson.cli.lifetime.process_group import SECONDS_TO_SAVE, signal_group
 
 GRACE_S = 1.5
 """What the worker gets to end by itself, seconds."""
@@ -96,10 +97,10 @@ def _wait(worker: int, mark: str) -> int:
             _end(worker, mark)
             return INTERRUPTED
         if number == signal.SIGTSTP:
-            os.killpg(worker, signal.SIGSTOP)
+            signal_group(worker, signal.SIGSTOP)
             os.kill(os.getpid(), signal.SIGSTOP)
         elif number == signal.SIGCONT:
-            os.killpg(worker, signal.SIGCONT)
+            signal_group(worker, signal.SIGCONT)
         ended, status = os.waitpid(worker, os.WNOHANG)
         if ended:
             return os.waitstatus_to_exitcode(status)
@@ -107,8 +108,6 @@ def _wait(worker: int, mark: str) -> int:
 
 def _end(worker: int, mark: str) -> None:
     """Acknowledge a signal, and end the worker with all that it started."""
-    from robojackson.rl.training_hooks import SECONDS_TO_SAVE
-
     began = time.monotonic()
     until = began + GRACE_S
     processes = {worker, *marked(mark)}
@@ -130,7 +129,7 @@ def _end(worker: int, mark: str) -> None:
         if saving:
             until = max(until, min(now + GRACE_AFTER_SAVING_S, began + SECONDS_TO_SAVE))
     files |= kill_all(mark, worker)
-    os.killpg(worker, signal.SIGKILL)  # forks of the worker carry no mark
+    signal_group(worker, signal.SIGKILL)  # forks of the worker carry no mark
     os.waitpid(worker, 0)
     for file in files:
         with suppress(OSError):  # its folder, too, may be gone

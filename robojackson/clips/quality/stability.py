@@ -10,7 +10,23 @@ from jaxtyping import Float
 from pydantic import Field
 
 from robojackson.config import config_dataclass
+from robojackson.files.table_file import Columns, Facts, TableFile
+from robojackson.files.table_types import F64, I32, Column, TableSchema
 from robojackson.motion.landmark_track import LANDMARKS, LandmarkTrack
+
+STABILITY_SCORE = TableSchema(
+    "StabilityScore",
+    "clip",
+    (
+        Column("frames", I32),
+        Column("detected", I32),
+        Column("missing_joints", I32),
+        Column("jitter", F64, "image sizes"),
+        Column("stability_score", F64, "1"),
+        Column("missing_joints_per_frame", F64, "1"),
+        Column("jitter_per_frame", F64, "image sizes"),
+    ),
+)
 
 
 @config_dataclass
@@ -23,7 +39,7 @@ class StabilityConfig:
 
 
 @dataclass(frozen=True)
-class Stability:
+class Stability(TableFile):
     """The score of one clip.
 
     Attributes:
@@ -36,6 +52,8 @@ class Stability:
             sums favour short clips.
     """
 
+    SCHEMA = STABILITY_SCORE
+
     frames: int
     detected: int
     missing_joints: int
@@ -43,6 +61,14 @@ class Stability:
     stability_score: float
     missing_joints_per_frame: float
     jitter_per_frame: float
+
+    def to_columns(self) -> tuple[Columns, Facts]:
+        names = (column.name for column in STABILITY_SCORE.columns)
+        return {name: np.array([getattr(self, name)]) for name in names}, {}
+
+    @classmethod
+    def from_columns(cls, columns: Columns, facts: Facts) -> "Stability":
+        return cls(**{name: values[0].item() for name, values in columns.items()})
 
 
 def stability(track: LandmarkTrack, config: StabilityConfig) -> Stability:

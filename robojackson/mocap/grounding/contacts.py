@@ -8,13 +8,14 @@ in the air is forbidden there. The likeliest path is found by dynamic programmin
 Metres, seconds; floor at z = 0. Order: `motion.smpl_sequence.CONTACT_POINTS`.
 """
 
-from itertools import product
+from itertools import product, repeat
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from robojackson.body.forward_kinematics import unit
 from robojackson.config import config_dataclass
+from robojackson.geometry.shortest_path import viterbi
 from robojackson.motion.smpl_sequence import AIR, CONTACT_POINTS, PLANTED, SLIDING
 
 STATES = (AIR, PLANTED, SLIDING)
@@ -74,7 +75,8 @@ def contacts(
     airborne = (JOINT == AIR).all(1)
     joint[np.ix_(~np.asarray(falling, bool), airborne)] = IMPOSSIBLE
     changes = (JOINT[:, None] != JOINT[None]).sum(-1)
-    return JOINT[likeliest_path(joint, -config.change * changes)].astype(np.int8)
+    path = viterbi(-joint, repeat(config.change * changes, len(joint) - 1))
+    return JOINT[path].astype(np.int8)
 
 
 def log_likelihood(
@@ -100,23 +102,6 @@ def log_likelihood(
     still = still + config.outlier * moving
     raised = 0.5 * (still + moving)
     return np.log(np.stack([loose * raised, touching * still, touching * moving], -1))
-
-
-def likeliest_path(
-    emission: Float[np.ndarray, "T S"], transition: Float[np.ndarray, "S S"]
-) -> Int[np.ndarray, " T"]:
-    """The path of greatest summed log likelihood; `transition` is from row to column."""
-    best = emission[0]
-    origin = np.empty(emission.shape, int)
-    for frame in range(1, len(emission)):
-        ways = best[:, None] + transition
-        origin[frame] = ways.argmax(0)
-        best = ways[origin[frame], np.arange(len(best))] + emission[frame]
-    path = np.empty(len(emission), int)
-    path[-1] = int(best.argmax())
-    for frame in range(len(emission) - 1, 0, -1):
-        path[frame - 1] = origin[frame, path[frame]]
-    return path
 
 
 def image_speed(points_c: Float[np.ndarray, "T 4 3"], fps: float) -> Float[np.ndarray, "T 4"]:

@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from robojackson.clips.people.camera_path import warp
 from robojackson.errors import NoPersonFound, TrackTooShort, UnknownName
+from robojackson.geometry.shortest_path import viterbi
 from robojackson.motion.landmark_track import LandmarkTrack
 
 LANDMARK_NAMES: tuple[str, ...] = (
@@ -160,13 +161,6 @@ def swapped_frames(landmarks: Landmarks) -> np.ndarray:
     kept, crossed = features[:, NECK_DOWN], features[:, MIRROR][:, NECK_DOWN]
     same = np.linalg.norm(kept[1:] - kept[:-1], axis=-1).mean(-1)
     other = np.linalg.norm(crossed[1:] - kept[:-1], axis=-1).mean(-1)
-    cost = np.array([0.0, SWAP_PRIOR_M])
-    previous = np.empty((len(same), 2), int)
-    for step, (stay, change) in enumerate(zip(same, other, strict=True)):
-        ways = cost[:, None] + np.array([[stay, change], [change, stay]])
-        previous[step] = ways.argmin(0)
-        cost = ways.min(0) + [0.0, SWAP_PRIOR_M]
-    states = [int(cost.argmin())]
-    for choices in previous[::-1]:
-        states.append(int(choices[states[-1]]))
-    return np.array(states[::-1], bool)
+    changes = np.stack([same, other, other, same], -1).reshape(-1, 2, 2)
+    crossing = np.tile([0.0, SWAP_PRIOR_M], (len(kept), 1))
+    return viterbi(crossing, changes).astype(bool)

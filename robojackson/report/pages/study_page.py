@@ -15,7 +15,8 @@ from typing import Any
 
 import jinja2
 
-from robojackson.metrics.ablation_statistics import Claim, Comparison, Effect, Estimate
+from robojackson.metrics.ablation_statistics import Claim, Comparison
+from robojackson.metrics.seed_statistics import Effect, Estimate
 from robojackson.report.pages.run_page import Plot
 
 FIGURES: Mapping[str, tuple[str, int, float]] = {

@@ -1,10 +1,10 @@
 """The video that proves it: source, skeleton, reference robot and trained robot side by side.
 
-All four panels show the same moment. The cameras stand where the one that filmed stood, in front
-(+x), and follow their subject over the floor.
+Each panel is there when it is given. All show the same moment. The cameras stand where the one that
+filmed stood, in front (+x), and follow their subject over the floor.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -48,9 +48,9 @@ class VideoConfig:
 
 
 def side_by_side(
-    source: Path,
-    track: LandmarkTrack,
-    sequence: SmplSequence,
+    source: Path | None,
+    track: LandmarkTrack | None,
+    sequence: SmplSequence | None,
     reference: ReferenceMotion,
     rollout_qpos: Float[np.ndarray, "S nq"] | None,
     out: Path,
@@ -59,10 +59,11 @@ def side_by_side(
     config: VideoConfig | None = None,
     progress: Progress | None = None,
 ) -> Path:
-    """Write the mp4; without a rollout it has three panels.
+    """Write the mp4; what is None has no panel.
 
     Args:
-        source: The clip that `track` was made from.
+        source, track: The clip and the landmarks that were found in it; both or neither.
+        sequence: The motion of the person.
         rollout_qpos: The trained robot at the reference's control step, from its first step on;
             may be longer than a cycle, and ends where the robot fell.
         model: The robot that qpos belongs to.
@@ -72,9 +73,9 @@ def side_by_side(
     """
     config = config or VideoConfig()
     steps = 0 if rollout_qpos is None else len(rollout_qpos)
-    when = timeline(
-        reference, track.fps, len(sequence), steps, float(config.fps), config.max_seconds
-    )
+    filmed = [each for each in (track, sequence) if each is not None]
+    fps, frames = (filmed[0].fps, len(filmed[-1])) if filmed else (1.0, 1)
+    when = timeline(reference, fps, frames, steps, float(config.fps), config.max_seconds)
     with ExitStack() as stack:
         film = Film(stack, source, track, sequence, config, when)
         film.add_robot("reference", reference_qpos(reference, when), model, REFERENCE_TINT)
@@ -90,16 +91,19 @@ class Film:
     def __init__(
         self,
         stack: ExitStack,
-        source: Path,
-        track: LandmarkTrack,
-        sequence: SmplSequence,
+        source: Path | None,
+        track: LandmarkTrack | None,
+        sequence: SmplSequence | None,
         config: VideoConfig,
         when: Timeline,
     ) -> None:
         self._stack, self._config, self._when, self._sequence = stack, config, when, sequence
         self._size = config.panel_width, config.panel_height
-        self._sources = source_panels(source, track, when.frame, *self._size)
-        self._skeleton_target = self._followed(sequence.keypoints_w[when.frame, 0])
+        self._sources: dict[int, canvas.Picture] | None = None
+        if source is not None and track is not None:
+            self._sources = source_panels(source, track, when.frame, *self._size)
+        if sequence is not None:
+            self._skeleton_target = self._followed(sequence.keypoints_w[when.frame, 0])
         self._robots: list[tuple[str, RobotView, np.ndarray, np.ndarray]] = []
 
     def add_robot(
@@ -110,22 +114,23 @@ class Film:
 
     def pictures(self) -> Iterator[canvas.Picture]:
         for index in range(len(self._when)):
-            panels = [self._source(index), self._skeleton(index)]
+            panels = [] if self._sources is None else [self._source(index, self._sources)]
+            panels += [] if self._sequence is None else [self._skeleton(index, self._sequence)]
             panels += [self._robot(index, *robot) for robot in self._robots]
             yield canvas.side_by_side(panels)
 
-    def _source(self, index: int) -> canvas.Picture:
+    def _source(self, index: int, sources: Mapping[int, canvas.Picture]) -> canvas.Picture:
         frame = int(self._when.frame[index])
         blank = np.full((self._size[1], self._size[0], 3), canvas.BACKDROP, np.uint8)
-        panel = self._sources.get(frame, blank).copy()
+        panel = sources.get(frame, blank).copy()
         canvas.label(panel, "source", f"frame {frame}")
         return panel
 
-    def _skeleton(self, index: int) -> canvas.Picture:
-        frame = min(int(self._when.frame[index]), len(self._sequence) - 1)
+    def _skeleton(self, index: int, sequence: SmplSequence) -> canvas.Picture:
+        frame = min(int(self._when.frame[index]), len(sequence) - 1)
         view = view_of(self._skeleton_target[index], self._config.azimuth_deg, *self._size)
-        panel = skeleton_panel(self._sequence, frame, view, *self._size)
-        canvas.label(panel, "motion capture", "" if self._sequence.valid[frame] else "(filled in)")
+        panel = skeleton_panel(sequence, frame, view, *self._size)
+        canvas.label(panel, "motion capture", "" if sequence.valid[frame] else "(filled in)")
         return panel
 
     def _robot(

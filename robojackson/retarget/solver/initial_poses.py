@@ -4,13 +4,16 @@ The second solves each frame from several poses at once and picks one a frame so
 the smoothest cheap motion (Viterbi); its keypoint error is the kinematic floor of the clip.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial.transform import Rotation
 
 from robojackson.geometry.rotations import from_rotation
+from robojackson.geometry.shortest_path import viterbi
 from robojackson.metrics.retarget_error import keypoint_error_mm
 from robojackson.retarget.solver.block_banded import Normal
 from robojackson.retarget.solver.clip_problem import Problem
@@ -64,7 +67,7 @@ def frame_start(problem: Problem, rng: np.random.Generator, seeds: int) -> Frame
         problem, starts.reshape(seeds * len(frames), -1), np.tile(frames, seeds)
     )
     poses = poses.reshape(seeds, len(frames), -1)
-    pick = _viterbi(cost.reshape(seeds, -1).T, poses[..., 7:].swapaxes(0, 1))
+    pick = viterbi(cost.reshape(seeds, -1).T, _jump_costs(poses[..., 7:].swapaxes(0, 1)))
     picked = continuous(poses[pick, np.arange(len(frames))])
     best = poses[cost.reshape(seeds, -1).argmin(axis=0), np.arange(len(frames))]
     at, wanted = pose(problem.tree, best).site_pos, problem.targets.keypoints_w[frames]
@@ -106,16 +109,7 @@ def _frame_step(
     ), cost
 
 
-def _viterbi(cost: Float[np.ndarray, "N M"], hinges: Float[np.ndarray, "N M J"]) -> np.ndarray:
-    """Index of the candidate of each frame on the cheapest path."""
-    best, back = cost[0].copy(), np.zeros(cost.shape, int)
-    for t in range(1, len(cost)):
-        jump = np.sum((hinges[t - 1][:, None] - hinges[t][None]) ** 2, axis=-1)
-        total = best[:, None] + _JUMP_COST * jump
-        back[t] = total.argmin(axis=0)
-        best = total.min(axis=0) + cost[t]
-    path = np.zeros(len(cost), int)
-    path[-1] = best.argmin()
-    for t in range(len(cost) - 1, 0, -1):
-        path[t - 1] = back[t][path[t]]
-    return path
+def _jump_costs(hinges: Float[np.ndarray, "N M J"]) -> Iterator[Float[np.ndarray, "M M"]]:
+    """Yield what a change from each candidate of a frame to each of the next one costs, m2."""
+    for before, after in pairwise(hinges):
+        yield _JUMP_COST * np.sum((before[:, None] - after[None]) ** 2, axis=-1)

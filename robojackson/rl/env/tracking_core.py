@@ -5,19 +5,22 @@ step is worth, how an episode begins. Episodes end by a fall, by getting lost, a
 that is not cyclic, or by the time limit; only the last is a truncation and is bootstrapped.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any
 
 import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
-from robojackson.errors import UnknownName
+from robojackson.errors import BadConfiguration, UnknownName
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import PaperConfig, TrackConfig
 from robojackson.rl.env.episode_totals import EpisodeTotals
 from robojackson.rl.modes.mode import Mode, Score
 from robojackson.rl.modes.paper_mode import PaperMode
+from robojackson.rl.modes.rewards import RewardFunction
 from robojackson.rl.modes.track_mode import TrackMode
 from robojackson.rl.sim.simulation import require_same_clock
 from robojackson.robot.model import Robot
@@ -62,13 +65,14 @@ class TrackingCore:
         config: TrackConfig | PaperConfig,
         n: int,
         seed: int,
+        rewards: Mapping[str, RewardFunction] = MappingProxyType({}),
     ) -> None:
         names = robot.keypoint_names
         if names != reference.keypoint_names:
             unknown = sorted(set(reference.keypoint_names) ^ set(names))
             raise UnknownName("keypoint", ", ".join(unknown), "reference motion", names)
         self.config, self.n = config, n
-        self.mode = mode_of(robot, reference, config, n, seed)
+        self.mode = mode_of(robot, reference, config, n, seed, rewards)
         self.sim, self.clip, self.limit = self.mode.sim, self.mode.clip, self.mode.limit
         require_same_clock(self.sim.dt, reference.dt)
         self.rng = np.random.default_rng(seed)
@@ -174,9 +178,20 @@ OBSERVED = ("qpos", "qvel", "points", "com", "broken")
 
 
 def mode_of(
-    robot: Robot, reference: ReferenceMotion, config: TrackConfig | PaperConfig, n: int, seed: int
+    robot: Robot,
+    reference: ReferenceMotion,
+    config: TrackConfig | PaperConfig,
+    n: int,
+    seed: int,
+    rewards: Mapping[str, RewardFunction] = MappingProxyType({}),
 ) -> Mode:
-    """The mode that a configuration belongs to."""
-    if isinstance(config, PaperConfig):
-        return PaperMode(robot, reference, config, n, seed)
-    return TrackMode(robot, reference, config, n, seed)
+    """The mode that a configuration belongs to.
+
+    Raises:
+        BadConfiguration: a user's reward terms for the paper's mode, whose reward is the paper's.
+    """
+    if not isinstance(config, PaperConfig):
+        return TrackMode(robot, reference, config, n, seed, rewards)
+    if rewards:
+        raise BadConfiguration("reward terms of your own need mode=track; paper has the paper's")
+    return PaperMode(robot, reference, config, n, seed)

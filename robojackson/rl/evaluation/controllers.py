@@ -5,9 +5,8 @@ from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
-from pydantic import PositiveInt, ValidationError
+from pydantic import PositiveInt, TypeAdapter, ValidationError
 
-from robojackson.config import validated
 from robojackson.errors import BadPolicy
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.evaluate_config import TRAINED
@@ -64,7 +63,7 @@ def fact(policy: Policy, name: str, kind: type[T]) -> T:
         BadPolicy: it holds what this version does not know.
     """
     try:
-        return validated(kind, policy.facts[name])
+        return TypeAdapter(kind).validate_python(policy.facts[name])
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, (name, *first["loc"])))

@@ -6,15 +6,19 @@ sites are compared relative to the pelvis, so that drifting over the floor costs
 term.
 """
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
 
+from robojackson.errors import BadConfiguration
 from robojackson.geometry.rotations import quat_angle
 from robojackson.rl.config.train_config import RewardConfig, TerminationConfig
 from robojackson.rl.sim.reference_clip import ClipStep
 
+RewardFunction = Callable[["RewardState"], Float[np.ndarray, " N"]]
+"""A reward term of a user: one number a robot."""
 BELLS = RewardConfig.terms()
 """Terms of the reward that pay for a small error: each has the same name in `TrackingErrors`."""
 PELVIS = "pelvis"
@@ -101,6 +105,51 @@ def tracking_errors(
         height=place[:, 2],
         drift=np.sqrt(_squares(place[:, :2])),
     )
+
+
+@dataclass(frozen=True)
+class RewardState:
+    """What a reward term of a user sees: N robots after a control step. World frame; read-only.
+
+    Attributes:
+        qpos: MuJoCo positions; root at 0:3 (m), its quaternion wxyz at 3:7, hinges (rad).
+        qvel: MuJoCo velocities; root linear (m/s) at 0:3, angular (rad/s) at 3:6, hinges (rad/s).
+        points: Keypoint sites, m, in the order of `Robot.keypoint_names`.
+        moved: Their velocities, m/s.
+        target: The reference at the same step.
+        errors: How far each robot is from it.
+        action_change: Mean squared change of the action, -1..1.
+    """
+
+    qpos: Float[np.ndarray, "N nq"]
+    qvel: Float[np.ndarray, "N nv"]
+    points: Float[np.ndarray, "N K 3"]
+    moved: Float[np.ndarray, "N K 3"]
+    target: ClipStep
+    errors: TrackingErrors
+    action_change: Float[np.ndarray, " N"]
+
+
+def own_terms(
+    functions: Mapping[str, RewardFunction], state: RewardState
+) -> dict[str, Float[np.ndarray, " N"]]:
+    """The reward terms of a user's functions, by their names.
+
+    Raises:
+        BadConfiguration: one returns anything but one finite number a robot.
+    """
+    count = len(state.qpos)
+    terms = {}
+    for name, function in functions.items():
+        value = np.asarray(function(state), float)
+        if value.shape != (count,) or not np.isfinite(value).all():
+            raise BadConfiguration(
+                f"reward {name!r} returned {value.dtype} of shape {value.shape}"
+                f"{'' if np.isfinite(value).all() else ' with NaN or infinity'}; "
+                f"one finite number for each of {count} robots is wanted"
+            )
+        terms[name] = value
+    return terms
 
 
 def reward_terms(

@@ -5,6 +5,8 @@ to the reference's next hinge angles and followed by the PD law of `Simulation`.
 `observation.observe`. Reward: `rewards.reward_terms`. Episodes start as `reset_states` says.
 """
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -23,10 +25,13 @@ from robojackson.rl.modes.reset_states import (
     standing_pose_at,
 )
 from robojackson.rl.modes.rewards import (
+    RewardFunction,
+    RewardState,
     TrackedPoints,
     TrackingErrors,
     fallen,
     is_off_track,
+    own_terms,
     reward_terms,
     tracked_points,
     tracking_errors,
@@ -46,9 +51,15 @@ class TrackMode:
     repeats = 1
 
     def __init__(
-        self, robot: Robot, reference: ReferenceMotion, config: TrackConfig, n: int, seed: int
+        self,
+        robot: Robot,
+        reference: ReferenceMotion,
+        config: TrackConfig,
+        n: int,
+        seed: int,
+        rewards: Mapping[str, RewardFunction] = MappingProxyType({}),
     ) -> None:
-        self._config, self.clip = config, Clip(reference)
+        self._config, self.clip, self._rewards = config, Clip(reference), rewards
         names = robot.keypoint_names
         self._which = tracked_points(names)
         self.sim = Simulation(robot, config.control, n, config.threads, config.random, seed)
@@ -71,6 +82,9 @@ class TrackMode:
         sim, rules = self.sim, self._config.termination
         moved = (sim.points - before) / self.clip.dt
         errors, terms = evaluate_step(sim, moved, at, change, self._which, self._config.reward)
+        if self._rewards:
+            seen = RewardState(sim.qpos, sim.qvel, sim.points, moved, at, errors, change)
+            terms |= own_terms(self._rewards, seen)
         failed = fallen(sim.qpos, rules) | is_off_track(errors, rules) | sim.broken
         return Score(terms, failed, errors.site_mean)
 

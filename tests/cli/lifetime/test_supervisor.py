@@ -13,7 +13,7 @@ import pytest
 
 from robojackson.cli.lifetime.orphans import HALF_WRITTEN
 from robojackson.cli.lifetime.supervisor import SAME_S
-from robojackson.pipeline.local_folder import TEMPORARY
+from robojackson.files.local_folder import TEMPORARY
 from tests.fixtures.commands import environment
 from tools.stack.interrupted_command import living_with
 
@@ -46,9 +46,9 @@ while True:
 SAVE = """
 flag = UnsavedFlag()
 flag.set()
-signal.signal(signal.SIGINT, lambda *_: None)
+signal.pthread_sigmask(signal.SIG_BLOCK, {{signal.SIGINT}})
 say('ready')
-signal.pause()
+signal.sigwait({{signal.SIGINT}})
 time.sleep({seconds})
 open({path!r}, 'w').write('whole')
 """
@@ -151,7 +151,8 @@ def test_a_training_below_the_command_is_stopped_and_saves(start: Start, tmp_pat
         f"say = lambda text: print(text, file=sys.stderr, flush=True)\n{save}"
     )
     words = f"[sys.executable, '-c', {child!r}]"
-    process = start(f"subprocess.Popen({words}, start_new_session=True)\n{SWALLOW}")
+    started = f"subprocess.Popen({words}, start_new_session=True)"
+    process = start(f"signal.signal(signal.SIGINT, signal.SIG_IGN)\n{started}\n{SWALLOW}")
     process.send_signal(signal.SIGINT)
     _, err = process.communicate()
     assert "the training is saving its checkpoint" in err

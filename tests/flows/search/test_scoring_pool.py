@@ -11,7 +11,7 @@ from prefect.task_runners import TaskRunner, ThreadPoolTaskRunner
 from prefect_dask import DaskTaskRunner
 
 from flows.search.scoring_pool import VARIABLE, scorers
-from flows.video_pass.dance_stages import score_all
+from flows.video_pass.scored_candidates import score_all
 from robojackson.clips.trim import trim
 from robojackson.errors import MissingDependency
 from robojackson.pipeline.pipeline_config import PipelineConfig

@@ -1,7 +1,5 @@
 """Laws of contacts, of feet that are held, and of the path that keeps them still."""
 
-from itertools import product
-
 import numpy as np
 import pytest
 
@@ -13,7 +11,6 @@ from robojackson.mocap.grounding.contacts import (
     ContactConfig,
     contacts,
     image_speed,
-    likeliest_path,
     ray_speed,
 )
 from robojackson.motion.smpl_sequence import AIR, PLANTED, SLIDING
@@ -79,15 +76,6 @@ def test_a_step_changes_the_state_where_it_happens() -> None:
     found = contacts(np.zeros((FRAMES, 4)), speed, GROUNDED, FPS, CONFIG)
     assert (found[:20] == PLANTED).all()
     assert (found[20:] == SLIDING).all()
-
-
-def test_likeliest_path_is_the_best_of_all_paths() -> None:
-    """Against all 3^6 paths."""
-    rng = np.random.default_rng(5)
-    emission, transition = rng.normal(size=(6, 3)), rng.normal(size=(3, 3))
-    paths = np.array(list(product(range(3), repeat=6)))
-    score = emission[np.arange(6), paths].sum(1) + transition[paths[:, :-1], paths[:, 1:]].sum(1)
-    assert np.array_equal(likeliest_path(emission, transition), paths[score.argmax()])
 
 
 def test_speed_in_the_image_is_blind_along_the_ray() -> None:

@@ -1,6 +1,7 @@
 """The record of a call is found without running it, wherever the call was made."""
 
 import asyncio
+import json
 from pathlib import Path
 from typing import Any
 
@@ -89,6 +90,18 @@ def test_records_lie_where_the_store_says_whatever_home_prefect_has(
         recorded(10, first=True)
     assert doubled.recorded(number=10) is not None
     assert not (tmp_path / "results").exists()
+
+
+def test_a_record_whose_address_an_earlier_version_wrote_is_found(store_folder: Path) -> None:
+    recorded(13, first=True)
+    (path,) = (store_folder / "records" / "doubled").glob("*.json")
+    record = json.loads(path.read_text())
+    assert record["metadata"]["storage_key"] == f"robojackson://records/doubled/{path.name}"
+    record["metadata"]["storage_key"] = f"doubled/{path.name}"
+    path.write_text(json.dumps(record))
+    ran.clear()
+    recorded(13, first=True)
+    assert ran == []
 
 
 def test_a_record_in_an_object_store_is_found_as_well(monkeypatch: pytest.MonkeyPatch) -> None:

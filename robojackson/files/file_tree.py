@@ -5,11 +5,11 @@ Commands write their results through it; the store of the flows is one of these,
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from robojackson.errors import RoboJacksonError, StoreError
-from robojackson.pipeline.local_folder import (
+from robojackson.files.local_folder import (
     TEMPORARY,
     LocalFolder,
     Place,
@@ -106,6 +106,24 @@ def in_one_line(what: str, error: type[RoboJacksonError] = StoreError) -> Iterat
         reason = cause.strerror if isinstance(cause, OSError) and cause.strerror else str(cause)
         line = " ".join(reason.split()) or type(cause).__name__
         raise error(f"{what}: {line}") from cause
+
+
+@contextmanager
+def results_in(out: Path) -> Iterator[FileTree]:
+    """A folder for results, told at once when it cannot be written.
+
+    After a failure the folders that were made for it and are empty go away again.
+    """
+    made = [path for path in (out, *out.parents) if not path.exists()]
+    try:
+        files = FileTree(out)
+        files.require_writable()
+        yield files
+    except BaseException:
+        with suppress(OSError):
+            for path in made:
+                path.rmdir()
+        raise
 
 
 def _is_text(key: str) -> bool:

@@ -10,17 +10,15 @@ import pyarrow.parquet as pq
 import pytest
 
 from robojackson.clips.quality.stability import Stability
-from robojackson.errors import BadTable, UnknownName
-from robojackson.motion.landmark_track import LandmarkTrack
+from robojackson.errors import BadTable
+from robojackson.files import tables
+from robojackson.motion.landmark_track import LANDMARK_TRACK, LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
-from robojackson.motion.smpl_sequence import SmplSequence
-from robojackson.pipeline import tables
-from robojackson.pipeline.table_codecs import Rollout
+from robojackson.motion.rollout import Rollout
+from robojackson.motion.smpl_sequence import SMPL_SEQUENCE, SmplSequence
 from robojackson.pipeline.table_schemas import (
     EPISODE_RECORD,
     EVALUATION_RECORD,
-    LANDMARK_TRACK,
-    SMPL_SEQUENCE,
 )
 from storage import artifact_tables
 from storage.store import Store
@@ -191,11 +189,6 @@ def test_another_table_is_refused() -> None:
     told = "holds a LandmarkTrack, expected a SmplSequence; `robojackson mocap` writes one"
     with pytest.raises(BadTable, match=told):
         tables.decode(SmplSequence, data, "landmarks.parquet")
-
-
-def test_a_class_without_a_table_is_refused() -> None:
-    with pytest.raises(UnknownName, match="unknown table 'int'"):
-        tables.encode(3)
 
 
 @pytest.mark.parametrize("moved", [False, True])

@@ -8,32 +8,44 @@ a `BadTable` that names the column and the file.
 import io
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, TypeVar
+from typing import Any, ClassVar, Protocol, Self, TypeVar
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from robojackson.errors import BadTable
-from robojackson.pipeline.table_codecs import CODECS, Codec, codec_of
-from robojackson.pipeline.table_schemas import VERSION, Column, TableSchema
+from robojackson.files.table_types import VERSION, Column, TableSchema
 
 MAKERS = {"SmplSequence": "mocap", "ReferenceMotion": "retarget"}
 """Which command writes a table that other commands read."""
-Value = TypeVar("Value")
 Row = Mapping[str, Any]
 
 
-def encode(value: object) -> bytes:
+class Tabular(Protocol):
+    """What can be a table (`table_file.TableFile` is the base class of those that are)."""
+
+    SCHEMA: ClassVar[TableSchema]
+
+    def to_columns(self) -> tuple[dict[str, np.ndarray], dict[str, Any]]: ...
+
+    @classmethod
+    def from_columns(cls, columns: dict[str, np.ndarray], facts: dict[str, Any]) -> Self: ...
+
+
+Value = TypeVar("Value", bound=Tabular)
+
+
+def encode(value: Tabular) -> bytes:
     """A stage's dataclass as a Parquet file."""
-    codec = codec_of(type(value))
-    columns, metadata = codec.to_columns(value)
-    arrays = [_vector_column(c, columns[c.name]) for c in codec.schema.columns]
+    schema = value.SCHEMA
+    columns, metadata = value.to_columns()
+    arrays = [_vector_column(c, columns[c.name]) for c in schema.columns]
     fields = [
         column.field(array.type.list_size if column.is_vector else None)
-        for column, array in zip(codec.schema.columns, arrays, strict=True)
+        for column, array in zip(schema.columns, arrays, strict=True)
     ]
-    return _to_bytes(codec.schema, arrays, fields, metadata)
+    return _to_bytes(schema, arrays, fields, metadata)
 
 
 def decode(cls: type[Value], data: bytes, where: str) -> Value:
@@ -42,13 +54,13 @@ def decode(cls: type[Value], data: bytes, where: str) -> Value:
     Raises:
         BadTable: not Parquet, another table, or a column or metadata key that is wrong.
     """
-    codec: Codec = CODECS[cls]
-    table = check(codec.schema, _from_bytes(data, where), where)
-    columns = {c.name: _numbers(c, table.column(c.name)) for c in codec.schema.columns}
+    schema = cls.SCHEMA
+    table = check(schema, _from_bytes(data, where), where)
+    columns = {c.name: _numbers(c, table.column(c.name)) for c in schema.columns}
     try:
-        return codec.from_columns(columns, metadata_of(table))
+        return cls.from_columns(columns, metadata_of(table))
     except (KeyError, ValueError, TypeError) as cause:
-        raise BadTable(f"{where}: metadata of {codec.schema.name} is wrong: {cause}") from cause
+        raise BadTable(f"{where}: metadata of {schema.name} is wrong: {cause}") from cause
 
 
 def encode_rows(schema: TableSchema, rows: Iterable[Row]) -> bytes:
@@ -170,7 +182,7 @@ def _vector_column(column: Column, values: np.ndarray) -> pa.Array:
 
 
 def _scalar_column(schema: TableSchema, column: Column, rows: Sequence[Row]) -> pa.Array:
-    values = [_plain(row.get(column.name)) for row in rows]
+    values = [_without_nan(row.get(column.name)) for row in rows]
     missing = sum(value is None for value in values)
     if missing and not column.nullable:
         raise BadTable(f"{schema.name}: column {column.name!r} is empty in {missing} rows")
@@ -180,8 +192,8 @@ def _scalar_column(schema: TableSchema, column: Column, rows: Sequence[Row]) -> 
         raise BadTable(f"{schema.name}: column {column.name!r}: {cause}") from cause
 
 
-def _plain(value: Any) -> Any:
-    """A Python scalar; NaN means that there is none."""
+def _without_nan(value: Any) -> Any:
+    """Return a Python scalar, None where it is NaN; infinity and times stay what they are."""
     scalar = value.item() if isinstance(value, np.generic) else value
     return None if isinstance(scalar, float) and np.isnan(scalar) else scalar
 

@@ -1,0 +1,122 @@
+"""The clips of a pass, scored by Algorithm 1, and the choice of the one that is danced."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from robojackson.clips.quality.stability import Stability
+from robojackson.errors import NoPersonFound, RoboJacksonError, UnreadableVideo
+from robojackson.pipeline.pipeline_config import PipelineConfig
+from storage import artifact_tables
+from storage.artifact import Artifact
+from storage.store import Store
+from tasks.detect_landmarks import detect_landmarks
+from tasks.probe_video import SourceFile, probe_video
+from tasks.runtime.run_logger import run_logger
+from tasks.runtime.stage import Stage
+from tasks.score_stability import score_stability
+
+Input = TypeVar("Input")
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A clip that may be danced.
+
+    Attributes:
+        name: Of the file.
+        clip: Its video and what is known of it, as `probe_video` left them.
+        stability, score: Of Algorithm 1, as artifact and as value.
+    """
+
+    name: str
+    clip: dict[str, Artifact]
+    stability: Artifact
+    score: Stability
+
+
+def score_all(
+    paths: tuple[Path, ...],
+    settings: PipelineConfig,
+    start_s: float | None,
+    end_s: float | None,
+) -> list[Candidate]:
+    """Score all candidates by Algorithm 1; one that cannot be scored is left out.
+
+    Raises:
+        RoboJacksonError: none can be scored; why the first cannot.
+    """
+    dancer = settings.dancer if settings.dancer.number else None
+    size = settings.scoring_detector
+    readable = _readable(paths)
+    clips = _each(probe_video, readable, lambda given: (given[1], settings.video, start_s, end_s))
+    tracks = _each(
+        detect_landmarks, clips, lambda given: (given[1]["video"], given[1]["info"], size, dancer)
+    )
+    scores = _each(score_stability, tracks, lambda given: (given[1], settings.stability))
+    store = Store.from_environment()
+    return [
+        Candidate(path.name, clip, score, artifact_tables.read(Stability, store, score))
+        for (((path, _), clip), _), score in scores
+    ]
+
+
+def choose(candidates: list[Candidate]) -> Candidate:
+    """Return the steadiest candidate in which there is a person.
+
+    Raises:
+        NoPersonFound: there is none.
+    """
+    danced = [candidate for candidate in candidates if candidate.score.detected]
+    if not danced:
+        frames = {candidate.name: candidate.score.frames for candidate in candidates}
+        told = (f"{name}: no person found in {n} of {n} frames" for name, n in frames.items())
+        raise NoPersonFound("; ".join(told))
+    return min(danced, key=lambda candidate: candidate.score.stability_score)
+
+
+def _readable(paths: Sequence[Path]) -> list[tuple[Path, SourceFile]]:
+    """Return the files that can be read, with their digests.
+
+    Raises:
+        UnreadableVideo: none can; why the first cannot.
+    """
+    found, causes = [], []
+    for path in paths:
+        try:
+            found.append((path, SourceFile.at(path)))
+        except OSError as cause:
+            causes.append(UnreadableVideo(f"cannot be read ({cause.strerror})", path))
+            run_logger().warning("%s", causes[-1])
+    if not found:
+        raise causes[0]
+    return found
+
+
+def _each(
+    stage: Stage[..., Any], inputs: Sequence[Input], call: Callable[[Input], tuple[Any, ...]]
+) -> list[tuple[Input, Any]]:
+    """Run a stage for every input; return the inputs with their results, in order.
+
+    An input that is itself the cause of a failure is left out.
+
+    Args:
+        call: Input to the arguments of the stage.
+    Raises:
+        RoboJacksonError: no input is left; the first cause.
+        Exception: a failure that no input has caused.
+    """
+    made, causes = [], []
+    outcomes = stage.outcomes([call(given) for given in inputs])
+    for given, result in zip(inputs, outcomes, strict=True):
+        if isinstance(result, RoboJacksonError):
+            run_logger().warning("%s", result)
+            causes.append(result)
+        elif isinstance(result, BaseException):
+            raise result
+        else:
+            made.append((given, result))
+    if not made:
+        raise causes[0]
+    return made

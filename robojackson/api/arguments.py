@@ -1,0 +1,70 @@
+"""What the public functions take: a path, or what an earlier function returned."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from os import PathLike
+from pathlib import Path
+from typing import TypeVar
+
+from robojackson.api.progress_bar import bar
+from robojackson.errors import RejectedReference
+from robojackson.motion.landmark_track import LandmarkTrack
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.smpl_sequence import SmplSequence
+from robojackson.pipeline.robot_descriptions import describe_robot
+from robojackson.robot.description import RobotDescription
+from robojackson.robot.model import Robot
+from robojackson.robot.model import load_robot as bind_robot
+
+FilePath = str | PathLike[str]
+Counter = Callable[[int, int], None]
+"""Called with (done, in all)."""
+Progress = bool | Counter
+"""True shows a bar on stderr, False nothing; a function is called with (done, in all)."""
+RobotLike = str | PathLike[str] | RobotDescription | Robot
+Table = TypeVar("Table", LandmarkTrack, SmplSequence, ReferenceMotion)
+
+
+def read_if_path(kind: type[Table], given: FilePath | Table) -> Table:
+    """The value itself, or what its Parquet file holds.
+
+    Raises:
+        StoreError: no such file.
+        BadTable: it holds another table, or a damaged one.
+    """
+    return given if isinstance(given, kind) else kind.load(Path(given))  # type: ignore[arg-type]
+
+
+def robot_of(reference: ReferenceMotion) -> Robot:
+    """The robot that a reference motion was made for.
+
+    Raises:
+        UnknownName: there is no such robot description.
+        RejectedReference: its model has changed since.
+    """
+    return require_robot(reference, bind_robot(describe_robot(reference.robot)))
+
+
+def require_robot(reference: ReferenceMotion, robot: Robot) -> Robot:
+    """The robot itself, if the reference motion was made for its model.
+
+    Raises:
+        RejectedReference: it was made for another.
+    """
+    if robot.sha256 != reference.model_sha256:
+        raise RejectedReference(
+            f"the reference motion was made for another model of {reference.robot!r} "
+            f"(sha256 {reference.model_sha256[:12]}..., here {robot.sha256[:12]}...)",
+            "retarget the motion again",
+        )
+    return robot
+
+
+@contextmanager
+def counter(progress: Progress, label: str) -> Iterator[Counter | None]:
+    """What a stage calls with (done, in all); None where nobody wants to know."""
+    if progress is True:
+        with bar(label) as advance:
+            yield advance
+    else:
+        yield progress or None

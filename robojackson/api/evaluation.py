@@ -1,0 +1,176 @@
+"""Judgement and video: how well a policy dances, and what that looks like."""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from robojackson.api.arguments import (
+    FilePath,
+    Progress,
+    RobotLike,
+    counter,
+    read_if_path,
+    require_robot,
+    robot_of,
+)
+from robojackson.api.robots import load_robot
+from robojackson.clips import video as video_files
+from robojackson.clips.video import VideoInfo
+from robojackson.errors import BadConfiguration
+from robojackson.files import tables
+from robojackson.files.file_tree import results_in
+from robojackson.files.json_types import to_json_types
+from robojackson.motion.landmark_track import LandmarkTrack
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.rollout import Rollout
+from robojackson.motion.smpl_sequence import SmplSequence
+from robojackson.pipeline.run_names import motion_name, run_labels
+from robojackson.pipeline.table_schemas import EVALUATION_RECORD
+from robojackson.report.video.side_by_side import VideoConfig, side_by_side
+from robojackson.rl.config.evaluate_config import EvaluateConfig
+from robojackson.rl.evaluation import policy_evaluation
+from robojackson.rl.policy import Policy, load_policy
+
+PartProgress = Callable[[str, int, int], None]
+"""Called with (name of the part, done, in all)."""
+
+
+@dataclass(frozen=True, repr=False)
+class PolicyEvaluation:
+    """The verdict on a policy.
+
+    Attributes:
+        summary: Means over its rollouts; `baselines`: the same of bodies that do not dance.
+        rows: One row a rollout, of the policy and of every baseline.
+        rollout: What the robot did from the first step of the motion on.
+    """
+
+    summary: dict[str, Any]
+    rows: list[dict[str, Any]]
+    rollout: Rollout
+
+    def __repr__(self) -> str:
+        told = self.summary
+        return (
+            f"PolicyEvaluation(strict_success={told['strict_success']:.0%}, "
+            f"skill={told['skill']:.2f}, site_error_m={told['site_error_m']:.3f}, "
+            f"survived_s={told['survived_s']:.2f}, {told['rollouts']:.0f} rollouts)"
+        )
+
+    def save(self, folder: FilePath) -> Path:
+        """Write evaluations.parquet, evaluation.json and rollout.parquet.
+
+        Returns:
+            The folder.
+
+        Raises:
+            StoreError: it cannot be written.
+        """
+        rows = tables.encode_rows(EVALUATION_RECORD, self.rows)
+        summary = json.dumps(to_json_types(self.summary), indent=1)
+        with results_in(Path(folder)) as files:
+            files.write("evaluations.parquet", rows)
+            files.write("evaluation.json", summary.encode())
+            files.write("rollout.parquet", self.rollout.to_bytes())
+        return Path(folder)
+
+
+def evaluate_policy(
+    policy: FilePath | Policy,
+    reference: FilePath | ReferenceMotion,
+    robot: RobotLike | None = None,
+    *,
+    config: EvaluateConfig | None = None,
+    move: str = "",
+    setup: str = "",
+    progress: bool | PartProgress = False,
+) -> PolicyEvaluation:
+    """Judge a policy on stock physics from many starts, beside baselines that do not dance.
+
+    Args:
+        policy: A policy, or the policy.safetensors of a training.
+        reference: The motion that it was trained on, or its file.
+        robot: The one that the motion was made for; None finds it by name.
+        config: Starts, horizon and noise.
+        move: Name of the dance in the tables.
+        setup: Name of the training in the tables, where the policy's file does not say.
+        progress: True shows a bar; a function is called with (name of the part, done, in all).
+
+    Returns:
+        Survival in seconds, strict success 0..1, skill (1 is perfect, 0 the best frozen pose), mean
+        site error in metres, and one row a rollout.
+
+    Raises:
+        BadPolicy: no policy file of ours, or one for another robot.
+        RejectedReference: the robot's model has changed since the motion was made.
+    """
+    motion = read_if_path(ReferenceMotion, reference)
+    machine = robot_of(motion) if robot is None else require_robot(motion, load_robot(robot))
+    trained = policy if isinstance(policy, Policy) else load_policy(Path(policy))
+    with counter(progress is True, "evaluation") as count:
+        tell: PartProgress = (lambda name, done, total: None) if progress is False else progress  # type: ignore[assignment]
+        if count is not None:
+            tell = lambda name, done, total: count(done, total)  # noqa: E731
+        judged = policy_evaluation.evaluate_policy(
+            trained, motion, machine, config or EvaluateConfig(), tell
+        )
+    name = move or ("motion" if isinstance(reference, ReferenceMotion) else motion_name(reference))
+    labels = run_labels(name, trained.setup or setup or "scratch", trained.training["seed"])
+    rows = [{**labels, **trained.training, **row} for row in judged.rows]
+    return PolicyEvaluation(dict(judged.summary), rows, Rollout(motion.dt, judged.rollout_qpos))
+
+
+def render_video(
+    out: FilePath,
+    reference: FilePath | ReferenceMotion,
+    *,
+    rollout: PolicyEvaluation | Rollout | Float[np.ndarray, "S nq"] | None = None,
+    motion: FilePath | SmplSequence | None = None,
+    video: FilePath | None = None,
+    landmarks: FilePath | LandmarkTrack | None = None,
+    robot: RobotLike | None = None,
+    config: VideoConfig | None = None,
+    progress: Progress = False,
+) -> VideoInfo:
+    """Write an mp4 of the reference robot, beside whatever else is given, at the same moment.
+
+    Args:
+        out: The file.
+        reference: The robot's motion.
+        rollout: The trained robot: an evaluation, its rollout, or qpos (S, nq) a control step.
+        motion: The person, as a skeleton.
+        video: The source; with `landmarks`.
+        landmarks: What was detected in it.
+        robot: The one that the motion was made for; None finds it by name.
+        config: Size, rate, length and camera.
+        progress: True shows a bar; a function is called with (pictures done, pictures in all).
+
+    Returns:
+        What the file holds.
+
+    Raises:
+        MissingDependency: no way to draw without a screen; the message is what to install.
+        BadConfiguration: a video without landmarks, or the other way round.
+        StoreError: the file cannot be written.
+    """
+    if (video is None) != (landmarks is None):
+        raise BadConfiguration("a video is shown with its landmarks: give both or neither")
+    target = read_if_path(ReferenceMotion, reference)
+    machine = robot_of(target) if robot is None else require_robot(target, load_robot(robot))
+    danced = rollout.rollout if isinstance(rollout, PolicyEvaluation) else rollout
+    qpos = danced.qpos if isinstance(danced, Rollout) else danced
+    track = None if landmarks is None else read_if_path(LandmarkTrack, landmarks)
+    person = None if motion is None else read_if_path(SmplSequence, motion)
+    source = None if video is None else Path(video)
+    path = Path(out)
+    with results_in(path.parent), counter(progress, path.name) as count:
+        side_by_side(
+            source, track, person, target, qpos, path,
+            model=machine.model, config=config, progress=count,
+        )  # fmt: skip
+    return video_files.probe(path, video_files.VideoLimits(max_duration_s=None, min_frames=1))

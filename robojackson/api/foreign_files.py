@@ -1,0 +1,160 @@
+"""Files of other projects: recognised, read onto our floor, and the formats by name."""
+
+import io
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Literal, TypeVar
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from robojackson.errors import BadConfiguration, BadTable, StoreError, UnknownName
+from robojackson.files.file_tree import FileTree
+from robojackson.files.table_file import require_file
+from robojackson.formats.foreign_motion import (
+    Y_UP_TO_WORLD,
+    Z_UP_TO_WORLD,
+    ForeignMotion,
+    HybrikMotion,
+)
+from robojackson.formats.format import Importer, PolicyNetwork
+from robojackson.formats.registry import policy_exporters, recognise
+from robojackson.mocap.imported_motion import (
+    ground_foreign_motion,
+    ground_hybrik_motion,
+    kinematics_error_mm,
+)
+from robojackson.mocap.recover import MocapConfig
+from robojackson.motion.smpl_sequence import SmplSequence
+
+LARGEST = 2**30
+"""Bytes of a file that is read."""
+SLOWEST, FASTEST = 1.0, 1000.0
+"""Frames a second."""
+AXES = {"y": Y_UP_TO_WORLD, "z": Z_UP_TO_WORLD}
+Up = Literal["y", "z"]
+Exporter = TypeVar("Exporter")
+
+
+@dataclass(frozen=True)
+class ForeignFile:
+    """What was read of a file of another project.
+
+    Attributes:
+        motion: On the floor.
+        format: Name of the format.
+        figures: `kinematics_error_mm` of HybrIK's files: how far our joints are from theirs.
+    """
+
+    motion: SmplSequence
+    format: str
+    figures: Mapping[str, float | None] = field(default_factory=dict)
+
+
+def read_foreign(file: Path, fps: float | None, up: Up | None, config: MocapConfig) -> ForeignFile:
+    """Read a human motion of another project; nothing in the file is executed.
+
+    Raises:
+        StoreError: the file cannot be read.
+        UnknownName, BadTable: no known format, a damaged file, or one that asks to run something.
+        BadConfiguration: a frame rate that no motion has, or axes that the file has not.
+    """
+    data = _bytes_of(file)
+    importer = recognise(data, str(file))
+    with _naming_the_file(file):
+        motion = importer.read(data)
+    rate, notes = _rate(motion, importer, fps)
+    figures: dict[str, float | None] = {}
+    if isinstance(motion, HybrikMotion):
+        if up:
+            raise BadConfiguration("--up is for files with a world; HybrIK's are in camera axes")
+        with _naming_the_file(file):
+            sequence = ground_hybrik_motion(motion, rate, config)
+        figures["kinematics_error_mm"] = kinematics_error_mm(motion)
+    else:
+        axes = motion.to_world if up is None else AXES[up]
+        with _naming_the_file(file):
+            sequence = ground_foreign_motion(replace(motion, to_world=axes), rate)
+    sequence = replace(sequence, notes=(*sequence.notes, *notes))
+    return ForeignFile(sequence, importer.name, figures)
+
+
+def holds_a_person(source: Path) -> bool:
+    """Whether a Parquet file has SMPL's columns.
+
+    Raises:
+        StoreError: no such file.
+        BadTable: it is no Parquet file.
+    """
+    require_file(source)
+    try:
+        return "global_orient" in pq.read_schema(io.BytesIO(source.read_bytes())).names
+    except pa.ArrowInvalid as cause:
+        raise BadTable(f"{source}: not a Parquet file ({cause})") from cause
+
+
+def format_of(name: str, known: Mapping[str, Exporter], what: str) -> Exporter:
+    """Return the exporter of that name.
+
+    Args:
+        known: Those that write what is at hand.
+        what: What is at hand, in words.
+
+    Raises:
+        UnknownName: it is none of them.
+    """
+    if name not in known:
+        raise UnknownName("format", name, f"--to; this is {what}", known)
+    return known[name]
+
+
+def write_policy(policy: PolicyNetwork, file: Path, to: str) -> Path:
+    """Write a policy in the format of another project, such as `onnx`.
+
+    Raises:
+        UnknownName: no such format of policies.
+        MissingDependency: the package that writes the format is not installed.
+        StoreError: the file cannot be written.
+    """
+    content = format_of(to, policy_exporters(), "a policy").write(policy)
+    FileTree(file.parent).write(file.name, content)
+    return file
+
+
+@contextmanager
+def _naming_the_file(file: Path) -> Iterator[None]:
+    """What is wrong is told with the file's name."""
+    try:
+        yield
+    except BadTable as cause:
+        raise BadTable(f"{file}: {cause}") from cause
+
+
+def _bytes_of(file: Path) -> bytes:
+    require_file(file)
+    if (size := file.stat().st_size) > LARGEST:
+        raise StoreError(f"{file}: {size} bytes; at most {LARGEST} are read")
+    return file.read_bytes()
+
+
+def _rate(
+    motion: ForeignMotion | HybrikMotion, importer: Importer, given: float | None
+) -> tuple[float, list[str]]:
+    """Frames a second, and what the user should know of them."""
+    told = motion.fps if isinstance(motion, ForeignMotion) else None
+    rate = given or told or importer.fps
+    if rate is None:
+        raise BadConfiguration(
+            f"this {importer.name} file does not say its frame rate: give it with --fps"
+        )
+    if not SLOWEST <= rate <= FASTEST:
+        raise BadConfiguration(
+            f"{rate:g} frames a second: wanted {SLOWEST:g} to {FASTEST:g}; give it with --fps"
+        )
+    if given and told and abs(given - told) > 0.01:
+        return rate, [f"the file says {told:g} frames a second: {given:g} was given"]
+    if not given and not told:
+        return rate, [f"the file does not say its frame rate: taken as {rate:g}; --fps changes it"]
+    return rate, []

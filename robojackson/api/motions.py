@@ -1,0 +1,208 @@
+"""Human and robot motions: recovered from a person, fitted to a robot, read and written."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from robojackson.api.arguments import FilePath, Progress, RobotLike, counter, read_if_path, robot_of
+from robojackson.api.foreign_files import Up, format_of, holds_a_person, read_foreign
+from robojackson.api.robots import load_robot
+from robojackson.api.videos import detect_landmarks
+from robojackson.clips.video import read_frames
+from robojackson.errors import BadConfiguration, StoreError
+from robojackson.files.file_tree import FileTree
+from robojackson.formats import registry
+from robojackson.mocap import recover
+from robojackson.mocap.landmarks.landmark_pipeline import Quality
+from robojackson.mocap.networks.network_config import NetworkConfig
+from robojackson.mocap.recover import MocapConfig
+from robojackson.motion.landmark_track import LandmarkTrack
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.smpl_sequence import SmplSequence
+from robojackson.retarget import retargeting
+from robojackson.retarget.retarget_config import RetargetConfig
+
+if TYPE_CHECKING:
+    from robojackson.mocap.networks.inference import Networks
+
+TABLE = ".parquet"
+
+
+@dataclass(frozen=True)
+class LoadedNetworks:
+    """The published networks with the weights that a user brought.
+
+    Attributes:
+        config: How they run.
+        networks: The modules.
+    """
+
+    config: NetworkConfig
+    networks: "Networks"
+
+
+def recover_motion(
+    source: FilePath | LandmarkTrack,
+    *,
+    quality: Quality = "full",
+    person: int | None = None,
+    config: MocapConfig | None = None,
+    networks: NetworkConfig | LoadedNetworks | None = None,
+    video: FilePath | None = None,
+    progress: Progress = False,
+) -> SmplSequence:
+    """Recover the motion of a person, in metres, standing on the floor.
+
+    Args:
+        source: A video, a landmarks.parquet, or the landmarks themselves.
+        quality: Pose model for a video; see `detect_landmarks`.
+        person: Whom to follow in a video; see `detect_landmarks`.
+        config: How landmarks become a motion.
+        networks: Weights of HybrIK, and NIKI, that take the place of our own network; what
+            `load_weights` returned, or their paths.
+        video: The file of the landmarks, which HybrIK looks at; a video as source is its own.
+        progress: True shows a bar; a function is called with (frames done, frames in all).
+
+    Returns:
+        SMPL parameters, axis-angle (T, 24 * 3), and 29 keypoints (T, 29, 3), metres, world frame
+        (x forward, y left, z up, floor at 0), at even frames.
+
+    Raises:
+        UnreadableVideo, TruncatedVideo, VideoTooLong: see `probe_video`.
+        NoPersonFound, TrackTooShort: nobody to be followed for long enough.
+        BadWeights: a file of weights cannot be used.
+        BadConfiguration: HybrIK without a video.
+    """
+    motion = config or MocapConfig()
+    if isinstance(source, LandmarkTrack) or Path(source).suffix == TABLE:
+        track = read_if_path(LandmarkTrack, source)
+    else:
+        video = video or source
+        track = detect_landmarks(source, quality=quality, person=person, progress=progress)
+    loaded = load_weights(networks) if isinstance(networks, NetworkConfig) else networks
+    if loaded is None:
+        return recover.recover_motion(track, motion)
+    if video is None:
+        raise BadConfiguration("HybrIK's network looks at the video: give video=, too")
+    from robojackson.mocap.networks.network_motion import network_motion
+
+    with counter(progress, f"networks on {Path(video).name}") as count:
+        images = read_frames(Path(video))
+        return network_motion(track, images, loaded.networks, motion, loaded.config, count)
+
+
+def load_weights(config: NetworkConfig) -> LoadedNetworks | None:
+    """Load HybrIK's and NIKI's weights; None where none are named.
+
+    Raises:
+        BadWeights: a file cannot be used.
+    """
+    if not config.hybrik:
+        return None
+    from robojackson.mocap.networks.inference import load_networks
+
+    return LoadedNetworks(config, load_networks(config))
+
+
+def retarget_motion(
+    motion: FilePath | SmplSequence,
+    robot: RobotLike = "humanoid",
+    *,
+    config: RetargetConfig | None = None,
+) -> ReferenceMotion:
+    """Fit a human motion to a robot: every frame solved together, checked against its motors.
+
+    Args:
+        motion: What `recover_motion` or `read_motion` returned, or a file that they read.
+        robot: Name, YAML file, or what `load_robot` returned.
+        config: Method, weights, tempo and repair.
+
+    Returns:
+        MuJoCo positions (S, nq) and velocities (S, nv) at the robot's control step, metres and
+        radians. `scorecard` tells how good it is: training refuses what is over a bar.
+
+    Raises:
+        TrackTooShort: too few frames.
+        UnknownName, BadConfiguration: no such robot, or a wrong description of it.
+    """
+    sequence = motion if isinstance(motion, SmplSequence) else read_motion(motion)
+    if not isinstance(sequence, SmplSequence):
+        raise BadConfiguration(f"{motion}: a motion of robot {sequence.robot!r} already")
+    return retargeting.retarget_motion(sequence, load_robot(robot), config or RetargetConfig())
+
+
+def read_motion(
+    file: FilePath,
+    *,
+    fps: float | None = None,
+    up: Up | None = None,
+    config: MocapConfig | None = None,
+) -> SmplSequence | ReferenceMotion:
+    """Read a motion: our Parquet tables, or a human motion of another project.
+
+    Args:
+        file: smpl.parquet, reference.parquet, or a file of HybrIK, NIKI, AMASS, AIST++, GVHMR, BVH
+            or our csv; its content says which. Nothing in it is executed.
+        fps: Frames a second, where the file does not say.
+        up: Axis that points up, where it is unusual.
+        config: Of the camera and the floor of HybrIK's files.
+
+    Returns:
+        A human motion put on the floor, or a robot's reference motion.
+
+    Raises:
+        StoreError: no such file.
+        UnknownName, BadTable: no known format, or a damaged file.
+        BadConfiguration: no frame rate, or one that no motion has.
+    """
+    path = Path(file)
+    if path.suffix == TABLE:
+        return SmplSequence.load(path) if holds_a_person(path) else ReferenceMotion.load(path)
+    return read_foreign(path, fps, up, config or MocapConfig()).motion
+
+
+def write_motion(
+    motion: FilePath | SmplSequence | ReferenceMotion, file: FilePath, to: str | None = None
+) -> Path:
+    """Write a motion in the format of another project, or as our own table.
+
+    Args:
+        motion: A human or a robot motion, or the file of one.
+        file: For the result.
+        to: Name of the format (docs/formats.md); without it the suffix of the file says: `.parquet`
+            is our table, `.bvh` and `.csv` are the formats of these names.
+
+    Returns:
+        The path of the file.
+
+    Raises:
+        UnknownName: no such format, or none for such a motion.
+        RejectedReference: the robot's model has changed since the motion was made.
+        StoreError: the file cannot be written.
+    """
+    found = motion
+    if not isinstance(found, SmplSequence | ReferenceMotion):
+        found = read_motion(found)
+    path = Path(file)
+    if not isinstance(motion, SmplSequence | ReferenceMotion):
+        require_another(Path(motion), path)
+    if to is None and path.suffix == TABLE:
+        return found.save(path)
+    name = to or path.suffix.removeprefix(".")
+    if isinstance(found, SmplSequence):
+        content = format_of(name, registry.person_exporters(), "a person's motion").write(found)
+    else:
+        exporter = format_of(name, registry.robot_exporters(), "a robot's motion")
+        content = exporter.write(found, robot_of(found).model)
+    FileTree(path.parent).write(path.name, content)
+    return path
+
+
+def require_another(source: Path, out: Path) -> None:
+    """Refuse to write a result over what it is made from.
+
+    Raises:
+        StoreError: both are one file.
+    """
+    if out.exists() and source.exists() and out.samefile(source):
+        raise StoreError(f"{out}: is the motion itself; write the result to another file")

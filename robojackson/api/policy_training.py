@@ -1,0 +1,221 @@
+"""Training: a reference motion in, a policy out."""
+
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from robojackson.api.arguments import (
+    FilePath,
+    Progress,
+    RobotLike,
+    counter,
+    read_if_path,
+    require_robot,
+    robot_of,
+)
+from robojackson.api.robots import load_robot
+from robojackson.api.trained_policy import TrainedPolicy
+from robojackson.files.file_tree import results_in
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.pipeline.episode_log import EpisodeLog
+from robojackson.pipeline.folder_lock import locked
+from robojackson.pipeline.run_names import motion_name, run_labels
+from robojackson.pipeline.yaml_loader import load
+from robojackson.retarget.scorecard_gate import check, scorecard_record
+from robojackson.rl import training
+from robojackson.rl.checkpoint_folder import newest_checkpoint
+from robojackson.rl.config.train_config import TrainConfig
+from robojackson.rl.evaluation.reward_audit import audit_both_readings, audit_record
+from robojackson.rl.modes.paper_mode import require_trainable
+from robojackson.rl.modes.rewards import RewardFunction
+from robojackson.rl.policy import load_policy
+from robojackson.rl.training_hooks import Hooks, Row
+from robojackson.robot.model import Robot
+
+DEFAULT_MINUTES = 9.0
+"""Wall time of a training for which no budget is given."""
+SETUPS = {
+    (False, False): "scratch",
+    (True, False): "pretrain",
+    (True, True): "curiosity",
+    (False, True): "scratch-curiosity",
+}
+"""What a configuration is called that no file gave: by whether it starts from networks, and whether
+curiosity is paid."""
+OWN_REWARD = "own"
+"""Name of a reward term that is given as a bare function."""
+
+
+def train_policy(
+    reference: FilePath | ReferenceMotion,
+    robot: RobotLike | None = None,
+    *,
+    config: TrainConfig | None = None,
+    setup: str | None = None,
+    steps: int | None = None,
+    minutes: float | None = None,
+    seed: int | None = None,
+    reward: RewardFunction | Mapping[str, RewardFunction] | None = None,
+    out: FilePath | None = None,
+    move: str = "",
+    run_id: str = "",
+    force: bool = False,
+    hooks: Hooks | None = None,
+    progress: bool | Callable[[Row], None] = False,
+) -> TrainedPolicy:
+    """Teach a robot to follow a reference motion with TQC.
+
+    Args:
+        reference: What `retarget_motion` returned, or its reference.parquet.
+        robot: The one that the motion was made for; None finds it by name.
+        config: Every number of the training.
+        setup: `scratch`, `pretrain` and others of configs/setups, or a file; what the tables call
+            it where `config` is given, too.
+        steps: Budget in control steps of all simulations, over that of the configuration.
+        minutes: Budget of wall time, over that of the configuration; 9 where nothing ends it.
+        seed: Of networks, environments and replay, over that of the configuration.
+        reward: Terms of your own beside the configured ones: a function of `RewardState` that
+            returns one number a robot, (N,), or several by name. Not part of a checkpoint.
+        out: Folder for checkpoints and tables; the same call resumes from it. None keeps nothing.
+        move: Name of the dance in the tables.
+        run_id: Name of the run in the tables; made of move, setup and seed when empty.
+        force: Train on a motion that the gate refuses, too.
+        hooks: What else is told while it runs, and how it is stopped.
+        progress: True shows a bar; a function gets a row every few seconds: steps, seconds_left,
+            survived_s, site_error_m, episode_return.
+
+    Returns:
+        The policy with the table of its episodes.
+
+    Raises:
+        RejectedReference: the robot cannot follow the motion, or its model has changed since.
+        BadConfiguration: a reward that is no number a robot; a checkpoint of another configuration.
+        BadPolicy: the networks to start from do not fit.
+        StoreError: another training holds the folder.
+        KeyboardInterrupt: Ctrl-C, after a checkpoint was written to `out`.
+    """
+    wanted = _configured(config, setup, steps, minutes, seed)
+    motion = read_if_path(ReferenceMotion, reference)
+    machine = robot_of(motion) if robot is None else require_robot(motion, load_robot(robot))
+    require_trainable(machine)
+    if not force:
+        check(scorecard_record(motion))
+    name = move or ("motion" if isinstance(reference, ReferenceMotion) else motion_name(reference))
+    labels = _labels(wanted, name, setup, run_id)
+    heard = replace(hooks or Hooks(), setup=labels["setup"], rewards=_named(reward))
+    with _folder(out) as folder, _telling(progress, f"training {name}") as tell:
+        return _trained(motion, machine, wanted, folder, labels, heard, tell)
+
+
+def _labels(config: TrainConfig, move: str, setup: str | None, run_id: str) -> dict[str, Any]:
+    """What the rows of the run are known by."""
+    usual = SETUPS[config.start != "scratch", config.curiosity != "off"]
+    labels = run_labels(move, Path(setup).stem if setup else usual, config.seed)
+    return labels | ({"run_id": run_id} if run_id else {})
+
+
+def _trained(
+    motion: ReferenceMotion,
+    robot: Robot,
+    config: TrainConfig,
+    folder: Path,
+    labels: Mapping[str, Any],
+    hooks: Hooks,
+    tell: Callable[[Row], None],
+) -> TrainedPolicy:
+    """Train in a folder that nobody else may use meanwhile; its table is saved in any case."""
+    with results_in(folder) as files, locked(folder):
+        rows = EpisodeLog(files, labels, resumes=newest_checkpoint(folder) is not None)
+        audit = audit_record(audit_both_readings(robot, motion, config.environment))
+        hooks.audited(audit)
+        try:
+            told = _joined(hooks, rows, tell)
+            result = training.train_policy(motion, robot, config, folder, told)
+        finally:
+            if len(rows):
+                rows.save()
+        if not len(rows):
+            rows.save()
+        return TrainedPolicy(
+            load_policy(result.policy), motion, config, rows.rows, result.steps,
+            result.updates, result.seconds, result.stopped, audit,
+        )  # fmt: skip
+
+
+def _configured(
+    config: TrainConfig | None,
+    setup: str | None,
+    steps: int | None,
+    minutes: float | None,
+    seed: int | None,
+) -> TrainConfig:
+    """The configuration with what was given over it, and the usual budget where it has none."""
+    found = config or load(TrainConfig, setup_file(setup))
+    found = replace(
+        found,
+        steps=found.steps if steps is None else steps,
+        minutes=found.minutes if minutes is None else minutes,
+        seed=found.seed if seed is None else seed,
+    )
+    return found if found.has_budget else replace(found, minutes=DEFAULT_MINUTES)
+
+
+def setup_file(name: str | None) -> str | None:
+    """What the loader finds: a bare name is one of configs/setups."""
+    bare = name is not None and not {"/", "."} & set(name)
+    return f"setups/{name}" if bare else name
+
+
+def _named(
+    reward: RewardFunction | Mapping[str, RewardFunction] | None,
+) -> Mapping[str, RewardFunction]:
+    if reward is None:
+        return {}
+    return reward if isinstance(reward, Mapping) else {OWN_REWARD: reward}
+
+
+def _joined(hooks: Hooks, rows: EpisodeLog, tell: Callable[[Row], None]) -> Hooks:
+    """The caller's hooks, with the table of episodes and the bar of ours."""
+
+    def progress(row: Row) -> None:
+        hooks.progress(row)
+        tell(row)
+
+    def sink(new: list[Row]) -> None:
+        rows.add(new)
+        hooks.sink(new)
+
+    def saving() -> None:
+        rows.save()
+        hooks.saving()
+
+    return replace(hooks, progress=progress, sink=sink, saving=saving)
+
+
+@contextmanager
+def _telling(progress: bool | Callable[[Row], None], label: str) -> Iterator[Callable[[Row], None]]:
+    if callable(progress):
+        yield progress
+        return
+    shown: Progress = progress
+    with counter(shown, label) as count:
+
+        def tell(row: Row) -> None:
+            if count is not None:
+                spent = row["steps"] / max(row["steps_per_s"], 1e-9)
+                count(round(spent), round(spent + row["seconds_left"]))
+
+        yield tell
+
+
+@contextmanager
+def _folder(out: FilePath | None) -> Iterator[Path]:
+    """The folder of a training: the caller's, or one that goes away."""
+    if out is not None:
+        yield Path(out)
+        return
+    with tempfile.TemporaryDirectory(prefix="robojackson-") as folder:
+        yield Path(folder)

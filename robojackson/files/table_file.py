@@ -1,0 +1,106 @@
+"""What a table of its own knows: its schema, and how it is taken apart and put together."""
+
+import json
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from robojackson.errors import StoreError
+from robojackson.files import tables
+from robojackson.files.file_tree import FileTree, results_in
+from robojackson.files.table_types import TableSchema
+
+Columns = dict[str, np.ndarray]
+Facts = dict[str, Any]
+
+
+class TableFile:
+    """Base class of a dataclass that is one Parquet table."""
+
+    SCHEMA: ClassVar[TableSchema]
+
+    def to_columns(self) -> tuple[Columns, Facts]:
+        """Return the columns by name and the metadata of the table."""
+        raise NotImplementedError
+
+    @classmethod
+    def from_columns(cls, columns: Columns, facts: Facts) -> Self:
+        """Return the value of which these are columns and metadata."""
+        raise NotImplementedError
+
+    def to_bytes(self) -> bytes:
+        """Return the content of the Parquet file."""
+        return tables.encode(self)
+
+    @classmethod
+    def from_bytes(cls, data: bytes, where: str) -> Self:
+        """Return the value that a Parquet file holds.
+
+        Args:
+            data: Content of the file.
+            where: How errors name it.
+
+        Raises:
+            BadTable: not Parquet, another table, or a column or metadata key that is wrong.
+        """
+        return tables.decode(cls, data, where)
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write the Parquet file, whole or not at all.
+
+        Returns:
+            The path.
+
+        Raises:
+            StoreError: the file cannot be written.
+        """
+        file = Path(path)
+        with results_in(file.parent) as files:
+            files.write(file.name, self.to_bytes())
+        return file
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> Self:
+        """Return the value that a Parquet file holds.
+
+        Raises:
+            StoreError: no such file.
+            BadTable: not Parquet, another table, or a column or metadata key that is wrong.
+        """
+        file = Path(path)
+        require_file(file)
+        return cls.from_bytes(FileTree(file.parent).read(file.name), str(file))
+
+
+def require_file(path: Path) -> None:
+    """Refuse a path that cannot be read as one file.
+
+    Raises:
+        StoreError: it is a folder, or not there.
+    """
+    if path.is_dir():
+        raise StoreError(f"{path}: a folder, not a file")
+    if not path.is_file():
+        raise StoreError(f"{path}: no such file")
+
+
+def numbered(index: str, rows: int, period_s: float) -> Columns:
+    """Return the columns that number the rows: `index`, and `time_s` at equal spaces, seconds."""
+    return {index: np.arange(rows, dtype=np.int32), "time_s": np.arange(rows) * period_s}
+
+
+def json_facts(value: Facts) -> Facts:
+    """Return metadata in JSON's types, arrays as lists; `TypeError` names what does not fit."""
+    found: Facts = json.loads(json.dumps(value, default=_plain))
+    return found
+
+
+def _plain(value: object) -> Any:
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, Mapping):
+        return dict(value)
+    raise TypeError(f"{type(value).__name__} does not fit into a table's metadata")

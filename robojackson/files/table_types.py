@@ -1,0 +1,74 @@
+"""Types of tables: a column with type, unit and frame; a table with columns and metadata."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import pyarrow as pa
+
+VERSION = 1
+WORLD = "world"
+F32, F64, I32, I64 = pa.float32(), pa.float64(), pa.int32(), pa.int64()
+TEXT, FLAG, STATE = pa.string(), pa.bool_(), pa.int8()
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column.
+
+    Attributes:
+        name: Of the column or table.
+        type: Of one number (or text).
+        unit: SI symbol, `1` for a ratio, `` for what has none.
+        frame: Axes of a vector, `` for a scalar.
+        width: Numbers a row; 1 is a scalar, None a vector whose width the file itself tells.
+        nullable: Whether a row may have none.
+    """
+
+    name: str
+    type: pa.DataType
+    unit: str = ""
+    frame: str = ""
+    width: int | None = 1
+    nullable: bool = False
+
+    @property
+    def is_vector(self) -> bool:
+        """Whether a row holds more than one number."""
+        return self.width != 1
+
+    def field(self, width: int | None = None) -> pa.Field:
+        """The column in Arrow's words, with unit and frame in its metadata."""
+        size = self.width or width or -1
+        type_ = pa.list_(self.type, size) if self.is_vector else self.type
+        notes = {"unit": self.unit, "frame": self.frame}
+        return pa.field(self.name, type_, self.nullable, {k: v for k, v in notes.items() if v})
+
+
+@dataclass(frozen=True)
+class TableSchema:
+    """One table.
+
+    Attributes:
+        name: Of the column or table.
+        row: What one row is.
+        columns: All fixed columns.
+        metadata: Keys that the file's metadata must have (JSON values).
+        dynamic: Beginnings of further columns, float64, nullable, with their unit; which of them a
+            file has depends on the reward and the robot.
+    """
+
+    name: str
+    row: str
+    columns: tuple[Column, ...]
+    metadata: tuple[str, ...] = ()
+    dynamic: Mapping[str, str] | None = None
+
+    def column(self, name: str) -> Column | None:
+        """The column of that name, also a dynamic one; None where the table has no such column."""
+        for column in self.columns:
+            if column.name == name:
+                return column
+        for start, unit in (self.dynamic or {}).items():
+            if name.startswith(start):
+                return Column(name, F64, unit, nullable=True)
+        return None

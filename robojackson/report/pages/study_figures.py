@@ -1,0 +1,74 @@
+"""The plots of a study: a learning curve a move, and for each figure a dot a seed."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from robojackson.report.pages.run_page import Plot
+from robojackson.report.pages.study_page import FIGURES
+from robojackson.report.pages.study_table import BySeed
+
+SeedCurves = Mapping[tuple[str, str], Mapping[int, Mapping[str, np.ndarray]]]
+"""By (move, setup) and seed: `episode_return` and `episode_length` of each interval."""
+
+
+def curve_plots(
+    curves: SeedCurves, grid: Float[np.ndarray, " G"], moves: Sequence[str], setups: Sequence[str]
+) -> list[Plot]:
+    """Draw the learning curves of each move that has any.
+
+    Args:
+        grid: Ends of the intervals of the curves, control steps.
+    """
+    from robojackson.report.plots.run_plots import png  # matplotlib: only when something is drawn
+    from robojackson.report.plots.study_plots import Curves, learning_curves
+
+    middle = (grid[1:] + grid[:-1]) / 2
+    made = []
+    for move in moves:
+        drawn: dict[str, Curves] = {
+            setup: Curves(
+                middle,
+                np.array([seed["episode_return"] for seed in curves[move, setup].values()]),
+                np.array([seed["episode_length"] for seed in curves[move, setup].values()]),
+            )
+            for setup in setups
+            if (move, setup) in curves
+        }
+        if drawn:
+            told = "Training episodes: return, bonuses in, and length. Mean and range over seeds."
+            made.append(Plot(f"Learning {move}", told, png(learning_curves(drawn))))
+    return made
+
+
+def evaluation_plots(
+    figures: Mapping[str, BySeed],
+    baselines: Mapping[str, Mapping[str, Mapping[str, float]]],
+    moves: Sequence[str],
+    setups: Sequence[str],
+) -> list[Plot]:
+    """Draw the figures that any seed has a value of.
+
+    Args:
+        figures: Values of the seeds, by name of the figure.
+        baselines: By move, policy and name of the figure; drawn as lines.
+    """
+    from robojackson.report.plots.run_plots import png  # matplotlib: only when something is drawn
+    from robojackson.report.plots.study_plots import evaluation_plot
+
+    made = []
+    for name, by_key in figures.items():
+        by_move: dict[str, dict[str, list[float]]] = {
+            move: {setup: list(by_key.get((move, setup), {}).values()) for setup in setups}
+            for move in moves
+        }
+        lines = {
+            move: {p: known[name] for p, known in found.items() if name in known}
+            for move, found in baselines.items()
+        }
+        if any(values for found in by_move.values() for values in found.values()):
+            title, _, _ = FIGURES[name]
+            told = "A dot a seed, the bar their mean; lines are policies that learnt nothing."
+            made.append(Plot(title, told, png(evaluation_plot(by_move, lines, title))))
+    return made

@@ -1,0 +1,76 @@
+"""The folder of a training on disk: its checkpoint and its results, written whole or not at all.
+
+checkpoint/              all that is needed to continue
+checkpoint.old/          the one before, while the new one takes its place
+policy.safetensors       the newest policy
+networks.safetensors     the newest networks, for other trainings to start from
+"""
+
+import logging
+import os
+import shutil
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from robojackson.errors import StoreError
+
+log = logging.getLogger(__name__)
+
+RESULTS = ("policy.safetensors", "networks.safetensors")
+CHECKPOINT, OLD_CHECKPOINT = "checkpoint", "checkpoint.old"
+
+
+def newest_checkpoint(out: Path) -> Path | None:
+    """Return the last whole checkpoint: the one before when a crash came between two renames."""
+    for name in (CHECKPOINT, OLD_CHECKPOINT):
+        if (out / name / "run.json").exists():
+            return out / name
+    return None
+
+
+def write_checkpoint(out: Path, save: Callable[[Path], None], results: Mapping[str, bytes]) -> None:
+    """Replace the checkpoint and the results of a training.
+
+    Args:
+        out: Folder of the training.
+        save: Writes the files of a checkpoint into a folder.
+        results: Content of each of `RESULTS`.
+    Raises:
+        StoreError: the folder takes no more; the checkpoint before is still whole.
+    """
+    fresh, final = out / "checkpoint.new", out / CHECKPOINT
+    shutil.rmtree(fresh, ignore_errors=True)
+    try:
+        fresh.mkdir()
+        save(fresh)
+        for name, content in results.items():
+            (out / f"{name}.part").write_bytes(content)
+        for file in (*fresh.iterdir(), *out.glob("*.safetensors.part")):
+            _to_disk(file)
+    except OSError as error:
+        shutil.rmtree(fresh, ignore_errors=True)
+        for part in out.glob("*.safetensors.part"):
+            part.unlink(missing_ok=True)
+        raise StoreError(f"{out}: the checkpoint cannot be written ({error})") from error
+    # First, since a checkpoint whose budget is used up is not written again.
+    for name in RESULTS:
+        os.replace(out / f"{name}.part", out / name)
+    old = out / OLD_CHECKPOINT
+    if final.exists():
+        shutil.rmtree(old, ignore_errors=True)
+        final.rename(old)
+    fresh.rename(final)
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def set_results_aside(out: Path) -> None:
+    """Rename the results of another training, which those of a new one would replace."""
+    for name in RESULTS:
+        if (out / name).is_file():
+            os.replace(out / name, out / f"before-{name}")
+            log.warning("%s was here before; it is before-%s now", name, name)
+
+
+def _to_disk(path: Path) -> None:
+    with path.open("rb") as file:
+        os.fsync(file.fileno())
