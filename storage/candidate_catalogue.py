@@ -135,7 +135,7 @@ def champion(store: Store, dance: str, kind: str = "") -> dict[str, Any] | None:
             gone.add(_key_of(row))
         is_chosen = row["decision"] == "chosen" and _key_of(row) not in gone
         if is_chosen and row["video_key"] and store.exists(row["video_key"]):
-            return row
+            return dict(row)
     return None
 
 

@@ -53,14 +53,14 @@ class Remote:
 
     def read(self, key: str) -> bytes:
         self._system.invalidate_cache()
-        return self._system.cat_file(self._path(key))
+        return bytes(self._system.cat_file(self._path(key)))
 
     def sha256(self, key: str) -> str:
         return sha256_of(self.read(key))
 
     def exists(self, key: str) -> bool:
         self._system.invalidate_cache()
-        return self._system.isfile(self._path(key))
+        return bool(self._system.isfile(self._path(key)))
 
     def remove(self, key: str) -> None:
         self._system.rm_file(self._path(key))

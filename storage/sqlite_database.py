@@ -39,7 +39,7 @@ class SQLite:
         if not self.exists():
             return True
         with _opened(self.path) as database:
-            return database.execute("SELECT count(*) FROM sqlite_master").fetchone() == (0,)
+            return bool(database.execute("SELECT count(*) FROM sqlite_master").fetchone() == (0,))
 
     def dump(self, target: Path) -> None:
         """Write a consistent copy, also while a server writes.

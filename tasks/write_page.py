@@ -68,4 +68,4 @@ def _results(store: Store, made: Mapping[str, Artifact], file: Path) -> "Results
 
 
 def _json(store: Store, artifact: Artifact) -> dict[str, Any]:
-    return json.loads(store.read(artifact.key))
+    return dict(json.loads(store.read(artifact.key)))

@@ -27,7 +27,7 @@ def scorers(environment: Mapping[str, str] = os.environ) -> TaskRunner[Any]:
     if not address:
         return ThreadPoolTaskRunner(max_workers=THREADS)
     try:
-        from prefect_dask import DaskTaskRunner
+        from prefect_dask import DaskTaskRunner  # type: ignore[attr-defined]
     except ImportError as cause:
         raise MissingDependency(
             f"{VARIABLE}={address} needs Dask: pip install 'robojackson[dask]'"

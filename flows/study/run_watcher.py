@@ -44,7 +44,8 @@ class RunWatcher:
         if self._asking is None or self._asking.done():
             self._asking = asyncio.create_task(self._poll())
         try:
-            return await ended
+            last: FlowRun = await ended
+            return last
         finally:
             del self._waiting[run.id]
 

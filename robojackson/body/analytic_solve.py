@@ -105,12 +105,14 @@ def _target_directions(
     """
     predicted = child - start
     if method == "naive":
-        return predicted
+        result_: np.ndarray = predicted
+        return result_
     length = np.linalg.norm(predicted, axis=-1, keepdims=True)
     rescaled = predicted * np.linalg.norm(bone, axis=-1, keepdims=True) / np.maximum(length, TINY)
     corrected = child - end
     far = np.linalg.norm(corrected - rescaled, axis=-1, keepdims=True) > CARRY_OVER_LIMIT
-    return np.where(far, rescaled, corrected)
+    result: np.ndarray = np.where(far, rescaled, corrected)
+    return result
 
 
 def _root(goal: np.ndarray, rest: np.ndarray, method: Method) -> np.ndarray:
@@ -127,9 +129,11 @@ def _root(goal: np.ndarray, rest: np.ndarray, method: Method) -> np.ndarray:
     sine = np.sum(np.cross(before, after) * axis, -1)
     size = np.hypot(cosine, sine)
     cosine = np.where(size < TINY, 1.0, cosine / np.maximum(size, TINY))
-    return rotate_about(axis, cosine, sine / np.maximum(size, TINY)) @ swung
+    result: np.ndarray = rotate_about(axis, cosine, sine / np.maximum(size, TINY)) @ swung
+    return result
 
 
 def _across(vector: np.ndarray, axis: np.ndarray) -> np.ndarray:
     """The part of a vector at right angles to a unit axis."""
-    return vector - np.sum(vector * axis, -1, keepdims=True) * axis
+    result: np.ndarray = vector - np.sum(vector * axis, -1, keepdims=True) * axis
+    return result

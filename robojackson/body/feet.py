@@ -38,7 +38,8 @@ def foot_points(pose: Pose, rest_joints: Float[np.ndarray, "29 3"]) -> Float[np.
 def pitch(feet: Float[np.ndarray, "T 4 3"]) -> Float[np.ndarray, "T 2"]:
     """Angle of each sole above the horizontal: positive when the toe is higher than the heel."""
     sole = feet[:, 1::2] - feet[:, 0::2]
-    return np.arctan2(sole[..., 2], np.linalg.norm(sole[..., :2], axis=-1))
+    result: np.ndarray = np.arctan2(sole[..., 2], np.linalg.norm(sole[..., :2], axis=-1))
+    return result
 
 
 def pitch_bias(feet: Float[np.ndarray, "T 4 3"], fps: float) -> float:
@@ -61,7 +62,8 @@ def stands_flat(feet: Float[np.ndarray, "T 4 3"], planted: np.ndarray) -> np.nda
     Heel and toe both stand, or one of them does and the foot is about level.
     """
     ends = planted.reshape(-1, 2, 2)
-    return ends.all(2) | (ends.any(2) & (np.abs(pitch(feet)) < FLAT))
+    result: np.ndarray = ends.all(2) | (ends.any(2) & (np.abs(pitch(feet)) < FLAT))
+    return result
 
 
 def level_feet(
@@ -102,7 +104,8 @@ def near(flags: np.ndarray, ramp: float) -> Float[np.ndarray, " T"]:
         return np.zeros(len(flags))
     distance = distance_transform_edt(~flags)
     part = np.clip(1.0 - distance / ramp, 0.0, 1.0)
-    return part * part * (3.0 - 2.0 * part)
+    result: np.ndarray = part * part * (3.0 - 2.0 * part)
+    return result
 
 
 def _steady_heading(sole: np.ndarray, flat: np.ndarray) -> Float[np.ndarray, "T 3"]:

@@ -44,12 +44,14 @@ def apply(
     rotation: Float[np.ndarray, "*T 3 3"], vector: Float[np.ndarray, "*T 3"]
 ) -> Float[np.ndarray, "*T 3"]:
     """R v over any batch."""
-    return np.einsum("...ij,...j->...i", rotation, vector)
+    result: np.ndarray = np.einsum("...ij,...j->...i", rotation, vector)
+    return result
 
 
 def unit(vector: Float[np.ndarray, "*T 3"]) -> Float[np.ndarray, "*T 3"]:
     """v / |v|; a zero vector stays zero."""
-    return vector / np.maximum(np.linalg.norm(vector, axis=-1, keepdims=True), TINY)
+    result: np.ndarray = vector / np.maximum(np.linalg.norm(vector, axis=-1, keepdims=True), TINY)
+    return result
 
 
 def rotate_about(
@@ -126,7 +128,8 @@ def align(
     rest: tuple[np.ndarray, np.ndarray], posed: tuple[np.ndarray, np.ndarray]
 ) -> Float[np.ndarray, "*T 3 3"]:
     """Rotation that takes the primary rest vector to the posed one and keeps the half plane."""
-    return triad(*posed) @ np.swapaxes(triad(*rest), -1, -2)
+    result: np.ndarray = triad(*posed) @ np.swapaxes(triad(*rest), -1, -2)
+    return result
 
 
 def kabsch(

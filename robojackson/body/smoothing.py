@@ -17,4 +17,5 @@ def lowpass(values: np.ndarray, fps: float, cutoff_hz: float) -> np.ndarray:
     if cutoff_hz >= 0.49 * fps or padding < 2:
         return np.array(values, float)
     sections = butter(ORDER, cutoff_hz, fs=fps, output="sos")
-    return sosfiltfilt(sections, values, axis=0, padtype="odd", padlen=padding)
+    result: np.ndarray = sosfiltfilt(sections, values, axis=0, padtype="odd", padlen=padding)
+    return result

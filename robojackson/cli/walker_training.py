@@ -89,7 +89,10 @@ def curve(out: Path) -> list[dict[str, float]]:
     path = out / "episodes.parquet"
     rows = tables.decode_rows(EPISODE_RECORD, path.read_bytes(), str(path))
     parts = np.array_split(np.arange(len(rows)), min(CURVE_POINTS, max(1, len(rows))))
-    mean = lambda part, key: float(np.mean([rows[i][key] for i in part]))  # noqa: E731
+
+    def mean(part: np.ndarray, key: str) -> float:
+        return float(np.mean([rows[i][key] for i in part]))
+
     return [
         {
             "step": float(rows[part[-1]]["step"]),

@@ -83,7 +83,8 @@ def decode_rows(schema: TableSchema, data: bytes, where: str) -> list[dict[str, 
     Raises:
         BadTable: not Parquet, another table, or a column that is wrong.
     """
-    return decode_table(schema, data, where).to_pylist()
+    result: list[dict[str, Any]] = decode_table(schema, data, where).to_pylist()
+    return result
 
 
 def decode_table(schema: TableSchema, data: bytes, where: str) -> pa.Table:
@@ -202,10 +203,12 @@ def _numbers(column: Column, found: pa.ChunkedArray) -> np.ndarray:
     """A column as an array, NaN rows where it is null."""
     array = found.combine_chunks()
     if not column.is_vector:
-        return array.to_numpy(zero_copy_only=False)
+        result_: np.ndarray = array.to_numpy(zero_copy_only=False)
+        return result_
     width = array.type.list_size
     rows = array.fill_null([np.nan] * width) if array.null_count else array
-    return rows.flatten().to_numpy(zero_copy_only=False).reshape(len(array), width)
+    result: np.ndarray = rows.flatten().to_numpy(zero_copy_only=False).reshape(len(array), width)
+    return result
 
 
 def _to_bytes(

@@ -165,7 +165,8 @@ def matrices(vectors: Float[np.ndarray, "T N"]) -> Float[np.ndarray, "T 24 3 3"]
     given = vectors.reshape(len(vectors), -1, 3)[:, :24]
     full = np.zeros((len(vectors), 24, 3))
     full[:, : given.shape[1]] = given
-    return Rotation.from_rotvec(full.reshape(-1, 3)).as_matrix().reshape(-1, 24, 3, 3)
+    result: np.ndarray = Rotation.from_rotvec(full.reshape(-1, 3)).as_matrix().reshape(-1, 24, 3, 3)
+    return result
 
 
 def body_vectors(sequence: SmplSequence) -> Float[np.ndarray, "T 72"]:

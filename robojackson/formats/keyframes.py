@@ -24,7 +24,8 @@ def write(reference: ReferenceMotion) -> bytes:
         facts |= {"qpos": _numbers(qpos), "qvel": _numbers(qvel)}
         ElementTree.SubElement(keyframe, "key", facts)
     ElementTree.indent(root)
-    return ElementTree.tostring(root, encoding="utf-8", xml_declaration=False) + b"\n"
+    result: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=False) + b"\n"
+    return result
 
 
 def read(data: bytes) -> SampledMotion:

@@ -46,7 +46,8 @@ def write(policy: PolicyNetwork) -> bytes:
     opsets = [helper.make_opsetid("", OPSET)]
     model = helper.make_model(graph, opset_imports=opsets, ir_version=IR_VERSION)
     helper.set_model_props(model, {"facts": json.dumps(dict(policy.facts), sort_keys=True)})
-    return model.SerializeToString()
+    result: bytes = model.SerializeToString()
+    return result
 
 
 EXPORT = PolicyExporter("onnx", write)

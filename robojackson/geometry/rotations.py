@@ -35,7 +35,8 @@ def quat_multiply(
 
 def quat_conjugate(q: Float[np.ndarray, "*B 4"]) -> Float[np.ndarray, "*B 4"]:
     """The inverse of a unit quaternion wxyz."""
-    return q * np.array([1.0, -1.0, -1.0, -1.0])
+    result: np.ndarray = q * np.array([1.0, -1.0, -1.0, -1.0])
+    return result
 
 
 def quat_to_matrix(q: Float[np.ndarray, "*B 4"]) -> Float[np.ndarray, "*B 3 3"]:
@@ -48,12 +49,14 @@ def quat_to_matrix(q: Float[np.ndarray, "*B 4"]) -> Float[np.ndarray, "*B 3 3"]:
     matrix = products[..., FIRST] + SIGN * products[..., SECOND]
     matrix *= FACTOR
     matrix[..., ::4] += 1.0
-    return matrix.reshape(*q.shape[:-1], 3, 3)
+    result: np.ndarray = matrix.reshape(*q.shape[:-1], 3, 3)
+    return result
 
 
 def quat_angle(a: Float[np.ndarray, "*B 4"], b: Float[np.ndarray, "*B 4"]) -> np.ndarray:
     """Angle between two unit quaternions wxyz, radians in [0, pi]."""
-    return 2.0 * np.arccos(np.clip(np.abs(np.sum(a * b, -1)), 0.0, 1.0))
+    result: np.ndarray = 2.0 * np.arccos(np.clip(np.abs(np.sum(a * b, -1)), 0.0, 1.0))
+    return result
 
 
 def to_rotation(q: Float[np.ndarray, "*B 4"]) -> Rotation:
@@ -63,19 +66,22 @@ def to_rotation(q: Float[np.ndarray, "*B 4"]) -> Rotation:
 
 def from_rotation(rotation: Rotation) -> Float[np.ndarray, "*B 4"]:
     """Quaternions wxyz of a scipy Rotation; the sign is scipy's."""
-    return rotation.as_quat()[..., [3, 0, 1, 2]]
+    result: np.ndarray = rotation.as_quat()[..., [3, 0, 1, 2]]
+    return result
 
 
 def sign_continuous(q: Float[np.ndarray, "T 4"]) -> Float[np.ndarray, "T 4"]:
     """The same rotations with signs chosen so that successive quaternions are nearest."""
     flips = np.where(np.sum(q[1:] * q[:-1], -1) < 0, -1.0, 1.0)
-    return q * np.concatenate([[1.0], np.cumprod(flips)])[:, None]
+    result: np.ndarray = q * np.concatenate([[1.0], np.cumprod(flips)])[:, None]
+    return result
 
 
 def heading(q: Float[np.ndarray, "*B 4"]) -> np.ndarray:
     """Angle of the body's x axis about z, radians (yaw of the z-y-x decomposition)."""
     w, x, y, z = np.moveaxis(q, -1, 0)
-    return np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    result: np.ndarray = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    return result
 
 
 def wrapped(angle: np.ndarray) -> np.ndarray:

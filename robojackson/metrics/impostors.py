@@ -33,7 +33,8 @@ def mean_pose(truth: Motion, fps: float) -> Motion:
 def half_amplitude(truth: Motion, fps: float) -> Motion:
     """The right motion, half as large."""
     mean = truth.mean(0, keepdims=True)
-    return mean + (truth - mean) / 2.0
+    result: Motion = mean + (truth - mean) / 2.0
+    return result
 
 
 def late(truth: Motion, fps: float) -> Motion:
@@ -57,12 +58,14 @@ def mirrored(truth: Motion, fps: float, sides: Sequence[tuple[int, int]]) -> Mot
     order = np.arange(truth.shape[1])
     for a, b in sides:
         order[[a, b]] = order[[b, a]]
-    return swapped[:, order]
+    result: Motion = swapped[:, order]
+    return result
 
 
 def flailing(truth: Motion, fps: float, rng: np.random.Generator) -> Motion:
     """Each joint wanders about its mean place as it likes."""
-    return truth.mean(0, keepdims=True) + wander(truth.shape, fps, FLAIL_M, FLAIL_HZ, rng)
+    result: Motion = truth.mean(0, keepdims=True) + wander(truth.shape, fps, FLAIL_M, FLAIL_HZ, rng)
+    return result
 
 
 def teleported(truth: Motion, fps: float) -> Motion:
@@ -76,7 +79,8 @@ def honest(
     truth: Motion, fps: float, rng: np.random.Generator, size_m: float = HONEST_ERROR_M
 ) -> Motion:
     """A good estimate: the truth plus a smooth error of 20 mm in the mean."""
-    return truth + wander(truth.shape, fps, size_m, HONEST_HZ, rng)
+    result: Motion = truth + wander(truth.shape, fps, size_m, HONEST_HZ, rng)
+    return result
 
 
 def wander(
@@ -84,7 +88,8 @@ def wander(
 ) -> Motion:
     """Smooth noise whose mean length is `size_m`."""
     noise = lowpass(rng.normal(size=shape), fps, cutoff_hz)
-    return noise * size_m / np.linalg.norm(noise, axis=-1).mean()
+    result: Motion = noise * size_m / np.linalg.norm(noise, axis=-1).mean()
+    return result
 
 
 def impostors(sides: Sequence[tuple[int, int]], rng: np.random.Generator) -> Mapping[str, Impostor]:

@@ -23,7 +23,8 @@ class Similarity:
     def __call__(self, points: Float[np.ndarray, "*B J 3"]) -> Float[np.ndarray, "*B J 3"]:
         """Transform points."""
         turned = np.einsum("...ij,...nj->...ni", self.rotation, points)
-        return self.scale[..., None, None] * turned + self.shift[..., None, :]
+        result: np.ndarray = self.scale[..., None, None] * turned + self.shift[..., None, :]
+        return result
 
 
 def procrustes(
@@ -61,7 +62,8 @@ def root_relative(
     points: Float[np.ndarray, "T J 3"], roots: Sequence[int]
 ) -> Float[np.ndarray, "T J 3"]:
     """Positions minus the mean of the root joints (the two hips) in every frame."""
-    return points - points[:, list(roots)].mean(1, keepdims=True)
+    result: np.ndarray = points - points[:, list(roots)].mean(1, keepdims=True)
+    return result
 
 
 def align_clip(
@@ -77,7 +79,8 @@ def align_clip(
     x, y = root_relative(points, roots), root_relative(truth, roots)
     left, _, right = np.linalg.svd(np.einsum("tni,tnj->ij", y, x))
     flip = np.array([1.0, 1.0, np.linalg.det(left @ right)])
-    return x @ ((left * flip) @ right).T
+    result: np.ndarray = x @ ((left * flip) @ right).T
+    return result
 
 
 def rr_mpjpe(

@@ -42,7 +42,8 @@ def limit_excess(
     hinges: Float[np.ndarray, "S J"], lower: np.ndarray, upper: np.ndarray
 ) -> Float[np.ndarray, "S J"]:
     """How far each hinge is outside its limits, radians."""
-    return np.maximum(np.maximum(lower - hinges, hinges - upper), 0.0)
+    result: np.ndarray = np.maximum(np.maximum(lower - hinges, hinges - upper), 0.0)
+    return result
 
 
 def slip_cm_s(

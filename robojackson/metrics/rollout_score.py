@@ -49,7 +49,8 @@ def site_error(
     points: Float[np.ndarray, "*T K 3"], wanted: Float[np.ndarray, "*T K 3"]
 ) -> Float[np.ndarray, "*T"]:
     """Mean distance of the points, metres, both in the pelvis-heading frame."""
-    return np.mean(np.linalg.norm(points - wanted, axis=-1), -1)
+    result: np.ndarray = np.mean(np.linalg.norm(points - wanted, axis=-1), -1)
+    return result
 
 
 def best_frozen_error(wanted: Float[np.ndarray, "T K 3"]) -> float:

@@ -103,7 +103,10 @@ def before_camera(
     rays = _camera(motion, config).rays(motion.pixels)
     root = pinhole_camera.fit_root(motion.points, rays)
     root[:, 2:] = lowpass(root[:, 2:], fps, config.depth_cutoff_hz)
-    return lowpass(motion.points, fps, cutoff_hz) + lowpass(root, fps, cutoff_hz)[:, None]
+    result: np.ndarray = (
+        lowpass(motion.points, fps, cutoff_hz) + lowpass(root, fps, cutoff_hz)[:, None]
+    )
+    return result
 
 
 def kinematics_error_mm(motion: HybrikMotion) -> float | None:

@@ -70,7 +70,8 @@ class LandmarkTrack(TableFile):
     @property
     def detected(self) -> np.ndarray:
         """True in frames where a person was found, shape (T,)."""
-        return ~np.isnan(self.landmarks[:, 0, 0])
+        result: np.ndarray = ~np.isnan(self.landmarks[:, 0, 0])
+        return result
 
     @property
     def times(self) -> Float[np.ndarray, " T"]:

@@ -122,7 +122,8 @@ class _Yaml12(yaml.SafeLoader):
                     None, None, f"key {key!r} stands twice", key_node.start_mark
                 )
             seen.add(key)
-        return super().construct_mapping(node, deep)
+        result: dict[Any, Any] = super().construct_mapping(node, deep)
+        return result
 
 
 BASES = {"0o": 8, "0x": 16}
@@ -144,10 +145,14 @@ _Yaml12.add_implicit_resolver(
     re.compile(r"^(?:[-+]?\d+|0o[0-7]+|0x[0-9a-fA-F]+)$"),
     list("-+0123456789"),
 )
-_Yaml12.add_constructor(
-    "tag:yaml.org,2002:int",
-    lambda loader, node: int(text := loader.construct_scalar(node), BASES.get(text[:2], 10)),
-)
+
+
+def _integer(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> int:
+    text = str(loader.construct_scalar(node))
+    return int(text, BASES.get(text[:2], 10))
+
+
+_Yaml12.add_constructor("tag:yaml.org,2002:int", _integer)
 
 
 def _read(path: Path) -> dict[str, Any]:

@@ -57,7 +57,8 @@ class Policy:
         for weight, bias in self.layers[:-1]:
             hidden = np.maximum(hidden @ weight + bias, 0.0)
         weight, bias = self.layers[-1]
-        return np.tanh(hidden @ weight + bias)
+        result: np.ndarray = np.tanh(hidden @ weight + bias)
+        return result
 
     @property
     def _widths(self) -> list[int]:
@@ -66,12 +67,14 @@ class Policy:
     @property
     def observation_size(self) -> int:
         """Length of the observation that the first layer takes."""
-        return self.layers[0][0].shape[0]
+        result: int = self.layers[0][0].shape[0]
+        return result
 
     @property
     def action_size(self) -> int:
         """Length of the action that the last layer gives."""
-        return self.layers[-1][0].shape[1]
+        result: int = self.layers[-1][0].shape[1]
+        return result
 
     @property
     def training(self) -> dict[str, int | None]:

@@ -152,7 +152,8 @@ class Run:
         fields = asdict(self.config)
         for free in NOT_OF_THE_RUN:
             del fields[free]
-        return json.loads(json.dumps(fields | {"task": asdict(self.task)}))
+        result: dict[str, object] = json.loads(json.dumps(fields | {"task": asdict(self.task)}))
+        return result
 
     def _save(self, folder: Path) -> None:
         """Write what is needed to go on into a folder."""
@@ -223,7 +224,10 @@ class Run:
     def _status(self) -> Row:
         steps = self.trainer.steps()
         recent = list(self._recent)
-        mean = lambda key: float(np.mean([row[key] for row in recent])) if recent else np.nan  # noqa: E731
+
+        def mean(key: str) -> float:
+            return float(np.mean([row[key] for row in recent])) if recent else float("nan")
+
         return {
             "steps": steps,
             "updates": self.trainer.updates(),

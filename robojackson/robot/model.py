@@ -102,14 +102,16 @@ class Robot:
     @cached_property
     def actuated(self) -> Bool[np.ndarray, " J"]:
         """Which hinges have a motor."""
-        return np.isfinite(self.torque_limit)
+        result: np.ndarray = np.isfinite(self.torque_limit)
+        return result
 
     @cached_property
     def standing(self) -> Float[np.ndarray, " nq"]:
         """qpos of the rest pose, upright above the origin, root at its height in the MJCF."""
         qpos = self.model.qpos0.copy()
         qpos[7:] = np.clip(self.rest, self.lower, self.upper)
-        return qpos
+        result: np.ndarray = qpos
+        return result
 
     @cached_property
     def sole_depth(self) -> float:

@@ -191,7 +191,8 @@ def _about(axis: Float[np.ndarray, "3"], angle: Float[np.ndarray, " T"]) -> np.n
     x, y, z = axis
     skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     sine, cosine = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
-    return np.eye(3) + sine * skew + (1 - cosine) * (skew @ skew)
+    result: np.ndarray = np.eye(3) + sine * skew + (1 - cosine) * (skew @ skew)
+    return result
 
 
 def _minus_skew(v: Float[np.ndarray, "T P 3"]) -> Float[np.ndarray, "T P 3 3"]:

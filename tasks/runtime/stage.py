@@ -21,7 +21,7 @@ from dataclasses import dataclass, fields, is_dataclass
 from functools import cache, cached_property, update_wrapper
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar, cast
 
 from robojackson.errors import StoreError
 from storage import stage_records
@@ -131,9 +131,9 @@ class Stage(Generic[P, R]):
         """
         if not _records_only.get():
             return self.task(*args, **kwargs)
-        found: Any = self.required(*args, **kwargs)
+        found: R = self.required(*args, **kwargs)
         if inspect.iscoroutinefunction(self.fn):
-            found = _awaitable(found)
+            return cast("R", _awaitable(found))
         return found
 
     def submit(self, *args: P.args, **kwargs: P.kwargs) -> "PrefectFuture[R]":

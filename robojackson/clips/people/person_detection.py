@@ -136,7 +136,8 @@ def _colour(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
     pixels = image[mask]
     if len(pixels) < FEWEST_PIXELS:
         return np.full(3, np.nan)
-    return cv2.cvtColor(pixels[None], cv2.COLOR_RGB2LAB)[0].mean(0)
+    result: np.ndarray = cv2.cvtColor(pixels[None], cv2.COLOR_RGB2LAB)[0].mean(0)
+    return result
 
 
 def _near(

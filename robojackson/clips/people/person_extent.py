@@ -54,7 +54,8 @@ def full_body(track: LandmarkTrack, visibility: float) -> Bool[np.ndarray, " T"]
 def heights_px(track: LandmarkTrack) -> Float[np.ndarray, " T"]:
     """From the highest to the lowest landmark, pixels, NaN where nobody was found."""
     rows = track.landmarks[..., 1] * track.height
-    return rows.max(1) - rows.min(1)
+    result: np.ndarray = rows.max(1) - rows.min(1)
+    return result
 
 
 def stature(points: Float[np.ndarray, "*T 33 2"]) -> Float[np.ndarray, "*T"]:
@@ -65,11 +66,13 @@ def stature(points: Float[np.ndarray, "*T 33 2"]) -> Float[np.ndarray, "*T"]:
     """
 
     def middle(name: str) -> np.ndarray:
-        return points[..., indices((f"left_{name}", f"right_{name}")), :].mean(-2)
+        result: np.ndarray = points[..., indices((f"left_{name}", f"right_{name}")), :].mean(-2)
+        return result
 
     def leg(side: str) -> np.ndarray:
         chain = points[..., indices(tuple(f"{side}_{n}" for n in ("hip", "knee", "ankle"))), :]
-        return np.linalg.norm(np.diff(chain, axis=-2), axis=-1).sum(-1)
+        result: np.ndarray = np.linalg.norm(np.diff(chain, axis=-2), axis=-1).sum(-1)
+        return result
 
     neck, hips = middle("shoulder"), middle("hip")
     head = np.linalg.norm(points[..., POINTS["nose"], :] - neck, axis=-1)

@@ -86,7 +86,8 @@ def displacement(track: LandmarkTrack) -> Float[np.ndarray, " T-1"]:
     size = np.array([track.width, track.height])
     steps = np.linalg.norm(np.diff(track.landmarks[..., :2] * size, axis=0), axis=-1)
     tall = np.nanmedian(heights_px(track)) if track.detected.any() else np.nan
-    return np.median(steps, axis=1) / tall
+    result: np.ndarray = np.median(steps, axis=1) / tall
+    return result
 
 
 def together(scenes: list[int], jumps: list[int], frames_apart: int) -> list[int]:

@@ -66,12 +66,14 @@ def poses(track: LandmarkTrack, rate: float) -> Poses:
     tall = np.nanmedian(heights_px(track)) if track.detected.any() else np.nan
     count = max(1, int(len(track) / track.fps * rate))
     chosen = np.minimum((np.arange(count) / rate * track.fps).round().astype(int), len(track) - 1)
-    return ((xy - hips) / tall)[chosen]
+    result: Poses = ((xy - hips) / tall)[chosen]
+    return result
 
 
 def mirrored(seen: Poses) -> Poses:
     """The same poses in a mirror: left is right, in the image and in the names."""
-    return seen[:, list(MIRROR)] * np.array([-1.0, 1.0])
+    result: Poses = seen[:, list(MIRROR)] * np.array([-1.0, 1.0])
+    return result
 
 
 def distance(one: Poses, two: Poses, config: DuplicateConfig) -> float:

@@ -164,7 +164,8 @@ def _extract(address: str, options: dict[str, Any]) -> dict[str, Any]:
 
     with YoutubeDL(options) as ydl:
         info = ydl.extract_info(address, download=False)
-        return ydl.sanitize_info(info)
+        result: dict[str, Any] = ydl.sanitize_info(info)
+        return result
 
 
 def _download(info: Mapping[str, Any], options: dict[str, Any]) -> None:

@@ -67,7 +67,9 @@ def from_bytes(data: Any, kind: Any, shape: Any, order: str) -> np.ndarray:
     if not isinstance(data, bytes | bytearray):
         raise Refused("refused, it asks for an array of objects")
     array = np.frombuffer(bytes(data), kind.dtype)
-    return array.reshape(tuple(int(size) for size in shape), order=order)  # type: ignore[call-overload]
+    sizes = tuple(int(size) for size in shape)
+    result: np.ndarray = array.reshape(sizes, order=order)  # type: ignore[call-overload]
+    return result
 
 
 def _number(kind: NumberType, data: Any) -> float:

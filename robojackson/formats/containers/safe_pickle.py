@@ -30,7 +30,7 @@ BASE: Any = pickle._Unpickler
 """The unpickler that is written in Python; its memo is a dictionary."""
 
 
-class Reader(BASE):
+class Reader(BASE):  # type: ignore[misc]
     """An unpickler that knows `words` and nothing else."""
 
     dispatch: ClassVar[dict[int, Any]] = dict(BASE.dispatch)

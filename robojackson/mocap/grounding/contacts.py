@@ -76,7 +76,8 @@ def contacts(
     joint[np.ix_(~np.asarray(falling, bool), airborne)] = IMPOSSIBLE
     changes = (JOINT[:, None] != JOINT[None]).sum(-1)
     path = viterbi(-joint, repeat(config.change * changes, len(joint) - 1))
-    return JOINT[path].astype(np.int8)
+    result: np.ndarray = JOINT[path].astype(np.int8)
+    return result
 
 
 def log_likelihood(
@@ -101,7 +102,8 @@ def log_likelihood(
     still = (1.0 - config.outlier) * still
     still = still + config.outlier * moving
     raised = 0.5 * (still + moving)
-    return np.log(np.stack([loose * raised, touching * still, touching * moving], -1))
+    result: np.ndarray = np.log(np.stack([loose * raised, touching * still, touching * moving], -1))
+    return result
 
 
 def image_speed(points_c: Float[np.ndarray, "T 4 3"], fps: float) -> Float[np.ndarray, "T 4"]:

@@ -115,7 +115,8 @@ def _refined(
     information += _between_feet(weight, feet) / total.sum() / config.floor_sd_m**2
     information += np.diag(_level_prior(up, config))
     least = np.linalg.eigh(information)[1][:, 0]
-    return least * np.sign(least @ mean)
+    result: np.ndarray = least * np.sign(least @ mean)
+    return result
 
 
 def _carrying(
@@ -126,7 +127,8 @@ def _carrying(
     height = feet @ up
     above = height - height.min(1, keepdims=True)
     still = np.exp(-((speed / config.support_speed_mps) ** 2))
-    return still * np.exp(-above / config.support_height_m) + LEAST_WEIGHT
+    result: np.ndarray = still * np.exp(-above / config.support_height_m) + LEAST_WEIGHT
+    return result
 
 
 def _level_prior(up: np.ndarray, config: GravityConfig) -> Float[np.ndarray, "3"]:
@@ -142,7 +144,8 @@ def _between_feet(weight: np.ndarray, feet: np.ndarray) -> Float[np.ndarray, "3 
     each = weight.reshape(-1, 2, 2)
     place = np.einsum("tfp,tfpi->tfi", each, feet.reshape(-1, 2, 2, 3)) / each.sum(2)[..., None]
     apart = place[:, 0] - place[:, 1]
-    return np.einsum("t,ti,tj->ij", each.sum(2).prod(1), apart, apart)
+    result: np.ndarray = np.einsum("t,ti,tj->ij", each.sum(2).prod(1), apart, apart)
+    return result
 
 
 def camera_to_world(up: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
@@ -156,13 +159,15 @@ def centre_of_mass(points: Float[np.ndarray, "T 29 3"]) -> Float[np.ndarray, "T 
     """Whole-body centre from segment masses (Winter 2009, table 4.1, rounded)."""
 
     def middle(name: str) -> np.ndarray:
-        return points[:, list(pair(name))].mean(1)
+        result: np.ndarray = points[:, list(pair(name))].mean(1)
+        return result
 
     def segment(start: str, end: str, part: float) -> np.ndarray:
-        return middle(start) + part * (middle(end) - middle(start))
+        result: np.ndarray = middle(start) + part * (middle(end) - middle(start))
+        return result
 
     trunk = 0.5 * (middle("hip") + middle("shoulder"))
-    return (
+    result: np.ndarray = (
         0.50 * trunk
         + 0.08 * points[:, keypoint("head")]
         + 0.20 * segment("hip", "knee", 0.43)
@@ -171,6 +176,7 @@ def centre_of_mass(points: Float[np.ndarray, "T 29 3"]) -> Float[np.ndarray, "T 
         + 0.056 * segment("shoulder", "elbow", 0.44)
         + 0.044 * segment("elbow", "wrist", 0.5)
     )
+    return result
 
 
 def free_fall(height: Float[np.ndarray, " T"], fps: float) -> np.ndarray:
@@ -187,7 +193,8 @@ def free_fall(height: Float[np.ndarray, " T"], fps: float) -> np.ndarray:
     for start, end in stretches(falling):
         if (end - start) / fps < SHORTEST_FALL_S:
             falling[start:end] = False
-    return falling
+    result: np.ndarray = falling
+    return result
 
 
 def flight(

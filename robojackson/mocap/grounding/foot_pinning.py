@@ -158,7 +158,10 @@ def faded(wanted: Float[np.ndarray, "T N"], ramp: float) -> Float[np.ndarray, "T
         part = np.where(away < 0, 0.0, np.clip(1.0 - away / ramp, 0.0, 1.0))
         shares.append((part * part * (3.0 - 2.0 * part))[:, None])
     total = np.maximum(shares[0] + shares[1], 1.0)
-    return (shares[0] * wanted[known[before]] + shares[1] * wanted[known[after]]) / total
+    result: np.ndarray = (
+        shares[0] * wanted[known[before]] + shares[1] * wanted[known[after]]
+    ) / total
+    return result
 
 
 def shared_height(

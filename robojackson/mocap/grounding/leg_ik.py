@@ -17,7 +17,8 @@ TINY = 1e-9
 def lift_offsets(feet: Float[np.ndarray, "T 4 3"]) -> Float[np.ndarray, "T 2 3"]:
     """How far to raise each foot so that neither its heel nor its toe is under the floor."""
     lowest = feet[..., 2].reshape(-1, 2, 2).min(2)
-    return np.maximum(-lowest, 0.0)[..., None] * np.array([0.0, 0.0, 1.0])
+    result: np.ndarray = np.maximum(-lowest, 0.0)[..., None] * np.array([0.0, 0.0, 1.0])
+    return result
 
 
 def move_feet(
@@ -70,4 +71,5 @@ def _eased(distance: np.ndarray, now: np.ndarray, longest: np.ndarray) -> np.nda
     longest = longest * STRAIGHT
     start = np.clip(now, longest - EASE_M, longest - TINY)
     room, beyond = longest - start, np.maximum(distance - start, 0.0)
-    return np.minimum(distance, start) + room * (1.0 - np.exp(-beyond / room))
+    result: np.ndarray = np.minimum(distance, start) + room * (1.0 - np.exp(-beyond / room))
+    return result

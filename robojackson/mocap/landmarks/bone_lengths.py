@@ -52,7 +52,8 @@ def _scaled(bare: str, offset: np.ndarray, scale: Mapping[str, float]) -> np.nda
             return offset * scale[group]
     for group, (_, members) in ACROSS.items():
         if bare in members:
-            return offset * np.array([scale[group], scale["flank"], scale["flank"]])
+            result: np.ndarray = offset * np.array([scale[group], scale["flank"], scale["flank"]])
+            return result
     return offset * scale["flank"]
 
 
@@ -69,4 +70,7 @@ def _across(points: np.ndarray, mark: str) -> float:
 
 
 def _distance(points: np.ndarray, start: str, end: str) -> np.ndarray:
-    return np.linalg.norm(points[:, landmark(end)] - points[:, landmark(start)], axis=-1)
+    result: np.ndarray = np.linalg.norm(
+        points[:, landmark(end)] - points[:, landmark(start)], axis=-1
+    )
+    return result

@@ -77,7 +77,8 @@ def root_relative(covariance: Float[np.ndarray, "T 36 36"]) -> Float[np.ndarray,
     each[:, HIPS] -= 0.5
     blocks = covariance.reshape(len(covariance), len(ORDER), 3, len(ORDER), 3)
     traces = np.einsum("tiaja->tij", blocks)
-    return np.einsum("ki,tij,kj->tk", each, traces, each) / 3.0
+    result: np.ndarray = np.einsum("ki,tij,kj->tk", each, traces, each) / 3.0
+    return result
 
 
 def _second_difference(frames: int, count: int) -> Float[np.ndarray, "3 T"]:

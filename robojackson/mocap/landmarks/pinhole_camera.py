@@ -40,7 +40,8 @@ class Pinhole:
     def project(self, points: Float[np.ndarray, "*T 3"]) -> Float[np.ndarray, "*T 2"]:
         """Pixels of points before the camera."""
         centre = np.array([self.width, self.height]) / 2.0
-        return points[..., :2] / points[..., 2:] * self.focal_px + centre
+        result: np.ndarray = points[..., :2] / points[..., 2:] * self.focal_px + centre
+        return result
 
 
 def guess_focal(width: int, height: int) -> float:

@@ -119,7 +119,8 @@ def gather(
 def bone_lengths(rest_joints: Float[np.ndarray, "29 3"]) -> Float[np.ndarray, " B"]:
     """Lengths of `BONES` in a rest pose, metres."""
     ends = np.array([[keypoint(a), keypoint(b)] for a, b in BONES])
-    return np.linalg.norm(rest_joints[ends[:, 1]] - rest_joints[ends[:, 0]], axis=-1)
+    result: np.ndarray = np.linalg.norm(rest_joints[ends[:, 1]] - rest_joints[ends[:, 0]], axis=-1)
+    return result
 
 
 def carry_along(
@@ -158,7 +159,8 @@ def _step(
     if count > 2:
         _add_acceleration(bands, count, stiff)
     step = solveh_banded(bands, -moment.reshape(-1))
-    return step.reshape(count, *SHAPE)
+    result: np.ndarray = step.reshape(count, *SHAPE)
+    return result
 
 
 def stiffness(fps: float, config: RefineConfig) -> float:

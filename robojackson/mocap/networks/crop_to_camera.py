@@ -44,7 +44,8 @@ class View:
     def offset(self) -> Float[np.ndarray, "T 2"]:
         """From the image's middle to the crop's, in sides of the crop."""
         middle = np.array([self.width, self.height]) / 2.0
-        return (self.boxes[:, :2] - middle) / self.boxes[:, 2:]
+        result: np.ndarray = (self.boxes[:, :2] - middle) / self.boxes[:, 2:]
+        return result
 
     @property
     def focal_px(self) -> Float[np.ndarray, " T"]:
@@ -110,4 +111,5 @@ def refocus(
     ray = root[:, :2] / root[:, 2:] * view.focal_px[:, None] / camera.focal_px
     depth = lowpass(root[:, 2:] * camera.focal_px / view.focal_px[:, None], fps, depth_cutoff_hz)
     place = np.concatenate([ray * depth, depth], -1)
-    return points - root[:, None] + place[:, None]
+    result: np.ndarray = points - root[:, None] + place[:, None]
+    return result

@@ -91,7 +91,8 @@ class HRNet(nn.Module):
             self.incre_modules[1:], self.downsamp_modules, branches[1:], strict=True
         ):
             total = grow(branch) + shrink(total)
-        return self.final_feat_layer(total).mean((2, 3))
+        result: Float[Tensor, "B 2048"] = self.final_feat_layer(total).mean((2, 3))
+        return result
 
 
 def _stage(number: int) -> nn.Sequential:

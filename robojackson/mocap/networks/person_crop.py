@@ -62,4 +62,5 @@ def to_image(
     uv: Float[np.ndarray, "T J 2"], boxes: Float[np.ndarray, "T 3"]
 ) -> Float[np.ndarray, "T J 2"]:
     """Pixels of the image from shares of the crop (-0.5..0.5)."""
-    return boxes[:, None, :2] + uv * boxes[:, None, 2:]
+    result: np.ndarray = boxes[:, None, :2] + uv * boxes[:, None, 2:]
+    return result

@@ -45,7 +45,8 @@ class SmplBody:
 
     def rest_joints(self, betas: Float[np.ndarray, "*T 10"]) -> Float[np.ndarray, "*T 29 3"]:
         """T-poses of people."""
-        return self.mean + np.einsum("jcb,...b->...jc", self.slope, betas)
+        result: np.ndarray = self.mean + np.einsum("jcb,...b->...jc", self.slope, betas)
+        return result
 
 
 def body_of(weights: Weights) -> SmplBody | None:

@@ -164,4 +164,5 @@ def _confidence(visibility: np.ndarray) -> Float[np.ndarray, "T 29"]:
             result[:, column] = visibility[:, landmark(f"{side}_{source}")]
     for name in ("head", "head_top"):
         result[:, keypoint(name)] = visibility[:, landmark("nose")]
-    return np.clip(result, 0.0, 1.0)
+    answer: np.ndarray = np.clip(result, 0.0, 1.0)
+    return answer

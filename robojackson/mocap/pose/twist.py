@@ -124,7 +124,8 @@ def _bent(upper: np.ndarray, lower: np.ndarray) -> Float[np.ndarray, " T"]:
     flexion = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
     start, full = FLEXION_DEG
     part = np.clip((flexion - start) / (full - start), 0.0, 1.0)
-    return part * part * (3.0 - 2.0 * part)
+    result: np.ndarray = part * part * (3.0 - 2.0 * part)
+    return result
 
 
 def _between(first: np.ndarray, second: np.ndarray, share: float) -> Float[np.ndarray, "T 3"]:
@@ -139,7 +140,8 @@ def cue_angle(cue: Cue, bone: np.ndarray, swung: np.ndarray) -> Float[np.ndarray
     flat = cue.rest - (cue.rest @ axis) * axis
     sine = np.sum(np.cross(flat, measured) * axis, -1)
     cosine = np.sum(flat * measured, -1)
-    return np.arctan2(sine, cosine)
+    result: np.ndarray = np.arctan2(sine, cosine)
+    return result
 
 
 def _blend(name: str, prior_angle: float, angle: np.ndarray, weight: np.ndarray) -> np.ndarray:
@@ -148,4 +150,5 @@ def _blend(name: str, prior_angle: float, angle: np.ndarray, weight: np.ndarray)
     limit = np.radians(LIMIT_DEG.get(bare, OTHER_LIMIT_DEG))
     difference = (angle - prior_angle + np.pi) % (2.0 * np.pi) - np.pi
     fade = np.clip((np.pi - np.abs(difference)) / FADE, 0.0, 1.0)
-    return prior_angle + weight * fade * np.clip(difference, -limit, limit)
+    result: np.ndarray = prior_angle + weight * fade * np.clip(difference, -limit, limit)
+    return result

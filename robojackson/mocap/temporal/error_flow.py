@@ -61,7 +61,10 @@ def sample(count: int, weights: Weights, rng: np.random.Generator) -> Float[np.n
 
 
 def _condition(features: np.ndarray, weights: Weights) -> np.ndarray:
-    return np.maximum(features @ weights["flow.read.weight"].T + weights["flow.read.bias"], 0.0)
+    result: np.ndarray = np.maximum(
+        features @ weights["flow.read.weight"].T + weights["flow.read.bias"], 0.0
+    )
+    return result
 
 
 def _nets(

@@ -117,12 +117,14 @@ def base(sight: ClipView) -> Float[np.ndarray, "T 12 3"]:
 def at_depth(sight: ClipView, depth: Float[np.ndarray, "T 12"]) -> Float[np.ndarray, "T 12 2"]:
     """Where the body is across the image if it is that far behind the hips."""
     distance = np.linalg.norm(sight.root, axis=-1)[:, None]
-    return sight.flat[:, BODY] * ((distance + depth) / distance)[..., None]
+    result: np.ndarray = sight.flat[:, BODY] * ((distance + depth) / distance)[..., None]
+    return result
 
 
 def to_camera(sight: ClipView, points: Float[np.ndarray, "T N 3"]) -> Float[np.ndarray, "T N 3"]:
     """From the axes along the ray to the camera's."""
-    return apply(sight.axes[:, None], points) + sight.root[:, None]
+    result: np.ndarray = apply(sight.axes[:, None], points) + sight.root[:, None]
+    return result
 
 
 def mirror(sight: ClipView) -> ClipView:
@@ -154,7 +156,8 @@ def resample(values: np.ndarray, places: Float[np.ndarray, " S"]) -> np.ndarray:
     low = np.minimum(np.floor(places).astype(int), max(len(values) - 2, 0))
     part = (places - low).reshape(-1, *[1] * (values.ndim - 1))
     high = np.minimum(low + 1, len(values) - 1)
-    return values[low] * (1.0 - part) + values[high] * part
+    result: np.ndarray = values[low] * (1.0 - part) + values[high] * part
+    return result
 
 
 NAMES: tuple[str, ...] = tuple(LANDMARK_NAMES[index] for index in BODY)

@@ -19,7 +19,7 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.report.video import canvas
 from robojackson.report.video.encoder import write_video
-from robojackson.report.video.robot_panel import REFERENCE_TINT, TRAINED_TINT, RobotView
+from robojackson.report.video.robot_panel import REFERENCE_TINT, TRAINED_TINT, RobotView, Tint
 from robojackson.report.video.skeleton_panel import skeleton_panel, smooth_camera_path, view_of
 from robojackson.report.video.source_panel import source_panels
 from robojackson.report.video.timeline import Timeline, reference_qpos, timeline
@@ -107,7 +107,11 @@ class Film:
         self._robots: list[tuple[str, RobotView, np.ndarray, np.ndarray]] = []
 
     def add_robot(
-        self, title: str, qpos: Float[np.ndarray, "N nq"], model: mujoco.MjModel, tint: tuple
+        self,
+        title: str,
+        qpos: Float[np.ndarray, "N nq"],
+        model: mujoco.MjModel,
+        tint: Tint,
     ) -> None:
         view = self._stack.enter_context(RobotView(model, *self._size, tint))
         self._robots.append((title, view, qpos, self._followed(qpos[:, :3])))

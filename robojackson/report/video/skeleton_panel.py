@@ -54,7 +54,8 @@ class View:
 
 def smooth_camera_path(points: Float[np.ndarray, "T 3"], fps: float) -> Float[np.ndarray, "T 2"]:
     """Where on the floor a camera looks that follows a point gently."""
-    return gaussian_filter1d(points[:, :2], SMOOTHING_S * fps, axis=0, mode="nearest")
+    result: np.ndarray = gaussian_filter1d(points[:, :2], SMOOTHING_S * fps, axis=0, mode="nearest")
+    return result
 
 
 def view_of(target: Float[np.ndarray, "2"], azimuth_deg: float, width: int, height: int) -> View:

@@ -47,7 +47,8 @@ def source_panels(
 def _inside(
     pixels: Float[np.ndarray, "33 2"], box: tuple[int, int, int, int], width: int
 ) -> Float[np.ndarray, "33 2"]:
-    return (pixels - box[:2]) * (width / box[2])
+    result: np.ndarray = (pixels - box[:2]) * (width / box[2])
+    return result
 
 
 def _draw_person(

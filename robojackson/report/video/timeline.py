@@ -65,4 +65,5 @@ def reference_qpos(reference: ReferenceMotion, when: Timeline) -> Float[np.ndarr
     """The reference's positions at each picture, moved on by the cycles before."""
     qpos = np.array(reference.qpos, dtype=float)[when.step]
     qpos[:, :3] += when.cycle[:, None] * np.asarray(reference.cycle_offset)
-    return qpos
+    result: np.ndarray = qpos
+    return result

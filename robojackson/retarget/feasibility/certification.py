@@ -91,7 +91,8 @@ def _motor_torque(asked: contact_wrench.Demand, found: Supply) -> Float[np.ndarr
     limit = 1.0 / np.where(asked.ease > 0, asked.ease, np.inf)
     upper = np.where(np.isinf(asked.upper) & (asked.ease > 0), limit, np.inf)
     lower = np.where(np.isinf(asked.lower) & (asked.ease > 0), -limit, -np.inf)
-    return np.clip(found.torque, lower, upper)
+    result: np.ndarray = np.clip(found.torque, lower, upper)
+    return result
 
 
 def _without_limits(asked: contact_wrench.Demand) -> Supply:

@@ -42,7 +42,8 @@ class Box:
     @property
     def edges(self) -> int:
         """Number of pushes."""
-        return self.columns.shape[2]
+        result: int = self.columns.shape[2]
+        return result
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,8 @@ class Point:
 
     def barrier(self, box: Box) -> Float[np.ndarray, "S n"]:
         """Curvature of the bounds."""
-        return self.low / self.above(box) + self.high / self.below(box)
+        result: np.ndarray = self.low / self.above(box) + self.high / self.below(box)
+        return result
 
 
 def solve_box(box: Box) -> Point:
@@ -146,7 +148,8 @@ def _room(value: np.ndarray, change: np.ndarray) -> np.ndarray:
 def _gradient(box: Box, x: np.ndarray) -> np.ndarray:
     left = left_over(box, x)
     pushes = (box.columns.swapaxes(1, 2) @ left[..., None])[..., 0]
-    return np.concatenate([-pushes, -box.stiff * left[:, 6:]], axis=1) + box.price * x
+    result: np.ndarray = np.concatenate([-pushes, -box.stiff * left[:, 6:]], axis=1) + box.price * x
+    return result
 
 
 def _newton(box: Box, barrier: np.ndarray, right: np.ndarray) -> np.ndarray:

@@ -76,7 +76,8 @@ def warp(rate: Float[np.ndarray, " S"], ring: bool) -> Float[np.ndarray, " M"]:
     time = np.concatenate([[0.0], np.cumsum((pace[1:] + pace[:-1]) / 2)])
     count = int(np.ceil(time[-1] - 1e-9))
     steps = np.interp(np.arange(count + 1) * time[-1] / count, time, np.arange(len(time)))
-    return steps[:-1] if ring else steps
+    result: np.ndarray = steps[:-1] if ring else steps
+    return result
 
 
 def warped(aims: Targets, steps: Float[np.ndarray, " M"]) -> Targets:
@@ -97,7 +98,8 @@ def times_at(
 ) -> Float[np.ndarray, " M"]:
     """Times in the source clip at fractional steps; the last step is as long as the one before."""
     following = np.append(time_s, 2 * time_s[-1] - time_s[-2])
-    return np.interp(steps, np.arange(len(following)), following)
+    result: np.ndarray = np.interp(steps, np.arange(len(following)), following)
+    return result
 
 
 def _between(

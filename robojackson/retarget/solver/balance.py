@@ -26,7 +26,10 @@ def moment_points(problem: Problem, posed: Posed) -> Float[np.ndarray, "N 2"]:
         inner = flat[1:-1] - height / GRAVITY * np.diff(flat, 2, axis=0) / problem.targets.dt**2
         return np.concatenate([inner[:1], inner, inner[-1:]])
     joined = np.concatenate([flat[-1:] - cycle_offset[:2], flat, flat[:1] + cycle_offset[:2]])
-    return flat - height / GRAVITY * np.diff(joined, 2, axis=0) / problem.targets.dt**2
+    result: np.ndarray = (
+        flat - height / GRAVITY * np.diff(joined, 2, axis=0) / problem.targets.dt**2
+    )
+    return result
 
 
 def lean(problem: Problem, qpos: Float[np.ndarray, "N nq"]) -> Float[np.ndarray, "2"]:

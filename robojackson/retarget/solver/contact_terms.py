@@ -142,7 +142,8 @@ def _robust_weight(
     weight = problem.weights.balance * carried / (1.0 + share)
     loss = problem.weights.balance * carried * np.log1p(share) * reach**2
     out.cost += 0.5 * float(np.sum(loss - weight * share * reach**2))
-    return np.sqrt(weight)
+    result: np.ndarray = np.sqrt(weight)
+    return result
 
 
 def _neighbours(frames: int, ring: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

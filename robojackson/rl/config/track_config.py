@@ -107,7 +107,8 @@ class RewardConfig:
     @property
     def perfect(self) -> float:
         """What a step earns that equals the reference."""
-        return sum(getattr(self, name) for name in self.terms())
+        result: float = sum(getattr(self, name) for name in self.terms())
+        return result
 
 
 @config_dataclass

@@ -4,6 +4,7 @@ Both are thin: all physics, rewards and resets are `TrackingCore`'s.
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import gymnasium as gym
@@ -79,7 +80,9 @@ class TrackingVecEnv(VecEnv):
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
         setattr(self, attr_name, value)
 
-    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list:
+    def env_method(
+        self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any
+    ) -> list[Any]:
         raise NotImplementedError(f"the robots share one core; call core.{method_name} instead")
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
@@ -92,7 +95,7 @@ class TrackingEnv(gym.Env[np.ndarray, np.ndarray]):
     def __init__(
         self, robot: Robot, reference: ReferenceMotion, config: TrackConfig | PaperConfig
     ) -> None:
-        self._make = lambda seed: TrackingCore(robot, reference, config, n=1, seed=seed)
+        self._make = partial(TrackingCore, robot, reference, config, 1)
         self.core = self._make(0)
         self.observation_space, self.action_space = _spaces(self.core)
 

@@ -92,7 +92,10 @@ def _trained(policy: Policy, robot: Robot, control: ControlConfig) -> Driver:
         def torque(
             sim: Simulation, following: ClipStep, start: np.ndarray, last: np.ndarray
         ) -> np.ndarray:
-            return most * policy.act(stock_observation(sim)[:, : policy.observation_size])
+            result: np.ndarray = most * policy.act(
+                stock_observation(sim)[:, : policy.observation_size]
+            )
+            return result
 
         repeats = fact(policy, "repeats", PositiveInt) if "repeats" in policy.facts else 1
         return Driver(control, torque, repeats)
@@ -101,7 +104,8 @@ def _trained(policy: Policy, robot: Robot, control: ControlConfig) -> Driver:
         sim: Simulation, following: ClipStep, start: np.ndarray, last: np.ndarray
     ) -> np.ndarray:
         seen = observe(sim.qpos, sim.qvel, sim.points, following, last)
-        return sim.reference_angles(following) + sim.residual * policy.act(seen)
+        result: np.ndarray = sim.reference_angles(following) + sim.residual * policy.act(seen)
+        return result
 
     return Driver(control, target)
 

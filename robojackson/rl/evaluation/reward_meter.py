@@ -14,7 +14,8 @@ from robojackson.rl.config.train_config import PaperConfig, RewardConfig, TrackC
 from robojackson.rl.evaluation.rollouts import Moment, Reading
 from robojackson.rl.modes.paper_mode import PaperPoints
 from robojackson.rl.modes.paper_reward import Miss, miss, paper_terms
-from robojackson.rl.modes.track_mode import evaluate_step, tracked_points
+from robojackson.rl.modes.rewards import tracked_points
+from robojackson.rl.modes.track_mode import evaluate_step
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.robot.model import Robot
 

@@ -25,7 +25,11 @@ def observe(
     turned, wanted = quat_to_matrix(np.stack([qpos[:, 3:7], target.qpos[:, 3:7]]))
     to_body = np.swapaxes(turned, 1, 2)
     turn = to_body @ wanted
-    local = lambda vector: np.einsum("nij,nj->ni", to_body, vector)  # noqa: E731
+
+    def local(vector: np.ndarray) -> np.ndarray:
+        found: np.ndarray = np.einsum("nij,nj->ni", to_body, vector)
+        return found
+
     angle = 2 * np.pi * target.phase
     parts = [
         qpos[:, 2:3] - 1.2,
@@ -45,7 +49,8 @@ def observe(
         * POINT_SCALE,
         last_action * 0.5,
     ]
-    return np.clip(np.concatenate(parts, 1), -CLIP, CLIP).astype(np.float32)
+    result: np.ndarray = np.clip(np.concatenate(parts, 1), -CLIP, CLIP).astype(np.float32)
+    return result
 
 
 def observation_size(hinges: int, motors: int, points: int) -> int:

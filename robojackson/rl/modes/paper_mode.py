@@ -57,7 +57,8 @@ class PaperMode:
 
     def command(self, following: ClipStep, action: np.ndarray) -> np.ndarray:
         self._com = self.sim.com.copy()
-        return self._control * action
+        result: np.ndarray = self._control * action
+        return result
 
     def observe(self, following: ClipStep, action: np.ndarray) -> Float[np.ndarray, "N D"]:
         return stock_observation(self.sim)[:, : self.observation_size]
@@ -109,7 +110,8 @@ class PaperMode:
         pelvis = self._keypoint_pelvis
         here = self.sim.points - self.sim.points[:, pelvis, None]
         there = at.points - at.points[:, pelvis, None]
-        return np.linalg.norm(here - there, axis=-1).mean(-1)
+        result: np.ndarray = np.linalg.norm(here - there, axis=-1).mean(-1)
+        return result
 
 
 def require_trainable(robot: Robot) -> None:

@@ -61,14 +61,21 @@ def miss(
     """How far the points are from where the reference has them."""
     apart = state.points - target
     carried = apart - (state.root - target_root)[:, None]
-    mean = lambda d: np.sum(d**2, -1) @ weights / weights.sum()  # noqa: E731
+
+    def mean(distance: np.ndarray) -> np.ndarray:
+        found: np.ndarray = np.sum(distance**2, -1) @ weights / weights.sum()
+        return found
+
     return Miss(mean(carried), mean(apart))
 
 
 def has_fallen(state: PaperState, config: PaperConfig) -> Bool[np.ndarray, " N"]:
     """The paper's fall rule: the torso below 0.7 m or tilted over 60 degrees."""
     tilted = state.upright < np.cos(min(config.fall_tilt, np.pi)) - 1e-12
-    return (state.height < config.fall_height) | tilted | (state.height > config.highest)
+    result: np.ndarray = (
+        (state.height < config.fall_height) | tilted | (state.height > config.highest)
+    )
+    return result
 
 
 def paper_terms(
@@ -96,4 +103,5 @@ def speed(state: PaperState, config: PaperConfig) -> Float[np.ndarray, " N"]:
     """What curiosity pays for: the sum of absolute hinge speeds, or of angular body speeds."""
     if config.curiosity_of == "bodies":
         return state.spin
-    return np.abs(state.hinge_speed).sum(-1)
+    result: np.ndarray = np.abs(state.hinge_speed).sum(-1)
+    return result

@@ -113,7 +113,8 @@ def default_standing_pose(model: mujoco.MjModel) -> Float[np.ndarray, " nq"]:
     lowest = min(data.geom_xpos[i][2] - _reach_down(model, data, i) for i in solid)
     qpos = model.qpos0.copy()
     qpos[2] -= lowest
-    return qpos
+    result: np.ndarray = qpos
+    return result
 
 
 def standing_pose_at(stand: Float[np.ndarray, " nq"], root: Float[np.ndarray, " 7"]) -> np.ndarray:

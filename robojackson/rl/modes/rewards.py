@@ -180,14 +180,16 @@ def fallen(qpos: Float[np.ndarray, "N nq"], config: TerminationConfig) -> Bool[n
     """The paper's fall rule: the torso below 0.7 m or tilted over 60 degrees."""
     _, x, y, _ = qpos[:, 3:7].T
     upright = 1 - 2 * (x * x + y * y)
-    return (qpos[:, 2] < config.fall_height) | (upright < np.cos(config.fall_tilt))
+    result: np.ndarray = (qpos[:, 2] < config.fall_height) | (upright < np.cos(config.fall_tilt))
+    return result
 
 
 def is_off_track(errors: TrackingErrors, config: TerminationConfig) -> Bool[np.ndarray, " N"]:
     """Early termination of training: too far from the reference to learn from."""
-    return (
+    result: np.ndarray = (
         (errors.orientation > config.orientation)
         | (np.abs(errors.height) > config.height)
         | (errors.site_mean > config.sites)
         | (errors.drift > config.drift)
     )
+    return result

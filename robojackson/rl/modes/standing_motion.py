@@ -16,7 +16,10 @@ def make_standing_motion(robot: Robot) -> ReferenceMotion:
     data = mujoco.MjData(model)
     data.qpos[:] = default_standing_pose(model)
     mujoco.mj_kinematics(model, data)
-    held = lambda value: np.repeat(np.asarray(value, float)[None], STEPS, 0)  # noqa: E731
+
+    def held(value: object) -> np.ndarray:
+        return np.repeat(np.asarray(value, float)[None], STEPS, 0)
+
     return ReferenceMotion(
         robot=robot.description.name,
         model_sha256=robot.sha256,

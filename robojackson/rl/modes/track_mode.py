@@ -70,7 +70,8 @@ class TrackMode:
         self.observation_size = observation_size(robot.model.nq - 7, robot.model.nu, len(names))
 
     def command(self, following: ClipStep, action: np.ndarray) -> np.ndarray:
-        return self.sim.reference_angles(following) + self.sim.residual * action
+        result: np.ndarray = self.sim.reference_angles(following) + self.sim.residual * action
+        return result
 
     def observe(self, following: ClipStep, action: np.ndarray) -> Float[np.ndarray, "N D"]:
         return observe(self.sim.qpos, self.sim.qvel, self.sim.points, following, action)

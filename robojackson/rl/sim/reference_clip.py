@@ -93,7 +93,8 @@ class Clip:
         """Backward differences, as a simulation that is read once a step sees them."""
         before = np.roll(self._points, 1, axis=0)
         before[0] = self._points[-1] - self._offset if self.cyclic else self._points[0]
-        return (self._points - before) / self.dt
+        result: np.ndarray = (self._points - before) / self.dt
+        return result
 
     def _split(self, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         if self.cyclic:

@@ -105,7 +105,8 @@ class Batch:
         np.subtract(torque, braking, out=torque)
         np.maximum(torque, self._least, out=torque)
         np.minimum(torque, motors.limit, out=torque)
-        return np.divide(torque, motors.gear, out=torque)
+        result: np.ndarray = np.divide(torque, motors.gear, out=torque)
+        return result
 
 
 def centre_of_mass(model: mujoco.MjModel, data: mujoco.MjData) -> Float[np.ndarray, "3"]:

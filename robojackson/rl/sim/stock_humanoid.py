@@ -52,7 +52,8 @@ def own_reward(
     healthy = HEALTHY * ((low < sim.qpos[:, 2]) & (sim.qpos[:, 2] < high))
     contact = CONTACT * np.array([np.sum(np.square(data.cfrc_ext)) for data in sim.datas])
     effort = CONTROL * np.sum(np.square(control), -1)
-    return forward + healthy - effort - np.minimum(contact, MOST_CONTACT)
+    result: np.ndarray = forward + healthy - effort - np.minimum(contact, MOST_CONTACT)
+    return result
 
 
 def bodies_now(sim: Simulation) -> Float[np.ndarray, "N nbody 3"]:
@@ -63,10 +64,12 @@ def bodies_now(sim: Simulation) -> Float[np.ndarray, "N nbody 3"]:
 def mass_centres_now(sim: Simulation) -> Float[np.ndarray, "N 3"]:
     """Centres of mass in step with `qpos`, metres, world."""
     mass = sim.model.body_mass / sim.model.body_mass.sum()
-    return np.einsum("b,nbx->nx", mass, np.array([data.xipos for data in sim.datas]))
+    result: np.ndarray = np.einsum("b,nbx->nx", mass, np.array([data.xipos for data in sim.datas]))
+    return result
 
 
 def spin_now(sim: Simulation) -> Float[np.ndarray, " N"]:
     """Sum over bodies of their angular speeds, rad/s."""
     spins = np.array([data.cvel[1:, :3] for data in sim.datas])
-    return np.linalg.norm(spins, axis=-1).sum(-1)
+    result: np.ndarray = np.linalg.norm(spins, axis=-1).sum(-1)
+    return result

@@ -7,6 +7,7 @@ way round, and that of a wide one from a transposed copy. The actor's loss asks 
 slope by the action alone: an observation is no input of that product.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 import jax
@@ -37,7 +38,8 @@ def _forward(x: Array, kernel: Array, bias: Array) -> tuple[Array, tuple[Array, 
 
 def _backward(kept: tuple[Array, Array], slope: Array) -> tuple[Array, Array, Array]:
     x, kernel = kept
-    as_it_stands = jax.lax.optimization_barrier  # or XLA turns the product round again
+    # Or XLA turns the product round again.
+    as_it_stands: Callable[[Array], Array] = jax.lax.optimization_barrier
     if slope.shape[1] < NARROW:
         by_kernel = as_it_stands(slope.T @ x).T
     elif x.shape[1] % NARROW == 0:
@@ -104,4 +106,5 @@ def _normal(params: Parameters, i: int, value: Array) -> Array:
     layer = params["params"][f"LayerNorm_{i}"]
     centred = value - value.mean(1, keepdims=True)
     spread = jnp.square(centred).mean(1, keepdims=True)
-    return centred * jax.lax.rsqrt(spread + NORM_EPSILON) * layer["scale"] + layer["bias"]
+    result: Array = centred * jax.lax.rsqrt(spread + NORM_EPSILON) * layer["scale"] + layer["bias"]
+    return result

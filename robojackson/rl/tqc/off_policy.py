@@ -66,10 +66,12 @@ class OffPolicyTrainer:
         )
 
     def steps(self) -> int:
-        return self.model.num_timesteps
+        result: int = self.model.num_timesteps
+        return result
 
     def updates(self) -> int:
-        return self.model._n_updates
+        result: int = self.model._n_updates
+        return result
 
     def saved(self) -> None:
         assert self._files is not None
@@ -80,7 +82,8 @@ class OffPolicyTrainer:
         self.model.learning_starts = 0
 
     def _rows(self) -> int:
-        return self.model.num_timesteps // self.model.n_envs
+        result: int = self.model.num_timesteps // self.model.n_envs
+        return result
 
     def _save_rest(self, folder: Path, replay: Path) -> None:
         save_random(folder / "random.json", self._generators)

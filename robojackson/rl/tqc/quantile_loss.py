@@ -18,7 +18,8 @@ def lowest(values: Float[Array, "T B"], count: int) -> Bool[Array, "T B"]:
         return rank + ((other < values) | ((other == values) & (i < order)))
 
     rank = jax.lax.fori_loop(0, len(values), passed, jnp.zeros(values.shape, jnp.int32))
-    return rank < count
+    result: Bool[Array, "T B"] = rank < count
+    return result
 
 
 def quantile_huber(

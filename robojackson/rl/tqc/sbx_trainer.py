@@ -124,7 +124,7 @@ class SbxTrainer(OffPolicyTrainer):
         try:
             super().learn(callback)
         finally:  # a round that XLA still computes when Python ends would crash it
-            jax.block_until_ready(self._state())
+            jax.block_until_ready(self._state())  # type: ignore[no-untyped-call]
 
     def layers(self) -> Layers:
         layers = dense_layers(self.model.policy.actor_state.params)

@@ -61,7 +61,8 @@ def round_of_updates(
             learnt = _critics(learnt, batch, kept, tau)
         return _actor(learnt, batch.observations, target_entropy)
 
-    return jax.lax.fori_loop(0, count // delay, step, learnt)
+    result: LearnerState = jax.lax.fori_loop(0, count // delay, step, learnt)
+    return result
 
 
 def _critics(learnt: LearnerState, batch: Samples, kept: int, tau: float) -> LearnerState:
