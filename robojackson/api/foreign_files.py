@@ -10,6 +10,7 @@ from typing import Literal, TypeVar
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from robojackson.api.arguments import FilePath
 from robojackson.errors import BadConfiguration, BadTable, StoreError, UnknownName
 from robojackson.files.file_tree import FileTree
 from robojackson.files.table_file import require_file
@@ -19,7 +20,7 @@ from robojackson.formats.foreign_motion import (
     ForeignMotion,
     HybrikMotion,
 )
-from robojackson.formats.format import Importer, PolicyNetwork
+from robojackson.formats.format import Importer
 from robojackson.formats.registry import policy_exporters, recognise
 from robojackson.mocap.imported_motion import (
     ground_foreign_motion,
@@ -28,6 +29,7 @@ from robojackson.mocap.imported_motion import (
 )
 from robojackson.mocap.recover import MocapConfig
 from robojackson.motion.smpl_sequence import SmplSequence
+from robojackson.rl.policy import Policy, load_policy
 
 LARGEST = 2**30
 """Bytes of a file that is read."""
@@ -100,26 +102,29 @@ def format_of(name: str, known: Mapping[str, Exporter], what: str) -> Exporter:
 
     Args:
         known: Those that write what is at hand.
-        what: What is at hand, in words.
+        what: What is at hand, as a clause.
 
     Raises:
         UnknownName: it is none of them.
     """
     if name not in known:
-        raise UnknownName("format", name, f"--to; this is {what}", known)
+        raise UnknownName("format", name, f"--to; {what}", known)
     return known[name]
 
 
-def write_policy(policy: PolicyNetwork, file: Path, to: str) -> Path:
+def write_policy(policy: FilePath | Policy, file: Path, to: str) -> Path:
     """Write a policy in the format of another project, such as `onnx`.
 
     Raises:
         UnknownName: no such format of policies.
+        BadPolicy: the file is no policy of ours.
         MissingDependency: the package that writes the format is not installed.
         StoreError: the file cannot be written.
     """
-    content = format_of(to, policy_exporters(), "a policy").write(policy)
-    FileTree(file.parent).write(file.name, content)
+    held = "this is" if isinstance(policy, Policy) else f"{policy} holds"
+    exporter = format_of(to, policy_exporters(), f"{held} a policy")
+    found = policy if isinstance(policy, Policy) else load_policy(Path(policy))
+    FileTree(file.parent).write(file.name, exporter.write(found))
     return file
 
 

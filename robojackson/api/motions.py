@@ -189,10 +189,12 @@ def write_motion(
     if to is None and path.suffix == TABLE:
         return found.save(path)
     name = to or path.suffix.removeprefix(".")
+    held = "this is" if motion is found else f"{motion} holds"
     if isinstance(found, SmplSequence):
-        content = format_of(name, registry.person_exporters(), "a person's motion").write(found)
+        writer = format_of(name, registry.person_exporters(), f"{held} a person's motion")
+        content = writer.write(found)
     else:
-        exporter = format_of(name, registry.robot_exporters(), "a robot's motion")
+        exporter = format_of(name, registry.robot_exporters(), f"{held} a robot's motion")
         content = exporter.write(found, robot_of(found).model)
     FileTree(path.parent).write(path.name, content)
     return path

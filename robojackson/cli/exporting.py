@@ -35,12 +35,12 @@ def export(source: Path, to: str, out: Path) -> dict[str, Any]:
         from robojackson.api.foreign_files import write_policy
         from robojackson.rl.policy import load_policy
 
+        write_policy(source, out, to)
         policy = load_policy(source)
-        write_policy(policy, out, to)
         about = {"observations": policy.observation_size, "actions": policy.action_size}
     else:
+        write_motion(source, out, to)
         motion = read_motion(source)
-        write_motion(motion, out, to)
         if isinstance(motion, SmplSequence):
             about = {"frames": len(motion), "fps": motion.fps}
         else:

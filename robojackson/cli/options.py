@@ -57,7 +57,17 @@ Quality = Annotated[
     Literal["lite", "full", "heavy", "best"] | None,
     typer.Option(help="Pose model; best: full and heavy vote, at a third of the speed."),
 ]
-Robot = Annotated[str | None, typer.Option("--robot", help="Name of a robot of configs/robots.")]
+Robot = Annotated[
+    str | None,
+    typer.Option("--robot", help="Name of a robot of configs/robots, or the path of your own YAML."),
+]
+MotionRobot = Annotated[
+    str | None,
+    typer.Option(
+        "--robot",
+        help="Name or YAML of the robot that the motion is for, where the motion does not find it.",
+    ),
+]
 Trainer = Annotated[
     Literal["sbx", "sb3"] | None, typer.Option(help="sbx (JAX, fast) or sb3 (the reference).")
 ]
@@ -80,6 +90,6 @@ def overrides_from(pairs: list[str] | None, given: dict[str, Any] | None = None)
     return overrides
 
 
-def yaml_text(path: Path | None) -> str | None:
-    """A path as a value that YAML reads as text, whatever is in it."""
+def yaml_text(path: Path | str | None) -> str | None:
+    """A path or a name as a value that YAML reads as text, whatever is in it."""
     return None if path is None else "'" + str(path).replace("'", "''") + "'"

@@ -35,6 +35,7 @@ from robojackson.rl.training_task import Task, TrainResult
 log = logging.getLogger(__name__)
 
 RECENT_EPISODES = 100
+RECENT_FIGURES = ("survived_s", "episode_return", "site_error_m")
 NOT_OF_THE_RUN = (
     *("steps", "minutes", "cpu_minutes", "checkpoint_seconds", "progress_seconds", "tensorboard"),
 )
@@ -228,14 +229,8 @@ class Run:
         def mean(key: str) -> float:
             return float(np.mean([row[key] for row in recent])) if recent else float("nan")
 
-        return {
-            "steps": steps,
-            "updates": self.trainer.updates(),
-            **self._budget.progress(steps),
-            "survived_s": mean("survived_s"),
-            "episode_return": mean("episode_return"),
-            "site_error_m": mean("site_error_m"),
-        }
+        told = {"steps": steps, "updates": self.trainer.updates(), **self._budget.progress(steps)}
+        return told | {name: mean(name) for name in RECENT_FIGURES}
 
 
 class _Callback(BaseCallback):

@@ -1,9 +1,10 @@
-"""The description of a robot that a user edits: `configs/robots/<name>.yaml`.
+"""The description of a robot that a user edits: `configs/robots/<name>.yaml`, or a file anywhere.
 
 Names are bound to a MuJoCo model by `robot.model.load_robot`. Metres, radians, seconds.
 """
 
 from collections.abc import Mapping
+from dataclasses import field
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -19,6 +20,8 @@ TOES: tuple[str, ...] = ("left_toe", "right_toe")
 """Keypoints that a robot with ankles may have, too: they aim its feet."""
 Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 Offset = tuple[float, float, float]
+Weight = Annotated[float, Field(ge=0)]
+Positive = Annotated[float, Field(gt=0)]
 
 
 @config_dataclass
@@ -27,7 +30,7 @@ class ContactPoint:
 
     Attributes:
         site: Keypoint of the foot that it belongs to.
-        radius: Metres.
+        radius: Metres, above zero.
         body: Body that carries it and the site; its geoms are left out of the floor collision term.
         side: Foot of the human that it follows, left or right.
         offset: Centre of the ball beside the site, in the frame of the body, metres.
@@ -35,7 +38,7 @@ class ContactPoint:
     """
 
     site: str
-    radius: float
+    radius: Positive
     body: str
     side: str
     offset: Offset = (0.0, 0.0, 0.0)
@@ -67,11 +70,12 @@ class RobotSource:
 
 @config_dataclass
 class RobotDescription:
-    """What `configs/robots/<name>.yaml` holds.
+    """What `configs/robots/<name>.yaml` holds. Where it and its model lie is no part of what it is:
+    `mjcf` and `file` are not compared and in no cache key; the digest of the model is.
 
     Attributes:
         name: Name of the robot.
-        mjcf: A file, `package:path` inside an installed package, or `store:path` inside the folder
+        mjcf: A file (from the folder of the YAML, else from the working directory), `package:path` inside an installed package, or `store:path` inside the folder
             that `robojackson robots add NAME` fills.
         root_body: Body with the free joint; the robot faces along its x axis.
         sites: Keypoint -> body and position in the body, metres.
@@ -83,17 +87,20 @@ class RobotDescription:
         gear_scale: Factor on the torque of all motors.
         torque_limits: Hinge, or pattern with `*`, -> torque limit where the MJCF has no motor, Nm.
         source: Where the model comes from when it is not installed.
+        file: The YAML that it was read from, where that is none of `configs/robots`; set by its
+            reader.
     """
 
     name: str
-    mjcf: str
+    mjcf: str = field(compare=False)
     root_body: str
     sites: Mapping[str, tuple[str, Offset]]
-    weights: Mapping[str, float]
+    weights: Mapping[str, Weight]
     contacts: Mapping[str, ContactPoint]
     rest_pose: Mapping[str, float] = Field(default_factory=dict)
     max_joint_speed: float = Field(default=12.0, gt=0)
     control_dt: float = Field(default=0.015, gt=0)
     gear_scale: float = Field(default=1.0, gt=0)
-    torque_limits: Mapping[str, float] = Field(default_factory=dict)
+    torque_limits: Mapping[str, Positive] = Field(default_factory=dict)
     source: RobotSource | None = None
+    file: str = field(default="", compare=False)

@@ -9,7 +9,7 @@ from robojackson.robot.description import RobotDescription
 
 def where(description: RobotDescription, key: str) -> str:
     """The place in the configuration that an error message names."""
-    return f"configs/robots/{description.name}.yaml: {key}"
+    return f"{description.file or f'configs/robots/{description.name}.yaml'}: {key}"
 
 
 def known(kind: str, name: str, names: Iterable[str], place: str) -> str:

@@ -7,14 +7,14 @@ from types import SimpleNamespace
 
 import pytest
 
-from robojackson.cli import stages, training_process
+from robojackson.api import policy_training
+from robojackson.cli import training_process
 from robojackson.cli.lifetime.interruption import UNSAVED
 from robojackson.cli.lifetime.orphans import VARIABLE, holding
 from robojackson.errors import RejectedReference
 from robojackson.pipeline.yaml_loader import load
 from robojackson.rl import training
 from robojackson.rl.config.train_config import TrainConfig
-from robojackson.rl.evaluation import reward_audit
 from robojackson.rl.training_hooks import Hooks
 from robojackson.robot.model import RobotDescription, load_robot
 
@@ -32,11 +32,11 @@ def budgets(monkeypatch: pytest.MonkeyPatch) -> list[TrainConfig]:
         seen.append(config)
         raise RejectedReference("no")
 
-    monkeypatch.setattr(stages, "read_table", lambda cls, path: None)
+    monkeypatch.setattr(policy_training, "read_if_path", lambda kind, path: None)
     humanoid = load_robot(load(RobotDescription, "robots/humanoid"))
-    monkeypatch.setattr(stages, "robot_of", lambda motion: humanoid)
+    monkeypatch.setattr(policy_training, "robot_of", lambda motion: humanoid)
     monkeypatch.setattr(training, "train_policy", refuse)
-    monkeypatch.setattr(reward_audit, "audit_both_readings", lambda *what: {})
+    monkeypatch.setattr(policy_training, "audit_both_readings", lambda *what: {})
     monkeypatch.setattr(training_process.signal, "signal", lambda *wish: None)
     return seen
 
@@ -59,7 +59,7 @@ def test_a_motion_that_nobody_has_looked_at_is_not_trained_on(
 ) -> None:
     """The gate of `dance` holds for `train` alone, too; --force goes on."""
     unseen = SimpleNamespace(scorecard={}, certificate=None)
-    monkeypatch.setattr(stages, "read_table", lambda cls, path: unseen)
+    monkeypatch.setattr(policy_training, "read_if_path", lambda kind, path: unseen)
     with pytest.raises(RejectedReference, match=r"no score card.*--force"):
         training_process.train(tmp_path / "reference.parquet", tmp_path / "a", None, {})
     assert budgets == []
@@ -90,7 +90,7 @@ def test_what_the_reward_can_ask_for_is_one_line() -> None:
     [("pretrain", "setups/pretrain"), ("setups/x", "setups/x"), ("a.yaml", "a.yaml"), (None, None)],
 )
 def test_a_bare_name_is_one_of_the_setups(given: str | None, found: str | None) -> None:
-    assert training_process._setup(given) == found
+    assert policy_training.setup_file(given) == found
 
 
 @pytest.mark.parametrize(
@@ -106,7 +106,7 @@ def test_a_bare_name_is_one_of_the_setups(given: str | None, found: str | None) 
 def test_a_run_is_called_by_its_file_or_by_what_it_does(
     given: dict[str, str], setup: str | None, name: str
 ) -> None:
-    common = training_process._common(TrainConfig(**given), "walk", setup, "")  # type: ignore[arg-type]
+    common = policy_training._labels(TrainConfig(**given), "walk", setup, "")  # type: ignore[arg-type]
     assert (common["setup"], common["run_id"]) == (name, f"walk-{name}-s0")
 
 

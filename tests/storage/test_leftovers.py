@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from robojackson.pipeline import local_folder
+from robojackson.files import local_folder
 from robojackson.pipeline.folder_lock import locked
 from storage.leftovers import sweep
 from storage.store import Store
@@ -20,7 +20,7 @@ DIES = """
 import os, signal, sys
 from pathlib import Path
 from typing import Any
-from robojackson.pipeline import local_folder
+from robojackson.files import local_folder
 from storage.store import Store
 def die(file, source):
     file.write(b"half")
