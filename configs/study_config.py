@@ -86,7 +86,7 @@ class Study:
         mode: `paper`: its reward, observation and torques; `track`: the method that dances.
         steps: Control steps of each training. No clock ends one: the tables are repeatable.
         trainer: `sbx` (JAX, fast) or `sb3` (the reference).
-        robot: Name of `configs/robots/*.yaml`.
+        robot: Name of `configs/robots/*.yaml`, or path, where the worker is, of the YAML of another.
         pipeline: Name of the configuration that makes the reference motions and judges.
         gate: Refuse the study when a motion breaks a hard bar of its score card, as `dance` does;
             off: train on it all the same, and say so.
@@ -113,7 +113,7 @@ class Study:
     mode: Literal["paper", "track"] = "paper"
     steps: Annotated[int, Field(ge=1)] = 50_000
     trainer: Literal["sbx", "sb3"] = "sbx"
-    robot: str = "humanoid"
+    robot: str = field(default="humanoid", compare=False)
     pipeline: str = "base"
     gate: bool = True
     train: dict[str, Any] = Field(default_factory=dict)

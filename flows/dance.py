@@ -15,6 +15,7 @@ from flows.runtime.run_artifacts import show_dance
 from flows.search.scoring_pool import scorers
 from flows.video_pass.dance_stages import make_dance
 from flows.video_pass.inputs import Minutes, Search, Seconds, Source, name_of, videos_of
+from robojackson.cli.options import yaml_text
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.yaml_loader import load
 from storage.leftovers import sweep
@@ -51,6 +52,7 @@ async def dance(
     end_s: Seconds | None = None,
     minutes: Minutes | None = None,
     search: Search = Search(),  # noqa: B008 (frozen)
+    robot: str | None = None,
 ) -> dict[str, Any]:
     """From the name of a dance, or a video of it, to a robot that dances it.
 
@@ -58,14 +60,16 @@ async def dance(
         source: Name of a dance, as APT; or address of a video on the web; or path, where the worker
             is, of a video or of a folder of them, of which the steadiest is danced.
         config: Name or path of the pipeline's configuration.
-        overrides: Values of it by key path, as robot or train.seed.
+        overrides: Values of it by key path, as train.seed.
         start_s, end_s: Range of the video, seconds.
         minutes: Budget of the whole pass; that of the configuration if absent.
         search: How a dance is looked for that is given by its name.
+        robot: Name of one of configs/robots; or path, where the worker is, of the YAML of your own.
     """
     store = Store.from_environment()
     sweep(store, work=False)
-    given = {**(overrides or {}), **({} if minutes is None else {"minutes": minutes})}
+    given: dict[str, Any] = {"minutes": minutes, "robot": yaml_text(robot)}
+    given = {**(overrides or {}), **{k: v for k, v in given.items() if v is not None}}
     settings = load(PipelineConfig, config, given)
     async with videos_of(source, search) as paths:
         done = await make_dance(store, paths, settings, start_s, end_s)

@@ -68,7 +68,8 @@ async def refresh(
         config: Name or path of the configuration of the search.
         overrides: Of that, values by key path.
         pipeline: Name or path of the configuration of the stages after it.
-        pipeline_overrides: Of that, values by key path.
+        pipeline_overrides: Of that, values by key path, as robot: a name of configs/robots, or the
+            path, where the worker is, of the YAML of your own.
     Raises:
         BadConfiguration: two dances of the book have the same letters and digits.
         SearchFailed: every dance failed; the message has the reasons.

@@ -15,7 +15,7 @@ from robojackson.robot.model import RobotDescription
 from storage.artifact import Artifact
 from storage.store import Store
 from tasks.runtime.child_process import run_process
-from tasks.runtime.robot_digests import robot_models
+from tasks.runtime.robot_digests import robot_file, robot_models
 from tasks.runtime.stage import identity, stage
 
 TABLE, SUMMARY, ROLLOUT = "evaluations.parquet", "evaluation.json", "rollout.parquet"
@@ -50,7 +50,7 @@ async def evaluate_policy(
         settings = work / "evaluate.yaml"
         settings.write_text(yaml.safe_dump({"evaluate": to_json_types(config)}))
         words = ["evaluate", learnt, motion, "--out", work, "--config", settings]
-        words += ["--parent", os.getpid(), "--json"]
+        words += ["--robot", robot_file(robot, work), "--parent", os.getpid(), "--json"]
         command = [sys.executable, "-m", "robojackson.cli", *map(str, words)]
         await run_process(command, name, work, limit_s)
         kept = {

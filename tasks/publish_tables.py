@@ -14,6 +14,7 @@ from typing import Any
 from robojackson.errors import StoreError
 from robojackson.files.json_types import to_json_types
 from robojackson.pipeline.app_folder import app_folder, is_checkout
+from robojackson.pipeline.robot_descriptions import describe_robot
 from storage import study_tables
 from storage.artifact import Artifact
 from storage.store import Store
@@ -83,7 +84,7 @@ def provenance(
         "git_commit": _commit(),
         "config": asdict(cell.train),
         "evaluate": asdict(cell.evaluate),
-        "robot": cell.robot,
+        "robot": describe_robot(cell.robot).name,
         "reference_sha256": cell.reference.sha256,
         "versions": {name: _version(name) for name in PACKAGES},
         "machine": f"{platform.node()} {platform.machine()} {os.cpu_count()} cores",

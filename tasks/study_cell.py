@@ -13,7 +13,7 @@ class Cell:
     Attributes:
         study, move, setup, seed: What its rows are known by.
         reference: The motion.
-        robot: Name of a configuration.
+        robot: Name of a configuration, or path of one where the cell runs.
         train, evaluate: Whole configurations.
         timeout_minutes, retries: As in `Study`.
     """

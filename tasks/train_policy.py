@@ -27,6 +27,7 @@ from storage.artifact import Artifact
 from storage.store import Store
 from tasks.runtime.child_process import run_process
 from tasks.runtime.code_digest import digest
+from tasks.runtime.robot_digests import robot_file
 from tasks.runtime.stage import identity, stage
 from tasks.runtime.training_progress import show_progress
 
@@ -88,7 +89,7 @@ async def train_policy(
     if minutes is not None:
         limit_s = min(limit_s or math.inf, 60 * minutes + OVERTIME_S)
     with locked(work, "task.lock", A_MOMENT), store.local(reference) as path:
-        command = _command(path, work, config, labels, run_id, minutes)
+        command = _command(path, work, robot, config, labels, run_id, minutes)
         async with show_progress(work, f"{labels.setup}-{labels.move}-s{config.seed}"):
             answer = await run_process(command, run_id, work, limit_s)
         kept = {
@@ -127,6 +128,7 @@ def _minutes(config: TrainConfig, deadline: float | None) -> float | None:
 def _command(
     reference: Path,
     work: Path,
+    robot: RobotDescription,
     config: TrainConfig,
     labels: RunLabels,
     run_id: str,
@@ -137,6 +139,7 @@ def _command(
     options = {
         "--out": work,
         "--setup": setup,
+        "--robot": robot_file(robot, work),
         "--run-id": run_id,
         "--move": labels.move,
         "--parent": os.getpid(),

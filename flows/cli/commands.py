@@ -24,6 +24,7 @@ from robojackson.cli.options import (
     Set,
     Trainer,
     overrides_from,
+    yaml_text,
 )
 
 
@@ -53,7 +54,7 @@ def dance(
     from storage.store import Store
 
     found = None if is_name(source) else resolve(source)
-    given = {"minutes": minutes, "robot": robot, "train.trainer": trainer, "train.seed": seed}
+    given = {"minutes": minutes, "robot": yaml_text(robot), "train.trainer": trainer, "train.seed": seed}
     overrides = overrides_from(set_, given | {"dancer.number": person, "detector": quality})
     if force:
         overrides["gate"] = False

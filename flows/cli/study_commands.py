@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 from robojackson.cli.console import CommandResult, command, complain, table
-from robojackson.cli.options import Json, SetStudy, overrides_from
+from robojackson.cli.options import Json, Robot, SetStudy, overrides_from, yaml_text
 
 
 @command
@@ -22,6 +22,7 @@ def ablation(
         typer.Option(help="Processes of this machine, or runs that workers take."),
     ] = None,
     slots: Annotated[int | None, typer.Option(min=1, help="Trainings at once.")] = None,
+    robot: Robot = None,
     set_: SetStudy = None,
     as_json: Json = False,
 ) -> CommandResult:
@@ -31,7 +32,7 @@ def ablation(
     from storage.store import Store
 
     given: dict[str, Any] = {"moves": moves, "setups": setups, "seeds": seeds}
-    given |= {"steps": steps, "executor": executor, "slots": slots}
+    given |= {"steps": steps, "executor": executor, "slots": slots, "robot": yaml_text(robot)}
     wanted = study_of(study, overrides_from(set_, given))
     prepare(Store.from_environment())
     from flows.ablation import run

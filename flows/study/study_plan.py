@@ -1,6 +1,7 @@
 """What a study trains, read and checked before Prefect is imported."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from configs.study_config import Move, Study
@@ -20,12 +21,13 @@ def study_of(name: str, overrides: Mapping[str, Any]) -> Study:
         UnreadableVideo: the clip of a move is not there.
     """
     study = load(Study, f"studies/{name}" if "." not in name else name, overrides)
-    load_robot(describe_robot(study.robot))
+    robot = describe_robot(study.robot)
+    load_robot(robot)
     for move in study.moves:
         require_move(move, study.pipeline)
     for setup in study.setups:
         training(study, setup)
-    return study
+    return replace(study, robot=robot.file or study.robot)
 
 
 def training(study: Study, setup: str) -> TrainConfig:

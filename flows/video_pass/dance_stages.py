@@ -113,7 +113,8 @@ def conclude(
     summary = json.loads(store.read(made["evaluation"].key))
     seed = settings.train.seed
     run_id = f"{labels.move}-{labels.setup}-s{seed}-{made['policy'].sha256[:8]}"
-    names = {"run_id": run_id, "move": labels.move, "robot": settings.robot}
+    robot = describe_robot(settings.robot).name
+    names = {"run_id": run_id, "move": labels.move, "robot": robot}
     when = datetime.now(UTC)
     entry = run_catalogue.Run(
         **names, setup=labels.setup, seed=seed, finished_at=when, artifacts=made, summary=summary

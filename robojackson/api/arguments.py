@@ -1,5 +1,6 @@
 """What the public functions take: a path, or what an earlier function returned."""
 
+import platform
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from os import PathLike
@@ -7,11 +8,11 @@ from pathlib import Path
 from typing import TypeVar
 
 from robojackson.api.progress_bar import bar
-from robojackson.errors import RejectedReference
+from robojackson.errors import RejectedReference, UnknownName
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
-from robojackson.pipeline.robot_descriptions import describe_robot
+from robojackson.pipeline.robot_descriptions import describe_robot, robot_names
 from robojackson.robot.description import RobotDescription
 from robojackson.robot.model import Robot
 from robojackson.robot.model import load_robot as bind_robot
@@ -39,10 +40,18 @@ def robot_of(reference: ReferenceMotion) -> Robot:
     """The robot that a reference motion was made for.
 
     Raises:
-        UnknownName: there is no such robot description.
+        UnknownName: its description is not here; the message says what to give.
         RejectedReference: its model has changed since.
     """
-    return require_robot(reference, bind_robot(describe_robot(reference.robot)))
+    name, file = reference.robot, reference.robot_file
+    if file and not Path(file).is_file():
+        where = f"the motion was made for {file}, which is not on {platform.node()}"
+    elif not file and name not in robot_names():
+        where = "the motion does not say where its description is"
+    else:
+        return require_robot(reference, bind_robot(describe_robot(file or name)))
+    told = f"{where}; give --robot FILE, in Python robot="
+    raise UnknownName("robot", name, told, robot_names())
 
 
 def require_robot(reference: ReferenceMotion, robot: Robot) -> Robot:

@@ -1,10 +1,18 @@
 """Human and robot motions: recovered from a person, fitted to a robot, read and written."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robojackson.api.arguments import FilePath, Progress, RobotLike, counter, read_if_path, robot_of
+from robojackson.api.arguments import (
+    FilePath,
+    Progress,
+    RobotLike,
+    counter,
+    read_if_path,
+    require_robot,
+    robot_of,
+)
 from robojackson.api.foreign_files import Up, format_of, holds_a_person, read_foreign
 from robojackson.api.robots import load_robot
 from robojackson.api.videos import detect_landmarks
@@ -21,6 +29,7 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.retarget import retargeting
 from robojackson.retarget.retarget_config import RetargetConfig
+from robojackson.robot.model import Robot
 
 if TYPE_CHECKING:
     from robojackson.mocap.networks.inference import Networks
@@ -128,7 +137,9 @@ def retarget_motion(
     sequence = motion if isinstance(motion, SmplSequence) else read_motion(motion)
     if not isinstance(sequence, SmplSequence):
         raise BadConfiguration(f"{motion}: a motion of robot {sequence.robot!r} already")
-    return retargeting.retarget_motion(sequence, load_robot(robot), config or RetargetConfig())
+    machine = load_robot(robot)
+    reference = retargeting.retarget_motion(sequence, machine, config or RetargetConfig())
+    return replace(reference, robot_file=machine.description.file)
 
 
 def read_motion(
@@ -162,7 +173,10 @@ def read_motion(
 
 
 def write_motion(
-    motion: FilePath | SmplSequence | ReferenceMotion, file: FilePath, to: str | None = None
+    motion: FilePath | SmplSequence | ReferenceMotion,
+    file: FilePath,
+    to: str | None = None,
+    robot: RobotLike | None = None,
 ) -> Path:
     """Write a motion in the format of another project, or as our own table.
 
@@ -171,6 +185,7 @@ def write_motion(
         file: For the result.
         to: Name of the format (docs/formats.md); without it the suffix of the file says: `.parquet`
             is our table, `.bvh` and `.csv` are the formats of these names.
+        robot: The one that a robot's motion was made for; None finds it.
 
     Returns:
         The path of the file.
@@ -195,9 +210,13 @@ def write_motion(
         content = writer.write(found)
     else:
         exporter = format_of(name, registry.robot_exporters(), f"{held} a robot's motion")
-        content = exporter.write(found, robot_of(found).model)
+        content = exporter.write(found, _machine(found, robot).model)
     FileTree(path.parent).write(path.name, content)
     return path
+
+
+def _machine(motion: ReferenceMotion, robot: RobotLike | None) -> Robot:
+    return robot_of(motion) if robot is None else require_robot(motion, load_robot(robot))
 
 
 def require_another(source: Path, out: Path) -> None:

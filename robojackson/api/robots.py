@@ -1,14 +1,12 @@
 """Robots: a description bound to its MuJoCo model."""
 
-from pathlib import Path
+from os import fspath
 
 from robojackson.api.arguments import RobotLike
-from robojackson.pipeline.robot_descriptions import describe_robot, read_description
+from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.robot.description import RobotDescription
 from robojackson.robot.model import Robot
 from robojackson.robot.model import load_robot as bind_robot
-
-SUFFIXES = (".yaml", ".yml")
 
 
 def load_robot(robot: RobotLike = "humanoid") -> Robot:
@@ -30,6 +28,4 @@ def load_robot(robot: RobotLike = "humanoid") -> Robot:
         return robot
     if isinstance(robot, RobotDescription):
         return bind_robot(robot)
-    if Path(robot).suffix in SUFFIXES:
-        return bind_robot(read_description(Path(robot)))
-    return bind_robot(describe_robot(str(robot)))
+    return bind_robot(describe_robot(fspath(robot)))

@@ -111,7 +111,7 @@ def retarget(
 
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     log_to_stderr()
-    overrides = overrides_from(set_, {"retarget.method": method, "robot": robot})
+    overrides = overrides_from(set_, {"retarget.method": method, "robot": yaml_text(robot)})
     made = stages.retarget(smpl, out, config, overrides)
     if video:
         from robojackson.cli.retarget_pictures import draw_retargeting

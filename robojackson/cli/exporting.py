@@ -15,7 +15,7 @@ from robojackson.motion.smpl_sequence import SmplSequence
 POLICY_SUFFIX = ".safetensors"
 
 
-def export(source: Path, to: str, out: Path) -> dict[str, Any]:
+def export(source: Path, to: str, out: Path, robot: str | None = None) -> dict[str, Any]:
     """Write a robot's motion, a person's motion or a policy as `to`.
 
     Raises:
@@ -39,7 +39,7 @@ def export(source: Path, to: str, out: Path) -> dict[str, Any]:
         policy = load_policy(source)
         about = {"observations": policy.observation_size, "actions": policy.action_size}
     else:
-        write_motion(source, out, to)
+        write_motion(source, out, to, robot)
         motion = read_motion(source)
         if isinstance(motion, SmplSequence):
             about = {"frames": len(motion), "fps": motion.fps}

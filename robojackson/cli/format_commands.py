@@ -7,7 +7,7 @@ import typer
 from typer.core import TyperCommand
 
 from robojackson.cli.console import CommandResult, command, log_to_stderr
-from robojackson.cli.options import Config, Folder, Json, Set, overrides_from
+from robojackson.cli.options import Config, Folder, Json, MotionRobot, Set, overrides_from
 
 
 class ExportCommand(TyperCommand):
@@ -32,13 +32,14 @@ def export(
     ],
     to: Annotated[str, typer.Option(help="The format.")],
     out: Annotated[Path, typer.Option("-o", "--out", help="File for the result.")],
+    robot: MotionRobot = None,
     as_json: Json = False,
 ) -> CommandResult:
     """A robot's or a person's motion, or a policy, in the file format of another project."""
     from robojackson.cli import exporting
 
     log_to_stderr()
-    return CommandResult(exporting.export(motion, to, out))
+    return CommandResult(exporting.export(motion, to, out, robot))
 
 
 @command

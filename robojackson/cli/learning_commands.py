@@ -15,6 +15,8 @@ from robojackson.cli.options import (
     Folder,
     Force,
     Json,
+    MotionRobot,
+    Robot,
     Seed,
     Set,
     SetTrain,
@@ -31,6 +33,7 @@ Parent = Annotated[int, typer.Option(hidden=True, help="End with this process.")
 def train(
     reference: Annotated[Path, typer.Argument(help="reference.parquet of `robojackson retarget`.")],
     out: Folder,
+    robot: MotionRobot = None,
     mode: Annotated[
         Literal["track", "paper"] | None, typer.Option(help="Ours that dances, or the paper's.")
     ] = None,
@@ -58,7 +61,7 @@ def train(
     given = {"mode": mode, "trainer": trainer, "steps": steps, "minutes": minutes, "seed": seed}
     return CommandResult(
         training_process.train(
-            reference, out, setup, overrides_from(set_, given), run_id, move, force
+            reference, out, setup, overrides_from(set_, given), run_id, move, force, robot
         )
     )
 
@@ -72,6 +75,7 @@ def pretrain(
     reference: Annotated[
         Path | None, typer.Option(help="Motion to imitate (track); the bundled walk by itself.")
     ] = None,
+    robot: Robot = None,
     steps: Annotated[int | None, typer.Option(min=1, help="Policy steps in all.")] = None,
     minutes: TrainMinutes = None,
     trainer: Trainer = None,
@@ -90,7 +94,7 @@ def pretrain(
     log_to_stderr()
     given = {"trainer": trainer, "steps": steps, "minutes": minutes, "seed": seed}
     return CommandResult(
-        walker_training.pretrain(kind, out, reference, overrides_from(set_, given))
+        walker_training.pretrain(kind, out, reference, overrides_from(set_, given), robot)
     )
 
 
@@ -98,6 +102,7 @@ def pretrain(
 def evaluate(
     policy: Annotated[Path, typer.Argument(help="policy.safetensors of `robojackson train`.")],
     reference: Annotated[Path, typer.Argument(help="The reference.parquet it was trained on.")],
+    robot: MotionRobot = None,
     seconds: Annotated[float | None, typer.Option(min=0.1, help="Length of a rollout, s.")] = None,
     out: TablesFolder = None,
     config: Config = "base",
@@ -114,5 +119,5 @@ def evaluate(
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     log_to_stderr()
     overrides = overrides_from(set_, {"evaluate.seconds": seconds})
-    judged = stages.evaluate(policy, reference, out, config, overrides)
+    judged = stages.evaluate(policy, reference, out, config, overrides, robot)
     return CommandResult(judged, text=stages.verdict_lines(judged))

@@ -120,7 +120,12 @@ def gate(scorecard: Figures, out: Path, config: str, overrides: Overrides) -> No
 
 
 def evaluate(
-    policy: Path, reference: Path, out: Path | None, config: str, overrides: Overrides
+    policy: Path,
+    reference: Path,
+    out: Path | None,
+    config: str,
+    overrides: Overrides,
+    robot: str | None = None,
 ) -> Figures:
     """The verdict on a policy; with a folder, also its tables and the rollout."""
     from robojackson.api.evaluation import evaluate_policy
@@ -129,8 +134,9 @@ def evaluate(
     settings = load(PipelineConfig, config, overrides)
     with console.stages() as progress:
         verdict = evaluate_policy(
-            policy, reference, config=settings.evaluate, setup=settings.setup, progress=progress
-        )
+            policy, reference, robot, config=settings.evaluate, setup=settings.setup,
+            progress=progress,
+        )  # fmt: skip
     if out is not None:
         verdict.save(out)
     summary = to_json_types(verdict.summary)

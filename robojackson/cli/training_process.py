@@ -31,12 +31,14 @@ def train(
     run_id: str = "",
     move: str = "",
     force: bool = False,
+    robot: str | None = None,
 ) -> dict[str, Any]:
     """Train until the budget is used up; the same call goes on after an interruption.
 
     Args:
         setup: `pretrain` and the like of configs/setups, or the path of a training configuration.
         force: Train on a motion that the gate refuses, too.
+        robot: Name or file of the one that the motion is for; None finds it.
     Raises:
         Interrupted: Ctrl-C or SIGTERM, after a checkpoint was written.
         RejectedReference: the motion's own score card says that the robot cannot follow it.
@@ -57,7 +59,7 @@ def train(
         )
         try:
             trained = train_policy(
-                reference, config=config, setup=setup, out=out, move=move, run_id=run_id,
+                reference, robot, config=config, setup=setup, out=out, move=move, run_id=run_id,
                 force=force, hooks=hooks,
             )  # fmt: skip
         except KeyboardInterrupt:

@@ -31,11 +31,18 @@ ROBOT, PIPELINE = "humanoid", "base"
 CURVE_POINTS = 20
 
 
-def pretrain(kind: str, out: Path, reference: Path | None, overrides: Mapping[str, Any]) -> Figures:
+def pretrain(
+    kind: str,
+    out: Path,
+    reference: Path | None,
+    overrides: Mapping[str, Any],
+    robot: str | None = None,
+) -> Figures:
     """Train a walker: walker_<kind>.safetensors and walker.json with command, curve, evaluation.
 
     Raises:
-        BadConfiguration: a reference motion for `paper`, whose walker follows none.
+        BadConfiguration: a reference motion or a robot for `paper`, whose walker follows no motion
+            and is Humanoid-v5.
     """
     from robojackson.rl.config.train_config import TrainConfig
     from robojackson.rl.policy import load_policy
@@ -51,26 +58,32 @@ def pretrain(kind: str, out: Path, reference: Path | None, overrides: Mapping[st
             f"--reference {reference}: the walker of kind 'paper' follows no motion; leave it out, "
             "or take --kind track"
         )
-    robot = load_robot(describe_robot(ROBOT))
-    motion = reference or _reference(kind, out, robot)
+    if kind == "paper" and robot not in (None, ROBOT):
+        raise BadConfiguration(
+            f"--robot {robot}: the walker of kind 'paper' is {ROBOT}; take --kind track"
+        )
+    machine = load_robot(describe_robot(robot or ROBOT))
+    motion = reference or _reference(kind, out, machine)
+    given = None if reference is not None and robot is None else robot or ROBOT
     stands = kind == "paper"  # a motion that only stands has no score card
     trained = training_process.train(
-        motion, out, f"walker-{kind}", overrides, move="walk", force=stands
+        motion, out, f"walker-{kind}", overrides, move="walk", force=stands, robot=given
     )
     networks = load_networks(out / "networks.safetensors")
     policy = load_policy(out / "policy.safetensors")
     if kind == "paper":
-        model = robot.model
+        model = machine.model
         size = stock_observation_size(model.nq, model.nv, model.nbody)
         networks = widened(networks, size)
-        judged = _evaluate_walk(policy, robot)
+        judged = _evaluate_walk(policy, machine)
     else:
-        judged = stages.evaluate(out / "policy.safetensors", motion, out, PIPELINE, {})
+        judged = stages.evaluate(out / "policy.safetensors", motion, out, PIPELINE, {}, given)
     made = out / f"walker_{kind}.safetensors"
     made.write_bytes(networks.to_bytes())
+    machine_words = [] if robot is None else ["--robot", robot]
     facts = {
         "command": shlex.join(
-            ["robojackson", "pretrain", "--kind", kind, *_command_options(overrides)]
+            ["robojackson", "pretrain", "--kind", kind, *_command_options(overrides), *machine_words]
         ),
         "seed": trained["seed"],
         "steps": trained["steps"],
@@ -116,7 +129,7 @@ def _reference(kind: str, out: Path, robot: "Robot") -> Path:
     made = folder / "reference.parquet"
     if not made.exists():
         stages.mocap(bundled(WALK), folder, PIPELINE, {})
-        stages.retarget(folder / "smpl.parquet", folder, PIPELINE, {"robot": ROBOT})
+        stages.retarget(folder / "smpl.parquet", folder, PIPELINE, {"robot": robot.description.file or robot.description.name})
     return made
 
 

@@ -55,7 +55,7 @@ class ReferenceMotion(TableFile):
     `cycle_offset`; a motion that is not cyclic ends at its last step.
 
     Attributes:
-        robot: Name of the robot description (`configs/robots/<robot>.yaml`).
+        robot: Name of the robot description.
         model_sha256: Digest of the MJCF that the motion was made for.
         dt: Seconds a control step (Humanoid-v5: 0.015).
         cyclic: Whether the motion may be looped.
@@ -70,6 +70,8 @@ class ReferenceMotion(TableFile):
         joint_names, body_names, keypoint_names, contact_names: What the columns are.
         scorecard: Figures that say how good the motion is.
         certificate: What the robot cannot do in it; None where nobody has looked.
+        robot_file: Path of the robot's YAML on the machine that made the motion; empty for one of
+            `configs/robots`, and where a flow made it.
     """
 
     SCHEMA = REFERENCE_MOTION
@@ -92,6 +94,7 @@ class ReferenceMotion(TableFile):
     contact_names: tuple[str, ...]
     scorecard: Mapping[str, float] = field(default_factory=dict)
     certificate: Certificate | None = None
+    robot_file: str = ""
 
     def __len__(self) -> int:
         return len(self.qpos)
@@ -110,6 +113,8 @@ class ReferenceMotion(TableFile):
         facts = {name: getattr(self, name) for name in REFERENCE_MOTION.metadata}
         if self.certificate is not None:
             facts["certificate"] = asdict(self.certificate)
+        if self.robot_file:
+            facts["robot_file"] = self.robot_file
         return columns, json_facts(facts)
 
     @classmethod
@@ -127,6 +132,7 @@ class ReferenceMotion(TableFile):
             source_time_s=columns["source_time_s"],
             scorecard=dict(facts["scorecard"]),
             certificate=_certificate(facts),
+            robot_file=str(facts.get("robot_file", "")),
             **(arrays | {name: tuple(facts[name]) for name in NAMES}),
         )
 

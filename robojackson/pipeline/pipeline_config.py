@@ -20,7 +20,8 @@ class PipelineConfig:
     """One pass from a video to a robot that dances.
 
     Attributes:
-        robot: Name of the robot description (`configs/robots/<robot>.yaml`).
+        robot: Name of the robot description (`configs/robots/<robot>.yaml`), or path of the YAML of
+            another, from the working directory of whoever runs the stages.
         setup: Name under which the training is recorded.
         minutes: Wall time of the whole pass, minutes.
         reserved_minutes: Share of it that the stages other than training get, minutes.

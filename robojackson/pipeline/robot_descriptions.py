@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from robojackson.errors import BadConfiguration, UnknownName
-from robojackson.pipeline.yaml_loader import SUFFIXES, load, names
+from robojackson.pipeline.yaml_loader import SUFFIXES, find, load, names
 from robojackson.robot.description import RobotDescription
 
 FOLDER = "robots"
@@ -45,7 +45,8 @@ def describe_robot(robot: str) -> RobotDescription:
             f"configs/{FOLDER}/{robot}.yaml: name is {found.name!r}; it must be that of the file, "
             f"{robot!r}"
         )
-    return replace(found, file="")
+    folder = find(f"{FOLDER}/{robot}").absolute().parent
+    return replace(found, file="", mjcf=_beside(found.mjcf, folder) or found.mjcf)
 
 
 def read_description(file: Path) -> RobotDescription:
@@ -66,13 +67,16 @@ def read_description(file: Path) -> RobotDescription:
             f"`robojackson robots new {file}` writes a first one"
         )
     found = load(RobotDescription, path)
-    return replace(found, file=str(path), mjcf=_from_anywhere(found.mjcf, path.parent))
+    model = found.mjcf if _in_package(found.mjcf) else os.path.abspath(Path(found.mjcf).expanduser())
+    return replace(found, file=str(path), mjcf=_beside(found.mjcf, path.parent) or model)
 
 
-def _from_anywhere(mjcf: str, folder: Path) -> str:
-    """The model of a file: beside the file where it is there, else from the working directory."""
+def _in_package(mjcf: str) -> bool:
     package, colon, _ = mjcf.partition(":")
-    if colon and len(package) > 1:
-        return mjcf
-    given = Path(mjcf).expanduser()
-    return os.path.abspath(folder / given if (folder / given).is_file() else given)
+    return bool(colon) and len(package) > 1
+
+
+def _beside(mjcf: str, folder: Path) -> str | None:
+    """The model from the folder of its description, where it is there."""
+    model = folder / Path(mjcf).expanduser()
+    return os.path.abspath(model) if not _in_package(mjcf) and model.is_file() else None

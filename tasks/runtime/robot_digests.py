@@ -1,11 +1,27 @@
-"""What a stage that loads a robot has in its cache key: the digest of the robot's model."""
+"""Robots in stages: what is in the cache key of one that loads a robot, and what its process reads."""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
+import yaml
+
+from robojackson.files.json_types import to_json_types
+from robojackson.robot.description import RobotDescription
 from robojackson.robot.model import load_robot
 
 
 def robot_models(parameters: Mapping[str, Any]) -> list[str]:
     """Digest of the model of the parameter `robot`."""
     return [load_robot(parameters["robot"]).sha256]
+
+
+def robot_file(robot: RobotDescription, work: Path) -> Path:
+    """Write the description of a robot for a process; return its path.
+
+    The motion that the process reads does not say where the description is, since it may have been
+    made on another machine.
+    """
+    path = work.absolute() / "robot.yaml"
+    path.write_text(yaml.safe_dump(to_json_types(robot)))
+    return path

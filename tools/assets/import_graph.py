@@ -21,7 +21,19 @@ import numpy as np
 
 TOPS = ("robojackson", "storage", "configs", "tasks", "flows")
 LIBRARY = (
-    *("errors", "geometry", "motion", "body", "robot", "metrics", "formats", "clips", "mocap"),
+    *(
+        "errors",
+        "config",
+        "geometry",
+        "files",
+        "motion",
+        "body",
+        "robot",
+        "metrics",
+        "formats",
+        "clips",
+        "mocap",
+    ),
     *("retarget", "rl", "report", "pipeline", "api", "cli"),
 )
 """The order inside the library; packages that a tree does not have are left out."""
