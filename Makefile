@@ -1,7 +1,8 @@
 # Two commands on a fresh machine: `make dance` and `make test`. Everything else is for developers.
 #
 #   make dance    the hip-shake clip, from video to a dancing robot (ARGS="--minutes 5" and others)
-#   make test     all tests (ARGS="tests/mocap -x")
+#   make test     all tests, one process a core up to four (ARGS="tests/mocap -x"; WORKERS=0 for one process)
+#   make test-fast  more than two thirds of them, of every folder, within 90 s
 #   make test-stack  the whole stack and the documented server as processes, end to end (half an
 #                 hour; apt-get install postgresql chromium)
 #   make bench    accuracy of the mocap stage against ground truth, cost of judging a clip
@@ -18,13 +19,15 @@
 #   make clean    remove the environment and all caches; the store stays
 #
 # Each sets up its own environment, .venv, and reuses it. TORCH_INDEX chooses where torch comes from,
-# PYTHON the interpreter (3.11), ROBOJACKSON_STORE where results are kept.
+# PYTHON the interpreter (3.11, 3.12 or 3.13), ROBOJACKSON_STORE where results are kept.
 
 PY := .venv/bin/python
 ARGS ?=
+WORKERS ?= auto
+PYTEST := $(PY) -m pytest -q -n $(WORKERS) --dist loadgroup
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: dance test test-stack bench bench-learning bench-mocap bench-retarget chaos bench-orchestration deploy lint doctor docs wheel clean setup
+.PHONY: dance test test-fast test-stack bench bench-learning bench-mocap bench-retarget chaos bench-orchestration deploy lint doctor docs wheel clean setup
 .DEFAULT_GOAL := dance
 
 setup:
@@ -34,7 +37,10 @@ dance: setup
 	@.venv/bin/robojackson dance $(ARGS)
 
 test: setup
-	@$(PY) -m pytest -q $(ARGS)
+	@$(PYTEST) $(ARGS)
+
+test-fast: setup
+	@$(PYTEST) -m "not slow and not medium" $(ARGS)
 
 test-stack: setup
 	@$(PY) -m pytest -q -m cluster tests/deploy $(ARGS)

@@ -18,7 +18,6 @@ OF_THE_STUDY = (
     "robot",
     "setup",
     "minutes",
-    "reserved_minutes",
     "gate",
     "train",
     "evaluate",
@@ -86,7 +85,7 @@ class Study:
         mode: `paper`: its reward, observation and torques; `track`: the method that dances.
         steps: Control steps of each training. No clock ends one: the tables are repeatable.
         trainer: `sbx` (JAX, fast) or `sb3` (the reference).
-        robot: Name of `configs/robots/*.yaml`, or path, where the worker is, of the YAML of another.
+        robot: Name of `configs/robots/*.yaml`, or path, where the worker is, of your own YAML.
         pipeline: Name of the configuration that makes the reference motions and judges.
         gate: Refuse the study when a motion breaks a hard bar of its score card, as `dance` does;
             off: train on it all the same, and say so.

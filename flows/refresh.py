@@ -44,6 +44,7 @@ from tasks.probe_video import SourceFile, probe_video
 KIND = "refresh"
 """Beginning of the ids of its runs in the catalogue."""
 FOLDER = "refresh"
+TOLD_OF_CHOSEN = ("video_id", "url", "title", "score_per_second", "stability_score")
 SLACK = 0.1
 """Share of the days between two searches that a nightly run may come early."""
 Facts = dict[str, Any]
@@ -144,7 +145,10 @@ async def refresh_dance(
         "run_id": found.run_id,
         "assessed": len(told),
         "is_new": chosen is not reigning,
-        "chosen": {key: chosen[key] for key in ("video_id", "url", "title", "stability_score")},
+        "chosen": {
+            key: chosen[key]
+            for key in ("video_id", "url", "title", "score_per_second", "stability_score")
+        },
         **made,
     }
 

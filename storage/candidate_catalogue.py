@@ -76,7 +76,7 @@ def records(store: Store, dance: str | None = None) -> list[dict[str, Any]]:
     """All judgements, or those of one dance, the oldest first."""
     where = "" if dance is None else "WHERE lower(dance) = lower($dance)"
     given = {} if dance is None else {"dance": dance}
-    ordered = "ORDER BY decided_at, run_id, decision, stability_score, record_id"
+    ordered = "ORDER BY decided_at, run_id, decision, score_per_second, stability_score, record_id"
     return query(store, f"SELECT * FROM candidates {where} {ordered}", given)
 
 
@@ -190,7 +190,7 @@ def _read(store: Store, key: str) -> pa.Table | None:
         if store.exists(key):
             raise
         return None
-    return tables.decode_table(CANDIDATE_RECORD, data, store.address(key))
+    return tables.decode_table(CANDIDATE_RECORD, data, store.address(key), earlier=True)
 
 
 def _without_zones(table: pa.Table) -> pa.Table:

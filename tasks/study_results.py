@@ -1,6 +1,6 @@
 """The figures of a study out of its tables: by (move, setup), a value for every seed."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from configs.study_config import Study
 from robojackson.metrics import learning_curve
 from robojackson.rl.config.evaluate_config import TRAINED, VARIANTS
+from robojackson.rl.evaluation import verdict
 from storage.study_tables import RunQuery
 
 INTERVALS = 40
@@ -20,6 +21,7 @@ EVALUATED = ("return_own", "survived_s", "stand_s", "strict_success", "skill", "
 Key = tuple[str, str]
 Seeds = Mapping[int, Mapping[str, np.ndarray]]
 Figures = dict[str, dict[Key, dict[int, float]]]
+Baselines = dict[str, dict[str, dict[str, float]]]
 
 
 def grid_of(study: Study) -> np.ndarray:
@@ -72,16 +74,42 @@ def of_evaluations(ask: RunQuery, study: Study) -> Figures:
     return found
 
 
-def of_baselines(ask: RunQuery, study: Study) -> dict[str, dict[str, dict[str, float]]]:
+def of_baselines(ask: RunQuery, study: Study) -> Baselines:
     """By move and policy that learnt nothing: the same figures."""
     sql = f"SELECT move, policy, {_means(ask)} FROM evaluations WHERE study = $study "
     given = {"study": study.name, "taught": [TRAINED, *VARIANTS]}
     rows = ask(f"{sql} AND policy NOT IN $taught GROUP BY ALL ORDER BY ALL", given)
-    found: dict[str, dict[str, dict[str, float]]] = {move: {} for move in study.moves}
+    found: Baselines = {move: {} for move in study.moves}
     for row in rows:
         known = {name: float(row[name]) for name in EVALUATED if row[name] is not None}
         found.setdefault(row["move"], {})[row["policy"]] = known
     return found
+
+
+def too_short_moves(ask: RunQuery, study: Study, baselines: Baselines) -> list[str]:
+    """Moves whose rollouts say nothing: bodies that do not dance succeed as well."""
+    sql = (
+        "SELECT move, max(survived_s) AS longest FROM evaluations WHERE study = $study GROUP BY ALL"
+    )
+    longest = {row["move"]: row["longest"] for row in ask(sql, {"study": study.name})}
+    easy = {
+        move
+        for move, found in baselines.items()
+        if any(figures.get("strict_success", 0.0) >= verdict.EASY for figures in found.values())
+    }
+    return [
+        m for m in study.moves if m in longest and (m in easy or longest[m] < verdict.SHORTEST_S)
+    ]
+
+
+def judged(figures: Figures, unjudged: Collection[str]) -> Figures:
+    """The figures without the success and skill of moves that are too short to judge."""
+    return {
+        name: {
+            k: v for k, v in by_key.items() if name not in verdict.UNJUDGED or k[0] not in unjudged
+        }
+        for name, by_key in figures.items()
+    }
 
 
 def _means(ask: RunQuery) -> str:

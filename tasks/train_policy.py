@@ -28,15 +28,16 @@ from storage.store import Store
 from tasks.runtime.child_process import run_process
 from tasks.runtime.code_digest import digest
 from tasks.runtime.robot_digests import robot_file
+from tasks.runtime.run_logger import run_logger
 from tasks.runtime.stage import identity, stage
 from tasks.runtime.training_progress import show_progress
 
 CODE = ("robojackson.rl.training",)
 """Module of what the process runs."""
+SHORTEST_MINUTES = 0.5
+"""What a training gets in any case."""
 DIGITS = 12
 """Of the digest in a run id."""
-COMPLETE_SHARE = 0.9
-"""Share of its minutes with which a training counts as whole."""
 OVERTIME_S = 300.0
 """What a training may take beyond its budget: start, compilation, last checkpoint."""
 
@@ -54,30 +55,42 @@ class RunLabels:
     setup: str
 
 
-def _models(parameters: Mapping[str, Any]) -> list[str]:
-    """Of the networks to start from; and whether the clock cuts it short, to how many tenths: with
-    more time the same call then trains for longer.
+@dataclass(frozen=True)
+class TrainingTime:
+    """What the clock of a pass leaves for its training.
+
+    Attributes:
+        deadline: Unix time at which the training ends in any case, seconds.
+        needed_minutes: About what such a dance takes.
     """
-    config = parameters["config"]
-    granted = _minutes(config, parameters.get("deadline"))
-    if config.minutes is None or granted is None or granted >= COMPLETE_SHARE * config.minutes:
-        return _start(config)
-    return [*_start(config), f"cut short to {math.floor(10 * granted / config.minutes)} tenths"]
+
+    deadline: float
+    needed_minutes: float
 
 
-@stage(models=_models, reaches=CODE, unkeyed=("labels", "deadline", "limit_s"))
+def _models(parameters: Mapping[str, Any]) -> list[str]:
+    """Of the networks to start from. The minutes in the key are those that were asked for, not
+    those that the clock left: the same call again does not train again.
+    """
+    return _start(parameters["config"])
+
+
+@stage(models=_models, reaches=CODE, unkeyed=("labels", "time_left", "limit_s"))
 async def train_policy(
     reference: Artifact,
     robot: RobotDescription,
     config: TrainConfig,
     labels: RunLabels,
-    deadline: float | None = None,
+    time_left: TrainingTime | None = None,
     limit_s: float | None = None,
+    whole_pass: bool = False,
 ) -> dict[str, Artifact]:
     """`policy`: safetensors; `episodes`: EpisodeRecord; `training`: steps, seconds, as JSON.
 
     Args:
-        deadline: Unix time at which the budget ends in any case, seconds.
+        time_left: Of the pass that it is part of.
+        whole_pass: Whether `config.minutes` is the budget of a whole pass, of which training gets
+            what the other stages leave.
         limit_s: Time after which it has failed, seconds; a budget in minutes sets one by itself.
     Raises:
         StoreError: the same training is running already.
@@ -85,10 +98,10 @@ async def train_policy(
     store = Store.from_environment()
     run_id = run_id_of(reference, robot, config, labels)
     work = store.work(f"train-{run_id[-DIGITS:]}")
-    minutes = _minutes(config, deadline)
-    if minutes is not None:
-        limit_s = min(limit_s or math.inf, 60 * minutes + OVERTIME_S)
     with locked(work, "task.lock", A_MOMENT), store.local(reference) as path:
+        minutes = _minutes(config, time_left, whole_pass)
+        if minutes is not None:
+            limit_s = min(limit_s or math.inf, 60 * minutes + OVERTIME_S)
         command = _command(path, work, robot, config, labels, run_id, minutes)
         async with show_progress(work, f"{labels.setup}-{labels.move}-s{config.seed}"):
             answer = await run_process(command, run_id, work, limit_s)
@@ -119,10 +132,17 @@ def _start(config: TrainConfig) -> list[str]:
     return [] if path is None else [sha256_of_file(path)]
 
 
-def _minutes(config: TrainConfig, deadline: float | None) -> float | None:
-    if config.minutes is None or deadline is None:
+def _minutes(config: TrainConfig, time_left: TrainingTime | None, whole_pass: bool) -> float | None:
+    """What the clock leaves of the minutes that were asked for; says so."""
+    if config.minutes is None or time_left is None:
         return config.minutes
-    return max(0.5, min(config.minutes, (deadline - time.time()) / 60))
+    left = max(SHORTEST_MINUTES, (time_left.deadline - time.time()) / 60)
+    granted = left if whole_pass else min(config.minutes, left)
+    run_logger().info(
+        "training gets %.1f of %g min; dances of this length need about %.0f",
+        granted, config.minutes, time_left.needed_minutes,
+    )  # fmt: skip
+    return granted
 
 
 def _command(

@@ -18,6 +18,7 @@ from robojackson.metrics import ablation_statistics
 from robojackson.report.pages import study_page, study_table
 from robojackson.report.pages.run_page import Plot
 from robojackson.report.pages.study_figures import curve_plots, evaluation_plots
+from robojackson.rl.evaluation.verdict import UNJUDGED
 from robojackson.rl.pretrained import pretrained
 from storage import study_tables
 from storage.artifact import Artifact
@@ -27,14 +28,18 @@ from tasks.runtime.stage import stage
 from tasks.study_results import (
     EVALUATED,
     grid_of,
+    judged,
     learning,
     of_baselines,
     of_evaluations,
     of_learning,
+    too_short_moves,
 )
 
 FOLDER = "studies"
 TEMPLATES = ("study.html", "page.css")
+LEAST_STEPS = 10_000
+"""Control steps of a training below which nothing is learnt."""
 PRIMARY = "return_own"
 """The figure that the claims are about, chosen before any run (docs/ablation.md)."""
 
@@ -83,7 +88,14 @@ def report(
         curves = learning(ask, study)
         figures = {**of_learning(curves, study), **of_evaluations(ask, study)}
         baselines, facts = of_baselines(ask, study), _facts(ask, study)
-        notes = [*_few(study), *_starts(ask, study)]
+        short = too_short_moves(ask, study, baselines)
+        notes = [*_meaningless(study), *_too_short(short), *_few(study), *_starts(ask, study)]
+    figures = judged(figures, short)
+    for move in short:
+        baselines[move] = {
+            policy: {name: value for name, value in found.items() if name not in UNJUDGED}
+            for policy, found in baselines[move].items()
+        }
     walking = {name: move.walking for name, move in moves.items()}
     claims = ablation_statistics.claims(figures[PRIMARY], walking, rng)
     compared = ablation_statistics.comparisons(figures[PRIMARY], study.moves, rng)
@@ -122,6 +134,24 @@ def _facts(ask: study_tables.RunQuery, study: Study) -> dict[str, Any]:
         "seeds": ", ".join(map(str, study.seeds)),
         "code": ", ".join(sorted(commit[:10] for commit in commits)),
     }
+
+
+def _meaningless(study: Study) -> list[str]:
+    if study.steps >= LEAST_STEPS:
+        return []
+    return [
+        f"Trainings of {study.steps:,} control steps: this study shows that every part runs; its "
+        "numbers mean nothing."
+    ]
+
+
+def _too_short(moves: Sequence[str]) -> list[str]:
+    if not moves:
+        return []
+    return [
+        f"{', '.join(moves)}: too short to judge. Bodies that do not dance succeed as well, so "
+        "success and skill are left out."
+    ]
 
 
 def _few(study: Study) -> list[str]:

@@ -6,7 +6,20 @@ from pathlib import Path
 
 import pytest
 
+ROOT = Path(__file__).parents[1]
+MOST_WORKERS = 4
+"""A worker takes up to 3.5 GB of memory."""
+
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+# What JAX compiles is kept for the child processes that train, and for the next run of the tests.
+os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(ROOT / ".pytest_cache" / "jax"))
+os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
+os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "-1")
+
+
+def pytest_xdist_auto_num_workers() -> int:
+    """Return how many processes `-n auto` starts: one a core that we may use, within limits."""
+    return min(len(os.sched_getaffinity(0)), MOST_WORKERS)
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -3,21 +3,35 @@
 #   bootstrap.sh missing   print the apt packages that this machine lacks, on one line
 #   bootstrap.sh check     one sentence and exit 1 when something is lacking, before any work
 #   bootstrap.sh install   create .venv or bring it up to date; does nothing when it is
-# Environment: PYTHON (an interpreter 3.11), TORCH_INDEX (where torch comes from), EXTRAS (which of
-# pyproject.toml's optional dependencies; the image leaves `dev` out).
+# Environment: PYTHON (an interpreter 3.11, 3.12 or 3.13; by default the first of these that is here
+# and can make an environment), TORCH_INDEX (where torch comes from), EXTRAS (which of pyproject.toml's
+# optional dependencies; the image leaves `dev` out).
 set -eu
 cd "$(dirname "$0")/.."
 VENV=.venv
 STAMP=$VENV/.stamp
 EXTRAS=${EXTRAS:-app,fast,s3,dev}
 
-is_python() { "$1" -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' 2>/dev/null; }
+OURS='(3, 11) <= sys.version_info[:2] <= (3, 13)'
+is_python() { "$1" -c "import sys; sys.exit(not $OURS)" 2>/dev/null; }
 has_venv() { "$1" -c 'import venv, ensurepip' 2>/dev/null; }
+version() { "$1" -c 'import sys; print("%d.%d" % sys.version_info[:2])'; }
 
-# The interpreter: one that can make an environment if there is any, else any 3.11.
+candidates() {
+    if [ -n "${PYTHON:-}" ]; then
+        echo "$PYTHON"
+        return
+    fi
+    for minor in 11 12 13; do
+        echo "python3.$minor /usr/bin/python3.$minor"
+    done
+    echo "python3 /usr/bin/python3"
+}
+
+# The interpreter: the first that can make an environment if there is any, else the first of ours.
 find_python() {
     found=
-    for name in ${PYTHON:-} python3.11 /usr/bin/python3.11 python3 /usr/bin/python3; do
+    for name in $(candidates); do
         is_python "$name" || continue
         [ -n "$found" ] || found=$name
         if has_venv "$name"; then
@@ -40,8 +54,13 @@ has_mesa() {
 missing() {
     packages=
     python=$(find_python)
-    [ -n "$python" ] || packages="python3.11 python3.11-venv"
-    [ -z "$python" ] || has_venv "$python" || packages="python3.11-venv"
+    if [ -z "$python" ] && command -v python3 >/dev/null; then
+        packages="python3.11 python3.11-venv" # the python3 of this system is none of ours
+    elif [ -z "$python" ]; then
+        packages="python3 python3-venv"
+    elif ! has_venv "$python"; then
+        packages="python$(version "$python")-venv"
+    fi
     known=$(libraries)
     for pair in libEGL.so.1:libegl1 libGLESv2.so.2:libgles2 libOpenGL.so.0:libopengl0; do
         case $known in *"${pair%%:*}"*) ;; *) packages="$packages ${pair#*:}" ;; esac
@@ -51,6 +70,10 @@ missing() {
 }
 
 check() {
+    if [ -n "${PYTHON:-}" ] && ! is_python "$PYTHON"; then
+        echo "PYTHON=$PYTHON is no Python 3.11, 3.12 or 3.13; name one of these, or leave PYTHON out." >&2
+        exit 1
+    fi
     packages=$(missing)
     [ -z "$packages" ] && return 0
     echo "This machine lacks system packages that RoboJackson needs; install them with:" \
@@ -64,15 +87,22 @@ pinned() { sed -n "s/^$1==//p" constraints.txt; }
 
 say() { echo "setup: $*" >&2; }
 
+# Whether the environment is there, of a Python of ours and of PYTHON's version where that is given.
+has_environment() {
+    is_python "$VENV/bin/python" || return 1
+    [ -z "${PYTHON:-}" ] || [ "$(version "$PYTHON")" = "$(version "$VENV/bin/python")" ]
+}
+
 install() {
     check
-    if [ -f "$STAMP" ] && [ "$(cat "$STAMP")" = "$(wanted)" ] && is_python "$VENV/bin/python"; then
+    if [ -f "$STAMP" ] && [ "$(cat "$STAMP")" = "$(wanted)" ] && has_environment; then
         return 0
     fi
-    if ! is_python "$VENV/bin/python"; then
-        say "creating $VENV"
+    if ! has_environment; then
+        python=$(find_python)
+        say "creating $VENV with Python $(version "$python")"
         rm -rf "$VENV"
-        "$(find_python)" -m venv "$VENV"
+        "$python" -m venv "$VENV"
     fi
     pip="$VENV/bin/python -m pip --disable-pip-version-check --quiet"
     say "torch $(pinned torch) (some minutes, some gigabytes)"

@@ -3,7 +3,8 @@
 Like `robojackson.cli.app`, each imports what it needs inside itself.
 """
 
-from typing import Annotated
+import shlex
+from typing import Annotated, Any
 
 import typer
 
@@ -26,6 +27,9 @@ from robojackson.cli.options import (
     overrides_from,
     yaml_text,
 )
+
+LONGER_MINUTES = 15
+"""Least that a pass is advised to take whose robot does not dance."""
 
 
 @command
@@ -50,17 +54,24 @@ def dance(
     """A video in, a robot that dances it out: every stage, cached, and a page at the end."""
     from flows.runtime.environment import prepare
     from flows.search.dance_source import is_name, load_settings, require_usable, resolve
-    from robojackson.cli.stages import verdict_lines
+    from flows.search.requests import require_findable
     from storage.store import Store
 
     found = None if is_name(source) else resolve(source)
-    given = {"minutes": minutes, "robot": yaml_text(robot), "train.trainer": trainer, "train.seed": seed}
+    given = {
+        "minutes": minutes,
+        "robot": yaml_text(robot),
+        "train.trainer": trainer,
+        "train.seed": seed,
+    }
     overrides = overrides_from(set_, given | {"dancer.number": person, "detector": quality})
     if force:
         overrides["gate"] = False
     settings = load_settings(config, overrides)
     if found is not None:
         require_usable(found, settings, start, end)
+    else:
+        require_findable(str(source), Store.from_environment())
     prepare(Store.from_environment())
     made = None
     if found is not None:
@@ -68,11 +79,37 @@ def dance(
 
         made = replay(found, config, overrides, start, end)
     if made is None:
+        from flows.cli.dance_bar import dance_bar, quiet_prefect
+
+        quiet_prefect()
         from flows.dance import run
 
-        made = run(str(found or source), config, overrides, start, end)
-    text = [*verdict_lines(made["evaluation"]), f"page   {made['page']}", f"video  {made['video']}"]
+        with dance_bar(settings.minutes, Store.from_environment().here):
+            made = run(str(found or source), config, overrides, start, end)
+    return _concluded(made, settings.minutes)
+
+
+def _concluded(made: dict[str, Any], minutes: float) -> CommandResult:
+    """The answer of a dance with its verdict and the command to type next."""
+    from robojackson.cli.cards import closing
+    from robojackson.cli.stages import verdict_lines
+
+    verdict = made["evaluation"]["verdict"]
+    made |= {"verdict": verdict, "next": _next(verdict["kind"], made["page"], minutes)}
+    where = [f"page   {made['page']}", f"video  {made['video']}"]
+    text = [*verdict_lines(made["evaluation"]), *where, *closing(made)]
     return CommandResult(made, text=text)
+
+
+def _next(kind: str, page: str, minutes: float) -> str:
+    """Return what to type after a dance."""
+    if kind == "dances":
+        return shlex.join(["python", "-m", "webbrowser", page])
+    if kind == "too_short":
+        return "film or choose a range of at least two seconds (--start, --end)"
+    from robojackson.cli.lifetime.interruption import with_option
+
+    return with_option("--minutes", f"{max(2 * minutes, LONGER_MINUTES):g}")
 
 
 app = make_app()

@@ -3,6 +3,7 @@
 Like `robojackson.cli.app`, each imports what it needs inside itself.
 """
 
+import shlex
 from typing import Annotated
 
 import typer
@@ -29,12 +30,14 @@ def find(
     from configs.find_config import FindConfig
     from flows.runtime.environment import prepare
     from flows.search import ranking_table
-    from flows.search.requests import find_dance
+    from flows.search.requests import find_dance, require_online
     from robojackson.pipeline.yaml_loader import load
     from storage.store import Store
 
     overrides = overrides_from(set_)
-    dance = find_dance(query, source, address, top, load(FindConfig, config, overrides))
+    settings = load(FindConfig, config, overrides)
+    dance = find_dance(query, source, address, top, settings)
+    require_online(dance, settings)
     prepare(Store.from_environment())
     from flows.find import run
 
@@ -88,4 +91,21 @@ def catalogue(
             {"rows": found}, text=console.table(named, list(found[0]) if found else [])
         )
     rows = candidate_catalogue.records(store, dance)
-    return CommandResult({"candidates": rows}, text=ranking_table.lines(rows))
+    text = ranking_table.lines(rows) if rows else [nothing_judged(dance)]
+    return CommandResult({"candidates": rows}, text=text)
+
+
+def nothing_judged(dance: str | None) -> str:
+    """What fills a catalogue that has no rows, or none of a dance."""
+    from robojackson.clips.web.untrusted_text import clean_text
+
+    if dance is None:
+        return (
+            "The catalogue is empty: `robojackson find DANCE`, `robojackson dance DANCE` and "
+            "`robojackson refresh` fill it; `robojackson find FOLDER --source folder` needs no "
+            "network."
+        )
+    return (
+        f"No video of {clean_text(dance)} was ever judged: `robojackson find {shlex.quote(dance)}` "
+        "looks for some; `robojackson catalogue` lists all dances."
+    )

@@ -20,6 +20,7 @@ TITLE_SHARE = 0.22
 MARKS = {"chosen": "►", "accepted": " ", "rejected": "✗", "failed": "!"}
 STYLES = {"chosen": "bold green", "accepted": "", "rejected": "dim", "failed": "red"}
 FIGURES = {
+    "score/s": ("score_per_second", "{:.2f}"),
     "score": ("stability_score", "{:.2f}"),
     "sec": ("duration_s", "{:.1f}"),
     "views": ("view_count", "{:,}"),

@@ -7,10 +7,14 @@ from typing import Any
 
 from configs.dance_book import Dance, DanceBook
 from configs.find_config import FindConfig
-from robojackson.clips.sources import folder, is_local
+from robojackson.clips.sources import folder, is_local, page_of
 from robojackson.clips.sources import source as source_of
+from robojackson.clips.web.reachability import require_reachable
 from robojackson.clips.web.untrusted_text import clean_text
+from robojackson.errors import SearchFailed
 from robojackson.pipeline.yaml_loader import build, load
+from storage import candidate_catalogue
+from storage.store import Store
 
 ALL = 10_000
 """Files of a folder are all judged: nobody counted who watched them."""
@@ -33,6 +37,31 @@ def find_dance(query: str, source: str, address: str, top: int | None, config: F
     if is_local(source):
         search(query, address, 1, config.web, datetime.now(UTC))
     return replace(dance, top=top or (ALL if source == folder.NAME else None))
+
+
+def require_online(dance: Dance, config: FindConfig) -> None:
+    """Raise where the site of a dance's source cannot be reached, before Prefect is started.
+
+    Raises:
+        SearchFailed: one line with the reason and what to do.
+    """
+    page = page_of(dance.source, dance.full_query, dance.address)
+    if page:
+        require_reachable(page, config.web.proxy)
+
+
+def require_findable(words: str, store: Store) -> None:
+    """Raise where a dance that is given by its name can neither be searched nor was found before.
+
+    Raises:
+        SearchFailed: as `require_online`.
+    """
+    dance = load(DanceBook, "dances").find(words.strip())
+    try:
+        require_online(dance, load(FindConfig, "finding"))
+    except SearchFailed:
+        if candidate_catalogue.champion(store, dance.name) is None:
+            raise
 
 
 def check_refresh(dances: Sequence[str] | None, config: str, overrides: Mapping[str, Any]) -> None:

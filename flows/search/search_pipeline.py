@@ -35,6 +35,9 @@ from tasks.download_video import WebVideo, download_video, take_file
 from tasks.probe_video import SourceFile
 from tasks.search_videos import search_videos
 
+USUAL_FPS = 30.0
+"""Frames a second of a video whose length is not known."""
+
 
 def search_and_rank(
     dance: Dance,
@@ -125,6 +128,9 @@ def challenged(
         return list(entries)
     first = entries[0]
     old = Stability(**{f.name: reigning[f.name] for f in fields(Stability)})
+    if old.score_per_second is None:  # judged before there was such a column
+        seconds = reigning["duration_s"] or reigning["frames"] / USUAL_FPS
+        old = replace(old, score_per_second=old.stability_score / seconds)
     assert first.score
     if candidate_ranking.order({"old": old, "new": first.score}, settings.filters)[0] == "new":
         return list(entries)

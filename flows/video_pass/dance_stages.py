@@ -12,11 +12,14 @@ from pathlib import Path
 from typing import Any
 
 from flows.video_pass.motion_stages import to_reference
+from flows.video_pass.pass_progress import announce
 from flows.video_pass.scored_candidates import Candidate, choose, score_all
+from flows.video_pass.time_budget import training_time
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.pipeline.run_names import run_name
 from robojackson.retarget.scorecard_gate import check
+from robojackson.rl.config.train_config import TrainConfig
 from robojackson.robot.model import RobotDescription
 from storage import run_catalogue
 from storage.artifact import Artifact
@@ -24,15 +27,12 @@ from storage.store import Store
 from tasks.draw_pictures import draw_snapshot
 from tasks.evaluate_dance import evaluate_dance
 from tasks.render_video import render_video
-from tasks.runtime.run_logger import run_logger
 from tasks.runtime.stage import labelled
 from tasks.train_policy import RunLabels, train_policy
 from tasks.write_page import write_page
 
 Artifacts = dict[str, Artifact]
 Facts = dict[str, Any]
-LAST_STAGES_MINUTES = 1.5
-"""What evaluation, video and page take; training ends early rather than run into it."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +67,7 @@ async def make_dance(
     """
     robot = describe_robot(settings.robot)
     began = time.time()  # what a search takes is no part of the budget
+    announce("scoring")
     candidates = score_all(paths, settings, start_s, end_s)
     best = choose(candidates)
     labels = RunLabels(*map(run_name, (Path(best.name).stem, settings.setup)))
@@ -88,14 +89,21 @@ async def perform(
         began: When the budget of the pass began, Unix time, seconds.
     """
     with labelled(labels.move):
+        announce("motion capture and retargeting")
         moved = to_reference(best.clip, robot, settings)
         reference = moved["reference"]
         if settings.gate:
             check(json.loads(Store.from_environment().read(moved["scorecard"].key)))
-        deadline = began + 60 * (settings.minutes - LAST_STAGES_MINUTES)
-        trained = await train_policy(reference, robot, _budgeted(settings), labels, deadline)
+        announce("training")
+        config, whole_pass = _budgeted(settings)
+        trained = await train_policy(
+            reference, robot, config, labels,
+            time_left=training_time(reference, robot, settings, began), whole_pass=whole_pass,
+        )  # fmt: skip
+        announce("evaluation")
         judged = evaluate_dance(trained["policy"], reference, robot, settings.evaluate, labels)
         shown = (best.clip["video"], moved["landmarks"], moved["smpl"], reference)
+        announce("video")
         film = render_video(*shown, judged["rollout"], robot, settings.render)
         made = {**best.clip, "stability": best.stability, **moved, **trained, **judged}
         made |= {"dance": film, "still": draw_snapshot(film)}
@@ -124,22 +132,16 @@ def conclude(
         "page": store.address(made["page"].key),
         "video": store.address(made["dance"].key),
         **names,
-        "candidates": {c.name: c.score.stability_score for c in candidates},
+        "candidates": {c.name: c.score.score_per_second for c in candidates},
         "scorecard": json.loads(store.read(made["scorecard"].key)),
         "evaluation": summary,
         "artifacts": {name: store.address(artifact.key) for name, artifact in made.items()},
     }
 
 
-def _budgeted(settings: PipelineConfig) -> Any:
-    """Return the training's configuration; its default budget is what is left of the pass."""
+def _budgeted(settings: PipelineConfig) -> tuple[TrainConfig, bool]:
+    """Return the training's configuration, and whether its budget is that of the whole pass."""
     config = settings.train
     if config.has_budget:
-        if (config.minutes or 0.0) > settings.train_minutes:
-            run_logger().warning(
-                "train.minutes=%g is more than minutes=%g leave it: it may be cut short",
-                config.minutes,
-                settings.minutes,
-            )
-        return config
-    return replace(config, minutes=settings.train_minutes)
+        return config, False
+    return replace(config, minutes=settings.minutes), True

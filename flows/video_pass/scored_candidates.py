@@ -63,7 +63,7 @@ def score_all(
 
 
 def choose(candidates: list[Candidate]) -> Candidate:
-    """Return the steadiest candidate in which there is a person.
+    """Return the steadiest candidate in which there is a person: the lowest score a second.
 
     Raises:
         NoPersonFound: there is none.
@@ -73,7 +73,7 @@ def choose(candidates: list[Candidate]) -> Candidate:
         frames = {candidate.name: candidate.score.frames for candidate in candidates}
         told = (f"{name}: no person found in {n} of {n} frames" for name, n in frames.items())
         raise NoPersonFound("; ".join(told))
-    return min(danced, key=lambda candidate: candidate.score.stability_score)
+    return min(danced, key=lambda candidate: candidate.score.score_per_second)
 
 
 def _readable(paths: Sequence[Path]) -> list[tuple[Path, SourceFile]]:

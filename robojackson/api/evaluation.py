@@ -56,9 +56,12 @@ class PolicyEvaluation:
 
     def __repr__(self) -> str:
         told = self.summary
+        if told["verdict"]["kind"] == "too_short":
+            said = "too short to judge"
+        else:
+            said = f"strict_success={told['strict_success']:.0%}, skill={told['skill']:.2f}"
         return (
-            f"PolicyEvaluation(strict_success={told['strict_success']:.0%}, "
-            f"skill={told['skill']:.2f}, site_error_m={told['site_error_m']:.3f}, "
+            f"PolicyEvaluation({said}, site_error_m={told['site_error_m']:.3f}, "
             f"survived_s={told['survived_s']:.2f}, {told['rollouts']:.0f} rollouts)"
         )
 

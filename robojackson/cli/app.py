@@ -30,6 +30,7 @@ from robojackson.cli.options import (
     Quality,
     Robot,
     Set,
+    Verbose,
     Weights,
     overrides_from,
     yaml_text,
@@ -43,18 +44,20 @@ def score(
     person: Person = None,
     config: Config = "base",
     set_: Set = None,
+    verbose: Verbose = False,
     as_json: Json = False,
 ) -> CommandResult:
     """How steady the dancer is seen (Algorithm 1): missing joints plus jitter, lowest is best.
 
     Exit code 1 where a video that is named cannot be read; one inside a folder is only told.
     """
-    from robojackson.cli import scoring
+    from robojackson.cli import cards, scoring
 
     log_to_stderr()
     scored = scoring.score(video, config, overrides_from(set_, {"dancer.number": person}))
     unread = {told["video"] for told in scored["videos"] if "error" in told}
-    return CommandResult(scored, code=1 if unread & set(map(str, video)) else 0)
+    text = cards.shown(scored, cards.score_lines(scored), verbose)
+    return CommandResult(scored, code=1 if unread & set(map(str, video)) else 0, text=text)
 
 
 @command
@@ -73,10 +76,11 @@ def mocap(
     ] = 0,
     config: Config = "base",
     set_: Set = None,
+    verbose: Verbose = False,
     as_json: Json = False,
 ) -> CommandResult:
     """The motion of the person in a video: landmarks.parquet and smpl.parquet."""
-    from robojackson.cli import stages
+    from robojackson.cli import cards, stages
 
     log_to_stderr()
     if people:
@@ -86,7 +90,8 @@ def mocap(
         return CommandResult(told, text=lines)
     brought = {"network.hybrik": yaml_text(hybrik), "network.niki": yaml_text(niki)}
     overrides = overrides_from(set_, {**brought, "dancer.number": person, "detector": quality})
-    return CommandResult(stages.mocap(video, out, config, overrides, hypotheses))
+    made = stages.mocap(video, out, config, overrides, hypotheses)
+    return CommandResult(made, text=cards.shown(made, cards.mocap_lines(made), verbose))
 
 
 @command
@@ -104,10 +109,11 @@ def retarget(
     config: Config = "base",
     force: Force = False,
     set_: Set = None,
+    verbose: Verbose = False,
     as_json: Json = False,
 ) -> CommandResult:
     """The same motion for a robot: reference.parquet and scorecard.json."""
-    from robojackson.cli import stages
+    from robojackson.cli import cards, stages
 
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     log_to_stderr()
@@ -119,7 +125,7 @@ def retarget(
         made |= draw_retargeting(smpl, out, config, overrides)
     if not force:
         stages.gate(made["scorecard"], out, config, overrides)
-    return CommandResult(made)
+    return CommandResult(made, text=cards.shown(made, cards.retarget_lines(made), verbose))
 
 
 @command

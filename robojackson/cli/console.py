@@ -30,6 +30,8 @@ USAGE_ERROR: Any = typer.BadParameter.__bases__[0]
 
 APP_PACKAGES = ("prefect", "fastapi", "sqlalchemy", "yt_dlp")
 """What the extra `app` brings: without it the commands of one stage work and the others do not."""
+OWN_PACKAGES = ("robojackson", "flows", "tasks", "storage", "configs")
+"""Whose log is for the user; of all other packages only warnings and errors are."""
 INSTALL_APP = "pip install 'robojackson[app]'"
 
 log = logging.getLogger("robojackson")
@@ -131,10 +133,10 @@ def table(rows: Mapping[str, Mapping[str, Any]], columns: Sequence[str]) -> list
 
 
 def log_to_stderr() -> None:
-    """Send the log of the libraries to stderr, one short line a record."""
-    logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(message)s")
-    for noisy in ("jax", "absl", "matplotlib", "httpx", "torch"):
-        logging.getLogger(noisy).setLevel(logging.WARNING)
+    """Send our log to stderr, one short line a record, and what other libraries warn of."""
+    logging.basicConfig(level=logging.WARNING, stream=sys.stderr, format="%(message)s")
+    for own in OWN_PACKAGES:
+        logging.getLogger(own).setLevel(logging.INFO)
 
 
 @contextmanager

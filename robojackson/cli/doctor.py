@@ -8,6 +8,8 @@ from typing import Any
 
 from robojackson.clips.web import javascript_runtimes
 
+PYTHONS = ((3, 11), (3, 12), (3, 13))
+"""The versions that pyproject.toml allows and the tests run on."""
 GRAPHICS = {
     "libEGL.so.1": "libegl1",
     "libGLESv2.so.2": "libgles2",
@@ -47,7 +49,9 @@ def examine() -> dict[str, Any]:
     packages = {name: installed(name) for name in (*REQUIRED, *OPTIONAL)}
     libraries = {name: loads(name) for name in GRAPHICS}
     models = {size: model(size) for size in MODELS}
-    missing = [f"{name}: run `make` again" for name in REQUIRED if packages[name] is None]
+    missing = unsupported(sys.version_info[:2])
+    python_supported = not missing
+    missing += [f"{name}: run `make` again" for name in REQUIRED if packages[name] is None]
     missing += _system_line(libraries)
     missing += [words for size, words in models.items() if words and size in NEEDED_MODELS]
     missing += [
@@ -63,6 +67,7 @@ def examine() -> dict[str, Any]:
     return {
         "ok": not missing,
         "python": sys.version.split()[0],
+        "python_supported": python_supported,
         "packages": packages,
         "libraries": libraries,
         "models": {size: not words for size, words in models.items()},
@@ -71,6 +76,17 @@ def examine() -> dict[str, Any]:
         "missing": missing,
         "optional": optional,
     }
+
+
+def unsupported(version: tuple[int, int]) -> list[str]:
+    """Return nothing, or the line that says which Python to use instead of this one."""
+    if version in PYTHONS:
+        return []
+    known = ", ".join("{}.{}".format(*pair) for pair in PYTHONS)
+    return [
+        "Python {}.{} is not supported (supported: {}): ".format(*version, known)
+        + "run `make setup PYTHON=python{}.{}`".format(*PYTHONS[-1])
+    ]
 
 
 def installed(name: str) -> str | None:

@@ -23,6 +23,7 @@ from robojackson.cli.options import (
     TablesFolder,
     Trainer,
     TrainMinutes,
+    Verbose,
     overrides_from,
 )
 
@@ -49,21 +50,21 @@ def train(
     parent: Parent = 0,
     force: Force = False,
     set_: SetTrain = None,
+    verbose: Verbose = False,
     as_json: Json = False,
 ) -> CommandResult:
     """Teach the robot the motion: policy.safetensors and episodes.parquet; resumes by itself."""
-    from robojackson.cli import training_process
+    from robojackson.cli import cards, training_process
 
     if parent:
         training_process.end_with(parent)
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     log_to_stderr()
     given = {"mode": mode, "trainer": trainer, "steps": steps, "minutes": minutes, "seed": seed}
-    return CommandResult(
-        training_process.train(
-            reference, out, setup, overrides_from(set_, given), run_id, move, force, robot
-        )
+    trained = training_process.train(
+        reference, out, setup, overrides_from(set_, given), run_id, move, force, robot
     )
+    return CommandResult(trained, text=cards.shown(trained, cards.train_lines(trained), verbose))
 
 
 @command
@@ -108,10 +109,11 @@ def evaluate(
     config: Config = "base",
     parent: Parent = 0,
     set_: Set = None,
+    verbose: Verbose = False,
     as_json: Json = False,
 ) -> CommandResult:
     """Judge a policy on stock physics from many starts, beside baselines that do not dance."""
-    from robojackson.cli import stages
+    from robojackson.cli import cards, stages
     from robojackson.cli.training_process import end_with
 
     if parent:
@@ -120,4 +122,5 @@ def evaluate(
     log_to_stderr()
     overrides = overrides_from(set_, {"evaluate.seconds": seconds})
     judged = stages.evaluate(policy, reference, out, config, overrides, robot)
-    return CommandResult(judged, text=stages.verdict_lines(judged))
+    table = [*stages.verdict_lines(judged), *cards.closing(judged)]
+    return CommandResult(judged, text=cards.shown(judged, table, verbose))

@@ -8,6 +8,7 @@ import typer
 from robojackson.errors import BadConfiguration
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print all figures.")]
 Config = Annotated[str, typer.Option("--config", help="Name or path of a configuration.")]
 
 
@@ -59,7 +60,9 @@ Quality = Annotated[
 ]
 Robot = Annotated[
     str | None,
-    typer.Option("--robot", help="Name of a robot of configs/robots, or the path of your own YAML."),
+    typer.Option(
+        "--robot", help="Name of a robot of configs/robots, or the path of your own YAML."
+    ),
 ]
 MotionRobot = Annotated[
     str | None,

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robojackson.cli import console
+from robojackson.cli.cards import command_line
 from robojackson.cli.stages import Figures, Overrides
 from robojackson.errors import RoboJacksonError, TrackTooShort, UnreadableVideo
 from robojackson.pipeline.yaml_loader import load
@@ -48,7 +49,28 @@ def score(videos: list[Path], config: str, overrides: Overrides) -> Figures:
             found[-1]["note"] = f"no person found in {len(track)} of {len(track)} frames"
     if causes and len(causes) == len(infos):
         raise causes[0]
-    return {"videos": found}
+    found.sort(key=_place)
+    return {"videos": found, **_verdict(found)}
+
+
+def _place(told: Figures) -> tuple[bool, bool, float]:
+    """The steadiest first, then clips without a person, then what cannot be read."""
+    return "error" in told, not told.get("detected"), told.get("score_per_second", 0.0)
+
+
+def _verdict(found: list[Figures]) -> Figures:
+    """Which video is the steadiest, and what to do with it."""
+    best = found[0]
+    if not best.get("detected"):
+        told = "Nobody is seen in any of the videos: a whole person has to be in view."
+        return {"verdict": {"kind": "nobody", "sentence": told}}
+    name, score = Path(best["video"]).name, best["score_per_second"]
+    of = "" if len(found) == 1 else f" of {len(found)} videos"
+    sentence = f"{name} is tracked most steadily{of}: {score:.2f} a second."
+    return {
+        "verdict": {"kind": "steadiest", "sentence": sentence},
+        "next": command_line("dance", best["video"]),
+    }
 
 
 def _readable(

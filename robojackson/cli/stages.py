@@ -12,15 +12,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robojackson.cli import console
+from robojackson.cli import cards, console
 from robojackson.errors import NoPersonFound, RejectedReference, TrackTooShort
 from robojackson.files.file_tree import results_in
 from robojackson.files.json_types import to_json_types
 from robojackson.pipeline.yaml_loader import load
+from robojackson.rl.evaluation.verdict import UNJUDGED
 
 if TYPE_CHECKING:
     from robojackson.motion.smpl_sequence import SmplSequence
 
+LONGER_MINUTES = 20
+"""What a training is advised to take whose robot does not dance."""
 Figures = dict[str, Any]
 Overrides = Mapping[str, Any]
 
@@ -62,10 +65,12 @@ def mocap(
         "frames": len(sequence),
         "fps": sequence.fps,
         "detected": int(track.detected.sum()),
-        "person": track.person,
+        "person": max(track.person, 1),
         "floor": _floor(sequence),
         "contact_share": _contact_share(sequence),
         "notes": list(sequence.notes),
+        "verdict": cards.mocap_verdict(len(sequence), int(sequence.valid.sum())),
+        "next": cards.command_line("retarget", out / "smpl.parquet", "-o", out),
         "seconds": time.monotonic() - began,
     }
 
@@ -98,6 +103,8 @@ def retarget(smpl: Path, out: Path, config: str, overrides: Overrides) -> Figure
         "dt": reference.dt,
         "cyclic": reference.cyclic,
         "scorecard": scorecard,
+        "verdict": cards.retarget_verdict(scorecard),
+        "next": cards.command_line("train", out / "reference.parquet", "-o", out / "training"),
         "seconds": time.monotonic() - began,
     }
 
@@ -140,7 +147,11 @@ def evaluate(
     if out is not None:
         verdict.save(out)
     summary = to_json_types(verdict.summary)
-    return {"policy": str(policy), "reference": str(reference), **summary}
+    again = ("train", reference, "-o", policy.parent, "--minutes", LONGER_MINUTES)
+    export = ("export", policy, "--to", "onnx", "-o", policy.with_suffix(".onnx"))
+    dances = summary["verdict"]["kind"] == "dances"
+    following = cards.command_line(*(export if dances else again))
+    return {"policy": str(policy), "reference": str(reference), **summary, "next": following}
 
 
 VERDICT = ("survived_s", "success", "strict_success", "skill", "site_error_m", "limb_gain")
@@ -148,7 +159,12 @@ VERDICT = ("survived_s", "success", "strict_success", "skill", "site_error_m", "
 
 def verdict_lines(evaluation: Mapping[str, Any]) -> list[str]:
     """The table of an evaluation: the policy, then its baselines."""
-    return console.table({"trained": evaluation, **evaluation["baselines"]}, VERDICT)
+    short = evaluation.get("verdict", {}).get("kind") == "too_short"
+    rows = {"trained": evaluation, **evaluation["baselines"]}
+    if short:
+        shown = dict.fromkeys(UNJUDGED, "too short")
+        rows = {name: {**row, **shown} for name, row in rows.items()}
+    return console.table(rows, VERDICT)
 
 
 def _contact_share(sequence: "SmplSequence") -> dict[str, float]:

@@ -5,6 +5,7 @@ it, and it holds a lock on its folder, so that no two trainings share a checkpoi
 """
 
 import json
+import logging
 import math
 import os
 import signal
@@ -12,13 +13,22 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from robojackson.cli import console
-from robojackson.cli.lifetime.interruption import STOPS, UnsavedFlag, is_guarded
+from robojackson.cli import cards, console
+from robojackson.cli.lifetime.interruption import STOPS, UnsavedFlag, is_guarded, with_option
 from robojackson.cli.lifetime.parent_death import end_with_parent
 from robojackson.pipeline.yaml_loader import load
 
+if TYPE_CHECKING:
+    from robojackson.api.trained_policy import TrainedPolicy
+
+log = logging.getLogger(__name__)
+
+USUAL_MINUTES = 10.0
+"""What a training is advised to take that ended before its first update."""
+RECENT = 100
+"""Episodes at the end of a training by which it is described."""
 PROGRESS = "progress.json"
 """How far a training is, in its folder."""
 
@@ -66,8 +76,20 @@ def train(
             there = newest_checkpoint(out)
             kept = f"the checkpoint is in {out}; resume" if there else "nothing learnt yet; again"
             raise console.Interrupted(f"{kept}: {console.same_command()}") from None
+    return _answer(trained, reference, out / "policy.safetensors")
+
+
+def _answer(trained: "TrainedPolicy", reference: Path, policy: Path) -> dict[str, Any]:
+    """Return what the command answers of a training that has ended."""
+    config = trained.config
+    survived = [row["survived_s"] for row in trained.episodes[-RECENT:]]
+    verdict = cards.train_verdict(trained.updates, trained.steps, survived)
+    following = cards.command_line("evaluate", policy, reference)
+    if verdict["kind"] == "untrained":
+        log.warning(verdict["sentence"])
+        following = with_option("--minutes", f"{USUAL_MINUTES:g}")
     return {
-        "policy": str(out / "policy.safetensors"),
+        "policy": str(policy),
         "reference": str(reference),
         "mode": config.mode,
         "trainer": config.trainer,
@@ -78,6 +100,8 @@ def train(
         "seconds": trained.seconds,
         "stopped": trained.stopped,
         "episodes": len(trained.episodes),
+        "verdict": verdict,
+        "next": following,
     }
 
 

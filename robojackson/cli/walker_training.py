@@ -50,18 +50,9 @@ def pretrain(
     from robojackson.rl.tqc.network_arrays import load_networks, widened
     from robojackson.robot.model import load_robot
 
-    mode = load(TrainConfig, f"setups/walker-{kind}", overrides).mode
-    if mode != kind:
-        raise BadConfiguration(f"mode={mode}: the walker of kind {kind!r} learns in mode {kind}")
-    if kind == "paper" and reference is not None:
-        raise BadConfiguration(
-            f"--reference {reference}: the walker of kind 'paper' follows no motion; leave it out, "
-            "or take --kind track"
-        )
-    if kind == "paper" and robot not in (None, ROBOT):
-        raise BadConfiguration(
-            f"--robot {robot}: the walker of kind 'paper' is {ROBOT}; take --kind track"
-        )
+    _require_fitting(
+        kind, load(TrainConfig, f"setups/walker-{kind}", overrides).mode, reference, robot
+    )
     machine = load_robot(describe_robot(robot or ROBOT))
     motion = reference or _reference(kind, out, machine)
     given = None if reference is not None and robot is None else robot or ROBOT
@@ -80,11 +71,10 @@ def pretrain(
         judged = stages.evaluate(out / "policy.safetensors", motion, out, PIPELINE, {}, given)
     made = out / f"walker_{kind}.safetensors"
     made.write_bytes(networks.to_bytes())
-    machine_words = [] if robot is None else ["--robot", robot]
+    words = ["--kind", kind, *_command_options(overrides)]
+    words += [] if robot is None else ["--robot", robot]
     facts = {
-        "command": shlex.join(
-            ["robojackson", "pretrain", "--kind", kind, *_command_options(overrides), *machine_words]
-        ),
+        "command": shlex.join(["robojackson", "pretrain", *words]),
         "seed": trained["seed"],
         "steps": trained["steps"],
         "updates": trained["updates"],
@@ -92,7 +82,26 @@ def pretrain(
         "evaluation": judged,
     }
     (out / "walker.json").write_text(json.dumps(facts, indent=1, default=float))
-    return {"walker": str(made), **facts}
+    return {"walker": str(made)} | facts
+
+
+def _require_fitting(kind: str, mode: str, reference: Path | None, robot: str | None) -> None:
+    """Refuse what the walker of a kind cannot be made with.
+
+    Raises:
+        BadConfiguration: another mode; a reference motion or another robot for `paper`.
+    """
+    if mode != kind:
+        raise BadConfiguration(f"mode={mode}: the walker of kind {kind!r} learns in mode {kind}")
+    if kind == "paper" and reference is not None:
+        raise BadConfiguration(
+            f"--reference {reference}: the walker of kind 'paper' follows no motion; leave it out, "
+            "or take --kind track"
+        )
+    if kind == "paper" and robot not in (None, ROBOT):
+        raise BadConfiguration(
+            f"--robot {robot}: the walker of kind 'paper' is {ROBOT}; take --kind track"
+        )
 
 
 def curve(out: Path) -> list[dict[str, float]]:
@@ -129,7 +138,12 @@ def _reference(kind: str, out: Path, robot: "Robot") -> Path:
     made = folder / "reference.parquet"
     if not made.exists():
         stages.mocap(bundled(WALK), folder, PIPELINE, {})
-        stages.retarget(folder / "smpl.parquet", folder, PIPELINE, {"robot": robot.description.file or robot.description.name})
+        stages.retarget(
+            folder / "smpl.parquet",
+            folder,
+            PIPELINE,
+            {"robot": robot.description.file or robot.description.name},
+        )
     return made
 
 

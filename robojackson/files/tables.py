@@ -87,13 +87,24 @@ def decode_rows(schema: TableSchema, data: bytes, where: str) -> list[dict[str, 
     return result
 
 
-def decode_table(schema: TableSchema, data: bytes, where: str) -> pa.Table:
+def decode_table(
+    schema: TableSchema, data: bytes, where: str, *, earlier: bool = False
+) -> pa.Table:
     """The records of a Parquet file, as an Arrow table.
 
+    Args:
+        earlier: Whether it may be of an earlier version: nullable columns that it lacks are empty.
     Raises:
         BadTable: not Parquet, another table, or a column that is wrong.
     """
-    return check(schema, _from_bytes(data, where), where)
+    found = _from_bytes(data, where)
+    if earlier:
+        for field in (c.field() for c in schema.columns if c.nullable):
+            if field.name not in found.column_names:
+                found = found.append_column(field, pa.nulls(found.num_rows, field.type))
+        known = [c.name for c in schema.columns if c.name in found.column_names]
+        found = found.select([*known, *(n for n in found.column_names if n not in known)])
+    return check(schema, found, where)
 
 
 def check(schema: TableSchema, table: pa.Table, where: str) -> pa.Table:

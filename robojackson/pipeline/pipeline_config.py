@@ -23,8 +23,7 @@ class PipelineConfig:
         robot: Name of the robot description (`configs/robots/<robot>.yaml`), or path of the YAML of
             another, from the working directory of whoever runs the stages.
         setup: Name under which the training is recorded.
-        minutes: Wall time of the whole pass, minutes.
-        reserved_minutes: Share of it that the stages other than training get, minutes.
+        minutes: Wall time of the whole pass, minutes; training gets what the other stages leave.
         scoring_detector: Size of the pose model that scores candidates.
         detector: Pose model that feeds mocap; best lets two vote.
         dancer: Who of several people is danced.
@@ -36,7 +35,6 @@ class PipelineConfig:
     robot: str = "humanoid"
     setup: str = "scratch"
     minutes: float = Field(default=12.0, gt=0)
-    reserved_minutes: float = Field(default=3.0, ge=0)
     scoring_detector: Size = "lite"
     detector: Quality = "full"
     dancer: DancerConfig = Field(default_factory=DancerConfig)
@@ -49,8 +47,3 @@ class PipelineConfig:
     train: TrainConfig = Field(default_factory=TrainConfig)
     evaluate: EvaluateConfig = Field(default_factory=EvaluateConfig)
     render: VideoConfig = Field(default_factory=VideoConfig)
-
-    @property
-    def train_minutes(self) -> float:
-        """What is left for training, at least half a minute."""
-        return max(0.5, self.minutes - self.reserved_minutes)

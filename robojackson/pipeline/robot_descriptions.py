@@ -58,22 +58,22 @@ def read_description(file: Path) -> RobotDescription:
     """
     path = Path(os.path.abspath(file.expanduser()))
     if not path.is_file():
-        raise UnknownName(
-            "robot", str(file), f"no file {path} on {platform.node()}", robot_names()
-        )
+        raise UnknownName("robot", str(file), f"no file {path} on {platform.node()}", robot_names())
     if path.suffix.lower() not in SUFFIXES:
         raise BadConfiguration(
             f"{file}: a robot is described by a .yaml file; of an MJCF, "
             f"`robojackson robots new {file}` writes a first one"
         )
     found = load(RobotDescription, path)
-    model = found.mjcf if _in_package(found.mjcf) else os.path.abspath(Path(found.mjcf).expanduser())
+    model = (
+        found.mjcf if _in_package(found.mjcf) else os.path.abspath(Path(found.mjcf).expanduser())
+    )
     return replace(found, file=str(path), mjcf=_beside(found.mjcf, path.parent) or model)
 
 
 def _in_package(mjcf: str) -> bool:
     package, colon, _ = mjcf.partition(":")
-    return bool(colon) and len(package) > 1
+    return bool(colon) and len(package) > 1 and package.isidentifier()
 
 
 def _beside(mjcf: str, folder: Path) -> str | None:

@@ -131,7 +131,7 @@ def _holds(robot: Robot, motion: Feasible, config: RetargetConfig) -> bool:
     problem = Problem.of(robot, motion.aims, config.weights)
     broken = faults(problem, motion.qpos, config)
     if bad := broken.deep or broken.fast or broken.jumps:
-        _log.info("repair undone: %s", broken)
+        _log.debug("repair undone: %s", broken)
     return not bad
 
 

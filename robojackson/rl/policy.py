@@ -83,6 +83,11 @@ class Policy:
         return {"seed": seed or 0, "step": steps}
 
     @property
+    def updates(self) -> int | None:
+        """Gradient updates of its training; None where the file does not say."""
+        return _count(self.facts.get("updates"))
+
+    @property
     def setup(self) -> str:
         """What the configuration of its training was called; empty where the file does not say."""
         said = self.facts.get("setup")

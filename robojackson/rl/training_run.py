@@ -207,6 +207,7 @@ class Run:
             "start": Path(config.start).name,
             "curiosity": config.curiosity,
             "steps": self.trainer.steps(),
+            "updates": self.trainer.updates(),
             "control": asdict(self.core.sim.control),
             "repeats": self.core.mode.repeats,
             "environment": json.loads(json.dumps(asdict(config.environment))),

@@ -33,18 +33,23 @@ def check_names(
     """Every body, joint and keypoint of contacts, weights and poses is known."""
     if not description.contacts:
         raise BadConfiguration(f"{where(description, 'contacts')}: a robot needs feet")
-    for name, point in description.contacts.items():
-        place = where(description, f"contacts.{name}")
-        known("body", point.body, bodies, f"{place}.body")
-        known("keypoint", point.site, description.sites, f"{place}.site")
-        known("side", point.side, _LABELS, f"{place}.side")
-        carrier = description.sites[point.site][0]
-        if carrier != point.body:
-            raise BadConfiguration(f"{place}: {point.site} is on {carrier!r}, not {point.body!r}")
+    for name in description.contacts:
+        check_contact(description, name, bodies)
     for key in description.weights:
         known("keypoint", key, description.sites, where(description, "weights"))
     for joint in description.rest_pose:
         matching("joint", joint, joints, where(description, "rest_pose"))
+
+
+def check_contact(description: RobotDescription, name: str, bodies: tuple[str, ...]) -> None:
+    """Body, keypoint and side of a contact are known, and the body carries the keypoint."""
+    point, place = description.contacts[name], where(description, f"contacts.{name}")
+    known("body", point.body, bodies, f"{place}.body")
+    known("keypoint", point.site, description.sites, f"{place}.site")
+    known("side", point.side, _LABELS, f"{place}.side")
+    carrier = description.sites[point.site][0]
+    if carrier != point.body:
+        raise BadConfiguration(f"{place}: {point.site} is on {carrier!r}, not {point.body!r}")
 
 
 def check_symmetry(description: RobotDescription, lengths: dict[tuple[str, str], float]) -> None:

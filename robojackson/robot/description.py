@@ -75,8 +75,9 @@ class RobotDescription:
 
     Attributes:
         name: Name of the robot.
-        mjcf: A file (from the folder of the YAML, else from the working directory), `package:path` inside an installed package, or `store:path` inside the folder
-            that `robojackson robots add NAME` fills.
+        mjcf: A file (from the folder of the YAML, else from the working directory), `package:path`
+            inside an installed package, or `store:path` inside the folder that `robojackson robots
+            add NAME` fills.
         root_body: Body with the free joint; the robot faces along its x axis.
         sites: Keypoint -> body and position in the body, metres.
         weights: Keypoint -> weight of its squared error; zero where it is not named.

@@ -47,7 +47,7 @@ def mjcf_path(description: RobotDescription) -> Path:
         BadConfiguration: It is not there, or not the one that was pinned.
     """
     package, colon, inside = description.mjcf.partition(":")
-    if not colon or len(package) == 1:
+    if not colon or len(package) == 1 or not package.isidentifier():
         path = Path(description.mjcf)
     elif package == ADDED:
         return _added(description, inside)
@@ -83,7 +83,7 @@ def _in_package(description: RobotDescription, package: str, inside: str) -> Pat
 
 def compiled(description: RobotDescription, path: Path) -> mujoco.MjModel:
     """The model with the keypoint sites, a floor, and scaled motors."""
-    spec = _read(path, description)
+    spec = read_spec(path, description)
     bodies = [body.name for body in spec.bodies if body.name != "world"]
     _add_sites(spec, description, bodies)
     planes = (geom.type == mujoco.mjtGeom.mjGEOM_PLANE for geom in spec.worldbody.geoms)
@@ -125,7 +125,12 @@ def _files(path: Path) -> list[Path]:
     return found
 
 
-def _read(path: Path, description: RobotDescription) -> mujoco.MjSpec:
+def read_spec(path: Path, description: RobotDescription) -> mujoco.MjSpec:
+    """The MJCF as it is.
+
+    Raises:
+        BadConfiguration: MuJoCo cannot read it.
+    """
     try:
         return mujoco.MjSpec.from_file(str(path))
     except ValueError as error:

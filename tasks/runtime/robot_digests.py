@@ -1,4 +1,4 @@
-"""Robots in stages: what is in the cache key of one that loads a robot, and what its process reads."""
+"""Robots in stages: what is in the cache key of one that loads a robot; what its process reads."""
 
 from collections.abc import Mapping
 from pathlib import Path

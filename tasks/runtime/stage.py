@@ -55,6 +55,11 @@ def records_only() -> Iterator[None]:
         _records_only.reset(token)
 
 
+def is_records_only() -> bool:
+    """Whether calls are answered from records alone (`records_only`)."""
+    return _records_only.get()
+
+
 @contextmanager
 def labelled(name: str) -> Iterator[None]:
     """Name the task runs inside after a dance, a clip or a cell: `train_policy-<name>`."""

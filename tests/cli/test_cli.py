@@ -11,21 +11,19 @@ from typing import Any
 import av
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from flows.cli.commands import app
 from robojackson.cli.console import lines, to_json_types
 from robojackson.clips import pose_detector
 from robojackson.errors import TruncatedVideo
-from tests.fixtures.commands import ROOT, environment, robojackson
+from tests.fixtures.commands import ROOT, environment, in_process, robojackson
 
 HIPS = ROOT / "clips" / "hip_shake.mp4"
 COMMANDS = ["dance", "score", "mocap", "retarget", "train", "evaluate", "doctor"]
 
 
 def invoke(*words: object) -> tuple[int, str, str]:
-    done = CliRunner().invoke(app, [str(word) for word in words])
-    return done.exit_code, done.stdout, done.stderr
+    said = in_process(*words)
+    return said.code, said.out, said.err
 
 
 def write_video(path: Path, frames: int) -> Path:
@@ -271,6 +269,7 @@ def test_doctor_tells_what_is_there_in_one_object() -> None:
     said = robojackson("doctor", "--json")
     assert {"ok", "packages", "libraries", "models", "missing", "optional"} == set(said.answer) - {
         "python",
+        "python_supported",
         "ffmpeg",
         "javascript",
     }

@@ -20,7 +20,7 @@ from robojackson.formats import (
     registry,
     unitree_csv,
 )
-from tests.fixtures.commands import Said, robojackson
+from tests.fixtures.commands import Said, in_process, robojackson
 from tests.fixtures.robots import robot_motion
 
 READERS = {
@@ -103,6 +103,6 @@ def test_the_command_loads_no_prefect(said: Said) -> None:
 
 
 def test_the_help_lists_every_format() -> None:
-    listed = set(re.findall(r"[\w-]+", robojackson("export", "--help").out))
+    listed = set(re.findall(r"[\w-]+", in_process("export", "--help").out))
     declared = {*registry.robot_exporters(), *registry.person_exporters()}
     assert listed >= declared | set(registry.policy_exporters())

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from robojackson.files import tables
-from tests.fixtures.commands import robojackson
+from tests.fixtures.commands import in_process
 from tests.fixtures.robots import human
 
 SMOKE = ("--config", "smoke", "--json")
@@ -20,7 +20,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_bad_motion_is_refused_in_one_line_and_kept(folder: Path, tmp_path: Path) -> None:
-    said = robojackson(
+    said = in_process(
         *("retarget", folder / "smpl.parquet", "-o", tmp_path, "--method", "paper", *SMOKE)
     )
     (line,) = [line for line in said.err.splitlines() if "reference refused" in line]
@@ -32,7 +32,7 @@ def test_a_bad_motion_is_refused_in_one_line_and_kept(folder: Path, tmp_path: Pa
 
 def test_force_goes_on_with_it(folder: Path, tmp_path: Path) -> None:
     words = ("retarget", folder / "smpl.parquet", "-o", tmp_path, "--method", "paper")
-    said = robojackson(*words, "--force", *SMOKE)
+    said = in_process(*words, "--force", *SMOKE)
     assert said.code == 0
     assert said.answer["scorecard"]["passed"] == 0.0
     assert said.answer["scorecard"]["findings"]

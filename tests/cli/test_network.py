@@ -10,7 +10,7 @@ from robojackson.mocap.networks.hybrik_net import HybrikResNet
 from robojackson.mocap.networks.network_config import NetworkConfig
 from robojackson.mocap.networks.niki import TwistSwing
 from tasks.runtime.stage import identity
-from tests.fixtures.commands import robojackson
+from tests.fixtures.commands import in_process, robojackson
 
 ROOT = Path(__file__).parents[2]
 
@@ -41,7 +41,7 @@ def test_a_video_goes_through_both_networks(weights: Path, tmp_path: Path) -> No
 
 def test_weights_that_cannot_be_used_are_told_in_one_line(weights: Path, tmp_path: Path) -> None:
     wrong = ("--hybrik", weights / "niki's.pth")
-    said = robojackson("mocap", weights / "short.mp4", "-o", tmp_path / "out", *wrong)
+    said = in_process("mocap", weights / "short.mp4", "-o", tmp_path / "out", *wrong)
     assert said.code == 1
     assert "BadWeights" in said.err
     assert "expected weights of hybrik" in said.err

@@ -1,6 +1,7 @@
 """`robojackson robots`: a model out of a pinned wheel, whole or not at all."""
 
 import hashlib
+import re
 import subprocess
 import sys
 import zipfile
@@ -8,13 +9,15 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
-from robojackson.cli import robot_models
+from robojackson.cli import robot_models, robot_sheets
 from robojackson.errors import BadConfiguration, DownloadFailed, StoreError, UnknownName
 from robojackson.pipeline.yaml_loader import load
 from robojackson.robot.description import RobotDescription, RobotSource
 from robojackson.robot.model import load_robot
-from tests.fixtures import machine
+from tests.fixtures import commands, machine
+from tests.fixtures.own_robot import gymnasium_model, own_robot
 
 FOLDER = "bundle/zoo/machine"
 
@@ -159,3 +162,83 @@ def test_the_command_lists_the_robots_as_json(tmp_path: Path):
     command = [sys.executable, "-m", "robojackson", "robots", "--json"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert '"robot": "humanoid_strong"' in done.stdout
+
+
+def broken(folder: Path, old: str, new: str) -> Path:
+    """A user's description with one thing changed."""
+    path = own_robot(folder)
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+    return path
+
+
+def test_a_good_description_is_told_and_drawn(tmp_path: Path):
+    told, lines = robot_sheets.check_robot(str(own_robot(tmp_path)), tmp_path / "mine.png")
+    assert (told["ok"], told["problems"], told["hinges"], told["motors"]) == (True, [], 17, 17)
+    assert told["height_m"] == pytest.approx(1.56, abs=0.02)
+    assert told["contacts"] == pytest.approx({"left_foot": 0.0, "right_foot": 0.0}, abs=1e-9)
+    assert told["keypoints"]["left_knee"] == "left_shin"
+    assert any(re.match(r"left_knee +-160.0 +-2.0 +-17.2 +80$", line) for line in lines)
+    with Image.open(tmp_path / "mine.png") as picture:
+        assert picture.width > 2000
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "cause"),
+    [
+        ("left_foot: [left_foot", "left_foot: [left_shoe", "unknown body 'left_shoe'"),
+        ("  head: [torso, [0.0, 0.0, 0.19]]\n", "", "sites: missing head"),
+        ("radius: 0.075, body: left_foot", "radius: -0.075, body: left_foot", "greater than 0"),
+        ("[left_lower_arm, [0.18,", "[left_lower_arm, [0.1,", "must be mirrored"),
+        ("mjcf: model.xml", "mjcf: gone.xml", "no such file: "),
+        ("root_body:", "root_bodi:", "unknown key 'root_bodi'. Did you mean 'root_body'?"),
+    ],
+)
+def test_a_broken_description_is_told_in_a_line_that_names_the_file(
+    tmp_path: Path, old, new, cause
+):
+    path = broken(tmp_path, old, new)
+    told, lines = robot_sheets.check_robot(str(path), None)
+    assert not told["ok"]
+    assert any(cause in line and str(path) in line for line in told["problems"])
+    assert told["problems"] == lines[1:]
+
+
+def test_wrong_keys_are_told_all_at_once(tmp_path: Path):
+    path = broken(tmp_path, "root_body: torso", "root_bodi: torso\nspeed: 3")
+    told, _ = robot_sheets.check_robot(str(path), None)
+    assert all(any(key in line for line in told["problems"]) for key in ("root_bodi", "speed"))
+
+
+def test_new_writes_a_description_that_passes_and_keeps_a_file_that_is_there(
+    tmp_path: Path, monkeypatch
+):
+    model = tmp_path / "model.xml"
+    model.write_text(gymnasium_model().read_text())
+    monkeypatch.chdir(tmp_path)
+    told, lines = robot_sheets.new_robot(model, None, force=False)
+    assert (told["file"], told["ok"], told["left"]) == ("my_humanoid.yaml", True, [])
+    assert lines[-1] == "next     robojackson robots check my_humanoid.yaml -o my_humanoid.png"
+    Path("my_humanoid.yaml").write_text("mine")
+    with pytest.raises(StoreError, match="there already; --force"):
+        robot_sheets.new_robot(model, None, force=False)
+    assert Path("my_humanoid.yaml").read_text() == "mine"
+    robot_sheets.new_robot(model, Path("my_humanoid.yaml"), force=True)
+    assert Path("my_humanoid.yaml").read_text() != "mine"
+
+
+def test_new_says_which_keys_are_left(tmp_path: Path):
+    model = tmp_path / "machine.xml"
+    model.write_text(machine.mjcf())
+    _, lines = robot_sheets.new_robot(model, tmp_path / "it.yaml", force=False)
+    assert any(line.startswith("left     torque_limits: ") for line in lines)
+    assert any(line.startswith("guessed  sites.head: ") for line in lines)
+
+
+def test_the_commands_answer_as_json_with_an_exit_code(tmp_path: Path):
+    good, bad = own_robot(tmp_path / "a"), broken(tmp_path / "b", "[torso,", "[tors,")
+    said = [commands.robojackson("robots", "check", path, "--json") for path in (good, bad)]
+    assert [(each.code, each.answer["ok"]) for each in said] == [(0, True), (1, False)]
+    assert good.with_suffix(".png").is_file()
+    assert not bad.with_suffix(".png").exists()

@@ -78,7 +78,7 @@ def a_reference(rng: np.random.Generator) -> ReferenceMotion:
 
 
 def a_stability(rng: np.random.Generator) -> Stability:
-    return Stability(10, 9, 41, float(rng.normal()), 41.5, 4.1, 0.05)
+    return Stability(10, 9, 41, float(rng.normal()), 41.5, 4.1, 0.05, 125.0)
 
 
 def a_rollout(rng: np.random.Generator) -> Rollout:

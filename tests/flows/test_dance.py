@@ -152,7 +152,7 @@ class Played:
 
 def a_candidate(name: str, score: float, detected: int = 10) -> Candidate:
     artifact = Artifact(key="k", sha256="0" * 64)
-    return Candidate(name, {}, artifact, Stability(10, detected, 0, score, score, 0.0, 0.0))
+    return Candidate(name, {}, artifact, Stability(10, detected, 0, score, score, 0.0, 0.0, score))
 
 
 def test_the_lowest_score_is_danced() -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from flows.search.dance_source import is_name
-from tests.fixtures.commands import Said, robojackson
+from tests.fixtures.commands import Said, in_process, robojackson
 from tests.fixtures.difficult_clips import black, write
 
 
@@ -50,12 +50,12 @@ def test_the_catalogue_has_the_same_rows_and_needs_no_prefect(found: Said, store
 
 def test_the_catalogue_answers_sql(found: Said, store: Path) -> None:
     sql = "SELECT count(*) AS n FROM candidates WHERE decision = 'chosen'"
-    said = robojackson("catalogue", "--sql", sql, "--json", ROBOJACKSON_STORE=str(store))
+    said = in_process("catalogue", "--sql", sql, "--json", ROBOJACKSON_STORE=str(store))
     assert said.answer == {"rows": [{"n": 1}]}
 
 
 def test_an_unknown_source_is_one_line(store: Path) -> None:
-    said = robojackson("find", "x", "--source", "myspace", ROBOJACKSON_STORE=str(store))
+    said = in_process("find", "x", "--source", "myspace", ROBOJACKSON_STORE=str(store))
     assert said.code == 1
     assert "unknown source 'myspace'" in said.err
     assert "youtube" in said.err

@@ -7,6 +7,7 @@ import pytest
 from robojackson.errors import BadConfiguration, UnknownName
 from robojackson.pipeline import yaml_loader
 from robojackson.pipeline.robot_descriptions import describe_robot, robot_names
+from tests.fixtures.own_robot import own_robot
 
 
 def test_every_shipped_robot_has_the_name_of_its_file() -> None:
@@ -28,3 +29,57 @@ def test_a_copy_with_the_name_of_the_original_is_refused(
     monkeypatch.setattr(yaml_loader, "SHIPPED", tmp_path)
     with pytest.raises(BadConfiguration, match=r"strong\.yaml: name is 'humanoid'"):
         describe_robot("strong")
+
+
+def test_a_file_is_a_robot_from_wherever_one_stands(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = own_robot(tmp_path / "mine")
+    monkeypatch.chdir(tmp_path)
+    found = [describe_robot(given) for given in (str(path), "mine/mine.yaml", "./mine/mine.yaml")]
+    assert {each.mjcf for each in found} == {str(path.parent / "model.xml")}
+    assert {each.file for each in found} == {str(path)}
+
+
+def test_the_home_folder_may_be_a_tilde(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = own_robot(tmp_path)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert describe_robot("~/mine.yaml").file == str(path)
+
+
+def test_a_model_that_is_not_beside_the_file_is_found_from_the_working_directory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = own_robot(tmp_path / "yaml")
+    (path.parent / "model.xml").rename(tmp_path / "model.xml")
+    monkeypatch.chdir(tmp_path)
+    assert describe_robot("yaml/mine.yaml").mjcf == str(tmp_path / "model.xml")
+
+
+def test_the_model_of_a_named_robot_may_lie_beside_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = own_robot(tmp_path / "configs" / "robots")
+    monkeypatch.setenv("ROBOJACKSON_CONFIGS", str(tmp_path / "configs"))
+    found = describe_robot("mine")
+    assert (found.mjcf, found.file) == (str(path.parent / "model.xml"), "")
+
+
+def test_a_description_is_what_it_says_and_not_where_it_lies(tmp_path: Path) -> None:
+    here, there = (describe_robot(str(own_robot(tmp_path / name))) for name in "ab")
+    assert here == there
+
+
+@pytest.mark.parametrize("given", ["gone.yaml", "no/such", "no/such.yml"])
+def test_a_file_that_is_not_there_is_one_line_with_the_machine_and_the_names(given: str) -> None:
+    with pytest.raises(UnknownName, match=r"no file /.* on \S+\)\. Known: g1, humanoid") as told:
+        describe_robot(given)
+    assert "\n" not in str(told.value)
+
+
+def test_a_model_in_place_of_its_description_names_the_command_that_makes_one(
+    tmp_path: Path,
+) -> None:
+    own_robot(tmp_path)
+    with pytest.raises(BadConfiguration, match=r"robojackson robots new .*model\.xml"):
+        describe_robot(str(tmp_path / "model.xml"))

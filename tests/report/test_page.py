@@ -38,7 +38,7 @@ def results(sequence: SmplSequence, reference: ReferenceMotion) -> Results:
     return Results(
         title="hip shake",
         info=VideoInfo(Path("a/hip <i>shake.mp4"), 640, 480, 30.0, 12, 0.4, 0),
-        stability=Stability(12, 12, 3, 0.1, 3.1, 0.25, 0.01),
+        stability=Stability(12, 12, 3, 0.1, 3.1, 0.25, 0.01, 7.8),
         sequence=sequence,
         reference=reference,
         training={"trainer": "sbx", "steps": 1200, "training_s": 90.0},

@@ -1,10 +1,12 @@
 """The catalogue of candidates: nothing is lost, nothing counted twice, whoever writes beside."""
 
+import io
 import threading
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
+import pyarrow.parquet as pq
 import pytest
 
 from robojackson.errors import BadTable
@@ -226,3 +228,18 @@ def test_a_video_that_could_never_be_judged_is_told(store: Store) -> None:
 def test_columns_of_one_name_are_refused(store: Store) -> None:
     with pytest.raises(BadTable, match="two columns are called a: name them with AS"):
         candidate_catalogue.query(store, "SELECT 1 AS a, 2 AS a")
+
+
+def test_a_file_of_an_earlier_version_is_read_with_what_it_lacks_empty(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    candidate_catalogue.append(store, [row("old", stability_score=3.0)])
+    (key,) = store.list(candidate_catalogue.FOLDER)
+    table = pq.read_table(io.BytesIO(store.read(key)))
+    sink = io.BytesIO()
+    pq.write_table(table.drop_columns(["score_per_second"]), sink)
+    store.put(key, sink.getvalue())
+    candidate_catalogue.append(store, [row("new", score_per_second=1.5)])
+    found = {r["video_id"]: r["score_per_second"] for r in candidate_catalogue.records(store)}
+    assert sorted(found.values(), key=str) == [1.5, None]
+    assert candidate_catalogue.compact(store, 2) is not None
+    assert len(candidate_catalogue.records(store)) == 2

@@ -75,6 +75,19 @@ def same_command() -> str:
     return "robojackson " + " ".join(shlex.quote(word) for word in sys.argv[1:])
 
 
+def with_option(option: str, value: str) -> str:
+    """Return the command line of this process with another value of an option."""
+    words = list(sys.argv[1:])
+    for place, word in enumerate(words):
+        if word == option:
+            del words[place : place + 2]
+            break
+        if word.startswith(f"{option}="):
+            del words[place]
+            break
+    return shlex.join(["robojackson", *words, option, value])
+
+
 def become_worker(supervisor: int, mark: str, last_line: int) -> None:
     """Prepare a fork of the supervisor for the command: its group, mark, signals and input.
 

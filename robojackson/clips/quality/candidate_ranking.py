@@ -20,7 +20,7 @@ class FilterConfig:
     """What a clip must be. None switches a filter off; its figure stays in the table.
 
     Attributes:
-        rank_by: The paper's sum, or the sum a frame, which does not favour short clips.
+        rank_by: The score a second or a frame, which do not favour short clips, or the paper's sum.
         shortest_s: Shortest clip, seconds.
         detected_share: Least share of frames with a person.
         full_body_share: Least share of frames with head, trunk and legs in view.
@@ -33,7 +33,7 @@ class FilterConfig:
         copies: When two clips count as the same.
     """
 
-    rank_by: Literal["sum", "frame"] = "sum"
+    rank_by: Literal["second", "frame", "sum"] = "second"
     shortest_s: NonNegativeFloat | None = 1.0
     detected_share: Share | None = 0.9
     full_body_share: Share | None = 0.7
@@ -85,9 +85,12 @@ def order(scores: Mapping[str, Stability], config: FilterConfig) -> list[str]:
 
     def figure(name: str) -> tuple[bool, float]:
         score = scores[name]
-        by_frame = config.rank_by == "frame"
-        value = score.stability_score / max(score.frames, 1) if by_frame else score.stability_score
-        return not score.detected, value
+        values = {
+            "second": score.score_per_second,
+            "frame": score.stability_score / max(score.frames, 1),
+            "sum": score.stability_score,
+        }
+        return not score.detected, values[config.rank_by]
 
     return sorted(scores, key=figure)
 

@@ -25,6 +25,7 @@ STABILITY_SCORE = TableSchema(
         Column("stability_score", F64, "1"),
         Column("missing_joints_per_frame", F64, "1"),
         Column("jitter_per_frame", F64, "image sizes"),
+        Column("score_per_second", F64, "1/s"),
     ),
 )
 
@@ -48,8 +49,8 @@ class Stability(TableFile):
         missing_joints: M, landmarks not seen, summed over the clip.
         jitter: J, normalised image units, summed over the clip.
         stability_score: M + J; lower is steadier.
-        missing_joints_per_frame, jitter_per_frame: M and J divided by the number of frames: the
-            sums favour short clips.
+        missing_joints_per_frame, jitter_per_frame: M and J divided by the number of frames.
+        score_per_second: M + J divided by the length of the clip, 1/s: the sum favours short clips.
     """
 
     SCHEMA = STABILITY_SCORE
@@ -61,6 +62,7 @@ class Stability(TableFile):
     stability_score: float
     missing_joints_per_frame: float
     jitter_per_frame: float
+    score_per_second: float
 
     def to_columns(self) -> tuple[Columns, Facts]:
         names = (column.name for column in STABILITY_SCORE.columns)
@@ -84,6 +86,7 @@ def stability(track: LandmarkTrack, config: StabilityConfig) -> Stability:
         stability_score=missing + moved,
         missing_joints_per_frame=missing / max(frames, 1),
         jitter_per_frame=moved / max(frames, 1),
+        score_per_second=(missing + moved) * track.fps / max(frames, 1),
     )
 
 

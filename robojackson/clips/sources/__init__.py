@@ -1,7 +1,8 @@
 """Where videos are looked for. A new source is one new file beside this one.
 
 The file defines `search`, and its name is the name of the source. `IS_LOCAL = True` says that it
-reads this machine's disk, so that a mistake is reported before anything is started.
+reads this machine's disk, so that a mistake is reported before anything is started; `page` says
+which page of the web it asks, so that a missing network is.
 """
 
 from datetime import datetime
@@ -9,6 +10,7 @@ from importlib import import_module
 from pkgutil import iter_modules
 from typing import Protocol, cast
 
+from robojackson.clips.web.untrusted_text import web_address
 from robojackson.clips.web.video_candidate import VideoCandidate
 from robojackson.clips.web.yt_dlp_client import WebConfig
 from robojackson.errors import UnknownName
@@ -56,3 +58,13 @@ def is_local(name: str) -> bool:
         UnknownName: as `source`.
     """
     return bool(getattr(source(name), "IS_LOCAL", False))
+
+
+def page_of(name: str, query: str, address: str) -> str:
+    """Return the address of the web page that a source asks first; empty where there is none.
+
+    Raises:
+        UnknownName: as `source`.
+    """
+    page = getattr(source(name), "page", None)
+    return web_address(page(query, address)) if page else ""

@@ -16,6 +16,11 @@ LARGEST_PAGE = 4_000_000
 """Bytes."""
 
 
+def page(query: str, address: str) -> str:
+    """The one that lists the files."""
+    return address or query
+
+
 def search(
     query: str, address: str, count: int, config: WebConfig, now: datetime
 ) -> list[VideoCandidate]:

@@ -10,6 +10,11 @@ from robojackson.clips.web.yt_dlp_client import WebConfig, entries, listing
 from robojackson.errors import SearchFailed
 
 
+def page(query: str, address: str) -> str:
+    """The site's own."""
+    return address
+
+
 def search(
     query: str, address: str, count: int, config: WebConfig, now: datetime
 ) -> list[VideoCandidate]:

@@ -1,11 +1,17 @@
 """Why a request to the web failed, and whether it is worth another try."""
 
+import math
+import re
+import socket
 from typing import Any, NamedTuple
 
 from robojackson.clips.web.untrusted_text import clean_text
 
 BUSY, SERVER_FAULT = 429, 500
 REASON_LENGTH = 200
+UNRESOLVED = "failed to resolve"
+CONNECTION = re.compile(r"^HTTPS?Connection\([^)]*\): ")
+"""What urllib3 writes before its reason: the host stands in the reason, too."""
 
 
 class Failure(NamedTuple):
@@ -13,11 +19,13 @@ class Failure(NamedTuple):
     reason: In one line.
     passing: Whether another attempt makes sense.
     wait_s: Seconds that the server asks to wait.
+    most_retries: How often it makes sense at most; a name that cannot be resolved is soon sure.
     """
 
     reason: str
     passing: bool
     wait_s: float
+    most_retries: float = math.inf
 
 
 def explain(failure: BaseException) -> Failure:
@@ -36,7 +44,10 @@ def explain(failure: BaseException) -> Failure:
         if isinstance(cause, TimeoutError) or "timed out" in str(cause).lower():
             return Failure("the server fell silent", True, 0.0)
         if isinstance(cause, TransportError):
-            return Failure(f"no connection ({_line(cause)})", True, 0.0)
+            line = _line(cause)
+            no_name = isinstance(cause, socket.gaierror) or UNRESOLVED in line.lower()
+            most = 1 if no_name else math.inf
+            return Failure(f"no connection ({CONNECTION.sub('', line)})", True, 0.0, most)
     text = _line(failure)
     is_short = "more expected" in text
     return Failure("the server cut the file short" if is_short else text, is_short, 0.0)

@@ -1,8 +1,9 @@
 """The one place that talks to yt-dlp: what an address holds, and the file behind it.
 
 yt-dlp's Python API, quiet, with our retries around it: a server that is busy, silent or cuts the
-line is asked again after 1, 2, 4 ... times the back-off (or when it says), and a file goes on where
-it stopped. Every failure becomes one line of reason. Sizes in bytes, times in seconds.
+line is asked again after 1, 2, 4 ... times the back-off (or when it says; once where the name
+cannot be resolved), and a file goes on where it stopped. Every failure becomes one line of reason.
+Sizes in bytes, times in seconds.
 """
 
 import logging
@@ -209,8 +210,8 @@ def _patiently(attempt: Callable[[], Result], config: WebConfig) -> Result:
         try:
             return attempt()
         except (YoutubeDLError, OSError, ValueError, RecursionError) as cause:
-            reason, transient, asked_s = explain(cause)
-            if not transient or number == config.retries:
+            reason, transient, asked_s, most = explain(cause)
+            if not transient or number >= min(config.retries, most):
                 tried = f" ({number + 1} attempts)" if number else ""
                 raise DownloadFailed(f"{reason}{tried}") from cause
             wait_s = min(max(config.backoff_s * 2**number, asked_s), config.longest_wait_s)

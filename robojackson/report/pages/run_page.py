@@ -15,11 +15,14 @@ import jinja2
 
 from robojackson.report.quantities import POLICY_TITLES, Quantity, format_value, quantities
 from robojackson.rl.config.evaluate_config import TRAINED
+from robojackson.rl.evaluation.verdict import UNJUDGED
 
 VERDICT_COLUMNS = (
     "survived_s", "success", "strict_success", "skill", "site_error_m", "limb_gain", "drift_m",
     "heading_error_deg",
 )  # fmt: skip
+TOO_SHORT = "too short"
+"""In place of a figure that rollouts are too short to judge."""
 SCORECARD_LINES = (
     "seconds", "cyclic", "keypoint_mm", "keypoint_p95_mm", "keypoint_leaned_mm", "lean_deg",
     "bone_deg", "limit_violations",
@@ -120,7 +123,11 @@ def headline(evaluation: Mapping[str, Any]) -> str:
     """Return one sentence that says how well it went, beside the best of the baselines."""
     if not evaluation:
         return ""
-    said = (
+    said = str(evaluation.get("verdict", {}).get("sentence", ""))
+    if evaluation.get("success") is None:
+        return said
+    said += " " if said else ""
+    said += (
         f"The trained robot finished {format_value('success', evaluation['success'])} of "
         f"{format_value('rollouts', evaluation['rollouts'])} rollouts without a fall"
     )
@@ -145,7 +152,7 @@ def _tiles(evaluation: Mapping[str, Any]) -> list[Quantity]:
         "site_error_m": "mean distance of 14 points",
         "limb_gain": "1 is the whole amplitude",
     }
-    found = {key: evaluation[key] for key in meanings if key in evaluation}
+    found = {key: evaluation[key] for key in meanings if evaluation.get(key) is not None}
     return [
         Quantity(f.label, f.value, meanings[key])
         for key, f in zip(found, quantities(found), strict=True)
@@ -160,7 +167,11 @@ def verdicts(evaluation: Mapping[str, Any]) -> list[Verdict]:
     rows = []
     for name, figures in policies.items():
         title, meaning = POLICY_TITLES.get(name, (name, ""))
-        values = [format_value(column, figures.get(column)) for column in VERDICT_COLUMNS]
+        short = evaluation.get("verdict", {}).get("kind") == "too_short"
+        values = [
+            TOO_SHORT if short and column in UNJUDGED else format_value(column, figures.get(column))
+            for column in VERDICT_COLUMNS
+        ]
         rows.append(Verdict(title, meaning, values, name == TRAINED))
     return rows
 

@@ -160,11 +160,11 @@ def joint_tracking(
     return figure
 
 
-def png(figure: Figure, dpi: int = 160) -> bytes:
-    """The figure as a picture with a transparent ground."""
+def png(figure: Figure, dpi: int = 160, opaque: bool = False) -> bytes:
+    """The figure as a picture, with a transparent ground unless it is to be opaque."""
     buffer = io.BytesIO()
     FigureCanvasAgg(figure)
-    figure.savefig(buffer, format="png", dpi=dpi, transparent=True)
+    figure.savefig(buffer, format="png", dpi=dpi, transparent=not opaque)
     return buffer.getvalue()
 
 

@@ -30,6 +30,7 @@ from robojackson.rl.evaluation.reward_audit import RewardAudit, audit_both_readi
 from robojackson.rl.evaluation.reward_meter import RewardMeter, without_curiosity
 from robojackson.rl.evaluation.rollout_records import RolloutScorer
 from robojackson.rl.evaluation.rollouts import Rollouts, Starts, roll_out
+from robojackson.rl.evaluation.verdict import verdict_on, without_unjudged
 from robojackson.rl.modes.paper_mode import facing_ahead
 from robojackson.rl.modes.reset_states import default_standing_pose, noisy, standing_pose_at
 from robojackson.rl.policy import Policy
@@ -52,7 +53,8 @@ class Evaluation:
     """The verdict on a policy.
 
     Attributes:
-        summary: Means over the policy's rollouts, and those of the baselines by name.
+        summary: Means over the policy's rollouts, and those of the baselines by name; `verdict`:
+            kind and sentence. Success and skill are None where that is `too_short`.
         rows: One row a rollout, of the policy and of every baseline.
         rollout_qpos: The policy's rollout from the clip's first step (phase 0, reset 0, whether it
             falls or not), for the video; row s is the state at the reference's step s.
@@ -103,8 +105,15 @@ def evaluate_policy(
     own = summaries.pop(TRAINED)
     variants = {name: summaries.pop(name) for name in VARIANTS if name in summaries}
     reward = reward_report(robot, reference, environment, own, float(horizon.mean()))
-    told = {"variants": variants, "baselines": summaries, "reward": reward}
-    return Evaluation({**own, **told}, rows, qpos)
+    length = config.seconds if clip.cyclic else clip.steps * clip.dt
+    verdict = verdict_on(own, summaries, length, policy.updates)
+    shown: dict[str, object] = dict(own)
+    baselines: dict[str, object] = dict(summaries)
+    if verdict.kind == "too_short":
+        shown = without_unjudged(own)
+        baselines = {name: without_unjudged(found) for name, found in summaries.items()}
+    told = {"variants": variants, "baselines": baselines, "reward": reward}
+    return Evaluation({**shown, **told, "verdict": verdict.as_facts()}, rows, qpos)
 
 
 def environment_of(policy: Policy, control: ControlConfig) -> TrackConfig | PaperConfig:

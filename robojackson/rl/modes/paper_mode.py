@@ -9,14 +9,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
 from robojackson.errors import BadConfiguration, UnknownName
 from robojackson.geometry.rotations import heading, quat_multiply
 from robojackson.motion.reference_motion import ReferenceMotion
-from robojackson.rl.config.paper_config import POINT_WEIGHTS
-from robojackson.rl.config.train_config import ControlConfig, PaperConfig
+from robojackson.rl.config.train_config import ControlConfig, PaperConfig, TerminationConfig
 from robojackson.rl.modes.mode import EpisodeStart, Score
 from robojackson.rl.modes.paper_reward import PaperState, has_fallen, miss, paper_terms, ramp
 from robojackson.rl.sim.reference_clip import Clip, ClipStep
@@ -32,6 +32,8 @@ from robojackson.rl.sim.stock_humanoid import (
 from robojackson.robot.model import Robot
 
 PELVIS = "pelvis"
+SPINE = ("lwaist", "torso")
+"""Bodies of Humanoid-v5 among the points; another robot may do without."""
 
 
 class PaperMode:
@@ -115,18 +117,43 @@ class PaperMode:
 
 
 def require_trainable(robot: Robot) -> None:
-    """Refuse a robot that the rewards cannot look at.
+    """Refuse a robot that a training cannot move, or that the fall rule calls fallen as it stands.
 
     Raises:
-        BadConfiguration: it lacks points that they name.
+        BadConfiguration: it has no torque motors with a range, or it is too small.
     """
-    known = (*robot.keypoint_names, *robot.body_names)
-    missing = [name for name in (PELVIS, *POINT_WEIGHTS) if name not in known]
-    if missing:
-        raise BadConfiguration(
-            f"training is not possible on robot {robot.description.name!r} yet: it has no "
-            f"{', '.join(missing)}; retargeting, its video and export are"
+    model, reason = robot.model, ""
+    motors = (
+        (model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT))
+        & (model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_NONE))
+        & (model.actuator_ctrllimited > 0)
+    )
+    height = float((robot.contact_radii - _sole_centres(robot)).max())
+    if not model.nu:
+        reason = "its MJCF has no motors"
+    elif not motors.all():
+        name = model.actuator(int(np.argmin(motors))).name
+        reason = f"actuator {name!r} is no torque motor with a control range"
+    elif height < TerminationConfig().fall_height:
+        reason = (
+            f"it stands with its root {height:.2f} m above the floor, and less than "
+            f"{TerminationConfig().fall_height:g} m counts as a fall"
         )
+    if reason:
+        raise BadConfiguration(
+            f"training is not possible on robot {robot.description.name!r} yet: {reason}; "
+            "retargeting, its video and export are"
+        )
+
+
+def _sole_centres(robot: Robot) -> Float[np.ndarray, " C"]:
+    """Heights of the contact balls' centres above the root in the rest pose, metres."""
+    data = mujoco.MjData(robot.model)
+    data.qpos[:] = robot.standing
+    mujoco.mj_kinematics(robot.model, data)
+    feet = data.site_xpos[robot.keypoint_sites[robot.contact_keypoints], 2]
+    result: np.ndarray = feet + robot.contact_arms[:, 2] - data.qpos[2]
+    return result
 
 
 class PaperPoints:
@@ -139,20 +166,22 @@ class PaperPoints:
     def __init__(self, robot: Robot, reference: ReferenceMotion, config: PaperConfig) -> None:
         sites, bodies = robot.keypoint_names, robot.body_names
         known = (*sites, *bodies)
-        for name in (*config.weights, PELVIS):
+        weights = {k: w for k, w in config.weights.items() if k in known or k not in SPINE}
+        for name in weights:
             if name not in known:
                 raise UnknownName("point", name, "paper.weights", known)
-        self.weights = np.array(list(config.weights.values()))
-        self._sites = _columns(config.weights, sites)
-        self._bodies = _columns([w for w in config.weights if w not in sites], bodies)
-        found = sorted(config.weights, key=lambda name: name not in sites)
-        self._order = _columns(config.weights, found)
-        self._pelvis = bodies.index(PELVIS)
+        self.weights = np.array(list(weights.values()))
+        self._sites = _columns(weights, sites)
+        self._bodies = _columns([w for w in weights if w not in sites], bodies)
+        found = sorted(weights, key=lambda name: name not in sites)
+        self._order = _columns(weights, found)
+        pelvis = robot.description.sites[PELVIS][0]
+        self._pelvis = bodies.index(pelvis)
         told = list(reference.body_names)
         self._reference = self._named(
             reference.keypoints_w, reference.body_pos_w[:, [told.index(name) for name in bodies]]
         )
-        self._root = np.asarray(reference.body_pos_w, float)[:, told.index(PELVIS)]
+        self._root = np.asarray(reference.body_pos_w, float)[:, told.index(pelvis)]
 
     def of(self, sim: Simulation) -> PaperState:
         """What the reward looks at, of every robot of a simulation."""

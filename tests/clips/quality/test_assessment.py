@@ -1,6 +1,7 @@
 """The folder of difficult clips, judged once: the ranking is what a person would choose."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,8 @@ from robojackson.clips.quality import candidate_ranking
 from robojackson.clips.quality.assessment import Assessment, AssessmentConfig, assess_video
 from robojackson.clips.quality.candidate_ranking import FilterConfig, Ranked
 from robojackson.clips.quality.duplicates import DuplicateConfig, find_duplicates
+from robojackson.clips.quality.stability import StabilityConfig, stability
+from robojackson.motion.landmark_track import LandmarkTrack
 from tests.fixtures.difficult_clips import DANCERS, REAL
 
 GOOD = {*DANCERS, REAL}
@@ -117,6 +120,23 @@ def test_by_frame_the_order_does_not_favour_short_clips(judged: Judged) -> None:
         GOOD, key=lambda n: scores[n].jitter_per_frame + scores[n].missing_joints_per_frame
     )
     assert by_frame == expected
+
+
+def test_by_second_a_short_clip_is_not_favoured() -> None:
+    """Half of a clip has half of its sum and the same score a second."""
+    rng = np.random.default_rng(0)
+    marks = rng.normal(size=(120, 33, 3)).cumsum(0) / 100
+    whole = LandmarkTrack(30.0, 64, 48, marks, marks, np.ones((120, 33)))
+    half = replace(
+        whole, landmarks=marks[:60], world_landmarks=marks[:60], visibility=np.ones((60, 33))
+    )
+    shaky = replace(half, landmarks=1.3 * marks[:60])
+    scores = {n: stability(t, StabilityConfig()) for n, t in (("whole", whole), ("shaky", shaky))}
+    assert stability(half, StabilityConfig()).score_per_second == pytest.approx(
+        scores["whole"].score_per_second, rel=0.1
+    )
+    assert candidate_ranking.order(scores, FilterConfig(rank_by="sum")) == ["shaky", "whole"]
+    assert candidate_ranking.order(scores, FilterConfig()) == ["whole", "shaky"]
 
 
 def test_a_clip_without_a_person_comes_last_however_low_its_score(judged: Judged) -> None:

@@ -5,7 +5,12 @@ from pathlib import Path
 import pytest
 
 from configs.find_config import FindConfig
-from flows.search.requests import ALL, find_dance
+from flows.search import requests
+from flows.search.requests import ALL, find_dance, require_findable, require_online
+from robojackson.errors import SearchFailed
+from storage import candidate_catalogue
+from storage.store import Store
+from tests.fixtures.commands import robojackson
 
 
 def test_a_list_of_addresses_needs_no_query(tmp_path: Path) -> None:
@@ -23,3 +28,37 @@ def test_a_query_that_the_book_knows_is_that_dance() -> None:
 def test_a_folder_is_judged_whole_unless_a_number_is_given(top, judged, tmp_path: Path) -> None:
     (tmp_path / "a.mp4").write_text("")
     assert find_dance(str(tmp_path), "folder", "", top, FindConfig()).top == judged
+
+
+def offline(page: str, proxy: str | None) -> None:
+    raise SearchFailed(f"no connection to {page}")
+
+
+def test_without_a_network_a_folder_can_still_be_searched(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(requests, "require_reachable", offline)
+    (tmp_path / "a.mp4").write_text("")
+    require_online(find_dance(str(tmp_path), "folder", "", None, FindConfig()), FindConfig())
+
+
+def test_without_a_network_a_name_is_refused_unless_it_was_found_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(requests, "require_reachable", offline)
+    store = Store(tmp_path)
+    with pytest.raises(SearchFailed, match=r"no connection to https://www\.youtube\.com"):
+        require_findable("apt", store)
+    monkeypatch.setattr(candidate_catalogue, "champion", lambda *_: {"video_key": "video/a.mp4"})
+    require_findable("apt", store)
+
+
+def test_find_without_a_network_is_one_line_and_starts_no_prefect(tmp_path: Path) -> None:
+    where = ("--source", "server", "--address", "http://127.0.0.1:9/")
+    said = robojackson("find", "apt", *where, ROBOJACKSON_STORE=str(tmp_path))
+    assert said.code == 1
+    assert not said.loaded_prefect
+    assert [line for line in said.err.splitlines() if "SearchFailed" in line] == [
+        line for line in said.err.splitlines() if line and "prefect loaded" not in line
+    ]
+    assert not list(tmp_path.iterdir())

@@ -1,6 +1,8 @@
 """The paper's mode: stock Humanoid-v5 to the bit, and its reward term by term."""
 
 import dataclasses
+import re
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -11,6 +13,7 @@ from stable_baselines3.common.env_checker import check_env as check_sb3
 from robojackson.errors import BadConfiguration, UnknownName
 from robojackson.geometry.rotations import heading, quat_angle
 from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.pipeline.yaml_loader import load, names
 from robojackson.rl.config.train_config import PaperConfig, TrackConfig, TrainConfig
 from robojackson.rl.env.tracking_core import TrackingCore
@@ -19,7 +22,8 @@ from robojackson.rl.evaluation.reward_audit import audit_both_readings, audit_re
 from robojackson.rl.modes.paper_mode import facing_ahead, require_trainable
 from robojackson.rl.modes.paper_reward import Miss, PaperState, has_fallen, miss, paper_terms, ramp
 from robojackson.rl.modes.standing_motion import make_standing_motion
-from robojackson.robot.model import Robot
+from robojackson.robot.model import Robot, load_robot
+from tests.fixtures.own_robot import own_robot
 
 WALKER = PaperConfig(preset="walker", reset_noise=0.0)
 
@@ -233,11 +237,41 @@ def test_weights_that_weigh_nothing_are_refused(weights: dict[str, float]) -> No
         PaperConfig(weights=weights)
 
 
-def test_a_robot_without_the_points_of_the_rewards_is_refused_in_words(robot: Robot) -> None:
-    bodies = tuple(name for name in robot.body_names if name != "lwaist")
+def altered(folder: Path, *changes: tuple[str, str]) -> Robot:
+    """Humanoid-v5 with another model, as a user's own robot."""
+    path = own_robot(folder)
+    text = (folder / "model.xml").read_text()
+    for old, new in changes:
+        text = re.sub(old, new, text)
+    (folder / "model.xml").write_text(text)
+    return load_robot(describe_robot(str(path)))
+
+
+@pytest.mark.parametrize(
+    ("change", "cause"),
+    [
+        (("<motor [^>]*joint[^>]*/>", ""), "its MJCF has no motors"),
+        (
+            ('<motor gear="100" joint="abdomen_y"', '<position joint="abdomen_y"'),
+            "'abdomen_y' is no",
+        ),
+    ],
+)
+def test_a_robot_that_torques_do_not_move_is_refused_in_words(
+    robot: Robot, tmp_path: Path, change: tuple[str, str], cause: str
+) -> None:
     require_trainable(robot)
-    with pytest.raises(BadConfiguration, match=r"not possible on robot 'humanoid' yet.*no lwaist"):
-        require_trainable(dataclasses.replace(robot, body_names=bodies))
+    with pytest.raises(BadConfiguration, match=f"not possible on robot 'mine' yet: .*{cause}"):
+        require_trainable(altered(tmp_path, change))
+
+
+def test_a_robot_whose_spine_has_other_names_is_rewarded_without_it(
+    sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    other = altered(tmp_path, ('"lwaist"', '"belly"'))
+    told = tuple("belly" if name == "lwaist" else name for name in sway.body_names)
+    audit = audit_both_readings(other, dataclasses.replace(sway, body_names=told), PaperConfig())
+    assert audit["root"].of["statue"] < 1.0
 
 
 def test_a_point_without_a_body_is_refused(robot: Robot, sway: ReferenceMotion) -> None:

@@ -230,19 +230,16 @@ def test_the_weights_of_the_temporal_network_are_part_of_the_key(tmp_path: Path)
     assert keys[0] != keys[1]
 
 
-def test_a_training_that_the_clock_cuts_short_has_another_key(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(train_policy.time, "time", lambda: 0.0)
-    config = TrainConfig(minutes=20.0)
-    half, one, nine, most, whole, more = (
-        train_policy._models({"config": config, "deadline": 60.0 * minutes})
-        for minutes in (0.5, 1.0, 9.0, 17.9, 18.5, 30.0)
-    )
-    assert whole == more == train_policy._models({"config": config})
-    cut = [[*whole, f"cut short to {tenths} tenths"] for tenths in (0, 4, 8)]
-    assert [half, nine, most] == cut
-    assert half == one
+def test_the_key_of_a_training_holds_the_minutes_that_were_asked_for() -> None:
+    """Not those that the clock left, so that the same call again does not train again."""
+    recipe = train_policy.train_policy.recipe
+    given = {"config": TrainConfig(minutes=20.0), "whole_pass": True, "limit_s": None}
+    clocks = [None, *(train_policy.TrainingTime(at, 10.0) for at in (0.0, 1e9))]
+    keys = {recipe.key({**given, "time_left": clock}) for clock in clocks}
+    other = recipe.key({**given, "config": TrainConfig(minutes=30.0)})
+    alone = recipe.key({**given, "whole_pass": False})
+    assert len(keys) == 1
+    assert len(keys | {other, alone}) == 3
 
 
 def test_the_place_of_an_artifact_is_not_part_of_the_key() -> None:

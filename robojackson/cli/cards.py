@@ -1,0 +1,181 @@
+"""What single stages say to people: a few lines, a sentence that judges, the command to type next.
+
+Everything is made from the answer that `--json` prints; `--verbose` prints all of it.
+"""
+
+import math
+import shlex
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from robojackson.cli.console import lines
+from robojackson.retarget.scorecard_gate import BARS, failures
+
+Answer = Mapping[str, Any]
+FULL, EMPTY, CELLS = "█", "·", 10
+WHOLE, MOSTLY = 0.95, 0.7
+"""Shares of frames with the person from which on a motion is whole, or mostly there."""
+ROWS: tuple[tuple[str, str, str, int], ...] = (
+    ("in the floor", "floor_penetration_mm", "mm", 1),
+    ("in itself", "self_penetration_mm", "mm", 1),
+    ("slip of planted feet", "planted_slip_cm_s", "cm/s", 2),
+    ("gap under planted feet", "contact_gap_mm", "mm", 1),
+    ("fastest joint", "speed_over_limit", "of its limit", 2),
+    ("beyond motors or balance", "infeasible_share", "of the steps", 2),
+)
+"""Lines of the card: words, gated figure, unit, digits."""
+
+
+def shown(answer: Answer, card: Sequence[str], verbose: bool) -> list[str]:
+    """Return the card, or with `verbose` every figure of the answer and the closing lines."""
+    return [*lines(answer), *closing(answer)] if verbose else list(card)
+
+
+def closing(answer: Answer) -> list[str]:
+    """Return the last lines of a command: the verdict, and the command to type next."""
+    said = answer.get("verdict", {}).get("sentence", "")
+    following = answer.get("next", "")
+    return [*([said] if said else []), *([f"next: {following}"] if following else [])]
+
+
+def command_line(*words: object) -> str:
+    """Return a command that can be copied into a shell."""
+    return shlex.join(["robojackson", *map(str, words)])
+
+
+def score_lines(answer: Answer) -> list[str]:
+    """Return the table of scores, the steadiest first and marked."""
+    scored = [video for video in answer["videos"] if "score_per_second" in video]
+    unread = [video for video in answer["videos"] if "error" in video]
+    width = max((len(Path(v["video"]).name) for v in answer["videos"]), default=5)
+    rows = [
+        f"  {'video':<{width}}  score/s  missing  jitter  length  seen",
+    ]
+    for place, video in enumerate(scored):
+        mark = "►" if place == 0 and video["detected"] else " "
+        frames = max(video["frames"], 1)
+        length = f"{video['frames'] / video['fps']:.1f} s"
+        rows.append(
+            f"{mark} {Path(video['video']).name:<{width}}  {video['score_per_second']:7.2f}  "
+            f"{video['missing_joints']:7d}  {video['jitter']:6.2f}  {length:>6}  "
+            f"{video['detected'] / frames:4.0%}"
+        )
+    rows.append("lower is steadier; score/s is missing landmarks and jitter a second")
+    rows += [f"! {video['error']}" for video in unread]
+    return [*rows, *closing(answer)]
+
+
+def mocap_lines(answer: Answer) -> list[str]:
+    """Return what was recovered of a person, in a few lines."""
+    feet = ", ".join(
+        f"{name.replace('_', ' ')} {share:.0%}" for name, share in answer["contact_share"].items()
+    )
+    seconds = answer["frames"] / answer["fps"]
+    rows = [
+        f"frames    {answer['frames']} at {answer['fps']:.4g} a second, {seconds:.1f} s",
+        f"person    {answer['person']}, seen in {answer['detected']} frames",
+        f"planted   {feet} of the time",
+        f"floor     lowest point {100 * answer['floor']['lowest_keypoint_m']:.1f} cm above it",
+    ]
+    rows += [f"note      {note}" for note in (*answer["notes"], *answer.get("advice", ()))]
+    rows += [f"motion    {answer['smpl']}"]
+    rows += [f"{key:<9} {answer[key]}" for key in ("picture", "video_file") if key in answer]
+    return [*rows, *closing(answer)]
+
+
+def mocap_verdict(frames: int, detected: int) -> dict[str, str]:
+    """Return kind and sentence about a recovered motion."""
+    share = detected / max(frames, 1)
+    if share >= WHOLE:
+        return {
+            "kind": "whole",
+            "sentence": "The motion is whole: the person is in view all along.",
+        }
+    if share >= MOSTLY:
+        told = f"The person is out of sight in {1 - share:.0%} of the frames, which are filled in."
+        return {"kind": "gaps", "sentence": told}
+    told = f"The person is seen in only {share:.0%} of the frames: choose another range or clip."
+    return {"kind": "poor", "sentence": told}
+
+
+def retarget_lines(answer: Answer) -> list[str]:
+    """Return the card of a reference motion: ten lines with bars, and the verdict."""
+    card = answer["scorecard"]
+    kind = "cyclic" if answer["cyclic"] else "not cyclic"
+    seconds, step_ms = answer["steps"] * answer["dt"], 1000 * answer["dt"]
+    rows = [
+        f"robot                     {answer['robot']}, {answer['steps']} steps of "
+        f"{step_ms:.3g} ms, {seconds:.1f} s, {kind}",
+        f"tempo                     {card.get('tempo_mean', card.get('tempo', 1.0)):.2f} of the "
+        "dancer's",
+        f"keypoints                 {_figure(card, 'keypoint_leaned_mm', 1)} mm off, bones "
+        f"{_figure(card, 'bone_deg', 1)} degrees",
+        f"joint limits              {card['limit_violations']:.0f} violations",
+    ]
+    for words, name, unit, digits in ROWS:
+        value, limit = card.get(name, math.nan), BARS[name]
+        if value is None or not math.isfinite(value):
+            continue
+        told = f"{value:.{digits}f} {unit}"
+        rows.append(f"{words:<25} {told:<18} {bar(value, limit)} at most {limit:g}")
+    rows += [f"finding                   {told}" for told in card.get("findings", ())[:3]]
+    rows += [f"{key:<25} {answer[key]}" for key in ("reference", "picture", "video")
+              if key in answer]  # fmt: skip
+    return [*rows, *closing(answer)]
+
+
+def retarget_verdict(card: Mapping[str, Any]) -> dict[str, str]:
+    """Return kind and sentence about a reference motion."""
+    failed = failures(card)
+    if failed:
+        return {
+            "kind": "refused",
+            "sentence": f"The robot cannot follow this: {failed[0].replace('_', ' ')} is "
+            f"{card.get(failed[0], math.nan):.3g}, at most {BARS[failed[0]]:g} is allowed.",
+        }
+    tempo = card.get("tempo_mean", card.get("tempo", 1.0))
+    slow = "" if tempo > 0.995 else f" at {tempo:.2f} of the dancer's tempo"
+    return {"kind": "feasible", "sentence": f"The robot can do this motion{slow}."}
+
+
+def bar(value: float, limit: float) -> str:
+    """Return how much of a limit is used, as a bar of ten cells."""
+    share = (0.0 if value <= 0 else 1.0) if limit <= 0 else min(max(value / limit, 0.0), 1.0)
+    full = math.ceil(share * CELLS - 0.05) if share else 0
+    return FULL * full + EMPTY * (CELLS - full)
+
+
+def train_lines(answer: Answer) -> list[str]:
+    """Return how a training went, in a few lines."""
+    return [
+        f"trained   {answer['steps']:,} steps, {answer['updates']:,} updates, "
+        f"{answer['episodes']:,} episodes in {answer['seconds'] / 60:.1f} min "
+        f"({answer['stopped']} used up)",
+        f"policy    {answer['policy']}",
+        *closing(answer),
+    ]
+
+
+def train_verdict(updates: int, steps: int, survived_s: Sequence[float]) -> dict[str, str]:
+    """Return kind and sentence about a training.
+
+    Args:
+        survived_s: Of its last episodes, seconds.
+    """
+    if updates == 0:
+        told = (
+            f"Nothing was learnt: the {steps:,} steps ended before the first update. Give it more "
+            "--steps or --minutes."
+        )
+        return {"kind": "untrained", "sentence": told}
+    if not survived_s:
+        return {"kind": "learning", "sentence": "No episode ended yet: train longer."}
+    mean = sum(survived_s) / len(survived_s)
+    told = f"The last {len(survived_s)} episodes of the training lasted {mean:.1f} s."
+    return {"kind": "trained", "sentence": told}
+
+
+def _figure(card: Mapping[str, Any], name: str, digits: int) -> str:
+    value = card.get(name)
+    return "-" if value is None else f"{value:.{digits}f}"

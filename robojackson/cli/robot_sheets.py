@@ -1,0 +1,154 @@
+"""`robojackson robots check` and `robots new`: your own robot, from its model to a description."""
+
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from robojackson.errors import BadConfiguration, RoboJacksonError, StoreError
+from robojackson.files.file_tree import FileTree
+from robojackson.pipeline.robot_descriptions import describe_robot, is_file, robot_names
+from robojackson.robot.description import RobotDescription
+from robojackson.robot.model import Robot
+
+Figures = dict[str, Any]
+
+
+def check_robot(given: str, picture: Path | None) -> tuple[Figures, list[str]]:
+    """The figures of a robot and what a person reads of them; draws it where a picture is named.
+
+    Returns:
+        Figures with `ok` and `problems`; lines.
+
+    Raises:
+        UnknownName: no such robot.
+        MissingDependency: no way to draw without a screen.
+    """
+    from robojackson.robot.description_check import problems
+    from robojackson.robot.model import load_robot
+
+    try:
+        description = describe_robot(given)
+        found = problems(description)
+    except BadConfiguration as cause:
+        found = _all_of(cause)
+    told: Figures = {"robot": given, "ok": not found, "problems": found}
+    lines = [f"{given}: {len(found)} problem{'s' if len(found) > 1 else ''}", *found]
+    try:
+        robot = load_robot(describe_robot(given))
+    except RoboJacksonError:
+        return told, lines
+    figures = _figures(robot)
+    told |= figures | {"picture": None}
+    lines = (lines if found else []) + _table(figures)
+    if picture is not None:
+        from robojackson.report.plots.robot_sheet import robot_sheet
+        from robojackson.report.plots.run_plots import png
+
+        FileTree(picture.parent).write(picture.name, png(robot_sheet(robot), opaque=True))
+        told["picture"] = str(picture)
+        lines.append(f"picture  {picture}")
+    return told, lines
+
+
+def picture_of(given: str) -> Path:
+    """Where the picture of a robot goes that no other place is named for."""
+    return Path(given).with_suffix(".png") if is_file(given) else Path(f"{given}.png")
+
+
+def new_robot(model: Path, out: Path | None, force: bool) -> tuple[Figures, list[str]]:
+    """Write a first description of a model and check it.
+
+    Raises:
+        BadConfiguration: MuJoCo cannot load the model.
+        StoreError: there is a file already and `force` is not given, or it cannot be written.
+    """
+    from robojackson.robot.first_description import first_description, name_of_model
+
+    name = out.stem if out is not None else name_of_model(model)
+    if name in robot_names():
+        name = f"my_{name}"
+    target = out or Path(f"{name}.yaml")
+    draft = first_description(model, target.parent, name)
+    if target.exists() and not force:
+        raise StoreError(f"{target} is there already; --force overwrites it, -o names another")
+    FileTree(target.parent).write(target.name, draft.text.encode())
+    told, lines = check_robot(str(target), None)
+    head = [f"wrote    {target}"]
+    if draft.guessed:
+        head.append(f"guessed  {', '.join(draft.guessed)}: no name says them; look at the picture")
+    if draft.left:
+        head.append(f"left     {', '.join(draft.left)}: comments in the file, fill them in")
+    tail = [f"next     robojackson robots check {target} -o {target.with_suffix('.png')}"]
+    lines = lines if told["problems"] else lines[:1]
+    facts = {"file": str(target), "guessed": list(draft.guessed), "left": list(draft.left)}
+    return facts | told, [*head, *lines, *tail]
+
+
+def _all_of(cause: BadConfiguration) -> list[str]:
+    """Every wrong key and value of a file where the loader names the first."""
+    from pydantic import ValidationError
+
+    found = [str(cause)]
+    if isinstance(cause.__cause__, ValidationError):
+        where = str(cause).partition(": ")[0]
+        for error in cause.__cause__.errors()[1:]:
+            key = ".".join(str(part) for part in error["loc"])
+            unknown = error["type"] == "unexpected_keyword_argument"
+            words = f"unknown key {key!r}.{_close(key)}" if unknown else f"{key!r}: {error['msg']}"
+            found.append(f"{where}: {words}")
+    return found
+
+
+def _close(key: str) -> str:
+    """The key of a description that was probably meant."""
+    import difflib
+
+    close = difflib.get_close_matches(key, [f.name for f in fields(RobotDescription)], 1)
+    return f" Did you mean {close[0]!r}?" if close else ""
+
+
+def _figures(robot: Robot) -> Figures:
+    from robojackson.report.plots.robot_sheet import standing
+
+    pose, model = standing(robot), robot.model
+    heights = {
+        name: float(at[2] - radius)
+        for (name, at), radius in zip(pose.balls.items(), robot.contact_radii, strict=True)
+    }
+    ranges = {
+        name: {"low": low, "high": high, "rest": rest, "torque": torque}
+        for name, low, high, rest, torque in zip(
+            robot.joint_names, robot.lower, robot.upper, robot.rest, robot.torque_limit, strict=True
+        )
+    }
+    bodies = {key: body for key, (body, _) in robot.description.sites.items()}
+    return {
+        "name": robot.description.name,
+        "hinges": len(robot.joint_names),
+        "motors": int(robot.actuated.sum()),
+        "mass_kg": float(model.body_mass.sum()),
+        "height_m": float(pose.high[2]),
+        "joints": ranges,
+        "keypoints": {key: bodies[key] for key in pose.keypoints},
+        "contacts": heights,
+    }
+
+
+def _table(told: Figures) -> list[str]:
+    width = max(map(len, (*told["joints"], *told["keypoints"], *told["contacts"])))
+    lines = [
+        f"{told['name']}: {told['hinges']} hinges, {told['motors']} with a torque limit, "
+        f"{told['mass_kg']:.1f} kg, {told['height_m']:.2f} m tall at rest",
+        f"{'joint':<{width}}  {'from':>7}  {'to':>7}  {'rest':>7}  {'Nm':>6}   degrees",
+    ]
+    for name, joint in told["joints"].items():
+        low, high, rest = (57.29578 * float(joint[key]) for key in ("low", "high", "rest"))
+        torque = f"{joint['torque']:.0f}" if joint["torque"] < float("inf") else "-"
+        lines.append(f"{name:<{width}}  {low:>7.1f}  {high:>7.1f}  {rest:>7.1f}  {torque:>6}")
+    lines.append(f"{'keypoint':<{width}}  body")
+    lines += [f"{key:<{width}}  {body}" for key, body in told["keypoints"].items()]
+    lines.append(f"{'contact ball':<{width}}  mm above the floor at rest")
+    lines += [
+        f"{name:<{width}}  {round(1e3 * at, 1) + 0.0:.1f}" for name, at in told["contacts"].items()
+    ]
+    return lines

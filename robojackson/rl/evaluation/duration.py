@@ -1,0 +1,58 @@
+"""How long things take on this machine: what a training gets of a budget, and what it needs."""
+
+import time
+
+import mujoco
+import numpy as np
+
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.rl.config.evaluate_config import EvaluateConfig
+from robojackson.robot.model import Robot
+
+POLICIES = 6
+"""That are judged: the trained one, a variant of it and four that do not dance."""
+TIMED_STEPS = 400
+AROUND_A_STEP = 1.6
+"""Time of a simulated step with control and scoring, in times of MuJoCo's alone."""
+CYCLIC_MINUTES, WALKING_MINUTES, OTHER_MINUTES = 10.0, 20.0, 40.0
+"""What the bundled hip_shake, walk and dance_b took until they danced, minutes of one core
+(docs/benchmarks.md)."""
+MEASURED_S = 4.0
+"""Length of these motions, seconds; longer ones take proportionally longer."""
+WALKS_M = 0.2
+"""Path of a cycle from which on a robot walks rather than dances on the spot, metres."""
+
+
+def seconds_to_evaluate(robot: Robot, reference: ReferenceMotion, config: EvaluateConfig) -> float:
+    """Return about how long an evaluation takes here, seconds; measured by a short simulation."""
+    length = config.seconds if reference.cyclic else len(reference) * reference.dt
+    rollouts = POLICIES * (config.phases * config.resets + 1)
+    substeps = length / robot.model.opt.timestep
+    return float(AROUND_A_STEP * rollouts * substeps * seconds_a_step(robot) / config.threads)
+
+
+def seconds_a_step(robot: Robot) -> float:
+    """Return the time of one step of the physics on this machine, seconds."""
+    data = mujoco.MjData(robot.model)
+    data.qpos[:] = robot.standing
+    data.qpos[2] += 0.9
+    times = []
+    for _ in range(4):
+        began = time.perf_counter()
+        for _ in range(TIMED_STEPS // 4):
+            mujoco.mj_step(robot.model, data)
+        times.append((time.perf_counter() - began) * 4 / TIMED_STEPS)
+    return float(np.median(times))
+
+
+def minutes_needed(reference: ReferenceMotion) -> float:
+    """Return about how long a training takes until a robot dances this, minutes of one core.
+
+    By kind and length of the motion, from what the bundled ones took; no promise.
+    """
+    seconds = len(reference) * reference.dt
+    usual = OTHER_MINUTES
+    if reference.cyclic:
+        walks = float(np.linalg.norm(reference.cycle_offset[:2])) > WALKS_M
+        usual = WALKING_MINUTES if walks else CYCLIC_MINUTES
+    return usual * max(1.0, seconds / MEASURED_S)

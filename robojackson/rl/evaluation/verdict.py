@@ -1,0 +1,126 @@
+"""What an evaluation says, as a kind with figures; the sentence is made from them last."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+Kind = Literal["too_short", "untrained", "falls", "learning", "partly", "dances"]
+SHORTEST_S = 2.0
+"""Rollouts shorter than this say nothing: a body that does nothing does not fall that fast."""
+EASY = 0.5
+"""Strict success of a body that does not dance, from which on success says nothing."""
+DANCES = 0.95
+"""Strict success of a robot that dances."""
+PARTLY = 0.5
+NO_BETTER = 1.25
+"""Times the survival of the best baseline up to which a robot is no better."""
+UNJUDGED = ("success", "strict_success", "skill")
+"""Figures that are empty where the rollouts are too short to judge."""
+TITLES = {
+    "statue": "a statue",
+    "mean_pose": "the mean pose",
+    "zero_residual": "the bare reference",
+    "random": "a random policy",
+}
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What is to be said of a policy.
+
+    Attributes:
+        kind: In one word.
+        seconds: Length of a rollout, seconds.
+        survived_s: Of the policy, mean, seconds.
+        strict_success: Of the policy, 0..1.
+        skill: Of the policy; 1 is perfect.
+        baseline: The body that does not dance and comes nearest.
+        baseline_s: Its survival, mean, seconds.
+        baseline_success: Its strict success, 0..1.
+    """
+
+    kind: Kind
+    seconds: float
+    survived_s: float
+    strict_success: float
+    skill: float
+    baseline: str = ""
+    baseline_s: float = 0.0
+    baseline_success: float = 0.0
+
+    @property
+    def sentence(self) -> str:
+        """Return the verdict in one sentence."""
+        other = TITLES.get(self.baseline, self.baseline)
+        if self.kind == "too_short":
+            why = f"rollouts last {self.seconds:.1f} s"
+            if self.baseline_success >= EASY:
+                why += f", and {other} succeeds in {self.baseline_success:.0%} of them"
+            return f"Too short to judge: {why}."
+        if self.kind == "untrained":
+            return "The robot has learnt nothing: the training ended before its first update."
+        if self.kind == "dances":
+            return (
+                f"The robot dances: it follows from {self.strict_success:.0%} of the starts to the "
+                f"end, skill {self.skill:.2f} of 1."
+            )
+        if self.kind == "partly":
+            return (
+                f"The robot dances from {self.strict_success:.0%} of the starts and falls or "
+                f"strays from the others, skill {self.skill:.2f} of 1."
+            )
+        if self.kind == "falls":
+            return f"The robot falls after {self.survived_s:.1f} s, no better than {other}."
+        return (
+            f"The robot does not dance yet: it stays up for {self.survived_s:.1f} of "
+            f"{self.seconds:.1f} s, {other} for {self.baseline_s:.1f} s."
+        )
+
+    def as_facts(self) -> dict[str, Any]:
+        """Return kind and sentence, as they stand in evaluation.json."""
+        return {"kind": self.kind, "sentence": self.sentence, "seconds": self.seconds}
+
+
+def verdict_on(
+    own: Mapping[str, float],
+    baselines: Mapping[str, Mapping[str, float]],
+    seconds: float,
+    updates: int | None = None,
+) -> Verdict:
+    """Return the verdict on a policy.
+
+    Args:
+        own: Means over its rollouts: survived_s, strict_success, skill.
+        baselines: The same of bodies that do not dance, by name.
+        seconds: Length of a rollout that does not end early, seconds.
+        updates: Gradient updates of its training; None where nobody knows.
+    """
+    survived = {name: found["survived_s"] for name, found in baselines.items()}
+    success = {name: found["strict_success"] for name, found in baselines.items()}
+    easiest = max(success, key=lambda name: (success[name], survived[name]), default="")
+    figures = (own["survived_s"], own["strict_success"], own["skill"])
+    known = (easiest, survived.get(easiest, 0.0), success.get(easiest, 0.0))
+    return Verdict(_kind(own, known[1], known[2], seconds, updates), seconds, *figures, *known)
+
+
+def _kind(
+    own: Mapping[str, float],
+    baseline_s: float,
+    baseline_success: float,
+    seconds: float,
+    updates: int | None,
+) -> Kind:
+    if updates == 0:
+        return "untrained"
+    if seconds < SHORTEST_S or baseline_success >= EASY:
+        return "too_short"
+    if own["strict_success"] >= DANCES:
+        return "dances"
+    if own["strict_success"] >= PARTLY:
+        return "partly"
+    return "falls" if own["survived_s"] <= NO_BETTER * baseline_s else "learning"
+
+
+def without_unjudged(figures: Mapping[str, Any]) -> dict[str, Any]:
+    """Return figures with those empty that say nothing in rollouts that are too short."""
+    return {**figures, **{name: None for name in UNJUDGED if name in figures}}

@@ -1,0 +1,99 @@
+"""Everything that is wrong with a robot description, a line each, in one go.
+
+`load_robot` stops at the first error; here every name is looked up by itself, and what a robot can
+be loaded with although it is hardly meant is told, too.
+"""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from robojackson.errors import RoboJacksonError
+from robojackson.robot.checks import check_contact, check_joints
+from robojackson.robot.description import KEYPOINTS, TOES, RobotDescription
+from robojackson.robot.mjcf import mjcf_path, read_spec
+from robojackson.robot.model import Robot, load_robot
+from robojackson.robot.names import known, matching, where
+
+SWAPPED_M = 0.01
+"""A left keypoint that is further to the right of the right one than this is on the wrong side."""
+MIRRORED_M = 0.005
+PAIRS = tuple(key.removeprefix("left_") for key in (*KEYPOINTS, *TOES) if key.startswith("left_"))
+
+
+def problems(description: RobotDescription) -> list[str]:
+    """What is wrong, a line each; a description without problems is that of a robot that loads."""
+    found = list(dict.fromkeys(_unknown_names(description)))
+    if found:
+        return found
+    try:
+        robot = load_robot(description)
+    except RoboJacksonError as cause:
+        return [str(cause)]
+    return [*_out_of_range(robot), *_sides(robot)]
+
+
+def _unknown_names(description: RobotDescription) -> Iterator[str]:
+    """What the model or the description has no name for."""
+    try:
+        model = read_spec(mjcf_path(description), description).compile()
+    except (RoboJacksonError, ValueError) as cause:
+        yield str(cause).splitlines()[0]
+        return
+    bodies = tuple(model.body(index).name for index in range(1, model.nbody))
+    joints = tuple(model.joint(index).name for index in range(1, model.njnt))
+    sites = description.sites
+    yield from _error(check_joints, model, description)
+    for key in KEYPOINTS + (TOES if set(TOES) & set(sites) else ()):
+        if key not in sites:
+            yield f"{where(description, 'sites')}: missing {key}"
+    for key, (body, _) in sites.items():
+        yield from _error(known, "keypoint", key, KEYPOINTS + TOES, where(description, "sites"))
+        yield from _error(known, "body", body, bodies, where(description, f"sites.{key}"))
+    if not description.contacts:
+        yield f"{where(description, 'contacts')}: a robot needs feet"
+    for name in description.contacts:
+        yield from _error(check_contact, description, name, bodies)
+    for key in description.weights:
+        yield from _error(known, "keypoint", key, sites, where(description, "weights"))
+    for section in ("rest_pose", "torque_limits"):
+        for name in getattr(description, section):
+            yield from _error(matching, "joint", name, joints, where(description, section))
+
+
+def _error(check: Callable[..., Any], *given: Any) -> Iterator[str]:
+    try:
+        check(*given)
+    except RoboJacksonError as cause:
+        yield str(cause)
+
+
+def _out_of_range(robot: Robot) -> Iterator[str]:
+    """Rest angles beyond a limit: the robot would stand otherwise than its soles were checked."""
+    place = where(robot.description, "rest_pose")
+    for name, rest, low, high in zip(
+        robot.joint_names, robot.rest, robot.lower, robot.upper, strict=True
+    ):
+        if rest and not low <= rest <= high:  # zero is where nobody said anything
+            yield f"{place}.{name} is {rest:g}: beyond its range, {low:.3g} to {high:.3g} radians"
+
+
+def _sides(robot: Robot) -> Iterator[str]:
+    """Keypoints that are on the other side, or not mirrored, in the zero pose."""
+    description, data = robot.description, mujoco.MjData(robot.model)
+    mujoco.mj_kinematics(robot.model, data)
+    at = dict(zip(robot.keypoint_names, data.site_xpos[robot.keypoint_sites], strict=True))
+    middle = data.xpos[robot.model.body(description.root_body).id][1]
+    for name in PAIRS:
+        if f"left_{name}" not in at:
+            continue
+        left, right = at[f"left_{name}"], at[f"right_{name}"]
+        mirrored = right * [1.0, -1.0, 1.0] + [0.0, 2 * middle, 0.0]
+        place = where(description, f"sites.left_{name}")
+        if left[1] < right[1] - SWAPPED_M:
+            yield f"{place} is to the right of right_{name}; the robot faces along x, left is +y"
+        elif np.linalg.norm(left - mirrored) > MIRRORED_M:
+            apart = 1e3 * np.linalg.norm(left - mirrored)
+            yield f"{place} is {apart:.0f} mm from the mirror image of right_{name}"

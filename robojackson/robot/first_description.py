@@ -1,0 +1,244 @@
+"""A first description of a model, guessed from its names and its kinematic tree, as YAML to edit.
+
+Every line says what it was guessed from; what could not be told is a comment in its place.
+"""
+
+import json
+import os
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from robojackson.errors import BadConfiguration
+from robojackson.robot.contact_guess import guess_contacts, toe_of
+from robojackson.robot.description import KEYPOINTS, TOES, ContactPoint
+from robojackson.robot.keypoint_guess import Guess, guess_keypoints
+from robojackson.robot.limbs import SIDES, Skeleton, skeleton_of
+
+WEIGHTS = {"foot": 1.5, "hand": 1.5, "head": 0.5, "toe": 0.7, "pelvis": 0.0}
+"""Of the squared error, by the end of a keypoint's name; the others have 1. As Humanoid-v5's."""
+BENT_RAD = 0.3
+"""How far the knees are bent at rest; hips and ankles half as far."""
+SIDEWAYS = 0.9
+"""Least share of y in the axis of a hinge that bends a leg forward."""
+SUBSTEPS, SHORTEST_S, LONGEST_S, USUAL_S = 5, 0.01, 0.03, 0.015
+"""Of a control step; training takes five steps of the model unless it is told otherwise."""
+SIDE = re.compile("left|right", re.IGNORECASE)
+PLAIN = re.compile(r"(?!(?:true|false|null)$)[A-Za-z_][\w./-]*$", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Draft:
+    """A first description.
+
+    Attributes:
+        name: Of the robot.
+        text: The YAML.
+        guessed: Keys that want a look: no name said them.
+        left: Keys that nothing was found for.
+    """
+
+    name: str
+    text: str
+    guessed: tuple[str, ...]
+    left: tuple[str, ...]
+
+
+def first_description(path: Path, folder: Path, name: str) -> Draft:
+    """Guess the description of a model.
+
+    Args:
+        path: The MJCF.
+        folder: Where the description will be; a model below it is named from there.
+        name: Of the robot.
+    Raises:
+        BadConfiguration: no such file, or MuJoCo cannot load it.
+    """
+    model = _model(path)
+    skeleton = skeleton_of(model)
+    keypoints = guess_keypoints(skeleton)
+    contacts = guess_contacts(skeleton, keypoints)
+    toes = {
+        f"{side}_toe": toe_of(skeleton, keypoints[f"{side}_foot"], contacts, side)
+        for side in SIDES
+        if f"{side}_foot" in keypoints
+    }
+    if len(toes) == len(SIDES) and all(toes.values()):
+        keypoints |= {key: toe for key, toe in toes.items() if toe is not None}
+    has_root = bool((model.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE)).any())
+    left = [f"sites.{key}" for key in KEYPOINTS if key not in keypoints]
+    left += [] if has_root else ["root_body"]
+    left += [f"contacts of the {s} foot" for s in SIDES if not any(s in c for c in contacts)]
+    undriven = _undriven(model)
+    left += ["torque_limits"] if None in undriven.values() else []
+    guessed = [f"sites.{key}" for key, guess in keypoints.items() if not guess.sure]
+    lines = [
+        f"# {name}: a first description by `robojackson robots new`. A line with GUESS is not said",
+        "# by a name of the model; see it in the picture of `robojackson robots check`.",
+        f"name: {_text(name)}",
+        f"mjcf: {_text(_place(path, folder))}",
+        f"root_body: {_text(model.body(skeleton.root).name)} # "
+        + ("has the free joint" if has_root else "GUESS: no body has a free joint; give it one"),
+        *_site_lines(keypoints),
+        *_weight_lines(keypoints),
+        *_contact_lines(contacts),
+        *_rest_lines(guess_rest(skeleton)),
+        *_torque_lines(undriven),
+        "max_joint_speed: 12.0 # rad/s; of the motors, where you know it",
+        *_clock_lines(model.opt.timestep),
+    ]
+    return Draft(name, "\n".join(lines) + "\n", tuple(guessed), tuple(left))
+
+
+def guess_rest(skeleton: Skeleton) -> dict[str, float]:
+    """Knees a little bent over level feet, radians; hinges that cannot be at zero at a limit."""
+    model, found = skeleton.model, dict[str, float]()
+    for hinge in np.flatnonzero(model.jnt_type == int(mujoco.mjtJoint.mjJNT_HINGE)):
+        low, high = model.jnt_range[hinge]
+        if model.jnt_limited[hinge] and not low <= 0.0 <= high:
+            found[model.joint(hinge).name] = round(float(np.clip(0.0, low, high)), 4)
+    bent: dict[str, float] = {}
+    for side in SIDES:
+        leg = skeleton.limbs.get(f"{side}_leg")
+        if leg is None:
+            return found
+        turns = {"hip": -BENT_RAD / 2, "knee": BENT_RAD, "ankle": -BENT_RAD / 2}
+        for part, turn in turns.items():
+            if part == "ankle" and not leg.parts[part]:
+                continue
+            across = [h for h in leg.parts[part] if abs(skeleton.data.xaxis[h][1]) > SIDEWAYS]
+            if not across:
+                return found
+            angle = turn * float(np.sign(skeleton.data.xaxis[across[0]][1]))
+            low, high = model.jnt_range[across[0]]
+            if model.jnt_limited[across[0]] and not low < angle < high:
+                return found
+            bent[model.joint(across[0]).name] = angle
+    return found | bent
+
+
+def _model(path: Path) -> mujoco.MjModel:
+    if not path.is_file():
+        raise BadConfiguration(f"{path}: no such file; expected the MJCF of a robot")
+    try:
+        model = mujoco.MjModel.from_xml_path(str(path))
+    except ValueError as cause:
+        raise BadConfiguration(f"{path}: {str(cause).splitlines()[0]}") from cause
+    if model.nbody < 2 or not (model.jnt_type == int(mujoco.mjtJoint.mjJNT_HINGE)).any():
+        raise BadConfiguration(f"{path}: no body with a hinge; expected the MJCF of a robot")
+    return model
+
+
+def name_of_model(path: Path) -> str:
+    """What a model calls itself, else the name of its file, as a robot's name."""
+    text = path.read_text(errors="replace") if path.is_file() else ""
+    told = re.search(r"<mujoco[^>]*\bmodel=\"([^\"]+)\"", text)
+    name = re.sub(r"\W+", "_", told.group(1) if told else path.stem).strip("_").lower()
+    return name or "robot"
+
+
+def _place(path: Path, folder: Path) -> str:
+    """The model's path from the folder of its description, or from the root where it is outside."""
+    whole, base = Path(os.path.abspath(path)), Path(os.path.abspath(folder))
+    return whole.relative_to(base).as_posix() if whole.is_relative_to(base) else str(whole)
+
+
+def _undriven(model: mujoco.MjModel) -> dict[str, float | None]:
+    """Hinges that no motor of the model drives -> their own torque limit, None without one."""
+    hinges = np.flatnonzero(model.jnt_type == int(mujoco.mjtJoint.mjJNT_HINGE))
+    joint = int(mujoco.mjtTrn.mjTRN_JOINT)
+    driven = set(model.actuator_trnid[model.actuator_trntype == joint, 0].tolist())
+    found: dict[str, float | None] = {}
+    for hinge in hinges:
+        if hinge not in driven:
+            limit = float(np.abs(model.jnt_actfrcrange[hinge]).max())
+            found[model.joint(hinge).name] = limit if model.jnt_actfrclimited[hinge] else None
+    return found
+
+
+def _text(name: str) -> str:
+    return name if PLAIN.match(name) else json.dumps(name)
+
+
+def _vector(values: Iterable[float]) -> str:
+    return f"[{', '.join(f'{value:g}' if value % 1 else f'{value:.1f}' for value in values)}]"
+
+
+def _site_lines(keypoints: Mapping[str, Guess]) -> list[str]:
+    lines = ["sites: # keypoint: [body, position in the body, metres]"]
+    for key in (*KEYPOINTS, *(toe for toe in TOES if toe in keypoints)):
+        if key not in keypoints:
+            lines.append(f"  # {key}: [BODY, [0.0, 0.0, 0.0]] # not found: put a body in")
+            continue
+        guess = keypoints[key]
+        sure = "" if guess.sure else "GUESS: "
+        lines.append(f"  {key}: [{_text(guess.body)}, {_vector(guess.offset)}] # {sure}{guess.why}")
+    return lines
+
+
+def _weight_lines(keypoints: Mapping[str, Guess]) -> list[str]:
+    lines = ["weights: # of the squared keypoint error, as Humanoid-v5's"]
+    for key in (*KEYPOINTS, *TOES):
+        weight = WEIGHTS.get(key.rpartition("_")[2], 1.0)
+        if key in keypoints and weight:
+            lines.append(f"  {key}: {weight}")
+    return lines if len(lines) > 1 else ["weights: {}"]
+
+
+def _contact_lines(contacts: Mapping[str, ContactPoint]) -> list[str]:
+    lines = [
+        "contacts: # balls under the soles; offset of the centre from the foot's keypoint, metres"
+    ]
+    for name, ball in contacts.items():
+        words = f"site: {ball.site}, offset: {_vector(ball.offset)}, radius: {ball.radius:g}"
+        lines.append(
+            f"  {name}: {{{words}, body: {_text(ball.body)}, side: {ball.side}, "
+            f"label: {ball.label}}}"
+        )
+    for side in SIDES:
+        if not any(ball.side == side for ball in contacts.values()):
+            lines.append(
+                f"  # {side}_foot: {{site: {side}_foot, radius: 0.02, body: BODY, side: {side}}}"
+            )
+    return lines if contacts else ["contacts: {}", *lines[1:]]
+
+
+def _rest_lines(rest: Mapping[str, float]) -> list[str]:
+    if not rest:
+        return ["rest_pose: {} # radians; a hinge that is not named rests at zero"]
+    lines = ["rest_pose: # radians; a hinge that is not named rests at zero"]
+    return lines + [f"  {_text(name)}: {angle:g}" for name, angle in rest.items()]
+
+
+def _torque_lines(undriven: Mapping[str, float | None]) -> list[str]:
+    """Limits that the hinges have themselves; the others as comments, both sides in one."""
+    known = {name: limit for name, limit in undriven.items() if limit is not None}
+    lines = ["torque_limits: # newton-metres, of the hinges themselves: no motor drives them"]
+    lines += [f"  {_text(name)}: {limit:g}" for name, limit in known.items()]
+    unknown = [name for name in undriven if name not in known]
+    if not unknown:
+        return lines if known else []
+    patterns = Counter(SIDE.sub("*", name) for name in unknown)
+    told = [
+        p if n > 1 else next(x for x in unknown if SIDE.sub("*", x) == p)
+        for p, n in patterns.items()
+    ]
+    rest = [f"{_text(name)}: 50.0" for name in told]
+    note = "newton-metres, of hinges that no motor of the MJCF drives: fill in your motors'"
+    if known:
+        return [*lines, f"  # {note}", *(f"  # {line}" for line in rest)]
+    return [f"# torque_limits: # {note}", *(f"#   {line}" for line in rest)]
+
+
+def _clock_lines(timestep: float) -> list[str]:
+    steps, note = SUBSTEPS, ""
+    if not SHORTEST_S <= steps * timestep <= LONGEST_S:
+        steps = max(1, round(USUAL_S / timestep))
+        note = f"; to train: --set track.control.substeps={steps}"
+    told = f"{steps} steps of {1e3 * timestep:g} ms of the model"
+    return [f"control_dt: {steps * timestep:g} # seconds: {told}{note}"]

@@ -1,0 +1,93 @@
+"""A robot that is given by its file, through the commands of one stage."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from robojackson.cli import exporting, stages, training_process, walker_training
+from robojackson.cli.options import yaml_text
+from robojackson.errors import BadConfiguration, RejectedReference, UnknownName
+from robojackson.motion.reference_motion import ReferenceMotion
+from tests.fixtures.own_robot import own_robot
+from tests.fixtures.robots import human
+
+SHORT = {"trainer": "sb3", "steps": 64}
+
+
+class Made:
+    """A motion for a user's robot, and the folder that it is in."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.robot = folder, own_robot(folder / "my robots: 1")
+        human("hip_shake").save(folder / "smpl.parquet")
+        overrides = {"robot": yaml_text(str(self.robot))}
+        stages.retarget(folder / "smpl.parquet", folder, "smoke", overrides)
+        self.reference = folder / "reference.parquet"
+
+    def train(self, out: str, robot: str | None = None) -> dict[str, Any]:
+        return training_process.train(
+            self.reference, self.folder / out, None, SHORT, force=True, robot=robot
+        )
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Made:
+    return Made(tmp_path_factory.mktemp("own"))
+
+
+def test_the_motion_remembers_the_file_whatever_its_name(made: Made) -> None:
+    motion = ReferenceMotion.load(made.reference)
+    assert (motion.robot, motion.robot_file) == ("mine", str(made.robot))
+
+
+def test_train_evaluate_and_export_find_the_robot_by_themselves(made: Made) -> None:
+    policy = Path(made.train("policy")["policy"])
+    overrides = {"evaluate.seconds": 0.1}
+    judged = stages.evaluate(policy, made.reference, None, "smoke", overrides)
+    assert judged["rollouts"] > 0
+    told = exporting.export(made.reference, "gmr", made.folder / "motion.pkl")
+    assert told["robot"] == "mine"
+
+
+def test_a_file_that_is_gone_is_one_line_that_says_what_to_give(made: Made) -> None:
+    elsewhere = made.robot.rename(made.robot.with_stem("moved"))
+    try:
+        with pytest.raises(
+            UnknownName, match=r"'mine' .*mine\.yaml, which is not on .*--robot FILE"
+        ):
+            made.train("gone")
+        assert made.train("given", str(elsewhere))["steps"] >= SHORT["steps"]
+        told = exporting.export(made.reference, "gmr", made.folder / "m.pkl", str(elsewhere))
+        assert told["robot"] == "mine"
+    finally:
+        elsewhere.rename(made.robot)
+
+
+def test_a_motion_that_does_not_name_the_file_says_so(made: Made, tmp_path: Path) -> None:
+    """As the motions of the flows, which may be read on another machine."""
+    from dataclasses import replace
+
+    path = replace(ReferenceMotion.load(made.reference), robot_file="").save(tmp_path / "r.parquet")
+    with pytest.raises(UnknownName, match=r"'mine' .*does not say where .*give --robot FILE"):
+        exporting.export(path, "gmr", tmp_path / "m.pkl")
+
+
+def test_another_model_than_the_motions_is_refused(made: Made, tmp_path: Path) -> None:
+    other = own_robot(tmp_path)
+    model = other.parent / "model.xml"
+    model.write_text(model.read_text().replace('size="0.07"', 'size="0.08"', 1))
+    with pytest.raises(RejectedReference, match="another model of 'mine'"):
+        made.train("other", str(other))
+
+
+def test_a_file_that_is_not_there_is_one_line(made: Made) -> None:
+    with pytest.raises(UnknownName, match=r"unknown robot 'no/robot\.yaml' \(no file /"):
+        stages.retarget(
+            made.folder / "smpl.parquet", made.folder, "smoke", {"robot": "no/robot.yaml"}
+        )
+
+
+def test_the_walker_of_the_paper_is_humanoid_v5(made: Made, tmp_path: Path) -> None:
+    with pytest.raises(BadConfiguration, match="kind 'paper' is humanoid; take --kind track"):
+        walker_training.pretrain("paper", tmp_path, None, {}, str(made.robot))

@@ -1,0 +1,22 @@
+"""What `catalogue` says where nothing was judged yet."""
+
+from pathlib import Path
+
+from tests.fixtures.commands import in_process
+
+
+def test_an_empty_catalogue_says_what_fills_it(tmp_path: Path) -> None:
+    said = in_process("catalogue", ROBOJACKSON_STORE=str(tmp_path / "store"))
+    assert said.code == 0, said.err
+    assert "robojackson find DANCE" in said.out
+    assert "--source folder" in said.out
+
+
+def test_a_dance_that_was_never_judged_says_how_to_look_for_it(tmp_path: Path) -> None:
+    said = in_process("catalogue", "--dance", "it's", ROBOJACKSON_STORE=str(tmp_path / "store"))
+    assert "robojackson find 'it'" in said.out
+
+
+def test_an_empty_catalogue_is_an_empty_list_for_programs(tmp_path: Path) -> None:
+    said = in_process("catalogue", "--json", ROBOJACKSON_STORE=str(tmp_path / "store"))
+    assert said.answer == {"candidates": []}

@@ -1,0 +1,82 @@
+"""All that is wrong with a description is told in one go, a line each."""
+
+from dataclasses import replace
+
+import pytest
+
+from robojackson.robot.description import ContactPoint, RobotDescription
+from robojackson.robot.description_check import problems
+from tests.fixtures.robots import description
+
+
+@pytest.fixture
+def humanoid() -> RobotDescription:
+    return description()
+
+
+@pytest.mark.parametrize("name", ["humanoid", "humanoid_strong"])
+def test_a_shipped_robot_has_no_problems(name: str) -> None:
+    assert problems(description(name)) == []
+
+
+def test_every_unknown_name_is_told_at_once(humanoid: RobotDescription) -> None:
+    told = problems(
+        replace(
+            humanoid,
+            sites={**humanoid.sites, "left_knee": ("left_chin", (0.0, 0.0, 0.0))},
+            weights={**humanoid.weights, "tail": 1.0},
+            rest_pose={"left_gnee": 0.1},
+            torque_limits={"*_tail": 3.0},
+            contacts={"left_foot": ContactPoint("left_foot", 0.1, "left_shoe", "left")},
+        )
+    )
+    words = ["chin", "shoe", "'tail'", "gnee", "*_tail"]
+    assert [next(word for word in words if word in line) for line in told] == words
+
+
+def test_every_missing_site_is_told(humanoid: RobotDescription) -> None:
+    sites = {k: v for k, v in humanoid.sites.items() if k not in ("head", "left_hand")}
+    weights = {k: v for k, v in humanoid.weights.items() if k in sites}
+    told = problems(replace(humanoid, sites=sites, weights=weights))
+    assert [line.rpartition(" ")[2] for line in told] == ["left_hand", "head"]
+
+
+def test_a_model_that_is_not_there_is_one_line(humanoid: RobotDescription) -> None:
+    (told,) = problems(replace(humanoid, mjcf="gone.xml"))
+    assert told.endswith("mjcf: no such file: gone.xml")
+
+
+def test_limbs_of_different_length_are_told(humanoid: RobotDescription) -> None:
+    sites = {**humanoid.sites, "left_hand": ("left_lower_arm", (0.1, -0.1, 0.1))}
+    (told,) = problems(replace(humanoid, sites=sites))
+    assert "they must be mirrored" in told
+
+
+def test_sides_that_are_swapped_are_told(humanoid: RobotDescription) -> None:
+    sites = dict(humanoid.sites)
+    for name in ("shoulder", "elbow", "hand"):
+        sites[f"left_{name}"], sites[f"right_{name}"] = (
+            humanoid.sites[f"{side}_{name}"] for side in ("right", "left")
+        )
+    told = problems(replace(humanoid, sites=sites))
+    assert len(told) == 3
+    assert all("to the right of" in line for line in told)
+
+
+def test_a_keypoint_off_its_mirror_image_is_told(humanoid: RobotDescription) -> None:
+    sites = {
+        **humanoid.sites,
+        "left_hip": ("left_thigh", (0.03, 0.0, 0.0)),
+        "left_knee": ("left_shin", (0.03, 0.0, 0.02)),
+        "left_foot": ("left_foot", (0.03, 0.0, 0.1)),
+    }
+    told = problems(replace(humanoid, sites=sites))
+    assert [line.split(": ")[1].split()[0] for line in told] == [
+        "sites.left_hip", "sites.left_knee", "sites.left_foot",
+    ]  # fmt: skip
+    assert "30 mm from the mirror image" in told[0]
+
+
+def test_a_rest_angle_beyond_its_range_is_told(humanoid: RobotDescription) -> None:
+    (told,) = problems(replace(humanoid, rest_pose={**humanoid.rest_pose, "abdomen_z": 1.0}))
+    assert "rest_pose.abdomen_z is 1: beyond its range" in told

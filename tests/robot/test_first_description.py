@@ -1,0 +1,122 @@
+"""A first description of a model that nobody has described comes near to what a person wrote."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from robojackson.errors import BadConfiguration
+from robojackson.pipeline.robot_descriptions import read_description
+from robojackson.retarget.retarget_config import RetargetConfig
+from robojackson.retarget.retargeting import retarget_motion
+from robojackson.robot.description import RobotDescription
+from robojackson.robot.description_check import problems
+from robojackson.robot.first_description import Draft, first_description, name_of_model
+from robojackson.robot.model import load_robot
+from tests.fixtures import machine
+from tests.fixtures.own_robot import gymnasium_model
+from tests.fixtures.robots import description, human, robot_motion
+
+NEAR_MM = 1.0
+"""Between the same motion on the guessed robot and on the shipped one, mean over keypoints."""
+
+
+def drafted(model: Path, folder: Path) -> tuple[Draft, RobotDescription]:
+    draft = first_description(model, folder, "drafted")
+    path = folder / "drafted.yaml"
+    path.write_text(draft.text)
+    return draft, read_description(path)
+
+
+def model_file(folder: Path, text: str) -> Path:
+    path = folder / "model.xml"
+    path.write_text(text)
+    return path
+
+
+def test_humanoid_v5_is_described_as_the_shipped_file_does(tmp_path: Path) -> None:
+    draft, found = drafted(gymnasium_model(), tmp_path)
+    shipped = description()
+    assert (draft.left, draft.guessed, problems(found)) == ((), (), [])
+    for part in ("root_body", "sites", "weights", "contacts", "rest_pose", "control_dt"):
+        assert getattr(found, part) == getattr(shipped, part), part
+
+
+def test_a_motion_for_the_drafted_humanoid_is_that_for_the_shipped_one(tmp_path: Path) -> None:
+    _, found = drafted(gymnasium_model(), tmp_path)
+    motion = retarget_motion(human("hip_shake"), load_robot(found), RetargetConfig())
+    shipped = robot_motion("hip_shake")
+    apart = np.linalg.norm(motion.keypoints_w - shipped.keypoints_w, axis=-1).mean()
+    assert 1e3 * apart < NEAR_MM
+
+
+def test_a_machine_with_ankles_and_soles_is_described_with_its_corners(tmp_path: Path) -> None:
+    draft, found = drafted(model_file(tmp_path, machine.mjcf()), tmp_path)
+    written = machine.description(tmp_path)
+    assert (draft.left, draft.guessed) == (("torque_limits",), ("sites.head",))
+    assert problems(found) == []
+    assert found.sites.keys() == written.sites.keys()
+    assert {k: body for k, (body, _) in found.sites.items()} == {
+        k: body for k, (body, _) in written.sites.items()
+    }
+    apart = [np.subtract(found.sites[k][1], written.sites[k][1]) for k in found.sites]
+    assert np.abs(apart).max() < 0.025
+    assert found.contacts.keys() == written.contacts.keys()
+    assert found.rest_pose["left_knee"] == 0.3
+
+
+def test_a_model_below_the_file_is_named_from_there(tmp_path: Path) -> None:
+    (tmp_path / "parts").mkdir()
+    draft = first_description(model_file(tmp_path / "parts", machine.mjcf()), tmp_path, "it")
+    assert yaml.safe_load(draft.text)["mjcf"] == "parts/model.xml"
+
+
+def test_names_that_say_nothing_leave_the_tree_to_tell_the_joints(tmp_path: Path) -> None:
+    names = sorted(set(re.findall(r'<(?:body|joint) name="(\w+)"', machine.mjcf())))
+    text = machine.mjcf()
+    for number, name in enumerate(names):
+        text = re.sub(rf'"{name}"', f'"p{number}"', text)
+    draft, found = drafted(model_file(tmp_path, text), tmp_path)
+    written = machine.description(tmp_path)
+    known = {f"p{number}": name for number, name in enumerate(names)}
+    assert {key: known[body] for key, (body, _) in found.sites.items()} == {
+        key: body for key, (body, _) in written.sites.items()
+    }
+    assert len(draft.guessed) > len(draft.left)
+    assert draft.text.count("# GUESS: ") == len(draft.guessed)
+
+
+def test_what_is_not_there_is_left_as_a_comment(tmp_path: Path) -> None:
+    armless = re.sub(r"(?s)<body name=\"left_upper\".*?</body></body>", "", machine.mjcf())
+    draft = first_description(model_file(tmp_path, armless), tmp_path, "it")
+    assert {f"sites.left_{part}" for part in ("shoulder", "elbow", "hand")} <= set(draft.left)
+    assert "  # left_hand: [BODY, [0.0, 0.0, 0.0]]" in draft.text
+    assert "left_hand" not in yaml.safe_load(draft.text)["sites"]
+
+
+def test_the_limits_that_hinges_have_themselves_are_taken(tmp_path: Path) -> None:
+    text = machine.mjcf().replace('range="0 2.4"', 'range="0 2.4" actuatorfrcrange="-33 33"')
+    text = re.sub(r"<position.*?/>", "", text)
+    draft, found = drafted(model_file(tmp_path, text), tmp_path)
+    assert found.torque_limits == {"left_knee": 33.0, "right_knee": 33.0}
+    assert '  # "*_hip_pitch": 50.0' in draft.text
+
+
+def test_odd_names_stay_text(tmp_path: Path) -> None:
+    text = machine.mjcf().replace('"base"', '"no: 1"')
+    _, found = drafted(model_file(tmp_path, text), tmp_path)
+    assert found.root_body == "no: 1"
+
+
+@pytest.mark.parametrize("content", ["<mujoco", "<mujoco/>", "text"])
+def test_what_is_no_robot_is_one_line(tmp_path: Path, content: str) -> None:
+    with pytest.raises(BadConfiguration, match=r"^\S*model\.xml: .+$"):
+        first_description(model_file(tmp_path, content), tmp_path, "it")
+
+
+def test_a_model_is_called_as_it_calls_itself(tmp_path: Path) -> None:
+    named = model_file(tmp_path, machine.mjcf().replace('"machine"', json.dumps("My Robot-2")))
+    assert name_of_model(named) == "my_robot_2"
