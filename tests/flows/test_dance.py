@@ -241,8 +241,14 @@ def test_a_source_without_words_or_with_too_many_is_refused(source: str) -> None
 
 
 def test_a_training_that_says_its_processor_time_gets_no_clock() -> None:
-    told = dance_stages._budgeted(load(PipelineConfig, "base", {"train.cpu_minutes": 60}))
-    assert (told.minutes, told.cpu_minutes) == (None, 60)
+    settings = load(PipelineConfig, "base", {"train.cpu_minutes": 60})
+    told, whole_pass = dance_stages._budgeted(settings)
+    assert (told.minutes, told.cpu_minutes, whole_pass) == (None, 60, False)
+
+
+def test_a_training_without_a_budget_has_that_of_the_pass() -> None:
+    told, whole_pass = dance_stages._budgeted(load(PipelineConfig, "base", {"minutes": 3.5}))
+    assert (told.minutes, whole_pass) == (3.5, True)
 
 
 def test_files_that_cannot_be_read_are_left_out(tmp_path: Path) -> None:

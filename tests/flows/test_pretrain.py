@@ -8,6 +8,8 @@ import pytest
 
 from flows import pretrain
 from robojackson.cli import stages, walker_training
+from robojackson.pipeline.robot_descriptions import describe_robot
+from robojackson.robot.model import load_robot
 from storage.store import Store
 from tests.fixtures.commands import robojackson
 
@@ -84,5 +86,6 @@ def test_the_bundled_walk_is_found_from_any_folder(
     found: list[bool] = []
     monkeypatch.setattr(stages, "mocap", lambda video, *rest: found.append(video.is_file()))
     monkeypatch.setattr(stages, "retarget", lambda *given: None)
-    walker_training._reference("track", tmp_path, None)
+    humanoid = load_robot(describe_robot("humanoid"))
+    walker_training._reference("track", tmp_path, humanoid)
     assert found == [True]

@@ -1,0 +1,77 @@
+"""What single stages say to people: a verdict last, and a command that can be typed."""
+
+import pytest
+
+from robojackson.cli import cards
+from robojackson.cli.lifetime import interruption
+from robojackson.retarget.scorecard_gate import BARS
+
+VIDEO = {"missing_joints": 3, "jitter": 0.5, "frames": 60, "fps": 30.0, "detected": 60}
+SCORED = {
+    "videos": [
+        {"video": "a/steady.mp4", "score_per_second": 0.1, **VIDEO},
+        {"video": "a/shaky.mp4", "score_per_second": 2.0, **VIDEO},
+        {"video": "a/broken.mp4", "error": "a/broken.mp4: not a video"},
+    ],
+    "verdict": {"kind": "steadiest", "sentence": "steady.mp4 is tracked most steadily."},
+    "next": "robojackson dance a/steady.mp4",
+}
+CARD = dict.fromkeys(BARS, 0.0) | {"tempo_mean": 0.78, "keypoint_leaned_mm": 6.8, "bone_deg": 4.7}
+RETARGETED = {"robot": "humanoid", "steps": 266, "dt": 0.015, "cyclic": True, "reference": "r"}
+
+
+def test_the_steadiest_video_is_marked_and_what_cannot_be_read_is_told() -> None:
+    lines = cards.score_lines(SCORED)
+    assert [line.split()[1] for line in lines if line.startswith("►")] == ["steady.mp4"]
+    assert "lower is steadier" in "\n".join(lines)
+    assert lines[-3:] == [
+        "! a/broken.mp4: not a video",
+        "steady.mp4 is tracked most steadily.",
+        "next: robojackson dance a/steady.mp4",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("detected", "kind"), [(100, "whole"), (95, "whole"), (80, "gaps"), (30, "poor")]
+)
+def test_a_motion_is_judged_by_how_much_was_seen(detected: int, kind: str) -> None:
+    assert cards.mocap_verdict(100, detected)["kind"] == kind
+
+
+def test_the_card_has_a_bar_for_every_gated_figure_and_ends_with_the_verdict() -> None:
+    answer = RETARGETED | {"scorecard": CARD, "verdict": cards.retarget_verdict(CARD)}
+    lines = cards.retarget_lines(answer)
+    assert len([line for line in lines if "at most" in line]) == len(cards.ROWS)
+    assert lines[-1] == "The robot can do this motion at 0.78 of the dancer's tempo."
+
+
+def test_a_motion_over_a_bar_is_refused_by_the_name_of_the_figure() -> None:
+    told = cards.retarget_verdict(CARD | {"planted_slip_cm_s": 7.0})
+    assert told["kind"] == "refused"
+    assert "planted slip cm s is 7, at most 1" in told["sentence"]
+
+
+@pytest.mark.parametrize(
+    ("value", "limit", "full"), [(0, 5, 0), (0.01, 5, 0), (2.5, 5, 5), (9, 5, 10), (1, 0, 10)]
+)
+def test_a_bar_shows_the_share_of_the_limit(value: float, limit: float, full: int) -> None:
+    assert cards.bar(value, limit).count(cards.FULL) == full
+    assert len(cards.bar(value, limit)) == cards.CELLS
+
+
+def test_a_training_without_an_update_learnt_nothing() -> None:
+    assert cards.train_verdict(0, 512, [1.0])["kind"] == "untrained"
+    assert "lasted 2.0 s" in cards.train_verdict(5, 512, [1.0, 3.0])["sentence"]
+
+
+def test_a_command_can_be_copied_into_a_shell() -> None:
+    assert cards.command_line("dance", "my clip.mp4") == "robojackson dance 'my clip.mp4'"
+
+
+@pytest.mark.parametrize("words", [["--minutes", "3"], ["--minutes=3"], []])
+def test_an_option_takes_the_place_of_its_earlier_value(
+    words: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(interruption.sys, "argv", ["robojackson", "dance", "a.mp4", *words])
+    told = interruption.with_option("--minutes", "15")
+    assert told == "robojackson dance a.mp4 --minutes 15"
