@@ -65,7 +65,7 @@ def load_settings(config: str, overrides: Mapping[str, Any]) -> "PipelineConfig"
     """
     from robojackson.pipeline.pipeline_config import PipelineConfig
     from robojackson.pipeline.yaml_loader import load
-    from robojackson.rl.modes.paper_mode import require_trainable
+    from robojackson.rl.sim.trainable import require_trainable
     from robojackson.robot.model import load_robot
 
     settings = load(PipelineConfig, config, overrides)

@@ -29,9 +29,9 @@ from robojackson.rl import training
 from robojackson.rl.checkpoint_folder import newest_checkpoint
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.evaluation.reward_audit import audit_both_readings, audit_record
-from robojackson.rl.modes.paper_mode import require_trainable
 from robojackson.rl.modes.rewards import RewardFunction
 from robojackson.rl.policy import load_policy
+from robojackson.rl.sim.trainable import require_trainable
 from robojackson.rl.training_hooks import Hooks, Row
 from robojackson.robot.model import Robot
 

@@ -80,6 +80,13 @@ EVALUATION_RECORD = TableSchema(
         Column("travel_ratio", F64, "1", nullable=True),
         Column("fell", FLAG),
         Column("kneels", FLAG, nullable=True),
+        Column("on_floor", FLAG, nullable=True),
+        Column("end_height_error_m", F64, "m", nullable=True),
+        Column("mpjpe_l_m", F64, "m", nullable=True),
+        Column("mpjpe_g_m", F64, "m", nullable=True),
+        Column("mpjpe_l_alive_m", F64, "m", nullable=True),
+        Column("mpjpe_g_alive_m", F64, "m", nullable=True),
+        Column("acceleration_ratio", F64, "1", nullable=True),
     ),
     dynamic={
         "limb_gain_": "1",

@@ -16,12 +16,12 @@ class RepairConfig:
 
     Attributes:
         target_share: Share of feasible steps from which nothing more is done; 0 repairs nothing.
-        weights: Of the dynamics term, tried in turn.
+        weights: Weights of the dynamics term, tried in turn.
         iterations: Most Newton steps with each of them.
         tolerance: Relative decrease of the cost at which they stop.
         max_added_error_mm: Largest keypoint error that repair may add, millimetres.
         slow_rounds: How often a motion with `tempo: auto` may be slowed down and solved again.
-        slowest: Smallest tempo that `auto` may choose.
+        slowest: Smallest tempo that `auto` may choose, ratio to the clip's.
     """
 
     target_share: float = Field(default=0.95, ge=0, le=1)
@@ -40,8 +40,8 @@ class RetargetConfig:
     Attributes:
         method: optimise (ours), paper (Table I literally) or framefix (its signs corrected).
         cyclic: Whether to close the clip to a cycle; auto decides by the seam.
-        tempo: Speed of the motion beside the clip's, below 1 slower; auto slows it down where that
-            lets the robot do it.
+        tempo: Speed of the motion, ratio to the clip's, below 1 slower; auto slows it down where
+            that lets the robot do it.
         seed: Seed of the random starts of the per-frame solver.
         starts: Poses from which every frame is solved.
         lean_deg: Largest lean that brings a body that stays on both feet over them, degrees.

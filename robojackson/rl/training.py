@@ -51,7 +51,8 @@ def train_policy(
     run = Run(out, config, core, Task.of(reference, robot), hooks)
     env = TrackingVecEnv(core, run.episodes)
     tqc = config.tqc if networks is None else _shaped(networks, core, config)
-    trainer = make_trainer(config.trainer, env, tqc, config.seed)
+    seen = core.actor_size if core.actor_size < core.observation_size else None
+    trainer = make_trainer(config.trainer, env, tqc, config.seed, seen)
     if networks is not None:
         trainer.start_from(chosen(networks, config.start_critics).tensors)
     run.bind(trainer)

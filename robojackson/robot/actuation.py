@@ -1,4 +1,10 @@
-"""Torque limits of the hinges, from the motors of the MJCF or from the description. Nm."""
+"""Torque limits, gains and action scales of the hinges, from the description or from the MJCF.
+
+A motor's number in the description goes before that of the MJCF. Nm, radians, seconds.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -6,6 +12,90 @@ from jaxtyping import Float
 
 from robojackson.robot.description import RobotDescription
 from robojackson.robot.names import matching, where
+
+STIFFNESS_OF_LIMIT = 4.0
+"""Proportional gain where the description names none, multiples of the torque limit, 1/rad."""
+DAMPING_OF_STIFFNESS = 0.1
+"""Derivative gain where the description names none, multiples of the proportional one, s."""
+DAMPING_RATIO = 2.0
+ACTION_SCALE_RAD = 0.5
+
+
+@dataclass(frozen=True)
+class Actuation:
+    """What drives the hinges, in the order of qpos.
+
+    Attributes:
+        torque_limit: Nm; infinite without a motor.
+        speed_limit: rad/s.
+        stiffness: Proportional gain, Nm/rad; infinite without a motor.
+        damping: Derivative gain, Nm s/rad.
+        action_scale: How far a full action moves a hinge's target, rad.
+    """
+
+    torque_limit: Float[np.ndarray, " J"]
+    speed_limit: Float[np.ndarray, " J"]
+    stiffness: Float[np.ndarray, " J"]
+    damping: Float[np.ndarray, " J"]
+    action_scale: Float[np.ndarray, " J"]
+
+
+def actuation_of(
+    model: mujoco.MjModel, description: RobotDescription, joints: tuple[str, ...]
+) -> Actuation:
+    """Bind the numbers of the description to the hinges of a compiled model.
+
+    Gains are those that are named; else those of the natural frequency f and damping ratio z of
+    the PD law with the hinge's armature I, kp = I (2 pi f)^2 and kd = 2 z I 2 pi f (BeyondMimic,
+    2025, appendix); else multiples of the torque limit.
+
+    Raises:
+        UnknownName: a hinge or pattern that matches none.
+    """
+
+    def named(key: str) -> Float[np.ndarray, " J"]:
+        return per_hinge(getattr(description, key), joints, where(description, key))
+
+    limit = torque_limits(model, description, joints)
+    armature = model.dof_armature[6:]
+    turns, ratio = 2 * np.pi * named("natural_frequency"), named("damping_ratio")
+    ratio = np.where(np.isnan(ratio), DAMPING_RATIO, ratio)
+    stiffness = _first(named("stiffness"), armature * turns**2, STIFFNESS_OF_LIMIT * limit)
+    damping = _first(
+        named("damping"), 2 * ratio * armature * turns, DAMPING_OF_STIFFNESS * stiffness
+    )
+    scale = named("action_scale")
+    speed = named("speed_limits")
+    return Actuation(
+        torque_limit=limit,
+        speed_limit=np.where(np.isnan(speed), description.max_joint_speed, speed),
+        stiffness=stiffness,
+        damping=damping,
+        action_scale=np.where(np.isnan(scale), ACTION_SCALE_RAD, scale),
+    )
+
+
+def per_hinge(
+    named: Mapping[str, float], joints: tuple[str, ...], place: str
+) -> Float[np.ndarray, " J"]:
+    """Values of patterns a hinge, NaN where none matches; the last that matches counts.
+
+    Raises:
+        UnknownName: a pattern that matches no hinge.
+    """
+    values = np.full(len(joints), np.nan)
+    for pattern, value in named.items():
+        for name in matching("joint", pattern, joints, place):
+            values[joints.index(name)] = value
+    return values
+
+
+def _first(*choices: Float[np.ndarray, " J"]) -> Float[np.ndarray, " J"]:
+    """The first that is a number, hinge by hinge."""
+    result = choices[0]
+    for choice in choices[1:]:
+        result = np.where(np.isnan(result), choice, result)
+    return result
 
 
 def torque_limits(
@@ -24,11 +114,9 @@ def torque_limits(
             joint = model.actuator_trnid[index, 0]
             driven[joint - 1] += _force(model, index)
             limit[joint - 1] = min(driven[joint - 1], _own_limit(model, joint))
-    for pattern, torque in description.torque_limits.items():
-        place = where(description, "torque_limits")
-        for name in matching("joint", pattern, joints, place):
-            limit[joints.index(name)] = torque * description.gear_scale
-    return limit
+    place = where(description, "torque_limits")
+    named = per_hinge(description.torque_limits, joints, place) * description.gear_scale
+    return np.where(np.isnan(named), limit, named)
 
 
 def _force(model: mujoco.MjModel, index: int) -> float:

@@ -69,6 +69,62 @@ class RobotSource:
 
 
 @config_dataclass
+class SimulationDescription:
+    """How the physics is stepped; what is not named stays as the MJCF has it.
+
+    Attributes:
+        timestep: Seconds a physics substep; a control step is a whole number of them.
+        integrator: MuJoCo's integrator.
+        iterations: Most iterations of the constraint solver.
+        ls_iterations: Most iterations of its line search.
+        friction: Sliding friction of the floor and of the bodies that carry contact points.
+    """
+
+    timestep: Positive | None = None
+    integrator: Literal["Euler", "RK4", "implicit", "implicitfast"] | None = None
+    iterations: Annotated[int, Field(ge=1)] | None = None
+    ls_iterations: Annotated[int, Field(ge=1)] | None = None
+    friction: Positive | None = None
+
+
+@config_dataclass
+class FallRule:
+    """When a robot has fallen.
+
+    Attributes:
+        frame: `world`: the root is lower than `height` or tilted more than `tilt` (the paper's
+            rule). `reference`: it is farther from the height of the reference's root, or its up
+            axis from the reference's, so that bowing and kneeling are allowed where the reference
+            does (the termination of BeyondMimic, 2025).
+        height: Metres; when null, 0.7 or 0.55 of the height at which the root stands, whichever is
+            less.
+        tilt: Radians.
+    """
+
+    frame: Literal["world", "reference"] = "world"
+    height: Weight | None = None
+    tilt: float = Field(default=1.0471975511965976, gt=0)
+
+
+@config_dataclass
+class StrictRule:
+    """What strict success forbids at every step, beside a fall.
+
+    Attributes:
+        sites: Largest mean distance of the keypoints, in the frame of pelvis and heading, m.
+        ends: Largest difference in height of feet and hands to the reference's, m; none when null.
+        knees: Height of a knee below which it kneels where the reference does not, m; none when
+            null.
+        floor: Whether no body may touch the floor that the reference does not hold there.
+    """
+
+    sites: float = Field(default=0.30, gt=0)
+    ends: Positive | None = None
+    knees: Positive | None = 0.15
+    floor: bool = False
+
+
+@config_dataclass
 class RobotDescription:
     """What `configs/robots/<name>.yaml` holds. Where it and its model lie is no part of what it is:
     `mjcf` and `file` are not compared and in no cache key; the digest of the model is.
@@ -86,7 +142,22 @@ class RobotDescription:
         max_joint_speed: Speed limit of the hinges in a reference motion, rad/s.
         control_dt: Seconds a control step.
         gear_scale: Factor on the torque of all motors.
-        torque_limits: Hinge, or pattern with `*`, -> torque limit where the MJCF has no motor, Nm.
+        torque_limits: Hinge, or pattern with `*`, -> torque limit, Nm. A hinge without an actuator
+            in the MJCF gets a motor of that limit. Here and below the last pattern that matches
+            counts.
+        speed_limits: Hinge -> speed limit of its motor, rad/s; `max_joint_speed` where not named.
+        armature: Hinge -> rotor inertia seen at the hinge, kg m^2; the MJCF's where not named.
+        stiffness: Hinge -> proportional gain of the PD law, Nm/rad; where not named, that of the
+            natural frequency, else four times the torque limit.
+        damping: Hinge -> derivative gain, Nm s/rad; where not named, that of the damping ratio,
+            else a tenth of the proportional gain.
+        natural_frequency: Hinge -> natural frequency of armature and PD law, Hz.
+        damping_ratio: Hinge -> damping ratio of the same; 2 where only the frequency is named.
+        action_scale: Hinge -> how far a full action of a policy moves its target, rad.
+        stand_pose: Hinge -> angle of the default stand, radians; zero where it is not named.
+        simulation: How the physics is stepped.
+        fall: When the robot has fallen.
+        strict: What strict success forbids beside a fall.
         source: Where the model comes from when it is not installed.
         file: The YAML that it was read from, where that is none of `configs/robots`; set by its
             reader.
@@ -103,5 +174,16 @@ class RobotDescription:
     control_dt: float = Field(default=0.015, gt=0)
     gear_scale: float = Field(default=1.0, gt=0)
     torque_limits: Mapping[str, Positive] = Field(default_factory=dict)
+    speed_limits: Mapping[str, Positive] = Field(default_factory=dict)
+    armature: Mapping[str, Weight] = Field(default_factory=dict)
+    stiffness: Mapping[str, Positive] = Field(default_factory=dict)
+    damping: Mapping[str, Weight] = Field(default_factory=dict)
+    natural_frequency: Mapping[str, Positive] = Field(default_factory=dict)
+    damping_ratio: Mapping[str, Positive] = Field(default_factory=dict)
+    action_scale: Mapping[str, Positive] = Field(default_factory=dict)
+    stand_pose: Mapping[str, float] = Field(default_factory=dict)
+    simulation: SimulationDescription = Field(default_factory=SimulationDescription)
+    fall: FallRule = Field(default_factory=FallRule)
+    strict: StrictRule = Field(default_factory=StrictRule)
     source: RobotSource | None = None
     file: str = field(default="", compare=False)

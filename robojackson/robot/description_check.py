@@ -20,6 +20,8 @@ from robojackson.robot.names import known, matching, where
 SWAPPED_M = 0.01
 """A left keypoint that is further to the right of the right one than this is on the wrong side."""
 MIRRORED_M = 0.005
+UPRIGHT = 0.5
+"""Least cosine of the angles of the root's x axis to forward and of its z axis to up."""
 PAIRS = tuple(key.removeprefix("left_") for key in (*KEYPOINTS, *TOES) if key.startswith("left_"))
 
 
@@ -32,7 +34,7 @@ def problems(description: RobotDescription) -> list[str]:
         robot = load_robot(description)
     except RoboJacksonError as cause:
         return [str(cause)]
-    return [*_out_of_range(robot), *_sides(robot)]
+    return [*_upright(robot), *_out_of_range(robot), *_sides(robot)]
 
 
 def _unknown_names(description: RobotDescription) -> Iterator[str]:
@@ -68,6 +70,19 @@ def _error(check: Callable[..., Any], *given: Any) -> Iterator[str]:
         check(*given)
     except RoboJacksonError as cause:
         yield str(cause)
+
+
+def _upright(robot: Robot) -> Iterator[str]:
+    """A root whose own axes are others: its heading and its falls would be measured wrong."""
+    data = mujoco.MjData(robot.model)
+    mujoco.mj_kinematics(robot.model, data)
+    axes = data.xmat[robot.model.body(robot.description.root_body).id].reshape(3, 3)
+    if axes[0, 0] < UPRIGHT or axes[2, 2] < UPRIGHT:
+        yield (
+            f"{where(robot.description, 'root_body')}: the axes of {robot.description.root_body!r} "
+            "are not x forward and z up where the model stands, and a fall is measured by them; in "
+            "the MJCF, put the free joint on a body around it that has no rotation"
+        )
 
 
 def _out_of_range(robot: Robot) -> Iterator[str]:

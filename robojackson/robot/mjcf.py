@@ -15,6 +15,7 @@ import mujoco
 from robojackson.errors import BadConfiguration
 from robojackson.robot.description import KEYPOINTS, TOES, RobotDescription
 from robojackson.robot.names import known, where
+from robojackson.robot.physics import apply_physics, is_plane
 
 STORE = "ROBOJACKSON_STORE"
 ADDED = "store"
@@ -83,13 +84,14 @@ def _in_package(description: RobotDescription, package: str, inside: str) -> Pat
 
 def compiled(description: RobotDescription, path: Path) -> mujoco.MjModel:
     """The model with the keypoint sites, a floor, and scaled motors."""
+    _silence_mujoco()
     spec = read_spec(path, description)
     bodies = [body.name for body in spec.bodies if body.name != "world"]
     _add_sites(spec, description, bodies)
-    planes = (geom.type == mujoco.mjtGeom.mjGEOM_PLANE for geom in spec.worldbody.geoms)
-    if not any(planes):
+    if not any(is_plane(geom) for geom in spec.worldbody.geoms):
         plane = mujoco.mjtGeom.mjGEOM_PLANE
         spec.worldbody.add_geom(name="floor", type=plane, size=[40, 40, 1], rgba=[0.5] * 3 + [1])
+    apply_physics(spec, description)
     try:
         model = spec.compile()
     except ValueError as error:
@@ -104,6 +106,17 @@ def model_sha256(path: Path) -> str:
     if len(digests) == 1:
         return digests[0].hexdigest()
     return hashlib.sha256(b"".join(digest.digest() for digest in digests)).hexdigest()
+
+
+def _silence_mujoco() -> None:
+    """Keep MuJoCo's warnings out of the terminal and of a MUJOCO_LOG.TXT where the user stands.
+
+    A simulation that diverges, as a robot that just learns to stand does, is counted in
+    `data.warning`, which ends the episode.
+    """
+    config = mujoco.MjLogConfig.get()
+    config.logto_console = config.logto_file = False
+    mujoco.MjLogConfig.set(config)
 
 
 def _files(path: Path) -> list[Path]:

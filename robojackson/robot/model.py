@@ -15,8 +15,9 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from robojackson.errors import BadConfiguration
 from robojackson.files.file_tree import FileTree
-from robojackson.robot.actuation import torque_limits
+from robojackson.robot.actuation import Actuation, actuation_of, per_hinge
 from robojackson.robot.checks import check_joints, check_names, check_soles, check_symmetry
 from robojackson.robot.description import (
     KEYPOINTS,
@@ -26,7 +27,8 @@ from robojackson.robot.description import (
     RobotSource,
 )
 from robojackson.robot.mjcf import compiled, mjcf_path, model_sha256, site_of
-from robojackson.robot.names import known, matching, where
+from robojackson.robot.names import known, where
+from robojackson.robot.physics import substeps_of
 
 __all__ = [
     "KEYPOINTS", "TOES", "ContactPoint", "Robot", "RobotDescription", "RobotSource", "known",
@@ -53,7 +55,9 @@ class Robot:
         toe_arms: The same of the toe keypoints beside the feet's; empty where it has none.
         lower, upper: Hinge limits, radians.
         rest: Hinge rest angles, radians.
-        torque_limit: Torque limit a hinge, Nm; infinite without a motor.
+        stand: Hinge angles of the default stand, radians.
+        actuation: Torque limits, gains and action scales a hinge.
+        substeps: Physics substeps a control step.
         lengths: Distance of every pair of keypoints in the zero pose, metres.
     """
 
@@ -75,7 +79,9 @@ class Robot:
     lower: Float[np.ndarray, " J"]
     upper: Float[np.ndarray, " J"]
     rest: Float[np.ndarray, " J"]
-    torque_limit: Float[np.ndarray, " J"]
+    stand: Float[np.ndarray, " J"]
+    actuation: Actuation
+    substeps: int
     lengths: Mapping[tuple[str, str], float] = field(default_factory=dict)
 
     def __repr__(self) -> str:
@@ -98,6 +104,11 @@ class Robot:
         mujoco.mj_saveModel(self.model, None, content)
         FileTree(file.parent).write(file.name, content.tobytes())
         return file
+
+    @property
+    def torque_limit(self) -> Float[np.ndarray, " J"]:
+        """Torque limit a hinge, Nm; infinite without a motor."""
+        return self.actuation.torque_limit
 
     @cached_property
     def actuated(self) -> Bool[np.ndarray, " J"]:
@@ -138,7 +149,7 @@ def _bind(model: mujoco.MjModel, description: RobotDescription, sha256: str) -> 
     bodies = _names(model.nbody, model.body)[1:]
     check_names(description, bodies, joints)
     keys = KEYPOINTS + tuple(toe for toe in TOES if toe in description.sites)
-    rest = _rest(description, joints)
+    rest = _pose(description, "rest_pose", joints)
     lengths = _lengths(_posed(model, np.zeros_like(rest)), keys)
     check_symmetry(description, lengths)
     contacts = description.contacts
@@ -163,7 +174,9 @@ def _bind(model: mujoco.MjModel, description: RobotDescription, sha256: str) -> 
         lower=model.jnt_range[1:, 0].copy(),
         upper=model.jnt_range[1:, 1].copy(),
         rest=rest,
-        torque_limit=torque_limits(model, description, joints),
+        stand=_pose(description, "stand_pose", joints),
+        actuation=actuation_of(model, description, joints),
+        substeps=_substeps(model, description),
         lengths=lengths,
     )
 
@@ -172,12 +185,23 @@ def _names(count: int, accessor: object) -> tuple[str, ...]:
     return tuple(accessor(index).name for index in range(count))  # type: ignore[operator]
 
 
-def _rest(description: RobotDescription, joints: tuple[str, ...]) -> Float[np.ndarray, " J"]:
-    rest = np.zeros(len(joints))
-    for pattern, angle in description.rest_pose.items():
-        for name in matching("joint", pattern, joints, where(description, "rest_pose")):
-            rest[joints.index(name)] = angle
-    return rest
+def _pose(
+    description: RobotDescription, key: str, joints: tuple[str, ...]
+) -> Float[np.ndarray, " J"]:
+    named: Mapping[str, float] = getattr(description, key)
+    result: np.ndarray = np.nan_to_num(per_hinge(named, joints, where(description, key)))
+    return result
+
+
+def _substeps(model: mujoco.MjModel, description: RobotDescription) -> int:
+    timestep = float(model.opt.timestep)
+    count = substeps_of(description.control_dt, timestep)
+    if count is None:
+        raise BadConfiguration(
+            f"{where(description, 'control_dt')}: {1e3 * description.control_dt:g} ms is no whole "
+            f"number of physics steps of {1e3 * timestep:g} ms"
+        )
+    return count
 
 
 def _posed(model: mujoco.MjModel, hinges: Float[np.ndarray, " J"]) -> mujoco.MjData:

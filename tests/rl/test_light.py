@@ -10,7 +10,7 @@ import numpy as np
 from robojackson.files import tables
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import ControlConfig
-from robojackson.rl.modes.observation import observation_size
+from robojackson.rl.modes.observation import Observer
 from robojackson.rl.policy import Policy
 from robojackson.robot.model import Robot
 from tests.fixtures.commands import environment
@@ -29,8 +29,7 @@ finally:
 def test_the_command_evaluate_loads_nothing_that_trains(
     robot: Robot, sway: ReferenceMotion, tmp_path: Path
 ) -> None:
-    model = robot.model
-    size = observation_size(model.nq - 7, model.nu, len(robot.keypoint_names))
+    model, size = robot.model, Observer(robot, "full").size
     nothing = (np.zeros((size, model.nu)), np.zeros(model.nu))
     facts = {"robot": "humanoid", "control": dataclasses.asdict(ControlConfig())}
     (tmp_path / "policy.safetensors").write_bytes(Policy((nothing,), facts).to_bytes())

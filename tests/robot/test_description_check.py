@@ -1,11 +1,13 @@
 """All that is wrong with a description is told in one go, a line each."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from robojackson.robot.description import ContactPoint, RobotDescription
 from robojackson.robot.description_check import problems
+from robojackson.robot.mjcf import mjcf_path
 from tests.fixtures.robots import description
 
 
@@ -44,6 +46,20 @@ def test_every_missing_site_is_told(humanoid: RobotDescription) -> None:
 def test_a_model_that_is_not_there_is_one_line(humanoid: RobotDescription) -> None:
     (told,) = problems(replace(humanoid, mjcf="gone.xml"))
     assert told.endswith("mjcf: no such file: gone.xml")
+
+
+@pytest.mark.parametrize(
+    ("turn", "wrong"), [("0 0 100", True), ("0 80 0", True), ("0 10 10", False)]
+)
+def test_a_root_that_does_not_stand_upright_and_face_along_x_is_told(
+    turn: str, wrong: bool, humanoid: RobotDescription, tmp_path: Path
+) -> None:
+    """It would be taken for one that has fallen."""
+    text = mjcf_path(humanoid).read_text()
+    turned = text.replace('<body name="torso"', f'<body name="torso" euler="{turn}"')
+    (tmp_path / "turned.xml").write_text(turned)
+    told = problems(replace(humanoid, mjcf=str(tmp_path / "turned.xml")))
+    assert any("root_body: the axes of 'torso'" in line for line in told) == wrong
 
 
 def test_limbs_of_different_length_are_told(humanoid: RobotDescription) -> None:

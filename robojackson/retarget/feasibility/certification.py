@@ -15,14 +15,9 @@ from robojackson.motion.certificate import Cause, Certificate, Finding
 from robojackson.retarget.feasibility import contact_wrench, inverse_dynamics, tempo
 from robojackson.retarget.feasibility.contact_wrench import Supply, Tolerance
 from robojackson.retarget.targets.ground_contact import GRAVITY
+from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
-from robojackson.robot.tree_kinematics import pose, tree
 
-FALL_HEIGHT_M = 0.7
-FALL_TILT_DEG = 60.0
-"""The paper's fall rule for Humanoid-v5: the torso lower or tilted more has fallen."""
-FALL_SHARE = 0.55
-"""Of the height at which a smaller robot's root stands: lower, it has fallen."""
 _GAP_STEPS = 4  # findings so near to each other are one
 
 
@@ -79,13 +74,6 @@ def fallen(robot: Robot, qpos: Float[np.ndarray, "S nq"]) -> Bool[np.ndarray, " 
     return np.array([failure is not None for failure in _falls(robot, qpos)])
 
 
-def fall_height(robot: Robot) -> float:
-    """Height of the root below which the robot has fallen, metres."""
-    standing = robot.standing[None]
-    sole = inverse_dynamics.sole_points(robot, pose(tree(robot), standing))[0, :, 2].min()
-    return float(min(FALL_HEIGHT_M, FALL_SHARE * (standing[0, 2] - sole)))
-
-
 def _motor_torque(asked: contact_wrench.Demand, found: Supply) -> Float[np.ndarray, "S J"]:
     """Torque of the motors: what a hinge presses on its stop beyond its limit is the stop's."""
     limit = 1.0 / np.where(asked.ease > 0, asked.ease, np.inf)
@@ -123,14 +111,16 @@ def _failure(
 
 
 def _falls(robot: Robot, qpos: Float[np.ndarray, "S nq"]) -> list[_Failure | None]:
-    lowest = fall_height(robot)
+    rule = Fall.of(robot)
+    if rule.relative:  # a motion does not fall beside itself
+        return [None] * len(qpos)
     up = quat_to_matrix(qpos[:, 3:7])[:, 2, 2]
     tilt = np.degrees(np.arccos(np.clip(up, -1.0, 1.0)))
     out: list[_Failure | None] = []
     for angle, height in zip(tilt, qpos[:, 2], strict=True):
-        if angle > FALL_TILT_DEG:
+        if angle > np.degrees(rule.tilt):
             out.append(_Failure("fall rule", "tilt", float(angle), 0.0, 0.0))
-        elif height < lowest:
+        elif height < rule.height:
             out.append(_Failure("fall rule", "height", float(height), 0.0, 0.0))
         else:
             out.append(None)
@@ -183,7 +173,7 @@ def _describe(worst: _Failure) -> tuple[str, str]:
         )
     if worst.cause == "fall rule":
         if worst.part == "tilt":
-            return f"tilted {worst.amount:.0f} degrees (fall: {FALL_TILT_DEG:g})", "cut it out"
+            return f"tilted {worst.amount:.0f} degrees: a fall", "cut it out"
         return f"root at {worst.amount:.2f} m: a fall", "cut it out"
     if worst.cause == "no contact":
         return (

@@ -20,17 +20,18 @@ class Weights:
     """Weights of the cost; the keypoints' own are in the robot description.
 
     Attributes:
-        height: Of the sole height of a foot in contact, 1/m2.
-        penetration: Of floor penetration of feet and of anything else, 1/m2.
-        self_penetration: Of overlap between the robot's own geoms, 1/m2.
-        slip: Of the velocity of a planted sole, s2/m2.
-        balance: Of the distance from the zero moment point to the support, 1/m2.
+        height: Weight of the sole height of a foot in contact, 1/m2.
+        penetration: Weight of floor penetration of feet and of anything else, 1/m2.
+        self_penetration: Weight of overlap between the robot's own geoms, 1/m2.
+        slip: Weight of the velocity of a planted sole, s2/m2.
+        balance: Weight of the distance from the zero moment point to the support, 1/m2.
         balance_reach: Distance from which that term loses its grip (Cauchy's loss), metres.
-        acceleration: Of tangent accelerations, s4/rad2.
-        posture: Of the distance to the rest pose, 1/rad2.
-        speed: Of hinge speed over the limit, s2/rad2.
+        acceleration: Weight of tangent accelerations, s4/rad2.
+        posture: Weight of the distance to the rest pose, 1/rad2.
+        speed: Weight of hinge speed over the limit, s2/rad2.
         speed_share: Share of the speed limit from which it costs.
-        dynamics: Of what neither soles nor motors can give, in tolerances; only the last solution.
+        dynamics: Weight of what neither soles nor motors can give, 1/tolerances2; only the last
+            solution.
         dynamics_reach: Slack from which that term loses its grip (Cauchy's loss), tolerances.
         dynamics_margin: Slack from which it costs, tolerances.
         dynamics_barrier: How softly that term keeps off every limit, squared tolerances.

@@ -36,9 +36,9 @@ class SolverConfig:
         iterations: Most Newton steps from each start, at the coarsest rate.
         polish_iterations: Most Newton steps at each finer rate.
         tolerance: Relative decrease of the cost at which the control rate stops.
-        rough_tolerance: The same at the coarser rates.
+        rough_tolerance: Relative decrease of the cost at which the coarser rates stop.
         largest_turn: Largest change of an angle in one step, radians.
-        damping: First Levenberg-Marquardt damping.
+        damping: First Levenberg-Marquardt damping, unitless.
     """
 
     iterations: int = Field(default=40, ge=1)

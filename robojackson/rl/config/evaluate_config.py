@@ -16,12 +16,15 @@ class EvaluateConfig:
         seconds: Length of a rollout on a cyclic clip, s; others run to their end.
         phases: Start phases, spread evenly over the clip.
         resets: Noisy starts a phase.
-        seed: Of the noise.
-        joint_noise, joint_speed_noise, root_speed_noise: Reset noise, rad, rad/s, m/s.
-        strict_error: Largest mean site error of a strict success, m.
-        kneel_height: A knee lower than this is kneeling, m.
+        seed: Seed of the noise.
+        joint_noise: Reset noise of hinge angles, rad.
+        joint_speed_noise: Reset noise of hinge speeds, rad/s.
+        root_speed_noise: Reset noise of the root's velocity, m/s.
+        strict_error: Largest mean site error of a strict success, m; the robot's when null.
+        kneel_height: A knee lower than this is kneeling, m; the robot's when null.
         fast: Reference speed from which a limb's gain is measured, m/s.
         max_lag: Longest lag tried for a limb's gain, s.
+        threads: Threads that step the simulations.
     """
 
     seconds: float = Field(default=10.0, gt=0, le=3600)
@@ -31,8 +34,8 @@ class EvaluateConfig:
     joint_noise: float = Field(default=0.02, ge=0)
     joint_speed_noise: float = Field(default=0.1, ge=0)
     root_speed_noise: float = Field(default=0.02, ge=0)
-    strict_error: float = Field(default=0.30, gt=0)
-    kneel_height: float = 0.15
+    strict_error: float | None = Field(default=None, gt=0)
+    kneel_height: float | None = Field(default=None, gt=0)
     fast: float = Field(default=0.15, gt=0)
     max_lag: float = Field(default=0.1, ge=0)
     threads: int = Field(default=2, ge=1)

@@ -73,15 +73,18 @@ class PaperConfig:
         imitation: Weight of the imitation term; lambda ramps it.
         relative: The points are compared relative to the pelvis (`root`) or where they are
             (`world`); the table of episodes has both distances.
-        weights: Of the squared distances, by keypoint or body.
-        lambda_min, lambda_max, ramp_episodes: lambda = max(min, max * min(1, episode / ramp)).
+        weights: Weights of the squared distances, by keypoint or body.
+        lambda_min: Least lambda = max(min, max * min(1, episode / ramp)), unitless.
+        lambda_max: Largest lambda, unitless.
+        ramp_episodes: Episodes over which it grows.
         upright: Weight of max(0, z . g), the torso's axis against gravity.
-        balance: Weight of 1 / (1 + |COM_xy - pelvis_xy|), metres.
-        own: Weight of Humanoid-v5's own reward, summed over the repeats.
+        balance: Weight of 1 / (1 + |COM_xy - pelvis_xy|), distances in metres, unitless.
+        own: Weight of Humanoid-v5's own reward, summed over the repeats, unitless.
         curiosity: Which weight the sum of absolute speeds gets.
         curiosity_of: Speeds of the `hinges`, or angular speeds of all `bodies`, rad/s.
-        fall_penalty: Taken off once at a fall.
-        fall_height, fall_tilt: Torso lower (m) or tilted more (rad) is a fall.
+        fall_penalty: Reward that is taken off once at a fall, unitless.
+        fall_height: Torso lower than this is a fall, m.
+        fall_tilt: Torso tilted more than this is a fall, rad.
         highest: Torso higher than this ends the episode too, m.
         early_fall: Policy steps below which a fall counts as early.
         repeats: Control steps for which an action is held.
@@ -89,7 +92,7 @@ class PaperConfig:
         observe: Humanoid-v5's 348 numbers (`stock`), or only the first 45 of them, positions and
             velocities (`joints`), which learn faster; `network_arrays.widened` makes up for the
             rest.
-        reset_noise: Uniform noise on the state of the stock reset, m, rad, m/s, rad/s.
+        reset_noise: Uniform noise on the state of the stock reset, SI units.
         threads: Threads that step the simulations.
     """
 

@@ -63,17 +63,23 @@ class TqcConfig:
         n_envs: Simulations stepped together.
         steps_per_round: Policy steps of every simulation between two rounds of updates.
         updates_per_round: Gradient updates a round.
+        learning_rate: Step of Adam, for actor, critics and entropy, unitless.
         buffer: Transitions kept for replay, float32.
         warmup: Transitions before the first update, random ones unless the start is pretrained.
-        critics: SBX has two, and so has the reference.
-        top_quantiles_to_drop: Of each critic's quantiles, against overestimation.
+        batch: Transitions of a gradient update.
+        tau: Share by which the target critics follow an update.
+        gamma: Discount of a later reward, factor a policy step.
+        critics: Critic networks; SBX has two, and so has the reference.
+        quantiles: Quantiles of each critic.
+        top_quantiles_to_drop: Quantiles of each critic that are dropped, against overestimation.
+        entropy: Entropy coefficient: `auto` learns it, `auto_0.02` from that value.
         policy_delay: Critic updates an actor update, so many times in a round; `sb3` knows only 1.
         actor: Units of the actor's hidden layers.
-        critic: The same of the critics'.
+        critic: Units of the critics' hidden layers.
         layer_norm: Layer normalisation between the critics' layers.
         gsde: State-dependent exploration; `sbx` has none and explores with plain noise.
         log_std_init: Logarithm of the first exploration noise; `sb3` uses it with gSDE only.
-        target_entropy: Entropy that exploration keeps, in units of minus the number of actions.
+        target_entropy: Entropy that exploration keeps, multiples of minus the number of actions.
         actor_average: Weight of the past in the running mean of the actor that becomes the
             policy, a round of updates; 0 is the last actor.
     """

@@ -16,20 +16,22 @@ class ControlConfig:
     Attributes:
         law: `pd`: a PD law evaluated once a substep. `hold`: the same evaluated once a control
             step, its torque held, as a plain `env.step` does. `torque`: the action is the torque.
-        substeps: Physics substeps a control step (Humanoid-v5: 5 of 3 ms).
-        stiffness: Proportional gain, multiples of the stock torque limit, 1/rad.
-        damping: Derivative gain, multiples of the proportional one, seconds.
-        residual: Largest offset that the policy adds to the reference's joint angles, rad.
-        arm_residual: The same for the arms: enough to hold them up, too little to balance by
-            flailing.
+        substeps: Physics substeps a control step; the robot's when null.
+        stiffness: Proportional gain, multiples of the torque limit, 1/rad; the robot's own gains
+            when null.
+        damping: Derivative gain, multiples of the proportional one, seconds; the robot's when
+            null.
+        residual: Largest offset that the policy adds to the reference's joint angles, rad; the
+            robot's action scale when null.
+        arm_residual: Largest offset that the policy adds to the arms' angles, rad.
     """
 
     law: Literal["pd", "hold", "torque"] = "pd"
-    substeps: int = Field(default=5, ge=1)
-    stiffness: float = Field(default=4.0, gt=0)
-    damping: float = Field(default=0.1, ge=0)
-    residual: float = Field(default=0.5, gt=0)
-    arm_residual: float = Field(default=0.25, gt=0)
+    substeps: int | None = Field(default=None, ge=1)
+    stiffness: float | None = Field(default=None, gt=0)
+    damping: float | None = Field(default=None, ge=0)
+    residual: float | None = Field(default=None, gt=0)
+    arm_residual: float | None = Field(default=None, gt=0)
 
 
 @config_dataclass
@@ -58,17 +60,26 @@ class RewardConfig:
     """Weights and widths of the local tracking reward; a term is weight * exp(-error^2 / width^2).
 
     Attributes:
-        joints, joints_width: Hinge angles, root mean square, rad.
-        sites, sites_width: Keypoint sites relative to the pelvis, root mean square, m.
-        hands, hands_width: The hands and the head alone, relative to the pelvis, m.
-        orientation, orientation_width: Root orientation, rad.
-        velocity, velocity_width: Root linear velocity, m/s.
-        joint_speed, joint_speed_width: Hinge speeds, root mean square, rad/s.
-        limb_speed, limb_speed_width: Velocities of feet, hands and head, root mean square, m/s:
-            keeps a robot from balancing by flailing or stepping where the dancer stands.
-        height, height_width: Root height, m.
-        drift, drift_width: Root position, m.
-        action_rate: Penalty on the mean squared change of the action.
+        joints: Weight of the hinge angles, unitless.
+        joints_width: Width for hinge angles, root mean square, rad.
+        sites: Weight of the keypoint sites, unitless.
+        sites_width: Width for sites relative to the pelvis, root mean square, m.
+        hands: Weight of the hands and the head alone, unitless.
+        hands_width: Width for them, relative to the pelvis, m.
+        orientation: Weight of the root orientation, unitless.
+        orientation_width: Width for it, rad.
+        velocity: Weight of the root linear velocity, unitless.
+        velocity_width: Width for it, m/s.
+        joint_speed: Weight of the hinge speeds, unitless.
+        joint_speed_width: Width for hinge speeds, root mean square, rad/s.
+        limb_speed: Weight of the velocities of feet, hands and head, unitless; keeps a robot from
+            balancing by flailing or stepping where the dancer stands.
+        limb_speed_width: Width for these velocities, root mean square, m/s.
+        height: Weight of the root height, unitless.
+        height_width: Width for it, m.
+        drift: Weight of the root position, unitless.
+        drift_width: Width for it, m.
+        action_rate: Penalty on the mean squared change of the action, unitless.
         fine: Share of every term that is paid by a narrower bell: the wide one shows the way from
             afar, the narrow one still pays for the last centimetre.
         narrow: Width of the narrower bell, in widths of the wide one.
@@ -113,19 +124,19 @@ class RewardConfig:
 
 @config_dataclass
 class TerminationConfig:
-    """When an episode ends early. The fall rule is the paper's; the others are for training only.
+    """When an episode ends early. The fall rule is the robot's; the others are for training only.
 
     Attributes:
-        fall_height: Torso lower than this is a fall, m.
-        fall_tilt: Torso tilted more than this is a fall, rad (60 degrees).
+        fall_height: Height of the robot's fall rule, m; the robot's own when null.
+        fall_tilt: Tilt of the robot's fall rule, rad; the robot's own when null.
         orientation: Largest root orientation error, rad.
         height: Largest root height error, m.
         sites: Largest mean site error relative to the pelvis, m.
         drift: Largest root position error, m.
     """
 
-    fall_height: float = 0.7
-    fall_tilt: float = 1.0471975511965976
+    fall_height: float | None = Field(default=None, ge=0)
+    fall_tilt: float | None = Field(default=None, gt=0)
     orientation: float = 1.0
     height: float = 0.25
     sites: float = 0.30
@@ -138,15 +149,13 @@ class RandomConfig:
 
     Attributes:
         friction: Half-width of a uniform factor on the friction of all geoms.
-        gains: The same on stiffness and damping of the PD law.
-        integrators: Robot i gets the i-th, over and over.
+        gains: Half-width of a uniform factor on stiffness and damping of the PD law.
+        integrators: Robot i gets the i-th, over and over; none named, all have the robot's own.
     """
 
     friction: float = Field(default=0.0, ge=0, lt=1)
     gains: float = Field(default=0.0, ge=0, lt=1)
-    integrators: tuple[Literal["RK4", "Euler", "implicitfast"], ...] = Field(
-        default=("RK4",), min_length=1
-    )
+    integrators: tuple[Literal["RK4", "Euler", "implicit", "implicitfast"], ...] = ()
 
 
 @config_dataclass
@@ -154,10 +163,13 @@ class TrackConfig:
     """The tracking environment.
 
     Attributes:
+        observation: What the policy sees: `full`, all that a simulation knows, or `onboard`, what a
+            real robot measures by itself (the critics see all).
         episode_seconds: Time limit of a training episode, s; its end is bootstrapped.
         threads: Threads that step the simulations.
     """
 
+    observation: Literal["full", "onboard"] = "full"
     control: ControlConfig = Field(default_factory=ControlConfig)
     reset: ResetConfig = Field(default_factory=ResetConfig)
     reward: RewardConfig = Field(default_factory=RewardConfig)

@@ -42,7 +42,7 @@ class TrainConfig:
     Attributes:
         mode: `track`, the method that dances, or `paper`, the paper's own.
         trainer: `sbx` (JAX, fast) or `sb3` (sb3-contrib, the reference).
-        seed: Of networks, environments and replay.
+        seed: Seed of networks, environments and replay.
         steps: Policy steps over all simulations, rounded up to a round of updates.
         minutes: Wall time, minutes.
         cpu_minutes: Time of the processor, all threads together, minutes.

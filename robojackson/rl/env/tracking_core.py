@@ -82,6 +82,7 @@ class TrackingCore:
         self._last = np.zeros((n, robot.model.nu))
         self._totals = EpisodeTotals(n, self.clip.dt)
         self.observation_size = self.mode.observation_size
+        self.actor_size = self.mode.actor_size
         self.action_size = robot.model.nu
 
     def reseed(self, seed: int) -> None:

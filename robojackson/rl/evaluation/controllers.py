@@ -1,6 +1,6 @@
 """Who drives a robot when a policy is judged: the policy, and those that do not dance beside it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TypeVar
 
@@ -12,7 +12,7 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.evaluate_config import TRAINED
 from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.evaluation.rollouts import Driver
-from robojackson.rl.modes.observation import observation_size, observe
+from robojackson.rl.modes.observation import Kind, Observer
 from robojackson.rl.policy import Policy
 from robojackson.rl.sim.motors import Motors, residual_scale
 from robojackson.rl.sim.reference_clip import ClipStep
@@ -42,7 +42,7 @@ def control_of(policy: Policy, robot: Robot) -> ControlConfig:
         )
     if "control" not in policy.facts:
         raise BadPolicy("the policy's file says nothing of its control law")
-    sizes = _observation_sizes(robot, mode_of(policy))
+    sizes = _observation_sizes(policy, robot)
     if policy.observation_size not in sizes:
         raise BadPolicy(
             f"the policy takes {policy.observation_size} observations and robot "
@@ -100,11 +100,14 @@ def _trained(policy: Policy, robot: Robot, control: ControlConfig) -> Driver:
         repeats = fact(policy, "repeats", PositiveInt) if "repeats" in policy.facts else 1
         return Driver(control, torque, repeats)
 
+    observer = Observer(robot, observation_of(policy))
+
     def target(
         sim: Simulation, following: ClipStep, start: np.ndarray, last: np.ndarray
     ) -> np.ndarray:
-        seen = observe(sim.qpos, sim.qvel, sim.points, following, last)
-        result: np.ndarray = sim.reference_angles(following) + sim.residual * policy.act(seen)
+        seen = observer.observe(sim.qpos, sim.qvel, sim.points, following, last)
+        action = policy.act(seen[:, : observer.actor_size])
+        result: np.ndarray = sim.reference_angles(following) + sim.residual * action
         return result
 
     return Driver(control, target)
@@ -130,10 +133,17 @@ def _baselines(
     return {name: Driver(control, command) for name, command in commands.items()}
 
 
-def _observation_sizes(robot: Robot, mode: str) -> tuple[int, ...]:
-    """Lengths of the observations that a policy of a mode may take."""
+def observation_of(policy: Policy) -> Kind:
+    """Which inputs a policy of mode `track` takes."""
+    held = policy.facts.get("environment")
+    said = held.get("observation", "full") if isinstance(held, Mapping) else "full"
+    return "onboard" if said == "onboard" else "full"
+
+
+def _observation_sizes(policy: Policy, robot: Robot) -> tuple[int, ...]:
+    """Lengths of the observations that a policy may take."""
     model = robot.model
-    if mode == "paper":
+    if mode_of(policy) == "paper":
         joints = model.nq - 2 + model.nv
         return stock_observation_size(model.nq, model.nv, model.nbody), joints
-    return (observation_size(model.nq - 7, model.nu, len(robot.keypoint_names)),)
+    return (Observer(robot, observation_of(policy)).actor_size,)

@@ -22,7 +22,6 @@ from robojackson.rl.config.train_config import (
     EvaluateConfig,
     PaperConfig,
     ResetConfig,
-    TerminationConfig,
     TrackConfig,
 )
 from robojackson.rl.evaluation.controllers import control_of, drivers, fact, mode_of
@@ -35,7 +34,8 @@ from robojackson.rl.modes.paper_mode import facing_ahead
 from robojackson.rl.modes.reset_states import default_standing_pose, noisy, standing_pose_at
 from robojackson.rl.policy import Policy
 from robojackson.rl.sim.reference_clip import Clip
-from robojackson.rl.sim.simulation import require_same_clock
+from robojackson.rl.sim.simulation import control_step, require_same_clock
+from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
 
 log = logging.getLogger(__name__)
@@ -78,7 +78,7 @@ def evaluate_policy(
         BadPolicy: the policy's observation does not fit this robot.
     """
     control = control_of(policy, robot)
-    require_same_clock(control.substeps * robot.model.opt.timestep, reference.dt)
+    require_same_clock(control_step(robot, control), reference.dt)
     _warn_about_other_motion(policy, reference)
     environment = environment_of(policy, control)
     if isinstance(environment, PaperConfig):
@@ -90,13 +90,16 @@ def evaluate_policy(
         RolloutScorer(robot, reference, config),
         RewardMeter(robot, reference, clip, environment),
     )
+    fall = Fall.of(robot)
     rows: list[dict[str, object]] = []
     summaries: dict[str, dict[str, float]] = {}
     qpos = np.zeros((0, robot.model.nq))
     for name, driver in drivers(policy, reference, robot, config.seed).items():
         tick = partial(progress, name)
-        rules = TerminationConfig()
-        done = roll_out(robot, clip, driver, starts, horizon, config.threads, rules, meter, tick)
+        whole = fall.relative and name == TRAINED
+        done = roll_out(
+            robot, clip, driver, starts, horizon, config.threads, fall, meter, tick, whole
+        )
         judged = [judge.row(name, label, done, i) for i, label in enumerate(labels)]
         rows += judged
         summaries[name] = summarise(judged)
@@ -168,7 +171,8 @@ def _warn_about_other_motion(policy: Policy, reference: ReferenceMotion) -> None
 def summarise(rows: list[dict[str, object]]) -> dict[str, float]:
     """Means over rollouts; limb gains only over those in which the limb had to move."""
     keys = ("survived_s", "success", "strict_success", "skill", "site_error_m", "clip_fraction",
-            "velocity_score", "drift_m", "heading_error_deg", "travel_ratio")  # fmt: skip
+            "velocity_score", "drift_m", "heading_error_deg", "travel_ratio", "mpjpe_l_m",
+            "mpjpe_g_m", "mpjpe_l_alive_m", "mpjpe_g_alive_m", "acceleration_ratio")  # fmt: skip
     out = {key: _mean(rows, key) for key in keys}
     limbs = [key for key in rows[0] if key.startswith(MEANT)]
     out |= {key: _mean(rows, key) for key in limbs}
@@ -195,7 +199,7 @@ def _starts(
         root_speed_noise=config.root_speed_noise,
     )
     qpos, qvel = noisy(at.qpos, at.qvel, noise, np.random.default_rng(config.seed))
-    qpos[-1], qvel[-1] = standing_pose_at(default_standing_pose(robot.model), at.qpos[-1, :7]), 0.0
+    qpos[-1], qvel[-1] = standing_pose_at(default_standing_pose(robot), at.qpos[-1, :7]), 0.0
     return Starts(step, qpos, qvel), labels
 
 

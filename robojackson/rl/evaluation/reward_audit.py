@@ -14,7 +14,6 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import (
     ControlConfig,
     PaperConfig,
-    TerminationConfig,
     TrackConfig,
 )
 from robojackson.rl.evaluation.reward_meter import RewardMeter
@@ -22,6 +21,7 @@ from robojackson.rl.evaluation.rollouts import Driver, Moment, Starts, roll_out
 from robojackson.rl.modes.paper_mode import facing_ahead
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.simulation import Simulation
+from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
 
 MOST_STEPS = 400
@@ -131,7 +131,7 @@ def _replayed(robot: Robot, clip: Clip, meter: RewardMeter) -> float:
     at = clip.at(np.zeros(1, int))
     starts = Starts(np.zeros(1, int), at.qpos, at.qvel)
     horizon = np.full(1, _most(clip))
-    done = roll_out(robot, clip, driver, starts, horizon, 1, TerminationConfig(), meter)
+    done = roll_out(robot, clip, driver, starts, horizon, 1, Fall.of(robot), meter)
     return float(done.totals["return_own"][0])
 
 

@@ -5,6 +5,7 @@ import numpy as np
 
 from robojackson.geometry.rotations import heading, wrapped
 from robojackson.metrics.dance_score import heading_score
+from robojackson.metrics.joint_position_error import acceleration_ratio, mpjpe
 from robojackson.metrics.rollout_score import (
     best_frozen_error,
     heading_frame,
@@ -15,11 +16,13 @@ from robojackson.metrics.rollout_score import (
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import EvaluateConfig
 from robojackson.rl.evaluation.rollouts import Rollouts
+from robojackson.rl.evaluation.strict_success import StrictJudge
 from robojackson.rl.modes.rewards import EXTREMITIES, FEET, PELVIS
-from robojackson.robot.model import Robot
+from robojackson.robot.model import KEYPOINTS, Robot
 
-KNEES = ("left_knee", "right_knee")
 LIMB_ENDS = (*FEET, *EXTREMITIES)
+SITES = len(KEYPOINTS)
+"""Keypoints that position errors are means over: the toes that some robots have come after them."""
 LEAST_MOVING_SHARE = 0.05
 """Of the frames, below which no gain of a limb is told."""
 LEAST_SPREAD_RAD = 0.02
@@ -35,7 +38,7 @@ class RolloutScorer:
         names = robot.keypoint_names
         self._config, self._dt = config, reference.dt
         self._pelvis = names.index(PELVIS)
-        self._knees = [names.index(name) for name in KNEES]
+        self._strict = StrictJudge(robot, reference, config)
         self._limbs = {name: names.index(name) for name in LIMB_ENDS}
         self._model, self._joints = robot.model, robot.joint_names
         asked, slowed = (reference.scorecard.get(key, 1.0) for key in ("tempo", "tempo_mean"))
@@ -52,12 +55,9 @@ class RolloutScorer:
             rollouts.target[span, i], rollouts.target_qpos[span, i, 3:7], self._pelvis
         )
         error = site_error(here, there)
-        knees = rollouts.points[span, i][:, self._knees, 2]
-        wanted_knees = rollouts.target[span, i][:, self._knees, 2]
-        low = self._config.kneel_height
-        kneels = bool(((knees < low) & (wanted_knees >= low)).any())
-        strict = not fell and not kneels and float(error.max()) <= self._config.strict_error
         phase, reset = label
+        found = self._strict.findings(rollouts, i, span, max(phase, 0), error)
+        strict = not fell and not found.any
         row: dict[str, object] = {
             "policy": policy,
             "phase": phase,
@@ -67,7 +67,9 @@ class RolloutScorer:
             "fell": fell,
             "success": float(not fell),
             "strict_success": float(strict),
-            "kneels": kneels,
+            "kneels": found.kneels,
+            "on_floor": found.floor,
+            "end_height_error_m": found.worst_end_m,
             "site_error_m": float(error.mean()),
             "skill": 0.0 if fell else skill(float(error.mean()), best_frozen_error(there)),
             "integrator": mujoco.mjtIntegrator(self._model.opt.integrator).name.removeprefix(
@@ -77,6 +79,7 @@ class RolloutScorer:
         }
         row |= {name: float(total[i]) for name, total in self._means(rollouts).items()}
         row["velocity_score"] = self._velocity_score(rollouts, i, span)
+        row |= _position_errors(rollouts, i, span)
         row |= self._whereabouts(rollouts, i, span) | self._limb_figures(here, there)
         return row | self._usage(rollouts, i, span)
 
@@ -133,3 +136,18 @@ class RolloutScorer:
             figures[f"limb_lag_{name}"] = found.lag_s if found and moves else float("nan")
             figures[f"excess_speed_{name}"] = found.excess_m_s if found else float("nan")
         return figures
+
+
+def _position_errors(rollouts: Rollouts, i: int, span: slice) -> dict[str, float]:
+    """Position errors up to the fall, and to the horizon where robots went on after their fall."""
+    figures: dict[str, float] = {}
+    whole = slice(0, int(rollouts.horizon[i]))
+    for name, part in {"mpjpe_l_alive_m": span, "mpjpe_l_m": whole}.items():
+        roots = (rollouts.qpos[part, i, :3], rollouts.target_qpos[part, i, :3])
+        points = (rollouts.points[part, i, :SITES], rollouts.target[part, i, :SITES])
+        known = part is span or rollouts.whole or not rollouts.fell[i]
+        figures[name] = mpjpe(*points, *roots) if known else float("nan")
+        in_world = name.replace("_l_", "_g_")
+        figures[in_world] = mpjpe(*points) if known else float("nan")
+    points = (rollouts.points[span, i], rollouts.target[span, i])
+    return figures | {"acceleration_ratio": acceleration_ratio(*points)}

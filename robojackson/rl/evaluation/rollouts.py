@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from robojackson.rl.config.train_config import ControlConfig, TerminationConfig
-from robojackson.rl.modes.rewards import fallen
+from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.sim.reference_clip import Clip, ClipStep
 from robojackson.rl.sim.simulation import Simulation
+from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
 
 Reading = dict[str, Float[np.ndarray, " N"]]
@@ -61,9 +61,10 @@ class Moment:
 
 @dataclass(frozen=True)
 class Rollouts:
-    """What N robots did; after its fall a robot's rows repeat the last state.
+    """What N robots did; after its fall a robot's rows repeat the last state, unless `whole`.
 
     Attributes:
+        whole: Whether robots that fell were simulated on to their horizon.
         length: Steps each survived, at most H.
         fell: Whether each fell before the horizon.
         horizon: Steps that each was asked for.
@@ -82,6 +83,7 @@ class Rollouts:
     target: Float[np.ndarray, "H N K 3"]
     target_qpos: Float[np.ndarray, "H N nq"]
     totals: Reading
+    whole: bool = False
 
 
 def roll_out(
@@ -91,11 +93,13 @@ def roll_out(
     starts: Starts,
     horizon: Int[np.ndarray, " N"],
     threads: int,
-    rules: TerminationConfig,
+    fall: Fall,
     meter: Callable[[Moment], Reading] = lambda moment: {},
     tick: Callable[[int, int], None] = lambda step, total: None,
+    whole: bool = False,
 ) -> Rollouts:
-    """Drive a robot from every start, each to its own horizon or its fall."""
+    """Drive a robot from every start, each to its own horizon or its fall; to its horizon in any
+    case when `whole`."""
     n, steps = len(starts.step), int(horizon.max())
     sim = Simulation(robot, driver.control, n, threads)
     sim.place(np.arange(n), starts.qpos, starts.qvel)
@@ -110,8 +114,8 @@ def roll_out(
             residual = command - sim.reference_angles(target)
             last, action = action, np.clip(residual / sim.residual, -1, 1)
             change = np.mean((action - last) ** 2, -1)
-        sim.step(command, alive)
-        still = alive & ~fallen(sim.qpos, rules) & ~sim.broken & (t < horizon)
+        sim.step(command, t < horizon if whole else alive)
+        still = alive & ~fall.has_fallen(sim.qpos, target.qpos) & ~sim.broken & (t < horizon)
         reading = meter(Moment(sim, target, before, change, alive & ~still & (t < horizon)))
         for name, value in reading.items():
             totals[name] = totals.get(name, 0.0) + np.where(alive & (t < horizon), value, 0.0)
@@ -119,8 +123,10 @@ def roll_out(
         length += alive
         record.append((sim.qpos.copy(), sim.points.copy(), target.points, target.qpos))
         tick(t + 1, steps)
-        if not (alive & (t + 1 < horizon)).any():
+        if not ((alive | whole) & (t + 1 < horizon)).any():
             break
     sim.close()
     qpos, points, wanted, target_qpos = (np.stack(column) for column in zip(*record, strict=True))
-    return Rollouts(length, length < horizon, horizon, qpos, points, wanted, target_qpos, totals)
+    return Rollouts(
+        length, length < horizon, horizon, qpos, points, wanted, target_qpos, totals, whole
+    )

@@ -48,7 +48,8 @@ class Mode(Protocol):
         clip: The motion, as the mode compares with it.
         repeats: Control steps an action.
         limit: Control steps of an episode.
-        observation_size: Length of what the policy sees.
+        observation_size: Length of an observation.
+        actor_size: Length of what the policy sees of it: its beginning.
     """
 
     sim: Simulation
@@ -56,6 +57,7 @@ class Mode(Protocol):
     repeats: int
     limit: int
     observation_size: int
+    actor_size: int
 
     def command(self, following: ClipStep, action: np.ndarray) -> np.ndarray:
         """What the simulation is told, for actions -1..1 and the reference's next step."""

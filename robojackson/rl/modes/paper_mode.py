@@ -9,14 +9,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
-from robojackson.errors import BadConfiguration, UnknownName
+from robojackson.errors import UnknownName
 from robojackson.geometry.rotations import heading, quat_multiply
 from robojackson.motion.reference_motion import ReferenceMotion
-from robojackson.rl.config.train_config import ControlConfig, PaperConfig, TerminationConfig
+from robojackson.rl.config.train_config import ControlConfig, PaperConfig
 from robojackson.rl.modes.mode import EpisodeStart, Score
 from robojackson.rl.modes.paper_reward import PaperState, has_fallen, miss, paper_terms, ramp
 from robojackson.rl.sim.reference_clip import Clip, ClipStep
@@ -53,6 +52,7 @@ class PaperMode:
         self.limit = round(config.seconds / self.clip.dt)
         whole = stock_observation_size(model.nq, model.nv, model.nbody)
         self.observation_size = whole if config.observe == "stock" else model.nq - 2 + model.nv
+        self.actor_size = self.observation_size
         self._keypoint_pelvis = robot.keypoint_names.index(PELVIS)
         self._own, self._com = np.zeros(n), self.sim.com.copy()
         self._early = 0
@@ -114,46 +114,6 @@ class PaperMode:
         there = at.points - at.points[:, pelvis, None]
         result: np.ndarray = np.linalg.norm(here - there, axis=-1).mean(-1)
         return result
-
-
-def require_trainable(robot: Robot) -> None:
-    """Refuse a robot that a training cannot move, or that the fall rule calls fallen as it stands.
-
-    Raises:
-        BadConfiguration: it has no torque motors with a range, or it is too small.
-    """
-    model, reason = robot.model, ""
-    motors = (
-        (model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT))
-        & (model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_NONE))
-        & (model.actuator_ctrllimited > 0)
-    )
-    height = float((robot.contact_radii - _sole_centres(robot)).max())
-    if not model.nu:
-        reason = "its MJCF has no motors"
-    elif not motors.all():
-        name = model.actuator(int(np.argmin(motors))).name
-        reason = f"actuator {name!r} is no torque motor with a control range"
-    elif height < TerminationConfig().fall_height:
-        reason = (
-            f"it stands with its root {height:.2f} m above the floor, and less than "
-            f"{TerminationConfig().fall_height:g} m counts as a fall"
-        )
-    if reason:
-        raise BadConfiguration(
-            f"training is not possible on robot {robot.description.name!r} yet: {reason}; "
-            "retargeting, its video and export are"
-        )
-
-
-def _sole_centres(robot: Robot) -> Float[np.ndarray, " C"]:
-    """Heights of the contact balls' centres above the root in the rest pose, metres."""
-    data = mujoco.MjData(robot.model)
-    data.qpos[:] = robot.standing
-    mujoco.mj_kinematics(robot.model, data)
-    feet = data.site_xpos[robot.keypoint_sites[robot.contact_keypoints], 2]
-    result: np.ndarray = feet + robot.contact_arms[:, 2] - data.qpos[2]
-    return result
 
 
 class PaperPoints:

@@ -11,6 +11,7 @@ from jaxtyping import Float, Int
 from robojackson.geometry.rotations import heading
 from robojackson.rl.config.train_config import ResetConfig
 from robojackson.rl.sim.reference_clip import Clip
+from robojackson.robot.model import Robot
 
 BIN_SECONDS = 0.25
 FORGET = 0.02
@@ -105,13 +106,16 @@ def noisy(
     return qpos, qvel
 
 
-def default_standing_pose(model: mujoco.MjModel) -> Float[np.ndarray, " nq"]:
-    """The model's zero pose with its lowest geom on the floor, facing +x at the origin."""
+def default_standing_pose(robot: Robot) -> Float[np.ndarray, " nq"]:
+    """The robot's stand with its lowest solid geom on the floor, facing +x at the origin."""
+    model = robot.model
     data = mujoco.MjData(model)
+    data.qpos[7:] = robot.stand
     mujoco.mj_forward(model, data)
-    solid = [i for i in range(model.ngeom) if model.geom_bodyid[i] > 0]
-    lowest = min(data.geom_xpos[i][2] - _reach_down(model, data, i) for i in solid)
-    qpos = model.qpos0.copy()
+    solid = (model.geom_bodyid > 0) & ((model.geom_contype > 0) | (model.geom_conaffinity > 0))
+    heights = data.geom_xpos[:, 2]
+    lowest = min(heights[i] - _reach_down(model, data, int(i)) for i in np.flatnonzero(solid))
+    qpos = data.qpos.copy()
     qpos[2] -= lowest
     result: np.ndarray = qpos
     return result

@@ -176,14 +176,6 @@ def _mean(values: Float[np.ndarray, "*B K"]) -> Float[np.ndarray, "*B"]:
     return np.asarray(np.add.reduce(values, -1) / values.shape[-1])
 
 
-def fallen(qpos: Float[np.ndarray, "N nq"], config: TerminationConfig) -> Bool[np.ndarray, " N"]:
-    """The paper's fall rule: the torso below 0.7 m or tilted over 60 degrees."""
-    _, x, y, _ = qpos[:, 3:7].T
-    upright = 1 - 2 * (x * x + y * y)
-    result: np.ndarray = (qpos[:, 2] < config.fall_height) | (upright < np.cos(config.fall_tilt))
-    return result
-
-
 def is_off_track(errors: TrackingErrors, config: TerminationConfig) -> Bool[np.ndarray, " N"]:
     """Early termination of training: too far from the reference to learn from."""
     result: np.ndarray = (

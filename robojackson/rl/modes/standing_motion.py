@@ -14,7 +14,7 @@ def make_standing_motion(robot: Robot) -> ReferenceMotion:
     """The default stand, held, cyclic."""
     model, dt = robot.model, robot.description.control_dt
     data = mujoco.MjData(model)
-    data.qpos[:] = default_standing_pose(model)
+    data.qpos[:] = default_standing_pose(robot)
     mujoco.mj_kinematics(model, data)
 
     def held(value: object) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 Action: residual joint angles in actuator order, -1..1, times `Simulation.residual` radians, added
 to the reference's next hinge angles and followed by the PD law of `Simulation`. Observation:
-`observation.observe`. Reward: `rewards.reward_terms`. Episodes start as `reset_states` says.
+`observation.Observer`. Reward: `rewards.reward_terms`. Episodes start as `reset_states` says.
 """
 
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.paper_config import BETA
 from robojackson.rl.config.train_config import RewardConfig, TrackConfig
 from robojackson.rl.modes.mode import EpisodeStart, Score
-from robojackson.rl.modes.observation import observation_size, observe
+from robojackson.rl.modes.observation import Observer
 from robojackson.rl.modes.reset_states import (
     SettledStates,
     StartPhases,
@@ -29,7 +29,6 @@ from robojackson.rl.modes.rewards import (
     RewardState,
     TrackedPoints,
     TrackingErrors,
-    fallen,
     is_off_track,
     own_terms,
     reward_terms,
@@ -38,6 +37,7 @@ from robojackson.rl.modes.rewards import (
 )
 from robojackson.rl.sim.reference_clip import Clip, ClipStep
 from robojackson.rl.sim.simulation import Simulation
+from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
 
 SETTLED_STATES_NEEDED = 32
@@ -65,16 +65,21 @@ class TrackMode:
         self.sim = Simulation(robot, config.control, n, config.threads, config.random, seed)
         self.starts = StartPhases(self.clip, config.reset.failure_share)
         self._settled = SettledStates(robot.model.nq, robot.model.nv)
-        self._stand = default_standing_pose(robot.model)
+        self._stand = default_standing_pose(robot)
+        rules = config.termination
+        self._fall = Fall.of(robot, rules.fall_height, rules.fall_tilt)
         self.limit = round(config.episode_seconds / self.clip.dt)
-        self.observation_size = observation_size(robot.model.nq - 7, robot.model.nu, len(names))
+        self._observer = Observer(robot, config.observation)
+        self.observation_size = self._observer.size
+        self.actor_size = self._observer.actor_size
 
     def command(self, following: ClipStep, action: np.ndarray) -> np.ndarray:
         result: np.ndarray = self.sim.reference_angles(following) + self.sim.residual * action
         return result
 
     def observe(self, following: ClipStep, action: np.ndarray) -> Float[np.ndarray, "N D"]:
-        return observe(self.sim.qpos, self.sim.qvel, self.sim.points, following, action)
+        sim = self.sim
+        return self._observer.observe(sim.qpos, sim.qvel, sim.points, following, action)
 
     def after(self, command: np.ndarray) -> None:
         """Nothing is counted within a step."""
@@ -86,7 +91,8 @@ class TrackMode:
         if self._rewards:
             seen = RewardState(sim.qpos, sim.qvel, sim.points, moved, at, errors, change)
             terms |= own_terms(self._rewards, seen)
-        failed = fallen(sim.qpos, rules) | is_off_track(errors, rules) | sim.broken
+        fell = self._fall.has_fallen(sim.qpos, at.qpos)
+        failed = fell | is_off_track(errors, rules) | sim.broken
         return Score(terms, failed, errors.site_mean)
 
     def begin(self, count: int, rng: np.random.Generator) -> EpisodeStart:

@@ -38,14 +38,35 @@ class Motors:
         )
 
 
+def gains(
+    robot: Robot, control: ControlConfig
+) -> tuple[Float[np.ndarray, " nu"], Float[np.ndarray, " nu"]]:
+    """Gains of the PD law, Nm/rad and Nm s/rad: the robot's own, unless the configuration names
+    multiples of the torque limit."""
+    motors, own = Motors.of(robot.model), robot.actuation
+    kp = own.stiffness[motors.hinge]
+    if control.stiffness is not None:
+        kp = control.stiffness * motors.limit
+    kd = own.damping[motors.hinge] * (kp / own.stiffness[motors.hinge])
+    if control.damping is not None:
+        kd = control.damping * kp
+    return kp, kd
+
+
 def residual_scale(robot: Robot, control: ControlConfig) -> Float[np.ndarray, " nu"]:
-    """Radians that a full action moves each motor's target: less for the arms."""
+    """Radians that a full action moves each motor's target: the robot's action scale, unless the
+    configuration names another for all hinges or for the arms."""
     model = robot.model
     arms = _moved_by(robot, ("left_hand", "right_hand")) - _moved_by(robot, ("head",))
     legs = _moved_by(robot, ("left_foot", "right_foot"))
     joints = model.actuator_trnid[:, 0]
-    is_arm = [int(joint) in arms - legs for joint in joints]
-    return np.where(is_arm, control.arm_residual, control.residual)
+    is_arm = np.array([int(joint) in arms - legs for joint in joints])
+    scale: np.ndarray = robot.actuation.action_scale[Motors.of(model).hinge]
+    if control.residual is not None:
+        scale = np.where(is_arm, scale, control.residual)
+    if control.arm_residual is not None:
+        scale = np.where(is_arm, control.arm_residual, scale)
+    return scale
 
 
 def _moved_by(robot: Robot, keypoints: tuple[str, ...]) -> set[int]:

@@ -62,7 +62,7 @@ class Batch:
         kp: Float[np.ndarray, "..."],
         kd: Float[np.ndarray, "..."],
     ) -> None:
-        self._motors, self._law, self._substeps = motors, control.law, control.substeps
+        self._motors, self._law, self._substeps = motors, control.law, control.substeps or 1
         self._robots = [(m, d, d.ctrl) for m, d in zip(models, datas, strict=True)]
         self._state = [d.qpos[7:] for d in datas] + [d.qvel[6:] for d in datas]
         self._gains = np.stack(np.broadcast_arrays(np.atleast_2d(kp), kd))

@@ -11,6 +11,7 @@ World frame, metres, radians, seconds, newton-metres. MuJoCo releases the interp
 
 import copy
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from itertools import pairwise
 
 import mujoco
@@ -19,10 +20,11 @@ from jaxtyping import Bool, Float, Int
 
 from robojackson.errors import BadPolicy
 from robojackson.rl.config.train_config import ControlConfig, RandomConfig
-from robojackson.rl.sim.motors import Motors, residual_scale
+from robojackson.rl.sim.motors import Motors, gains, residual_scale
 from robojackson.rl.sim.reference_clip import ClipStep
 from robojackson.rl.sim.robot_batch import SIZE, Batch, Views, centre_of_mass
 from robojackson.robot.model import Robot
+from robojackson.robot.physics import integrator_of
 
 BAD_STATE = [
     int(kind)
@@ -33,6 +35,16 @@ BAD_STATE = [
     )
 ]
 """Warnings at which MuJoCo resets a state by itself."""
+
+
+def with_substeps(control: ControlConfig, robot: Robot) -> ControlConfig:
+    """The law of control with the robot's substeps where it names none."""
+    return control if control.substeps else replace(control, substeps=robot.substeps)
+
+
+def control_step(robot: Robot, control: ControlConfig) -> float:
+    """Seconds a control step."""
+    return float((control.substeps or robot.substeps) * robot.model.opt.timestep)
 
 
 def require_same_clock(simulation_dt: float, reference_dt: float) -> None:
@@ -71,11 +83,10 @@ class Simulation:
         random: RandomConfig | None = None,
         seed: int = 0,
     ) -> None:
-        model = robot.model
+        model, control = robot.model, with_substeps(control, robot)
         self.model, self.n, self._sites, self.control = model, n, robot.keypoint_sites, control
         self.motors = Motors.of(model)
-        self.kp = control.stiffness * self.motors.limit
-        self.kd = control.damping * self.kp
+        self.kp, self.kd = gains(robot, control)
         self._models = [model] * n
         if random is not None and random != RandomConfig():
             self._vary(random, np.random.default_rng(seed))
@@ -90,7 +101,7 @@ class Simulation:
         self.points = np.zeros((n, len(robot.keypoint_names), 3))
         self.com = np.zeros((n, 3))
         self.broken = np.zeros(n, bool)
-        self.dt = control.substeps * model.opt.timestep
+        self.dt = control_step(robot, control)
 
     def place(
         self,
@@ -140,8 +151,9 @@ class Simulation:
         self._models = [copy.copy(self.model) for _ in range(self.n)]
         for i, model in enumerate(self._models):
             model.geom_friction[:] *= 1 + random.friction * rng.uniform(-1, 1)
-            chosen = random.integrators[i % len(random.integrators)]
-            model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{chosen.upper()}")
+            if random.integrators:
+                chosen = random.integrators[i % len(random.integrators)]
+                model.opt.integrator = integrator_of(chosen)
         factor = 1 + random.gains * rng.uniform(-1, 1, (self.n, 1))
         self.kp, self.kd = self.kp * factor, self.kd * factor
 

@@ -68,11 +68,18 @@ def quantiles_of_actions(
     return _rest(params, seen + dense(actions, kernel[observations.shape[1] :], bias))
 
 
-def actions_of(params: Parameters, observations: Float[Array, "B O"]) -> Any:
-    """The actor's distribution over actions: a Gaussian squashed by tanh."""
-    hidden, last = observations, len(params["params"]) - 2
+def actions_of(
+    params: Parameters, observations: Float[Array, "B O"], seen: int | None = None
+) -> Any:
+    """The actor's distribution over actions: a Gaussian squashed by tanh.
+
+    Args:
+        seen: Inputs at the beginning that the actor sees; all of them when None.
+    """
+    hidden, last = observations[:, :seen], len(params["params"]) - 2
     for i in range(last):
-        hidden = jax.nn.relu(dense(hidden, *_layer(params, i)))
+        kernel, bias = _layer(params, i)
+        hidden = jax.nn.relu(dense(hidden, kernel[: hidden.shape[1]], bias))
     heads = (_layer(params, last), _layer(params, last + 1))
     kernel, bias = (jnp.concatenate(pair, -1) for pair in zip(*heads, strict=True))
     mean, log_std = jnp.split(dense(hidden, kernel, bias), 2, 1)

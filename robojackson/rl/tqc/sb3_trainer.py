@@ -4,10 +4,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import gymnasium
 import numpy as np
 import torch
 from sb3_contrib import TQC
-from sb3_contrib.tqc.policies import Critic, TQCPolicy
+from sb3_contrib.tqc.policies import Actor, Critic, TQCPolicy
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.type_aliases import RolloutReturn
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
@@ -15,7 +17,7 @@ from robojackson.rl.config.tqc_config import NORM_EPSILON
 from robojackson.rl.config.train_config import TqcConfig
 from robojackson.rl.tqc.network_arrays import CRITICS, TARGETS, Tensors
 from robojackson.rl.tqc.off_policy import OffPolicyTrainer, arguments, is_warming_up
-from robojackson.rl.tqc.trainer import Layers
+from robojackson.rl.tqc.trainer import Layers, of_seen
 
 
 class NormalisedCritic(Critic):
@@ -35,13 +37,39 @@ class NormalisedCritic(Critic):
             self.add_module(f"qf{i}", self.q_networks[i])
 
 
-class NormalisedPolicy(TQCPolicy):
-    """TQC's policy with such critics."""
+class OnboardPolicy(TQCPolicy):
+    """TQC's policy whose actor sees the beginning of an observation alone."""
+
+    seen: int | None = None
+
+    def make_actor(self, features_extractor: Any = None) -> Actor:
+        """The actor; the inputs that it does not see are zero to it."""
+        actor = super().make_actor(features_extractor)
+        if self.seen is not None:
+            actor.features_extractor = Beginning(self.observation_space, self.seen)
+        return actor
+
+
+class NormalisedPolicy(OnboardPolicy):
+    """The same with normalised critics."""
 
     def make_critic(self, features_extractor: Any = None) -> Critic:
         """Critics, or their targets."""
         given = self._update_features_extractor(self.critic_kwargs, features_extractor)
         return NormalisedCritic(**given).to(self.device)
+
+
+class Beginning(BaseFeaturesExtractor):
+    """Observations of which all but the beginning is zero."""
+
+    def __init__(self, space: gymnasium.Space[Any], seen: int) -> None:
+        size = int(np.prod(space.shape or 1))
+        super().__init__(space, size)
+        self._seen = torch.arange(size) < seen
+
+    def forward(self, observations: torch.Tensor) -> torch.Tensor:
+        """The observation with zeros."""
+        return torch.where(self._seen, observations, 0.0)
 
 
 class WarmupTQC(TQC):
@@ -68,25 +96,26 @@ class WarmupTQC(TQC):
 class Sb3Trainer(OffPolicyTrainer):
     """The torch trainer (`Trainer` protocol). It updates the actor with every critic update."""
 
-    def __init__(self, env: VecEnv, config: TqcConfig, seed: int) -> None:
+    def __init__(self, env: VecEnv, config: TqcConfig, seed: int, seen: int | None = None) -> None:
         torch.set_num_threads(1)
         given = arguments(config, seed, env)
         if config.gsde:
             given["use_sde"] = True
             given["policy_kwargs"] |= {"clip_mean": 0.0}  # the policy file knows no clipped mean
-        if config.layer_norm:
-            given["policy"] = NormalisedPolicy
+        kind = NormalisedPolicy if config.layer_norm else OnboardPolicy
+        given["policy"] = type(kind.__name__, (kind,), {"seen": seen})
         model = WarmupTQC(env=env, device="cpu", **given)
-        model.warmup = config.warmup
+        model.warmup, self._seen = config.warmup, seen
         super().__init__(model, generators={})
 
     def layers(self) -> Layers:
         actor = self.model.actor
         modules = [*actor.latent_pi.children(), actor.mu]
         linear = [m for m in modules if isinstance(m, torch.nn.Linear)]
-        return tuple(
+        layers = tuple(
             (m.weight.detach().numpy().T.copy(), m.bias.detach().numpy().copy()) for m in linear
         )
+        return of_seen(layers, self._seen)
 
     def acting(self) -> tuple[Layers, int]:
         return self.layers(), self.updates()

@@ -30,7 +30,7 @@ from robojackson.rl.tqc.dense_networks import LOG_STD_RANGE, dense_count
 from robojackson.rl.tqc.network_arrays import CRITICS, TARGETS, Tensors
 from robojackson.rl.tqc.off_policy import OffPolicyTrainer, arguments, is_warming_up
 from robojackson.rl.tqc.replay_files import buffer_of
-from robojackson.rl.tqc.trainer import Layers
+from robojackson.rl.tqc.trainer import Layers, of_seen
 from robojackson.rl.tqc.updates import LearnerState, round_of_updates
 
 log = logging.getLogger(__name__)
@@ -42,6 +42,7 @@ class OverlappedTQC(TQC):
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self.warmup = 0
+        self.seen: int | None = None
         self.noise = np.random.default_rng(self.seed)
         self._acting = dense_layers(self.policy.actor_state.params)
 
@@ -53,9 +54,9 @@ class OverlappedTQC(TQC):
         deterministic: bool = False,
     ) -> tuple[np.ndarray, Any]:
         """Sample actions from the actor of the round before."""
-        hidden = observation
+        hidden = observation[:, : self.seen]
         for weight, bias in self._acting[:-2]:
-            hidden = np.maximum(hidden @ weight + bias, 0.0)
+            hidden = np.maximum(hidden @ weight[: hidden.shape[1]] + bias, 0.0)
         (mean_w, mean_b), (std_w, std_b) = self._acting[-2:]
         mean = hidden @ mean_w + mean_b
         if not deterministic:
@@ -92,6 +93,7 @@ class OverlappedTQC(TQC):
             kept=policy.n_target_quantiles,
             count=gradient_steps,
             delay=self.policy_delay,
+            seen=self.seen,
         )
         policy.actor_state, self.ent_coef_state, self.key = learnt.actor, learnt.entropy, learnt.key
         policy.qf1_state, policy.qf2_state = learnt.critics
@@ -108,11 +110,11 @@ def dense_layers(params: Any) -> Layers:
 class SbxTrainer(OffPolicyTrainer):
     """The JAX trainer (`Trainer` protocol)."""
 
-    def __init__(self, env: VecEnv, config: TqcConfig, seed: int) -> None:
+    def __init__(self, env: VecEnv, config: TqcConfig, seed: int, seen: int | None = None) -> None:
         given = arguments(config, seed, env)
         given["policy_kwargs"] |= {"layer_norm": config.layer_norm}
         model = OverlappedTQC(env=env, policy_delay=config.policy_delay, **given)
-        model.warmup = config.warmup
+        model.warmup, model.seen = config.warmup, seen
         model.ent_coef_state = jax.tree_util.tree_map(_strong, model.ent_coef_state)
         if config.gsde:
             log.warning("trainer sbx has no gSDE: it explores with plain Gaussian noise")
@@ -128,10 +130,11 @@ class SbxTrainer(OffPolicyTrainer):
 
     def layers(self) -> Layers:
         layers = dense_layers(self.model.policy.actor_state.params)
-        return layers[:-1]
+        return of_seen(layers[:-1], self.model.seen)
 
     def acting(self) -> tuple[Layers, int]:
-        return self.model._acting[:-1], max(0, self.updates() - self.model.gradient_steps)
+        layers = of_seen(self.model._acting[:-1], self.model.seen)
+        return layers, max(0, self.updates() - self.model.gradient_steps)
 
     def networks(self) -> Tensors:
         policy = self.model.policy

@@ -14,6 +14,12 @@ if TYPE_CHECKING:
 Layers = tuple[tuple[np.ndarray, np.ndarray], ...]
 
 
+def of_seen(layers: Layers, seen: int | None) -> Layers:
+    """The layers for the inputs that the actor sees: the first of them; all when None."""
+    (weight, bias), *rest = layers
+    return ((weight[:seen], bias), *rest)
+
+
 class Trainer(Protocol):
     """A learning algorithm bound to an environment."""
 

@@ -13,8 +13,14 @@ if TYPE_CHECKING:
     from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
 
-def make_trainer(name: str, env: "VecEnv", config: TqcConfig, seed: int) -> Trainer:
+def make_trainer(
+    name: str, env: "VecEnv", config: TqcConfig, seed: int, seen: int | None = None
+) -> Trainer:
     """Build the named trainer.
+
+    Args:
+        seen: Inputs at the beginning of an observation that the actor sees; all when None. The
+            critics see all.
 
     Raises:
         MissingDependency: JAX is not installed; the message says how to get it.
@@ -22,7 +28,7 @@ def make_trainer(name: str, env: "VecEnv", config: TqcConfig, seed: int) -> Trai
     if name == "sb3":
         from robojackson.rl.tqc.sb3_trainer import Sb3Trainer
 
-        return Sb3Trainer(env, config, seed)
+        return Sb3Trainer(env, config, seed, seen)
     try:
         from robojackson.rl.tqc.sbx_trainer import SbxTrainer
     except ImportError as error:
@@ -30,4 +36,4 @@ def make_trainer(name: str, env: "VecEnv", config: TqcConfig, seed: int) -> Trai
             f"trainer 'sbx' needs JAX ({error}): .venv/bin/pip install -e '.[fast]', "
             "or choose --trainer sb3"
         ) from error
-    return SbxTrainer(env, config, seed)
+    return SbxTrainer(env, config, seed, seen)

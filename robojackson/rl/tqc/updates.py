@@ -33,7 +33,7 @@ class LearnerState(NamedTuple):
     key: Array
 
 
-@partial(jax.jit, static_argnames=("kept", "count", "delay"))
+@partial(jax.jit, static_argnames=("kept", "count", "delay", "seen"))
 def round_of_updates(
     learnt: LearnerState,
     samples: Samples,
@@ -42,6 +42,7 @@ def round_of_updates(
     kept: int,
     count: int,
     delay: int,
+    seen: int | None = None,
 ) -> LearnerState:
     """`count` updates of the critics, each from its part of the samples, and after every `delay` of
     them one of the actor and the entropy coefficient.
@@ -50,6 +51,7 @@ def round_of_updates(
         tau: Share of the critics that their targets take over with every update.
         kept: Lowest target quantiles that are left, of both critics together.
         delay: Divides `count`.
+        seen: Inputs at the beginning of an observation that the actor sees; all when None.
     """
     size = len(samples.rewards) // count
 
@@ -58,20 +60,22 @@ def round_of_updates(
             first = (i * delay + turn) * size
             part = partial(jax.lax.dynamic_slice_in_dim, start_index=first, slice_size=size)
             batch = jax.tree_util.tree_map(part, samples)
-            learnt = _critics(learnt, batch, kept, tau)
-        return _actor(learnt, batch.observations, target_entropy)
+            learnt = _critics(learnt, batch, kept, tau, seen)
+        return _actor(learnt, batch.observations, target_entropy, seen)
 
     result: LearnerState = jax.lax.fori_loop(0, count // delay, step, learnt)
     return result
 
 
-def _critics(learnt: LearnerState, batch: Samples, kept: int, tau: float) -> LearnerState:
+def _critics(
+    learnt: LearnerState, batch: Samples, kept: int, tau: float, seen: int | None
+) -> LearnerState:
     """One update of both critics and their targets."""
     key, noise, _, _ = jax.random.split(learnt.key, 4)
     key, _, _ = jax.random.split(key, 3)
-    seen, then = jnp.asarray(batch.observations), jnp.asarray(batch.next_observations)
+    now, then = jnp.asarray(batch.observations), jnp.asarray(batch.next_observations)
     actions = jnp.asarray(batch.actions)
-    chosen = dense_networks.actions_of(learnt.actor.params, then)
+    chosen = dense_networks.actions_of(learnt.actor.params, then, seen)
     following = chosen.sample(seed=noise)
     alpha = learnt.entropy.apply_fn({"params": learnt.entropy.params})
     values = [dense_networks.quantiles(c.target_params, then, following) for c in learnt.critics]
@@ -82,7 +86,7 @@ def _critics(learnt: LearnerState, batch: Samples, kept: int, tau: float) -> Lea
     states = []
     for critic in learnt.critics:
         current, pull = jax.vjp(
-            lambda params: dense_networks.quantiles(params, seen, actions),
+            lambda params: dense_networks.quantiles(params, now, actions),
             critic.params,
         )
         _, slope = quantile_huber(current.T, wanted, lowest_ones, kept)
@@ -91,14 +95,17 @@ def _critics(learnt: LearnerState, batch: Samples, kept: int, tau: float) -> Lea
 
 
 def _actor(
-    learnt: LearnerState, observations: Float[Array, "B O"], target_entropy: float
+    learnt: LearnerState,
+    observations: Float[Array, "B O"],
+    target_entropy: float,
+    seen: int | None,
 ) -> LearnerState:
     """One update of the actor and the entropy coefficient."""
     key, _, _, noise = jax.random.split(learnt.key, 4)
     alpha = learnt.entropy.apply_fn({"params": learnt.entropy.params})
 
     def loss(params: dense_networks.Parameters) -> tuple[Array, Array]:
-        chosen = dense_networks.actions_of(params, observations)
+        chosen = dense_networks.actions_of(params, observations, seen)
         actions = chosen.sample(seed=noise)
         log_prob = chosen.log_prob(actions)
         values = [

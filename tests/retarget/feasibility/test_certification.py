@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from robojackson.motion.certificate import Certificate
-from robojackson.retarget.feasibility.certification import Certified, certify, fall_height, fallen
+from robojackson.retarget.feasibility.certification import Certified, certify, fallen
 from robojackson.retarget.feasibility.contact_wrench import Tolerance
+from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
 from tests.fixtures.robots import robot_motion
 
@@ -123,7 +124,8 @@ def test_a_jump_that_falls_too_slowly_is_not_free(robot: Robot):
 
 def test_a_deep_squat_names_the_knee_that_fails(robot: Robot):
     """Thighs level: the weight hangs on a lever at the knees, and motors of a tenth give way."""
-    weak = replace(robot, torque_limit=0.1 * robot.torque_limit)
+    limits = replace(robot.actuation, torque_limit=0.1 * robot.torque_limit)
+    weak = replace(robot, actuation=limits)
     qpos = robot.standing.copy()
     for side in ("left", "right"):
         _bend(robot, qpos, f"{side}_hip_y", -0.9)
@@ -210,4 +212,4 @@ def test_the_fall_rule_sees_tilt_and_height(robot: Robot):
 
 
 def test_the_fall_rule_is_the_papers_on_the_stock_robot(robot: Robot):
-    assert fall_height(robot) == pytest.approx(0.7)
+    assert Fall.of(robot).height == pytest.approx(0.7)

@@ -12,15 +12,15 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import (
     ResetConfig,
     RewardConfig,
-    TerminationConfig,
     TrackConfig,
 )
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.env.vec_env import TrackingEnv, TrackingVecEnv
 from robojackson.rl.modes.reset_states import StartPhases, default_standing_pose, standing_pose_at
-from robojackson.rl.modes.rewards import TrackedPoints, fallen, reward_terms, tracking_errors
+from robojackson.rl.modes.rewards import TrackedPoints, reward_terms, tracking_errors
 from robojackson.rl.modes.track_mode import SETTLED_STATES_NEEDED
 from robojackson.rl.sim.reference_clip import Clip
+from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
 
 WHICH = TrackedPoints(pelvis=0, hands=(11, 12, 13), limbs=(5, 6, 11, 12, 13))
@@ -176,7 +176,7 @@ def test_a_settled_state_comes_back_at_its_own_step_and_place(
 
 
 def test_the_default_stand_touches_the_floor_and_faces_as_asked(robot: Robot) -> None:
-    stand = default_standing_pose(robot.model)
+    stand = default_standing_pose(robot)
     turned = standing_pose_at(stand, np.array([1.0, 2.0, 9.0, np.cos(0.6), 0.0, 0.0, np.sin(0.6)]))
     data = mujoco.MjData(robot.model)
     data.qpos[:] = turned
@@ -208,12 +208,12 @@ def test_a_reference_for_another_control_rate_is_refused(
     [(0.71, 0, False), (0.69, 0, True), (1.2, 59, False), (1.2, 61, True)],
 )
 def test_the_fall_rule_is_the_papers(
-    sway: ReferenceMotion, height: float, tilt_deg: float, falls: bool
+    robot: Robot, sway: ReferenceMotion, height: float, tilt_deg: float, falls: bool
 ) -> None:
     qpos = sway.qpos[:1].copy()
     half = np.radians(tilt_deg) / 2
     qpos[0, 2:7] = [height, np.cos(half), np.sin(half), 0, 0]
-    assert bool(fallen(qpos, TerminationConfig())[0]) is falls
+    assert bool(Fall.of(robot).has_fallen(qpos, qpos)[0]) is falls
 
 
 def test_an_episode_that_ends_hands_out_its_own_last_observation(

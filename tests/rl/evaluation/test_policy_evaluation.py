@@ -11,13 +11,14 @@ from robojackson.rl.config.train_config import (
     ControlConfig,
     EvaluateConfig,
     PaperConfig,
-    TerminationConfig,
 )
 from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
 from robojackson.rl.evaluation.rollout_records import RolloutScorer
 from robojackson.rl.evaluation.rollouts import Driver, Rollouts, Starts, roll_out
+from robojackson.rl.modes.observation import Observer
 from robojackson.rl.policy import Policy
 from robojackson.rl.sim.reference_clip import Clip
+from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
 
 STEPS = 160
@@ -44,9 +45,7 @@ def row(robot: Robot, sway: ReferenceMotion, rollouts: Rollouts) -> dict[str, ob
 
 def idle(robot: Robot, sway: ReferenceMotion, control: ControlConfig | None = None) -> Policy:
     """A policy that adds nothing to the reference."""
-    from robojackson.rl.modes.observation import observation_size
-
-    size = observation_size(robot.model.nq - 7, robot.model.nu, len(robot.keypoint_names))
+    size = Observer(robot, "full").size
     nothing = (np.zeros((size, robot.model.nu)), np.zeros(robot.model.nu))
     control = control or ControlConfig()
     return Policy((nothing,), {"robot": "humanoid", "control": dataclasses.asdict(control)})
@@ -157,7 +156,7 @@ def test_a_robot_that_lies_down_has_fallen(robot: Robot, sway: ReferenceMotion) 
         starts,
         np.full(2, 200),
         1,
-        TerminationConfig(),
+        Fall.of(robot),
     )
     assert limp.fell.all()
     assert (limp.length < 200).all()

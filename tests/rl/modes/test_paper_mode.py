@@ -19,9 +19,10 @@ from robojackson.rl.config.train_config import PaperConfig, TrackConfig, TrainCo
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.env.vec_env import TrackingEnv
 from robojackson.rl.evaluation.reward_audit import audit_both_readings, audit_reward
-from robojackson.rl.modes.paper_mode import facing_ahead, require_trainable
+from robojackson.rl.modes.paper_mode import facing_ahead
 from robojackson.rl.modes.paper_reward import Miss, PaperState, has_fallen, miss, paper_terms, ramp
 from robojackson.rl.modes.standing_motion import make_standing_motion
+from robojackson.rl.sim.trainable import require_trainable
 from robojackson.robot.model import Robot, load_robot
 from tests.fixtures.own_robot import own_robot
 
@@ -238,19 +239,19 @@ def test_weights_that_weigh_nothing_are_refused(weights: dict[str, float]) -> No
 
 
 def altered(folder: Path, *changes: tuple[str, str]) -> Robot:
-    """Humanoid-v5 with another model, as a user's own robot."""
+    """Humanoid-v5 with another model and no torque limits, as a user's own robot."""
     path = own_robot(folder)
     text = (folder / "model.xml").read_text()
     for old, new in changes:
         text = re.sub(old, new, text)
     (folder / "model.xml").write_text(text)
-    return load_robot(describe_robot(str(path)))
+    return load_robot(dataclasses.replace(describe_robot(str(path)), torque_limits={}))
 
 
 @pytest.mark.parametrize(
     ("change", "cause"),
     [
-        (("<motor [^>]*joint[^>]*/>", ""), "its MJCF has no motors"),
+        (("<motor [^>]*joint[^>]*/>", ""), "neither its MJCF nor torque_limits"),
         (
             ('<motor gear="100" joint="abdomen_y"', '<position joint="abdomen_y"'),
             "'abdomen_y' is no",

@@ -1,0 +1,38 @@
+"""What training needs of a robot: torque motors, and a stand that its fall rule allows."""
+
+import mujoco
+import numpy as np
+
+from robojackson.errors import BadConfiguration
+from robojackson.robot.fall import Fall, standing_height
+from robojackson.robot.model import Robot
+
+
+def require_trainable(robot: Robot) -> None:
+    """Refuse a robot that a training cannot move, or that the fall rule calls fallen as it stands.
+
+    Raises:
+        BadConfiguration: it has no torque motors with a range, or it is too small.
+    """
+    model, reason, fall = robot.model, "", Fall.of(robot)
+    motors = (
+        (model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT))
+        & (model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_NONE))
+        & (model.actuator_ctrllimited > 0)
+    )
+    height = standing_height(robot)
+    if not model.nu:
+        reason = "neither its MJCF nor torque_limits of its YAML give it motors"
+    elif not motors.all():
+        name = model.actuator(int(np.argmin(motors))).name
+        reason = f"actuator {name!r} is no torque motor with a control range"
+    elif not fall.relative and height < fall.height:
+        reason = (
+            f"it stands with its root {height:.2f} m above the floor, and less than "
+            f"{fall.height:g} m counts as a fall (fall.height of its YAML)"
+        )
+    if reason:
+        raise BadConfiguration(
+            f"training is not possible on robot {robot.description.name!r} yet: {reason}; "
+            "retargeting, its video and export are"
+        )

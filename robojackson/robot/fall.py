@@ -1,0 +1,75 @@
+"""When a robot has fallen: the rule of its description, bound to its size. Metres, radians."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from jaxtyping import Bool, Float
+
+from robojackson.robot.model import Robot
+
+FALL_HEIGHT_M = 0.7
+"""The paper's fall rule for Humanoid-v5: a lower torso has fallen."""
+FALL_SHARE = 0.55
+"""Of the height at which a smaller robot's root stands: lower, it has fallen."""
+
+
+@dataclass(frozen=True)
+class Fall:
+    """The fall rule of a robot (`robot.description.FallRule`).
+
+    Attributes:
+        relative: Whether height and tilt are differences to the reference's root.
+        height: Root lower than this, or farther from the reference's height, m.
+        tilt: Up axis farther from vertical, or from the reference's, rad.
+    """
+
+    relative: bool
+    height: float
+    tilt: float
+
+    @staticmethod
+    def of(robot: Robot, height: float | None = None, tilt: float | None = None) -> "Fall":
+        """The rule of a robot; `height` and `tilt` replace its numbers."""
+        rule = robot.description.fall
+        return Fall(
+            relative=rule.frame == "reference",
+            height=_least(robot) if height is None else height,
+            tilt=rule.tilt if tilt is None else tilt,
+        )
+
+    def has_fallen(
+        self, qpos: Float[np.ndarray, "N nq"], target: Float[np.ndarray, "N nq"]
+    ) -> Bool[np.ndarray, " N"]:
+        """Which of N robots have fallen; `target` is the reference's state at the same step."""
+        if not self.relative:
+            upright = up_axis(qpos[:, 3:7])[:, 2]
+            found: np.ndarray = (qpos[:, 2] < self.height) | (upright < np.cos(self.tilt))
+            return found
+        along = np.sum(up_axis(qpos[:, 3:7]) * up_axis(target[:, 3:7]), -1)
+        off = np.abs(qpos[:, 2] - target[:, 2])
+        result: np.ndarray = (off > self.height) | (along < np.cos(self.tilt))
+        return result
+
+
+def up_axis(quaternion: Float[np.ndarray, "N 4"]) -> Float[np.ndarray, "N 3"]:
+    """The body's z axis in the world, for quaternions wxyz."""
+    w, x, y, z = np.asarray(quaternion).T
+    return np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], -1)
+
+
+def standing_height(robot: Robot) -> float:
+    """Height of the root over the soles in the rest pose, metres."""
+    data = mujoco.MjData(robot.model)
+    data.qpos[:] = robot.standing
+    mujoco.mj_kinematics(robot.model, data)
+    feet = data.site_xpos[robot.keypoint_sites[robot.contact_keypoints], 2]
+    soles = feet + robot.contact_arms[:, 2] - robot.contact_radii
+    return float(data.qpos[2] - soles.min())
+
+
+def _least(robot: Robot) -> float:
+    rule = robot.description.fall
+    if rule.height is not None:
+        return rule.height
+    return min(FALL_HEIGHT_M, FALL_SHARE * standing_height(robot))

@@ -1,0 +1,151 @@
+"""What a YAML adds to a model: motors, armature, gains, stepping, the fall rule."""
+
+import dataclasses
+import importlib.util
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from robojackson.errors import BadConfiguration, UnknownName
+from robojackson.pipeline.robot_descriptions import describe_robot
+from robojackson.robot.description import FallRule, RobotDescription, SimulationDescription
+from robojackson.robot.fall import Fall, standing_height, up_axis
+from robojackson.robot.model import Robot, load_robot
+
+HUMANOID = describe_robot("humanoid")
+
+
+def altered(**changes: object) -> Robot:
+    return load_robot(dataclasses.replace(HUMANOID, **changes))
+
+
+def stock_model() -> mujoco.MjModel:
+    found = importlib.util.find_spec("gymnasium")
+    assert found is not None
+    assert found.origin is not None
+    folder = Path(found.origin).parent
+    return mujoco.MjModel.from_xml_path(str(folder / "envs/mujoco/assets/humanoid.xml"))
+
+
+def test_the_humanoids_yaml_says_what_its_model_has(robot: Robot) -> None:
+    stock, ours = stock_model(), robot.model
+    assert (ours.opt.timestep, ours.opt.integrator) == (stock.opt.timestep, stock.opt.integrator)
+    assert ours.opt.iterations == stock.opt.iterations
+    for name in ("dof_armature", "dof_damping", "actuator_gear", "actuator_ctrlrange"):
+        np.testing.assert_array_equal(getattr(ours, name), getattr(stock, name))
+    np.testing.assert_array_equal(ours.geom_friction, stock.geom_friction)
+    motors = dataclasses.replace(HUMANOID, torque_limits={})
+    np.testing.assert_allclose(load_robot(motors).torque_limit, robot.torque_limit)
+
+
+def test_the_humanoids_gains_are_those_of_the_rule_without_a_yaml(robot: Robot) -> None:
+    bare = altered(stiffness={}, damping={}).actuation
+    np.testing.assert_array_equal(bare.stiffness, robot.actuation.stiffness)
+    np.testing.assert_array_equal(bare.damping, robot.actuation.damping)
+
+
+def test_a_limited_hinge_without_an_actuator_gets_a_motor(tmp_path: Path) -> None:
+    text = Path(load_robot(HUMANOID).description.mjcf.replace("gymnasium:", "")).name
+    folder = Path(importlib.util.find_spec("gymnasium").origin).parent  # type: ignore
+    source = (folder / "envs/mujoco/assets" / text).read_text()
+    start, end = source.index("<actuator>"), source.index("</actuator>") + len("</actuator>")
+    bare = tmp_path / "bare.xml"
+    bare.write_text(source[:start] + source[end:])
+    limits = {"*": 30.0, "*_knee": 80.0}
+    robot = altered(mjcf=str(bare), torque_limits=limits)
+    assert robot.model.nu == len(robot.joint_names)
+    knee = robot.model.actuator("left_knee")
+    assert knee.gear[0] == 80.0
+    np.testing.assert_array_equal(knee.ctrlrange, [-1.0, 1.0])
+    assert robot.torque_limit[robot.joint_names.index("abdomen_y")] == 30.0
+
+
+def test_gains_of_a_natural_frequency_are_those_of_a_damped_oscillator() -> None:
+    """m x'' + kd x' + kp x = 0 has w0 = sqrt(kp / m) and ratio kd / (2 sqrt(kp m))."""
+    found = altered(
+        stiffness={}, damping={}, armature={"*": 0.02}, natural_frequency={"*": 10.0},
+        damping_ratio={"*": 1.5},
+    ).actuation  # fmt: skip
+    np.testing.assert_allclose(np.sqrt(found.stiffness / 0.02), 2 * np.pi * 10)
+    np.testing.assert_allclose(found.damping / (2 * np.sqrt(found.stiffness * 0.02)), 1.5)
+
+
+def test_the_last_pattern_that_matches_counts() -> None:
+    scale = altered(action_scale={"*": 0.4, "left_*": 0.2}).actuation.action_scale
+    names = load_robot(HUMANOID).joint_names
+    expected = [0.2 if name.startswith("left_") else 0.4 for name in names]
+    np.testing.assert_array_equal(scale, expected)
+
+
+@pytest.mark.parametrize("key", ["armature", "stiffness", "damping", "action_scale", "stand_pose"])
+def test_a_hinge_that_does_not_exist_is_named(key: str) -> None:
+    with pytest.raises(UnknownName, match=f"left_wing.*{key}"):
+        altered(**{key: {"left_wing": 1.0}})
+
+
+def test_stepping_is_as_the_yaml_says() -> None:
+    stepping = SimulationDescription(
+        timestep=0.005, integrator="implicitfast", iterations=7, ls_iterations=9, friction=0.6
+    )
+    robot = altered(simulation=stepping)
+    option = robot.model.opt
+    assert (option.timestep, option.iterations, option.ls_iterations) == (0.005, 7, 9)
+    assert option.integrator == mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    assert robot.substeps == 3
+    model = robot.model
+    floor = model.geom("floor").id
+    soles = [i for i in range(model.ngeom) if model.geom_bodyid[i] in robot.contact_bodies]
+    np.testing.assert_array_equal(model.geom_friction[[floor, *soles], 0], 0.6)
+
+
+def test_a_control_step_is_a_whole_number_of_physics_steps() -> None:
+    with pytest.raises(BadConfiguration, match=r"control_dt: 15 ms .* steps of 4 ms"):
+        altered(simulation=SimulationDescription(timestep=0.004))
+
+
+def tilted(qpos: np.ndarray, angle: float) -> np.ndarray:
+    out = qpos.copy()
+    out[:, 3:7] = [np.cos(angle / 2), 0.0, np.sin(angle / 2), 0.0]
+    return out
+
+
+def test_the_papers_fall_rule_looks_at_the_world(robot: Robot) -> None:
+    rule = Fall.of(robot)
+    high = np.tile(robot.standing, (1, 1))
+    low = high.copy()
+    low[:, 2] = 0.69
+    assert not rule.has_fallen(high, low).any()
+    assert rule.has_fallen(low, low).all()
+    assert rule.has_fallen(tilted(high, 1.06), high).all()
+
+
+def test_a_bow_is_no_fall_where_the_reference_bows() -> None:
+    robot = altered(fall=FallRule(frame="reference", height=0.25, tilt=0.8))
+    rule, stand = Fall.of(robot), np.tile(robot.standing, (1, 1))
+    bow = tilted(stand, 1.3)
+    bow[:, 2] -= 0.3
+    assert not rule.has_fallen(bow, bow).any()
+    assert rule.has_fallen(stand, bow).all()
+    turned = stand.copy()
+    turned[:, 3:7] = [np.cos(1.0), 0.0, 0.0, np.sin(1.0)]
+    assert not rule.has_fallen(turned, stand).any(), "a heading is no tilt"
+
+
+def test_the_up_axis_is_mujocos(robot: Robot, poses: np.ndarray) -> None:
+    data = mujoco.MjData(robot.model)
+    root = robot.model.body(robot.description.root_body).id
+    for qpos in poses[:5]:
+        data.qpos[:] = qpos
+        mujoco.mj_kinematics(robot.model, data)
+        expected = data.xmat[root].reshape(3, 3)[:, 2]
+        np.testing.assert_allclose(up_axis(qpos[None, 3:7])[0], expected, atol=1e-9)
+
+
+def test_a_small_robot_falls_lower(robot: Robot) -> None:
+    assert Fall.of(robot).height == 0.7
+    free = RobotDescription(**{**vars(HUMANOID), "fall": FallRule()})
+    assert Fall.of(load_robot(free)).height == pytest.approx(
+        min(0.7, 0.55 * standing_height(robot))
+    )
