@@ -78,10 +78,10 @@ class Study:
     """One ablation. How its cells are run (the last four fields) is no part of what it is.
 
     Attributes:
-        name: Of the study, in the tables and on the page.
+        name: Name of the study, in the tables and on the page.
         moves: Names of `configs/moves/*.yaml`.
         setups: Names of `configs/setups/*.yaml`.
-        seeds: Of the trainings; a seed is the same for all setups, so that they are paired.
+        seeds: Seeds of the trainings; a seed is the same for all setups, so that they are paired.
         mode: `paper`: its reward, observation and torques; `track`: the method that dances.
         steps: Control steps of each training. No clock ends one: the tables are repeatable.
         trainer: `sbx` (JAX, fast) or `sb3` (the reference).
@@ -92,8 +92,8 @@ class Study:
         train: Values of the training's configuration by key path, for all cells.
         executor: `local`: processes of this machine; `work-pool`: runs that workers take.
         slots: Trainings at once on this machine; the number of its cores if absent.
-        timeout_minutes: Wall time after which a cell has failed: training, judgement and what is
-            tried again of them, all together; waiting for a worker is no part of it.
+        timeout_minutes: Wall time after which a cell has failed, minutes: training, judgement and
+            what is tried again of them, all together; waiting for a worker is no part of it.
         retries: How often a cell whose process was killed is started again.
     """
 

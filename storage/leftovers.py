@@ -69,7 +69,7 @@ def _scratch(store: Store) -> Iterator[Path]:
 
 def _work(store: Store) -> Iterator[Path]:
     """Folders of judgements, which begin anew, and of trainings that were finished elsewhere."""
-    left = [f for f in _folders(store, f"{TRAINING}*") if not _is_held(f / TASK)]
+    left = [f for f in _folders(store, f"{TRAINING}*") if not is_held(f / TASK)]
     finished = _finished(store) if left else set()
     unneeded = [folder for folder in left if folder.name.removeprefix(TRAINING) in finished]
     for folder in [*_folders(store, f"{EVALUATION}*"), *unneeded]:
@@ -105,7 +105,7 @@ def _age_s(path: Path) -> float:
         return 0.0
 
 
-def _is_held(path: Path) -> bool:
+def is_held(path: Path) -> bool:
     """Whether a living process has locked the file."""
     try:
         with path.open("rb") as file:

@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from robojackson.clips.quality.advice import advise
 from robojackson.clips.quality.stability import Stability
+from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.rollout import Rollout
 from robojackson.motion.smpl_sequence import SmplSequence
@@ -64,6 +66,7 @@ def _results(store: Store, made: Mapping[str, Artifact], file: Path) -> "Results
         evaluation=_json(store, made["evaluation"]),
         evaluations=artifact_tables.read_rows(EVALUATION_RECORD, store, made["evaluations"]),
         rollout_qpos=artifact_tables.read(Rollout, store, made["rollout"]).qpos,
+        advice=advise(artifact_tables.read(LandmarkTrack, store, made["landmarks"])),
     )
 
 

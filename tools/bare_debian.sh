@@ -4,7 +4,8 @@
 #   tools/bare_debian.sh bookworm|trixie [FOLDER]     needs root and debootstrap; prints the seconds of each step
 # Environment: DANCE (arguments of `make dance`; empty: none), TESTS (the target; empty: none), MIRROR, BIND
 # (folders and files that the machine's pip needs and that shall be seen inside, such as a local index), and what begins
-# with PIP_, SSL_ or TORCH_, which is handed in. FOLDER stays; a system that is in it already is used again.
+# with PIP_, SSL_ or TORCH_, which is handed in. Certificates that this machine trusts besides Debian's are trusted
+# inside. FOLDER stays; a system that is in it already is used again.
 set -eu
 cd "$(dirname "$0")/.."
 SUITE=${1:?usage: bare_debian.sh bookworm|trixie [FOLDER]}
@@ -56,6 +57,15 @@ for place in /proc /sys /dev /dev/pts /dev/shm ${BIND:-}; do
     mount_in "$place" "$place"
 done
 
+trust() {
+    ls /usr/local/share/ca-certificates/*.crt >/dev/null 2>&1 || return 0
+    mkdir -p "$FOLDER/usr/local/share/ca-certificates"
+    cp /usr/local/share/ca-certificates/*.crt "$FOLDER/usr/local/share/ca-certificates/"
+    step "certificates" "apt-get update -qq && apt-get install -y -qq --no-install-recommends ca-certificates >/dev/null &&
+        update-ca-certificates >/dev/null"
+}
+
+trust
 step "apt-get update, make" "apt-get update -qq && apt-get install -y -qq --no-install-recommends make >/dev/null"
 echo "bare $SUITE: lacks: $(inside "sh tools/bootstrap.sh missing")"
 inside "make setup" || true # names what is missing, in one sentence

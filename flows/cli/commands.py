@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from flows.cli.backup_commands import backup, restore
+from flows.cli.clean_command import clean
 from flows.cli.search_commands import catalogue, find, refresh
 from flows.cli.study_commands import ablation, deploy, metrics, server
 from robojackson.cli.app import add_stages, make_app
@@ -91,13 +92,13 @@ def dance(
 
 def _concluded(made: dict[str, Any], minutes: float) -> CommandResult:
     """The answer of a dance with its verdict and the command to type next."""
-    from robojackson.cli.cards import closing
+    from robojackson.cli.cards import advice_lines, closing
     from robojackson.cli.stages import verdict_lines
 
     verdict = made["evaluation"]["verdict"]
     made |= {"verdict": verdict, "next": _next(verdict["kind"], made["page"], minutes)}
     where = [f"page   {made['page']}", f"video  {made['video']}"]
-    text = [*verdict_lines(made["evaluation"]), *where, *closing(made)]
+    text = [*verdict_lines(made["evaluation"]), *advice_lines(made), *where, *closing(made)]
     return CommandResult(made, text=text)
 
 
@@ -115,7 +116,7 @@ def _next(kind: str, page: str, minutes: float) -> str:
 app = make_app()
 for each in (
     *(dance, find, refresh, catalogue, ablation, metrics),
-    *(deploy, backup, restore, server),
+    *(deploy, backup, restore, clean, server),
 ):
     app.command()(each)
 add_stages(app)

@@ -28,9 +28,11 @@ def find(
 ) -> CommandResult:
     """The videos of a dance, ranked: Algorithm 1, and why others are rejected."""
     from configs.find_config import FindConfig
+    from flows.cli.verdicts import find_verdict
     from flows.runtime.environment import prepare
     from flows.search import ranking_table
     from flows.search.requests import find_dance, require_online
+    from robojackson.cli.cards import closing
     from robojackson.pipeline.yaml_loader import load
     from storage.store import Store
 
@@ -42,7 +44,9 @@ def find(
     from flows.find import run
 
     found = run(dance, config, overrides)
-    return CommandResult(found, text=[*ranking_table.lines(found["candidates"]), found["summary"]])
+    found |= find_verdict(found)
+    table = ranking_table.lines(found["candidates"])
+    return CommandResult(found, text=[*table, found["summary"], *closing(found)])
 
 
 @command
@@ -55,8 +59,10 @@ def refresh(
     as_json: Json = False,
 ) -> CommandResult:
     """The nightly run, now: for every dance the best new video, up to the robot's motion."""
+    from flows.cli.verdicts import refresh_lines, refresh_verdict
     from flows.runtime.environment import prepare
     from flows.search.requests import check_refresh
+    from robojackson.cli.cards import closing
     from storage.store import Store
 
     overrides = overrides_from(set_)
@@ -65,7 +71,9 @@ def refresh(
     from flows.refresh import run
 
     done = run(dances or None, config, overrides)
-    return CommandResult(done, code=1 if done["failed"] and not done["dances"] else 0)
+    done |= refresh_verdict(done)
+    code = 1 if done["failed"] and not done["dances"] else 0
+    return CommandResult(done, code, text=[*refresh_lines(done), *closing(done)])
 
 
 @command

@@ -27,8 +27,10 @@ def ablation(
     as_json: Json = False,
 ) -> CommandResult:
     """Moves x setups x seeds, each trained and judged, and a page that compares them."""
+    from flows.cli.verdicts import ablation_verdict
     from flows.runtime.environment import prepare
     from flows.study.study_plan import study_of
+    from robojackson.cli.cards import closing
     from storage.store import Store
 
     given: dict[str, Any] = {"moves": moves, "setups": setups, "seeds": seeds}
@@ -36,9 +38,12 @@ def ablation(
     wanted = study_of(study, overrides_from(set_, given))
     prepare(Store.from_environment())
     from flows.ablation import run
+    from tasks.write_study_page import LEAST_STEPS
 
     made = run(wanted)
-    return CommandResult(made, text=[f"page    {made['page']}", f"tables  {made['tables']}"])
+    made |= ablation_verdict(made, wanted.steps, len(wanted.seeds), LEAST_STEPS)
+    where = [f"page    {made['page']}", f"tables  {made['tables']}"]
+    return CommandResult(made, text=[*where, *closing(made)])
 
 
 @command

@@ -15,13 +15,15 @@ from flows.video_pass.motion_stages import to_reference
 from flows.video_pass.pass_progress import announce
 from flows.video_pass.scored_candidates import Candidate, choose, score_all
 from flows.video_pass.time_budget import training_time
+from robojackson.clips.quality.advice import advise
+from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.pipeline.run_names import run_name
 from robojackson.retarget.scorecard_gate import check
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.robot.model import RobotDescription
-from storage import run_catalogue
+from storage import artifact_tables, run_catalogue
 from storage.artifact import Artifact
 from storage.store import Store
 from tasks.draw_pictures import draw_snapshot
@@ -123,6 +125,7 @@ def conclude(
     run_id = f"{labels.move}-{labels.setup}-s{seed}-{made['policy'].sha256[:8]}"
     robot = describe_robot(settings.robot).name
     names = {"run_id": run_id, "move": labels.move, "robot": robot}
+    track = artifact_tables.read(LandmarkTrack, store, made["landmarks"])
     when = datetime.now(UTC)
     entry = run_catalogue.Run(
         **names, setup=labels.setup, seed=seed, finished_at=when, artifacts=made, summary=summary
@@ -135,6 +138,7 @@ def conclude(
         "candidates": {c.name: c.score.score_per_second for c in candidates},
         "scorecard": json.loads(store.read(made["scorecard"].key)),
         "evaluation": summary,
+        "advice": [each.record for each in advise(track)],
         "artifacts": {name: store.address(artifact.key) for name, artifact in made.items()},
     }
 

@@ -5,6 +5,7 @@ and `--help` answers at once.
 """
 
 import os
+import platform
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Literal
@@ -74,23 +75,28 @@ def mocap(
     hypotheses: Annotated[
         int, typer.Option(min=0, max=100, help="Also sample what hidden limbs may do: smpl_1...")
     ] = 0,
+    film: Annotated[
+        bool, typer.Option("--video", help="Also film it: source, skeleton over source, body.")
+    ] = False,
     config: Config = "base",
     set_: Set = None,
     verbose: Verbose = False,
     as_json: Json = False,
 ) -> CommandResult:
-    """The motion of the person in a video: landmarks.parquet and smpl.parquet."""
+    """The motion of the person in a video: smpl.parquet, landmarks.parquet and a picture."""
     from robojackson.cli import cards, stages
+    from robojackson.cli.pictures.mocap_pictures import draw_mocap
 
     log_to_stderr()
     if people:
-        from robojackson.cli.people_listing import list_people
+        from robojackson.cli.pictures.people_listing import list_people
 
         told, lines = list_people(video, out, config, overrides_from(set_))
         return CommandResult(told, text=lines)
     brought = {"network.hybrik": yaml_text(hybrik), "network.niki": yaml_text(niki)}
     overrides = overrides_from(set_, {**brought, "dancer.number": person, "detector": quality})
     made = stages.mocap(video, out, config, overrides, hypotheses)
+    made |= draw_mocap(video, out, config, overrides, film)
     return CommandResult(made, text=cards.shown(made, cards.mocap_lines(made), verbose))
 
 
@@ -112,16 +118,16 @@ def retarget(
     verbose: Verbose = False,
     as_json: Json = False,
 ) -> CommandResult:
-    """The same motion for a robot: reference.parquet and scorecard.json."""
+    """The same motion for a robot: reference.parquet, scorecard.json and a picture."""
     from robojackson.cli import cards, stages
+    from robojackson.cli.pictures.retarget_pictures import draw_poses, draw_retargeting
 
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     log_to_stderr()
     overrides = overrides_from(set_, {"retarget.method": method, "robot": yaml_text(robot)})
     made = stages.retarget(smpl, out, config, overrides)
+    made |= draw_poses(smpl, out)
     if video:
-        from robojackson.cli.retarget_pictures import draw_retargeting
-
         made |= draw_retargeting(smpl, out, config, overrides)
     if not force:
         stages.gate(made["scorecard"], out, config, overrides)
@@ -129,12 +135,22 @@ def retarget(
 
 
 @command
-def doctor(as_json: Json = False) -> CommandResult:
+def doctor(
+    report: Annotated[
+        bool, typer.Option("--report", help="A block of Markdown to paste into an issue.")
+    ] = False,
+    as_json: Json = False,
+) -> CommandResult:
     """What is installed, what is missing, and how to get it."""
     from robojackson.cli.doctor import examine
 
-    report = examine()
-    return CommandResult(report, code=0 if report["ok"] else 1)
+    found = examine()
+    if report:
+        from robojackson.cli.issue_report import issue_report
+
+        block = issue_report(found)
+        return CommandResult({"report": "\n".join(block)}, text=block)
+    return CommandResult(found, code=0 if found["ok"] else 1)
 
 
 STAGES: dict[str, Callable[..., None]] = {
@@ -151,16 +167,35 @@ STAGES: dict[str, Callable[..., None]] = {
 """Commands by name, in the order of `--help`."""
 
 
+def _print_version(given: bool) -> None:
+    """Print the versions of the package and of Python, and end the command."""
+    if given:
+        from importlib.metadata import version
+
+        typer.echo(f"robojackson {version('robojackson')}, Python {platform.python_version()}")
+        raise typer.Exit
+
+
 def make_app() -> typer.Typer:
-    """Return an application without commands."""
-    return typer.Typer(
+    """Return an application without commands; it knows its version and completes its words."""
+    app = typer.Typer(
         name="robojackson",
         help="A video of a dance in, a robot that dances it out.",
         no_args_is_help=True,
-        add_completion=False,
         pretty_exceptions_enable=False,
         context_settings={"help_option_names": ["-h", "--help"]},
     )
+    app.callback()(_common)
+    return app
+
+
+def _common(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version."),
+    ] = False,
+) -> None:
+    """Options of the application itself; each ends the process when it is given."""
 
 
 def add_stages(app: typer.Typer) -> None:

@@ -78,10 +78,16 @@ def mocap_lines(answer: Answer) -> list[str]:
         f"planted   {feet} of the time",
         f"floor     lowest point {100 * answer['floor']['lowest_keypoint_m']:.1f} cm above it",
     ]
-    rows += [f"note      {note}" for note in (*answer["notes"], *answer.get("advice", ()))]
+    rows += [f"note      {note}" for note in answer["notes"]]
+    rows += advice_lines(answer)
     rows += [f"motion    {answer['smpl']}"]
-    rows += [f"{key:<9} {answer[key]}" for key in ("picture", "video_file") if key in answer]
+    rows += [f"{key:<9} {answer[key]}" for key in ("picture", "film") if key in answer]
     return [*rows, *closing(answer)]
+
+
+def advice_lines(answer: Answer) -> list[str]:
+    """Return what to do better when the clip is filmed again, a line each."""
+    return [f"advice    {each['words']}" for each in answer.get("advice", ())]
 
 
 def mocap_verdict(frames: int, detected: int) -> dict[str, str]:

@@ -16,6 +16,7 @@ import typer
 from pydantic import ValidationError
 
 from robojackson.api.progress_bar import bar as bar
+from robojackson.cli.library_output import silence_libraries
 from robojackson.cli.lifetime.interruption import INTERRUPTED, conclude
 from robojackson.cli.lifetime.interruption import complain as complain
 from robojackson.cli.lifetime.interruption import same_command as same_command
@@ -31,7 +32,7 @@ USAGE_ERROR: Any = typer.BadParameter.__bases__[0]
 APP_PACKAGES = ("prefect", "fastapi", "sqlalchemy", "yt_dlp")
 """What the extra `app` brings: without it the commands of one stage work and the others do not."""
 OWN_PACKAGES = ("robojackson", "flows", "tasks", "storage", "configs")
-"""Whose log is for the user; of all other packages only warnings and errors are."""
+"""Whose log is for the user; of all other packages only errors are."""
 INSTALL_APP = "pip install 'robojackson[app]'"
 
 log = logging.getLogger("robojackson")
@@ -65,6 +66,7 @@ def command(body: Callable[P, CommandResult]) -> Callable[P, None]:
 
     @functools.wraps(body)
     def run(*args: P.args, **kwargs: P.kwargs) -> None:
+        silence_libraries()
         try:
             with stdout_is_stderr():
                 answer = body(*args, **kwargs)
@@ -133,8 +135,8 @@ def table(rows: Mapping[str, Mapping[str, Any]], columns: Sequence[str]) -> list
 
 
 def log_to_stderr() -> None:
-    """Send our log to stderr, one short line a record, and what other libraries warn of."""
-    logging.basicConfig(level=logging.WARNING, stream=sys.stderr, format="%(message)s")
+    """Send our log to stderr, one short line a record, and errors of other libraries."""
+    logging.basicConfig(level=logging.ERROR, stream=sys.stderr, format="%(message)s")
     for own in OWN_PACKAGES:
         logging.getLogger(own).setLevel(logging.INFO)
 

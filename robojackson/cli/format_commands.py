@@ -1,12 +1,13 @@
 """`robojackson export` and `import`: motions in the file formats of other projects."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
 from typer.core import TyperCommand
 
-from robojackson.cli.console import CommandResult, command, log_to_stderr
+from robojackson.cli.console import CommandResult, command, log_to_stderr, to_json_types
 from robojackson.cli.options import Config, Folder, Json, MotionRobot, Set, overrides_from
 
 
@@ -39,7 +40,8 @@ def export(
     from robojackson.cli import exporting
 
     log_to_stderr()
-    return CommandResult(exporting.export(motion, to, out, robot))
+    made = exporting.export(motion, to, out, robot)
+    return CommandResult(made, text=_text(made))
 
 
 @command
@@ -64,4 +66,14 @@ def import_(
     from robojackson.cli.importing import import_motion
 
     log_to_stderr()
-    return CommandResult(import_motion(file, out, fps, up, config, overrides_from(set_)))
+    made = import_motion(file, out, fps, up, config, overrides_from(set_))
+    return CommandResult(made, text=_text(made))
+
+
+def _text(made: Mapping[str, Any]) -> list[str]:
+    """The figures of an answer, then what they are worth and what to type next."""
+    from robojackson.cli.cards import closing
+    from robojackson.cli.console import lines
+
+    figures = {key: value for key, value in made.items() if key not in ("verdict", "next")}
+    return [*lines(to_json_types(figures)), *closing(made)]

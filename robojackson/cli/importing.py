@@ -1,16 +1,22 @@
 """A human motion in the file format of another project, to our own table, with no Prefect."""
 
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from robojackson.api.foreign_files import Up, read_foreign
+from robojackson.cli import cards
 from robojackson.cli.stages import Overrides
 from robojackson.files.file_tree import results_in
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.pipeline.yaml_loader import load
+from robojackson.rl.evaluation.verdict import SHORTEST_S
+
+AIRBORNE = 0.2
+"""Share of frames with a foot on the floor below which axes or frame rate are doubted."""
 
 
 def import_motion(
@@ -36,8 +42,23 @@ def import_motion(
     with results_in(out) as files:
         files.write("smpl.parquet", read.motion.to_bytes())
     told = {"smpl": str(out / "smpl.parquet"), "file": str(file), "format": read.format}
-    seconds = time.monotonic() - began
-    return told | {**read.figures} | _figures(read.motion) | {"seconds": seconds}
+    figures = _figures(read.motion)
+    following = cards.command_line("retarget", out / "smpl.parquet", "-o", out)
+    ends = {"verdict": import_verdict(figures), "next": following}
+    return told | {**read.figures} | figures | ends | {"seconds": time.monotonic() - began}
+
+
+def import_verdict(figures: Mapping[str, Any]) -> dict[str, str]:
+    """Return kind and sentence about an imported motion."""
+    seconds, share = figures["frames"] / figures["fps"], figures["contact_share"]
+    told = f"{seconds:.1f} s, with a foot on the floor in {share:.0%} of the frames"
+    if share < AIRBORNE:
+        sentence = f"The person hardly touches the floor ({told}): is --up right, or --fps?"
+        return {"kind": "airborne", "sentence": sentence}
+    if seconds < SHORTEST_S:
+        sentence = f"The motion is too short to judge a robot by: {told}."
+        return {"kind": "too_short", "sentence": sentence}
+    return {"kind": "whole", "sentence": f"The motion stands on the floor: {told}."}
 
 
 def _figures(sequence: SmplSequence) -> dict[str, Any]:

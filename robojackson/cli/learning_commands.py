@@ -20,7 +20,9 @@ from robojackson.cli.options import (
     Seed,
     Set,
     SetTrain,
+    Setup,
     TablesFolder,
+    TrainConfigFile,
     Trainer,
     TrainMinutes,
     Verbose,
@@ -42,9 +44,8 @@ def train(
     steps: Annotated[int | None, typer.Option(min=1, help="Policy steps in all.")] = None,
     minutes: TrainMinutes = None,
     seed: Seed = None,
-    setup: Annotated[
-        str | None, typer.Option(help="Name of a setup of configs/setups, or a path.")
-    ] = None,
+    setup: Setup = None,
+    config: TrainConfigFile = None,
     run_id: Annotated[str, typer.Option(help="Name of the run in the tables.")] = "",
     move: Annotated[str, typer.Option(help="Name of the dance in the tables.")] = "",
     parent: Parent = 0,
@@ -62,7 +63,7 @@ def train(
     log_to_stderr()
     given = {"mode": mode, "trainer": trainer, "steps": steps, "minutes": minutes, "seed": seed}
     trained = training_process.train(
-        reference, out, setup, overrides_from(set_, given), run_id, move, force, robot
+        reference, out, setup, overrides_from(set_, given), run_id, move, force, robot, config
     )
     return CommandResult(trained, text=cards.shown(trained, cards.train_lines(trained), verbose))
 

@@ -1,5 +1,6 @@
 """Options that several commands of `robojackson` share, and how they override a configuration."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -9,7 +10,38 @@ from robojackson.errors import BadConfiguration
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print all figures.")]
-Config = Annotated[str, typer.Option("--config", help="Name or path of a configuration.")]
+
+
+def _named(folder: str = "") -> Callable[[str], list[str]]:
+    """What completes the names of a kind of configuration; paths are the shell's."""
+
+    def complete(incomplete: str) -> list[str]:
+        from robojackson.pipeline.yaml_loader import names
+
+        return [name for name in names(folder) if name.startswith(incomplete)]
+
+    return complete
+
+
+Config = Annotated[
+    str,
+    typer.Option("--config", help="Name or path of a configuration.", autocompletion=_named()),
+]
+Setup = Annotated[
+    str | None,
+    typer.Option(
+        help="Name of a setup of configs/setups, or a path.", autocompletion=_named("setups")
+    ),
+]
+TrainConfigFile = Annotated[
+    str | None,
+    typer.Option(
+        "--config",
+        help="Name or path of a configuration of `dance`, whose section `train` is used; its "
+        "`gate` too.",
+        autocompletion=_named(),
+    ),
+]
 
 
 def _set(example: str) -> Any:
@@ -61,7 +93,9 @@ Quality = Annotated[
 Robot = Annotated[
     str | None,
     typer.Option(
-        "--robot", help="Name of a robot of configs/robots, or the path of your own YAML."
+        "--robot",
+        help="Name of a robot of configs/robots, or the path of your own YAML.",
+        autocompletion=_named("robots"),
     ),
 ]
 MotionRobot = Annotated[

@@ -11,6 +11,11 @@ from robojackson.robot.description import RobotDescription
 from robojackson.robot.model import Robot
 
 Figures = dict[str, Any]
+LEG = "sites.left_hip"
+NO_LEGS = (
+    "no legs were found; with its joints at zero the model has to face along x, its left at y > 0. "
+    "Turn its root body, or name the bodies by hand"
+)
 
 
 def check_robot(given: str, picture: Path | None) -> tuple[Figures, list[str]]:
@@ -78,6 +83,8 @@ def new_robot(model: Path, out: Path | None, force: bool) -> tuple[Figures, list
         head.append(f"guessed  {', '.join(draft.guessed)}: no name says them; look at the picture")
     if draft.left:
         head.append(f"left     {', '.join(draft.left)}: comments in the file, fill them in")
+    if LEG in draft.left:
+        head.append(f"hint     {NO_LEGS}")
     tail = [f"next     robojackson robots check {target} -o {target.with_suffix('.png')}"]
     lines = lines if told["problems"] else lines[:1]
     facts = {"file": str(target), "guessed": list(draft.guessed), "left": list(draft.left)}

@@ -35,6 +35,8 @@ def mocap(
     from robojackson.api.hypotheses import hypothesis_files, sample_hypotheses
     from robojackson.api.motions import load_weights, recover_motion
     from robojackson.api.videos import detect_landmarks, probe_video
+    from robojackson.cli.pictures import motion_source
+    from robojackson.clips.quality.advice import advise
     from robojackson.pipeline.pipeline_config import PipelineConfig
 
     began = time.monotonic()
@@ -53,10 +55,14 @@ def mocap(
             )
         except (NoPersonFound, TrackTooShort) as cause:
             raise type(cause)(cause.reason, video) from cause
-        files.write("landmarks.parquet", track.to_bytes())
-        files.write("smpl.parquet", sequence.to_bytes())
+        motions = {"smpl.parquet": sequence.to_bytes()}
         for name, other in sample_hypotheses(track, settings, hypotheses):
-            files.write(name, other.to_bytes())
+            motions[name] = other.to_bytes()
+        landmarks = track.to_bytes()
+        source = motion_source.source_record(video, landmarks, motions)
+        for name, content in {**motions, "landmarks.parquet": landmarks}.items():
+            files.write(name, content)
+        files.write(motion_source.FILE, source)
     return {
         "video": str(video),
         "smpl": str(out / "smpl.parquet"),
@@ -69,6 +75,7 @@ def mocap(
         "floor": _floor(sequence),
         "contact_share": _contact_share(sequence),
         "notes": list(sequence.notes),
+        "advice": [each.record for each in advise(track)],
         "verdict": cards.mocap_verdict(len(sequence), int(sequence.valid.sum())),
         "next": cards.command_line("retarget", out / "smpl.parquet", "-o", out),
         "seconds": time.monotonic() - began,

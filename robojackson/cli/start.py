@@ -5,6 +5,7 @@ import sys
 from collections.abc import Callable
 from typing import NoReturn
 
+from robojackson.cli.library_output import set_variables
 from robojackson.cli.lifetime.interruption import INTERRUPTED, conclude, same_command
 from robojackson.cli.lifetime.supervisor import guarded
 
@@ -18,6 +19,7 @@ def start(command: Callable[[], int]) -> NoReturn:
     Args:
         command: Imports what it needs inside itself; returns the exit code.
     """
+    set_variables()
     if sys.platform == "linux":
         os.environ.setdefault("MUJOCO_GL", "disable")
     sys.exit(guarded(lambda: _run(command)))

@@ -11,6 +11,7 @@ import os
 import signal
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,10 +19,12 @@ from typing import TYPE_CHECKING, Any
 from robojackson.cli import cards, console
 from robojackson.cli.lifetime.interruption import STOPS, UnsavedFlag, is_guarded, with_option
 from robojackson.cli.lifetime.parent_death import end_with_parent
+from robojackson.errors import BadConfiguration
 from robojackson.pipeline.yaml_loader import load
 
 if TYPE_CHECKING:
     from robojackson.api.trained_policy import TrainedPolicy
+    from robojackson.rl.config.train_config import TrainConfig
 
 log = logging.getLogger(__name__)
 
@@ -29,6 +32,8 @@ USUAL_MINUTES = 10.0
 """What a training is advised to take that ended before its first update."""
 RECENT = 100
 """Episodes at the end of a training by which it is described."""
+SECTION = "train."
+"""Where a training's keys stand in a pipeline's configuration."""
 PROGRESS = "progress.json"
 """How far a training is, in its folder."""
 
@@ -42,6 +47,7 @@ def train(
     move: str = "",
     force: bool = False,
     robot: str | None = None,
+    config: str | None = None,
 ) -> dict[str, Any]:
     """Train until the budget is used up; the same call goes on after an interruption.
 
@@ -49,16 +55,18 @@ def train(
         setup: `pretrain` and the like of configs/setups, or the path of a training configuration.
         force: Train on a motion that the gate refuses, too.
         robot: Name or file of the one that the motion is for; None finds it.
+        config: Name or path of a pipeline's configuration; a training with no setup is what its
+            section `train` says, and its `gate` holds.
     Raises:
+        BadConfiguration: a wrong key or value; a setup beside a configuration.
         Interrupted: Ctrl-C or SIGTERM, after a checkpoint was written.
         RejectedReference: the motion's own score card says that the robot cannot follow it.
     """
-    from robojackson.api.policy_training import setup_file, train_policy
+    from robojackson.api.policy_training import train_policy
     from robojackson.rl.checkpoint_folder import newest_checkpoint
-    from robojackson.rl.config.train_config import TrainConfig
     from robojackson.rl.training_hooks import Hooks
 
-    config = load(TrainConfig, setup_file(setup), overrides)
+    wanted = requested(config, setup, overrides)
     stop = _StopRequest(out)
     with stop.listening(), console.ticker() as tell:
         hooks = Hooks(
@@ -69,14 +77,52 @@ def train(
         )
         try:
             trained = train_policy(
-                reference, robot, config=config, setup=setup, out=out, move=move, run_id=run_id,
-                force=force, hooks=hooks,
+                reference, robot, config=wanted.train, setup=wanted.setup, out=out, move=move,
+                run_id=run_id, force=force or not wanted.gate, hooks=hooks,
             )  # fmt: skip
         except KeyboardInterrupt:
             there = newest_checkpoint(out)
             kept = f"the checkpoint is in {out}; resume" if there else "nothing learnt yet; again"
             raise console.Interrupted(f"{kept}: {console.same_command()}") from None
     return _answer(trained, reference, out / "policy.safetensors")
+
+
+@dataclass(frozen=True)
+class Requested:
+    """What a command asks of a training.
+
+    Attributes:
+        train: Its configuration.
+        setup: Name or file that the tables know it by; None names it by what it does.
+        gate: Whether a motion that the robot cannot follow is refused.
+    """
+
+    train: "TrainConfig"
+    setup: str | None
+    gate: bool = True
+
+
+def requested(config: str | None, setup: str | None, overrides: Mapping[str, Any]) -> Requested:
+    """Return what files, `--set` and options ask of a training; the latter win.
+
+    Raises:
+        UnknownName: no such file.
+        BadConfiguration: a wrong key or value; a setup beside a configuration.
+    """
+    from robojackson.api.policy_training import setup_file
+    from robojackson.pipeline.pipeline_config import PipelineConfig
+    from robojackson.rl.config.train_config import TrainConfig
+
+    if config is None:
+        return Requested(load(TrainConfig, setup_file(setup), overrides), setup)
+    if setup is not None:
+        raise BadConfiguration(
+            f"--config {config} and --setup {setup}: give one; what a setup says stands in the "
+            "section `train` of a configuration"
+        )
+    given = {f"{SECTION}{key.removeprefix(SECTION)}": value for key, value in overrides.items()}
+    whole = load(PipelineConfig, config, given)
+    return Requested(whole.train, None, whole.gate)
 
 
 def _answer(trained: "TrainedPolicy", reference: Path, policy: Path) -> dict[str, Any]:

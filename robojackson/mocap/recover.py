@@ -38,8 +38,9 @@ class MocapConfig:
         method: HybrIK's solve, adaptive or naive.
         focal_px: Focal length of the camera, pixels; None guesses from the image size.
         cutoff_hz: Zero-phase low-pass of the landmarks, hertz.
-        depth_cutoff_hz: The same for the distance of the body from the camera, hertz.
-        bone_trust: 0 takes the proportions of the rest skeleton, 1 the medians of the clip.
+        depth_cutoff_hz: Low-pass of the distance of the body from the camera, hertz.
+        bone_trust: Share of the clip's medians in the proportions; the others are of the rest
+            skeleton.
         temporal: Of the network that corrects the detector.
         refine: Of the whole-clip refinement.
         gravity: Of the direction of up.

@@ -10,6 +10,7 @@ from robojackson.files.table_types import F32, F64, I32, Column, TableSchema
 
 LANDMARKS = 33
 ARRAYS = ("landmarks", "world_landmarks", "visibility")
+FACTS = ("fps", "width", "height", "person", "notes", "people", "brightness", "sharpness")
 EVEN = 0.25
 """Frames that are off their place on an even grid by no more than this are evenly spaced."""
 
@@ -42,6 +43,9 @@ class LandmarkTrack(TableFile):
         notes: What the user must know of how he was seen.
         to_first: Takes pixels of each frame to those of the first, for a camera that moved; None
             where it stood.
+        people: Number of people that were told apart; 0 where one is alone.
+        brightness: Mean grey level of the person, 0..1; None where it was not measured.
+        sharpness: Share of the person's contrast that is fine detail; None as before.
     """
 
     SCHEMA = LANDMARK_TRACK
@@ -56,6 +60,9 @@ class LandmarkTrack(TableFile):
     person: int = 0
     notes: tuple[str, ...] = ()
     to_first: Float[np.ndarray, "T 3 3"] | None = None
+    people: int = 0
+    brightness: float | None = None
+    sharpness: float | None = None
 
     def __len__(self) -> int:
         return len(self.landmarks)
@@ -81,9 +88,7 @@ class LandmarkTrack(TableFile):
     def to_columns(self) -> tuple[Columns, Facts]:
         columns = numbered("frame", len(self), 1.0 / self.fps) | {"time_s": self.times}
         columns |= {name: getattr(self, name) for name in ARRAYS}
-        facts = {
-            name: getattr(self, name) for name in ("fps", "width", "height", "person", "notes")
-        }
+        facts = {name: getattr(self, name) for name in FACTS}
         if self.to_first is not None:
             facts["to_first"] = self.to_first.tolist()
         return columns, facts
@@ -102,6 +107,9 @@ class LandmarkTrack(TableFile):
             person=int(facts.get("person", 0)),
             notes=tuple(facts.get("notes", ())),
             to_first=np.array(facts["to_first"]) if "to_first" in facts else None,
+            people=int(facts.get("people", 0)),
+            brightness=facts.get("brightness"),
+            sharpness=facts.get("sharpness"),
         )
 
     def nearest(self, time_s: float) -> int:

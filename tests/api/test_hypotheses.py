@@ -42,6 +42,7 @@ def test_without_the_temporal_network_there_is_nothing_to_sample() -> None:
         hypothesis_files(plain, 1)
 
 
+@pytest.mark.medium
 def test_hypotheses_of_a_hidden_arm_differ(hidden_arm: LandmarkTrack) -> None:
     first, second = (motion for _, motion in sample_hypotheses(hidden_arm, PipelineConfig(), 2))
     assert np.abs(first.joints - second.joints).max() > 0.01

@@ -17,6 +17,8 @@ from robojackson.rl.config.evaluate_config import EvaluateConfig
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.policy import load_policy
 
+pytestmark = pytest.mark.xdist_group("api")
+
 CLIP = bundled("hip_shake.mp4")
 NO_LIBRARY = """
 import sys
@@ -83,6 +85,7 @@ def test_a_video_is_probed_and_its_figures_saved(tmp_path: Path) -> None:
     assert json.loads(info.save(tmp_path / "info.json").read_text())["fps"] == info.fps
 
 
+@pytest.mark.medium
 def test_frames_of_an_array_give_the_landmarks_of_the_file(track: rj.LandmarkTrack) -> None:
     frames = np.stack(list(read_frames(CLIP)))
     counted: list[tuple[int, int]] = []
@@ -107,6 +110,7 @@ def test_an_array_that_is_no_video_is_refused(frames: np.ndarray, fps: float | N
         rj.detect_landmarks(frames, fps=fps)
 
 
+@pytest.mark.medium
 def test_a_table_is_saved_and_loaded(
     track: rj.LandmarkTrack, motion: rj.SmplSequence, tmp_path: Path
 ) -> None:
@@ -116,6 +120,7 @@ def test_a_table_is_saved_and_loaded(
     assert np.abs(from_file.joints - motion.joints).max() < 1e-3
 
 
+@pytest.mark.medium
 def test_a_table_of_another_kind_is_refused(track: rj.LandmarkTrack, tmp_path: Path) -> None:
     path = track.save(tmp_path / "landmarks.parquet")
     with pytest.raises(BadTable, match="holds a LandmarkTrack"):
@@ -127,6 +132,7 @@ def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
         rj.read_motion(tmp_path / "nobody.parquet")
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("name", ["motion.bvh", "motion.npz", "motion.parquet"])
 def test_a_human_motion_is_written_and_read(
     name: str, motion: rj.SmplSequence, tmp_path: Path
@@ -138,6 +144,7 @@ def test_a_human_motion_is_written_and_read(
     assert np.abs(hips - (motion.joints[:, 0] - motion.joints[0, 0])).max() < 0.01
 
 
+@pytest.mark.medium
 def test_a_robots_motion_is_written_and_read(reference: rj.ReferenceMotion, tmp_path: Path) -> None:
     path = reference.save(tmp_path / "reference.parquet")
     assert np.array_equal(rj.read_motion(path).qpos, reference.qpos)  # type: ignore[union-attr]
@@ -192,6 +199,7 @@ def test_the_same_call_resumes(
         assert {name: kept[name] for name in row} == row
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(
     "wrong", [lambda state: 1.0, lambda state: np.full(len(state.qpos), np.nan)]
 )
@@ -202,6 +210,7 @@ def test_a_reward_that_is_no_number_a_robot_is_refused(
         rj.train_policy(reference, config=config, reward={"wrong": wrong})  # type: ignore[dict-item]
 
 
+@pytest.mark.medium
 def test_a_motion_that_the_gate_refuses_is_not_trained(
     reference: rj.ReferenceMotion, config: TrainConfig
 ) -> None:

@@ -85,6 +85,7 @@ def test_processes_are_found_by_their_home_and_killed(tmp_path: Path) -> None:
     assert under(tmp_path / "home") == []
 
 
+@pytest.mark.medium
 def test_a_process_that_has_ended_is_not_hit(tmp_path: Path) -> None:
     with subprocess.Popen([sys.executable, "-S", "-c", ""]) as process:
         dead = Found(process.pid, "", tmp_path)

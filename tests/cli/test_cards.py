@@ -31,6 +31,12 @@ def test_the_steadiest_video_is_marked_and_what_cannot_be_read_is_told() -> None
     ]
 
 
+def test_advice_stands_a_line_each_in_its_words() -> None:
+    told = {"advice": [{"kind": "dark", "words": "more light"}, {"words": "nearer"}]}
+    assert cards.advice_lines(told) == ["advice    more light", "advice    nearer"]
+    assert cards.advice_lines({}) == []
+
+
 @pytest.mark.parametrize(
     ("detected", "kind"), [(100, "whole"), (95, "whole"), (80, "gaps"), (30, "poor")]
 )

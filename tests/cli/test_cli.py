@@ -99,6 +99,7 @@ def missing_file(folder: Path) -> list[object]:
     return ["dance", folder / "gone.mp4"]
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(
     ("make", "told"),
     [
@@ -156,6 +157,7 @@ def test_a_video_that_breaks_off_while_it_is_looked_at_loses_no_other_score(
     )
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(
     ("where", "reason"),
     [
@@ -265,6 +267,7 @@ def test_an_override_without_a_value_is_refused() -> None:
     assert "expected KEY=VALUE" in invoke("score", "x.mp4", "--set", "train.seed")[2]
 
 
+@pytest.mark.medium
 def test_doctor_tells_what_is_there_in_one_object() -> None:
     said = robojackson("doctor", "--json")
     assert {"ok", "packages", "libraries", "models", "missing", "optional"} == set(said.answer) - {

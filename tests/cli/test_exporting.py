@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from robojackson.cli.cards import command_line
 from robojackson.cli.exporting import export
 from robojackson.errors import RejectedReference, StoreError, UnknownName
 from robojackson.files import tables
@@ -22,6 +23,8 @@ from robojackson.formats import (
 )
 from tests.fixtures.commands import Said, in_process, robojackson
 from tests.fixtures.robots import robot_motion
+
+pytestmark = pytest.mark.xdist_group("exporting")
 
 READERS = {
     "gmr": gmr.read,
@@ -41,6 +44,7 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("to", registry.robot_exporters())
 def test_every_format_starts_with_the_first_pose(to: str, reference: Path, tmp_path: Path) -> None:
     out = tmp_path / "motion"
@@ -51,17 +55,38 @@ def test_every_format_starts_with_the_first_pose(to: str, reference: Path, tmp_p
     np.testing.assert_allclose(first, [*wanted[:3], *sign * wanted[3:7], *wanted[7:]], atol=1e-5)
 
 
+@pytest.mark.medium
 def test_the_answer_tells_what_was_written(reference: Path, tmp_path: Path) -> None:
     out = tmp_path / "motion.csv"
     told = export(reference, "csv", out)
     assert (told["file"], told["bytes"]) == (str(out), out.stat().st_size)
 
 
+def test_the_answer_judges_the_motion_by_its_score_card(reference: Path, tmp_path: Path) -> None:
+    told = export(reference, "csv", tmp_path / "motion.csv")
+    assert told["verdict"]["kind"] == "feasible"
+    assert told["next"] == command_line("train", reference, "-o", reference.parent / "training")
+
+
+@pytest.mark.parametrize(
+    ("card", "kind"), [({}, "unchecked"), ({"floor_penetration_mm": 500.0}, "refused")]
+)
+def test_a_motion_that_no_robot_can_follow_is_retargeted_next(
+    card: dict[str, float], kind: str, tmp_path: Path
+) -> None:
+    motion = replace(robot_motion("hip_shake"), scorecard=card, certificate=None)
+    told = export(motion.save(tmp_path / "r.parquet"), "csv", tmp_path / "motion.csv")
+    assert told["verdict"]["kind"] == kind
+    assert told["next"].startswith("robojackson retarget ")
+
+
+@pytest.mark.medium
 def test_an_unknown_format_lists_those_there_are(reference: Path, tmp_path: Path) -> None:
     with pytest.raises(UnknownName, match="Known: beyondmimic, csv, gmr, keyframes, locomujoco"):
         export(reference, "fbx", tmp_path / "motion.fbx")
 
 
+@pytest.mark.medium
 def test_a_format_for_persons_does_not_fit_a_robot(reference: Path, tmp_path: Path) -> None:
     with pytest.raises(UnknownName, match=r"holds a robot's motion.*Known: beyondmimic, csv, gmr"):
         export(reference, "bvh", tmp_path / "motion.bvh")
@@ -93,11 +118,13 @@ def said(reference: Path) -> Said:
     return robojackson("export", reference, "--to", "gmr", "-o", out, "--json")
 
 
+@pytest.mark.medium
 def test_the_command_writes_the_file_it_names(said: Said) -> None:
     assert said.code == 0, said.err
     assert len(gmr.read(Path(said.answer["file"]).read_bytes())) > 1
 
 
+@pytest.mark.medium
 def test_the_command_loads_no_prefect(said: Said) -> None:
     assert not said.loaded_prefect
 

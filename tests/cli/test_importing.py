@@ -12,7 +12,7 @@ import pytest
 
 from robojackson.body.skeleton import keypoint
 from robojackson.cli.exporting import export
-from robojackson.cli.importing import import_motion
+from robojackson.cli.importing import import_motion, import_verdict
 from robojackson.errors import BadConfiguration, BadTable, StoreError, UnknownName
 from robojackson.files import tables
 from robojackson.formats import amass, bvh, registry
@@ -26,6 +26,8 @@ from robojackson.robot.description import RobotDescription
 from robojackson.robot.model import load_robot
 from tests.fixtures.commands import Said, robojackson
 from tests.fixtures.person import person
+
+pytestmark = pytest.mark.xdist_group("importing")
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +53,17 @@ def test_a_motion_goes_out_and_comes_back(to: str, smpl: Path, tmp_path: Path) -
     np.testing.assert_allclose(back.joints, read(smpl).joints, atol=1e-5)
 
 
+@pytest.mark.parametrize(
+    ("frames", "share", "kind"), [(90, 0.9, "whole"), (90, 0.1, "airborne"), (30, 0.9, "too_short")]
+)
+def test_an_import_is_judged_by_its_feet_and_its_length(
+    frames: int, share: float, kind: str
+) -> None:
+    told = import_verdict({"frames": frames, "fps": 30.0, "contact_share": share})
+    assert told["kind"] == kind
+
+
+@pytest.mark.medium
 def test_what_was_imported_can_be_retargeted(smpl: Path, tmp_path: Path) -> None:
     export(smpl, "bvh", tmp_path / "motion.bvh")
     import_motion(tmp_path / "motion.bvh", tmp_path, None, None, "base", {})
@@ -186,10 +199,12 @@ def said(smpl: Path) -> Said:
     return robojackson("import", path, "-o", smpl.parent / "out", "--json")
 
 
+@pytest.mark.medium
 def test_the_command_writes_the_table_it_names(said: Said) -> None:
     assert said.code == 0, said.err
     assert len(read(Path(said.answer["smpl"]))) == said.answer["frames"]
 
 
+@pytest.mark.medium
 def test_the_command_loads_no_prefect(said: Said) -> None:
     assert not said.loaded_prefect

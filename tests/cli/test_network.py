@@ -29,6 +29,7 @@ def weights(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_a_video_goes_through_both_networks(weights: Path, tmp_path: Path) -> None:
     brought = ("--hybrik", weights / "r34.pth", "--niki", weights / "niki's.pth")
     said = robojackson("mocap", weights / "short.mp4", "-o", tmp_path, *brought, "--json")
@@ -39,6 +40,7 @@ def test_a_video_goes_through_both_networks(weights: Path, tmp_path: Path) -> No
     assert not said.loaded_prefect
 
 
+@pytest.mark.medium
 def test_weights_that_cannot_be_used_are_told_in_one_line(weights: Path, tmp_path: Path) -> None:
     wrong = ("--hybrik", weights / "niki's.pth")
     said = in_process("mocap", weights / "short.mp4", "-o", tmp_path / "out", *wrong)

@@ -71,6 +71,7 @@ def describe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     return give
 
 
+@pytest.mark.medium
 def test_the_model_is_unpacked_with_its_licence_and_loads(source, describe, tmp_path: Path):
     description = describe(source)
     told = robot_models.add_robot("machine")
@@ -84,6 +85,7 @@ def test_the_model_is_unpacked_with_its_licence_and_loads(source, describe, tmp_
     assert [path.name for path in folder.parent.iterdir()] == ["machine"]
 
 
+@pytest.mark.medium
 def test_a_second_time_changes_nothing_and_needs_no_network(source, describe, monkeypatch):
     describe(source)
     robot_models.add_robot("machine")
@@ -91,6 +93,7 @@ def test_a_second_time_changes_nothing_and_needs_no_network(source, describe, mo
     assert robot_models.add_robot("machine")["added"] is False
 
 
+@pytest.mark.medium
 def test_an_altered_model_is_refused_and_added_again(source, describe, tmp_path: Path):
     description = describe(source)
     model = Path(robot_models.add_robot("machine")["model"])
@@ -106,6 +109,7 @@ def test_without_the_model_the_error_is_the_command_that_brings_it(source, descr
         load_robot(describe(source))
 
 
+@pytest.mark.medium
 def test_another_wheel_than_the_pinned_one_leaves_nothing(source, describe, tmp_path: Path):
     describe(replace(source, wheel_sha256="0" * 64))
     with pytest.raises(DownloadFailed, match=r"sha256 is [0-9a-f]{64}, expected 0{64}"):
@@ -113,6 +117,7 @@ def test_another_wheel_than_the_pinned_one_leaves_nothing(source, describe, tmp_
     assert list((tmp_path / "store" / "robots").iterdir()) == []
 
 
+@pytest.mark.medium
 def test_offline_is_one_line(source, describe, tmp_path: Path, monkeypatch):
     describe(source)
     monkeypatch.setenv("PIP_FIND_LINKS", str(tmp_path / "empty"))
@@ -158,6 +163,7 @@ def test_the_shipped_g1_pins_its_wheel_and_its_model():
     assert source.wheel_sha256.startswith("03d00385")
 
 
+@pytest.mark.medium
 def test_the_command_lists_the_robots_as_json(tmp_path: Path):
     command = [sys.executable, "-m", "robojackson", "robots", "--json"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
@@ -173,6 +179,7 @@ def broken(folder: Path, old: str, new: str) -> Path:
     return path
 
 
+@pytest.mark.medium
 def test_a_good_description_is_told_and_drawn(tmp_path: Path):
     told, lines = robot_sheets.check_robot(str(own_robot(tmp_path)), tmp_path / "mine.png")
     assert (told["ok"], told["problems"], told["hinges"], told["motors"]) == (True, [], 17, 17)
@@ -236,6 +243,16 @@ def test_new_says_which_keys_are_left(tmp_path: Path):
     assert any(line.startswith("guessed  sites.head: ") for line in lines)
 
 
+def test_new_says_why_no_legs_were_found(tmp_path: Path):
+    """A model that faces along y, as the CMU humanoid of dm_control does."""
+    turned = gymnasium_model().read_text()
+    turned = turned.replace('<body name="torso"', '<body name="torso" euler="0 0 -90"')
+    (tmp_path / "aside.xml").write_text(turned.replace("left", "a").replace("right", "b"))
+    _, lines = robot_sheets.new_robot(tmp_path / "aside.xml", tmp_path / "it.yaml", force=False)
+    assert any(line.startswith("hint     no legs were found; ") for line in lines)
+
+
+@pytest.mark.medium
 def test_the_commands_answer_as_json_with_an_exit_code(tmp_path: Path):
     good, bad = own_robot(tmp_path / "a"), broken(tmp_path / "b", "[torso,", "[tors,")
     said = [commands.robojackson("robots", "check", path, "--json") for path in (good, bad)]

@@ -36,11 +36,13 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Made:
     return Made(tmp_path_factory.mktemp("own"))
 
 
+@pytest.mark.medium
 def test_the_motion_remembers_the_file_whatever_its_name(made: Made) -> None:
     motion = ReferenceMotion.load(made.reference)
     assert (motion.robot, motion.robot_file) == ("mine", str(made.robot))
 
 
+@pytest.mark.medium
 def test_train_evaluate_and_export_find_the_robot_by_themselves(made: Made) -> None:
     policy = Path(made.train("policy")["policy"])
     overrides = {"evaluate.seconds": 0.1}
@@ -50,6 +52,7 @@ def test_train_evaluate_and_export_find_the_robot_by_themselves(made: Made) -> N
     assert told["robot"] == "mine"
 
 
+@pytest.mark.medium
 def test_a_file_that_is_gone_is_one_line_that_says_what_to_give(made: Made) -> None:
     elsewhere = made.robot.rename(made.robot.with_stem("moved"))
     try:
@@ -64,6 +67,7 @@ def test_a_file_that_is_gone_is_one_line_that_says_what_to_give(made: Made) -> N
         elsewhere.rename(made.robot)
 
 
+@pytest.mark.medium
 def test_a_motion_that_does_not_name_the_file_says_so(made: Made, tmp_path: Path) -> None:
     """As the motions of the flows, which may be read on another machine."""
     from dataclasses import replace
@@ -73,6 +77,7 @@ def test_a_motion_that_does_not_name_the_file_says_so(made: Made, tmp_path: Path
         exporting.export(path, "gmr", tmp_path / "m.pkl")
 
 
+@pytest.mark.medium
 def test_another_model_than_the_motions_is_refused(made: Made, tmp_path: Path) -> None:
     other = own_robot(tmp_path)
     model = other.parent / "model.xml"
@@ -81,6 +86,7 @@ def test_another_model_than_the_motions_is_refused(made: Made, tmp_path: Path) -
         made.train("other", str(other))
 
 
+@pytest.mark.medium
 def test_a_file_that_is_not_there_is_one_line(made: Made) -> None:
     with pytest.raises(UnknownName, match=r"unknown robot 'no/robot\.yaml' \(no file /"):
         stages.retarget(
@@ -88,6 +94,7 @@ def test_a_file_that_is_not_there_is_one_line(made: Made) -> None:
         )
 
 
+@pytest.mark.medium
 def test_the_walker_of_the_paper_is_humanoid_v5(made: Made, tmp_path: Path) -> None:
     with pytest.raises(BadConfiguration, match="kind 'paper' is humanoid; take --kind track"):
         walker_training.pretrain("paper", tmp_path, None, {}, str(made.robot))

@@ -11,6 +11,8 @@ from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.pipeline.table_schemas import EPISODE_RECORD, EVALUATION_RECORD
 from tests.fixtures.commands import Said, robojackson
 
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("stages")]
+
 SMOKE = ("--config", "smoke", "--json")
 TINY = (
     "--steps=400",

@@ -11,7 +11,8 @@ from robojackson.api import policy_training
 from robojackson.cli import training_process
 from robojackson.cli.lifetime.interruption import UNSAVED
 from robojackson.cli.lifetime.orphans import VARIABLE, holding
-from robojackson.errors import RejectedReference
+from robojackson.errors import BadConfiguration, RejectedReference
+from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.yaml_loader import load
 from robojackson.rl import training
 from robojackson.rl.config.train_config import TrainConfig
@@ -75,6 +76,38 @@ def test_a_training_without_a_budget_gets_the_usual_one(
     with pytest.raises(RejectedReference):
         training_process.train(tmp_path / "reference.parquet", tmp_path, None, given, force=True)
     assert [(config.steps, config.minutes) for config in budgets] == [budget]
+
+
+def written(folder: Path, text: str) -> str:
+    path = folder / "mine.yaml"
+    path.write_text(text)
+    return str(path)
+
+
+def test_a_configuration_of_dance_trains_with_its_section(tmp_path: Path) -> None:
+    config = written(tmp_path, "train: {seed: 3, tqc: {batch: 64}}\n")
+    wanted = training_process.requested(config, None, {})
+    assert (wanted.train.seed, wanted.train.tqc.batch, wanted.gate) == (3, 64, True)
+    assert wanted.train == load(PipelineConfig, config).train
+
+
+@pytest.mark.parametrize("key", ["seed", "train.seed"])
+def test_what_is_typed_wins_over_the_configuration(key: str, tmp_path: Path) -> None:
+    config = written(tmp_path, "gate: false\ntrain: {seed: 3}\n")
+    wanted = training_process.requested(config, None, {key: "4"})
+    assert (wanted.train.seed, wanted.gate) == (4, False)
+
+
+def test_a_wrong_key_of_the_configuration_is_named_with_its_path(tmp_path: Path) -> None:
+    config = written(tmp_path, "train: {tqc: {bach: 64}}\n")
+    with pytest.raises(BadConfiguration, match=r"mine\.yaml: .*'train\.tqc\.bach'.*mean 'batch'"):
+        training_process.requested(config, None, {})
+
+
+def test_a_setup_beside_a_configuration_is_refused(tmp_path: Path) -> None:
+    config = written(tmp_path, "train: {seed: 3}\n")
+    with pytest.raises(BadConfiguration, match=r"--setup pretrain: give one"):
+        training_process.requested(config, "pretrain", {})
 
 
 def test_what_the_reward_can_ask_for_is_one_line() -> None:

@@ -23,6 +23,7 @@ def test_a_dancer_is_found_in_every_frame_and_stands_upright(tmp_path: Path) -> 
     assert calls[-1] == (info.frames, info.frames)
 
 
+@pytest.mark.medium
 def test_rows_that_the_decoder_pads_are_read_straight(tmp_path: Path) -> None:
     path = trim(CLIPS / "person_cam1.mp4", 0.0, 0.1, tmp_path / "part.mp4")
     info = probe(path, VideoLimits())

@@ -121,6 +121,7 @@ def test_trim_keeps_exactly_the_range(write_video, tmp_path: Path) -> None:
     assert abs(levels[0] - 10) <= 3
 
 
+@pytest.mark.medium
 def test_trim_of_a_damaged_video_keeps_its_times(tmp_path: Path) -> None:
     path = tmp_path / "copy.mp4"
     path.write_bytes((CLIPS / "dance_a.mp4").read_bytes())

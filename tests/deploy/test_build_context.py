@@ -131,6 +131,7 @@ def test_no_ground_truth_of_tests_is_in_it(context: set[str]) -> None:
     assert [n for n in context if n.endswith(("_gt.npz", ".trc")) or "heldout" in n] == []
 
 
+@pytest.mark.medium
 def test_nothing_in_it_imports_what_stays_out(context: set[str]) -> None:
     wrong = []
     for name in (name for name in context if name.endswith(".py")):
@@ -166,11 +167,13 @@ def test_the_command_runs_on_it_alone(image: Path) -> None:
     assert "a robot that dances it out" in run(image, COMMAND, "--help")
 
 
+@pytest.mark.medium
 def test_the_doctor_finds_everything_there(image: Path) -> None:
     report = json.loads(run(image, COMMAND, "doctor", "--json"))
     assert report["missing"] == []
 
 
+@pytest.mark.medium
 def test_every_deployment_is_importable_from_it_alone(image: Path) -> None:
     entries = yaml.safe_load((image / "prefect.yaml").read_text())["deployments"]
     run(image, ENTRIES, *sorted({entry["entrypoint"] for entry in entries}))

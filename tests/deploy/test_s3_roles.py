@@ -16,6 +16,8 @@ import s3fs
 from tools.stack.compose_stack import ROLES, Stack
 from tools.stack.service import ROOT
 
+pytestmark = pytest.mark.xdist_group("s3_roles")
+
 BUCKET = "robojackson"
 KEY = f"{BUCKET}/motion/0a/a b ä.bin"
 CONTENT = bytes(range(256)) * 40_000
@@ -72,6 +74,7 @@ def bucket(stack: Stack) -> Stack:
     return stack
 
 
+@pytest.mark.medium
 def test_the_roles_have_different_passwords(stack: Stack) -> None:
     passwords = {
         stack.file[SERVICES[name]]["environment"]["AWS_SECRET_ACCESS_KEY"] for name in ROLES
@@ -79,6 +82,7 @@ def test_the_roles_have_different_passwords(stack: Stack) -> None:
     assert len(passwords) == len(ROLES)
 
 
+@pytest.mark.medium
 def test_setup_makes_the_bucket_as_often_as_it_runs(stack: Stack, tmp_path: Path) -> None:
     words = "from storage.store import Store; Store.from_environment().create().require_writable()"
     for _ in range(2):
@@ -93,6 +97,7 @@ def test_setup_makes_the_bucket_as_often_as_it_runs(stack: Stack, tmp_path: Path
         assert run.returncode == 0, run.stderr
 
 
+@pytest.mark.medium
 def test_a_worker_writes_reads_lists_and_removes(bucket: Stack) -> None:
     worker = role(bucket, "worker")
     assert worker.cat_file(KEY) == CONTENT
@@ -104,6 +109,7 @@ def test_a_worker_writes_reads_lists_and_removes(bucket: Stack) -> None:
     worker.makedirs(BUCKET, exist_ok=True)
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("name", READERS)
 def test_a_reader_reads_and_lists(name: str, bucket: Stack) -> None:
     reader = role(bucket, name)
@@ -128,6 +134,7 @@ ADMINISTRATION: dict[str, tuple[str, dict[str, Any]]] = {
 }
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("name", READERS)
 @pytest.mark.parametrize("call", WRITES)
 def test_a_reader_writes_nothing(name: str, call: str, bucket: Stack) -> None:
@@ -138,6 +145,7 @@ def test_a_reader_writes_nothing(name: str, call: str, bucket: Stack) -> None:
     assert role(bucket, "worker").cat_file(KEY) == CONTENT
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("name", ["worker", *READERS])
 @pytest.mark.parametrize("call", ADMINISTRATION)
 def test_none_but_setup_administers(name: str, call: str, bucket: Stack) -> None:
@@ -146,6 +154,7 @@ def test_none_but_setup_administers(name: str, call: str, bucket: Stack) -> None
         role(bucket, name).call_s3(method, **words)
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("call", ["make another bucket", "write elsewhere", "list elsewhere"])
 def test_setup_has_no_rights_beside_the_bucket(call: str, bucket: Stack) -> None:
     method, words = ADMINISTRATION[call]
@@ -153,6 +162,7 @@ def test_setup_has_no_rights_beside_the_bucket(call: str, bucket: Stack) -> None
         role(bucket, "setup").call_s3(method, **words)
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("method", ["GET", "PUT", "DELETE"])
 @pytest.mark.parametrize("path", ["", f"/{BUCKET}", f"/{BUCKET}/x", "/other"])
 def test_without_a_key_all_is_forbidden(path: str, method: str, bucket: Stack) -> None:
@@ -164,6 +174,7 @@ def test_without_a_key_all_is_forbidden(path: str, method: str, bucket: Stack) -
     assert refused.value.code == 403
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(("key", "secret"), [("worker", "wrong"), ("root", ""), ("x", "y")])
 def test_a_wrong_key_is_forbidden(key: str, secret: str, bucket: Stack) -> None:
     with pytest.raises(PermissionError):
@@ -180,6 +191,7 @@ def inner_port(stack: Stack, name: str) -> str:
     return next(w.partition("=")[2] for w in reversed(words) if w.startswith(f"-{name}="))
 
 
+@pytest.mark.medium
 def test_the_gateways_own_port_takes_no_identity_from_strangers(bucket: Stack) -> None:
     """Without a signing key it does: any process in the network makes itself an administrator."""
     credential = message(1, b"x") + message(2, b"y")
@@ -203,10 +215,12 @@ def listening(stack: Stack) -> dict[str, set[int]]:
     return found
 
 
+@pytest.mark.medium
 def test_the_process_listens_on_this_machine_alone(bucket: Stack) -> None:
     assert set(listening(bucket)) == {"127.0.0.1"}
 
 
+@pytest.mark.medium
 def test_only_the_gateway_listens_where_the_file_opens_it(tmp_path: Path) -> None:
     """Filer, volumes and master require no key; 127.0.0.2 is in place of the file's 0.0.0.0."""
     stack = Stack(tmp_path)
@@ -226,6 +240,7 @@ def test_only_the_gateway_listens_where_the_file_opens_it(tmp_path: Path) -> Non
         stack.remove()
 
 
+@pytest.mark.medium
 def test_a_backup_reads_from_it_once(bucket: Stack, tmp_path: Path) -> None:
     """The second one knows by the server's tags that nothing has changed."""
     given = bucket._environment("backup", "backup") | {
@@ -250,6 +265,7 @@ def test_a_backup_reads_from_it_once(bucket: Stack, tmp_path: Path) -> None:
     assert [path.read_bytes() for path in contents] == [CONTENT]
 
 
+@pytest.mark.medium
 def test_what_the_server_writes_is_in_the_stacks_folder(bucket: Stack) -> None:
     process = bucket.services["s3"].process
     assert process is not None

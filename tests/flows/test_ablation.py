@@ -104,6 +104,7 @@ def states_told() -> dict[str, str]:
     return {row["cell"]: row["state"] for row in json.loads(str(newest.data))}
 
 
+@pytest.mark.medium
 def test_a_failed_cell_is_named_and_its_neighbours_are_done(play: Any) -> None:
     with pytest.raises(StudyFailed, match=r"1 of 3 cells failed \(pretrain-walk-s0: run x was"):
         play(Played(fails="pretrain-walk-s0"))
@@ -111,6 +112,7 @@ def test_a_failed_cell_is_named_and_its_neighbours_are_done(play: Any) -> None:
     assert states_told() == told
 
 
+@pytest.mark.medium
 def test_the_page_is_of_the_cells_that_ended_well_in_this_run(
     play: Any, store_folder: Path
 ) -> None:
@@ -122,6 +124,7 @@ def test_the_page_is_of_the_cells_that_ended_well_in_this_run(
     assert play.shown == {"scratch-walk-s0.parquet", "curiosity-walk-s0.parquet"}
 
 
+@pytest.mark.medium
 def test_a_study_on_a_refused_motion_begins_no_cell_and_says_why(play: Any) -> None:
     executor = Played()
     told = r"1 of 1 motions are refused \(walk: .*infeasible_share is 0.5.*gate=false"
@@ -130,10 +133,12 @@ def test_a_study_on_a_refused_motion_begins_no_cell_and_says_why(play: Any) -> N
     assert executor.most == 0
 
 
+@pytest.mark.medium
 def test_a_study_without_a_gate_trains_on_a_refused_motion(play: Any) -> None:
     assert play(Played(), infeasible_share=0.5, gate=False)["cells"] == 3
 
 
+@pytest.mark.medium
 def test_no_more_cells_run_at_once_than_there_are_slots(play: Any) -> None:
     executor = Played()
     assert play(executor, slots=2)["cells"] == 3

@@ -61,6 +61,7 @@ def refused(**given: Any) -> bool:
     return bool(validate(given, schema, raise_on_error=False))
 
 
+@pytest.mark.slow
 def test_a_name_becomes_the_best_video(
     records: None, store_folder: Path, tmp_path: Path, short_clip: Path
 ) -> None:
@@ -70,6 +71,7 @@ def test_a_name_becomes_the_best_video(
     assert found == {"hips.mp4": short_clip.read_bytes()}
 
 
+@pytest.mark.medium
 def test_a_video_that_was_brought_leaves_no_copy(
     records: None, store_folder: Path, tmp_path: Path, short_clip: Path
 ) -> None:
@@ -78,6 +80,7 @@ def test_a_video_that_was_brought_leaves_no_copy(
     assert not list((store_folder / "work").rglob("*.mp4"))
 
 
+@pytest.mark.medium
 def test_a_name_without_a_video_that_can_be_danced_tells_every_reason(
     records: None, store_folder: Path, tmp_path: Path
 ) -> None:
@@ -85,6 +88,7 @@ def test_a_name_without_a_video_that_can_be_danced_tells_every_reason(
         files("Hips", near(tmp_path), book(tmp_path, f"{web.url}/missing/a.mp4"))
 
 
+@pytest.mark.medium
 def test_without_a_net_the_video_that_was_chosen_last_is_danced(
     records: None, store_folder: Path, config: str
 ) -> None:
@@ -97,6 +101,7 @@ def test_without_a_net_the_video_that_was_chosen_last_is_danced(
     assert files("apt dance", config) == {"apt.mp4": b"the last one"}
 
 
+@pytest.mark.medium
 def test_without_a_net_and_without_a_choice_the_search_has_failed(
     records: None, store_folder: Path, config: str
 ) -> None:
@@ -104,6 +109,7 @@ def test_without_a_net_and_without_a_choice_the_search_has_failed(
         files("a dance that nobody knows", config)
 
 
+@pytest.mark.medium
 def test_an_address_is_brought_without_a_search(
     records: None, store_folder: Path, tmp_path: Path, short_clip: Path
 ) -> None:
@@ -112,6 +118,7 @@ def test_an_address_is_brought_without_a_search(
     assert found == {"my-dance.mp4": short_clip.read_bytes()}
 
 
+@pytest.mark.medium
 def test_an_address_that_gives_nothing_is_told_with_its_reason(
     records: None, store_folder: Path, tmp_path: Path
 ) -> None:
@@ -119,10 +126,12 @@ def test_an_address_that_gives_nothing_is_told_with_its_reason(
         files(f"{web.url}/missing/a.mp4", near(tmp_path))
 
 
+@pytest.mark.medium
 def test_a_path_is_taken_as_it_is(records: None, short_clip: Path) -> None:
     assert files(str(short_clip)) == {short_clip.name: short_clip.read_bytes()}
 
 
+@pytest.mark.slow
 def test_a_name_goes_all_the_way_into_the_flow(
     records: None, store_folder: Path, tmp_path: Path, short_clip: Path
 ) -> None:

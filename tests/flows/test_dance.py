@@ -28,6 +28,8 @@ from storage.artifact import Artifact
 from storage.store import Store
 from tests.fixtures.commands import robojackson
 
+pytestmark = pytest.mark.xdist_group("dance")
+
 OVERRIDES = {"train.trainer": "sb3", "train.steps": 300}
 FILES = {
     "landmarks.parquet",
@@ -207,12 +209,14 @@ def score(
     return run
 
 
+@pytest.mark.medium
 def test_a_clip_whose_landmarks_fail_leaves_its_neighbours_to_be_danced(
     score: Callable[..., list[str]],
 ) -> None:
     assert score("a.mp4", "empty.mp4", "b.mp4") == ["a.mp4", "b.mp4"]
 
 
+@pytest.mark.medium
 def test_when_the_landmarks_of_all_clips_fail_the_first_cause_is_told(
     score: Callable[..., list[str]],
 ) -> None:
@@ -265,6 +269,7 @@ def test_a_source_that_is_not_there_is_refused(source: str) -> None:
         resolve(source)
 
 
+@pytest.mark.medium
 def test_a_reference_that_breaks_a_bar_is_not_trained(passes: Passes) -> None:
     """The paper's mapping breaks joint limits: the gate says so before a robot is trained on it."""
     with pytest.raises(RejectedReference, match=r"reference refused: .* is allowed"):

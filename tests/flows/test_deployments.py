@@ -96,6 +96,7 @@ async def environment_of_a_run(pool: str, known: dict[str, Any] | None) -> dict[
     return dict((await ProcessJobConfiguration.from_template_and_values(template, {})).env)
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(("pool", "known"), [("new", None), ("older", OLDER)])
 def test_a_run_of_our_pools_may_miss_two_heartbeats(
     prefect_server: None, pool: str, known: dict[str, Any] | None
@@ -131,6 +132,7 @@ def noted(text: str) -> Artifact:
     return Store.from_environment().put("note.txt", text.encode())
 
 
+@pytest.mark.medium
 def test_records_are_kept_where_each_machine_finds_the_store(
     prefect_server: None, bucket: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -143,6 +145,7 @@ def test_records_are_kept_where_each_machine_finds_the_store(
     assert os.environ["AWS_ENDPOINT_URL"].encode() not in store.read(record)
 
 
+@pytest.mark.medium
 def test_deploying_registers_no_place_for_results(prefect_server: None, store_folder: Path) -> None:
     """A block of the server would know one machine's address, and a local store had none."""
     assert "results" not in asyncio.run(deployments._prepare())

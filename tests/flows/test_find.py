@@ -9,6 +9,8 @@ from flows.search.dance_source import is_name
 from tests.fixtures.commands import Said, in_process, robojackson
 from tests.fixtures.difficult_clips import black, write
 
+pytestmark = pytest.mark.xdist_group("find")
+
 
 @pytest.fixture(scope="module")
 def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -25,11 +27,13 @@ def found(short_clip: Path, store: Path) -> Said:
     return robojackson("find", folder, "--source", "folder", "--json", ROBOJACKSON_STORE=str(store))
 
 
+@pytest.mark.medium
 def test_find_answers_with_the_chosen_video(found: Said) -> None:
     assert found.code == 0, found.err
     assert found.answer["chosen"]["title"] == "hips.mp4"
 
 
+@pytest.mark.medium
 def test_find_gives_every_video_its_reason(found: Said) -> None:
     told = {row["title"]: (row["decision"], row["reason"]) for row in found.answer["candidates"]}
     assert told == {
@@ -39,6 +43,7 @@ def test_find_gives_every_video_its_reason(found: Said) -> None:
     }
 
 
+@pytest.mark.medium
 def test_the_catalogue_has_the_same_rows_and_needs_no_prefect(found: Said, store: Path) -> None:
     said = robojackson("catalogue", "--json", ROBOJACKSON_STORE=str(store))
     rows = said.answer["candidates"]
@@ -48,12 +53,14 @@ def test_the_catalogue_has_the_same_rows_and_needs_no_prefect(found: Said, store
     assert not said.loaded_prefect
 
 
+@pytest.mark.medium
 def test_the_catalogue_answers_sql(found: Said, store: Path) -> None:
     sql = "SELECT count(*) AS n FROM candidates WHERE decision = 'chosen'"
     said = in_process("catalogue", "--sql", sql, "--json", ROBOJACKSON_STORE=str(store))
     assert said.answer == {"rows": [{"n": 1}]}
 
 
+@pytest.mark.medium
 def test_an_unknown_source_is_one_line(store: Path) -> None:
     said = in_process("find", "x", "--source", "myspace", ROBOJACKSON_STORE=str(store))
     assert said.code == 1

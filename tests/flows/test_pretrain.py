@@ -64,6 +64,7 @@ def test_a_configuration_that_was_changed_begins_anew(
     assert folder_of(asked[0]) != folder_of(asked[1])
 
 
+@pytest.mark.medium
 def test_a_walker_whose_flow_is_gone_is_not_trained(tmp_path: Path) -> None:
     out = tmp_path / "out"
     said = robojackson("pretrain", "--kind", "paper", "-o", out, "--steps", 64, "--parent", 1)

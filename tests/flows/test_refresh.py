@@ -31,6 +31,8 @@ from storage.artifact import Artifact
 from storage.store import Store
 from tests.fixtures.web_server import Web, serving
 
+pytestmark = pytest.mark.xdist_group("refresh")
+
 OVERRIDES = {"web.retries": 1, "web.backoff_s": 0.01, "web.timeout_s": 1, "web.request_pause_s": 0}
 FAILURES = {
     "missing": "HTTP 404 not found",
@@ -108,12 +110,14 @@ def nights(
         yield Nights(web, book, folder, night(book))
 
 
+@pytest.mark.medium
 def test_a_dance_whose_search_fails_does_not_stop_the_others(nights: Nights) -> None:
     assert list(nights.first["dances"]) == ["Good One"]
     assert list(nights.first["failed"]) == ["Nowhere"]
     assert "HTTP 404 not found" in nights.first["failed"]["Nowhere"]
 
 
+@pytest.mark.medium
 def test_the_chosen_video_is_ready_to_train(nights: Nights) -> None:
     done = nights.first["dances"]["Good One"]
     assert done["is_new"]
@@ -121,11 +125,13 @@ def test_the_chosen_video_is_ready_to_train(nights: Nights) -> None:
     assert done["scorecard"]
 
 
+@pytest.mark.medium
 def test_every_candidate_is_in_the_catalogue(nights: Nights) -> None:
     decisions = [row["decision"] for row in candidate_catalogue.records(nights.store, "good one")]
     assert sorted(decisions[:6]) == ["chosen", *["failed"] * 4, "rejected"]
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("kind", FAILURES)
 def test_a_failure_of_the_server_is_the_reason_in_the_table(nights: Nights, kind: str) -> None:
     row = nights.row(kind)
@@ -133,6 +139,7 @@ def test_a_failure_of_the_server_is_the_reason_in_the_table(nights: Nights, kind
     assert row["reason"].startswith(FAILURES[kind])
 
 
+@pytest.mark.medium
 def test_the_same_video_under_another_name_is_a_copy(nights: Nights) -> None:
     found = [
         row for row in candidate_catalogue.records(nights.store) if row["decision"] == "rejected"
@@ -140,21 +147,25 @@ def test_the_same_video_under_another_name_is_a_copy(nights: Nights) -> None:
     assert found[0]["reason"].startswith("a copy of")
 
 
+@pytest.mark.medium
 def test_a_hostile_name_leaves_nothing_outside_the_store(nights: Nights) -> None:
     outside = {path.name for path in nights.folder.iterdir()}
     assert outside == {"store", "urls.txt", "dances.yaml"}
 
 
+@pytest.mark.medium
 def test_prefect_shows_the_table_with_the_reasons(nights: Nights) -> None:
     rows = json.loads(artifact("candidates-good-one"))
     assert {row["decision"] for row in rows} <= {"chosen", "accepted", "rejected", "failed"}
     assert "\x1b" not in artifact("pictures-good-one")
 
 
+@pytest.mark.medium
 def test_prefect_links_to_the_chosen_video(nights: Nights) -> None:
     assert f"{nights.web.url}/good/" in artifact("chosen-good-one")
 
 
+@pytest.mark.medium
 def test_the_next_night_downloads_only_what_is_missing(nights: Nights) -> None:
     before = list(nights.web.asked)
     result = nights.again(["Good One"])
@@ -165,12 +176,14 @@ def test_the_next_night_downloads_only_what_is_missing(nights: Nights) -> None:
     assert done["reference"] == nights.first["dances"]["Good One"]["reference"]
 
 
+@pytest.mark.medium
 def test_a_dance_that_is_not_due_waits(nights: Nights) -> None:
     """Only the dance that failed is searched again, and fails again."""
     with pytest.raises(SearchFailed, match=r"^Nowhere: [^;]*$"):
         nights.again()
 
 
+@pytest.mark.medium
 def test_every_dance_failing_is_a_failed_run(nights: Nights) -> None:
     with pytest.raises(SearchFailed, match=r"Nowhere: .*404"):
         nights.again(["Nowhere"])

@@ -51,6 +51,7 @@ def test_files_have_the_listed_digests(folder: Path) -> None:
     assert actual == expected
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("name", FRAMES)
 def test_clip_decodes_to_the_stated_number_of_frames(name: str) -> None:
     with av.open(str(CLIPS / f"{name}.mp4")) as container:

@@ -20,7 +20,7 @@ COMMANDS = (
     *("flows/cli/commands.py", "flows/cli/search_commands.py", "flows/cli/study_commands.py"),
     *("flows/cli/backup_commands.py", "robojackson/cli/app.py", "robojackson/cli/options.py"),
     *("robojackson/cli/format_commands.py", "robojackson/cli/learning_commands.py"),
-    *("robojackson/cli/robot_commands.py",),
+    *("robojackson/cli/robot_commands.py", "flows/cli/clean_command.py"),
 )
 """Modules that define commands."""
 LIGHT = {
@@ -96,6 +96,7 @@ def house(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(
     ("path", "line", "broken"),
     [
@@ -117,6 +118,7 @@ def test_an_arrow_up_or_a_circle_is_refused(house: Path, path: str, line: str, b
     assert any(broken in row and "BROKEN" in row for row in done.stdout.splitlines())
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("layer", ["robojackson", "tasks", "storage"])
 def test_no_child_process_hides_an_arrow_up(layer: str) -> None:
     """Processes are started as `python -m robojackson.cli`; no layer names a module above it."""
@@ -165,6 +167,7 @@ def test_the_library_prints_nothing() -> None:
     assert [relative(path) for path in files("robojackson") if "print" in called(path)] == []
 
 
+@pytest.mark.medium
 def test_importing_the_library_and_the_layers_beside_it_opens_no_model() -> None:
     """Loading a model or a table at import would make every command slow."""
     opened = {"open", "read_text", "read_bytes", "load_robot", "load"}

@@ -3,6 +3,8 @@
 import ast
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("robojackson", "storage", "configs", "tasks", "flows")
 MOST_LINES_OF_A_MODULE = 250
@@ -27,6 +29,7 @@ def test_no_module_is_longer_than_250_lines() -> None:
     assert {path: n for path, n in found.items() if n > MOST_LINES_OF_A_MODULE} == {}
 
 
+@pytest.mark.medium
 def test_no_function_is_longer_than_60_lines() -> None:
     found = {
         f"{path.relative_to(ROOT).as_posix()}:{function.name}": length(function)

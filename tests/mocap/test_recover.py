@@ -25,20 +25,24 @@ def feet(motion: SmplSequence) -> np.ndarray:
     return foot_points(pose_sequence(motion), motion.rest_joints)
 
 
+@pytest.mark.medium
 def test_parameters_pose_the_joints_that_are_stored(motion: SmplSequence) -> None:
     assert np.allclose(pose_sequence(motion).points, motion.keypoints_w, atol=1e-9)
     assert np.array_equal(motion.joints, motion.keypoints_w[:, :24])
 
 
+@pytest.mark.medium
 def test_every_frame_of_the_clip_has_a_row(motion: SmplSequence, hip_shake: LandmarkTrack) -> None:
     assert len(motion) == len(hip_shake) == len(motion.contact) == len(motion.confidence)
 
 
+@pytest.mark.medium
 def test_nothing_is_nan(motion: SmplSequence) -> None:
     for array in (motion.global_orient, motion.body_pose, motion.transl, motion.keypoints_w):
         assert np.isfinite(array).all()
 
 
+@pytest.mark.medium
 def test_the_person_stands_upright_and_faces_the_camera(motion: SmplSequence) -> None:
     trunk = motion.joints[:, keypoint("neck")] - motion.joints[:, 0]
     across = motion.joints[:, keypoint("left_hip")] - motion.joints[:, keypoint("right_hip")]
@@ -46,24 +50,29 @@ def test_the_person_stands_upright_and_faces_the_camera(motion: SmplSequence) ->
     assert (across[:, 1] > 0.8 * np.linalg.norm(across, axis=-1)).all()
 
 
+@pytest.mark.medium
 def test_the_first_pelvis_is_over_the_origin(motion: SmplSequence) -> None:
     assert np.allclose(motion.joints[0, 0, :2], 0.0, atol=1e-9)
     assert 0.75 < motion.joints[0, 0, 2] < 1.1
 
 
+@pytest.mark.medium
 def test_feet_of_a_hip_shake_are_planted_all_the_time(motion: SmplSequence) -> None:
     assert (motion.contact == PLANTED).mean() > 0.97
     assert not (motion.contact == AIR).all(1).any()
 
 
+@pytest.mark.medium
 def test_planted_feet_do_not_slide(motion: SmplSequence, feet: np.ndarray) -> None:
     assert foot_slide(feet, motion.contact == PLANTED, motion.fps) < 0.005
 
 
+@pytest.mark.medium
 def test_no_foot_is_under_the_floor(feet: np.ndarray) -> None:
     assert floor_penetration(feet) < 0.002
 
 
+@pytest.mark.medium
 def test_the_motion_is_smoother_than_what_was_seen(
     motion: SmplSequence, hip_shake: LandmarkTrack
 ) -> None:
@@ -72,11 +81,13 @@ def test_the_motion_is_smoother_than_what_was_seen(
     assert jerk(ours, motion.fps) < 0.3 * jerk(left_wrist, motion.fps)
 
 
+@pytest.mark.medium
 def test_bones_keep_their_length(motion: SmplSequence) -> None:
     shin = motion.joints[:, keypoint("left_ankle")] - motion.joints[:, keypoint("left_knee")]
     assert np.ptp(np.linalg.norm(shin, axis=-1)) < 1e-9
 
 
+@pytest.mark.medium
 def test_same_track_same_motion(motion: SmplSequence, hip_shake: LandmarkTrack) -> None:
     assert np.array_equal(recover_motion(hip_shake, MocapConfig()).body_pose, motion.body_pose)
 
@@ -108,6 +119,7 @@ def test_two_frames_are_enough(hip_shake: LandmarkTrack) -> None:
     assert len(recover_motion(short, MocapConfig())) == 2
 
 
+@pytest.mark.medium
 def test_camera_in_the_result_sees_the_person_where_the_video_shows_him(
     motion: SmplSequence, hip_shake: LandmarkTrack
 ) -> None:
@@ -119,6 +131,7 @@ def test_camera_in_the_result_sees_the_person_where_the_video_shows_him(
     assert np.abs(across - shoulders).max() < 0.03 * hip_shake.width
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("method", ["adaptive", "naive"])
 def test_both_solves_give_a_grounded_motion(hip_shake: LandmarkTrack, method: str) -> None:
     found = recover_motion(hip_shake, MocapConfig(method=method))
@@ -126,6 +139,7 @@ def test_both_solves_give_a_grounded_motion(hip_shake: LandmarkTrack, method: st
     assert floor_penetration(points) < 0.002
 
 
+@pytest.mark.medium
 def test_a_jump_leaves_the_floor_and_comes_back(hip_shake: LandmarkTrack) -> None:
     """The recorded person thrown up for 0.6 s: 0.44 m high at the top, both feet in the air."""
     time = np.arange(len(hip_shake)) / hip_shake.fps - 1.5

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 import yaml
 
 from robojackson.pipeline import app_folder
@@ -37,12 +38,14 @@ def test_in_a_checkout_it_is_the_root() -> None:
     assert app_folder.is_checkout()
 
 
+@pytest.mark.slow
 def test_it_comes_first_once_for_the_process_and_its_children(tmp_path: Path) -> None:
     directory, first, inherited, configs = run(tmp_path)
     assert directory == first == inherited == str(ROOT)
     assert configs == "None"
 
 
+@pytest.mark.medium
 def test_the_users_configs_keep_their_place(tmp_path: Path) -> None:
     (tmp_path / "configs").mkdir()
     assert run(tmp_path)[3] == str(tmp_path / "configs")

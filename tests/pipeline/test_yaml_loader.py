@@ -209,6 +209,7 @@ def test_whole_numbers_are_those_of_yaml_1_2(text: str, seed: int) -> None:
     assert yaml_loader.load(Outer, None, {"seed": text}).seed == seed
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("text", ["1:30", "2024-13-45", "{[1]: 2}", "9" * 5000, "[" * 3000])
 def test_what_is_no_value_is_told_with_its_key(text: str) -> None:
     with pytest.raises(BadConfiguration, match="seed"):

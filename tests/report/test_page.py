@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from robojackson.clips.quality.advice import Advice
 from robojackson.clips.quality.stability import Stability
 from robojackson.clips.video import VideoInfo
 from robojackson.motion.reference_motion import ReferenceMotion
@@ -49,6 +50,7 @@ def results(sequence: SmplSequence, reference: ReferenceMotion) -> Results:
     )
 
 
+@pytest.mark.medium
 def test_page_shows_every_stage(results: Results) -> None:
     html = render(page_content(results, "dance.mp4"))
     headings = re.findall(r"<h2>(.*?)</h2>", html)
@@ -56,17 +58,27 @@ def test_page_shows_every_stage(results: Results) -> None:
         assert title in headings
 
 
+def test_page_shows_the_advice_about_the_clip(results: Results) -> None:
+    advised = replace(results, advice=(Advice("frame_rate", 10.0, 20.0),))
+    html = render(page_content(advised, "dance.mp4"))
+    assert "<li>10 frames a second: film at 30</li>" in html
+    assert "advice" not in render(page_content(results, "dance.mp4"))
+
+
+@pytest.mark.medium
 def test_page_shows_every_plot_inside_itself(results: Results) -> None:
     html = render(page_content(results, "dance.mp4"))
     assert html.count('src="data:image/png;base64,') == 6
 
 
+@pytest.mark.medium
 def test_page_asks_for_nothing_but_the_video(results: Results) -> None:
     html = render(page_content(results, "my dance.mp4"))
     addresses = set(re.findall(r'(?:src|href)="((?!data:)[^"]*)"', html))
     assert addresses == {"my%20dance.mp4"}
 
 
+@pytest.mark.medium
 def test_markup_in_names_is_text(results: Results) -> None:
     html = render(page_content(replace(results, title="<script>alert(1)</script>"), None))
     assert "<script>" not in html
@@ -113,10 +125,12 @@ def test_page_before_training_has_no_verdict() -> None:
     assert "<h2>Evaluation</h2>" not in render(PageContent(title="x"))
 
 
+@pytest.mark.medium
 def test_notes_are_told(results: Results) -> None:
     assert '<p class="note">the camera moves</p>' in render(page_content(results, None))
 
 
+@pytest.mark.medium
 def test_written_page_is_whole(results: Results, tmp_path: Path) -> None:
     page = write_page(page_content(results, None), tmp_path / "index.html")
     assert page.read_text().rstrip().endswith("</html>")

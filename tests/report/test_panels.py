@@ -9,15 +9,15 @@ import pytest
 
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.report.video import canvas
-from robojackson.report.video.robot_panel import RobotView
-from robojackson.report.video.skeleton_panel import (
+from robojackson.report.video.panel_camera import (
     CAMERA_HEIGHT,
     DISTANCE,
     FOCAL,
     LOOK_AT_HEIGHT,
-    skeleton_panel,
     view_of,
 )
+from robojackson.report.video.robot_panel import RobotView
+from robojackson.report.video.skeleton_panel import skeleton_panel
 
 TINT = (1.0, 0.0, 0.0)
 FRONT = view_of(np.zeros(2), 0.0, 320, 480)
@@ -104,6 +104,7 @@ def test_camera_that_follows_keeps_the_robot_in_the_middle(model: mujoco.MjModel
     assert columns.mean() == pytest.approx(80, abs=4)
 
 
+@pytest.mark.medium
 def test_drawing_leaves_the_model_as_it_was(model: mujoco.MjModel) -> None:
     before = model.geom_rgba.copy(), model.tex_data.copy(), model.vis.global_.fovy
     with RobotView(model, 64, 96, TINT) as view:

@@ -14,7 +14,7 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.report.video.encoder import write_video
 from robojackson.report.video.side_by_side import VideoConfig, side_by_side
-from robojackson.report.video.still_picture import _moments
+from robojackson.report.video.still_picture import MOMENTS, _moments
 
 SMALL = VideoConfig(fps=10, panel_width=64, panel_height=96)
 
@@ -24,6 +24,7 @@ def decoded(path: Path) -> list[np.ndarray]:
         return [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
 
 
+@pytest.mark.medium
 def test_video_shows_four_panels_for_the_whole_rollout(
     clip: Path, track: LandmarkTrack, sequence: SmplSequence, reference: ReferenceMotion,
     model: mujoco.MjModel, tmp_path: Path,
@@ -37,6 +38,7 @@ def test_video_shows_four_panels_for_the_whole_rollout(
     assert frames[0].shape == (96, 4 * 64 + 3 * 2, 3)
 
 
+@pytest.mark.medium
 def test_video_without_a_rollout_has_three_panels(
     clip: Path, track: LandmarkTrack, sequence: SmplSequence, reference: ReferenceMotion,
     model: mujoco.MjModel, tmp_path: Path,
@@ -108,14 +110,14 @@ def test_after_damaged_frames_the_pictures_go_on(
         visibility=track.visibility[::2],
         time_s=np.arange(0, len(track), 2) / track.fps,
     )
-    assert _moments(slow, sequence).frame.max() > len(few)
+    assert _moments(slow, sequence, MOMENTS).frame.max() > len(few)
     shown: list[int] = []
 
-    def panels(source: Path, track: LandmarkTrack, frames: np.ndarray, *size: int) -> dict:
+    def panels(source: Path, track: LandmarkTrack, person: None, frames: np.ndarray, *size: int):
         shown.extend(frames)
         raise InterruptedError
 
-    monkeypatch.setattr("robojackson.report.video.side_by_side.source_panels", panels)
+    monkeypatch.setattr("robojackson.report.video.film.SourceClip", panels)
     with pytest.raises(InterruptedError):
         side_by_side(clip, few, sequence, slow, None, clip.parent / "d.mp4", model=model)
     assert max(shown) > len(few)

@@ -118,6 +118,7 @@ def test_balls_are_at_their_offsets_whatever_the_pose(small: Robot, rng: np.rand
     np.testing.assert_allclose(pose(tree(small), qpos[None]).ball_pos[0], expected, atol=1e-12)
 
 
+@pytest.mark.medium
 def test_the_walk_keeps_all_hard_bars(motion: ReferenceMotion):
     card = motion.scorecard
     assert card["limit_violations"] == 0
@@ -126,11 +127,13 @@ def test_the_walk_keeps_all_hard_bars(motion: ReferenceMotion):
     assert card["speed_over_limit"] <= 1
 
 
+@pytest.mark.medium
 def test_the_walk_is_followed_to_a_tenth_of_the_leg(motion: ReferenceMotion):
     assert motion.scorecard["keypoint_mm"] < 55
     assert motion.scorecard["planted_share"] > 0.5
 
 
+@pytest.mark.medium
 def test_a_foot_that_stands_on_all_corners_is_flat(motion: ReferenceMotion, small: Robot):
     data, tilts = mujoco.MjData(small.model), []
     left = [name.startswith("left") for name in motion.contact_names]

@@ -86,12 +86,14 @@ def test_velocities_lead_from_step_to_step(robot: Robot):
     np.testing.assert_allclose(ahead, motion.qpos[11], atol=5e-3)
 
 
+@pytest.mark.medium
 def test_the_same_clip_gives_the_same_motion(robot: Robot):
     again = retarget_motion(human("hip_shake"), robot, RetargetConfig())
     np.testing.assert_array_equal(again.qpos, robot_motion("hip_shake").qpos)
     assert dict(again.scorecard) == dict(robot_motion("hip_shake").scorecard)
 
 
+@pytest.mark.medium
 def test_moving_the_recording_moves_the_motion_and_nothing_else(robot: Robot):
     source = human("hip_shake")
     moved = replace(source, keypoints_w=source.keypoints_w + [1.0, -2.0, 0.0])
@@ -102,6 +104,7 @@ def test_moving_the_recording_moves_the_motion_and_nothing_else(robot: Robot):
     assert np.ptp(shift, axis=0).max() < 0.01
 
 
+@pytest.mark.medium
 def test_noise_on_the_keypoints_does_not_break_the_bars(robot: Robot):
     source, rng = human("hip_shake"), np.random.default_rng(11)
     noisy = source.keypoints_w + 0.015 * rng.normal(size=source.keypoints_w.shape)
@@ -133,6 +136,7 @@ def test_the_literal_mapping_breaks_joint_limits_and_the_metric_sees_it():
     assert robot_motion("walk", "paper").scorecard["limit_violations"] == outside.sum() > 100
 
 
+@pytest.mark.medium
 def test_a_slower_tempo_needs_less_torque(robot: Robot):
     slow = retarget_motion(human("walk"), robot, RetargetConfig(tempo=0.5))
     fast = robot_motion("walk")
@@ -140,6 +144,7 @@ def test_a_slower_tempo_needs_less_torque(robot: Robot):
     assert slow.scorecard["seconds"] == pytest.approx(2 * fast.scorecard["seconds"], rel=0.05)
 
 
+@pytest.mark.medium
 def test_the_frame_rate_of_the_source_hardly_matters(robot: Robot):
     source = human("hip_shake")
     times = np.arange(0, len(source) - 1 + 1e-9, 0.5) / source.fps
@@ -159,6 +164,7 @@ def test_the_frame_rate_of_the_source_hardly_matters(robot: Robot):
     assert np.degrees(np.quantile(gap, 0.99)) < 2.0
 
 
+@pytest.mark.medium
 def test_every_second_frame_undetected_is_survived(robot: Robot):
     source = human("hip_shake")
     valid = source.valid.copy()

@@ -43,6 +43,7 @@ def at(address: str, cache: Path, patch: pytest.MonkeyPatch) -> None:
     patch.setattr(constants, "HF_HUB_CACHE", str(cache))
 
 
+@pytest.mark.medium
 def test_training_starts_from_a_repository_of_the_hub(
     robot: Robot,
     sway: ReferenceMotion,
@@ -80,6 +81,7 @@ def test_a_file_of_the_hub_that_is_no_zip_of_sb3_is_refused(
             pretrained(REPOSITORY, "paper")
 
 
+@pytest.mark.slow
 def test_the_command_says_in_one_line_that_the_hub_cannot_be_reached(
     sway: ReferenceMotion, tmp_path: Path
 ) -> None:

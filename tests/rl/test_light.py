@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from robojackson.files import tables
 from robojackson.motion.reference_motion import ReferenceMotion
@@ -26,6 +27,7 @@ finally:
 """
 
 
+@pytest.mark.medium
 def test_the_command_evaluate_loads_nothing_that_trains(
     robot: Robot, sway: ReferenceMotion, tmp_path: Path
 ) -> None:

@@ -47,6 +47,7 @@ def part(rows: ReplayBufferSamples, i: int) -> ReplayBufferSamples:
     return ReplayBufferSamples(*(None if x is None else x[span] for x in rows))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_k_updates_of_both_trainers_agree(
     kind: str, robot: Robot, sway: ReferenceMotion, monkeypatch: pytest.MonkeyPatch

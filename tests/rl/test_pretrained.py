@@ -48,6 +48,7 @@ def acts(networks: Networks, seen: np.ndarray) -> np.ndarray:
     return np.tanh(hidden @ networks.tensors["mean.weight"] + networks.tensors["mean.bias"])
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("name", ["sbx", "sb3"])
 def test_a_trainer_that_starts_from_networks_has_them(env: VecEnv, name: str) -> None:
     given = make_trainer("sb3", env, SMALL, seed=1).networks()

@@ -31,6 +31,7 @@ def updates(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return seen
 
 
+@pytest.mark.medium
 def test_learning_is_announced_once_after_the_first_updates(
     robot: Robot, sway: ReferenceMotion, tmp_path: Path, updates: list[int]
 ) -> None:
@@ -43,6 +44,7 @@ def test_learning_is_announced_once_after_the_first_updates(
     assert announced == [first]
 
 
+@pytest.mark.medium
 def test_a_resumed_training_announces_only_what_its_checkpoint_lacks(
     robot: Robot, sway: ReferenceMotion, tmp_path: Path, updates: list[int]
 ) -> None:

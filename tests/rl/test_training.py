@@ -32,6 +32,8 @@ from robojackson.rl.training import Hooks, TrainResult, train_policy
 from robojackson.rl.training_run import Run
 from robojackson.robot.model import Robot
 
+pytestmark = pytest.mark.xdist_group("trained")
+
 SMALL = TqcConfig(
     n_envs=4,
     warmup=64,
@@ -71,6 +73,7 @@ def trained(
     return result, episodes, progress, request.param
 
 
+@pytest.mark.medium
 def test_a_run_in_two_sittings_ends_as_one_that_was_never_stopped(
     trained: tuple, robot: Robot, sway: ReferenceMotion, tmp_path: Path
 ) -> None:
@@ -87,6 +90,7 @@ def test_a_run_in_two_sittings_ends_as_one_that_was_never_stopped(
     assert rows == episodes
 
 
+@pytest.mark.medium
 def test_exploration_that_depends_on_the_state_goes_on_to_the_bit(
     robot: Robot, sway: ReferenceMotion, tmp_path: Path
 ) -> None:
@@ -101,6 +105,7 @@ def test_exploration_that_depends_on_the_state_goes_on_to_the_bit(
     assert halves.policy.read_bytes() == whole.policy.read_bytes()
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("place", range(4))
 def test_a_death_between_two_files_of_the_last_checkpoint_loses_nothing(
     place: int,
@@ -133,6 +138,7 @@ def test_a_death_between_two_files_of_the_last_checkpoint_loses_nothing(
     assert result.policy.read_bytes() == whole.policy.read_bytes()
 
 
+@pytest.mark.medium
 def test_both_trainers_end_at_their_budget_with_a_policy(trained: tuple) -> None:
     result, _, _, name = trained
     assert result.steps == 320
@@ -141,6 +147,7 @@ def test_both_trainers_end_at_their_budget_with_a_policy(trained: tuple) -> None
     assert load_policy(result.policy).facts["trainer"] == name
 
 
+@pytest.mark.medium
 def test_every_episode_leaves_a_row_with_each_reward_term(trained: tuple) -> None:
     _, episodes, _, _ = trained
     assert [row["episode"] for row in episodes] == list(range(1, len(episodes) + 1))
@@ -149,12 +156,14 @@ def test_every_episode_leaves_a_row_with_each_reward_term(trained: tuple) -> Non
         assert sum(terms) == pytest.approx(row["episode_return"])
 
 
+@pytest.mark.medium
 def test_progress_tells_rate_and_time_left(trained: tuple) -> None:
     _, _, progress, _ = trained
     assert all(row["steps_per_s"] > 0 and row["seconds_left"] >= 0 for row in progress)
     assert progress
 
 
+@pytest.mark.medium
 def test_a_finished_run_asked_for_more_steps_goes_on(
     trained: tuple, robot: Robot, sway: ReferenceMotion
 ) -> None:
@@ -171,6 +180,7 @@ def test_a_finished_run_asked_for_more_steps_goes_on(
     assert rows[0]["step"] > 320
 
 
+@pytest.mark.medium
 def test_a_checkpoint_of_another_configuration_is_refused(
     trained: tuple, robot: Robot, sway: ReferenceMotion
 ) -> None:
@@ -180,6 +190,7 @@ def test_a_checkpoint_of_another_configuration_is_refused(
         run(robot, sway, other, result.policy.parent)
 
 
+@pytest.mark.medium
 def test_a_run_that_begins_anew_learns_nothing_from_the_one_before(
     robot: Robot, sway: ReferenceMotion, tmp_path: Path
 ) -> None:
@@ -194,6 +205,7 @@ def test_a_run_that_begins_anew_learns_nothing_from_the_one_before(
     assert [name.split("-")[1] for name in names] == ["000000000080.npz"]
 
 
+@pytest.mark.medium
 def test_a_training_that_diverges_says_so_and_keeps_what_it_had(
     trained: tuple, robot: Robot, sway: ReferenceMotion, tmp_path: Path
 ) -> None:
@@ -217,6 +229,7 @@ def test_a_training_that_diverges_says_so_and_keeps_what_it_had(
     assert (tmp_path / "policy.safetensors").read_bytes() == kept
 
 
+@pytest.mark.medium
 def test_a_checkpoint_of_another_reference_is_refused(
     trained: tuple, robot: Robot, sway: ReferenceMotion
 ) -> None:
@@ -226,6 +239,7 @@ def test_a_checkpoint_of_another_reference_is_refused(
         run(robot, other, brief(name, 960), result.policy.parent)
 
 
+@pytest.mark.medium
 def test_a_crash_between_two_renames_loses_nothing(
     robot: Robot, sway: ReferenceMotion, tmp_path: Path
 ) -> None:
@@ -236,6 +250,7 @@ def test_a_crash_between_two_renames_loses_nothing(
     assert all(row["step"] > 320 for row in rows)
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("name", ["sbx", "sb3"])
 def test_the_policy_file_acts_as_the_trainers_own_actor(
     robot: Robot, sway: ReferenceMotion, name: str
@@ -314,6 +329,7 @@ def test_a_run_without_a_budget_is_refused(
         run(robot, sway, TrainConfig(), tmp_path)
 
 
+@pytest.mark.medium
 def test_the_table_of_an_evaluation_has_every_start_and_baseline(
     trained: tuple, robot: Robot, sway: ReferenceMotion
 ) -> None:
@@ -350,6 +366,7 @@ def test_a_policy_that_no_robot_can_follow_is_refused(
         drivers(policy, sway, robot, 0)
 
 
+@pytest.mark.medium
 def test_an_evaluation_is_repeatable(trained: tuple, robot: Robot, sway: ReferenceMotion) -> None:
     result, _, _, _ = trained
     policy = load_policy(result.policy)
@@ -357,6 +374,7 @@ def test_an_evaluation_is_repeatable(trained: tuple, robot: Robot, sway: Referen
     np.testing.assert_array_equal(first.rollout_qpos, second.rollout_qpos)
 
 
+@pytest.mark.medium
 def test_a_policy_for_another_robot_is_refused(
     trained: tuple, robot: Robot, sway: ReferenceMotion
 ) -> None:
@@ -368,6 +386,7 @@ def test_a_policy_for_another_robot_is_refused(
         evaluate_policy(other, sway, robot, BRIEF)
 
 
+@pytest.mark.medium
 def test_evaluation_needs_neither_jax_nor_torch_nor_prefect() -> None:
     code = (
         "import sys, robojackson.rl.evaluation.policy_evaluation, robojackson.rl.policy\n"
@@ -389,6 +408,7 @@ def test_tensorboard_gets_the_terms_of_the_reward(
     assert {"survived_s", "reward_joints", "steps_per_s"} <= set(events.Tags()["scalars"])
 
 
+@pytest.mark.medium
 def test_logging_for_tensorboard_needs_no_torch() -> None:
     code = (
         "import sys, pathlib, tempfile\n"
@@ -400,6 +420,7 @@ def test_logging_for_tensorboard_needs_no_torch() -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("name", ["sb3"])
 def test_paper_mode_trains_from_the_shipped_walker(
     robot: Robot, sway: ReferenceMotion, tmp_path: Path, name: str

@@ -40,6 +40,7 @@ def test_a_budget_is_used_up_by_its_own_measure_alone(
         clock[:] = began
 
 
+@pytest.mark.slow
 def test_what_earlier_sittings_used_counts(clock: list[float]) -> None:
     budget = TrainingBudget(TrainConfig(minutes=2.0))
     budget.resume(500, seconds=90.0, cpu_seconds=30.0)
@@ -48,6 +49,7 @@ def test_what_earlier_sittings_used_counts(clock: list[float]) -> None:
     assert budget.used_up(501) == "minutes"
 
 
+@pytest.mark.slow
 def test_the_rate_is_that_of_this_sitting_and_the_shortest_budget_is_left(
     clock: list[float],
 ) -> None:

@@ -45,6 +45,7 @@ def test_humanoid_v5_is_described_as_the_shipped_file_does(tmp_path: Path) -> No
         assert getattr(found, part) == getattr(shipped, part), part
 
 
+@pytest.mark.medium
 def test_a_motion_for_the_drafted_humanoid_is_that_for_the_shipped_one(tmp_path: Path) -> None:
     _, found = drafted(gymnasium_model(), tmp_path)
     motion = retarget_motion(human("hip_shake"), load_robot(found), RetargetConfig())

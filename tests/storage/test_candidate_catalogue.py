@@ -96,6 +96,7 @@ def test_a_compaction_that_dies_before_it_tidies_up_doubles_no_row(
     assert ids(store) == ["v0", "v1", "v2"]
 
 
+@pytest.mark.medium
 def test_refreshes_and_compactions_at_once_lose_nothing(tmp_path: Path) -> None:
     store = Store(tmp_path)
     errors: list[BaseException] = []
@@ -118,6 +119,7 @@ def test_refreshes_and_compactions_at_once_lose_nothing(tmp_path: Path) -> None:
     assert ids(store) == sorted(f"{n}-{night}" for n in range(4) for night in range(6))
 
 
+@pytest.mark.medium
 def test_a_reader_beside_a_compaction_sees_every_row(tmp_path: Path) -> None:
     store = Store(tmp_path)
     candidate_catalogue.append(store, [row(f"v{number}") for number in range(5)])

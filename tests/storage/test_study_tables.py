@@ -86,6 +86,7 @@ def test_a_cell_that_was_trained_anew_replaces_its_rows(store: Store) -> None:
     assert study_tables.query(store, "SELECT run_id FROM runs") == [{"run_id": "r2"}]
 
 
+@pytest.mark.medium
 def test_writers_of_different_cells_lose_nothing(store: Store) -> None:
     given = made(store)
     with ThreadPoolExecutor(8) as pool:

@@ -27,6 +27,7 @@ def bring(web: Web, path: str = "good/clip.mp4", video_id: str = "v1") -> Artifa
     return download_video.fn(video, "score", FormatConfig(), PATIENT, VideoLimits())
 
 
+@pytest.mark.medium
 def test_the_file_is_in_the_store(web: Web, store_folder: Path) -> None:
     assert Store(store_folder).read(bring(web).key) == web.video
 
@@ -41,6 +42,7 @@ def test_a_second_download_asks_what_there_is_and_fetches_nothing(
     assert (before, len(web.asked) - before) == (2, 1)
 
 
+@pytest.mark.medium
 def test_two_runs_that_want_a_video_at_once_fetch_it_once(
     web: Web, store_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -67,6 +69,7 @@ def test_two_runs_that_want_a_video_at_once_fetch_it_once(
     assert list((store_folder / "work" / "downloads" / "generic").iterdir()) == []
 
 
+@pytest.mark.medium
 def test_an_altered_file_is_downloaded_again(web: Web, store_folder: Path) -> None:
     first = bring(web)
     (store_folder / first.key).write_bytes(b"altered")
@@ -84,6 +87,7 @@ def test_a_file_that_is_no_whole_video_is_thrown_away(web: Web, store_folder: Pa
     assert [path for path in store_folder.rglob("*") if path.is_file()] == []
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("video_id", ["../../x", "/tmp/x", "..", "a\x00b", "x" * 300, "", "\u202e"])
 def test_no_id_leaves_the_store(
     web: Web, store_folder: Path, tmp_path: Path, video_id: str

@@ -37,6 +37,7 @@ def track() -> LandmarkTrack:
         )
 
 
+@pytest.mark.medium
 def test_the_task_keeps_the_motion_of_the_networks(store: Store, tmp_path: Path) -> None:
     torch.manual_seed(0)
     network = HybrikResNet()

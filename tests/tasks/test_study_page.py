@@ -24,6 +24,8 @@ from storage.store import Store
 from tasks import write_study_page
 from tasks.write_study_page import report
 
+pytestmark = pytest.mark.xdist_group("study_page")
+
 STUDY = Study(
     name="known", moves=("hip_shake", "walk"), setups=("scratch", "pretrain"), seeds=(0, 1, 2, 3)
 )
@@ -82,6 +84,7 @@ def results(folder: Path) -> dict[str, Any]:
     return json.loads((folder / "results.json").read_text())
 
 
+@pytest.mark.medium
 def test_the_claims_are_about_the_yardstick_and_have_its_sign(folder: Path) -> None:
     said = {claim["text"]: claim for claim in results(folder)["claims"]}
     assert said["Pretraining helps"]["verdict"] == "holds"
@@ -89,6 +92,7 @@ def test_the_claims_are_about_the_yardstick_and_have_its_sign(folder: Path) -> N
     assert said["Curiosity helps on dances"]["verdict"] == "not measured"
 
 
+@pytest.mark.medium
 def test_an_effect_is_told_for_every_move_alone(folder: Path) -> None:
     first, *_, last = results(folder)["comparisons"]
     assert (first["treated"], first["control"]) == ("pretrain", "scratch")
@@ -98,6 +102,7 @@ def test_an_effect_is_told_for_every_move_alone(folder: Path) -> None:
     assert "<td>+2.0 [+2.0, +2.0]</td>" in (folder / "index.html").read_text()
 
 
+@pytest.mark.medium
 def test_the_table_has_a_line_a_move_and_setup_and_what_the_statue_does(folder: Path) -> None:
     rows = list(csv.DictReader(io.StringIO((folder / "table.csv").read_text())))
     found = {(row["move"], row["setup"]): row for row in rows}
@@ -108,12 +113,14 @@ def test_the_table_has_a_line_a_move_and_setup_and_what_the_statue_does(folder: 
     assert float(found["walk", "statue"]["stand_s"]) == pytest.approx(0.9)
 
 
+@pytest.mark.medium
 def test_steps_to_the_threshold_are_those_of_the_curve(folder: Path) -> None:
     line = next(line for line in results(folder)["lines"] if line["setup"] == "scratch")
     # Lengths grow from 10 to 100: 80 % of the last interval's mean comes at 0.77 of the budget.
     assert line["values"]["steps_to"]["mean"] == pytest.approx(0.77 * 50_000, rel=0.05)
 
 
+@pytest.mark.medium
 def test_the_page_stands_alone_and_says_how_few_seeds_there_are(folder: Path) -> None:
     page = (folder / "index.html").read_text()
     assert "no difference can have a p below 0.12" in page
@@ -121,6 +128,19 @@ def test_the_page_stands_alone_and_says_how_few_seeds_there_are(folder: Path) ->
     assert page.count("data:image/png;base64,") == 2 + 4
 
 
+@pytest.mark.medium
+def test_what_is_to_be_known_first_stands_above_the_claims(folder: Path) -> None:
+    page = (folder / "index.html").read_text()
+    assert page.index('<p class="note">') < page.index('class="claims"')
+
+
+def test_the_smoke_study_says_that_its_numbers_mean_nothing() -> None:
+    (said,) = write_study_page._meaningless(load(Study, "studies/smoke"))
+    assert said.endswith("its numbers mean nothing.")
+    assert write_study_page._meaningless(load(Study, "studies/paper")) == []
+
+
+@pytest.mark.medium
 def test_what_setups_of_one_reward_pay_to_bodies_that_do_not_dance_is_told_once(
     folder: Path,
 ) -> None:
@@ -129,15 +149,18 @@ def test_what_setups_of_one_reward_pay_to_bodies_that_do_not_dance_is_told_once(
     assert '<th scope="row">scratch, pretrain</th><td>99</td><td>100</td><td>90</td>' in page
 
 
+@pytest.mark.medium
 def test_the_code_that_made_the_rows_is_named(folder: Path) -> None:
     assert "0123456789" in (folder / "index.html").read_text()
 
 
+@pytest.mark.medium
 def test_what_the_walker_had_learnt_before_is_told(folder: Path) -> None:
     page = (folder / "index.html").read_text()
     assert "pretrain begin with networks (walker) that had learnt for 671,296 control steps" in page
 
 
+@pytest.mark.medium
 def test_rows_of_other_runs_under_the_name_of_the_study_do_not_count(
     store_folder: Path,
 ) -> None:
@@ -162,6 +185,7 @@ def test_seeds_that_never_reach_the_threshold_are_counted_apart() -> None:
     assert cell(never, "steps_to", 2) == ("never", [])
 
 
+@pytest.mark.medium
 def test_the_page_is_drawn_again_only_when_the_rows_change(
     records: None, store_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

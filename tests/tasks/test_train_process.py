@@ -55,6 +55,7 @@ def test_what_the_process_says_is_in_its_log(tmp_path: Path) -> None:
     assert (tmp_path / child_process.LOG).read_text() == "10 steps\n"
 
 
+@pytest.mark.medium
 def test_a_process_that_does_not_end_is_killed(tmp_path: Path) -> None:
     with pytest.raises(TrainingFailed, match="did not end within"):
         run(SLEEPER, tmp_path, 1.0)

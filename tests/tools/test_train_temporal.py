@@ -131,6 +131,7 @@ def test_discrepancy_tells_another_distribution() -> None:
     assert discrepancy(a, b + 1.0) > 5.0 * discrepancy(a, b).abs()
 
 
+@pytest.mark.slow
 def test_a_kept_state_goes_on_where_it_was(tmp_path: Path) -> None:
     from tools.temporal import fit
 

@@ -116,7 +116,7 @@ def camera_path(
     jumps = np.array((chain.jumps + [False] * missing)[: len(small)])
     scale = np.diag([width / chain.size[0], height / chain.size[1], 1.0])
     full = scale @ small @ np.linalg.inv(scale)
-    stray = _stray(full, width, height)
+    stray = stray_of(full, width, height)
     if stray <= STILL:
         full = np.broadcast_to(np.eye(3), full.shape).copy()
     return CameraPath(full, jumps, blind, stray)
@@ -129,6 +129,13 @@ def warp(
     ahead = np.concatenate([points, np.ones((*points.shape[:2], 1))], -1)
     moved = np.einsum("tij,tnj->tni", to_first, ahead)
     return np.asarray(moved[..., :2] / moved[..., 2:])
+
+
+def stray_of(to_first: Float[np.ndarray, "T 3 3"], width: int, height: int) -> float:
+    """Greatest displacement of the corners and the middle of the image, diagonals."""
+    marks = np.array([[0, 0], [1, 0], [0, 1], [1, 1], [0.5, 0.5]]) * [width, height]
+    moved = warp(np.broadcast_to(marks, (len(to_first), 5, 2)), to_first)
+    return float(np.linalg.norm(moved - marks, axis=-1).max() / np.hypot(width, height))
 
 
 class _Chain:
@@ -233,10 +240,3 @@ def _corners(grey: np.ndarray, xy: np.ndarray) -> Float32[np.ndarray, "N 1 2"]:
             if best is not None:
                 found.append(best + np.array([x0, y0], np.float32))
     return np.concatenate(found)
-
-
-def _stray(to_first: np.ndarray, width: int, height: int) -> float:
-    """Greatest displacement of the corners and the middle of the image, diagonals."""
-    marks = np.array([[0, 0], [1, 0], [0, 1], [1, 1], [0.5, 0.5]]) * [width, height]
-    moved = warp(np.broadcast_to(marks, (len(to_first), 5, 2)), to_first)
-    return float(np.linalg.norm(moved - marks, axis=-1).max() / np.hypot(width, height))

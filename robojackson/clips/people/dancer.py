@@ -7,6 +7,7 @@ largest steady person is number 1 and danced by default.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -90,7 +91,7 @@ def track_dancer(
         path, cast, number - 1, size, config, _shifted(progress, info.frames, passes - 1, passes)
     )
     notes = (f"{len(cast.rows)} people in view, this is person {number}: {cast}",)
-    return track_of(rows, cast.time_s, info, number, notes)
+    return replace(track_of(rows, cast.time_s, info, number, notes), people=len(cast.rows))
 
 
 def _scouted(

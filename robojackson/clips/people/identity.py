@@ -29,15 +29,17 @@ class IdentityConfig:
     Attributes:
         tracklets: What a tracklet is.
         shortest_tracklet_s: A tracklet below this is no one, seconds.
-        shortest_blend_s: The same for one that may be either of two, seconds.
-        memory_s: Of the motion that leads across a gap, seconds.
+        shortest_blend_s: Shortest tracklet that may be either of two people, seconds.
+        memory_s: Length of the motion that leads across a gap, seconds.
         foresight_s: A motion is not continued for longer than this, seconds.
-        reach, reach_speed, farthest: Distance across a gap: body heights, body heights for every
-            second of it, and never more than this.
+        reach: Distance that a person may be from where the motion leads, body heights.
+        reach_speed: What is added to it for every second of a gap, body heights a second.
+        farthest: Most that the two may be together, body heights.
         growth: Change of size, ratio.
         colour: Change of the mean colours, units of CIELAB.
-        parting: Cost of ending one person and beginning another.
-        shortest_s, least_share: Who is seen for less than either, seconds, is nobody.
+        parting: Cost of ending one person and beginning another, unitless.
+        shortest_s: Who is seen for less than this is nobody, seconds.
+        least_share: Who is seen in less than this share of the clip is nobody.
     """
 
     tracklets: TrackletConfig = Field(default_factory=TrackletConfig)

@@ -35,7 +35,7 @@ FEWEST_PIXELS = 12
 class PersonDetectionConfig:
     """Attributes:
     most: People that are looked for in a picture.
-    limb_width: Of the paint over a limb, body heights.
+    limb_width: Width of the paint over a limb, body heights.
     short_side: Pixels of the short side of the pictures that are looked at.
     visibility: Least mean visibility of the landmarks of a person, 0..1.
     smallest: A person below this size is in the background, heights of the largest.

@@ -30,10 +30,11 @@ class ContactConfig:
 
     Attributes:
         touch_sd_m: Height of a touching point over the refitted floor, standard deviation, metres.
-        air_sd_m: The same of a point in the air.
+        air_sd_m: Height of a point in the air, standard deviation, metres.
         still_sd_mps: Speed in the image of a planted point, one axis, metres a second.
-        moving_sd_mps: The same of any other point.
-        still_along_sd_mps, moving_along_sd_mps: The same along the ray, mostly noise.
+        moving_sd_mps: Speed in the image of any other point, one axis, metres a second.
+        still_along_sd_mps: Speed of a planted point along the ray, mostly noise, metres a second.
+        moving_along_sd_mps: Speed of any other point along the ray, metres a second.
         outlier: Share of measurements that tell nothing.
         samples_per_s: Independent measurements a second.
         change: Cost of a change of one point's state, nats.

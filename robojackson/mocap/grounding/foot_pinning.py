@@ -26,9 +26,9 @@ class FootPinningConfig:
 
     Attributes:
         track: Standard deviation of the camera's track across and along the ray, metres (y, x).
-        slip: Of a planted point's step between two frames, metres.
+        slip: Spread of a planted point's step between two frames, metres.
         leash_m: Shift along the ray beyond which the track pulls harder and harder, metres.
-        wobble: Of the path's second difference at 30 frames a second, metres.
+        wobble: Spread of the path's second difference at 30 frames a second, metres.
         ramp_s: Time over which a standing foot goes over to a moving one, seconds.
         fade_s: Time over which the correction of a pinned foot fades when it leaves, seconds.
         rounds: How often contacts, path and pins are found anew.

@@ -10,6 +10,7 @@ from typing import Literal
 
 from robojackson.clips.people.camera_path import camera_path
 from robojackson.clips.people.dancer import DancerConfig, track_dancer
+from robojackson.clips.quality.picture_quality import PictureQuality
 from robojackson.clips.video import VideoInfo, timed_frames
 from robojackson.mocap.landmarks.model_fusion import fuse_tracks
 from robojackson.motion.landmark_track import LandmarkTrack
@@ -52,11 +53,18 @@ def detect_landmarks(
 
 
 def with_camera(path: Path, track: LandmarkTrack) -> LandmarkTrack:
-    """The track with the path of the camera, and notes of it."""
+    """The track with the path of the camera, notes of it, and how well the person is seen."""
     images = (image for _, image in timed_frames(path, short_side=SHORT_SIDE))
-    found = camera_path(images, track.landmarks[..., :2], track.width, track.height)
-    notes = (*track.notes, *found.notes)
-    return replace(track, notes=notes, to_first=found.to_first if found.moved else None)
+    marks = track.landmarks[..., :2]
+    looks = PictureQuality(marks)
+    found = camera_path(looks.watch(images), marks, track.width, track.height)
+    return replace(
+        track,
+        notes=(*track.notes, *found.notes),
+        to_first=found.to_first if found.moved else None,
+        brightness=looks.brightness,
+        sharpness=looks.sharpness,
+    )
 
 
 def _part(progress: Progress | None, turn: int, turns: int) -> Progress | None:

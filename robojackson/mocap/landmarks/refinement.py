@@ -41,10 +41,10 @@ class RefineConfig:
 
     Attributes:
         enabled: Whether to refine at all.
-        image_m: Of a landmark across the image, at the person's distance, metres.
-        depth_m: Of the detector's depth relative to the hips, metres.
-        bone_m: Of a bone's length in one frame, metres.
-        acceleration_mps2: Of a joint's acceleration, m/s^2.
+        image_m: Spread of a landmark across the image, at the person's distance, metres.
+        depth_m: Spread of the detector's depth relative to the hips, metres.
+        bone_m: Spread of a bone's length in one frame, metres.
+        acceleration_mps2: Spread of a joint's acceleration, m/s^2.
         rounds: Gauss-Newton steps.
     """
 

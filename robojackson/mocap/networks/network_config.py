@@ -20,8 +20,9 @@ class NetworkConfig:
         niki: Weights of NIKI, one-stage or twist-and-swing; None leaves HybrIK's result.
         flip_test: Look at every frame and at its mirror image: twice the time, less jitter.
         update_scale: Refine the camera's scale of each frame by HybrIK's least squares.
-        noise: Standard deviation of NIKI's unused inputs; the authors draw 0.001, 0 is repeatable.
-        seed: Of that noise.
+        noise: Standard deviation of NIKI's unused inputs, unitless; the authors draw 0.001, 0 is
+            repeatable.
+        seed: Seed of that noise.
         cutoff_hz: Zero-phase low-pass of what the networks see frame by frame, hertz.
         batch: Frames that go through the network at once.
         device: auto takes a GPU where PyTorch sees one.

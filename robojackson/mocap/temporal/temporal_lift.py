@@ -34,7 +34,7 @@ class TemporalConfig:
             on real people than on rendered ones, and a hidden joint has nothing else to go by.
         depth_floor_m: Least spread of a corrected depth, metres.
         hypothesis: 0 is the likeliest motion; n > 0 the n-th sample of what hidden limbs may do.
-        seed: Of the samples.
+        seed: Seed of the samples.
     """
 
     enabled: bool = True

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from robojackson.clips.quality.advice import Advice
 from robojackson.clips.quality.stability import Stability
 from robojackson.clips.video import VideoInfo
 from robojackson.motion.reference_motion import ReferenceMotion
@@ -37,6 +38,7 @@ class Results:
         evaluation: Summary of the evaluation, its baselines inside.
         evaluations: Rows of EvaluationRecord.
         rollout_qpos: The trained robot from the first step, or None.
+        advice: What to do better when the clip is filmed again.
     """
 
     title: str
@@ -49,6 +51,7 @@ class Results:
     evaluation: Mapping[str, Any]
     evaluations: Sequence[Mapping[str, Any]]
     rollout_qpos: Float[np.ndarray, "S nq"] | None
+    advice: Sequence[Advice] = ()
 
 
 def page_content(results: Results, video: str | None) -> PageContent:
@@ -65,6 +68,7 @@ def page_content(results: Results, video: str | None) -> PageContent:
         plots=_plots(results),
         versions=versions(),
         notes=results.sequence.notes,
+        advice=[str(each) for each in results.advice],
     )
 
 

@@ -63,6 +63,7 @@ class PageContent:
         plots: In the order they are shown.
         versions: Of programs and models.
         notes: Warnings for the reader.
+        advice: What to do better when the clip is filmed again.
     """
 
     title: str
@@ -76,6 +77,7 @@ class PageContent:
     plots: Sequence[Plot] = ()
     versions: Mapping[str, str] = field(default_factory=dict)
     notes: Sequence[str] = ()
+    advice: Sequence[str] = ()
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,9 @@ from matplotlib.figure import Figure
 
 from robojackson.report.plots.run_plots import ACCENT, INK, SECOND
 from robojackson.report.video.canvas import Picture, side_colour
+from robojackson.report.video.panel_camera import view_of
+from robojackson.report.video.robot_extent import corners
 from robojackson.report.video.robot_panel import REFERENCE_TINT, RobotView
-from robojackson.report.video.skeleton_panel import view_of
 from robojackson.robot.model import Robot
 
 PIXELS = 1800
@@ -58,9 +59,8 @@ def standing(robot: Robot) -> Standing:
     data.qpos[2] -= soles.min()
     mujoco.mj_kinematics(model, data)
     on_robot = np.flatnonzero(model.geom_bodyid > 0)
-    corners = [_corners(model, data, int(geom)) for geom in on_robot]
     points = data.site_xpos[robot.keypoint_sites].copy()
-    box = np.concatenate([*corners, points])
+    box = np.concatenate([corners(model, data, on_robot).reshape(-1, 3), points])
     return Standing(
         data.qpos.copy(),
         dict(zip(robot.keypoint_names, points, strict=True)),
@@ -178,13 +178,4 @@ def _balls(robot: Robot, data: mujoco.MjData) -> Float[np.ndarray, "C 3"]:
     sites = data.site_xpos[robot.keypoint_sites[robot.contact_keypoints]]
     turns = data.xmat[robot.contact_bodies].reshape(-1, 3, 3)
     result: np.ndarray = sites + (turns @ robot.contact_offsets[:, :, None])[:, :, 0]
-    return result
-
-
-def _corners(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Float[np.ndarray, "8 3"]:
-    """Of the box around a geom, world."""
-    middle, half = model.geom_aabb[geom][:3], model.geom_aabb[geom][3:]
-    signs = np.array(np.meshgrid(*[(-1, 1)] * 3)).reshape(3, -1).T
-    turn = data.geom_xmat[geom].reshape(3, 3)
-    result: np.ndarray = data.geom_xpos[geom] + (middle + signs * half) @ turn.T
     return result

@@ -18,6 +18,8 @@ BACKDROP: Colour = (24, 27, 34)
 GRID: Colour = (62, 70, 84)
 """The subject's left, right and middle are told apart by colour in every panel."""
 SUBPIXEL_BITS = 4
+OUTSIDE = 0.25
+"""How far outside the image a crop follows a point, image sizes."""
 
 
 def side_colour(name: str) -> Colour:
@@ -54,6 +56,11 @@ def label(picture: Picture, title: str, note: str = "") -> None:
     picture[:height] = np.where(bright, strip, mixed).astype(np.uint8)
 
 
+def strip_height(width: int) -> int:
+    """Pixels of the strip of a title over a panel of that width."""
+    return 2 * _letter_height(width)
+
+
 def crop_box(
     points: Float[np.ndarray, "N 2"], size: tuple[int, int], aspect: float, margin: float = 0.15
 ) -> tuple[int, int, int, int]:
@@ -67,7 +74,8 @@ def crop_box(
     """
     seen = points[np.isfinite(points).all(1)]
     low, high = (seen.min(0), seen.max(0)) if len(seen) else (np.zeros(2), np.array(size, float))
-    low, high = np.maximum(low, 0.0), np.minimum(high, np.array(size, float))
+    beyond = OUTSIDE * np.array(size, float)
+    low, high = np.maximum(low, -beyond), np.minimum(high, np.array(size, float) + beyond)
     extent = (high - low) * (1.0 + 2.0 * margin if len(seen) else 1.0)
     height = max(extent[1], extent[0] / aspect, 2.0)
     width = height * aspect
@@ -102,7 +110,7 @@ def side_by_side(panels: Sequence[Picture], gap: int = 2) -> Picture:
 
 @lru_cache(maxsize=64)
 def _strip(title: str, note: str, width: int) -> Picture:
-    size = max(11, width // 22)
+    size = _letter_height(width)
     image = Image.new("RGB", (width, size * 2), (16, 18, 24))
     draw = ImageDraw.Draw(image)
     font = ImageFont.load_default(size)
@@ -110,6 +118,10 @@ def _strip(title: str, note: str, width: int) -> Picture:
     start = size + draw.textlength(title, font=font)
     draw.text((start, size * 0.4), note, font=font, fill=(150, 158, 172))
     return np.array(image)
+
+
+def _letter_height(width: int) -> int:
+    return max(11, width // 22)
 
 
 def _fixed_point(at: np.ndarray) -> tuple[int, int]:

@@ -1,74 +1,20 @@
 """The recovered 3D skeleton, seen by a level camera of our own that follows it over a grid.
 
-World: x forward, y left, z up; metres. The camera stands on the +x side, as the one that filmed.
+World: x forward, y left, z up; metres.
 """
-
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.ndimage import gaussian_filter1d
 
 from robojackson.body.skeleton import KEYPOINT_NAMES, PARENTS
 from robojackson.motion.smpl_sequence import PLANTED, SmplSequence
 from robojackson.report.video import canvas
+from robojackson.report.video.panel_camera import View
 
 GRID_CELL = 0.5
 GRID_REACH = 6
 """Metres; cells to each side."""
-FOCAL = 2.2
-"""Focal length over the height of the panel."""
-DISTANCE, CAMERA_HEIGHT, LOOK_AT_HEIGHT = 5.0, 1.35, 0.9
-NEAR = 0.3
-"""Metres."""
-SMOOTHING_S = 0.5
-"""How gently a camera follows, seconds."""
 FEET = (("left_ankle", "left_foot"), ("right_ankle", "right_foot"))
-
-
-@dataclass(frozen=True)
-class View:
-    """A pinhole camera.
-
-    Attributes:
-        target: Where on the floor it looks, metres.
-        eye: Position, world, metres.
-        axes: Rows right, down, forward, world.
-        focal: Pixels.
-        centre: Of the image, pixels.
-    """
-
-    target: Float[np.ndarray, "2"]
-    eye: Float[np.ndarray, "3"]
-    axes: Float[np.ndarray, "3 3"]
-    focal: float
-    centre: tuple[float, float]
-
-    def project(self, points: Float[np.ndarray, "*B 3"]) -> Float[np.ndarray, "*B 2"]:
-        """Pixels; NaN behind the camera."""
-        right, down, depth = np.moveaxis((points - self.eye) @ self.axes.T, -1, 0)
-        depth = np.where(depth > NEAR, depth, np.nan)
-        u = self.centre[0] + self.focal * right / depth
-        return np.stack([u, self.centre[1] + self.focal * down / depth], -1)
-
-
-def smooth_camera_path(points: Float[np.ndarray, "T 3"], fps: float) -> Float[np.ndarray, "T 2"]:
-    """Where on the floor a camera looks that follows a point gently."""
-    result: np.ndarray = gaussian_filter1d(points[:, :2], SMOOTHING_S * fps, axis=0, mode="nearest")
-    return result
-
-
-def view_of(target: Float[np.ndarray, "2"], azimuth_deg: float, width: int, height: int) -> View:
-    """The camera that looks at a place on the floor; azimuth 0 stands on the +x side."""
-    angle = np.radians(azimuth_deg)
-    outward = np.array([np.cos(angle), np.sin(angle), 0.0])
-    aim = np.array([*target, LOOK_AT_HEIGHT])
-    eye = np.array([*target, CAMERA_HEIGHT]) + DISTANCE * outward
-    forward = (aim - eye) / np.linalg.norm(aim - eye)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    axes = np.stack([right, np.cross(forward, right), forward])
-    return View(target, eye, axes, FOCAL * height, (width / 2, height / 2))
 
 
 def skeleton_panel(

@@ -1,13 +1,20 @@
-"""The source clip around the person, with the landmarks that the detector found."""
+"""The source clip around the person: as it is, with what the detector found, or what was recovered.
+
+Pixels, origin top left. The recovered skeleton is seen through the camera that the motion knows;
+where that moved, through the camera of the first frame and what the background did since.
+"""
 
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float, Int
 
+from robojackson.body.skeleton import KEYPOINT_NAMES, PARENTS
+from robojackson.clips.people.camera_path import warp
 from robojackson.clips.video import read_frames
 from robojackson.mocap.landmarks.blazepose import landmark
 from robojackson.motion.landmark_track import LandmarkTrack
+from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.report.video import canvas
 
 BONES = (
@@ -21,34 +28,107 @@ BONES = (
     ("right_hip", "right_knee"), ("right_knee", "right_ankle"), ("right_ankle", "right_heel"),
     ("right_heel", "right_foot_index"), ("nose", "left_ear"), ("nose", "right_ear"),
 )  # fmt: skip
+CAMERA = {"focal_px", "width", "height", "rotation_w", "position_w"}
+"""What a motion has to know of its camera to be drawn over the source."""
 _FAINT = 0.5
 """A bone is left out when one of its ends is less visible than this."""
 
 
-def source_panels(
-    source: Path, track: LandmarkTrack, frames: Int[np.ndarray, " N"], width: int, height: int
-) -> dict[int, canvas.Picture]:
-    """The panel of every frame that is named, by frame: of the picture nearest to its time."""
-    pixels = track.landmarks[..., :2] * [track.width, track.height]
-    box = canvas.crop_box(pixels.reshape(-1, 2), (track.width, track.height), width / height)
-    shown = {int(frame): track.nearest(frame / track.fps) for frame in frames}
-    wanted, last = set(shown.values()), max(shown.values())
-    panels: dict[int, canvas.Picture] = {}
-    for index, image in enumerate(read_frames(source)):
-        if index in wanted:
-            panel = canvas.cut(image, box, (width, height))
-            _draw_person(panel, _inside(pixels[index], box, width), track.visibility[index])
-            panels[index] = panel
-        if index >= last:
-            break
-    return {frame: panels[index] for frame, index in shown.items() if index in panels}
+class SourceClip:
+    """Pictures of a clip, cut around the person, for some of its frames.
+
+    Args:
+        source, track: The clip and the landmarks that were found in it.
+        sequence: The motion that was recovered from them, or None.
+        frames: Of the motion, that will be shown.
+        width, height: Of a panel, pixels.
+    """
+
+    def __init__(
+        self,
+        source: Path,
+        track: LandmarkTrack,
+        sequence: SmplSequence | None,
+        frames: Int[np.ndarray, " N"],
+        width: int,
+        height: int,
+    ) -> None:
+        self._track, self._size = track, (width, height)
+        self._found = track.landmarks[..., :2] * [track.width, track.height]
+        self._body = None if sequence is None else skeleton_in_image(sequence, track)
+        seen = [self._found, *([] if self._body is None else [self._body])]
+        around = np.concatenate([points.reshape(-1, 2) for points in seen])
+        self._box = canvas.crop_box(around, (track.width, track.height), width / height)
+        self._row = {int(frame): track.nearest(frame / track.fps) for frame in frames}
+        self._pictures = self._cut(source)
+
+    def plain(self, frame: int) -> canvas.Picture:
+        """The picture nearest to the time of a frame; backdrop where the clip has none."""
+        picture = self._pictures.get(self._row[frame])
+        if picture is None:
+            return np.full((self._size[1], self._size[0], 3), canvas.BACKDROP, np.uint8)
+        return picture.copy()
+
+    def with_landmarks(self, frame: int) -> canvas.Picture:
+        """The same with what the detector found."""
+        panel, row = self.plain(frame), self._row[frame]
+        if row in self._pictures:
+            _draw_person(panel, self._inside(self._found[row]), self._track.visibility[row])
+        return panel
+
+    def with_skeleton(self, frame: int) -> canvas.Picture:
+        """The same with the recovered skeleton; with landmarks where its camera is not known."""
+        if self._body is None:
+            return self.with_landmarks(frame)
+        panel = self.plain(frame)
+        if self._row[frame] in self._pictures:
+            points = self._inside(self._body[min(frame, len(self._body) - 1)])
+            draw_skeleton(panel, points, max(2, panel.shape[1] // 130))
+        return panel
+
+    def _cut(self, source: Path) -> dict[int, canvas.Picture]:
+        wanted = set(self._row.values())
+        pictures: dict[int, canvas.Picture] = {}
+        for index, image in enumerate(read_frames(source)):
+            if index in wanted:
+                pictures[index] = canvas.cut(image, self._box, self._size)
+            if index >= max(wanted):
+                break
+        return pictures
+
+    def _inside(self, pixels: Float[np.ndarray, "N 2"]) -> Float[np.ndarray, "N 2"]:
+        result: np.ndarray = (pixels - self._box[:2]) * (self._size[0] / self._box[2])
+        return result
 
 
-def _inside(
-    pixels: Float[np.ndarray, "33 2"], box: tuple[int, int, int, int], width: int
-) -> Float[np.ndarray, "33 2"]:
-    result: np.ndarray = (pixels - box[:2]) * (width / box[2])
-    return result
+def skeleton_in_image(
+    sequence: SmplSequence, track: LandmarkTrack
+) -> Float[np.ndarray, "T 29 2"] | None:
+    """The recovered keypoints in the pixels of every frame; None where the camera is not known."""
+    camera = sequence.camera
+    if not set(camera) >= CAMERA:
+        return None
+    turn, place = np.array(camera["rotation_w"], float), np.array(camera["position_w"], float)
+    local = (np.asarray(sequence.keypoints_w, float) - place) @ turn
+    depth = np.where(local[..., 2:] > 0.0, local[..., 2:], np.nan)
+    centre = np.array([camera["width"], camera["height"]], float) / 2.0
+    pixels = local[..., :2] / depth * np.array(camera["focal_px"], float) + centre
+    if track.to_first is None:
+        return np.asarray(pixels)
+    rows = [track.nearest(frame / sequence.fps) for frame in range(len(sequence))]
+    return warp(pixels, np.linalg.inv(track.to_first[rows]))
+
+
+def draw_skeleton(panel: canvas.Picture, points: Float[np.ndarray, "29 2"], width: int) -> None:
+    """Bones and joints of a projected skeleton, in place, each side in its colour."""
+    for child, parent in enumerate(PARENTS):
+        if parent >= 0:
+            canvas.draw_line(panel, points[parent], points[child], (14, 16, 21), width + 2)
+    for child, parent in enumerate(PARENTS):
+        if parent >= 0:
+            colour = canvas.side_colour(KEYPOINT_NAMES[child])
+            canvas.draw_line(panel, points[parent], points[child], colour, width)
+            canvas.draw_dot(panel, points[child], colour, width // 2 + 1)
 
 
 def _draw_person(

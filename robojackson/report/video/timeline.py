@@ -61,6 +61,28 @@ def timeline(
     )
 
 
+def clip_timeline(
+    source_fps: float, source_frames: int, fps: float, max_seconds: float
+) -> Timeline:
+    """Pictures at `fps` over a clip, up to `max_seconds`, where there is no robot."""
+    seconds = min(source_frames / source_fps, max_seconds)
+    time_s = np.arange(max(1, round(seconds * fps))) / fps
+    return at_frames(np.round(time_s * source_fps).astype(int), source_fps, source_frames)
+
+
+def at_frames(frames: Int[np.ndarray, " N"], source_fps: float, source_frames: int) -> Timeline:
+    """Some frames of a clip, where there is no robot."""
+    none = np.zeros(len(frames), int)
+    return Timeline(
+        time_s=frames / source_fps,
+        step=none,
+        cycle=none,
+        frame=np.clip(frames, 0, source_frames - 1),
+        rollout=none,
+        ended=np.zeros(len(frames), bool),
+    )
+
+
 def reference_qpos(reference: ReferenceMotion, when: Timeline) -> Float[np.ndarray, "N nq"]:
     """The reference's positions at each picture, moved on by the cycles before."""
     qpos = np.array(reference.qpos, dtype=float)[when.step]

@@ -66,6 +66,9 @@ class RewardConfig:
         sites_width: Width for sites relative to the pelvis, root mean square, m.
         hands: Weight of the hands and the head alone, unitless.
         hands_width: Width for them, relative to the pelvis, m.
+        feet: Weight of the places of feet and toes, unitless.
+        feet_width: Width for these, over the floor relative to the pelvis, in height as they are,
+            root mean square, m.
         orientation: Weight of the root orientation, unitless.
         orientation_width: Width for it, rad.
         velocity: Weight of the root linear velocity, unitless.
@@ -92,6 +95,8 @@ class RewardConfig:
     sites_width: float = Field(default=0.10, gt=0)
     hands: float = 0.10
     hands_width: float = Field(default=0.12, gt=0)
+    feet: float = 0.0
+    feet_width: float = Field(default=0.08, gt=0)
     orientation: float = 0.10
     orientation_width: float = Field(default=0.4, gt=0)
     velocity: float = 0.05

@@ -23,6 +23,7 @@ BELLS = RewardConfig.terms()
 """Terms of the reward that pay for a small error: each has the same name in `TrackingErrors`."""
 PELVIS = "pelvis"
 FEET = ("left_foot", "right_foot")
+SOLES = (*FEET, "left_toe", "right_toe")
 EXTREMITIES = ("left_hand", "right_hand", "head")
 
 
@@ -34,11 +35,13 @@ class TrackedPoints:
         pelvis: What the others are compared relative to.
         hands: Hands and head.
         limbs: Feet, hands and head: the ends that must not flail.
+        feet: Feet, and toes where the robot has them.
     """
 
     pelvis: int
     hands: tuple[int, ...]
     limbs: tuple[int, ...]
+    feet: tuple[int, ...] = ()
 
 
 def tracked_points(names: tuple[str, ...]) -> TrackedPoints:
@@ -47,6 +50,7 @@ def tracked_points(names: tuple[str, ...]) -> TrackedPoints:
         pelvis=names.index(PELVIS),
         hands=tuple(names.index(name) for name in EXTREMITIES),
         limbs=tuple(names.index(name) for name in (*FEET, *EXTREMITIES)),
+        feet=tuple(names.index(name) for name in SOLES if name in names),
     )
 
 
@@ -59,6 +63,8 @@ class TrackingErrors:
         joint_speed: Root mean square over hinges, rad/s.
         sites: Root mean square over sites relative to the pelvis, m.
         hands: The same over hands and head, m.
+        feet: Root mean square over feet and toes, over the floor relative to the pelvis, in
+            height as they are, m.
         site_mean: Mean distance of the sites relative to the pelvis, m.
         orientation: Of the root, rad.
         velocity: Of the root, m/s.
@@ -71,6 +77,7 @@ class TrackingErrors:
     joint_speed: Float[np.ndarray, " N"]
     sites: Float[np.ndarray, " N"]
     hands: Float[np.ndarray, " N"]
+    feet: Float[np.ndarray, " N"]
     site_mean: Float[np.ndarray, " N"]
     orientation: Float[np.ndarray, " N"]
     velocity: Float[np.ndarray, " N"]
@@ -92,12 +99,15 @@ def tracking_errors(
     wanted = target.points - target.points[:, which.pelvis, None]
     squared = _squares(relative - wanted)
     hurry = _squares((moved - target.moved).take(which.limbs, 1))
+    lifted = (relative - wanted).take(which.feet, 1)
+    lifted[..., 2] = (points - target.points).take(which.feet, 1)[..., 2]
     place, speed = qpos - target.qpos, qvel - target.qvel
     return TrackingErrors(
         joints=np.sqrt(_mean(place[:, 7:] ** 2)),
         joint_speed=np.sqrt(_mean(speed[:, 6:] ** 2)),
         sites=np.sqrt(_mean(squared)),
         hands=np.sqrt(_mean(squared.take(which.hands, 1))),
+        feet=np.sqrt(_mean(_squares(lifted))) if which.feet else np.zeros(len(qpos)),
         site_mean=_mean(np.sqrt(squared)),
         orientation=quat_angle(qpos[:, 3:7], target.qpos[:, 3:7]),
         velocity=np.sqrt(_squares(speed[:, :3])),

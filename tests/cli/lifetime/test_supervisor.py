@@ -104,6 +104,7 @@ def becomes(pid: int, states: str) -> bool:
     return state_of(pid) in states
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("send", [os.kill, os.killpg])
 @pytest.mark.parametrize("body", [HOLD_THE_INTERPRETER, SWALLOW], ids=["C call", "swallowed"])
@@ -134,6 +135,7 @@ def test_after_the_acknowledgement_the_command_writes_nothing(start: Start) -> N
     assert (process.returncode, out, len(err.splitlines())) == (130, "", 2)
 
 
+@pytest.mark.medium
 def test_a_command_with_learning_to_save_gets_the_time_for_it(start: Start, tmp_path: Path) -> None:
     file = tmp_path / "checkpoint"
     process = start(SAVE.format(seconds=4.0, path=str(file)))
@@ -143,6 +145,7 @@ def test_a_command_with_learning_to_save_gets_the_time_for_it(start: Start, tmp_
     assert (process.returncode, file.read_text()) == (130, "whole")
 
 
+@pytest.mark.medium
 def test_a_training_below_the_command_is_stopped_and_saves(start: Start, tmp_path: Path) -> None:
     file = tmp_path / "checkpoint"
     save = SAVE.format(seconds=3.0, path=str(file)).replace("SIGINT", "SIGTERM")
@@ -173,6 +176,7 @@ def test_a_second_signal_does_not_wait_for_the_checkpoint(start: Start, tmp_path
     assert time.monotonic() - sent < ENDED_S
 
 
+@pytest.mark.medium
 def test_a_signal_that_comes_twice_at_once_is_one(start: Start, tmp_path: Path) -> None:
     """A wrapper passes on the Ctrl-C that the terminal has sent to both."""
     file = tmp_path / "checkpoint"
@@ -183,6 +187,7 @@ def test_a_signal_that_comes_twice_at_once_is_one(start: Start, tmp_path: Path) 
     assert (process.returncode, file.read_text()) == (130, "whole")
 
 
+@pytest.mark.medium
 def test_no_process_is_left_however_stubborn(start: Start) -> None:
     stubborn = (
         "import os, signal, sys, time\n"
@@ -201,6 +206,7 @@ def test_no_process_is_left_however_stubborn(start: Start) -> None:
     assert not is_alive(child)
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("writer", ["command", "child"])
 def test_a_file_that_is_being_written_is_removed_and_a_whole_one_stays(
     writer: str, start: Start, tmp_path: Path
@@ -233,6 +239,7 @@ def test_the_worker_of_a_killed_supervisor_ends(start: Start) -> None:
     assert becomes(worker, "Z")
 
 
+@pytest.mark.medium
 def test_a_stopped_command_stops_and_goes_on(start: Start) -> None:
     process = start("print(os.getpid(), flush=True)\nsay('ready')\ntime.sleep(2)")
     assert process.stdout is not None
@@ -274,6 +281,7 @@ def test_the_exit_code_survives_a_parent_that_ignores_the_ends_of_its_children()
     assert (done.returncode, done.stderr) == (3, b"")
 
 
+@pytest.mark.medium
 def test_a_signal_that_the_shell_has_ignored_is_obeyed(tmp_path: Path) -> None:
     """A script's `&` has SIGINT ignored."""
     body = f"    say('ready')\n    {HOLD_THE_INTERPRETER}\n"
@@ -289,6 +297,7 @@ def test_a_signal_that_the_shell_has_ignored_is_obeyed(tmp_path: Path) -> None:
     assert process.returncode == 130
 
 
+@pytest.mark.medium
 def test_an_acknowledgement_that_none_can_read_delays_nothing(start: Start) -> None:
     """Ctrl-C in a pipeline ends the reader of stderr, too."""
     process = start(f"say('ready')\n{HOLD_THE_INTERPRETER}")

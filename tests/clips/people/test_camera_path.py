@@ -79,6 +79,7 @@ def test_a_cut_is_told() -> None:
     assert "jumps in 1 frames (first: 20)" in found.notes[0]
 
 
+@pytest.mark.medium
 def test_a_violent_shake_is_told() -> None:
     rng = np.random.default_rng(2)
     picture = wall()

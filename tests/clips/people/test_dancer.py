@@ -24,6 +24,8 @@ from robojackson.errors import NoPersonFound
 from tests.fixtures.crossing import write_crossing
 from tests.fixtures.made_people import SIZE, hips_x, row_of
 
+pytestmark = pytest.mark.xdist_group("dancer")
+
 CLIPS = Path(__file__).parents[3] / "clips"
 FRAMES = 56
 TIMES = np.arange(10) / 10.0
@@ -100,12 +102,14 @@ def whose(rows: np.ndarray, places: np.ndarray) -> tuple[set[int], float]:
     return set(nearest.tolist()), known.sum() / apart.sum()
 
 
+@pytest.mark.medium
 def test_two_who_cross_in_the_same_clothes_are_told_apart(crossed: Crossed) -> None:
     shown = [whose(rows, crossed.places) for rows in crossed.cast.rows]
     assert sorted(people for people, _ in shown) == [{0}, {1}]
     assert min(share for _, share in shown) > 0.85
 
 
+@pytest.mark.slow
 def test_the_dancer_is_never_exchanged(crossed: Crossed) -> None:
     track = track_dancer(crossed.path, crossed.info, "lite", DancerConfig())
     people, share = whose(track.landmarks, crossed.places)
@@ -114,6 +118,7 @@ def test_the_dancer_is_never_exchanged(crossed: Crossed) -> None:
     assert track.person == 1
 
 
+@pytest.mark.medium
 def test_an_impossible_number_tells_who_is_there(
     crossed: Crossed, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -122,6 +127,7 @@ def test_an_impossible_number_tells_who_is_there(
         track_dancer(crossed.path, crossed.info, "lite", replace(DancerConfig(), number=7))
 
 
+@pytest.mark.medium
 def test_one_who_is_alone_is_seen_as_ever(tmp_path: Path) -> None:
     path = trim(CLIPS / "walk.mp4", 0.0, 0.5, tmp_path / "part.mp4")
     info = probe(path, VideoLimits())

@@ -15,6 +15,8 @@ from robojackson.clips.quality.stability import StabilityConfig, stability
 from robojackson.motion.landmark_track import LandmarkTrack
 from tests.fixtures.difficult_clips import DANCERS, REAL
 
+pytestmark = pytest.mark.xdist_group("assessment")
+
 GOOD = {*DANCERS, REAL}
 REASONS = {
     "two_people": "2 people in view",
@@ -48,14 +50,17 @@ def ranking(judged: Judged) -> list[Ranked]:
     return candidate_ranking.rank(order, against, copied)
 
 
+@pytest.mark.medium
 def test_the_steadiest_dancer_is_chosen(ranking: list[Ranked]) -> None:
     assert (ranking[0].name, ranking[0].decision) == ("hip_shake", "chosen")
 
 
+@pytest.mark.medium
 def test_the_good_clips_stand_before_all_others(ranking: list[Ranked]) -> None:
     assert {place.name for place in ranking if place.place} == GOOD
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("name", REASONS)
 def test_a_bad_clip_is_rejected_for_what_is_wrong_with_it(ranking: list[Ranked], name: str) -> None:
     reason = next(place.reason for place in ranking if place.name == name)
@@ -63,6 +68,7 @@ def test_a_bad_clip_is_rejected_for_what_is_wrong_with_it(ranking: list[Ranked],
     assert ";" not in reason
 
 
+@pytest.mark.medium
 def test_the_cartoon_loses_though_algorithm_1_likes_it(
     judged: Judged, ranking: list[Ranked]
 ) -> None:
@@ -72,6 +78,7 @@ def test_the_cartoon_loses_though_algorithm_1_likes_it(
     assert "cartoon" not in {place.name for place in ranking if place.place}
 
 
+@pytest.mark.medium
 def test_the_score_is_algorithm_1(judged: Judged) -> None:
     """Worked out once more, landmark by landmark, without numpy's arithmetic."""
     for name in ("hip_shake", "slideshow", "black"):
@@ -90,11 +97,13 @@ def test_the_score_is_algorithm_1(judged: Judged) -> None:
         assert judged[name].stability.stability_score == pytest.approx(missing + jitter, abs=1e-9)
 
 
+@pytest.mark.medium
 def test_a_shaken_camera_hardly_ever_stands_still(judged: Judged) -> None:
     assert judged["shaken"].quality.static_share < 0.2
     assert judged["hip_shake"].quality.static_share == 1.0
 
 
+@pytest.mark.medium
 def test_the_person_is_as_tall_as_the_drawing(judged: Judged) -> None:
     """The clip that is 7/8 as large shows a person who is."""
     ratio = (
@@ -103,16 +112,19 @@ def test_the_person_is_as_tall_as_the_drawing(judged: Judged) -> None:
     assert ratio == pytest.approx(7 / 8, rel=0.02)
 
 
+@pytest.mark.medium
 def test_every_dancer_is_in_full_view(judged: Judged) -> None:
     assert min(judged[name].quality.full_body_share for name in DANCERS) > 0.95
 
 
+@pytest.mark.medium
 def test_filters_can_be_switched_off(judged: Judged) -> None:
     off = FilterConfig(people=None, cuts=None, static_share=None, flat_share=None)
     for name in ("two_people", "cut", "shaken", "cartoon"):
         assert candidate_ranking.objections(judged[name].stability, judged[name].quality, off) == []
 
 
+@pytest.mark.medium
 def test_by_frame_the_order_does_not_favour_short_clips(judged: Judged) -> None:
     scores = {name: judged[name].stability for name in GOOD}
     by_frame = candidate_ranking.order(scores, FilterConfig(rank_by="frame"))
@@ -139,11 +151,13 @@ def test_by_second_a_short_clip_is_not_favoured() -> None:
     assert candidate_ranking.order(scores, FilterConfig()) == ["whole", "shaky"]
 
 
+@pytest.mark.medium
 def test_a_clip_without_a_person_comes_last_however_low_its_score(judged: Judged) -> None:
     order = candidate_ranking.order({n: j.stability for n, j in judged.items()}, FilterConfig())
     assert set(order[-2:]) == {"black", "stick_figure"}
 
 
+@pytest.mark.medium
 def test_figures_are_plain_numbers(judged: Judged) -> None:
     values = [v for j in judged.values() for v in vars(j.quality).values()]
     assert all(type(v) in (int, float) and np.isfinite(v) for v in values)

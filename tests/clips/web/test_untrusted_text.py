@@ -47,6 +47,7 @@ def test_a_hostile_id_is_one_part_of_a_path(raw: str) -> None:
     assert len(name) <= 64
 
 
+@pytest.mark.medium
 @given(st.text())
 def test_any_id_is_made_of_letters_digits_and_two_signs(raw: str) -> None:
     assert all(c.isascii() and (c.isalnum() or c in "_-") for c in safe_name(raw))

@@ -24,6 +24,7 @@ def test_a_video_arrives_as_it_was_sent(web: Web, path: str, tmp_path: Path) -> 
     assert get(web, path, tmp_path).read_bytes() == web.video
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(
     ("path", "reason"),
     [
@@ -84,6 +85,7 @@ def test_a_file_beyond_the_limit_is_not_downloaded(web: Web, tmp_path: Path) -> 
         get(web, "endless/clip.mp4", tmp_path)
 
 
+@pytest.mark.medium
 def test_the_rate_limit_is_kept(web: Web, tmp_path: Path) -> None:
     import time
 

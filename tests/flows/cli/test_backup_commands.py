@@ -98,6 +98,7 @@ REFUSED = {
 }
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_cannot_be_is_refused_in_one_line(case: str, store: Store, tmp_path: Path) -> None:
     words, expected, reason = REFUSED[case]

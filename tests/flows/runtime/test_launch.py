@@ -41,6 +41,7 @@ ENDED_S = 10.0
 """A generous multiple of 3 s, for a busy machine."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("send", [os.kill, os.killpg])
 def test_an_interrupted_flow_ends_at_once_and_says_how_to_resume(

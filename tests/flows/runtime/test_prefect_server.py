@@ -65,6 +65,7 @@ def test_a_server_that_refuses_us_is_told_with_what_to_set(
         COMMANDS[name]()
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_server_that_is_not_there_is_told_with_what_to_do(name: str, store_folder: Path) -> None:
     address = f"http://127.0.0.1:{free_port()}/api"
@@ -73,6 +74,7 @@ def test_a_server_that_is_not_there_is_told_with_what_to_do(name: str, store_fol
         COMMANDS[name]()
 
 
+@pytest.mark.slow
 def test_the_command_says_it_in_one_line(tmp_path: Path) -> None:
     address = f"http://127.0.0.1:{free_port()}/api"
     environment = {"PREFECT_API_URL": address, "ROBOJACKSON_STORE": str(tmp_path / "store")}

@@ -91,6 +91,7 @@ def test_a_server_with_a_password_asks_for_it(
     assert ("www-authenticate" in answer.headers) == (code == 401)
 
 
+@pytest.mark.medium
 def test_a_port_that_is_taken_is_one_line(tmp_path: Path) -> None:
     with create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
@@ -110,6 +111,7 @@ print(PREFECT_UI_API_URL.value())
 """
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("given", ["PREFECT_UI_API_URL", "PREFECT_SERVER_UI_API_URL", None])
 def test_the_pages_call_the_server_relative_to_themselves_unless_the_user_says_else(
     given: str | None, tmp_path: Path

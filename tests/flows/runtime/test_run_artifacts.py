@@ -79,6 +79,7 @@ def test_a_study_shows_what_became_of_its_claims(store_folder: Path) -> None:
     assert set(reach(store, text)) == {200}
 
 
+@pytest.mark.medium
 def test_a_dance_has_a_key_of_its_own_and_keeps_its_history(
     records: None, store_folder: Path
 ) -> None:

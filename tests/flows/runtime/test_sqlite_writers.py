@@ -38,6 +38,7 @@ async def counted(config: AioSqliteConfiguration) -> int:
     return found
 
 
+@pytest.mark.medium
 def test_readers_that_become_writers_wait_for_each_other(tmp_path: Path) -> None:
     config = QueuedSqlite(connection_url=f"sqlite+aiosqlite:///{tmp_path}/prefect.db")
     assert asyncio.run(counted(config)) == WRITERS * ROUNDS

@@ -53,6 +53,7 @@ def test_without_a_network_a_name_is_refused_unless_it_was_found_before(
     require_findable("apt", store)
 
 
+@pytest.mark.medium
 def test_find_without_a_network_is_one_line_and_starts_no_prefect(tmp_path: Path) -> None:
     where = ("--source", "server", "--address", "http://127.0.0.1:9/")
     said = robojackson("find", "apt", *where, ROBOJACKSON_STORE=str(tmp_path))

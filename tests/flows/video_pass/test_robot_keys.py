@@ -65,6 +65,7 @@ def test_a_study_keeps_the_whole_path_of_its_robot(
     assert str(path) not in str(identity(study))
 
 
+@pytest.mark.medium
 def test_a_robot_that_is_not_where_the_flow_runs_is_one_line(
     prefect_server: None, short_clip: Path, store_folder: Path
 ) -> None:

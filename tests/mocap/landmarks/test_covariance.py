@@ -51,6 +51,7 @@ def test_variance_relative_to_the_hips_forgets_what_all_joints_share() -> None:
     assert np.allclose(root_relative(shared), 0.0)
 
 
+@pytest.mark.medium
 def test_a_hidden_arm_is_less_sure_and_the_other_is_not(hip_shake: LandmarkTrack) -> None:
     hidden = np.array(hip_shake.visibility)
     hidden[40:70][:, [13, 15, 17, 19, 21]] = 0.02

@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from robojackson.clips.people.camera_path import CameraPath, camera_path
 from robojackson.clips.video import read_frames
@@ -26,6 +27,7 @@ def panned(track: LandmarkTrack) -> tuple[LandmarkTrack, CameraPath]:
     return window, camera_path(images, landmarks[..., :2], width, track.height)
 
 
+@pytest.mark.medium
 def test_a_swaying_camera_moves_the_root_unless_its_background_is_known(
     hip_shake: LandmarkTrack,
 ) -> None:

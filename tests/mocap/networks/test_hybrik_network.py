@@ -123,6 +123,7 @@ def test_resnet_has_the_official_key(
     assert tuple(resnet_state[key].shape) == shape
 
 
+@pytest.mark.medium
 def test_hrnet_loads_strictly_and_looks_at_a_crop() -> None:
     torch.manual_seed(0)
     with torch.device("meta"):

@@ -39,6 +39,7 @@ def _scipy_slack(asked: Demand, step: int) -> float:
     return float(np.linalg.norm(found.fun))
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("hurry", [1.0, 2.0])
 def test_no_bounded_solver_leaves_less(hurry: float, robot: Robot):
     asked = _demand(robot, hurry)

@@ -102,6 +102,7 @@ def _hurried(robot: Robot, tempo: float | str) -> dict[str, float]:
     return dict(retarget_motion(fast, robot, config).scorecard)
 
 
+@pytest.mark.slow
 def test_auto_slows_a_hurried_dance_down_and_says_by_how_much(robot: Robot):
     kept, slowed = _hurried(robot, 1.0), _hurried(robot, "auto")
     assert kept["tempo_min"] == pytest.approx(1.0)

@@ -58,6 +58,7 @@ def _distance_mm(motion, robot: Robot) -> float:
     return float(1e3 * np.mean(np.abs(area) / np.linalg.norm(along, axis=1)))
 
 
+@pytest.mark.medium
 def test_a_standing_dance_is_leaned_over_its_feet(robot: Robot):
     upright = retarget_motion(human("hip_shake"), robot, RetargetConfig(lean_deg=0.0))
     leaned = robot_motion("hip_shake")

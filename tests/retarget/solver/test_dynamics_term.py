@@ -65,6 +65,7 @@ def test_the_slopes_of_inverse_dynamics_are_its_differences(robot: Robot):
     np.testing.assert_allclose(slopes.position[:, :, 12], rise, atol=1e-3)
 
 
+@pytest.mark.medium
 def test_repair_makes_a_walk_feasible_that_was_not(robot: Robot):
     config = RetargetConfig(repair=UNREPAIRED)
     before, after = retarget_motion(human("walk"), robot, config), robot_motion("walk")
@@ -73,6 +74,7 @@ def test_repair_makes_a_walk_feasible_that_was_not(robot: Robot):
     assert after.scorecard["keypoint_mm"] <= before.scorecard["keypoint_mm"] + 5.0
 
 
+@pytest.mark.medium
 def test_a_motion_that_is_feasible_is_left_alone(robot: Robot):
     config = RetargetConfig(repair=UNREPAIRED)
     np.testing.assert_array_equal(
@@ -80,6 +82,7 @@ def test_a_motion_that_is_feasible_is_left_alone(robot: Robot):
     )
 
 
+@pytest.mark.slow
 def test_a_dance_whose_legs_cross_is_repaired_and_slowed_down(robot: Robot):
     """Its cheapest solution has one shin jump through the other and back, in 15 ms each."""
     motion = robot_motion("dance_b")

@@ -29,6 +29,7 @@ def _sway(robot: Robot, steps: int) -> Targets:
     )
 
 
+@pytest.mark.medium
 def test_windows_of_a_long_clip_meet_as_smoothly_as_they_go_on(robot: Robot, monkeypatch):
     aims = _sway(robot, 240)
     problem = Problem.of(robot, aims, Weights())
@@ -41,6 +42,7 @@ def test_windows_of_a_long_clip_meet_as_smoothly_as_they_go_on(robot: Robot, mon
     assert jerk[1] < 3 * jerk[0]
 
 
+@pytest.mark.medium
 def test_the_memory_of_a_solution_does_not_grow_with_the_clip(robot: Robot, monkeypatch):
     seen = []
     monkeypatch.setattr(

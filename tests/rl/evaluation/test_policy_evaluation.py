@@ -171,6 +171,7 @@ def test_the_shown_rollout_begins_with_its_start(robot: Robot, sway: ReferenceMo
     assert len(shown) == 11
 
 
+@pytest.mark.medium
 def test_a_clip_that_is_not_cyclic_is_danced_to_its_end(
     robot: Robot, sway: ReferenceMotion
 ) -> None:
@@ -197,6 +198,7 @@ def test_a_policy_for_a_robot_of_another_name_is_refused(
         evaluate_policy(stranger, sway, robot, EvaluateConfig())
 
 
+@pytest.mark.medium
 def test_a_policy_that_learnt_another_dance_is_judged_with_a_word(
     robot: Robot, sway: ReferenceMotion, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -223,6 +225,7 @@ def test_a_reference_that_is_not_a_number_is_refused(sway: ReferenceMotion) -> N
         Clip(dataclasses.replace(sway, qpos=qpos))
 
 
+@pytest.mark.medium
 def test_a_statue_that_earns_more_than_the_policy_raises_a_flag(
     robot: Robot, sway: ReferenceMotion
 ) -> None:
@@ -247,6 +250,7 @@ def test_every_rollout_is_measured_by_the_papers_reward_too(
         assert 0 < row["return_paper"] < 10 * 5.2  # type: ignore[operator]
 
 
+@pytest.mark.medium
 def test_the_papers_reward_is_the_same_whatever_a_policy_was_trained_with(
     robot: Robot, sway: ReferenceMotion
 ) -> None:
@@ -286,6 +290,7 @@ def test_the_usage_of_a_joint_is_its_spread_over_the_references(
     assert judged["usage_right_knee"] == pytest.approx(1)
 
 
+@pytest.mark.medium
 def test_a_policy_of_paper_mode_is_judged_on_348_observations(
     robot: Robot, sway: ReferenceMotion
 ) -> None:

@@ -266,6 +266,7 @@ def test_a_robot_that_torques_do_not_move_is_refused_in_words(
         require_trainable(altered(tmp_path, change))
 
 
+@pytest.mark.medium
 def test_a_robot_whose_spine_has_other_names_is_rewarded_without_it(
     sway: ReferenceMotion, tmp_path: Path
 ) -> None:
@@ -291,6 +292,7 @@ def test_the_motion_is_turned_ahead_without_being_bent(robot: Robot, sway: Refer
     assert quat_angle(ahead.qpos[5, 3:7], facing_ahead(sway).qpos[5, 3:7]) < 1e-6
 
 
+@pytest.mark.medium
 def test_a_statue_earns_what_a_dancer_earns_by_the_papers_reward(
     robot: Robot, sway: ReferenceMotion
 ) -> None:
@@ -299,6 +301,7 @@ def test_a_statue_earns_what_a_dancer_earns_by_the_papers_reward(
     assert asked["root"].of["statue"] > 0.95
 
 
+@pytest.mark.medium
 def test_a_statue_earns_clearly_less_by_our_reward(robot: Robot, sway: ReferenceMotion) -> None:
     found = audit_reward(robot, sway, TrackConfig())
     assert found.perfect == pytest.approx(TrackConfig().reward.perfect, abs=0.01)
@@ -306,6 +309,7 @@ def test_a_statue_earns_clearly_less_by_our_reward(robot: Robot, sway: Reference
     assert found.of["flail"] < found.of["statue"]
 
 
+@pytest.mark.medium
 def test_with_curiosity_flailing_pays_more_than_dancing(
     robot: Robot, sway: ReferenceMotion
 ) -> None:

@@ -45,6 +45,7 @@ def same(ours: object, theirs: object) -> None:
         np.testing.assert_allclose(mine, other, rtol=2e-4, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_a_critic_and_its_slope_by_parameters_are_flaxs(made: SimpleNamespace) -> None:
     def squared(apply: object) -> object:
         return jax.value_and_grad(lambda p: jnp.sum(apply(p, made.seen, made.acts) ** 2))  # type: ignore[operator]
@@ -55,6 +56,7 @@ def test_a_critic_and_its_slope_by_parameters_are_flaxs(made: SimpleNamespace) -
     )  # type: ignore[operator]
 
 
+@pytest.mark.medium
 def test_a_critics_slope_by_actions_is_flaxs(made: SimpleNamespace) -> None:
     def squared(apply: object) -> object:
         return jax.value_and_grad(
@@ -67,6 +69,7 @@ def test_a_critics_slope_by_actions_is_flaxs(made: SimpleNamespace) -> None:
     )  # type: ignore[operator]
 
 
+@pytest.mark.medium
 def test_an_actor_and_its_slope_are_flaxs(made: SimpleNamespace) -> None:
     def told(apply: object) -> object:
         def value(params: object) -> jax.Array:

@@ -3,6 +3,7 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
 from robojackson.rl.tqc.quantile_loss import lowest, quantile_huber
 
@@ -31,6 +32,7 @@ def ours(current: np.ndarray, wanted: np.ndarray) -> tuple[jax.Array, jax.Array]
     return quantile_huber(jnp.asarray(current, jnp.float32), aims, lowest(aims, KEPT), KEPT)
 
 
+@pytest.mark.medium
 def test_the_loss_is_the_papers() -> None:
     current, wanted = drawn()
     np.testing.assert_allclose(ours(current, wanted)[0], formula(current, wanted), rtol=1e-5)

@@ -146,6 +146,7 @@ def test_the_text_of_a_tree_does_not_depend_on_the_python() -> None:
     assert hashlib.sha256(bare_tree(SAMPLE).encode()).hexdigest() == SAMPLE_SHA256
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("python", [sys.executable, *pythons()])
 def test_the_library_has_one_digest_on_all_pythons(python: str) -> None:
     """The tree of a file is the same text, or a worker with another Python would train again."""

@@ -39,27 +39,32 @@ def _empty(records: None, store_folder: Path) -> None:
     ran.clear()
 
 
+@pytest.mark.medium
 def test_a_call_that_was_made_is_recorded(store_folder: Path) -> None:
     assert recorded(3, first=True) == {"value": Store(store_folder).put("3.txt", b"6")}
 
 
+@pytest.mark.medium
 def test_a_call_that_was_not_made_is_not_and_nothing_runs() -> None:
     assert recorded(4, first=False) is None
     assert ran == []
 
 
+@pytest.mark.medium
 def test_a_call_whose_file_is_gone_is_not_recorded(store_folder: Path) -> None:
     recorded(5, first=True)
     (store_folder / "5.txt").unlink()
     assert recorded(5, first=False) is None
 
 
+@pytest.mark.medium
 def test_a_call_whose_file_was_altered_is_not_recorded(store_folder: Path) -> None:
     recorded(6, first=True)
     (store_folder / "6.txt").write_text("13")
     assert recorded(6, first=False) is None
 
 
+@pytest.mark.medium
 def test_a_record_answers_a_call_in_place_of_a_run(store_folder: Path) -> None:
     made = recorded(7, first=True)
     ran.clear()
@@ -68,12 +73,14 @@ def test_a_record_answers_a_call_in_place_of_a_run(store_folder: Path) -> None:
     assert ran == []
 
 
+@pytest.mark.medium
 def test_a_call_without_a_record_is_refused_where_nothing_may_run() -> None:
     with records_only(), pytest.raises(NotRecorded):
         asyncio.run(doubled(8))
     assert ran == []
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"result": "{"}', '{"result": 3}', "[" * 10**5])
 def test_a_damaged_record_is_no_record(store_folder: Path, text: str) -> None:
     recorded(9, first=True)
@@ -82,6 +89,7 @@ def test_a_damaged_record_is_no_record(store_folder: Path, text: str) -> None:
     assert doubled.recorded(number=9) is None
 
 
+@pytest.mark.medium
 def test_records_lie_where_the_store_says_whatever_home_prefect_has(
     store_folder: Path, tmp_path: Path
 ) -> None:
@@ -92,6 +100,7 @@ def test_records_lie_where_the_store_says_whatever_home_prefect_has(
     assert not (tmp_path / "results").exists()
 
 
+@pytest.mark.medium
 def test_a_record_whose_address_an_earlier_version_wrote_is_found(store_folder: Path) -> None:
     recorded(13, first=True)
     (path,) = (store_folder / "records" / "doubled").glob("*.json")
@@ -104,12 +113,14 @@ def test_a_record_whose_address_an_earlier_version_wrote_is_found(store_folder: 
     assert ran == []
 
 
+@pytest.mark.medium
 def test_a_record_in_an_object_store_is_found_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROBOJACKSON_STORE", "memory://records")
     assert recorded(11, first=True) is not None
     assert Store("memory://records").list("records/doubled")
 
 
+@pytest.mark.medium
 def test_task_runs_are_named_after_what_they_work_on() -> None:
     with labelled("scratch-walk-s0"):
         assert doubled.run_name() == "doubled-scratch-walk-s0"

@@ -132,15 +132,18 @@ def standin(
 ALL = ["first", "second", "beside", "third"]
 
 
+@pytest.mark.medium
 def test_a_second_run_executes_nothing(standin: Standin) -> None:
     assert (standin.run()[0], standin.run()[0]) == (ALL, [])
 
 
+@pytest.mark.medium
 def test_another_configuration_executes_everything(standin: Standin) -> None:
     standin.run(3)
     assert standin.run(4)[0] == ALL
 
 
+@pytest.mark.medium
 def test_a_parameter_without_influence_executes_nothing(standin: Standin) -> None:
     standin.run(hurry=False)
     assert standin.run(hurry=True)[0] == []
@@ -150,6 +153,7 @@ def alter(path: Path) -> None:
     path.write_bytes(b"8")
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("harm", [Path.unlink, alter], ids=["deleted", "altered"])
 @pytest.mark.parametrize("name", ALL)
 def test_a_harmed_artifact_runs_its_task_alone_when_the_content_returns(
@@ -160,6 +164,7 @@ def test_a_harmed_artifact_runs_its_task_alone_when_the_content_returns(
     assert standin.run() == ([name], results)
 
 
+@pytest.mark.medium
 def test_a_formula_with_another_result_runs_its_stage_and_what_depends_on_it(
     standin: Standin,
 ) -> None:
@@ -168,12 +173,14 @@ def test_a_formula_with_another_result_runs_its_stage_and_what_depends_on_it(
     assert standin.run()[0] == ["second", "third"]
 
 
+@pytest.mark.medium
 def test_a_formula_with_the_same_result_runs_its_stage_alone(standin: Standin) -> None:
     standin.run()
     standin.rewrite("formula", "2 * x", "x + x")
     assert standin.run()[0] == ["second"]
 
 
+@pytest.mark.medium
 def test_a_deleted_artifact_that_comes_back_different_runs_all_that_depends_on_it(
     standin: Standin, store_folder: Path
 ) -> None:
@@ -183,6 +190,7 @@ def test_a_deleted_artifact_that_comes_back_different_runs_all_that_depends_on_i
     assert standin.run()[0] == ALL
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(
     ("old", "new"), [("2 * x", "2 * x  # doubled"), ("Twice.", "The double, metres.")]
 )
@@ -192,6 +200,7 @@ def test_a_comment_or_a_docstring_runs_nothing(standin: Standin, old: str, new: 
     assert standin.run()[0] == []
 
 
+@pytest.mark.medium
 def test_two_tasks_with_equal_inputs_do_not_collide(standin: Standin) -> None:
     _, results = standin.run(3)
     assert [standin.value(results[name]) for name in ("second", "beside")] == [12, 13]

@@ -31,6 +31,7 @@ def test_an_error_of_the_work_comes_back() -> None:
         in_worker(divmod, 1, 0)
 
 
+@pytest.mark.slow
 def test_a_clip_that_kills_its_process_harms_no_other() -> None:
     with ThreadPoolExecutor(4) as threads:
         good = [threads.submit(in_worker, pow, 2, n) for n in range(3)]
@@ -40,6 +41,7 @@ def test_a_clip_that_kills_its_process_harms_no_other() -> None:
         assert [future.result() for future in good] == [1, 2, 4, 8, 16, 32]
 
 
+@pytest.mark.medium
 def test_a_process_ends_with_its_parent(tmp_path: Path) -> None:
     script = tmp_path / "orphans.py"
     script.write_text(ORPHANS)

@@ -1,16 +1,17 @@
-"""`robojackson.cli.retarget_pictures`: the pictures that `robojackson retarget --video` leaves
-beside its tables."""
+"""`robojackson retarget --video`: the pictures that it leaves beside its tables."""
 
 from pathlib import Path
 
 import av
 import pytest
 
-from robojackson.cli.retarget_pictures import draw_retargeting
+from robojackson.cli.pictures.retarget_pictures import draw_retargeting
 from robojackson.errors import StoreError
 from robojackson.files import tables
 from tests.fixtures.commands import robojackson
 from tests.fixtures.robots import human, robot_motion
+
+pytestmark = pytest.mark.medium
 
 TINY = {"render.max_seconds": 0.3, "render.panel_width": 96, "render.panel_height": 128}
 

@@ -1,0 +1,119 @@
+"""The command `clean`: how big and how old the store is, and what may go."""
+
+import shlex
+import sys
+from collections.abc import Sequence
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from robojackson.cli.console import CommandResult, command
+from robojackson.cli.options import Json
+
+if TYPE_CHECKING:
+    from storage.store_cleaning import Cleaning
+    from storage.store_inventory import Item
+
+DAY_S, MEGABYTE = 86_400.0, 1e6
+LONGEST_LIST = 20
+"""Files and folders that are named; the rest is counted."""
+
+
+class Choice(StrEnum):
+    """Kinds of `storage.store_inventory` that may go; of a `Literal`, typer makes no list."""
+
+    WORK = "work"
+    UNUSED = "unused"
+    VIDEOS = "videos"
+    CACHE = "cache"
+    RUNS = "runs"
+
+
+@command
+def clean(
+    kinds: Annotated[
+        list[Choice] | None,
+        typer.Option("--kind", help="What may go; work and unused by itself."),
+    ] = None,
+    older_than: Annotated[
+        float, typer.Option("--older-than", min=0, help="Only what is this old, days.")
+    ] = 30.0,
+    delete: Annotated[
+        bool, typer.Option("--delete", "--yes", help="Remove it; without, it is only listed.")
+    ] = False,
+    as_json: Json = False,
+) -> CommandResult:
+    """What is in the store, how old and how big; removes what is old, with --delete alone.
+
+    What a record, a run or a table refers to stays unless its kind is named; so does what a
+    process works on.
+    """
+    from storage.store import Store
+    from storage.store_cleaning import USUAL, plan, remove
+    from storage.store_inventory import KINDS
+
+    store = Store.from_environment()
+    wanted = [kind for kind in KINDS if kind in (kinds or ())]
+    found = plan(store, wanted or USUAL, older_than * DAY_S)
+    gone = remove(store, found) if delete else found.going
+    data = {
+        "store": store.root,
+        "kinds": {kind: summary(found.items, kind) for kind in KINDS},
+        "removed": delete,
+        "items": [{"key": i.key, "kind": i.kind, "size_mb": _mb([i])} for i in gone],
+        "size_mb": _mb(gone),
+        "waiting": found.users,
+    }
+    return CommandResult(data, text=[*_table(found), "", *_closing(found, gone, delete)])
+
+
+def summary(items: "Sequence[Item]", kind: str) -> dict[str, Any]:
+    """Return how many, how big and how old the items of a kind are."""
+    of = [item for item in items if item.kind == kind]
+    ages = [item.age_s / DAY_S for item in of]
+    return {
+        "items": len(of),
+        "size_mb": _mb(of),
+        "newest_days": round(min(ages), 1) if ages else None,
+        "oldest_days": round(max(ages), 1) if ages else None,
+    }
+
+
+def _table(found: "Cleaning") -> list[str]:
+    from storage.store_inventory import KINDS
+
+    rows = [f"{'kind':<7} {'items':>6} {'MB':>9}  {'age in days':>13}"]
+    for kind, words in KINDS.items():
+        of = summary(found.items, kind)
+        ages = f"{of['newest_days']:g} to {of['oldest_days']:g}" if of["items"] else "-"
+        rows.append(f"{kind:<7} {of['items']:>6} {of['size_mb']:>9,.1f}  {ages:>13}  {words}")
+    return rows
+
+
+def _closing(found: "Cleaning", gone: "Sequence[Item]", delete: bool) -> list[str]:
+    listed = [f"  {i.key}  {_mb([i]):,.1f} MB, {i.age_s / DAY_S:.0f} days" for i in gone]
+    rows = listed[:LONGEST_LIST]
+    if len(listed) > LONGEST_LIST:
+        rows.append(f"  and {len(listed) - LONGEST_LIST} more")
+    if found.users and len(found.going) < len(found.old):
+        rows.append(
+            f"{_counted(len(found.old) - len(found.going))} left while the store is in use by "
+            f"{', '.join(found.users)}."
+        )
+    size = f"{_counted(len(gone))}, {_mb(gone):,.1f} MB"
+    if delete:
+        return [*rows, f"Removed: {size}."]
+    if not gone:
+        return [*rows, "Nothing would go: --older-than DAYS and --kind KIND look further."]
+    words = [word for word in sys.argv[1:] if word != "--json"]
+    again = shlex.join(["robojackson", *words, "--delete"])
+    return [*rows, f"Would go: {size}. Nothing was removed.", f"next: {again}"]
+
+
+def _counted(number: int) -> str:
+    return f"{number:,} item{'' if number == 1 else 's'}"
+
+
+def _mb(items: "Sequence[Item]") -> float:
+    return round(sum(item.size for item in items) / MEGABYTE, 1)

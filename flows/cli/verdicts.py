@@ -1,0 +1,103 @@
+"""What searches and studies say at their end: a sentence that judges, the command to type next.
+
+Everything is made from what a command answers; as `robojackson.cli.cards` does for single stages.
+"""
+
+import shlex
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any
+
+from robojackson.cli.cards import command_line
+from robojackson.cli.lifetime.interruption import with_option
+from robojackson.clips.web.untrusted_text import clean_text
+
+Facts = Mapping[str, Any]
+TITLE, REASON = 60, 120
+"""Longest title and reason in a sentence, characters."""
+FEW_SEEDS, MANY_SEEDS = 6, 10
+"""Seeds below which no difference of two setups can be shown, and seeds that are advised."""
+
+
+def find_verdict(found: Facts) -> dict[str, Any]:
+    """Return `verdict` and `next` of a search.
+
+    Args:
+        found: `chosen`, `candidates` and `summary` of the flow `find`.
+    """
+    told, chosen = found["candidates"], found["chosen"]
+    if chosen is not None:
+        fit = sum(row["decision"] in ("chosen", "accepted") for row in told)
+        sentence = (
+            f"{_title(chosen)} is the steadiest of {len(told)}, "
+            f"{chosen['score_per_second']:.2f} a second (lower is steadier); {fit} may be danced."
+        )
+        return _closing("found", sentence, command_line("dance", chosen["url"]))
+    if not told:
+        sentence = "The search found no video: other words may."
+        return _closing("none", sentence, command_line("find", f"{found['dance']} tutorial"))
+    reasons = Counter(clean_text(row["reason"], REASON) for row in told)
+    reason, count = reasons.most_common(1)[0]
+    sentence = f"None of {len(told)} videos may be danced; of {count} the reason is: {reason}."
+    return _closing("none", sentence, with_option("--top", str(2 * len(told))))
+
+
+def refresh_lines(done: Facts) -> list[str]:
+    """Return a line for every dance of a refresh."""
+    rows = [
+        f"{name}: {'new' if made['is_new'] else 'as before'}, {_title(made['chosen'])}, "
+        f"{made['reference']}"
+        for name, made in done["dances"].items()
+    ]
+    rows += [f"{name}: failed, {reason}" for name, reason in done["failed"].items()]
+    return rows + [f"{name}: not due" for name in done["not_due"]]
+
+
+def refresh_verdict(done: Facts) -> dict[str, Any]:
+    """Return `verdict` and `next` of a refresh."""
+    dances, failed = done["dances"], done["failed"]
+    new = [name for name, made in dances.items() if made["is_new"]]
+    if not dances and not failed:
+        waiting = ", ".join(done["not_due"]) or "there is none in configs/dances.yaml"
+        following = command_line("refresh", *done["not_due"][:1])
+        return _closing("not_due", f"No dance is due: {waiting}.", following)
+    count = len(dances) + len(failed)
+    sentence = f"{len(dances)} of {count} dances have a motion, {len(new)} of a new video."
+    if failed:
+        return _closing("failed", sentence, command_line("refresh", *failed))
+    name = (new or list(dances))[0]
+    following = command_line("train", dances[name]["reference"], "-o", name.replace(" ", "_"))
+    return _closing("refreshed", sentence, following)
+
+
+def ablation_verdict(made: Facts, steps: int, seeds: int, least_steps: int) -> dict[str, Any]:
+    """Return `verdict` and `next` of a study.
+
+    Args:
+        made: `cells` and `page`.
+        steps, seeds: Of the study.
+        least_steps: Control steps of a training below which nothing is learnt.
+    """
+    if steps < least_steps:
+        sentence = (
+            f"{made['cells']} cells of {steps:,} steps show that every part runs; their numbers "
+            "mean nothing."
+        )
+        return _closing("meaningless", sentence, command_line("ablation", "paper"))
+    show = shlex.join(["python", "-m", "webbrowser", made["page"]])
+    if seeds < FEW_SEEDS:
+        sentence = (
+            f"{made['cells']} cells are judged, but {seeds} seed{'' if seeds == 1 else 's'} can "
+            f"show no difference between setups; {MANY_SEEDS} can. The page has the figures."
+        )
+        return _closing("few_seeds", sentence, show)
+    sentence = f"{made['cells']} cells are judged; the page says which claims hold."
+    return _closing("judged", sentence, show)
+
+
+def _closing(kind: str, sentence: str, following: str) -> dict[str, Any]:
+    return {"verdict": {"kind": kind, "sentence": sentence}, "next": following}
+
+
+def _title(row: Facts) -> str:
+    return clean_text(row.get("title"), TITLE) or clean_text(row.get("video_id"), TITLE)

@@ -1,0 +1,36 @@
+"""What libraries would write to the terminal beside our lines, and how they are kept from it.
+
+What a user must know of a library's trouble is an error of ours, or a note. The variables are read
+by native code when it is loaded, so they are set before anything is imported, and child processes
+inherit them. A user who sets one of them himself gets what he asks for.
+"""
+
+import os
+import sys
+
+VARIABLES = {
+    "TF_CPP_MIN_LOG_LEVEL": "3",  # XLA below JAX
+    "GLOG_minloglevel": "3",  # MediaPipe
+    "EGL_LOG_LEVEL": "fatal",  # Mesa
+    "MESA_DEBUG": "silent",
+    "PREFECT_LOGGING_ROOT_LEVEL": "ERROR",  # of other packages than Prefect
+    "PYTHONWARNINGS": "ignore",
+}
+
+
+def set_variables() -> None:
+    """Set what native code and child processes read, where the user has not."""
+    for name, value in VARIABLES.items():
+        os.environ.setdefault(name, value)
+
+
+def silence_libraries() -> None:
+    """Leave only errors of other packages' loggers, and no warning of Python's."""
+    import logging
+
+    if sys.warnoptions:
+        return
+    logging.captureWarnings(True)
+    log = logging.getLogger("py.warnings")
+    log.setLevel(logging.ERROR)
+    log.propagate = False

@@ -1,0 +1,1 @@
+"""What commands draw of their results, from files to files."""

@@ -1,0 +1,57 @@
+"""Which video a motion was recovered from: source.json beside it, left by `robojackson mocap`."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from robojackson.files.local_folder import sha256_of_file
+from robojackson.motion.landmark_track import LandmarkTrack
+
+FILE, LANDMARKS = "source.json", "landmarks.parquet"
+
+
+@dataclass(frozen=True)
+class MotionSource:
+    """The clip of a motion.
+
+    Attributes:
+        video: The file.
+        track: The landmarks that were found in it.
+    """
+
+    video: Path
+    track: LandmarkTrack
+
+
+def source_record(video: Path, landmarks: bytes, motions: Mapping[str, bytes]) -> bytes:
+    """Return the content of source.json.
+
+    Args:
+        landmarks: Content of landmarks.parquet.
+        motions: Content of the motions' files by name.
+    """
+    facts = {
+        "video": str(video.absolute()),
+        "bytes": video.stat().st_size,
+        "landmarks": hashlib.sha256(landmarks).hexdigest(),
+        "motions": {name: hashlib.sha256(data).hexdigest() for name, data in motions.items()},
+    }
+    return json.dumps(facts, indent=1).encode()
+
+
+def source_of(smpl: Path) -> MotionSource | None:
+    """Return the clip of a motion, None where it is not known, gone, or another one by now."""
+    try:
+        facts = json.loads((smpl.parent / FILE).read_text())
+        video = Path(facts["video"])
+        landmarks = smpl.parent / LANDMARKS
+        same = (
+            facts["motions"].get(smpl.name) == sha256_of_file(smpl)
+            and facts["landmarks"] == sha256_of_file(landmarks)
+            and facts["bytes"] == video.stat().st_size
+        )
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return None
+    return MotionSource(video, LandmarkTrack.load(landmarks)) if same else None

@@ -1,0 +1,122 @@
+"""What to do better when a clip is filmed again: kinds with figures; the words are made last.
+
+Derived from the clip alone, that is from the landmarks and what was measured beside them. The same
+advice is given by `mocap`, by `dance` and by the page of a run.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from robojackson.clips.people.camera_path import stray_of
+from robojackson.clips.people.person_extent import BODY, heights_px, indices
+from robojackson.motion.landmark_track import LandmarkTrack
+
+Kind = Literal[
+    "frame_rate", "too_short", "person_small", "body_outside", "person_missing", "people",
+    "camera_moves", "dark", "blurred",
+]  # fmt: skip
+LIMITS: Mapping[Kind, float] = {
+    "frame_rate": 20.0,
+    "too_short": 2.0,
+    "person_small": 140.0,
+    "body_outside": 0.1,
+    "person_missing": 0.9,
+    "people": 1.0,
+    "camera_moves": 0.02,
+    "dark": 0.2,
+    "blurred": 0.14,
+}
+"""Where advice begins: frames a second, seconds, pixels, share of the frames with a person, share
+of all frames, a count, share of the image's diagonal, grey level 0..1, share of fine detail. Under
+two seconds no evaluation can judge; the pixels are those of a search's filter; the last two are
+half of what the bundled clips have at the worst."""
+AT_MOST: tuple[Kind, ...] = ("body_outside", "people", "camera_moves")
+"""Figures that are advised against above their limit; the others below it."""
+
+
+@dataclass(frozen=True)
+class Advice:
+    """One thing to do better.
+
+    Attributes:
+        kind: What it is about.
+        value: The figure that was measured, in the unit of its limit.
+        limit: Where the advice begins.
+    """
+
+    kind: Kind
+    value: float
+    limit: float
+
+    def __str__(self) -> str:
+        return _WORDS[self.kind](self)
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """Kind, figures and words, for JSON."""
+        return {"kind": self.kind, "value": self.value, "limit": self.limit, "words": str(self)}
+
+
+def advise(track: LandmarkTrack) -> tuple[Advice, ...]:
+    """What to do better, the gravest kinds of a list by hand first; nothing for a good clip."""
+    return tuple(
+        Advice(kind, value, LIMITS[kind])
+        for kind, value in _figures(track).items()
+        if value is not None and (value > LIMITS[kind] if kind in AT_MOST else value < LIMITS[kind])
+    )
+
+
+def _figures(track: LandmarkTrack) -> dict[Kind, float | None]:
+    """Every figure that advice is about; None where it was not measured."""
+    seen = track.detected
+    height = float(np.median(heights_px(track)[seen])) if seen.any() else None
+    moved = None if track.to_first is None else stray_of(track.to_first, track.width, track.height)
+    return {
+        "person_missing": float(seen.mean()) if len(track) else None,
+        "people": float(track.people),
+        "body_outside": _outside(track) if seen.any() else None,
+        "person_small": height,
+        "frame_rate": track.fps,
+        "too_short": len(track) / track.fps,
+        "camera_moves": moved,
+        "dark": track.brightness,
+        "blurred": track.sharpness,
+    }
+
+
+def _outside(track: LandmarkTrack) -> float:
+    """Share of the frames with a person in which head, trunk or legs leave the image."""
+    xy = track.landmarks[track.detected][:, indices(BODY), :2]
+    return float(((xy < 0.0) | (xy > 1.0)).any((1, 2)).mean())
+
+
+_WORDS: Mapping[Kind, Callable[[Advice], str]] = {
+    "frame_rate": lambda a: f"{a.value:.3g} frames a second: film at 30",
+    "too_short": lambda a: f"{a.value:.1f} s long: film at least {a.limit:g} s",
+    "person_small": lambda a: (
+        f"the person is {a.value:.0f} pixels tall: go nearer, at least {a.limit:.0f} are needed"
+    ),
+    "body_outside": lambda a: (
+        f"the body leaves the picture in {a.value:.0%} of the frames: step back, or turn the "
+        "camera upright"
+    ),
+    "person_missing": lambda a: (
+        f"the person is seen in {a.value:.0%} of the frames: choose a range with --start and "
+        "--end, or film without anything in between"
+    ),
+    "people": lambda a: (
+        f"{a.value:.0f} people in view: film one alone, or choose with --person (mocap --people "
+        "lists them)"
+    ),
+    "camera_moves": lambda a: (
+        f"the camera moves by {a.value:.0%} of the picture: put it on something that stands"
+    ),
+    "dark": lambda a: f"the person is dark, {a.value:.0%} of full light: switch on more light",
+    "blurred": lambda a: (
+        f"the picture is blurred, {a.value:.0%} of its contrast is detail: clean the lens, focus "
+        "on the dancer, use more light"
+    ),
+}

@@ -1,0 +1,160 @@
+"""Panels side by side at the same moments, one picture a moment; panels are added one by one.
+
+The cameras stand where the one that filmed stood, in front (+x), follow their subject over the
+floor, and stand so far away that nobody leaves a panel in the whole film; all are equally far, so
+that sizes compare.
+"""
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+from pydantic import Field
+
+from robojackson.config import config_dataclass
+from robojackson.motion.landmark_track import LandmarkTrack
+from robojackson.motion.smpl_sequence import SmplSequence
+from robojackson.report.video import canvas
+from robojackson.report.video.panel_camera import Framing, Subject, fit, smooth_camera_path, view_of
+from robojackson.report.video.robot_extent import room_of
+from robojackson.report.video.robot_panel import RobotView
+from robojackson.report.video.robot_scene import Tint
+from robojackson.report.video.skeleton_panel import skeleton_panel
+from robojackson.report.video.source_panel import SourceClip
+from robojackson.report.video.timeline import Timeline
+
+Draw = Callable[[int, Framing], canvas.Picture]
+"""The picture of a moment, by its number, through a camera."""
+FLOOR = np.array([1.0, 1.0, 0.0])
+SIDE_DEG = 90.0
+"""From which the left side is seen."""
+
+
+@config_dataclass
+class VideoConfig:
+    """How the video looks.
+
+    Attributes:
+        fps: Pictures a second.
+        panel_width, panel_height: Pixels of one panel, even.
+        max_seconds: Longest video, seconds.
+        azimuth_deg: How far the cameras go around the subject; 0 is the front.
+        quality: Constant rate factor of H.264; lower is better and larger.
+    """
+
+    fps: int = Field(default=30, ge=1)
+    panel_width: int = Field(default=320, ge=64, multiple_of=2)
+    panel_height: int = Field(default=480, ge=64, multiple_of=2)
+    max_seconds: float = Field(default=20.0, gt=0.0)
+    azimuth_deg: float = 0.0
+    quality: int = Field(default=20, ge=0, le=51)
+
+
+class Film:
+    """The panels of one film.
+
+    Args:
+        stack: Closes what the panels hold of the graphics driver.
+        when: The moments.
+        still: Whether they are far apart, so that no camera follows from one to the next.
+    """
+
+    def __init__(
+        self, stack: ExitStack, config: VideoConfig, when: Timeline, still: bool = False
+    ) -> None:
+        self._stack, self._config, self._when, self._still = stack, config, when, still
+        self._size = config.panel_width, config.panel_height
+        self._panels: list[Draw] = []
+        self._subjects: list[Subject] = []
+        self._views: dict[tuple[int, Tint], RobotView] = {}
+
+    def add_source(
+        self, source: Path, track: LandmarkTrack, sequence: SmplSequence | None, plain: bool
+    ) -> None:
+        """The clip, and the clip with what was found in it.
+
+        Args:
+            sequence: What is drawn over it; None draws the landmarks.
+            plain: Whether it is also shown as it is.
+        """
+        clip = SourceClip(source, track, sequence, self._when.frame, *self._size)
+        if plain:
+            self._panels.append(lambda index, framing: self._clip(index, "source", clip.plain))
+        drawn = clip.with_landmarks if sequence is None else clip.with_skeleton
+        title = "source" if sequence is None else "skeleton over source"
+        self._panels.append(lambda index, framing: self._clip(index, title, drawn))
+
+    def add_body(
+        self, sequence: SmplSequence, title: str = "motion capture", turn_deg: float = 0.0
+    ) -> None:
+        """The recovered skeleton, from the front or so many degrees further to its left."""
+        frames = np.minimum(self._when.frame, len(sequence) - 1)
+        points = np.asarray(sequence.keypoints_w[frames], float)
+        target, azimuth = self._followed(points[:, 0]), self._config.azimuth_deg + turn_deg
+        around = points - np.pad(target, ((0, 0), (0, 1)))[:, None]
+        room = np.concatenate([around, around * FLOOR]).reshape(-1, 3)
+        self._subjects.append(Subject(room, azimuth))
+
+        def draw(index: int, framing: Framing) -> canvas.Picture:
+            view = view_of(target[index], azimuth, *self._size, framing)
+            panel = skeleton_panel(sequence, int(frames[index]), view, *self._size)
+            canvas.label(panel, title, "" if sequence.valid[frames[index]] else "(filled in)")
+            return panel
+
+        self._panels.append(draw)
+
+    def add_robot(
+        self,
+        title: str,
+        qpos: Float[np.ndarray, "N nq"],
+        model: mujoco.MjModel,
+        tint: Tint,
+        turn_deg: float = 0.0,
+    ) -> None:
+        """A robot at every moment."""
+        key = (id(model), tint)
+        if key not in self._views:
+            view = RobotView(model, *self._size, tint)
+            self._views[key] = self._stack.enter_context(view)
+        view = self._views[key]
+        target, azimuth = self._followed(qpos[:, :3]), self._config.azimuth_deg + turn_deg
+        self._subjects.append(Subject(room_of(model, qpos, target), azimuth))
+
+        def draw(index: int, framing: Framing) -> canvas.Picture:
+            panel = view.picture(qpos[index], target[index], azimuth, framing)
+            over = title.startswith("trained") and bool(self._when.ended[index])
+            canvas.label(panel, title, "ended" if over else f"{self._when.time_s[index]:.1f} s")
+            return panel
+
+        self._panels.append(draw)
+
+    def moments(self) -> Iterator[list[canvas.Picture]]:
+        """The panels of each moment, in the order in which they were added."""
+        framing = fit(self._subjects, *self._size)
+        for index in range(len(self._when)):
+            yield [draw(index, framing) for draw in self._panels]
+
+    def pictures(self) -> Iterator[canvas.Picture]:
+        """The panels of each moment in a row."""
+        return map(canvas.side_by_side, self.moments())
+
+    def sheet(self) -> canvas.Picture:
+        """One picture: a column a moment, a row a panel."""
+        columns = [np.concatenate(panels) for panels in self.moments()]
+        return canvas.side_by_side(columns)
+
+    def _clip(
+        self, index: int, title: str, drawn: Callable[[int], canvas.Picture]
+    ) -> canvas.Picture:
+        frame = int(self._when.frame[index])
+        panel = drawn(frame)
+        canvas.label(panel, title, f"frame {frame}")
+        return panel
+
+    def _followed(self, points: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "N 2"]:
+        if self._still:
+            return np.asarray(points[:, :2], float)
+        return smooth_camera_path(points, float(self._config.fps))

@@ -1,0 +1,145 @@
+"""The camera of a panel: level, in front of its subject, near enough to fill the panel.
+
+World: x forward, y left, z up; metres. Azimuth 0 stands on the +x side, as the camera that filmed.
+The camera follows its subject over the floor; how far it stands and how high it looks (`Framing`)
+is the same for a whole video, so that no picture of it cuts the subject.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.ndimage import gaussian_filter1d
+
+from robojackson.report.video.canvas import strip_height
+
+FOCAL = 2.2
+"""Focal length over the height of the panel."""
+DISTANCE, CAMERA_HEIGHT, LOOK_AT_HEIGHT = 5.0, 1.35, 0.9
+"""Metres over the floor, where nothing is fitted."""
+PITCH = float(np.arctan2(CAMERA_HEIGHT - LOOK_AT_HEIGHT, DISTANCE))
+"""How far the camera looks down, radians."""
+NEAR, CLOSEST = 0.3, 1.5
+"""Metres: nothing nearer than the first is drawn, no camera comes nearer than the second."""
+SMOOTHING_S = 0.5
+"""How gently a camera follows, seconds."""
+ROOM = 0.035
+"""Of the panel's height, left empty at each side of the subject."""
+HEIGHTS = 256
+"""Heights that are tried."""
+
+
+@dataclass(frozen=True)
+class Framing:
+    """Where a camera stands beside what it follows.
+
+    Attributes:
+        distance: From the camera to the point that it looks at, metres.
+        look_at_height: Of that point above the floor, metres.
+    """
+
+    distance: float = float(np.hypot(DISTANCE, CAMERA_HEIGHT - LOOK_AT_HEIGHT))
+    look_at_height: float = LOOK_AT_HEIGHT
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What a camera has to hold in its picture.
+
+    Attributes:
+        points: Of it at all times, relative to where on the floor the camera looks, metres.
+        azimuth_deg: Of the camera.
+    """
+
+    points: Float[np.ndarray, "N 3"]
+    azimuth_deg: float
+
+
+@dataclass(frozen=True)
+class View:
+    """A pinhole camera.
+
+    Attributes:
+        target: Where on the floor it looks, metres.
+        eye: Position, world, metres.
+        axes: Rows right, down, forward, world.
+        focal: Pixels.
+        centre: Of the image, pixels.
+    """
+
+    target: Float[np.ndarray, "2"]
+    eye: Float[np.ndarray, "3"]
+    axes: Float[np.ndarray, "3 3"]
+    focal: float
+    centre: tuple[float, float]
+
+    def project(self, points: Float[np.ndarray, "*B 3"]) -> Float[np.ndarray, "*B 2"]:
+        """Pixels; NaN behind the camera."""
+        right, down, depth = np.moveaxis((points - self.eye) @ self.axes.T, -1, 0)
+        depth = np.where(depth > NEAR, depth, np.nan)
+        u = self.centre[0] + self.focal * right / depth
+        return np.stack([u, self.centre[1] + self.focal * down / depth], -1)
+
+
+def smooth_camera_path(points: Float[np.ndarray, "T 3"], fps: float) -> Float[np.ndarray, "T 2"]:
+    """Where on the floor a camera looks that follows a point gently."""
+    result: np.ndarray = gaussian_filter1d(points[:, :2], SMOOTHING_S * fps, axis=0, mode="nearest")
+    return result
+
+
+def view_of(
+    target: Float[np.ndarray, "2"],
+    azimuth_deg: float,
+    width: int,
+    height: int,
+    framing: Framing | None = None,
+) -> View:
+    """The camera that looks at a place on the floor; azimuth 0 stands on the +x side."""
+    framing = framing or Framing()
+    axes = _axes(azimuth_deg)
+    aim = np.array([*target, framing.look_at_height])
+    eye = aim - framing.distance * axes[2]
+    return View(target, eye, axes, FOCAL * height, (width / 2, height / 2))
+
+
+def fit(subjects: Sequence[Subject], width: int, height: int) -> Framing:
+    """The nearest camera in whose panel each of the subjects is at all times, below the title.
+
+    Each edge of the panel asks for a distance that is linear in the height of the point looked at:
+    focal * offset <= room * (distance + depth). Of all heights that of the least distance is taken.
+
+    Args:
+        width, height: Of a panel, pixels.
+    """
+    known = [(each.points[np.isfinite(each.points).all(1)], each.azimuth_deg) for each in subjects]
+    known = [(points, azimuth) for points, azimuth in known if len(points)]
+    if not known:
+        return Framing()
+    level = np.concatenate([points[:, 2] for points, _ in known])
+    heights = np.linspace(level.min(), level.max(), HEIGHTS)
+    needed = np.full(HEIGHTS, CLOSEST)
+    for points, azimuth_deg in known:
+        for normal in _edges(_axes(azimuth_deg), width, height):
+            needed = np.maximum(needed, (points @ normal).max() - heights * normal[2])
+    best = int(needed.argmin())
+    return Framing(float(needed[best]), float(heights[best]))
+
+
+def _edges(axes: Float[np.ndarray, "3 3"], width: int, height: int) -> list[Float[np.ndarray, "3"]]:
+    """For each edge of a panel the distance that it asks for, per metre of a point's place."""
+    room = ROOM * height
+    beside = width / 2 - room
+    below, above = height / 2 - room, height / 2 - room - strip_height(width)
+    sides = ((axes[0], beside), (-axes[0], beside), (axes[1], below), (-axes[1], above))
+    return [FOCAL * height / max(pixels, 1.0) * outward - axes[2] for outward, pixels in sides]
+
+
+def _axes(azimuth_deg: float) -> Float[np.ndarray, "3 3"]:
+    """Rows right, down, forward of a camera that looks down by `PITCH`."""
+    angle = np.radians(azimuth_deg)
+    outward = np.array([np.cos(angle), np.sin(angle), 0.0])
+    forward = -np.cos(PITCH) * outward - [0.0, 0.0, np.sin(PITCH)]
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(forward, right), forward])

@@ -1,0 +1,108 @@
+"""The room in which a robot is drawn: the same floor, light and background for every robot.
+
+What a robot's own model has of floors, lights and sky differs (mjlab's G1 stands in the dark), so
+none of it is drawn. Metres; RGB 0..1.
+"""
+
+import copy
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+from robojackson.report.video.canvas import BACKDROP, Picture
+from robojackson.report.video.panel_camera import FOCAL
+
+Tint = tuple[float, float, float]
+SHADOW_ALPHA, SHADOW_HEIGHT = 0.28, 0.004
+"""Opacity, metres. A dark disc under each part: cast shadows would double the drawing time."""
+SHADOW_REACH = 0.7
+"""Radius of a part's disc over that of the ball around it."""
+FLOOR, LINE = (0.40, 0.43, 0.46), (0.55, 0.58, 0.62)
+FLOOR_REACH, LINE_REACH, LINE_CELL, LINE_WIDTH, LINE_HEIGHT = 60.0, 8, 0.5, 0.012, 0.001
+"""Metres; cells of the grid to each side."""
+HEAD_AMBIENT, HEAD_DIFFUSE, KEY_DIFFUSE, KEY_SPECULAR = 0.28, 0.42, 0.42, 0.15
+KEY_DIRECTION = (-0.45, -0.35, -0.82)
+"""Where the second light shines to, world; the first is the camera's."""
+FAR = 1.0
+"""Depth of what is not there."""
+
+
+def dressed(model: mujoco.MjModel, width: int, height: int, tint: Tint) -> mujoco.MjModel:
+    """A copy of the model with our lens, the robot in one colour, and no floor."""
+    dressed = copy.copy(model)
+    dressed.vis.global_.offwidth = max(width, dressed.vis.global_.offwidth)
+    dressed.vis.global_.offheight = max(height, dressed.vis.global_.offheight)
+    dressed.vis.global_.fovy = float(np.degrees(2.0 * np.arctan(0.5 / FOCAL)))
+    floors = dressed.geom_type == mujoco.mjtGeom.mjGEOM_PLANE.value
+    dressed.geom_matid[floors] = -1
+    dressed.geom_rgba[floors] = 0.0
+    on_robot = dressed.geom_bodyid > 0
+    dressed.geom_matid[on_robot] = -1
+    dressed.geom_rgba[on_robot, :3] = tint
+    return dressed
+
+
+def furnish(
+    scene: mujoco.MjvScene,
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    target: Float[np.ndarray, "2"],
+) -> None:
+    """Add floor, grid and shadows to a scene that was just updated, and replace its lights."""
+    _light(scene)
+    _add_floor(scene, np.round(target / LINE_CELL) * LINE_CELL)
+    for geom in shadowing(model):
+        radius = SHADOW_REACH * float(model.geom_rbound[geom])
+        at = [*data.geom_xpos[geom, :2], SHADOW_HEIGHT]
+        size = [radius, radius, SHADOW_HEIGHT / 4]
+        _add(scene, mujoco.mjtGeom.mjGEOM_ELLIPSOID, size, at, (0.0, 0.0, 0.0), SHADOW_ALPHA)
+
+
+def shadowing(model: mujoco.MjModel) -> np.ndarray:
+    """Numbers of a robot's geoms that are drawn."""
+    shown = mujoco.MjvOption().geomgroup[model.geom_group] > 0
+    return np.flatnonzero((model.geom_bodyid > 0) & shown & (model.geom_rgba[:, 3] > 0))
+
+
+def on_backdrop(picture: Picture, depth: Float[np.ndarray, "H W"]) -> Picture:
+    """The picture with our background where nothing was drawn."""
+    return np.where((depth >= FAR)[..., None], np.array(BACKDROP, np.uint8), picture)
+
+
+def _light(scene: mujoco.MjvScene) -> None:
+    head, key = scene.lights[0], scene.lights[1]
+    eye = (np.array(scene.camera[0].pos) + np.array(scene.camera[1].pos)) / 2
+    for light, direction in ((head, scene.camera[0].forward), (key, KEY_DIRECTION)):
+        light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL.value
+        light.headlight, light.castshadow, light.texid = light is head, 0, -1
+        light.pos, light.dir = eye, np.asarray(direction) / np.linalg.norm(direction)
+        light.attenuation[:] = [1.0, 0.0, 0.0]
+    head.ambient[:], head.diffuse[:], head.specular[:] = HEAD_AMBIENT, HEAD_DIFFUSE, 0.0
+    key.ambient[:], key.diffuse[:], key.specular[:] = 0.0, KEY_DIFFUSE, KEY_SPECULAR
+    scene.nlight = 2
+
+
+def _add_floor(scene: mujoco.MjvScene, middle: Float[np.ndarray, "2"]) -> None:
+    plane, box = mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_BOX
+    _add(scene, plane, [FLOOR_REACH, FLOOR_REACH, 1.0], [*middle, 0.0], FLOOR)
+    reach = LINE_REACH * LINE_CELL
+    for tick in np.arange(-LINE_REACH, LINE_REACH + 1) * LINE_CELL:
+        half = [LINE_WIDTH / 2, reach, LINE_HEIGHT / 2]
+        _add(scene, box, half, [middle[0] + tick, middle[1], 0.0], LINE)
+        _add(scene, box, [half[1], half[0], half[2]], [middle[0], middle[1] + tick, 0.0], LINE)
+
+
+def _add(
+    scene: mujoco.MjvScene,
+    kind: mujoco.mjtGeom,
+    size: list[float],
+    at: list[float],
+    colour: Tint,
+    alpha: float = 1.0,
+) -> None:
+    geom = scene.geoms[scene.ngeom]
+    rgba = np.array([*colour, alpha], np.float32)
+    mujoco.mjv_initGeom(geom, kind.value, np.array(size), np.array(at), np.eye(3).ravel(), rgba)
+    geom.specular = geom.reflectance = 0.0
+    scene.ngeom += 1

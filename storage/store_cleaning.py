@@ -1,0 +1,129 @@
+"""Removing from a store what is old: unfinished work and unused results; by request more kinds.
+
+A folder of work is removed by whoever holds its locks, as in `leftovers`. The other kinds stay
+while a process works with the store: it may know of results that no record names yet.
+"""
+
+import os
+import shutil
+from collections.abc import Collection
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from robojackson.errors import StoreError
+from robojackson.pipeline.folder_lock import locked
+from storage.store import DEFAULT_ROOT, VARIABLE, Store
+from storage.store_inventory import ARTIFACT, LOCKS, PAGES, WORK, Item, Kind, inventory, root_of
+
+USUAL: tuple[Kind, ...] = ("work", "unused")
+"""Kinds that nothing is lost with but time."""
+IDLE = {"server", "clean", "doctor", "metrics", "catalogue", "robots", "deploy"}
+"""Commands of ours that make no results."""
+FLOW = "prefect.flow_engine"
+"""What a worker of Prefect starts for a run."""
+
+
+@dataclass(frozen=True)
+class Cleaning:
+    """What would go and what stays.
+
+    Attributes:
+        items: Everything in the store.
+        old: What is requested and old enough.
+        users: Processes that work with the store; while there are any, only folders of work go.
+    """
+
+    items: list[Item]
+    old: list[Item]
+    users: list[str]
+
+    @property
+    def going(self) -> list[Item]:
+        """What `clean` removes now."""
+        return [item for item in self.old if item.kind == WORK or not self.users]
+
+
+def plan(store: Store, kinds: Collection[Kind], older_than_s: float) -> Cleaning:
+    """Return what a cleaning would remove; nothing is changed.
+
+    Args:
+        kinds: Those that are requested. What a record or a run that stays refers to stays, too.
+        older_than_s: Least age, seconds.
+    Raises:
+        StoreError: the store is no folder of this machine.
+    """
+    found = inventory(store)
+    old = [item for item in found if item.kind in kinds and item.age_s >= older_than_s]
+    return Cleaning(found, _without_named(store, old), users_of(root_of(store)))
+
+
+def remove(store: Store, cleaning: Cleaning) -> list[Item]:
+    """Remove what a plan says; return what is gone. What is held meanwhile stays."""
+    root = root_of(store)
+    return [item for item in cleaning.going if _removed(root / item.key, item.kind == WORK)]
+
+
+def users_of(root: Path) -> list[str]:
+    """Return the commands, with their process ids, that work with a store (Linux only)."""
+    own = {os.getpid(), os.getppid()}
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            words = (folder / "cmdline").read_bytes().decode(errors="replace").split("\0")
+            command = _command(words)
+            if command and int(folder.name) not in own and _store_of(folder) == root.resolve():
+                found.append(f"{command} (process {folder.name})")
+    return sorted(found)
+
+
+def _without_named(store: Store, old: list[Item]) -> list[Item]:
+    """Leave out what a younger record or run, that stays, refers to as well."""
+    root, going = root_of(store), {item.key for item in old}
+    stay = [
+        path
+        for folder in ("records", "runs")
+        for path in (root / folder).rglob("*.json")
+        if path.relative_to(root).as_posix() not in going
+    ]
+    named = {found.decode() for path in stay for found in ARTIFACT.findall(_content(path))}
+    results = {item.key for item in old if not item.key.startswith(f"{PAGES}/")} & named
+    return [item for item in old if item.key not in results]
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        return b""
+
+
+def _command(words: list[str]) -> str:
+    """What a process of ours does; empty for any other process."""
+    for place, word in enumerate(words):
+        if word == FLOW:
+            return "a run of a worker"
+        if Path(word).name == "robojackson" or word == "robojackson.cli":
+            following = next(iter(words[place + 1 :]), "")
+            return f"robojackson {following}" if following and following not in IDLE else ""
+    return ""
+
+
+def _store_of(process: Path) -> Path:
+    """The folder that a process takes for its store."""
+    variables = (process / "environ").read_bytes().decode(errors="replace").split("\0")
+    named = dict(each.partition("=")[::2] for each in variables)
+    return (Path(os.readlink(process / "cwd")) / (named.get(VARIABLE) or DEFAULT_ROOT)).resolve()
+
+
+def _removed(path: Path, is_work: bool) -> bool:
+    """Remove a file or a folder; whether it is gone."""
+    with suppress(OSError, StoreError), ExitStack() as held:
+        if is_work and path.is_dir():
+            for name in LOCKS:
+                held.enter_context(locked(path, name))
+        if path.is_dir():
+            shutil.rmtree(path)
+        else:
+            path.unlink(missing_ok=True)
+    return not path.exists()

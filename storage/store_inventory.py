@@ -1,0 +1,169 @@
+"""What is in a store on a disk: how old, how big, and what still refers to it.
+
+Reference means: a file of JSON in the store, or the catalogue of videos, names the folder of an
+artifact. The folder is named by the digest of its content, so no other text looks like it.
+"""
+
+import re
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from robojackson.errors import StoreError
+from robojackson.files.local_folder import TEMPORARY, LocalFolder
+from storage import candidate_catalogue, run_catalogue, stage_records
+from storage.leftovers import PROCESS, TASK, is_held
+from storage.store import HELD, Store
+
+Kind = Literal["work", "unused", "videos", "cache", "runs", "kept"]
+KINDS: dict[Kind, str] = {
+    "work": "unfinished trainings, downloads and scratch files that no process holds",
+    "unused": "results that no record, run or table refers to",
+    "videos": "downloaded videos that only their catalogue refers to; loaded again if wanted",
+    "cache": "records of finished stages and what only they refer to; made again if needed",
+    "runs": "pages and videos of finished dances, and what only they refer to",
+    "kept": "tables, studies, walkers, robots, Prefect's database, what is in use: never removed",
+}
+"""What each kind is, in the order in which they are listed."""
+WORK, PAGES, DOWNLOADS, WALKERS = "work", "dances", "downloads", "pretrain"
+REFERRING: tuple[Kind, ...] = ("kept", "runs", "cache", "videos")
+"""Kinds that refer to artifacts; the first of them that names one decides of which kind it is."""
+LOCKS = (TASK, PROCESS, HELD)
+"""Files by which a process holds a folder of work."""
+ARTIFACT = re.compile(rb"\b[a-z_]+/[0-9a-f]{16}(?=/)")
+"""The folder of an artifact in a text."""
+
+
+@dataclass(frozen=True)
+class Item:
+    """Files that stay or go together.
+
+    Attributes:
+        kind: What they are.
+        key: Of the file or folder, relative to the root.
+        size: Bytes.
+        age_s: Since the newest of them was written, seconds.
+    """
+
+    kind: Kind
+    key: str
+    size: int
+    age_s: float
+
+
+def inventory(store: Store) -> list[Item]:
+    """Return everything in a store; an artifact is `unused` or in the kind that refers to it.
+
+    Raises:
+        StoreError: the store is no folder of this machine.
+    """
+    root = root_of(store)
+    named = _references(store, root)
+    found = [_item(root, path, _kind_of(path.relative_to(root), named)) for path in _entries(root)]
+    return [item for item in found if item is not None]
+
+
+def root_of(store: Store) -> Path:
+    """Return the folder of a store.
+
+    Raises:
+        StoreError: it is an object store, or there is none yet.
+    """
+    if not isinstance(store.place, LocalFolder):
+        raise StoreError(
+            f"{store.root} is no folder of this machine; let its bucket expire old objects, or "
+            "name a folder in ROBOJACKSON_STORE"
+        )
+    if not store.place.root.is_dir():
+        raise StoreError(f"there is no store {store.place.root} yet; `robojackson dance` makes one")
+    return store.place.root
+
+
+def _entries(root: Path) -> Iterator[Path]:
+    """Folders of work, artifacts, pages and downloads, and all single files."""
+    for path in sorted(root.iterdir()):
+        if not path.is_dir():
+            yield path
+        elif path.name == WORK:
+            yield from _folders_with_files(path)
+        elif path.name in (stage_records.FOLDER, run_catalogue.FOLDER):
+            yield from (file for file in sorted(path.rglob("*")) if file.is_file())
+        elif path.name == PAGES or _has_artifacts(path):
+            yield from sorted(path.iterdir())
+        else:
+            yield path
+
+
+def _folders_with_files(folder: Path) -> Iterator[Path]:
+    """The topmost folders that hold a file."""
+    for path in sorted(folder.iterdir()):
+        if path.is_file() or any(inner.is_file() for inner in path.iterdir()):
+            yield path
+        else:
+            yield from _folders_with_files(path)
+
+
+def _has_artifacts(folder: Path) -> bool:
+    return any(re.fullmatch("[0-9a-f]{16}", path.name) for path in folder.iterdir())
+
+
+def _kind_of(path: Path, named: Callable[[str], Kind | None]) -> Kind:
+    top = path.parts[0]
+    if top == WORK:
+        return "work"
+    if top == stage_records.FOLDER:
+        return "cache"
+    if top in (PAGES, run_catalogue.FOLDER):
+        return "runs"
+    if len(path.parts) == 2 and top != WALKERS:
+        return named(path.as_posix()) or "unused"
+    return "kept"
+
+
+def _references(store: Store, root: Path) -> Callable[[str], Kind | None]:
+    """Return what finds the kind that refers to an artifact: what is kept longest decides."""
+    found: dict[Kind, set[str]] = {kind: set() for kind in REFERRING}
+    for path in root.rglob("*.json"):
+        kind = _kind_of_text(path.relative_to(root))
+        if kind in REFERRING:
+            found[kind] |= _named_in(path)
+    sql = "SELECT DISTINCT video_key FROM candidates WHERE video_key IS NOT NULL"
+    keys = (str(row["video_key"]) for row in candidate_catalogue.query(store, sql))
+    found["videos"] |= {key.rpartition("/")[0] for key in keys}
+
+    def named(folder: str) -> Kind | None:
+        return next((kind for kind in REFERRING if folder in found[kind]), None)
+
+    return named
+
+
+def _kind_of_text(path: Path) -> Kind:
+    """Of a file that may name artifacts: one inside an artifact counts as kept."""
+    kinds: dict[str, Kind] = {stage_records.FOLDER: "cache", run_catalogue.FOLDER: "runs"}
+    kinds |= {PAGES: "runs", WORK: "work", DOWNLOADS: "videos"}
+    return kinds.get(path.parts[0], "kept")
+
+
+def _named_in(path: Path) -> set[str]:
+    try:
+        return {match.decode() for match in ARTIFACT.findall(path.read_bytes())}
+    except (OSError, UnicodeDecodeError):
+        return set()
+
+
+def _item(root: Path, path: Path, kind: Kind) -> Item | None:
+    """Size and age of a file or folder; None where it has gone meanwhile."""
+    files = [path] if path.is_file() else [each for each in path.rglob("*") if each.is_file()]
+    try:
+        facts = [each.stat() for each in files if TEMPORARY not in each.name]
+    except FileNotFoundError:
+        return None
+    if not facts:
+        return None
+    if kind == "work" and any(is_held(path / name) for name in LOCKS):
+        kind = "kept"
+    age_s = time.time() - max(fact.st_mtime for fact in facts)
+    key = path.relative_to(root).as_posix()
+    return Item(kind, key, sum(fact.st_size for fact in facts), max(age_s, 0.0))

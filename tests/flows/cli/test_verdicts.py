@@ -1,0 +1,87 @@
+"""Each search and study ends with a sentence that judges it and a command to type next."""
+
+import shlex
+from typing import Any
+
+import pytest
+
+from flows.cli.verdicts import ablation_verdict, find_verdict, refresh_lines, refresh_verdict
+
+
+def row(decision: str, **more: Any) -> dict[str, Any]:
+    usual = {"title": "APT cover", "url": "https://example.org/a b", "reason": "two people"}
+    return {**usual, "decision": decision, "score_per_second": 3.456, **more}
+
+
+def found(*rows: dict[str, Any]) -> dict[str, Any]:
+    chosen = next((each for each in rows if each["decision"] == "chosen"), None)
+    return {"dance": "APT", "chosen": chosen, "candidates": list(rows)}
+
+
+def refreshed(**made: bool) -> dict[str, Any]:
+    dances = {
+        name: {"is_new": is_new, "chosen": row("chosen"), "reference": f"store/{name}.parquet"}
+        for name, is_new in made.items()
+    }
+    return {"dances": dances, "failed": {}, "not_due": []}
+
+
+def test_a_chosen_video_is_judged_and_danced_next() -> None:
+    told = find_verdict(found(row("chosen"), row("accepted"), row("rejected")))
+    assert "APT cover is the steadiest of 3, 3.46 a second" in told["verdict"]["sentence"]
+    assert "2 may be danced" in told["verdict"]["sentence"]
+    assert shlex.split(told["next"]) == ["robojackson", "dance", "https://example.org/a b"]
+
+
+def test_a_search_without_a_dance_names_the_commonest_reason(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("sys.argv", ["robojackson", "find", "APT", "--top", "3"])
+    rows = [row("rejected"), row("rejected"), row("failed", reason="no video")]
+    told = find_verdict(found(*rows))
+    assert told["verdict"]["sentence"].endswith("of 2 the reason is: two people.")
+    assert told["next"] == "robojackson find APT --top 6"
+
+
+def test_a_search_that_finds_nothing_says_what_to_type() -> None:
+    assert find_verdict(found())["next"] == "robojackson find 'APT tutorial'"
+
+
+def test_the_words_of_a_title_are_no_words_of_ours() -> None:
+    told = find_verdict(found(row("chosen", title="a\x1b[31mb\nc")))
+    assert "\x1b" not in told["verdict"]["sentence"]
+    assert "\n" not in told["verdict"]["sentence"]
+
+
+def test_a_refresh_trains_a_new_video_next() -> None:
+    told = refresh_verdict(refreshed(old=False, fresh=True))
+    assert told["verdict"]["sentence"] == "2 of 2 dances have a motion, 1 of a new video."
+    assert told["next"] == "robojackson train store/fresh.parquet -o fresh"
+
+
+def test_a_refresh_that_failed_is_given_again() -> None:
+    done = refreshed(a=True) | {"failed": {"b c": "no network"}}
+    assert refresh_verdict(done)["next"] == "robojackson refresh 'b c'"
+    assert refresh_lines(done)[-1] == "b c: failed, no network"
+
+
+def test_a_refresh_with_nothing_due_says_what_waits() -> None:
+    done = refreshed() | {"not_due": ["a", "b"]}
+    assert refresh_verdict(done)["verdict"]["sentence"] == "No dance is due: a, b."
+
+
+@pytest.mark.parametrize(
+    ("steps", "seeds", "kind", "words"),
+    [
+        (400, 1, "meaningless", "mean nothing"),
+        (50_000, 3, "few_seeds", "3 seeds can show no difference"),
+        (50_000, 10, "judged", "which claims hold"),
+    ],
+)
+def test_a_study_says_what_its_numbers_are_worth(
+    steps: int, seeds: int, kind: str, words: str
+) -> None:
+    told = ablation_verdict({"cells": 9, "page": "p.html"}, steps, seeds, 10_000)
+    assert told["verdict"]["kind"] == kind
+    assert words in told["verdict"]["sentence"]
+    assert told["next"]

@@ -1,0 +1,172 @@
+"""What `robojackson clean` finds in a store, and what it leaves there."""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from robojackson.errors import StoreError
+from robojackson.pipeline.folder_lock import locked
+from storage import stage_records
+from storage.artifact import Artifact
+from storage.store import Store
+from storage.store_cleaning import USUAL, plan, remove, users_of
+from storage.store_inventory import KINDS, inventory
+
+DAY_S = 86_400.0
+ALL = ("work", "unused", "videos", "cache", "runs")
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Store:
+    return Store(tmp_path / "store").create()
+
+
+def recorded(store: Store, name: str, result: object) -> str:
+    """A record as Prefect writes it: the result is JSON inside JSON."""
+    import json
+
+    key = stage_records.address(f"recover_motion/{name}")
+    store.put(key, json.dumps({"result": stage_records.encode(result).decode()}).encode())
+    return key
+
+
+def aged(store: Store, days: float) -> None:
+    """Make everything in the store so old."""
+    when = time.time() - days * DAY_S
+    for path in Path(store.root).rglob("*"):
+        os.utime(path, (when, when))
+
+
+def keys(store: Store) -> set[str]:
+    return set(store.list())
+
+
+def kind_of(store: Store, artifact: Artifact) -> str:
+    folder = artifact.key.rpartition("/")[0]
+    return next(item.kind for item in inventory(store) if item.key == folder)
+
+
+def test_a_result_that_nothing_names_is_unused_and_goes(store: Store) -> None:
+    store.save("mocap", "smpl.parquet", b"nobody's")
+    assert [item.kind for item in remove(store, plan(store, USUAL, 0.0))] == ["unused"]
+    assert keys(store) == set()
+
+
+def test_a_result_that_a_record_names_stays_unless_the_cache_is_named(store: Store) -> None:
+    made = store.save("mocap", "smpl.parquet", b"a motion")
+    record = recorded(store, "a.json", {"smpl": [made]})
+    assert kind_of(store, made) == "cache"
+    assert remove(store, plan(store, USUAL, 0.0)) == []
+    remove(store, plan(store, ["cache"], 0.0))
+    assert not store.exists(made.key)
+    assert not store.exists(record)
+
+
+def test_an_old_result_of_a_young_record_stays(store: Store) -> None:
+    made = store.save("mocap", "smpl.parquet", b"a motion")
+    old = recorded(store, "old.json", made)
+    aged(store, 60)
+    young = recorded(store, "young.json", made)
+    remove(store, plan(store, ALL, 30 * DAY_S))
+    assert keys(store) == {made.key, young}
+    assert not store.exists(old)
+
+
+def test_what_is_younger_than_asked_stays(store: Store) -> None:
+    store.save("mocap", "smpl.parquet", b"young")
+    store.work("train-1").joinpath("checkpoint.zip").write_bytes(b"young")
+    assert plan(store, USUAL, DAY_S).going == []
+    aged(store, 2)
+    assert {item.kind for item in plan(store, USUAL, DAY_S).going} == {"work", "unused"}
+
+
+def test_tables_studies_walkers_and_robots_are_never_removed(store: Store) -> None:
+    never = [
+        store.put("metrics/episodes/study=a/x.parquet", b"rows").key,
+        store.put("studies/paper/index.html", b"page").key,
+        store.put("robots/g1/g1.xml", b"model").key,
+        store.save("pretrain", "walker_track.safetensors", b"walker").key,
+        store.put("prefect/prefect.db", b"database").key,
+    ]
+    remove(store, plan(store, ALL, 0.0))
+    assert keys(store) == set(never)
+
+
+def test_a_result_that_a_study_names_stays(store: Store) -> None:
+    made = store.save("train", "policy.safetensors", b"weights")
+    store.put("metrics/runs/one.json", f'{{"policy": "{made.key}"}}'.encode())
+    assert kind_of(store, made) == "kept"
+
+
+def test_a_dance_goes_with_its_run_and_what_only_it_names(store: Store) -> None:
+    made = store.save("video", "clip.mp4", b"frames")
+    store.put("runs/one.json", f'{{"video": "{made.key}"}}'.encode())
+    store.put("dances/walk-0123abcd/index.html", b"page")
+    assert remove(store, plan(store, ["unused", "cache"], 0.0)) == []
+    remove(store, plan(store, ["runs"], 0.0))
+    assert keys(store) == set()
+
+
+def test_a_download_that_only_its_note_names_is_a_video(store: Store) -> None:
+    made = store.save("video", "clip.mp4", b"frames")
+    store.put("downloads/youtube/abc/best.json", f'{{"key": "{made.key}"}}'.encode())
+    assert kind_of(store, made) == "videos"
+    remove(store, plan(store, ["videos"], 0.0))
+    assert keys(store) == {"downloads/youtube/abc/best.json"}
+
+
+@pytest.mark.parametrize("lock", ["task.lock", "lock", ".held"])
+def test_work_that_a_process_holds_stays(lock: str, store: Store) -> None:
+    folder = store.work("train-1")
+    (folder / "checkpoint.zip").write_bytes(b"weights")
+    before = plan(store, ["work"], 0.0)
+    with locked(folder, lock):
+        assert plan(store, ["work"], 0.0).going == []
+        assert remove(store, before) == []  # it was taken up after the plan was made
+        assert (folder / "checkpoint.zip").exists()
+    assert [item.key for item in remove(store, before)] == ["work/train-1"]
+    assert not folder.exists()
+
+
+def test_while_a_process_uses_the_store_only_work_goes(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store.save("mocap", "smpl.parquet", b"nobody's")
+    store.work("train-1").joinpath("checkpoint.zip").write_bytes(b"weights")
+    monkeypatch.setattr("storage.store_cleaning.users_of", lambda root: ["robojackson dance"])
+    assert {item.kind for item in remove(store, plan(store, USUAL, 0.0))} == {"work"}
+    assert len(keys(store)) == 1
+
+
+@pytest.mark.parametrize(("words", "used"), [("dance clip.mp4", True), ("server", False)])
+def test_a_command_that_works_with_the_store_is_found(words: str, used: bool, store: Store) -> None:
+    environment = {**os.environ, "ROBOJACKSON_STORE": store.root}
+    sleeps = [sys.executable, "-c", "input()", "robojackson", *words.split()]
+    with subprocess.Popen(sleeps, env=environment, stdin=subprocess.PIPE) as process:
+        found = users_of(Path(store.root))
+        process.communicate(b"\n")
+    assert found == ([f"robojackson dance (process {process.pid})"] if used else [])
+
+
+def test_a_store_without_users_has_none(store: Store) -> None:
+    assert users_of(Path(store.root)) == []
+
+
+def test_a_bucket_is_refused_with_what_to_do() -> None:
+    with pytest.raises(StoreError, match="no folder of this machine"):
+        inventory(Store("memory://bucket/clean"))
+
+
+def test_a_store_that_is_not_there_is_not_made(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match="there is no store"):
+        inventory(Store(tmp_path / "none"))
+    assert not (tmp_path / "none").exists()
+
+
+def test_every_kind_is_explained(store: Store) -> None:
+    store.save("mocap", "smpl.parquet", b"x")
+    assert {item.kind for item in inventory(store)} <= set(KINDS)
