@@ -12,7 +12,6 @@ import numpy as np
 from benchmarks.learning.environment_core import humanoid
 from benchmarks.learning.policies import Folders, reference_of
 from benchmarks.learning.speed import told
-from robojackson.cli.stages import read_table
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.training import train_policy
@@ -40,7 +39,7 @@ def checkpoints(folders: Folders, minutes: float = 5.0) -> dict[str, Any]:
         sizes.append(max((run.out / "replay").glob("*.npz")).stat().st_size)
         steps.append(run.trainer.steps())
 
-    motion = read_table(ReferenceMotion, reference_of("hip_shake", folders))
+    motion = ReferenceMotion.load(reference_of("hip_shake", folders))
     config, timing = TrainConfig(minutes=minutes), patch.object(Run, "checkpoint", timed)
     with tempfile.TemporaryDirectory(dir=folders.work) as out, timing:
         train_policy(motion, humanoid(), config, Path(out))

@@ -75,7 +75,7 @@ def _turns(robot: Robot, script: Script, n: int, steps: int) -> tuple[float, flo
         spent += [_timed(environment, count), *(loop.run(first, count) for loop in loops)]
     for loop in loops:
         assert np.array_equal(environment.sim.qpos, [data.qpos for data in loop.datas])
-    substeps = n * steps * environment.sim.control.substeps
+    substeps = n * steps * (environment.sim.control.substeps or 1)
     ours, bare, batched = substeps / spent
     return float(ours), float(bare), float(batched)
 
@@ -149,7 +149,9 @@ class Bare:
         split = np.split(np.arange(n), ends[:-1]) if batched else [np.arange(n)]
         self._robots = [[robots[i] for i in which] for which in split]
         merged = lambda told: [np.concatenate(told, 1)]  # noqa: E731
-        self._controls = script.controls if batched else [merged(t) for t in script.controls]
+        self._controls = (
+            script.controls if batched else [merged(t) for t in script.controls]  # type: ignore[no-untyped-call]
+        )
         self._place(0)
 
     def run(self, first: int, steps: int) -> float:

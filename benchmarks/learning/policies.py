@@ -15,8 +15,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from queue import SimpleQueue
 
+from benchmarks.learning.split import load_split
+from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
+
 ROOT = Path(__file__).parents[2]
-PAPER = "ROBOJACKSON_PAPER"
+PAPER, CMU = "ROBOJACKSON_PAPER", "ROBOJACKSON_CMU"
+"""Variables that name the folders of the authors' files and of CMU's BVH files."""
+FROZEN = Path(__file__).parent / "references"
+"""Reference motions of rows whose motion is ours to keep, `ROW.parquet`."""
 HORIZONS_S = (10.0, 20.0)
 
 
@@ -25,12 +31,15 @@ class Move:
     """A row of the table of policies: what it may cost and what it must show.
 
     Attributes:
-        clip: A video of the repository, or the name of a file in the folder of the authors'.
+        clip: A video of the repository, or the name of a file in a folder of others'.
         cpu_minutes: Of one core.
         success, worst: Least strict success, of the mean over seeds and of the worst seed.
         skill: Least skill.
         cyclic: Whether it is danced for a time; else to its end.
         authors: Whether it is a file of the authors': limbs are told and not asked for.
+        robot: Who dances it.
+        mpjpe_mm: Largest mpjpe_l, fallen robots counted to the horizon; none for Humanoid-v5.
+        cmu: Whether it is a BVH file of CMU.
     """
 
     clip: str
@@ -40,11 +49,19 @@ class Move:
     skill: float
     cyclic: bool = True
     authors: bool = False
+    robot: str = "humanoid"
+    mpjpe_mm: float | None = None
+    cmu: bool = False
 
     @property
     def horizons_s(self) -> tuple[float, ...]:
         """Seconds that it is judged over, a row each."""
         return HORIZONS_S if self.cyclic else HORIZONS_S[:1]
+
+    @property
+    def is_foreign(self) -> bool:
+        """Whether its file is not of the repository."""
+        return self.authors or self.cmu
 
 
 MOVES = {
@@ -53,6 +70,16 @@ MOVES = {
     "dance_b": Move("clips/dance_b.mp4", 40, 0.85, 0.70, 0.5, cyclic=False),
     "authors_apt1": Move("apt1", 20, 0.85, 0.0, 0.5, cyclic=False, authors=True),
     "authors_walk": Move("walk", 20, 0.85, 0.0, 0.5, cyclic=False, authors=True),
+    "g1_hip_shake": Move("clips/hip_shake.mp4", 10, 0.99, 0.95, 0.75, robot="g1", mpjpe_mm=12),
+    "g1_walk": Move("clips/walk.mp4", 15, 0.98, 0.93, 0.7, robot="g1", mpjpe_mm=23),
+    "g1_dance_b": Move("clips/dance_b.mp4", 15, 0.98, 0.92, 0.72, False, robot="g1", mpjpe_mm=32),
+    "g1_dance_a": Move("clips/dance_a.mp4", 30, 0.88, 0.75, 0.55, False, robot="g1", mpjpe_mm=55),
+    "g1_authors_apt1": Move("apt1", 15, 0.98, 0.93, 0.58, False, True, robot="g1", mpjpe_mm=12),
+    "g1_authors_walk": Move("walk", 15, 0.98, 0.93, 0.68, False, True, robot="g1", mpjpe_mm=24),
+    **{
+        f"g1_cmu_{take}": Move(take, 25, 0.93, 0.8, 0.6, False, robot="g1", mpjpe_mm=42, cmu=True)
+        for take in ("05_02", "05_09", "05_18")
+    },
 }
 
 
@@ -108,10 +135,11 @@ def must(*words: object, core: int | None = None) -> None:
 
 def source_of(move: Move) -> Path | None:
     """The file that a move comes from; None where the authors' are not at hand."""
-    if not move.authors:
+    if not move.is_foreign:
         return ROOT / move.clip
-    found = Path(os.environ.get(PAPER, "")) / f"{move.clip}.pt"
-    return found if PAPER in os.environ and found.is_file() else None
+    variable, suffix = (CMU, ".bvh") if move.cmu else (PAPER, ".pt")
+    found = Path(os.environ.get(variable, "")) / f"{move.clip}{suffix}"
+    return found if variable in os.environ and found.is_file() else None
 
 
 def reference_of(name: str, folders: Folders) -> Path:
@@ -120,15 +148,44 @@ def reference_of(name: str, folders: Folders) -> Path:
     reference = work / "reference.parquet"
     if (work / "gate.json").is_file():
         return reference
-    source = source_of(move)
-    assert source is not None
-    must("import" if move.authors else "mocap", source, "-o", work)
-    options = ["--set", "retarget.cyclic=no"] if move.authors else []
-    refused = command("retarget", work / "smpl.parquet", "-o", work, *options)
+    frozen = FROZEN / f"{name}.parquet"
+    refused = 0
+    if frozen.is_file():
+        work.mkdir(parents=True, exist_ok=True)
+        reference.write_bytes(frozen.read_bytes())
+        refused = not load(reference).scorecard.get("passed", 1.0)
+    else:
+        refused = _made(move, work)
     if not reference.is_file():
         raise SystemExit(f"{name}: no reference motion was made (status {refused})")
+    require_frozen(name, reference)
     (work / "gate.json").write_text(json.dumps({"forced": bool(refused)}))
     return reference
+
+
+def require_frozen(name: str, reference: Path) -> None:
+    """Refuse a reference that is not the one that the row was frozen with (`split.yaml`)."""
+    asked = load_split().references.get(name)
+    found = poses_sha256(load(reference))
+    if asked is not None and asked != found:
+        raise SystemExit(
+            f"{name}: {reference} has the poses {found[:12]}, the row is measured on {asked[:12]}: "
+            "another mocap or retargeting made it; freeze it anew or use the old one"
+        )
+
+
+def load(reference: Path) -> ReferenceMotion:
+    """A reference motion."""
+    return ReferenceMotion.load(reference)
+
+
+def _made(move: Move, work: Path) -> int:
+    """Make the motion of a move from its source; the exit status of the gate."""
+    source = source_of(move)
+    assert source is not None
+    must("import" if move.is_foreign else "mocap", source, "-o", work)
+    options = ["--set", "retarget.cyclic=no"] if move.authors else []
+    return command("retarget", work / "smpl.parquet", "-o", work, "--robot", move.robot, *options)
 
 
 def forced(name: str, folders: Folders) -> bool:

@@ -79,7 +79,7 @@ def _rounds(
         if trainer_name == "sbx":
             import jax
 
-            jax.block_until_ready(trainer._state())  # type: ignore[attr-defined]
+            jax.block_until_ready(trainer._state())  # type: ignore[attr-defined, no-untyped-call]
         return tqc.updates_per_round
 
     one_round()

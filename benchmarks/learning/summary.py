@@ -19,7 +19,10 @@ AUTHORS_ROBOT = {
     "note": "at best: 27 steps of 0.06 s in the authors' own logs; nothing else can be told of it",
 }
 BESIDE = ("statue", "mean_pose", "zero_residual", "random", "hold")
-TOLD = ("survived_s", "strict_success", "skill", "velocity_score")
+TOLD = (
+    "survived_s", "strict_success", "skill", "velocity_score", "mpjpe_l_m", "mpjpe_g_m",
+    "acceleration_ratio",
+)  # fmt: skip
 
 
 def summary(folders: Folders) -> Rows:
@@ -77,6 +80,8 @@ def bars(found: Mapping[str, Any], move: Move) -> dict[str, bool]:
     if move.authors:
         del held[f"worst seed >= {move.worst:g}"]
         return held
+    if move.mpjpe_mm is not None and found["mpjpe_l_m"] is not None:
+        held[f"mpjpe_l <= {move.mpjpe_mm:g} mm"] = 1e3 * found["mpjpe_l_m"] <= move.mpjpe_mm
     low, high = GAIN
     for limb in LIMBS:
         gain, r2 = found["limb_gain"][limb], found["limb_r2"][limb]

@@ -57,7 +57,7 @@ class Curve:
 
 def measure(reference: Path, out: Path, options: list[str], until: float, minutes: float) -> None:
     """Train in this process and write the curve."""
-    from robojackson.cli import stages
+    from robojackson.api.arguments import robot_of
     from robojackson.motion.reference_motion import ReferenceMotion
     from robojackson.pipeline.yaml_loader import load
     from robojackson.rl.config.train_config import TrainConfig
@@ -65,12 +65,12 @@ def measure(reference: Path, out: Path, options: list[str], until: float, minute
 
     fixed = {"cpu_minutes": minutes, "checkpoint_seconds": 1e5, "track.threads": 1}
     config = load(TrainConfig, None, dict(o.split("=", 1) for o in options) | fixed)
-    motion = stages.read_table(ReferenceMotion, reference)
+    motion = ReferenceMotion.load(reference)
     curve = Curve(until)
     with tempfile.TemporaryDirectory() as folder:
         hooks = Hooks(sink=curve.add, stop=curve.reached)
         try:
-            train_policy(motion, stages.robot_of(motion), config, Path(folder), hooks)
+            train_policy(motion, robot_of(motion), config, Path(folder), hooks)
         except KeyboardInterrupt:
             if not curve.reached():
                 raise

@@ -82,13 +82,13 @@ def cases(folder: Path, clips: list[str]) -> Iterator[Case]:
             table = folder / clip / "smpl.parquet"
             if not table.is_file():
                 stages.mocap(video_path(clip), folder / clip, "base", {})
-            yield Case("mocap", clip, stages.read_table(SmplSequence, table))
+            yield Case("mocap", clip, SmplSequence.load(table))
     yield from (Case("truth", clip, truth_motion(clip)) for clip in TRUTH if clip in clips)
     if root := os.environ.get(PAPER):
         for file in sorted(Path(root).glob("*.pt")):
             out = folder / f"paper_{file.stem}"
             importing.import_motion(file, out, None, None, "base", {})
-            sequence = stages.read_table(SmplSequence, out / "smpl.parquet")
+            sequence = SmplSequence.load(out / "smpl.parquet")
             yield Case("paper", file.stem, sequence)
 
 

@@ -103,7 +103,8 @@ def _held_at(
     at[2] = robot.contact_radii[ball]
     if state != PLANTED:
         held[column] = None
-        return at
+        result: np.ndarray = at
+        return result
     if held[column] is None:
         held[column] = at
     return held[column]

@@ -124,4 +124,5 @@ def _quaternions(wxyz: Float[np.ndarray, "T 4"]) -> Rotation:
 
 
 def _wxyz(rotation: Rotation) -> Float[np.ndarray, "T 4"]:
-    return rotation.as_quat()[:, [3, 0, 1, 2]]
+    result: np.ndarray = rotation.as_quat()[:, [3, 0, 1, 2]]
+    return result

@@ -1,0 +1,95 @@
+"""The split of motions: what may be trained on, what is judged, and how near they are.
+
+    python -m benchmarks.learning.split FOLDER
+
+prints, for every judged motion of a folder of SMPL motions (`NAME.parquet`), which others contain
+it. `split.yaml` holds the lists.
+"""
+
+import sys
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from benchmarks.learning.motion_distance import contained_share, windows
+from robojackson.motion.smpl_sequence import SmplSequence
+
+FILE = Path(__file__).with_suffix(".yaml")
+DUPLICATE_SHARE = 0.5
+"""Of a judged motion's windows, from which on a motion that contains them is left out."""
+WORTH_TELLING = 0.1
+
+
+@dataclass(frozen=True)
+class Split:
+    """The lists of `split.yaml`.
+
+    Attributes:
+        judged: Motions that no training, pretraining or tuning may see.
+        train: Motions that trainings may see.
+        excluded: Near-duplicates of judged ones, with the motion and the share of it.
+        references: sha256 of the poses of frozen references, by row.
+    """
+
+    judged: tuple[str, ...]
+    train: tuple[str, ...]
+    excluded: Mapping[str, Mapping[str, Any]]
+    references: Mapping[str, str]
+
+    def require_trainable(self, names: Iterable[str]) -> None:
+        """Refuse motions that are not for training.
+
+        Raises:
+            ValueError: with the motions and where they stand.
+        """
+        bad = [name for name in names if name not in self.train]
+        if bad:
+            raise ValueError(
+                f"not for training: {', '.join(bad)}; {FILE.name} lists as train: "
+                f"{', '.join(self.train)}"
+            )
+
+
+def load_split(path: Path = FILE) -> Split:
+    """Read the split."""
+    said = yaml.safe_load(path.read_text())
+    return Split(
+        judged=tuple(said["judged"]),
+        train=tuple(said["train"]),
+        excluded=said["excluded"],
+        references=said["references"],
+    )
+
+
+def shares(motions: Mapping[str, SmplSequence], judged: Iterable[str]) -> list[dict[str, Any]]:
+    """For every judged motion, the others that contain some of it, plain or mirrored."""
+    plain = {name: windows(motion) for name, motion in motions.items()}
+    mirrored = {name: windows(motion, mirrored=True) for name, motion in motions.items()}
+    rows = []
+    for name in judged:
+        for other in motions:
+            if name == other or name not in motions:
+                continue
+            share = max(
+                contained_share(plain[name], plain[other]),
+                contained_share(plain[name], mirrored[other]),
+            )
+            rows.append({"judged": name, "motion": other, "share": share})
+    return rows
+
+
+def main() -> None:
+    """Print what contains the judged motions."""
+    folder = Path(sys.argv[1])
+    motions = {path.stem: SmplSequence.load(path) for path in sorted(folder.glob("*.parquet"))}
+    for row in shares(motions, load_split().judged):
+        if row["share"] >= WORTH_TELLING:
+            mark = "  near-duplicate" if row["share"] >= DUPLICATE_SHARE else ""
+            print(f"{row['judged']:>14} in {row['motion']:<14} {row['share']:.2f}{mark}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,62 @@
+"""What may be trained on: lists without overlap, and near-duplicates found by their movement."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from benchmarks.learning.motion_distance import contained_share, windows
+from benchmarks.learning.split import DUPLICATE_SHARE, load_split, shares
+from robojackson.geometry.rotations import quat_to_matrix
+from robojackson.motion.smpl_sequence import SmplSequence
+from tests.fixtures.robots import human
+
+SPLIT = load_split()
+
+
+@pytest.fixture(scope="module")
+def motion() -> SmplSequence:
+    return human("dance_b")
+
+
+def test_no_motion_stands_in_two_lists() -> None:
+    lists = [SPLIT.judged, SPLIT.train, tuple(SPLIT.excluded)]
+    names = [name for names in lists for name in names]
+    assert len(names) == len(set(names))
+
+
+def test_the_three_dances_that_judge_are_judged() -> None:
+    assert {"cmu_05_02", "cmu_05_09", "cmu_05_18"} <= set(SPLIT.judged)
+
+
+def test_every_near_duplicate_is_one_of_a_judged_motion() -> None:
+    for found in SPLIT.excluded.values():
+        assert found["of"] in SPLIT.judged
+        assert found["share"] >= DUPLICATE_SHARE
+
+
+def test_a_judged_motion_is_refused_for_training() -> None:
+    SPLIT.require_trainable(SPLIT.train)
+    with pytest.raises(ValueError, match="not for training: cmu_05_09"):
+        SPLIT.require_trainable([*SPLIT.train, "cmu_05_09"])
+
+
+def test_a_motion_elsewhere_and_turned_is_the_same(motion: SmplSequence) -> None:
+    turn = quat_to_matrix(np.array([[np.cos(0.6), 0.0, 0.0, np.sin(0.6)]]))[0]
+    moved = dataclasses.replace(motion, joints=motion.joints @ turn.T + [1.0, 2.0, 0.0])
+    np.testing.assert_allclose(windows(moved), windows(motion), atol=1e-5)
+    assert contained_share(windows(motion), windows(moved)) == 1.0
+
+
+def test_a_mirrored_copy_is_found(motion: SmplSequence) -> None:
+    order = (0, 2, 1, 3, 5, 4, 6, 8, 7, 9, 11, 10, 12, 14, 13, 15, 17, 16, 19, 18, 21, 20, 23, 22)
+    copy = dataclasses.replace(motion, joints=motion.joints[:, order] * [1.0, -1.0, 1.0])
+    rows = shares({"a": motion, "b": copy}, ["a"])
+    assert rows == [{"judged": "a", "motion": "b", "share": 1.0}]
+
+
+def test_another_movement_is_none(motion: SmplSequence) -> None:
+    still = dataclasses.replace(
+        motion, joints=np.repeat(motion.joints[:1] * [1.0, 1.0, 0.4], len(motion.joints), 0)
+    )
+    assert contained_share(windows(motion), windows(still)) == 0.0
