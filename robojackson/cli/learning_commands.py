@@ -46,6 +46,10 @@ def train(
     seed: Seed = None,
     setup: Setup = None,
     config: TrainConfigFile = None,
+    robust: Annotated[
+        bool,
+        typer.Option(help="Vary friction, masses, gains and delays; noise and pushes."),
+    ] = False,
     run_id: Annotated[str, typer.Option(help="Name of the run in the tables.")] = "",
     move: Annotated[str, typer.Option(help="Name of the dance in the tables.")] = "",
     parent: Parent = 0,
@@ -62,6 +66,10 @@ def train(
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     log_to_stderr()
     given = {"mode": mode, "trainer": trainer, "steps": steps, "minutes": minutes, "seed": seed}
+    if robust:
+        from robojackson.rl.evaluation.passport import robust_settings
+
+        given = {**robust_settings(), **given}
     trained = training_process.train(
         reference, out, setup, overrides_from(set_, given), run_id, move, force, robot, config
     )
@@ -106,6 +114,10 @@ def evaluate(
     reference: Annotated[Path, typer.Argument(help="The reference.parquet it was trained on.")],
     robot: MotionRobot = None,
     seconds: Annotated[float | None, typer.Option(min=0.1, help="Length of a rollout, s.")] = None,
+    passport: Annotated[
+        bool,
+        typer.Option(help="Also under other friction, masses, gains, delays, noise and pushes."),
+    ] = False,
     out: TablesFolder = None,
     config: Config = "base",
     parent: Parent = 0,
@@ -121,7 +133,9 @@ def evaluate(
         end_with(parent)
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     log_to_stderr()
-    overrides = overrides_from(set_, {"evaluate.seconds": seconds})
+    given = {"evaluate.seconds": seconds, "evaluate.passport": passport or None}
+    overrides = overrides_from(set_, given)
     judged = stages.evaluate(policy, reference, out, config, overrides, robot)
-    table = [*stages.verdict_lines(judged), *cards.closing(judged)]
+    lines = [*stages.verdict_lines(judged), *stages.passport_lines(judged)]
+    table = [*lines, *cards.closing(judged)]
     return CommandResult(judged, text=cards.shown(judged, table, verbose))

@@ -92,6 +92,7 @@ _FORMS: Mapping[str, _Form] = {
     "limb_gain": _Form("limb gain", "", 2),
     "drift_m": _Form("drift", "m", 2),
     "heading_error_deg": _Form("heading error", "deg", 1),
+    "kept": _Form("kept", "%", 0, 100.0),
     "rollouts": _Form("rollouts"),
 }
 _FLAGS = ("cyclic",)

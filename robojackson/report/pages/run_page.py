@@ -108,6 +108,8 @@ def render(content: PageContent) -> str:
         tiles=_tiles(content.evaluation),
         columns=[Quantity("", "")] + quantities(dict.fromkeys(VERDICT_COLUMNS)),
         verdicts=verdicts(content.evaluation),
+        passport_columns=[Quantity("", "")] + quantities(dict.fromkeys(PASSPORT_COLUMNS)),
+        passport=passport_rows(content.evaluation),
         sections=_sections(content),
         plots=[(plot, base64.b64encode(plot.png).decode()) for plot in content.plots],
     )
@@ -176,6 +178,19 @@ def verdicts(evaluation: Mapping[str, Any]) -> list[Verdict]:
         ]
         rows.append(Verdict(title, meaning, values, name == TRAINED))
     return rows
+
+
+PASSPORT_COLUMNS = ("strict_success", "skill", "survived_s", "kept")
+
+
+def passport_rows(evaluation: Mapping[str, Any]) -> list[Verdict]:
+    """Return the figures of the policy under other physics, ready to read."""
+    return [
+        Verdict(
+            row["case"], "", [format_value(key, row[key]) for key in PASSPORT_COLUMNS], index == 0
+        )
+        for index, row in enumerate(evaluation.get("passport", []))
+    ]
 
 
 def _sections(content: PageContent) -> list[_Section]:

@@ -23,6 +23,7 @@ class EvaluateConfig:
         strict_error: Largest mean site error of a strict success, m; the robot's when null.
         kneel_height: A knee lower than this is kneeling, m; the robot's when null.
         fast: Reference speed from which a limb's gain is measured, m/s.
+        passport: Whether the policy is also judged under other physics, delays, noise and pushes.
         max_lag: Longest lag tried for a limb's gain, s.
         threads: Threads that step the simulations.
     """
@@ -38,4 +39,5 @@ class EvaluateConfig:
     kneel_height: float | None = Field(default=None, gt=0)
     fast: float = Field(default=0.15, gt=0)
     max_lag: float = Field(default=0.1, ge=0)
+    passport: bool = False
     threads: int = Field(default=2, ge=1)

@@ -153,13 +153,23 @@ class RandomConfig:
     """Physics that differ a little from robot to robot while training; zero is the stock robot.
 
     Attributes:
-        friction: Half-width of a uniform factor on the friction of all geoms.
-        gains: Half-width of a uniform factor on stiffness and damping of the PD law.
+        friction: Half-width of a uniform factor on the friction of all geoms, unitless.
+        gains: Half-width of a uniform factor on stiffness and damping of the PD law, unitless.
+        mass: Half-width of a uniform factor on mass and inertia of all bodies, unitless.
+        com: Half-width of a uniform shift of the root body's centre of mass, each axis, m.
+        delay: Largest delay of an action, uniform, at most a control step, s.
+        sensor_noise: Noise of what the policy sees, multiples of mjlab's, unitless.
+        pushes: Pushes every 1 to 3 s, multiples of mjlab's, unitless.
         integrators: Robot i gets the i-th, over and over; none named, all have the robot's own.
     """
 
     friction: float = Field(default=0.0, ge=0, lt=1)
     gains: float = Field(default=0.0, ge=0, lt=1)
+    mass: float = Field(default=0.0, ge=0, lt=1)
+    com: float = Field(default=0.0, ge=0, le=0.2)
+    delay: float = Field(default=0.0, ge=0, le=0.1)
+    sensor_noise: float = Field(default=0.0, ge=0, le=10)
+    pushes: float = Field(default=0.0, ge=0, le=10)
     integrators: tuple[Literal["RK4", "Euler", "implicit", "implicitfast"], ...] = ()
 
 

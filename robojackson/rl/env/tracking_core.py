@@ -174,7 +174,7 @@ class TrackingCore:
         self._last[indices] = 0.0
 
 
-OBSERVED = ("qpos", "qvel", "points", "com", "broken")
+OBSERVED = ("qpos", "qvel", "points", "com", "broken", "previous", "count", "push_at")
 """What a simulation shows of its copies."""
 
 

@@ -85,6 +85,15 @@ def drivers(
     return found | _baselines(reference, robot, usual, seed)
 
 
+def trained_driver(policy: Policy, robot: Robot) -> Driver:
+    """The policy as it was trained.
+
+    Raises:
+        BadPolicy: it was trained for another robot.
+    """
+    return _trained(policy, robot, control_of(policy, robot))
+
+
 def _trained(policy: Policy, robot: Robot, control: ControlConfig) -> Driver:
     if control.law == "torque":
         most = robot.model.actuator_ctrlrange[:, 1]
@@ -105,7 +114,7 @@ def _trained(policy: Policy, robot: Robot, control: ControlConfig) -> Driver:
     def target(
         sim: Simulation, following: ClipStep, start: np.ndarray, last: np.ndarray
     ) -> np.ndarray:
-        seen = observer.observe(sim.qpos, sim.qvel, sim.points, following, last)
+        seen = observer.observe(*sim.sensed(), sim.points, following, last)
         action = policy.act(seen[:, : observer.actor_size])
         result: np.ndarray = sim.reference_angles(following) + sim.residual * action
         return result

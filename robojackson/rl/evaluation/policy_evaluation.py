@@ -21,17 +21,17 @@ from robojackson.rl.config.train_config import (
     ControlConfig,
     EvaluateConfig,
     PaperConfig,
-    ResetConfig,
     TrackConfig,
 )
 from robojackson.rl.evaluation.controllers import control_of, drivers, fact, mode_of
+from robojackson.rl.evaluation.passport import passport
 from robojackson.rl.evaluation.reward_audit import RewardAudit, audit_both_readings, audit_record
 from robojackson.rl.evaluation.reward_meter import RewardMeter, without_curiosity
 from robojackson.rl.evaluation.rollout_records import RolloutScorer
 from robojackson.rl.evaluation.rollouts import Rollouts, Starts, roll_out
+from robojackson.rl.evaluation.starts import starts_of, summarise
 from robojackson.rl.evaluation.verdict import verdict_on, without_unjudged
 from robojackson.rl.modes.paper_mode import facing_ahead
-from robojackson.rl.modes.reset_states import default_standing_pose, noisy, standing_pose_at
 from robojackson.rl.policy import Policy
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.simulation import control_step, require_same_clock
@@ -42,10 +42,6 @@ log = logging.getLogger(__name__)
 
 STATUE_SHARE = 0.9
 """Of a run's own return, above which what a statue earns raises a flag."""
-MEANT = ("limb_", "excess_", "usage_", "reward_", "return_", "error_")
-"""Beginnings of further columns that are averaged over the rollouts."""
-STAND = -1
-"""`phase` of the row that starts in the default stand."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +80,7 @@ def evaluate_policy(
     if isinstance(environment, PaperConfig):
         reference = facing_ahead(reference)
     clip = Clip(reference)
-    starts, labels = _starts(robot, clip, config)
+    starts, labels = starts_of(robot, clip, config)
     horizon = clip.horizon(starts.step, config.seconds)
     judge, meter = (
         RolloutScorer(robot, reference, config),
@@ -115,7 +111,9 @@ def evaluate_policy(
     if verdict.kind == "too_short":
         shown = without_unjudged(own)
         baselines = {name: without_unjudged(found) for name, found in summaries.items()}
-    told = {"variants": variants, "baselines": baselines, "reward": reward}
+    told: dict[str, object] = {"variants": variants, "baselines": baselines, "reward": reward}
+    if config.passport:
+        told["passport"] = passport(policy, reference, robot, config, progress)
     return Evaluation({**shown, **told, "verdict": verdict.as_facts()}, rows, qpos)
 
 
@@ -168,51 +166,7 @@ def _warn_about_other_motion(policy: Policy, reference: ReferenceMotion) -> None
         )
 
 
-def summarise(rows: list[dict[str, object]]) -> dict[str, float]:
-    """Means over rollouts; limb gains only over those in which the limb had to move."""
-    keys = ("survived_s", "success", "strict_success", "skill", "site_error_m", "clip_fraction",
-            "velocity_score", "drift_m", "heading_error_deg", "travel_ratio", "mpjpe_l_m",
-            "mpjpe_g_m", "mpjpe_l_alive_m", "mpjpe_g_alive_m", "acceleration_ratio")  # fmt: skip
-    out = {key: _mean(rows, key) for key in keys}
-    limbs = [key for key in rows[0] if key.startswith(MEANT)]
-    out |= {key: _mean(rows, key) for key in limbs}
-    out["limb_gain"] = _nanmean([out[key] for key in limbs if key.startswith("limb_gain_")])
-    out["rollouts"] = float(len(rows))
-    return out
-
-
-def _starts(
-    robot: Robot, clip: Clip, config: EvaluateConfig
-) -> tuple[Starts, list[tuple[int, int]]]:
-    """Evenly spread phases with noisy resets, then the default stand at the first step.
-
-    A clip that is not cyclic is started in its first quarter, so that most of it is always danced.
-    """
-    usable = clip.steps if clip.cyclic else max(1, clip.steps // 4)
-    phases = np.linspace(0, usable, config.phases, endpoint=False).astype(int)
-    labels = [(int(p), r) for p in phases for r in range(config.resets)] + [(STAND, 0)]
-    step = np.array([max(phase, 0) for phase, _ in labels])
-    at = clip.at(step)
-    noise = ResetConfig(
-        joint_noise=config.joint_noise,
-        joint_speed_noise=config.joint_speed_noise,
-        root_speed_noise=config.root_speed_noise,
-    )
-    qpos, qvel = noisy(at.qpos, at.qvel, noise, np.random.default_rng(config.seed))
-    qpos[-1], qvel[-1] = standing_pose_at(default_standing_pose(robot), at.qpos[-1, :7]), 0.0
-    return Starts(step, qpos, qvel), labels
-
-
 def _recorded_rollout(rollouts: Rollouts, starts: Starts) -> np.ndarray:
     """The rollout from the clip's first step, its start first, with its fall if it falls."""
     steps = min(int(rollouts.length[0]) + 1, len(rollouts.qpos))
     return np.concatenate([starts.qpos[:1], rollouts.qpos[:steps, 0]])
-
-
-def _mean(rows: list[dict[str, object]], key: str) -> float:
-    return _nanmean([float(row[key]) for row in rows])  # type: ignore[arg-type]
-
-
-def _nanmean(values: list[float]) -> float:
-    finite = [value for value in values if np.isfinite(value)]
-    return float(np.mean(finite)) if finite else float("nan")

@@ -1,12 +1,12 @@
 """Rollouts of many starts at once on stock physics, recorded until each robot falls."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from robojackson.rl.config.train_config import ControlConfig
+from robojackson.rl.config.train_config import ControlConfig, RandomConfig
 from robojackson.rl.sim.reference_clip import Clip, ClipStep
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.robot.fall import Fall
@@ -29,6 +29,21 @@ class Driver:
     control: ControlConfig
     command: Callable[[Simulation, ClipStep, np.ndarray, np.ndarray], np.ndarray]
     repeats: int = 1
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What disturbs the robots of a rollout.
+
+    Attributes:
+        random: Sensor noise, pushes and ranges of physics.
+        delay_s: By which actions come late, s.
+        seed: Of the random numbers.
+    """
+
+    random: RandomConfig = field(default_factory=RandomConfig)
+    delay_s: float = 0.0
+    seed: int = 0
 
 
 @dataclass(frozen=True)
@@ -97,11 +112,13 @@ def roll_out(
     meter: Callable[[Moment], Reading] = lambda moment: {},
     tick: Callable[[int, int], None] = lambda step, total: None,
     whole: bool = False,
+    conditions: Conditions | None = None,
 ) -> Rollouts:
     """Drive a robot from every start, each to its own horizon or its fall; to its horizon in any
     case when `whole`."""
     n, steps = len(starts.step), int(horizon.max())
-    sim = Simulation(robot, driver.control, n, threads)
+    met = conditions or Conditions()
+    sim = Simulation(robot, driver.control, n, threads, met.random, met.seed, met.delay_s)
     sim.place(np.arange(n), starts.qpos, starts.qvel)
     action = command = np.zeros((n, robot.model.nu))
     alive, length = np.ones(n, bool), np.zeros(n, int)

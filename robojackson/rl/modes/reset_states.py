@@ -131,8 +131,15 @@ def standing_pose_at(stand: Float[np.ndarray, " nq"], root: Float[np.ndarray, " 
 
 
 def _reach_down(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> float:
-    """How far a sphere or capsule extends below its centre, metres."""
-    radius, half = model.geom_size[geom][:2]
-    if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_CAPSULE:
-        return float(radius + half * abs(data.geom_xmat[geom].reshape(3, 3)[2, 2]))
+    """How far a sphere, capsule, box or mesh extends below its centre, metres."""
+    kind, size = model.geom_type[geom], model.geom_size[geom]
+    up = data.geom_xmat[geom].reshape(3, 3)[2]
+    if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
+        return float(size[0] + size[1] * abs(up[2]))
+    if kind == mujoco.mjtGeom.mjGEOM_BOX:
+        return float(size @ np.abs(up))
+    if kind == mujoco.mjtGeom.mjGEOM_MESH:
+        mesh = model.geom_dataid[geom]
+        first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+        return float(-(model.mesh_vert[first : first + count] @ up).min())
     return float(model.geom_rbound[geom])

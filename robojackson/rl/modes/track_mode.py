@@ -79,7 +79,7 @@ class TrackMode:
 
     def observe(self, following: ClipStep, action: np.ndarray) -> Float[np.ndarray, "N D"]:
         sim = self.sim
-        return self._observer.observe(sim.qpos, sim.qvel, sim.points, following, action)
+        return self._observer.observe(*sim.sensed(), sim.points, following, action)
 
     def after(self, command: np.ndarray) -> None:
         """Nothing is counted within a step."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.sim.motors import Motors
@@ -51,6 +51,7 @@ class Batch:
 
     Args:
         kp, kd: Gains of the PD law, N m/rad and N m s/rad, one row for all robots or one each.
+        delay: Substeps by which the targets of each robot come late; none when None.
     """
 
     def __init__(
@@ -61,8 +62,10 @@ class Batch:
         control: ControlConfig,
         kp: Float[np.ndarray, "..."],
         kd: Float[np.ndarray, "..."],
+        delay: Int[np.ndarray, " B"] | None = None,
     ) -> None:
         self._motors, self._law, self._substeps = motors, control.law, control.substeps or 1
+        self._delay = None if delay is None or not delay.any() else delay[:, None]
         self._robots = [(m, d, d.ctrl) for m, d in zip(models, datas, strict=True)]
         self._state = [d.qpos[7:] for d in datas] + [d.qvel[6:] for d in datas]
         self._gains = np.stack(np.broadcast_arrays(np.atleast_2d(kp), kd))
@@ -77,13 +80,18 @@ class Batch:
         targets: Float[np.ndarray, "B nu"],
         active: Bool[np.ndarray, " B"],
         com: Float[np.ndarray, "B 3"],
+        before: Float[np.ndarray, "B nu"],
     ) -> None:
-        """One control step of the robots that are active; law `torque` writes their `com`."""
+        """One control step of the robots that are active; law `torque` writes their `com`.
+
+        Args:
+            before: Targets of the control step before, which a delayed robot still follows.
+        """
         live = [(*self._robots[i], i) for i in np.flatnonzero(active)]
         step = mujoco.mj_step
         for substep in range(self._substeps):
             if substep == 0 or self._law == "pd":
-                told = self.controls(targets)
+                told = self.controls(self._followed(targets, before, substep))
             for model, data, ctrl, i in live:
                 ctrl[:] = told[i]
                 step(model, data)
@@ -92,6 +100,12 @@ class Batch:
                 mujoco.mj_rnePostConstraint(model, data)
                 com[i] = centre_of_mass(model, data)
             mujoco.mj_kinematics(model, data)
+
+    def _followed(self, targets: np.ndarray, before: np.ndarray, substep: int) -> np.ndarray:
+        """The targets that have reached the motors of each robot."""
+        if self._delay is None:
+            return targets
+        return np.where(substep < self._delay, before, targets)
 
     def controls(self, targets: Float[np.ndarray, "B nu"]) -> Float[np.ndarray, "B nu"]:
         """What is written to `ctrl`, from the states as they are; overwritten by the next call."""

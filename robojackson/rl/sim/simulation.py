@@ -9,7 +9,6 @@ World frame, metres, radians, seconds, newton-metres. MuJoCo releases the interp
 `mj_step`, so two threads keep two cores busy.
 """
 
-import copy
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import pairwise
@@ -20,11 +19,12 @@ from jaxtyping import Bool, Float, Int
 
 from robojackson.errors import BadPolicy
 from robojackson.rl.config.train_config import ControlConfig, RandomConfig
+from robojackson.rl.sim.disturbances import Disturbances
 from robojackson.rl.sim.motors import Motors, gains, residual_scale
 from robojackson.rl.sim.reference_clip import ClipStep
 from robojackson.rl.sim.robot_batch import SIZE, Batch, Views, centre_of_mass
+from robojackson.rl.sim.variation import varied_models
 from robojackson.robot.model import Robot
-from robojackson.robot.physics import integrator_of
 
 BAD_STATE = [
     int(kind)
@@ -67,6 +67,8 @@ class Simulation:
         control: The law of control.
         residual: Radians that a full action moves each motor's target.
         qpos, qvel: State of every copy after the last `step` or `place`.
+        previous: Targets of the control step before.
+        count, push_at: What the disturbances count by (`Disturbances`).
         broken: Copies whose state blew up since they were placed, so that MuJoCo reset them.
         points: Positions of the keypoint sites, world, in step with `qpos`.
         com: Centres of mass as `Humanoid-v5` sees them, one substep behind; law `torque` only.
@@ -82,14 +84,27 @@ class Simulation:
         threads: int = 1,
         random: RandomConfig | None = None,
         seed: int = 0,
+        delay_s: float = 0.0,
     ) -> None:
         model, control = robot.model, with_substeps(control, robot)
         self.model, self.n, self._sites, self.control = model, n, robot.keypoint_sites, control
         self.motors = Motors.of(model)
         self.kp, self.kd = gains(robot, control)
-        self._models = [model] * n
-        if random is not None and random != RandomConfig():
-            self._vary(random, np.random.default_rng(seed))
+        self._models, self._delay = [model] * n, np.zeros(n, int)
+        random = random or RandomConfig()
+        self.dt = control_step(robot, control)
+        if random != RandomConfig():
+            rng = np.random.default_rng(seed)
+            self._models = varied_models(robot, random, n, rng)
+            factor = 1 + random.gains * rng.uniform(-1, 1, (n, 1))
+            self.kp, self.kd = self.kp * factor, self.kd * factor
+            longest = min(round(random.delay / model.opt.timestep), control.substeps or 1)
+            self._delay = rng.integers(longest + 1, size=n)
+        most = control.substeps or 1
+        self._delay = np.minimum(self._delay + round(delay_s / model.opt.timestep), most)
+        self._disturbances = Disturbances(random, n, self.dt, seed)
+        self.previous = np.zeros((n, model.nu))
+        self.count, self.push_at = self._disturbances.count, self._disturbances.push_at
         self.datas = [mujoco.MjData(own) for own in self._models]
         self._views = Views.of(self.datas)
         self.residual = residual_scale(robot, control)
@@ -101,7 +116,6 @@ class Simulation:
         self.points = np.zeros((n, len(robot.keypoint_names), 3))
         self.com = np.zeros((n, 3))
         self.broken = np.zeros(n, bool)
-        self.dt = control_step(robot, control)
 
     def place(
         self,
@@ -116,6 +130,7 @@ class Simulation:
             data.qpos[:], data.qvel[:] = qpos[row], qvel[row]
             mujoco.mj_forward(self._models[i], data)
             self.com[i] = centre_of_mass(self.model, data)
+            self.previous[i] = data.qpos[7:][self.motors.hinge]
         self._gather(indices)
 
     def step(
@@ -133,9 +148,15 @@ class Simulation:
             jobs = [self._pool.submit(self._advance, c, targets, rows) for c in self.chunks]
             for job in jobs:
                 job.result()
+        self.previous[:] = targets
+        self._disturbances.after_step(self.datas, rows)
         raised = np.concatenate(self._views.warnings).reshape(self.n, -1)
         self.broken = np.any(raised[:, BAD_STATE] > 0, axis=1)
         self._gather_all()
+
+    def sensed(self) -> tuple[Float[np.ndarray, "N nq"], Float[np.ndarray, "N nv"]]:
+        """qpos and qvel as the sensors tell them."""
+        return self._disturbances.sense(self.qpos, self.qvel)
 
     def reference_angles(self, step: ClipStep) -> Float[np.ndarray, "N nu"]:
         """Target hinge angles that follow a reference step with nothing learnt, rad."""
@@ -146,17 +167,6 @@ class Simulation:
         if self._pool is not None:
             self._pool.shutdown()
 
-    def _vary(self, random: RandomConfig, rng: np.random.Generator) -> None:
-        """Give every copy a model and gains of its own."""
-        self._models = [copy.copy(self.model) for _ in range(self.n)]
-        for i, model in enumerate(self._models):
-            model.geom_friction[:] *= 1 + random.friction * rng.uniform(-1, 1)
-            if random.integrators:
-                chosen = random.integrators[i % len(random.integrators)]
-                model.opt.integrator = integrator_of(chosen)
-        factor = 1 + random.gains * rng.uniform(-1, 1, (self.n, 1))
-        self.kp, self.kd = self.kp * factor, self.kd * factor
-
     def _batches(self, lo: int, hi: int) -> list[tuple[int, int, Batch]]:
         """The copies of one thread, a batch at a time."""
         found = []
@@ -164,14 +174,17 @@ class Simulation:
             past = min(first + SIZE, hi)
             kp, kd = (k[first:past] if k.ndim > 1 else k for k in (self.kp, self.kd))
             models, datas = self._models[first:past], self.datas[first:past]
-            found.append((first, past, Batch(models, datas, self.motors, self.control, kp, kd)))
+            late = self._delay[first:past]
+            batch = Batch(models, datas, self.motors, self.control, kp, kd, late)
+            found.append((first, past, batch))
         return found
 
     def _advance(
         self, batches: list[tuple[int, int, Batch]], targets: np.ndarray, rows: np.ndarray
     ) -> None:
         for lo, hi, batch in batches:
-            batch.advance(targets[lo:hi], rows[lo:hi], self.com[lo:hi])
+            slices = (targets[lo:hi], rows[lo:hi], self.com[lo:hi], self.previous[lo:hi])
+            batch.advance(*slices)
 
     def _gather(self, indices: np.ndarray) -> None:
         for i in indices:

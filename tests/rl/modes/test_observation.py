@@ -65,6 +65,7 @@ def test_turning_robot_and_reference_together_changes_nothing_onboard(
     np.testing.assert_allclose(*found, atol=1e-5)
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("name", ["sbx", "sb3"])
 def test_the_actor_never_weighs_what_only_the_critics_see(
     robot: Robot, sway: ReferenceMotion, name: str
@@ -81,6 +82,7 @@ def test_the_actor_never_weighs_what_only_the_critics_see(
     env.close()
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("name", ["sbx", "sb3"])
 def test_a_policy_of_such_a_training_takes_the_onboard_numbers(
     robot: Robot, sway: ReferenceMotion, tmp_path: Path, name: str

@@ -1,0 +1,132 @@
+"""The passport of a policy: how well it dances under other physics than it was trained with.
+
+Each case changes one thing: friction, masses, gains, delay, sensors, pushes, time step, integrator.
+24 phases without a second reset and the default stand; the same judgement as an evaluation.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.rl.config.train_config import EvaluateConfig, RandomConfig
+from robojackson.rl.evaluation.controllers import trained_driver
+from robojackson.rl.evaluation.rollout_records import RolloutScorer
+from robojackson.rl.evaluation.rollouts import Conditions, roll_out
+from robojackson.rl.evaluation.starts import starts_of, summarise
+from robojackson.rl.policy import Policy
+from robojackson.rl.sim.reference_clip import Clip
+from robojackson.rl.sim.variation import Variation, varied
+from robojackson.robot.fall import Fall
+from robojackson.robot.model import Robot
+from robojackson.robot.physics import substeps_of
+
+ROBUST = RandomConfig(
+    friction=0.5, gains=0.2, mass=0.1, com=0.02, delay=0.02, sensor_noise=1.0, pushes=1.0
+)
+"""What `train --robust` draws from."""
+ROBUST_FIELDS = ("friction", "gains", "mass", "com", "delay", "sensor_noise", "pushes")
+NOMINAL = "nominal"
+KEPT_SHARE = 0.9
+"""Of the nominal strict success that a robust policy keeps in every case."""
+FIGURES = ("strict_success", "success", "skill", "survived_s", "site_error_m")
+TIMESTEPS_S = (0.0015, 0.002, 0.004, 0.005)
+INTEGRATORS = ("Euler", "implicitfast", "RK4")
+DELAYS_S = (0.01, 0.02)
+
+
+def robust_settings() -> dict[str, Any]:
+    """The same as overrides of a training's configuration."""
+    return {f"track.random.{name}": getattr(ROBUST, name) for name in ROBUST_FIELDS}
+
+
+@dataclass(frozen=True)
+class Case:
+    """One line of a passport: a name and what is different."""
+
+    name: str
+    variation: Variation = field(default_factory=Variation)
+    conditions: Conditions = field(default_factory=Conditions)
+
+
+def cases(robot: Robot, seed: int) -> list[Case]:
+    """All lines for a robot, the nominal one first."""
+    return [Case(NOMINAL), *_bodies(), *_stepping(robot), *_signals(robot, seed)]
+
+
+def _bodies() -> Iterator[Case]:
+    for factor in (0.5, 1.5):
+        yield Case(f"friction x {factor:g}", Variation(friction=factor))
+    for factor in (0.9, 1.1):
+        yield Case(f"mass x {factor:g}", Variation(mass=factor))
+    for axis, name in enumerate(("forward", "left")):
+        for shift in (-0.02, 0.02):
+            offset = (shift, 0.0, 0.0) if axis == 0 else (0.0, shift, 0.0)
+            yield Case(f"centre of mass {1e3 * shift:+.0f} mm {name}", Variation(com=offset))
+    for factor in (0.8, 1.2):
+        yield Case(f"gains x {factor:g}", Variation(gains=factor))
+
+
+def _stepping(robot: Robot) -> Iterator[Case]:
+    own, control_dt = float(robot.model.opt.timestep), robot.description.control_dt
+    for timestep in TIMESTEPS_S:
+        if substeps_of(control_dt, timestep) is not None and abs(timestep - own) > 1e-9:
+            yield Case(f"time step {1e3 * timestep:g} ms", Variation(timestep=timestep))
+    for name in INTEGRATORS:
+        yield Case(f"integrator {name}", Variation(integrator=name))  # type: ignore[arg-type]
+
+
+def _signals(robot: Robot, seed: int) -> Iterator[Case]:
+    for delay in DELAYS_S:
+        late = min(delay, robot.description.control_dt)
+        yield Case(f"action {1e3 * late:g} ms late", conditions=Conditions(delay_s=late))
+    noise, pushes = RandomConfig(sensor_noise=1.0), RandomConfig(pushes=1.0)
+    yield Case("sensor noise", conditions=Conditions(noise, seed=seed))
+    yield Case("pushes every 1 to 3 s", conditions=Conditions(pushes, seed=seed))
+
+
+def passport(
+    policy: Policy,
+    reference: ReferenceMotion,
+    robot: Robot,
+    config: EvaluateConfig,
+    progress: Callable[[str, int, int], None] = lambda name, step, total: None,
+) -> list[dict[str, Any]]:
+    """Evaluate a policy under every case.
+
+    Returns:
+        A row a case: `case`, the figures of `FIGURES`, and `kept`, the share of the nominal
+        strict success (None where that is zero).
+
+    Raises:
+        BadPolicy: the policy's observation does not fit this robot.
+    """
+    config = replace(config, resets=1)
+    rows: list[dict[str, Any]] = []
+    every = cases(robot, config.seed)
+    for number, case in enumerate(every):
+        progress(case.name, number, len(every))
+        rows.append({"case": case.name, **_judged(policy, reference, robot, config, case)})
+    nominal = rows[0]["strict_success"]
+    for row in rows:
+        row["kept"] = row["strict_success"] / nominal if nominal else None
+    return rows
+
+
+def _judged(
+    policy: Policy, reference: ReferenceMotion, robot: Robot, config: EvaluateConfig, case: Case
+) -> dict[str, float]:
+    """Means over the rollouts of a case; the driver's gains are the varied robot's."""
+    other, clip = varied(robot, case.variation), Clip(reference)
+    driver = trained_driver(policy, robot)
+    driver = replace(driver, control=replace(driver.control, substeps=other.substeps))
+    starts, labels = starts_of(robot, clip, config)
+    horizon = clip.horizon(starts.step, config.seconds)
+    done = roll_out(
+        other, clip, driver, starts, horizon, config.threads, Fall.of(robot),
+        conditions=case.conditions,
+    )  # fmt: skip
+    judge = RolloutScorer(robot, reference, config)
+    rows = [judge.row("trained", label, done, i) for i, label in enumerate(labels)]
+    figures = summarise(rows)
+    return {name: figures[name] for name in FIGURES}

@@ -1,0 +1,65 @@
+"""The passport: one line a case, each of which changes what it says."""
+
+import numpy as np
+
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.pipeline.yaml_loader import load
+from robojackson.report.pages.run_page import passport_rows
+from robojackson.rl.config.train_config import EvaluateConfig, TrainConfig
+from robojackson.rl.evaluation.passport import NOMINAL, ROBUST, cases, passport, robust_settings
+from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
+from robojackson.rl.modes.observation import Observer
+from robojackson.rl.policy import Policy
+from robojackson.robot.model import Robot
+
+BRIEF = EvaluateConfig(seconds=0.3, phases=2, resets=1, passport=True)
+
+
+def idle(robot: Robot) -> Policy:
+    nothing = (np.zeros((Observer(robot, "full").size, robot.model.nu)), np.zeros(robot.model.nu))
+    return Policy((nothing,), {"robot": "humanoid", "control": {"law": "pd"}})
+
+
+def seeing(robot: Robot) -> Policy:
+    """A policy whose action depends a little on all that it sees."""
+    shape = (Observer(robot, "full").size, robot.model.nu)
+    weights = 0.01 * np.random.default_rng(0).normal(size=shape)
+    return Policy(((weights, np.zeros(robot.model.nu)),), idle(robot).facts)
+
+
+def test_every_case_differs_from_the_nominal_one(robot: Robot) -> None:
+    found = cases(robot, 0)
+    assert found[0].name == NOMINAL
+    assert len({case.name for case in found}) == len(found)
+    plain = found[0]
+    for case in found[1:]:
+        assert (case.variation, case.conditions) != (plain.variation, plain.conditions), case.name
+
+
+def test_an_evaluation_with_a_passport_has_a_row_a_case(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    verdict = evaluate_policy(idle(robot), sway, robot, BRIEF)
+    rows = verdict.summary["passport"]
+    assert [row["case"] for row in rows] == [case.name for case in cases(robot, 0)]  # type: ignore[attr-defined]
+    shown = passport_rows(verdict.summary)
+    assert len(shown) == len(rows)  # type: ignore[arg-type]
+    assert shown[0].trained
+
+
+def test_slippery_floor_and_late_actions_change_the_outcome(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    config = EvaluateConfig(seconds=1.0, phases=4, resets=1)
+    rows = {
+        row["case"]: row["site_error_m"] for row in passport(seeing(robot), sway, robot, config)
+    }
+    nominal = rows.pop(NOMINAL)
+    same = [case for case, error in rows.items() if error == nominal]
+    # The robot's own integrator, and pushes that come after a second.
+    assert same == ["integrator RK4", "pushes every 1 to 3 s"]
+
+
+def test_train_robust_sets_what_the_passport_asks() -> None:
+    config = load(TrainConfig, None, robust_settings())
+    assert config.track.random == ROBUST

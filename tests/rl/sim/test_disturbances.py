@@ -1,0 +1,104 @@
+"""Varied physics, late actions, noisy sensors and pushes."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from robojackson.errors import BadConfiguration
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.rl.config.train_config import ControlConfig, RandomConfig, TrackConfig
+from robojackson.rl.env.tracking_core import TrackingCore
+from robojackson.rl.sim.disturbances import PUSH, PUSH_EVERY_S
+from robojackson.rl.sim.simulation import Simulation
+from robojackson.rl.sim.variation import Variation, varied
+from robojackson.robot.model import Robot
+
+N = 4
+
+
+def placed(robot: Robot, random: RandomConfig, delay_s: float = 0.0, seed: int = 0) -> Simulation:
+    sim = Simulation(robot, ControlConfig(), N, random=random, seed=seed, delay_s=delay_s)
+    qpos = np.tile(robot.standing, (N, 1))
+    sim.place(np.arange(N), qpos, np.zeros((N, robot.model.nv)))
+    return sim
+
+
+def test_a_heavier_robot_weighs_more_and_the_stock_one_stays(robot: Robot) -> None:
+    stock = robot.model.body_mass.sum()
+    heavy = varied(robot, Variation(mass=1.1, friction=0.5, com=(0.02, 0.0, 0.0)))
+    assert heavy.model.body_mass.sum() == pytest.approx(1.1 * stock)
+    np.testing.assert_allclose(heavy.model.geom_friction, 0.5 * robot.model.geom_friction)
+    root = robot.model.body(robot.description.root_body).id
+    moved = heavy.model.body_ipos[root] - robot.model.body_ipos[root]
+    np.testing.assert_allclose(moved, [0.02, 0.0, 0.0])
+    assert robot.model.body_mass.sum() == stock
+    ratio = heavy.model.dof_invweight0[0] / robot.model.dof_invweight0[0]
+    assert ratio == pytest.approx(1 / 1.1, rel=0.05), "what follows from masses is computed anew"
+
+
+def test_another_time_step_keeps_the_control_step(robot: Robot) -> None:
+    fine = varied(robot, Variation(timestep=0.0015))
+    assert fine.substeps == 10
+    with pytest.raises(BadConfiguration, match="divide"):
+        varied(robot, Variation(timestep=0.004))
+
+
+def test_an_action_that_comes_a_control_step_late_is_the_one_before(robot: Robot) -> None:
+    """Late by a whole step, the robot does what a prompt one does with the older targets."""
+    late, prompt = (placed(robot, RandomConfig(), delay) for delay in (0.015, 0.0))
+    hold = np.tile(robot.standing[7:][late.motors.hinge], (N, 1))
+    rng = np.random.default_rng(0)
+    targets = hold + rng.uniform(-0.2, 0.2, (3, *hold.shape))
+    for now, before in zip(targets, [hold, *targets[:-1]], strict=True):
+        late.step(now)
+        prompt.step(before)
+        np.testing.assert_allclose(late.qpos, prompt.qpos, atol=1e-12)
+
+
+def test_noise_is_within_its_bounds_and_the_same_within_a_step(robot: Robot) -> None:
+    sim = placed(robot, RandomConfig(sensor_noise=1.0))
+    qpos, qvel = sim.sensed()
+    np.testing.assert_array_equal(qpos, sim.sensed()[0])
+    off = np.abs(qpos[:, 7:] - sim.qpos[:, 7:])
+    assert 0 < off.max() <= 0.01
+    assert 0 < np.abs(qvel[:, 6:] - sim.qvel[:, 6:]).max() <= 0.5
+    np.testing.assert_array_equal(qpos[:, :3], sim.qpos[:, :3])
+    np.testing.assert_allclose(np.linalg.norm(qpos[:, 3:7], axis=1), 1.0)
+
+
+def test_without_noise_sensors_tell_the_truth(robot: Robot) -> None:
+    sim = placed(robot, RandomConfig())
+    assert sim.sensed()[0] is sim.qpos
+
+
+def test_pushes_come_every_one_to_three_seconds(robot: Robot) -> None:
+    """A push changes the root's velocity by more than a step does, never beyond mjlab's bounds."""
+    calm, pushed = (placed(robot, RandomConfig(pushes=p)) for p in (0.0, 1.0))
+    hold = np.tile(robot.standing[7:][calm.motors.hinge], (N, 1))
+    times = []
+    for step in range(int(3.2 / calm.dt)):
+        before = pushed.push_at.copy()
+        pushed.step(hold)
+        times += [(step + 1) * calm.dt] * int((pushed.push_at != before).sum())
+    first = sorted(times)[:N]
+    assert PUSH_EVERY_S[0] - 0.02 <= first[0]
+    assert len(times) >= N
+    assert max(PUSH) < 1.0
+
+
+def test_a_resumed_environment_goes_on_with_the_same_disturbances(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    random = RandomConfig(sensor_noise=1.0, pushes=1.0, delay=0.01, mass=0.1)
+    config = dataclasses.replace(TrackConfig(), random=random)
+    first, second = (TrackingCore(robot, sway, config, N, 3) for _ in range(2))
+    actions = np.random.default_rng(1).uniform(-0.3, 0.3, (120, N, robot.model.nu))
+    first.reset()
+    for action in actions[:60]:
+        first.step(action)
+    second.restore(first.state())
+    second.rng.bit_generator.state = first.rng.bit_generator.state
+    for action in actions[60:]:
+        seen, again = first.step(action).observation, second.step(action).observation
+        np.testing.assert_array_equal(seen, again)
