@@ -69,6 +69,20 @@ def certify(
     )
 
 
+def motor_torques(
+    robot: Robot,
+    qpos: Float[np.ndarray, "S nq"],
+    dt: float,
+    cycle_offset: np.ndarray | None,
+    tolerance: Tolerance,
+) -> Float[np.ndarray, "S J"]:
+    """Torque of every hinge's motor that the motion asks for, within its limit, Nm."""
+    force = inverse_dynamics.free_space(robot, qpos, dt, cycle_offset).at(1.0)
+    near = inverse_dynamics.touching(robot, qpos)
+    asked = inverse_dynamics.demand(robot, qpos, force, near, tolerance)
+    return _motor_torque(asked, contact_wrench.supply(asked))
+
+
 def fallen(robot: Robot, qpos: Float[np.ndarray, "S nq"]) -> Bool[np.ndarray, " S"]:
     """Steps that the fall rule ends."""
     return np.array([failure is not None for failure in _falls(robot, qpos)])

@@ -15,6 +15,7 @@ from robojackson.rl.evaluation.rollout_records import RolloutScorer
 from robojackson.rl.evaluation.rollouts import Conditions, roll_out
 from robojackson.rl.evaluation.starts import starts_of, summarise
 from robojackson.rl.policy import Policy
+from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.variation import Variation, varied
 from robojackson.robot.fall import Fall
@@ -117,8 +118,8 @@ def _judged(
     policy: Policy, reference: ReferenceMotion, robot: Robot, config: EvaluateConfig, case: Case
 ) -> dict[str, float]:
     """Means over the rollouts of a case; the driver's gains are the varied robot's."""
-    other, clip = varied(robot, case.variation), Clip(reference)
-    driver = trained_driver(policy, robot)
+    other, driver = varied(robot, case.variation), trained_driver(policy, robot)
+    clip = Clip(reference, lead_of(robot, reference, driver.control))
     driver = replace(driver, control=replace(driver.control, substeps=other.substeps))
     starts, labels = starts_of(robot, clip, config)
     horizon = clip.horizon(starts.step, config.seconds)

@@ -33,6 +33,7 @@ from robojackson.rl.evaluation.starts import starts_of, summarise
 from robojackson.rl.evaluation.verdict import verdict_on, without_unjudged
 from robojackson.rl.modes.paper_mode import facing_ahead
 from robojackson.rl.policy import Policy
+from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.simulation import control_step, require_same_clock
 from robojackson.robot.fall import Fall
@@ -79,7 +80,7 @@ def evaluate_policy(
     environment = environment_of(policy, control)
     if isinstance(environment, PaperConfig):
         reference = facing_ahead(reference)
-    clip = Clip(reference)
+    clip = Clip(reference, lead_of(robot, reference, control))
     starts, labels = starts_of(robot, clip, config)
     horizon = clip.horizon(starts.step, config.seconds)
     judge, meter = (

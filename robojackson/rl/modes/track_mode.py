@@ -35,6 +35,7 @@ from robojackson.rl.modes.rewards import (
     tracked_points,
     tracking_errors,
 )
+from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.reference_clip import Clip, ClipStep
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.robot.fall import Fall
@@ -59,7 +60,8 @@ class TrackMode:
         seed: int,
         rewards: Mapping[str, RewardFunction] = MappingProxyType({}),
     ) -> None:
-        self._config, self.clip, self._rewards = config, Clip(reference), rewards
+        self._config, self._rewards = config, rewards
+        self.clip = Clip(reference, lead_of(robot, reference, config.control))
         names = robot.keypoint_names
         self._which = tracked_points(names)
         self.sim = Simulation(robot, config.control, n, config.threads, config.random, seed)

@@ -22,6 +22,7 @@ class ClipStep:
     Attributes:
         moved: Velocities of the points, m/s.
         phase: 0..1 of the clip.
+        lead: Offset of the motors' targets from the reference's angles, rad; None without one.
     """
 
     step: Int[np.ndarray, " N"]
@@ -30,16 +31,22 @@ class ClipStep:
     points: Float[np.ndarray, "N K 3"]
     moved: Float[np.ndarray, "N K 3"]
     phase: Float[np.ndarray, " N"]
+    lead: Float[np.ndarray, "N nu"] | None = None
 
 
 class Clip:
     """Random access to a reference motion by step.
 
+    Args:
+        lead: Offset of the motors' targets from the reference's angles at every step, rad.
+
     Raises:
         TrackTooShort, RejectedReference: too few steps, or values that are no numbers.
     """
 
-    def __init__(self, reference: ReferenceMotion) -> None:
+    def __init__(
+        self, reference: ReferenceMotion, lead: Float[np.ndarray, "S nu"] | None = None
+    ) -> None:
         if len(reference) < LEAST_STEPS:
             raise TrackTooShort(
                 f"the reference motion has {len(reference)} steps, {LEAST_STEPS} are the least"
@@ -51,6 +58,7 @@ class Clip:
         self._qvel = np.asarray(reference.qvel, float)
         self._points = np.asarray(reference.keypoints_w, float)
         self._offset = np.asarray(reference.cycle_offset, float)
+        self._lead = lead
         self._moved = self._velocities()
         self._last: ClipStep | None = None
 
@@ -70,7 +78,7 @@ class Clip:
         arrays = qpos, self._qvel[index], points, self._moved[index], index / self.steps
         for array in arrays:
             array.setflags(write=False)
-        return ClipStep(step, *arrays)
+        return ClipStep(step, *arrays, None if self._lead is None else self._lead[index])
 
     def gather(
         self, values: Float[np.ndarray, "S P 3"], step: Int[np.ndarray, " N"]

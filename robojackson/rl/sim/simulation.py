@@ -160,7 +160,8 @@ class Simulation:
 
     def reference_angles(self, step: ClipStep) -> Float[np.ndarray, "N nu"]:
         """Target hinge angles that follow a reference step with nothing learnt, rad."""
-        return step.qpos[:, 7:][:, self.motors.hinge]
+        angles: np.ndarray = step.qpos[:, 7:][:, self.motors.hinge]
+        return angles if step.lead is None else angles + step.lead
 
     def close(self) -> None:
         """Stop the threads."""

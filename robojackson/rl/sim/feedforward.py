@@ -1,0 +1,31 @@
+"""Feed-forward: targets that lead the reference by what its own torques bend a PD law.
+
+A PD law holds a torque tau at a speed v only with its target at q + (tau + kd v) / kp. With soft
+gains that is as much as a policy may add; the certificate (`retarget.feasibility`) knows the torque.
+Radians, newton-metres; actuator order.
+"""
+
+import numpy as np
+from jaxtyping import Float
+
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.retarget.feasibility.certification import motor_torques
+from robojackson.retarget.feasibility.contact_wrench import Tolerance
+from robojackson.rl.config.train_config import ControlConfig
+from robojackson.rl.sim.motors import Motors, gains
+from robojackson.robot.model import Robot
+
+
+def lead_of(
+    robot: Robot, reference: ReferenceMotion, control: ControlConfig
+) -> Float[np.ndarray, "S nu"] | None:
+    """Offsets of the motors' targets at every step of the reference; None without feed-forward."""
+    if not control.feedforward:
+        return None
+    offset = np.asarray(reference.cycle_offset, float) if reference.cyclic else None
+    qpos, hinge = np.asarray(reference.qpos, float), Motors.of(robot.model).hinge
+    torque = motor_torques(robot, qpos, reference.dt, offset, Tolerance())[:, hinge]
+    kp, kd = gains(robot, control)
+    speed = np.asarray(reference.qvel, float)[:, 6:][:, hinge]
+    result: np.ndarray = control.feedforward * (torque + kd * speed) / kp
+    return result

@@ -1,0 +1,56 @@
+"""Feed-forward: the PD law gives the torque that the reference asks for."""
+
+import numpy as np
+import pytest
+
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.retarget.feasibility.certification import certify, motor_torques
+from robojackson.retarget.feasibility.contact_wrench import Tolerance
+from robojackson.rl.config.train_config import ControlConfig
+from robojackson.rl.evaluation.rollouts import Driver, Starts, roll_out
+from robojackson.rl.sim.feedforward import lead_of
+from robojackson.rl.sim.motors import Motors, gains
+from robojackson.rl.sim.reference_clip import Clip
+from robojackson.robot.fall import Fall
+from robojackson.robot.model import Robot
+
+AHEAD = ControlConfig(feedforward=1.0)
+
+
+def torques(robot: Robot, sway: ReferenceMotion) -> np.ndarray:
+    offset = np.asarray(sway.cycle_offset, float)
+    return motor_torques(robot, np.asarray(sway.qpos, float), sway.dt, offset, Tolerance())
+
+
+def test_the_torques_are_those_of_the_certificate(robot: Robot, sway: ReferenceMotion) -> None:
+    qpos, offset = np.asarray(sway.qpos, float), np.asarray(sway.cycle_offset, float)
+    ratio = certify(robot, qpos, sway.dt, offset, Tolerance()).torque_ratio
+    own = np.abs(torques(robot, sway)) / robot.torque_limit
+    np.testing.assert_allclose(own[:, robot.actuated], ratio)
+
+
+def test_on_the_reference_the_pd_law_gives_its_torque(robot: Robot, sway: ReferenceMotion) -> None:
+    lead, hinge = lead_of(robot, sway, AHEAD), Motors.of(robot.model).hinge
+    assert lead is not None
+    kp, kd = gains(robot, AHEAD)
+    speed = np.asarray(sway.qvel)[:, 6:][:, hinge]
+    np.testing.assert_allclose(kp * lead - kd * speed, torques(robot, sway)[:, hinge], atol=1e-9)
+
+
+def test_without_it_nothing_leads(robot: Robot, sway: ReferenceMotion) -> None:
+    assert lead_of(robot, sway, ControlConfig()) is None
+
+
+@pytest.mark.parametrize("share", [1.0])
+def test_a_replay_keeps_closer_to_the_reference(
+    robot: Robot, sway: ReferenceMotion, share: float
+) -> None:
+    errors = []
+    for control in (ControlConfig(), ControlConfig(feedforward=share)):
+        clip = Clip(sway, lead_of(robot, sway, control))
+        at = clip.at(np.zeros(1, int))
+        replay = Driver(control, lambda sim, following, *rest: sim.reference_angles(following))
+        starts = Starts(np.zeros(1, int), at.qpos, at.qvel)
+        done = roll_out(robot, clip, replay, starts, np.full(1, 30), 1, Fall.of(robot))
+        errors.append(np.abs(done.qpos[..., 7:] - done.target_qpos[..., 7:]).mean())
+    assert errors[1] < 0.7 * errors[0]
