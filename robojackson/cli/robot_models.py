@@ -21,9 +21,9 @@ from robojackson.errors import BadConfiguration, DownloadFailed, RoboJacksonErro
 from robojackson.files.local_folder import sha256_of_file
 from robojackson.pipeline.robot_descriptions import describe_robot, robot_names
 from robojackson.robot.description import RobotDescription, RobotSource
-from robojackson.robot.mjcf import mjcf_path, robots_folder
+from robojackson.robot.mjcf import added_folder, mjcf_path
 
-_ROOM_MB = 120
+_ROOM_MB = 200
 
 
 def list_robots() -> list[dict[str, Any]]:
@@ -48,7 +48,7 @@ def add_robot(name: str) -> dict[str, Any]:
         StoreError: The store is full or cannot be written.
     """
     description = describe_robot(name)
-    source, folder = description.source, robots_folder() / description.name
+    source, folder = description.source, added_folder(description)
     if source is None:
         raise BadConfiguration(f"robot {name!r} needs nothing: {mjcf_path(description)} is here")
     try:

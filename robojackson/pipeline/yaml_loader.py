@@ -2,8 +2,8 @@
 
 A name such as `smoke` or `robots/humanoid` is a file of the user's `./configs` (or of the folder
 that ROBOJACKSON_CONFIGS names), else of the shipped ones; whatever has a YAML suffix is a path.
-YAML is read as version 1.2 does it: `yes`, `no`, `on` and `off` are words, and a key that stands
-twice is an error.
+A file with `extends: robots/g1` begins with the keys of that one; a key of its own replaces the
+whole of the other's. YAML is read as version 1.2 does it (`yaml_scalars`).
 """
 
 import difflib
@@ -19,10 +19,12 @@ from pydantic import TypeAdapter, ValidationError
 
 from robojackson.errors import BadConfiguration, ConflictingValues, UnknownName
 from robojackson.pipeline.app_folder import CONFIGS, app_folder
+from robojackson.pipeline.yaml_scalars import Yaml12
 
 Config = TypeVar("Config")
 SHIPPED = app_folder() / "configs"
 SUFFIXES = (".yaml", ".yml")
+EXTENDS = "extends"
 
 
 def load(
@@ -39,7 +41,7 @@ def load(
         BadConfiguration: an unknown key, a wrong value, or no YAML.
     """
     path = None if name_or_path is None else find(name_or_path)
-    values = _read(path) if path else {}
+    values, places = _read_extended(path) if path else ({}, {})
     given = {
         key_path: _parsed(value, f"--set {key_path}")
         for key_path, value in (overrides or {}).items()
@@ -50,6 +52,7 @@ def load(
     try:
         return TypeAdapter(cls).validate_python(values)
     except ValidationError as cause:
+        where = places.get((*_keys(cause), "")[0], where)
         key = ".".join([*_keys(cause), ""])
         blamed = [g for g in given if key.startswith(f"{g}.") or f"{g}.".startswith(key)]
         if blamed:  # of several values that do not go together, those in question
@@ -109,50 +112,23 @@ def _display_name(path: Path) -> str:
     return f"configs/{path.relative_to(SHIPPED).as_posix()}" if inside else str(path)
 
 
-class _Yaml12(yaml.SafeLoader):
-    """SafeLoader with the scalars of YAML 1.2, in which 010 is ten and nothing a date, and no
-    doubled keys."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        seen: set[Any] = set()
-        for key_node, _ in node.value:
-            key = self.construct_object(key_node, deep=True)
-            if key in seen:
-                raise yaml.constructor.ConstructorError(
-                    None, None, f"key {key!r} stands twice", key_node.start_mark
-                )
-            seen.add(key)
-        result: dict[Any, Any] = super().construct_mapping(node, deep)
-        return result
-
-
-BASES = {"0o": 8, "0x": 16}
-REDEFINED = (":bool", ":float", ":int", ":timestamp")
-_Yaml12.yaml_implicit_resolvers = {
-    first: [(tag, pattern) for tag, pattern in rules if not tag.endswith(REDEFINED)]
-    for first, rules in yaml.SafeLoader.yaml_implicit_resolvers.items()
-}
-_Yaml12.add_implicit_resolver(
-    "tag:yaml.org,2002:bool", re.compile(r"^(?:true|True|TRUE|false|False|FALSE)$"), list("tTfF")
-)
-_Yaml12.add_implicit_resolver(
-    "tag:yaml.org,2002:float",
-    re.compile(r"^[-+]?(?:(?:\d+\.\d*|\.\d+)(?:[eE][-+]?\d+)?|\d+[eE][-+]?\d+|\.inf|\.nan)$"),
-    list("-+0123456789."),
-)
-_Yaml12.add_implicit_resolver(
-    "tag:yaml.org,2002:int",
-    re.compile(r"^(?:[-+]?\d+|0o[0-7]+|0x[0-9a-fA-F]+)$"),
-    list("-+0123456789"),
-)
-
-
-def _integer(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> int:
-    text = str(loader.construct_scalar(node))
-    return int(text, BASES.get(text[:2], 10))
-
-
-_Yaml12.add_constructor("tag:yaml.org,2002:int", _integer)
+def _read_extended(
+    path: Path, below: tuple[Path, ...] = ()
+) -> tuple[dict[str, Any], dict[str, str]]:
+    """The values of a file over those of the one that it extends, and the file of each key."""
+    values, place = _read(path), _display_name(path)
+    base, places = values.pop(EXTENDS, None), dict.fromkeys(values, place)
+    if base is None:
+        return values, places
+    below = (*below, path.resolve())
+    try:
+        file = find(path.parent / base if Path(base).suffix in SUFFIXES else base)
+    except (TypeError, UnknownName) as cause:
+        raise BadConfiguration(f"{place}: {EXTENDS} is {base!r}: {cause}") from cause
+    if file.resolve() in below:
+        raise BadConfiguration(f"{place}: {EXTENDS} is {base!r}, which extends this file")
+    other, origins = _read_extended(file, below)
+    return other | values, origins | places
 
 
 def _read(path: Path) -> dict[str, Any]:
@@ -173,7 +149,7 @@ def _parsed(value: Any, where: str) -> Any:
     if not isinstance(value, str):
         return value
     try:
-        return yaml.load(value, Loader=_Yaml12)
+        return yaml.load(value, Loader=Yaml12)
     except (yaml.YAMLError, ValueError, TypeError, RecursionError) as cause:
         raise BadConfiguration(f"{where}: {' '.join(str(cause).split())}") from cause
 

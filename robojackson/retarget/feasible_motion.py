@@ -9,7 +9,7 @@ import logging
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from robojackson.metrics.retarget_error import keypoint_error_mm
 from robojackson.retarget.feasibility import tempo
@@ -37,18 +37,32 @@ class Feasible:
         qpos: At the control step.
         aims: Targets at its steps.
         steps: Fractional step of the motion before that each step shows.
+        clip: Steps of that motion that are the clip's; the others are tails.
     """
 
     qpos: Float[np.ndarray, "S nq"]
     aims: Targets
     steps: Float[np.ndarray, " S"]
+    clip: slice
+
+    @property
+    def danced(self) -> Bool[np.ndarray, " S"]:
+        """Steps that show the clip: tails would dilute the share of those that are feasible."""
+        first, past = self.clip.start, self.clip.stop
+        result: np.ndarray = (self.steps > first - 0.5) & (self.steps < past - 0.5)
+        return result
 
 
 def make_feasible(
-    robot: Robot, qpos: Float[np.ndarray, "S nq"], aims: Targets, config: RetargetConfig
+    robot: Robot,
+    qpos: Float[np.ndarray, "S nq"],
+    aims: Targets,
+    config: RetargetConfig,
+    clip: slice | None = None,
 ) -> Feasible:
     """Repair a motion; slow it down where its tempo is free and that helps."""
-    given = Feasible(qpos, aims, np.arange(len(qpos), dtype=float))
+    whole = slice(0, len(qpos))
+    given = Feasible(qpos, aims, np.arange(len(qpos), dtype=float), clip or whole)
     how = config.repair
     if not how.weights or feasible_share(robot, given, config) >= how.target_share:
         return given
@@ -67,13 +81,13 @@ def make_feasible(
 def feasible_share(robot: Robot, motion: Feasible, config: RetargetConfig) -> float:
     """Share of feasible steps."""
     slack = _slack(robot, motion, config, tempo.GRID[:1])
-    return float((slack[0] <= 1.0).mean())
+    return float((slack[0, motion.danced] <= 1.0).mean())
 
 
 def _excess(robot: Robot, motion: Feasible, config: RetargetConfig) -> float:
     """Mean slack beyond the tolerance; one lost step counts as three tolerances."""
     slack = _slack(robot, motion, config, tempo.GRID[:1])
-    return float(np.clip(slack - 1.0, 0.0, 3.0).mean())
+    return float(np.clip(slack[:, motion.danced] - 1.0, 0.0, 3.0).mean())
 
 
 def _slack(robot: Robot, motion: Feasible, config: RetargetConfig, grid: np.ndarray) -> np.ndarray:
@@ -97,7 +111,7 @@ def _slowed(robot: Robot, motion: Feasible, config: RetargetConfig) -> Feasible 
     """
     aims = motion.aims
     slack = _slack(robot, motion, config, tempo.GRID)
-    if (slack[0] <= 1.0).mean() >= config.repair.target_share:
+    if (slack[0, motion.danced] <= 1.0).mean() >= config.repair.target_share:
         return None
     rate = tempo.smooth_rate(tempo.required_rate(slack), aims.dt, aims.cycle_offset is not None)
     so_far = np.gradient(motion.steps).clip(max=1.0)
@@ -110,6 +124,7 @@ def _slowed(robot: Robot, motion: Feasible, config: RetargetConfig) -> Feasible 
         qpos=clip_to_limits(robot, resample(motion.qpos, steps, aims.cycle_offset)),
         aims=tempo.warped(aims, steps),
         steps=tempo.times_at(motion.steps, steps),
+        clip=motion.clip,
     )
     solved = _solved(robot, slower, config.repair.weights[0], config)
     kept = _accepted(robot, slower, solved, config)

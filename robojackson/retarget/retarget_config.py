@@ -8,6 +8,7 @@ from robojackson.config import config_dataclass
 from robojackson.retarget.solver.clip_problem import Weights
 from robojackson.retarget.solver.levenberg_marquardt import SolverConfig
 from robojackson.retarget.targets.cycle import CycleConfig
+from robojackson.retarget.targets.tails import TailConfig
 
 
 @config_dataclass
@@ -51,6 +52,7 @@ class RetargetConfig:
         jump_bar_m_s2: Largest acceleration of a keypoint that is taken for a movement, m/s2, where
             the clip's own are not half as large; beyond it limbs have passed through each other,
             and another start is tried.
+        tails: Stands before and after a motion that does not repeat.
         cycle, weights, solver, repair: Of the stages.
     """
 
@@ -64,6 +66,7 @@ class RetargetConfig:
     depth_bar_m: float = Field(default=0.0045, gt=0)
     slip_bar_m_s: float = Field(default=0.007, gt=0)
     jump_bar_m_s2: float = Field(default=300.0, gt=0)
+    tails: TailConfig = Field(default_factory=TailConfig)
     cycle: CycleConfig = Field(default_factory=CycleConfig)
     weights: Weights = Field(default_factory=Weights)
     solver: SolverConfig = Field(default_factory=SolverConfig)

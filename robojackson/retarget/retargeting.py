@@ -6,11 +6,14 @@ same with the axes and signs of the hinges corrected.
 """
 
 import logging
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from robojackson.metrics.retarget_error import jerk
+from robojackson.motion.certificate import Certificate
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.retarget import paper_mapping
@@ -20,16 +23,23 @@ from robojackson.retarget.feasibility.tempo import times_at, warped
 from robojackson.retarget.feasible_motion import Feasible, make_feasible
 from robojackson.retarget.retarget_config import RetargetConfig
 from robojackson.retarget.scorecard import hovers, score
-from robojackson.retarget.scorecard_gate import BARS
+from robojackson.retarget.scorecard_gate import BARS, failures
 from robojackson.retarget.targets.cycle import Cycle, human_clip
 from robojackson.retarget.targets.human_clip import HumanClip
 from robojackson.retarget.targets.keypoint_targets import Targets, targets
+from robojackson.retarget.targets.tails import Tailed, settled, some_of, with_tails
 from robojackson.retarget.whole_clip import optimise, polished
 from robojackson.robot.model import Robot
 from robojackson.robot.resampling import velocities
 from robojackson.robot.tree_kinematics import pose, tree
 
 _log = logging.getLogger(__name__)
+A_ROW_A_STEP = (
+    "qpos", "qvel", "body_pos_w", "keypoints_w", "contact", "torque_ratio", "source_time_s",
+)  # fmt: skip
+OF_THE_CLIP = ("keypoint_", "bone_", "infeasible_", "slack_", "torque_", "contact_", "planted_",
+               "unsupported_", "velocity_")  # fmt: skip
+"""Beginnings of the figures that stands before and after the clip would flatter."""
 __all__ = ["RetargetConfig", "assemble", "retarget_motion"]
 
 
@@ -44,26 +54,37 @@ def retarget_motion(
     dt = robot.description.control_dt
     cyclic = config.cyclic if config.method == "optimise" else "no"
     clip, cycle = human_clip(sequence, dt, cyclic, config.fixed_tempo, config.cycle)
-    upright = aims = targets(clip, robot)
     extra = _notes(sequence, clip, cycle, config)
+    plain = targets(clip, robot)
+    danced: Bool[np.ndarray, " S"] | None = None
+    tailed = Tailed(plain, slice(0, len(plain)))
+    upright = aims = plain
     if config.method == "optimise":
+        tailed = with_tails(plain, robot, config.tails)
+        upright = aims = tailed.aims
+        extra |= _tail_seconds(tailed)
         found, floor_mm = optimise(aims, robot, config)
         hovering = hovers(robot, found.qpos, aims.dt)
         if hovering.mean() > BARS["unsupported_share"] / 2 and aims.airborne.any():
             _log.info("a flight that does not fall is taken back: solving again")
-            upright = targets(clip, robot, hovering)
+            upright = with_tails(
+                targets(clip, robot, hovering[tailed.clip]), robot, config.tails
+            ).aims
             found = polished(upright, found.qpos, found.shift, robot, config)
-        able = make_feasible(robot, found.qpos, found.aims, config)
+        able = make_feasible(robot, found.qpos, found.aims, config, tailed.clip)
         extra |= {"keypoint_floor_mm": floor_mm, "lean_deg": found.lean_deg}
         extra |= _slowing(able, upright, robot)
         qpos, aims, upright = able.qpos, able.aims, warped(upright, able.steps)
-        time_s = times_at(clip.time_s, able.steps)
+        time_s = times_at(tailed.source_time(clip.time_s), able.steps)
+        danced = able.danced
+        stands = (slice(0, tailed.lead), slice(len(qpos) - tailed.stand, len(qpos)))
+        qpos = settled(qpos, stands, aims.dt)
     else:
         qpos = paper_mapping.mapped(
             sequence, robot, clip.time_s, corrected=config.method == "framefix"
         )
         time_s = clip.time_s
-    return assemble(qpos, time_s, aims, upright, robot, extra, config.weights.tolerance)
+    return assemble(qpos, time_s, aims, upright, robot, extra, config.weights.tolerance, danced)
 
 
 def assemble(
@@ -74,10 +95,12 @@ def assemble(
     robot: Robot,
     extra: dict[str, float],
     tolerance: Tolerance,
+    danced: Bool[np.ndarray, " S"] | None = None,
 ) -> ReferenceMotion:
     """Everything that follows from the poses, and the score card.
 
-    `aims` are what the solver followed, perhaps leaned; `upright` is the dancer's own motion.
+    Figures that are means or shares are those of the steps that are `danced`. `aims` are
+    what the solver followed, perhaps leaned; `upright` is the dancer's own motion.
     """
     posed = pose(tree(robot), qpos)
     certified = certify(robot, qpos, aims.dt, aims.cycle_offset, tolerance)
@@ -101,8 +124,33 @@ def assemble(
         "contact_names": robot.contact_names,
     }
     card = score(ReferenceMotion(**parts), robot, aims, upright)  # type: ignore[arg-type]
+    if danced is not None and not danced.all():
+        card |= _without_tails(parts, danced, robot, aims, upright)
+        card["passed"] = float(not failures(card))
     card["root_residual_bw"] = float(np.median(certified.missing_bw))
     return ReferenceMotion(**parts, scorecard={**card, **extra})  # type: ignore[arg-type]
+
+
+def _tail_seconds(tailed: Tailed) -> dict[str, float]:
+    """How long the motion stands, and goes to and from the stand, around the clip."""
+    dt, after = tailed.aims.dt, len(tailed.aims) - tailed.clip.stop
+    return {"lead_s": tailed.clip.start * dt, "tail_s": after * dt} if after else {}
+
+
+def _without_tails(
+    parts: dict[str, Any],
+    danced: Bool[np.ndarray, " S"],
+    robot: Robot,
+    aims: Targets,
+    upright: Targets,
+) -> dict[str, float]:
+    """Means and shares over the clip's own steps."""
+    found: Certificate = parts["certificate"]
+    some = {name: parts[name][danced] for name in A_ROW_A_STEP}
+    some["certificate"] = replace(found, slack=found.slack[danced], tempo=found.tempo[danced])
+    motion = ReferenceMotion(**(parts | some))
+    card = score(motion, robot, some_of(aims, danced), some_of(upright, danced))
+    return {name: card[name] for name in card if name.startswith(OF_THE_CLIP)}
 
 
 def _slowing(able: Feasible, upright: Targets, robot: Robot) -> dict[str, float]:

@@ -57,6 +57,8 @@ class RobotSource:
         model_sha256: Digest of the MJCF.
         licence: Name of the model's licence.
         copyright: Who holds the rights.
+        shared_folder: Folder that `robots add` fills; the robot's name when empty. Robots of one
+            model share it.
     """
 
     package: str
@@ -66,6 +68,7 @@ class RobotSource:
     model_sha256: Digest
     licence: str
     copyright: str = ""
+    shared_folder: Annotated[str, Field(pattern=r"^\w*$")] = ""
 
 
 @config_dataclass
@@ -138,13 +141,16 @@ class RobotDescription:
         sites: Keypoint -> body and position in the body, metres.
         weights: Keypoint -> weight of its squared error; zero where it is not named.
         contacts: Balls under the feet, by name.
+        fixed_joints: Hinge, or pattern with `*`, -> angle at which it is welded, radians. The robot
+            goes without these hinges: whatever else names them is refused as unknown.
+        collision_excludes: Pairs of bodies that do not collide, beside those of the MJCF.
         rest_pose: Hinge -> rest angle, radians; zero where it is not named.
         max_joint_speed: Speed limit of the hinges in a reference motion, rad/s.
         control_dt: Seconds a control step.
         gear_scale: Factor on the torque of all motors.
         torque_limits: Hinge, or pattern with `*`, -> torque limit, Nm. A hinge without an actuator
-            in the MJCF gets a motor of that limit. Here and below the last pattern that matches
-            counts.
+            in the MJCF, or with a servo, gets a motor of that limit. Here and below the last
+            pattern that matches counts.
         speed_limits: Hinge -> speed limit of its motor, rad/s; `max_joint_speed` where not named.
         armature: Hinge -> rotor inertia seen at the hinge, kg m^2; the MJCF's where not named.
         stiffness: Hinge -> proportional gain of the PD law, Nm/rad; where not named, that of the
@@ -169,6 +175,8 @@ class RobotDescription:
     sites: Mapping[str, tuple[str, Offset]]
     weights: Mapping[str, Weight]
     contacts: Mapping[str, ContactPoint]
+    fixed_joints: Mapping[str, float] = Field(default_factory=dict)
+    collision_excludes: tuple[tuple[str, str], ...] = ()
     rest_pose: Mapping[str, float] = Field(default_factory=dict)
     max_joint_speed: float = Field(default=12.0, gt=0)
     control_dt: float = Field(default=0.015, gt=0)

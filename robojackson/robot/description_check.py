@@ -13,6 +13,7 @@ import numpy as np
 from robojackson.errors import RoboJacksonError
 from robojackson.robot.checks import check_contact, check_joints
 from robojackson.robot.description import KEYPOINTS, TOES, RobotDescription
+from robojackson.robot.fixed_joints import fix_joints
 from robojackson.robot.mjcf import mjcf_path, read_spec
 from robojackson.robot.model import Robot, load_robot
 from robojackson.robot.names import known, matching, where
@@ -40,7 +41,9 @@ def problems(description: RobotDescription) -> list[str]:
 def _unknown_names(description: RobotDescription) -> Iterator[str]:
     """What the model or the description has no name for."""
     try:
-        model = read_spec(mjcf_path(description), description).compile()
+        spec = read_spec(mjcf_path(description), description)
+        fix_joints(spec, description)
+        model = spec.compile()
     except (RoboJacksonError, ValueError) as cause:
         yield str(cause).splitlines()[0]
         return

@@ -41,6 +41,12 @@ def robots_folder() -> Path:
     return Path(root) / "robots"
 
 
+def added_folder(description: RobotDescription) -> Path:
+    """Where `robojackson robots add` puts the model of a robot."""
+    shared = description.source.shared_folder if description.source else ""
+    return robots_folder() / (shared or description.name)
+
+
 def mjcf_path(description: RobotDescription) -> Path:
     """The file of a description.
 
@@ -60,7 +66,7 @@ def mjcf_path(description: RobotDescription) -> Path:
 
 
 def _added(description: RobotDescription, inside: str) -> Path:
-    name, path = description.name, robots_folder() / description.name / inside
+    name, path = description.name, added_folder(description) / inside
     if not path.is_file():
         raise BadConfiguration(
             f"robot {name!r}: its model is not here ({path}); run: robojackson robots add {name}"
@@ -91,8 +97,8 @@ def compiled(description: RobotDescription, path: Path) -> mujoco.MjModel:
     if not any(is_plane(geom) for geom in spec.worldbody.geoms):
         plane = mujoco.mjtGeom.mjGEOM_PLANE
         spec.worldbody.add_geom(name="floor", type=plane, size=[40, 40, 1], rgba=[0.5] * 3 + [1])
-    apply_physics(spec, description)
     try:
+        apply_physics(spec, description)
         model = spec.compile()
     except ValueError as error:
         raise _unreadable(description, error) from error

@@ -117,6 +117,15 @@ class Robot:
         return result
 
     @cached_property
+    def foot_bodies(self) -> Int[np.ndarray, " F"]:
+        """The bodies of the contact balls and those that are welded to them."""
+        found = set(self.contact_bodies.tolist())
+        for body in range(1, self.model.nbody):  # parents come first
+            if not self.model.body_jntnum[body] and self.model.body_parentid[body] in found:
+                found.add(body)
+        return np.array(sorted(found))
+
+    @cached_property
     def standing(self) -> Float[np.ndarray, " nq"]:
         """qpos of the rest pose, upright above the origin, root at its height in the MJCF."""
         qpos = self.model.qpos0.copy()

@@ -1,38 +1,64 @@
-"""What a robot description adds to its MJCF before it is compiled: motors, armature, stepping.
+"""What a robot description changes in its MJCF before it is compiled: joints, motors, stepping.
 
 Metres, seconds, newton-metres. What the description does not name stays as the MJCF has it, so a
 description without these keys compiles to the stock model.
 """
 
+from collections.abc import Iterator
+
 import mujoco
 
 from robojackson.robot.actuation import per_hinge
 from robojackson.robot.description import RobotDescription
-from robojackson.robot.names import where
+from robojackson.robot.fixed_joints import fix_joints, remove
+from robojackson.robot.names import known, where
 
 SAME_S = 1e-9
 
 
 def apply_physics(spec: mujoco.MjSpec, description: RobotDescription) -> None:
-    """Write armature, motors, friction and the stepping of the description into a spec.
+    """Write joints, armature, motors, friction and the stepping of the description into a spec.
 
-    A hinge with a torque limit that no actuator of the MJCF drives gets a torque motor: its gear
-    is the limit, its control -1..1.
+    A hinge with a torque limit that no torque motor of the MJCF drives gets one: its gear is the
+    limit, its control -1..1. A position or velocity servo of that hinge goes: the PD law is ours.
 
     Raises:
-        UnknownName: a hinge or pattern that matches none.
+        UnknownName: a hinge, body or pattern that matches none.
     """
+    fix_joints(spec, description)
+    _exclude(spec, description)
     hinges = [joint for joint in spec.joints if joint.type == mujoco.mjtJoint.mjJNT_HINGE]
     names = tuple(joint.name for joint in hinges)
     armature = per_hinge(description.armature, names, where(description, "armature"))
     limits = per_hinge(description.torque_limits, names, where(description, "torque_limits"))
+    limited = {name for name, limit in zip(names, limits, strict=True) if limit == limit}
+    _remove_servos(spec, limited)
     driven = {actuator.target for actuator in spec.actuators}
     for hinge, inertia, limit in zip(hinges, armature, limits, strict=True):
         if inertia == inertia:  # a number
             hinge.armature = inertia
-        if limit == limit and hinge.name not in driven:
+        if hinge.name in limited and hinge.name not in driven:
             _add_motor(spec, hinge.name, float(limit))
     _step_as(spec, description)
+
+
+def _exclude(spec: mujoco.MjSpec, description: RobotDescription) -> None:
+    place = where(description, "collision_excludes")
+    bodies = [body.name for body in spec.bodies]
+    for pair in description.collision_excludes:
+        first, second = (known("body", name, bodies, place) for name in pair)
+        spec.add_exclude(bodyname1=first, bodyname2=second)
+
+
+def _remove_servos(spec: mujoco.MjSpec, hinges: set[str]) -> None:
+    none = mujoco.mjtBias.mjBIAS_NONE
+    servos = {
+        index
+        for index, actuator in enumerate(spec.actuators)
+        if actuator.target in hinges and actuator.biastype != none
+    }
+    if servos:
+        remove(spec, actuators=servos)
 
 
 def _add_motor(spec: mujoco.MjSpec, hinge: str, limit: float) -> None:
@@ -55,8 +81,16 @@ def _step_as(spec: mujoco.MjSpec, description: RobotDescription) -> None:
     if stepping.friction is not None:
         soles = {point.body for point in description.contacts.values()}
         floors = [geom for geom in spec.worldbody.geoms if is_plane(geom)]
-        for geom in floors + [geom for body in soles for geom in spec.body(body).geoms]:
+        for geom in floors + [geom for body in soles for geom in _rigid_geoms(spec.body(body))]:
             geom.friction = [stepping.friction, *geom.friction[1:]]
+
+
+def _rigid_geoms(body: mujoco.MjsBody) -> Iterator[mujoco.MjsGeom]:
+    """Geoms of a body and of those that are welded to it."""
+    yield from body.geoms
+    for child in body.bodies:
+        if not child.joints:
+            yield from _rigid_geoms(child)
 
 
 def integrator_of(name: str) -> mujoco.mjtIntegrator:

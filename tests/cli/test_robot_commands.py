@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from robojackson.cli import robot_models, robot_sheets
+from robojackson.cli import robot_models
+from robojackson.cli.pictures import robot_sheets
 from robojackson.errors import BadConfiguration, DownloadFailed, StoreError, UnknownName
 from robojackson.pipeline.yaml_loader import load
 from robojackson.robot.description import RobotDescription, RobotSource
@@ -146,14 +147,29 @@ def test_a_robot_that_is_here_already_needs_nothing():
 
 
 def test_an_unknown_robot_lists_the_known_ones():
-    with pytest.raises(UnknownName, match="g1, humanoid, humanoid_strong"):
+    with pytest.raises(UnknownName, match="g1, g1_23, humanoid, humanoid_strong, t1"):
         robot_models.add_robot("g2")
 
 
 def test_the_list_says_what_is_here(monkeypatch, tmp_path: Path):
     monkeypatch.setenv("ROBOJACKSON_STORE", str(tmp_path))
     ready = {entry["robot"]: entry["ready"] for entry in robot_models.list_robots()}
-    assert ready == {"g1": False, "humanoid": True, "humanoid_strong": True}
+    here = {name for name, is_ready in ready.items() if is_ready}
+    assert here == {"humanoid", "humanoid_strong"}
+    assert set(ready) - here == {"g1", "g1_23", "t1"}
+
+
+@pytest.mark.medium
+def test_robots_of_one_model_share_its_folder(source, describe, tmp_path: Path, monkeypatch):
+    shared = replace(source, shared_folder="machines")
+    describe(shared)
+    robot_models.add_robot("machine")
+    monkeypatch.setenv("PIP_FIND_LINKS", "/nowhere")
+    less = replace(describe(shared), name="less", fixed_joints={"waist": 0.1})
+    monkeypatch.setattr(robot_models, "describe_robot", lambda name: less)
+    assert robot_models.add_robot("less")["added"] is False
+    assert [path.name for path in (tmp_path / "store" / "robots").iterdir()] == ["machines"]
+    assert "waist" not in load_robot(less).joint_names
 
 
 def test_the_shipped_g1_pins_its_wheel_and_its_model():

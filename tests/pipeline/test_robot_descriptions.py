@@ -1,5 +1,6 @@
 """A robot is known by one name: that of its file and the one inside it."""
 
+import ast
 from pathlib import Path
 
 import pytest
@@ -9,14 +10,47 @@ from robojackson.pipeline import yaml_loader
 from robojackson.pipeline.robot_descriptions import describe_robot, robot_names
 from tests.fixtures.own_robot import own_robot
 
+ROOT = Path(__file__).parents[2]
+CODE = ("robojackson", "configs", "storage", "tasks", "flows")
+
 
 def test_every_shipped_robot_has_the_name_of_its_file() -> None:
     assert [describe_robot(name).name for name in robot_names()] == list(robot_names())
 
 
 def test_an_unknown_robot_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(UnknownName, match="g1, humanoid, humanoid_strong"):
+    with pytest.raises(UnknownName, match="g1, g1_23, humanoid, humanoid_strong, t1"):
         describe_robot("g2")
+
+
+def test_the_g1_of_23_hinges_is_the_whole_one_but_for_what_its_file_says() -> None:
+    whole, less = describe_robot("g1"), describe_robot("g1_23")
+    same = ("mjcf", "source", "sites", "contacts", "stiffness", "fall", "strict", "rest_pose")
+    assert [getattr(less, key) for key in same] == [getattr(whole, key) for key in same]
+    for key in ("torque_limits", "speed_limits", "armature"):
+        assert getattr(less, key).items() < getattr(whole, key).items()
+    assert not whole.fixed_joints
+
+
+@pytest.mark.parametrize("name", robot_names())
+def test_a_robot_of_a_wheel_is_pinned_with_its_licence(name: str) -> None:
+    found = describe_robot(name)
+    assert (found.source is not None) == found.mjcf.startswith("store:")
+    assert found.source is None or (found.source.licence and found.source.version)
+
+
+def test_no_code_names_a_robot_that_is_fetched() -> None:
+    """Everything that a robot needs stands in its YAML."""
+    fetched = {name for name in robot_names() if describe_robot(name).source}
+    files = [path for folder in CODE for path in (ROOT / folder).rglob("*.py")]
+    assert len(files) > 300
+    named = {
+        (path.name, node.value)
+        for path in files
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Constant) and node.value in fetched
+    }
+    assert named == set()
 
 
 def test_a_copy_with_the_name_of_the_original_is_refused(
@@ -72,7 +106,9 @@ def test_a_description_is_what_it_says_and_not_where_it_lies(tmp_path: Path) -> 
 
 @pytest.mark.parametrize("given", ["gone.yaml", "no/such", "no/such.yml"])
 def test_a_file_that_is_not_there_is_one_line_with_the_machine_and_the_names(given: str) -> None:
-    with pytest.raises(UnknownName, match=r"no file /.* on \S+\)\. Known: g1, humanoid") as told:
+    with pytest.raises(
+        UnknownName, match=r"no file /.* on \S+\)\. Known: g1, g1_23, humanoid"
+    ) as told:
         describe_robot(given)
     assert "\n" not in str(told.value)
 

@@ -173,7 +173,7 @@ def test_names_are_found_from_any_folder(monkeypatch, tmp_path) -> None:
         ({"tqc.buffer": 2000}, "room for 1984 transitions .* begin after 2000: raise buffer"),
         ({"mode": "paper", "paper.curiosity": "formula"}, "say curiosity=formula instead"),
         ({"track.reward.curiosity": "formula"}, "say curiosity=formula instead"),
-        ({"track.random.integrators": []}, "integrators"),
+        ({"track.random.integrators": ["RK5"]}, "integrators"),
         ({"mode": "paper", "paper.weights": {}}, "one at least must count"),
     ],
 )
@@ -214,3 +214,56 @@ def test_whole_numbers_are_those_of_yaml_1_2(text: str, seed: int) -> None:
 def test_what_is_no_value_is_told_with_its_key(text: str) -> None:
     with pytest.raises(BadConfiguration, match="seed"):
         yaml_loader.load(Outer, None, {"seed": text})
+
+
+@pytest.fixture
+def extended(tmp_path: Path) -> Path:
+    """A folder of configurations with a file that others extend."""
+    text = "seed: 3\ninner: {width: 0.25, cyclic: no}\nspeed: 0.5\n"
+    (tmp_path / "whole.yaml").write_text(text)
+    return tmp_path
+
+
+def test_a_file_that_extends_another_replaces_whole_keys(extended: Path) -> None:
+    (extended / "part.yaml").write_text("extends: whole.yaml\ninner: {width: 0.5}\n")
+    found = yaml_loader.load(Outer, extended / "part.yaml")
+    assert found == Outer(seed=3, inner=Inner(width=0.5, cyclic="auto"), speed=0.5)
+
+
+def test_a_name_is_extended_as_it_is_loaded(extended: Path, monkeypatch) -> None:
+    monkeypatch.setenv("ROBOJACKSON_CONFIGS", str(extended))
+    (extended / "part.yaml").write_text("extends: whole\nseed: 4\n")
+    assert yaml_loader.load(Outer, "part") == Outer(4, Inner(0.25, "no"), speed=0.5)
+
+
+@pytest.mark.parametrize(
+    ("own", "wrong", "key"),
+    [
+        ("seed: 1", "whole.yaml", "inner.widht"),
+        ("inner: {lenght: 1.0}", "part.yaml", "inner.lenght"),
+        ("sped: 1.0", "whole.yaml", "inner.widht"),
+    ],
+)
+def test_a_wrong_key_is_named_with_the_file_that_it_stands_in(
+    extended: Path, own: str, wrong: str, key: str
+) -> None:
+    (extended / "whole.yaml").write_text("inner: {widht: 0.25}\n")
+    (extended / "part.yaml").write_text(f"extends: whole.yaml\n{own}\n")
+    with pytest.raises(BadConfiguration, match=rf"/{wrong}: unknown key '{key}'"):
+        yaml_loader.load(Outer, extended / "part.yaml")
+
+
+@pytest.mark.parametrize(
+    ("base", "told"),
+    [
+        ("part.yaml", r"part\.yaml: extends is 'part\.yaml', which extends this file"),
+        ("gone", r"part\.yaml: extends is 'gone': unknown configuration 'gone'"),
+        ("3", r"part\.yaml: extends is 3: "),
+    ],
+)
+def test_a_base_that_cannot_be_is_told_with_the_file_that_names_it(
+    extended: Path, base: str, told: str
+) -> None:
+    (extended / "part.yaml").write_text(f"extends: {base}\n")
+    with pytest.raises(BadConfiguration, match=told):
+        yaml_loader.load(Outer, extended / "part.yaml")

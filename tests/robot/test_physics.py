@@ -10,11 +10,26 @@ import pytest
 
 from robojackson.errors import BadConfiguration, UnknownName
 from robojackson.pipeline.robot_descriptions import describe_robot
+from robojackson.retarget.solver.collision import Detector
+from robojackson.rl.modes.reset_states import default_standing_pose
+from robojackson.rl.sim.trainable import require_trainable
 from robojackson.robot.description import FallRule, RobotDescription, SimulationDescription
 from robojackson.robot.fall import Fall, standing_height, up_axis
 from robojackson.robot.model import Robot, load_robot
+from tests.fixtures import machine
 
 HUMANOID = describe_robot("humanoid")
+OCTAHEDRON = "".join(
+    f"v {x} {y} {z}\n"
+    for x, y, z in [
+        (0.1, 0, 0),
+        (-0.1, 0, 0),
+        (0, 0.05, 0),
+        (0, -0.05, 0),
+        (0, 0, 0.01),
+        (0, 0, -0.01),
+    ]
+) + "".join(f"f {x} {y} {z}\n" for x in (1, 2) for y in (3, 4) for z in (5, 6))
 
 
 def altered(**changes: object) -> Robot:
@@ -60,6 +75,86 @@ def test_a_limited_hinge_without_an_actuator_gets_a_motor(tmp_path: Path) -> Non
     assert knee.gear[0] == 80.0
     np.testing.assert_array_equal(knee.ctrlrange, [-1.0, 1.0])
     assert robot.torque_limit[robot.joint_names.index("abdomen_y")] == 30.0
+
+
+def test_a_servo_of_a_limited_hinge_gives_way_to_a_motor(tmp_path: Path) -> None:
+    """The PD law is ours; training takes torque motors alone."""
+    described = machine.description(tmp_path)
+    with pytest.raises(BadConfiguration, match="no torque motor"):
+        require_trainable(load_robot(described))
+    robot = load_robot(dataclasses.replace(described, torque_limits={"*": 20.0}))
+    require_trainable(robot)
+    knee = robot.model.actuator("left_knee")
+    assert (knee.biastype[0], knee.gear[0]) == (mujoco.mjtBias.mjBIAS_NONE, 20.0)
+    assert robot.model.nu == len(robot.joint_names)
+
+
+def test_excluded_bodies_do_not_collide(tmp_path: Path) -> None:
+    described = machine.description(tmp_path)
+    bent = {"left_elbow": -2.4, "left_shoulder_roll": -0.6}  # the arm is in the chest
+
+    def touching(excludes: tuple[tuple[str, str], ...]) -> set[frozenset[str]]:
+        model = load_robot(dataclasses.replace(described, collision_excludes=excludes)).model
+        data = mujoco.MjData(model)
+        for name, angle in bent.items():
+            data.joint(name).qpos[:] = angle
+        mujoco.mj_forward(model, data)
+        bodies = model.geom_bodyid[data.contact.geom]
+        return {frozenset(model.body(body).name for body in pair) for pair in bodies}
+
+    pairs = [("left_upper", "chest"), ("left_lower", "chest"), ("left_upper", "base")]
+    assert touching(()) & {frozenset(pair) for pair in pairs}
+    assert not touching(tuple(pairs)) & {frozenset(pair) for pair in pairs}
+    with pytest.raises(UnknownName, match=r"'tail'.*collision_excludes"):
+        touching((("chest", "tail"),))
+
+
+@pytest.fixture
+def on_balls(tmp_path: Path) -> Robot:
+    """The machine with a ball under each heel that is a body of its own, welded to the sole."""
+    described = machine.description(tmp_path)
+    ball = (
+        '<body name="{}_ball" pos="-.04 0 -.03"><geom type="sphere" size=".01" mass=".01"/></body>'
+    )
+    text = machine.mjcf()
+    for side in ("left", "right"):
+        site = f'<site name="{side}_foot"'
+        text = text.replace(site, ball.format(side) + site)
+    Path(described.mjcf).write_text(text)
+    simulation = SimulationDescription(friction=0.4)
+    return load_robot(dataclasses.replace(described, simulation=simulation))
+
+
+def test_a_body_that_is_welded_to_a_foot_is_of_the_foot(on_balls: Robot) -> None:
+    model = on_balls.model
+    names = {model.body(int(body)).name for body in on_balls.foot_bodies}
+    assert names == {"left_sole", "left_ball", "right_sole", "right_ball"}
+    feet = np.isin(model.geom_bodyid, on_balls.foot_bodies)
+    np.testing.assert_array_equal(model.geom_friction[feet, 0], 0.4)
+    assert (model.geom_friction[~feet & (model.geom_bodyid > 0), 0] == 1.0).all()
+    stand = default_standing_pose(on_balls)
+    assert Detector(on_balls, 0.01).touches(stand[None]).floor.any()
+    assert not Detector(on_balls, 0.01, feet=False).touches(stand[None]).floor.any()
+
+
+@pytest.mark.parametrize("mesh", [False, True])
+def test_the_stand_is_on_the_floor_whatever_the_shape_of_the_soles(
+    mesh: bool, tmp_path: Path
+) -> None:
+    described, text = machine.description(tmp_path), machine.mjcf()
+    if mesh:
+        (tmp_path / "sole.obj").write_text(OCTAHEDRON)
+        text = text.replace("<worldbody>", '<asset><mesh file="sole.obj"/></asset><worldbody>')
+        text = text.replace(
+            'type="box" size=".07 .03 .01" pos=".03', 'type="mesh" mesh="sole" pos=".03'
+        )
+        Path(described.mjcf).write_text(text)
+    robot = load_robot(described)
+    data = mujoco.MjData(robot.model)
+    data.qpos[:] = default_standing_pose(robot)
+    data.qpos[2] -= 1e-4
+    mujoco.mj_forward(robot.model, data)
+    assert data.contact.dist.min() == pytest.approx(-1e-4, abs=1e-6)
 
 
 def test_gains_of_a_natural_frequency_are_those_of_a_damped_oscillator() -> None:

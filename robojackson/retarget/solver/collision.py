@@ -49,7 +49,7 @@ class Detector:
         self.model = copy.copy(robot.model)
         self.model.geom_margin[:] = clearance
         if not feet:
-            _lift_feet(self.model, robot.contact_bodies)
+            _lift_feet(self.model, robot.foot_bodies)
         self.data = mujoco.MjData(self.model)
 
     def touches(self, qpos: Float[np.ndarray, "N nq"]) -> Touches:
@@ -113,7 +113,7 @@ class _Found:
         )
 
 
-def _lift_feet(model: mujoco.MjModel, feet: Int[np.ndarray, " C"]) -> None:
+def _lift_feet(model: mujoco.MjModel, feet: Int[np.ndarray, " F"]) -> None:
     """Put the floor on a bit of its own that the geoms of the feet do not have."""
     world = model.geom_bodyid == 0
     foot = np.isin(model.geom_bodyid, feet)

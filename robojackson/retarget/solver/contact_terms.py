@@ -70,7 +70,7 @@ def _no_slip(problem: Problem, posed: Posed, rows: np.ndarray, out: Normal) -> N
 
 def add_collisions(problem: Problem, posed: Posed, touches: Touches, out: Normal) -> None:
     """Penetration hinge of self contacts and of the floor under anything but the feet."""
-    feet = np.isin(touches.bodies, problem.robot.contact_bodies).any(axis=1)
+    feet = np.isin(touches.bodies, problem.robot.foot_bodies).any(axis=1)
     keep = (touches.distance < problem.weights.clearance) & ~(touches.floor & feet)
     if not keep.any():
         return

@@ -1,8 +1,8 @@
 """Feed-forward: targets that lead the reference by what its own torques bend a PD law.
 
 A PD law holds a torque tau at a speed v only with its target at q + (tau + kd v) / kp. With soft
-gains that is as much as a policy may add; the certificate (`retarget.feasibility`) knows the torque.
-Radians, newton-metres; actuator order.
+gains that is as much as a policy may add; `retarget.feasibility` knows the torque. Radians,
+newton-metres; actuator order.
 """
 
 import numpy as np

@@ -1,0 +1,237 @@
+"""Tails of a motion that does not repeat: it begins and ends standing.
+
+A robot that is left alone when its motion ends falls. So a stand is put before and after the clip,
+with the feet where the clip has them: the targets go from one to the other in `blend_s` by
+fifth-order polynomials (minimum jerk; Flash & Hogan, 1985), planted feet stay, a foot in the air is
+put down below itself. The solver, the repair and the certificate see tails and clip as one motion.
+Metres, seconds, world frame.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import mujoco
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from pydantic import Field
+from scipy.spatial.transform import Rotation, Slerp
+
+from robojackson.config import config_dataclass
+from robojackson.motion.smpl_sequence import AIR, PLANTED
+from robojackson.retarget.targets.keypoint_targets import Targets
+from robojackson.robot.model import Robot
+
+SETTLE_S = 0.3
+"""From the way into the stand until nothing moves."""
+KNEE_SHARE = 0.2
+"""Of its weight that a knee's target keeps where the stand is as wide as the clip left it."""
+LANDING_SHARE = 0.6
+"""Of the blend in which a foot in the air is put down."""
+
+
+@config_dataclass
+class TailConfig:
+    """Whether and how long a motion that does not repeat begins and ends standing.
+
+    Attributes:
+        use: `auto`: on robots that are judged beside the reference (`fall.frame: reference`).
+        lead_s: Stand before the clip, seconds.
+        blend_s: From the stand into the clip, and back, seconds.
+        stand_s: Stand after the clip, seconds.
+    """
+
+    use: Literal["auto", "yes", "no"] = "auto"
+    lead_s: float = Field(default=0.4, ge=0)
+    blend_s: float = Field(default=1.0, gt=0)
+    stand_s: float = Field(default=3.0, ge=0)
+
+    def wanted(self, robot: Robot) -> bool:
+        """Whether a robot's motions get tails."""
+        judged = robot.description.fall.frame == "reference"
+        return self.use == "yes" or (self.use == "auto" and judged)
+
+
+@dataclass(frozen=True)
+class Tailed:
+    """Targets with tails.
+
+    Attributes:
+        aims: Stand, clip, stand.
+        clip: Which of its steps are the clip's.
+        lead, stand: Steps of the stand before it and after it.
+    """
+
+    aims: Targets
+    clip: slice
+    lead: int = 0
+    stand: int = 0
+
+    def source_time(self, time_s: Float[np.ndarray, " N"]) -> Float[np.ndarray, " S"]:
+        """Time in the clip of every step; tails show its first and its last moment."""
+        after = len(self.aims) - self.clip.stop
+        return np.pad(time_s, (self.clip.start, after), mode="edge")
+
+
+def with_tails(aims: Targets, robot: Robot, config: TailConfig) -> Tailed:
+    """Put a stand before and after the targets of a clip; a cycle has no ends and gets none."""
+    if aims.cycle_offset is not None or not config.wanted(robot):
+        return Tailed(aims, slice(0, len(aims)))
+    before = _tail(_reversed(aims), robot, config.blend_s, config.lead_s)
+    after = _tail(aims, robot, config.blend_s, config.stand_s)
+    parts = (_reversed(before), aims, after)
+    first = len(before)
+    lead, stand = (round(seconds / aims.dt) for seconds in (config.lead_s, config.stand_s))
+    return Tailed(_joined(parts), slice(first, first + len(aims)), lead, stand)
+
+
+def settled(
+    qpos: Float[np.ndarray, "S nq"], stands: Sequence[slice], dt: float
+) -> Float[np.ndarray, "S nq"]:
+    """A motion whose stands are still: the solver lets what no target holds wander slowly.
+
+    Every stand becomes its middle pose, over `SETTLE_S` from the side of the clip.
+
+    Args:
+        stands: The first and the last stand, empty slices where there is none.
+        dt: Seconds a step.
+    """
+    found = qpos.copy()
+    for stand in stands:
+        count = stand.stop - stand.start
+        if count < 2:
+            continue
+        held = qpos[stand.start + count // 2]
+        time = np.arange(count) * dt
+        time = time[::-1] if stand.start == 0 else time
+        share = np.clip(time / SETTLE_S, 0.0, 1.0)
+        way = (share**3 * (10 - 15 * share + 6 * share**2))[:, None]
+        same = np.sign(np.sum(qpos[stand, 3:7] * held[3:7], -1, keepdims=True))
+        target = np.repeat(held[None], count, 0)
+        target[:, 3:7] *= same
+        mixed = (1 - way) * qpos[stand] + way * target
+        mixed[:, 3:7] /= np.linalg.norm(mixed[:, 3:7], axis=-1, keepdims=True)
+        found[stand] = mixed
+    return found
+
+
+def _tail(aims: Targets, robot: Robot, blend_s: float, stand_s: float) -> Targets:
+    """What follows the last step: the way into the stand, and the stand."""
+    steps = max(2, round(blend_s / aims.dt))
+    held = round(stand_s / aims.dt)
+    last, before = aims.keypoints_w[-1], aims.keypoints_w[-2]
+    stand = _stand(last, aims.heading[-1], robot)
+    feet = _columns_of_feet(robot)
+    speed = (last - before) / aims.dt
+    speed[feet] = 0.0
+    time = np.arange(1, steps + 1) / steps
+    way = _polynomial(last, speed * blend_s, stand, time)
+    landing = np.minimum(time / LANDING_SHARE, 1.0)
+    way[:, feet] = _polynomial(last[feet], 0 * last[feet], stand[feet], landing)
+    keypoints = np.concatenate([way, np.repeat(stand[None], held, 0)])
+    contact = np.full((len(keypoints), aims.contact.shape[1]), PLANTED, aims.contact.dtype)
+    lands = int(np.searchsorted(landing, 1.0))
+    contact[:lands, aims.contact[-1] == AIR] = AIR
+    weights = np.repeat(robot.keypoint_weights[None], len(keypoints), 0)
+    weights[:, [robot.keypoint_names.index(f"{side}_knee") for side in ("left", "right")]] *= (
+        KNEE_SHARE
+    )
+    return replace(
+        aims,
+        keypoints_w=keypoints,
+        weights=weights,
+        contact=contact,
+        heading=_headings(aims.heading[-1], steps, held),
+        airborne=np.zeros(len(keypoints), bool),
+    )
+
+
+def _stand(
+    points: Float[np.ndarray, "K 3"], heading: Float[np.ndarray, "3 3"], robot: Robot
+) -> Float[np.ndarray, "K 3"]:
+    """The robot's stand over the feet of a pose, soles on the floor, feet where they are."""
+    names = robot.keypoint_names
+    data = mujoco.MjData(robot.model)
+    data.qpos[:] = robot.standing
+    mujoco.mj_kinematics(robot.model, data)
+    own = data.site_xpos[robot.keypoint_sites].copy()
+    ankles = [names.index("left_foot"), names.index("right_foot")]
+    soles = own[robot.contact_keypoints, 2] + robot.contact_arms[:, 2] - robot.contact_radii
+    own[:, 2] -= soles.min()
+    own[:, :2] -= own[ankles, :2].mean(0)
+    turn = _about_up(_yaw(heading[:, 0]))
+    found = own @ turn.T
+    found[:, :2] += points[ankles, :2].mean(0)
+    for side, ankle in zip(("left", "right"), ankles, strict=True):
+        found[ankle, :2] = points[ankle, :2]
+        toe = f"{side}_toe"
+        if toe in names:
+            column = names.index(toe)
+            ahead = _yaw(points[column] - points[ankle])
+            found[column] = found[ankle] + _about_up(ahead) @ robot.toe_arms[toe]
+    return np.asarray(found)
+
+
+def _columns_of_feet(robot: Robot) -> Int[np.ndarray, " F"]:
+    """Keypoints of the feet, toes included."""
+    names = robot.keypoint_names
+    return np.array([i for i, name in enumerate(names) if name.endswith(("_foot", "_toe"))])
+
+
+def _polynomial(
+    start: Float[np.ndarray, "K 3"],
+    speed: Float[np.ndarray, "K 3"],
+    end: Float[np.ndarray, "K 3"],
+    time: Float[np.ndarray, " T"],
+) -> Float[np.ndarray, "T K 3"]:
+    """From a place with a speed (a unit of time) to rest, accelerations zero at both ends."""
+    t = time[:, None, None]
+    way = t**3 * (10 - 15 * t + 6 * t**2)
+    swing = t - t**3 * (6 - 8 * t + 3 * t**2)
+    return np.asarray(start + way * (end - start) + swing * speed)
+
+
+def _headings(
+    heading: Float[np.ndarray, "3 3"], steps: int, held: int
+) -> Float[np.ndarray, "S 3 3"]:
+    upright = _about_up(_yaw(heading[:, 0]))
+    turns = Rotation.from_matrix(np.stack([heading, upright]))
+    way = Slerp([0.0, 1.0], turns)(np.arange(1, steps + 1) / steps).as_matrix()
+    return np.concatenate([way, np.repeat(upright[None], held, 0)])
+
+
+def _yaw(ahead: Float[np.ndarray, "3"]) -> float:
+    return float(np.arctan2(ahead[1], ahead[0]))
+
+
+def _about_up(yaw: float) -> Float[np.ndarray, "3 3"]:
+    c, s = np.cos(yaw), np.sin(yaw)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _reversed(aims: Targets) -> Targets:
+    """The same backwards in time."""
+    return some_of(aims, np.arange(len(aims))[::-1])
+
+
+def some_of(aims: Targets, steps: Bool[np.ndarray, " S"] | Int[np.ndarray, " S"]) -> Targets:
+    """The targets of some steps, chosen or in another order."""
+    return replace(
+        aims,
+        keypoints_w=aims.keypoints_w[steps],
+        weights=aims.weights[steps],
+        contact=aims.contact[steps],
+        heading=aims.heading[steps],
+        airborne=aims.airborne[steps],
+    )
+
+
+def _joined(parts: tuple[Targets, ...]) -> Targets:
+    return replace(
+        parts[0],
+        keypoints_w=np.concatenate([part.keypoints_w for part in parts]),
+        weights=np.concatenate([part.weights for part in parts]),
+        contact=np.concatenate([part.contact for part in parts]),
+        heading=np.concatenate([part.heading for part in parts]),
+        airborne=np.concatenate([part.airborne for part in parts]),
+    )
