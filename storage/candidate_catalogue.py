@@ -73,10 +73,16 @@ def append(store: Store, rows: Iterable[Row]) -> Artifact | None:
 
 
 def records(store: Store, dance: str | None = None) -> list[dict[str, Any]]:
-    """All judgements, or those of one dance, the oldest first."""
+    """All judgements, or those of one dance: the oldest search first, in it the chosen video, those
+    that may be danced by their score, and the others.
+    """
     where = "" if dance is None else "WHERE lower(dance) = lower($dance)"
     given = {} if dance is None else {"dance": dance}
-    ordered = "ORDER BY decided_at, run_id, decision, score_per_second, stability_score, record_id"
+    places = "list_position(['chosen', 'accepted'], decision)"
+    ordered = (
+        f"ORDER BY decided_at, run_id, {places} NULLS LAST, decision, score_per_second, "
+        "stability_score, record_id"
+    )
     return query(store, f"SELECT * FROM candidates {where} {ordered}", given)
 
 

@@ -35,12 +35,6 @@ TABLES: Mapping[str, TableSchema] = {"episodes": EPISODE_RECORD, "evaluations": 
 RUNS = f"{FOLDER}/runs"
 ALWAYS = ("run_id", "study", "move", "setup", "config")
 """Columns of `runs`, whatever is known."""
-OVERVIEW = """
-SELECT study, move, setup, seed, count(*) AS rollouts, round(avg(survived_s), 2) AS survived_s,
-       round(avg(strict_success), 3) AS strict_success, round(avg(skill), 3) AS skill
-FROM evaluations WHERE policy = 'trained' GROUP BY ALL ORDER BY ALL
-"""
-"""A line a cell."""
 
 
 @dataclass(frozen=True)

@@ -36,6 +36,8 @@ CODE = ("robojackson.rl.training",)
 """Module of what the process runs."""
 SHORTEST_MINUTES = 0.5
 """What a training gets in any case."""
+BUDGET = "training gets %.1f of %g min; dances of this length need about %.0f"
+"""Log line about the budget, which the bar of `robojackson dance` shows as well."""
 DIGITS = 12
 """Of the digest in a run id."""
 OVERTIME_S = 300.0
@@ -138,10 +140,7 @@ def _minutes(config: TrainConfig, time_left: TrainingTime | None, whole_pass: bo
         return config.minutes
     left = max(SHORTEST_MINUTES, (time_left.deadline - time.time()) / 60)
     granted = left if whole_pass else min(config.minutes, left)
-    run_logger().info(
-        "training gets %.1f of %g min; dances of this length need about %.0f",
-        granted, config.minutes, time_left.needed_minutes,
-    )  # fmt: skip
+    run_logger().info(BUDGET, granted, config.minutes, time_left.needed_minutes)
     return granted
 
 

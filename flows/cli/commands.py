@@ -31,6 +31,8 @@ from robojackson.cli.options import (
 
 LONGER_MINUTES = 15
 """Least that a pass is advised to take whose robot does not dance."""
+LONG_ENOUGH_S = 10.0
+"""Rollouts that are advised where the settings' are too short to judge, seconds."""
 
 
 @command
@@ -87,26 +89,38 @@ def dance(
 
         with dance_bar(settings.minutes, Store.from_environment().here):
             made = run(str(found or source), config, overrides, start, end)
-    return _concluded(made, settings.minutes)
+    return _concluded(made, settings.minutes, settings.evaluate.seconds)
 
 
-def _concluded(made: dict[str, Any], minutes: float) -> CommandResult:
+def _concluded(made: dict[str, Any], minutes: float, seconds: float) -> CommandResult:
     """The answer of a dance with its verdict and the command to type next."""
     from robojackson.cli.cards import advice_lines, closing
     from robojackson.cli.stages import verdict_lines
 
     verdict = made["evaluation"]["verdict"]
-    made |= {"verdict": verdict, "next": _next(verdict["kind"], made["page"], minutes)}
+    made |= {"verdict": verdict, "next": _next(verdict["kind"], made["page"], minutes, seconds)}
     where = [f"page   {made['page']}", f"video  {made['video']}"]
     text = [*verdict_lines(made["evaluation"]), *advice_lines(made), *where, *closing(made)]
     return CommandResult(made, text=text)
 
 
-def _next(kind: str, page: str, minutes: float) -> str:
-    """Return what to type after a dance."""
+def _next(kind: str, page: str, minutes: float, seconds: float) -> str:
+    """Return what to type after a dance.
+
+    Args:
+        minutes: Budget of the pass.
+        seconds: Longest rollout that the settings allow.
+    """
     if kind == "dances":
-        return shlex.join(["python", "-m", "webbrowser", page])
+        from robojackson.cli.lifetime.interruption import python
+
+        return shlex.join([python(), "-m", "webbrowser", page])
     if kind == "too_short":
+        from robojackson.cli.lifetime.interruption import same_command
+        from robojackson.rl.evaluation.verdict import SHORTEST_S
+
+        if seconds < SHORTEST_S:  # the clip may be long enough
+            return f"{same_command()} --set evaluate.seconds={LONG_ENOUGH_S:g}"
         return "film or choose a range of at least two seconds (--start, --end)"
     from robojackson.cli.lifetime.interruption import with_option
 

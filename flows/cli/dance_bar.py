@@ -5,6 +5,7 @@ or a pipe there is no bar and all lines are written.
 """
 
 import json
+import logging
 import os
 import sys
 import threading
@@ -23,6 +24,7 @@ HANDLERS = ("CONSOLE", "CONSOLE_FLOW_RUNS", "CONSOLE_TASK_RUNS")
 REFRESH_S = 0.5
 TRAININGS = "work/train-*/progress.json"
 """What trainings leave of how far they are, in a store on this machine."""
+TASK_LOG = "prefect.task_runs"
 
 
 def quiet_prefect() -> None:
@@ -51,10 +53,36 @@ def dance_bar(minutes: float, store: Path) -> Iterator[None]:
         watch = _Watch(progress, task, minutes, store, over)
         threading.Thread(target=watch.run, daemon=True).start()
         try:
-            with listening(watch.at):
+            with listening(watch.at), _budget_told(progress):
                 yield
         finally:
             over.set()
+
+
+@contextmanager
+def _budget_told(progress: Progress) -> Iterator[None]:
+    """Print above the bar what training gets of the minutes; Prefect's line of it is hidden."""
+    notes, tasks = _Budget(progress), logging.getLogger(TASK_LOG)
+    tasks.addHandler(notes)
+    try:
+        yield
+    finally:
+        tasks.removeHandler(notes)
+
+
+class _Budget(logging.Handler):
+    """Prints the line that says what a training gets, and no other."""
+
+    def __init__(self, progress: Progress) -> None:
+        super().__init__(logging.INFO)
+        self._progress = progress
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print the record if it is that line."""
+        from tasks.train_policy import BUDGET
+
+        if record.msg == BUDGET:
+            self._progress.console.print(record.getMessage(), highlight=False)
 
 
 class _Watch:

@@ -57,13 +57,15 @@ def metrics(
     """The tables of all studies; without a question, a line a cell."""
     from storage import study_tables
     from storage.store import Store
+    from storage.study_overview import OVERVIEW
 
-    rows = study_tables.query(Store.from_environment(), sql or study_tables.OVERVIEW)
+    rows = study_tables.query(Store.from_environment(), sql or OVERVIEW)
     if not rows:
         return CommandResult({"rows": []}, text=["no rows; `robojackson ablation` makes some"])
-    return CommandResult(
-        {"rows": rows}, text=table({str(n): row for n, row in enumerate(rows, 1)}, tuple(rows[0]))
-    )
+    text = table({str(n): row for n, row in enumerate(rows, 1)}, tuple(rows[0]))
+    if sql is None and any(row["strict_success"] is None for row in rows):
+        text.append("-: too short to judge, or bodies that do not dance succeed as well")
+    return CommandResult({"rows": rows}, text=text)
 
 
 @command

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from robojackson.cli.cards import command_line
-from robojackson.cli.lifetime.interruption import with_option
+from robojackson.cli.lifetime.interruption import python, with_option
 from robojackson.clips.web.untrusted_text import clean_text
 
 Facts = Mapping[str, Any]
@@ -84,7 +84,7 @@ def ablation_verdict(made: Facts, steps: int, seeds: int, least_steps: int) -> d
             "mean nothing."
         )
         return _closing("meaningless", sentence, command_line("ablation", "paper"))
-    show = shlex.join(["python", "-m", "webbrowser", made["page"]])
+    show = shlex.join([python(), "-m", "webbrowser", made["page"]])
     if seeds < FEW_SEEDS:
         sentence = (
             f"{made['cells']} cells are judged, but {seeds} seed{'' if seeds == 1 else 's'} can "

@@ -75,7 +75,7 @@ def summary(found: Sequence[VideoCandidate], selection: Selection) -> str:
     words = {rejection.kind: str(rejection) for _, rejection in selection.dropped}
     words["too_long"] = "too long"
     dropped = ", ".join(f"{count} {words[kind]}" for kind, count in kinds.items())
-    line = f"{len(found)} found, {len(selection.selected)} kept"
+    line = f"{len(found)} found, {len(selection.selected)} judged"
     return f"{line} ({dropped})" if dropped else line
 
 

@@ -142,7 +142,7 @@ def doctor(
     as_json: Json = False,
 ) -> CommandResult:
     """What is installed, what is missing, and how to get it."""
-    from robojackson.cli.doctor import examine
+    from robojackson.cli.doctor import doctor_lines, examine
 
     found = examine()
     if report:
@@ -150,7 +150,7 @@ def doctor(
 
         block = issue_report(found)
         return CommandResult({"report": "\n".join(block)}, text=block)
-    return CommandResult(found, code=0 if found["ok"] else 1)
+    return CommandResult(found, code=0 if found["ok"] else 1, text=doctor_lines(found))
 
 
 STAGES: dict[str, Callable[..., None]] = {

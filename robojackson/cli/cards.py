@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from robojackson.cli.console import lines
+from robojackson.cli.lifetime.interruption import program
 from robojackson.retarget.scorecard_gate import BARS, failures
 
 Answer = Mapping[str, Any]
@@ -41,7 +42,7 @@ def closing(answer: Answer) -> list[str]:
 
 def command_line(*words: object) -> str:
     """Return a command that can be copied into a shell."""
-    return shlex.join(["robojackson", *map(str, words)])
+    return shlex.join([program(), *map(str, words)])
 
 
 def score_lines(answer: Answer) -> list[str]:

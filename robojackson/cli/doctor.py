@@ -3,9 +3,12 @@
 import ctypes
 import shutil
 import sys
+from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, distributions, version
 from typing import Any
 
+from robojackson.cli.console import lines
+from robojackson.cli.lifetime.interruption import program
 from robojackson.clips.web import javascript_runtimes
 
 PYTHONS = ((3, 11), (3, 12), (3, 13))
@@ -76,6 +79,17 @@ def examine() -> dict[str, Any]:
         "missing": missing,
         "optional": optional,
     }
+
+
+def doctor_lines(found: Mapping[str, Any]) -> list[str]:
+    """Return what `examine` found, for people: each thing that is missing on a line, a verdict."""
+    advice = ("missing", "optional")
+    rows = [*lines({key: value for key, value in found.items() if key not in advice})]
+    rows += [f"{key:<8}  {each}" for key in advice for each in found[key]]
+    count = len(found["missing"])
+    if count:
+        return [*rows, f"{count} needed thing{'s are' if count > 1 else ' is'} missing."]
+    return [*rows, "All that is needed is here.", f"next: {program()} dance"]
 
 
 def unsupported(version: tuple[int, int]) -> list[str]:

@@ -143,6 +143,7 @@ def evaluate(
 ) -> Figures:
     """The verdict on a policy; with a folder, also its tables and the rollout."""
     from robojackson.api.evaluation import evaluate_policy
+    from robojackson.cli.training_words import train_longer
     from robojackson.pipeline.pipeline_config import PipelineConfig
 
     settings = load(PipelineConfig, config, overrides)
@@ -154,10 +155,11 @@ def evaluate(
     if out is not None:
         verdict.save(out)
     summary = to_json_types(verdict.summary)
-    again = ("train", reference, "-o", policy.parent, "--minutes", LONGER_MINUTES)
-    export = ("export", policy, "--to", "onnx", "-o", policy.with_suffix(".onnx"))
-    dances = summary["verdict"]["kind"] == "dances"
-    following = cards.command_line(*(export if dances else again))
+    if summary["verdict"]["kind"] == "dances":
+        words = ("export", policy, "--to", "onnx", "-o", policy.with_suffix(".onnx"))
+        following = cards.command_line(*words)
+    else:
+        following = train_longer(reference, policy.parent, LONGER_MINUTES)
     return {"policy": str(policy), "reference": str(reference), **summary, "next": following}
 
 

@@ -1,5 +1,6 @@
 """Where a command starts: nothing heavy is imported before Ctrl-C is guarded."""
 
+import atexit
 import os
 import sys
 from collections.abc import Callable
@@ -19,10 +20,39 @@ def start(command: Callable[[], int]) -> NoReturn:
     Args:
         command: Imports what it needs inside itself; returns the exit code.
     """
+    end = _End()
+    atexit.register(end.leave)  # the first to be registered is the last to run
     set_variables()
     if sys.platform == "linux":
         os.environ.setdefault("MUJOCO_GL", "disable")
-    sys.exit(guarded(lambda: _run(command)))
+    end.code = guarded(lambda: _run(command))
+    sys.exit(end.code)
+
+
+class _End:
+    """Ends the process after all of Python's own end, without the destructors of C++ libraries.
+
+    On a busy machine those of pyarrow abort now and then ("terminate called without an active
+    exception"), which makes exit code 134 of a command that has done all its work.
+
+    Attributes:
+        code: Exit code of a command that came to its end.
+    """
+
+    def __init__(self) -> None:
+        self.code: int | None = None
+
+    def leave(self) -> None:
+        """Write out what is buffered and end; where it cannot be written, Python says so itself."""
+        if self.code is None:
+            return
+        try:
+            for stream in (sys.stdout, sys.stderr):
+                if stream is not None:
+                    stream.flush()
+        except (OSError, ValueError):
+            return
+        os._exit(self.code)
 
 
 def _run(command: Callable[[], int]) -> int:

@@ -237,6 +237,7 @@ def test_a_video_has_a_panel_for_what_is_given(
         rj.render_video(tmp_path / "x.mp4", reference, video=CLIP)
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("name", ["track", "motion", "reference"])
 def test_a_repr_is_one_line(name: str, request: pytest.FixtureRequest) -> None:
     told = repr(request.getfixturevalue(name))

@@ -1,5 +1,7 @@
 """What single stages say to people: a verdict last, and a command that can be typed."""
 
+from pathlib import Path
+
 import pytest
 
 from robojackson.cli import cards
@@ -72,6 +74,22 @@ def test_a_training_without_an_update_learnt_nothing() -> None:
 
 def test_a_command_can_be_copied_into_a_shell() -> None:
     assert cards.command_line("dance", "my clip.mp4") == "robojackson dance 'my clip.mp4'"
+
+
+def test_a_command_names_the_path_where_the_shell_does_not_know_the_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PATH", str(tmp_path / "bin"))
+    monkeypatch.setattr(interruption.sys, "argv", [".venv/bin/robojackson", "dance", "a b.mp4"])
+    assert interruption.same_command() == ".venv/bin/robojackson dance 'a b.mp4'"
+    assert cards.command_line("doctor") == ".venv/bin/robojackson doctor"
+    assert interruption.python() == interruption.sys.executable
+    for name in ("robojackson", "python3"):
+        (tmp_path / "bin").mkdir(exist_ok=True)
+        (tmp_path / "bin" / name).touch(0o755)
+    assert interruption.same_command() == "robojackson dance 'a b.mp4'"
+    assert interruption.python() == "python3"
 
 
 @pytest.mark.parametrize("words", [["--minutes", "3"], ["--minutes=3"], []])

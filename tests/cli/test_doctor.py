@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from robojackson.cli.doctor import PYTHONS, examine, unsupported
+from robojackson.cli.doctor import PYTHONS, doctor_lines, examine, unsupported
 
 PROJECT = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
 
@@ -27,6 +27,19 @@ def test_another_python_is_named_with_those_supported(version: tuple[int, int]) 
 def test_the_python_of_the_tests_is_supported() -> None:
     answer = examine()
     assert (answer["python"], answer["python_supported"]) == (sys.version.split()[0], True)
+
+
+def test_a_person_reads_each_missing_thing_on_a_line_and_a_verdict() -> None:
+    found = {"ok": False, "missing": ["torch: run `make` again"], "optional": ["a, or b", "c"]}
+    assert doctor_lines(found) == [
+        "ok  False",
+        "missing   torch: run `make` again",
+        "optional  a, or b",
+        "optional  c",
+        "1 needed thing is missing.",
+    ]
+    told = doctor_lines({"ok": True, "missing": [], "optional": []})
+    assert told[-2:] == ["All that is needed is here.", "next: robojackson dance"]
 
 
 def test_the_versions_are_those_of_the_project() -> None:

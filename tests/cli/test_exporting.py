@@ -62,12 +62,14 @@ def test_the_answer_tells_what_was_written(reference: Path, tmp_path: Path) -> N
     assert (told["file"], told["bytes"]) == (str(out), out.stat().st_size)
 
 
+@pytest.mark.medium
 def test_the_answer_judges_the_motion_by_its_score_card(reference: Path, tmp_path: Path) -> None:
     told = export(reference, "csv", tmp_path / "motion.csv")
     assert told["verdict"]["kind"] == "feasible"
     assert told["next"] == command_line("train", reference, "-o", reference.parent / "training")
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(
     ("card", "kind"), [({}, "unchecked"), ({"floor_penetration_mm": 500.0}, "refused")]
 )

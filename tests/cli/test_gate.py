@@ -19,6 +19,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+@pytest.mark.medium
 def test_a_bad_motion_is_refused_in_one_line_and_kept(folder: Path, tmp_path: Path) -> None:
     said = in_process(
         *("retarget", folder / "smpl.parquet", "-o", tmp_path, "--method", "paper", *SMOKE)
@@ -30,6 +31,7 @@ def test_a_bad_motion_is_refused_in_one_line_and_kept(folder: Path, tmp_path: Pa
     assert (tmp_path / "reference.parquet").exists()
 
 
+@pytest.mark.medium
 def test_force_goes_on_with_it(folder: Path, tmp_path: Path) -> None:
     words = ("retarget", folder / "smpl.parquet", "-o", tmp_path, "--method", "paper")
     said = in_process(*words, "--force", *SMOKE)

@@ -10,6 +10,7 @@ import pytest
 
 from tests.fixtures.commands import ROOT, Said, environment
 
+pytestmark = pytest.mark.xdist_group("library_output")
 SMOKE = ("--config", "smoke")
 STEPS = ("--steps=2000", "--trainer=sb3", "--set=tqc.n_envs=4", "--set=progress_seconds=0.5")
 FILM = ("--video", "--set", "render.max_seconds=0.3")
@@ -112,19 +113,17 @@ def danced(short_clip: Path, folder: Path) -> Said:
     return run("-m", "robojackson", *words, ROBOJACKSON_STORE=store)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    "command",
-    [
-        "scored", "captured", "retargeted", "trained", "judged",
-        pytest.param("danced", marks=pytest.mark.slow),
-    ],
-)  # fmt: skip
+    "command", ["scored", "captured", "retargeted", "trained", "judged", "danced"]
+)
 def test_every_line_of_a_command_is_ours(command: str, request: pytest.FixtureRequest) -> None:
     said: Said = request.getfixturevalue(command)
     assert said.code == 0, said.err
     assert strange(said) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["scored", "captured", "retargeted", "trained", "judged"])
 def test_the_answer_is_alone_on_stdout(command: str, request: pytest.FixtureRequest) -> None:
     said: Said = request.getfixturevalue(command)

@@ -22,6 +22,7 @@ TINY = {
 }
 
 
+@pytest.mark.medium
 def test_a_walker_for_the_papers_mode_takes_all_348_observations(tmp_path: Path) -> None:
     mine = tmp_path / "reference.parquet"
     mine.write_bytes(b"a dance that the user keeps here")

@@ -58,6 +58,7 @@ def test_page_shows_every_stage(results: Results) -> None:
         assert title in headings
 
 
+@pytest.mark.medium
 def test_page_shows_the_advice_about_the_clip(results: Results) -> None:
     advised = replace(results, advice=(Advice("frame_rate", 10.0, 20.0),))
     html = render(page_content(advised, "dance.mp4"))

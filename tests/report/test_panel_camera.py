@@ -117,6 +117,7 @@ def test_the_skeleton_touches_no_edge(clip: str) -> None:
     assert not any(has_skeleton(edge(panel)) for panel in panels)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("clip", CLIPS)
 def test_the_robot_touches_no_edge(clip: str) -> None:
     with ExitStack() as stack:

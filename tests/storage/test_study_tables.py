@@ -12,6 +12,7 @@ from robojackson.pipeline.table_schemas import EPISODE_RECORD, EVALUATION_RECORD
 from storage import study_tables
 from storage.artifact import Artifact
 from storage.store import Store
+from storage.study_overview import OVERVIEW
 
 NAMES = {"run_id": "other", "move": "other", "setup": "other", "seed": 9}
 
@@ -101,8 +102,33 @@ def test_provenance_is_a_table_beside_the_rows(store: Store) -> None:
     assert study_tables.query(store, sql) == [{"git_commit": "abc"}]
 
 
+@pytest.mark.parametrize(
+    ("success", "survived_s", "statue", "known"),
+    [
+        (1.0, 0.5, 0.0, None),  # half a second says nothing
+        (1.0, 10.0, 0.6, None),  # a statue does as well
+        (1.0, 10.0, 0.0, 1.0),
+        (0.0, 0.5, 0.0, 0.0),  # fell
+    ],
+)
+def test_a_line_a_cell_judges_nothing_that_is_too_short(
+    success: float, survived_s: float, statue: float, known: float | None, store: Store
+) -> None:
+    same = {**NAMES, "phase": 0, "reset": 0, "clip_fraction": 1.0, "fell": success == 0}
+    own = {"policy": "trained", "success": success, "strict_success": success, "skill": success}
+    rows = [
+        {**same, **own, "survived_s": survived_s},
+        {**same, **own, "policy": "statue", "strict_success": statue, "survived_s": survived_s},
+    ]
+    encoded = tables.encode_rows(EVALUATION_RECORD, rows)
+    kept = {"evaluations": store.save("stage", "evaluations.parquet", encoded)}
+    study_tables.write(store, cell(), {**made(store), **kept})
+    (row,) = study_tables.query(store, OVERVIEW)
+    assert (row["strict_success"], row["skill"], row["rollouts"]) == (known, known, 1)
+
+
 def test_an_empty_store_answers_with_no_rows(store: Store) -> None:
-    assert study_tables.query(store, study_tables.OVERVIEW) == []
+    assert study_tables.query(store, OVERVIEW) == []
 
 
 def test_a_question_cannot_read_other_files(store: Store, tmp_path: Path) -> None:

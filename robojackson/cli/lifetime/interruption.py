@@ -5,6 +5,7 @@ Only the standard library is imported here, since this precedes everything else.
 
 import os
 import shlex
+import shutil
 import signal
 import sys
 from types import FrameType
@@ -70,9 +71,26 @@ def as_line(text: str) -> str:
     return f"robojackson: {plain}"
 
 
+def program() -> str:
+    """Return what a person types for this program: its path where its name alone is not found.
+
+    `make dance` runs it from an environment that the person's shell has not activated.
+    """
+    name, path = "robojackson", sys.argv[0]
+    if os.path.basename(path) != name or shutil.which(name) is not None:
+        return name
+    inside = os.path.relpath(path)
+    return path if inside.startswith(os.pardir) else inside
+
+
+def python() -> str:
+    """Return what a person types for Python: Debian has no `python` outside an environment."""
+    return next((name for name in ("python", "python3") if shutil.which(name)), sys.executable)
+
+
 def same_command() -> str:
     """Return the command line of this process, to be typed again."""
-    return "robojackson " + " ".join(shlex.quote(word) for word in sys.argv[1:])
+    return shlex.join([program(), *sys.argv[1:]])
 
 
 def with_option(option: str, value: str) -> str:
@@ -85,7 +103,7 @@ def with_option(option: str, value: str) -> str:
         if word.startswith(f"{option}="):
             del words[place]
             break
-    return shlex.join(["robojackson", *words, option, value])
+    return shlex.join([program(), *words, option, value])
 
 
 def become_worker(supervisor: int, mark: str, last_line: int) -> None:

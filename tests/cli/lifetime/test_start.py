@@ -54,3 +54,28 @@ def test_ctrl_c_while_the_command_is_imported_is_one_line() -> None:
     )  # fmt: skip
     assert (done.returncode, done.stdout) == (130, "")
     assert done.stderr == "robojackson: interrupted: resume: robojackson dance\n"
+
+
+ABORTS_AT_EXIT = """
+import atexit, ctypes, sys, threading, time
+from robojackson.cli.start import start
+
+def command():
+    libc = ctypes.CDLL(None)
+    libc.__cxa_atexit(ctypes.cast(libc.abort, ctypes.c_void_p), None, None)
+    atexit.register(print, "python has ended")
+    threading.Thread(target=lambda: (time.sleep(0.2), print("so has the thread"))).start()
+    print("done")
+    return 3
+
+start(command)
+"""
+
+
+def test_a_library_that_aborts_at_the_end_changes_no_exit_code() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", ABORTS_AT_EXIT], capture_output=True, text=True, env=environment(),
+        check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (3, "")
+    assert done.stdout.splitlines() == ["done", "so has the thread", "python has ended"]

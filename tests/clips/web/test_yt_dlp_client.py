@@ -19,6 +19,7 @@ def get(web: Web, path: str, folder: Path, config: WebConfig = PATIENT) -> Path:
     return fetch(offer(f"{web.url}/{path}", "score", FormatConfig(), config), folder, config)
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("path", ["good/clip.mp4", "moved/clip.mp4", "busy_once/clip.mp4"])
 def test_a_video_arrives_as_it_was_sent(web: Web, path: str, tmp_path: Path) -> None:
     assert get(web, path, tmp_path).read_bytes() == web.video

@@ -35,7 +35,10 @@ def test_it_removes_when_it_is_told_to(word: str, store: Store) -> None:
 
 
 def test_what_is_young_stays_by_itself(store: Store) -> None:
-    assert "Nothing would go" in clean(store).out
+    assert (
+        "Nothing would go: of these kinds, nothing that may go is 30 days old" in clean(store).out
+    )
+    assert "Nothing was removed: of these kinds" in clean(store, "--delete").out
     assert clean(store, "--json", "--delete").answer["items"] == []
     assert len(store.list()) == 1
 

@@ -39,6 +39,7 @@ def rows(width: int, count: int = 5, seed: int = 1) -> Tensor:
     return torch.randn(count, width, generator=generator, dtype=torch.float64)
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(
     ("form", "keys", "parameters"), [(OneStage, 211, 16.5e6), (TwistSwing, 396, 29.0e6)]
 )

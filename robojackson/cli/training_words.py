@@ -1,0 +1,42 @@
+"""The command that goes on with a training: its folder knows the settings that it was given."""
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from robojackson.cli import cards
+from robojackson.rl.checkpoint_folder import newest_checkpoint
+from robojackson.rl.config.train_config import TrainConfig
+
+
+def train_longer(reference: Path, folder: Path, minutes: float) -> str:
+    """Return the command that trains on in a folder, with every setting that is not the usual one.
+
+    A checkpoint refuses other settings, wherever they came from: a file, an option or `--set`.
+    """
+    words = ("train", reference, "-o", folder, "--minutes", f"{minutes:g}")
+    return cards.command_line(*words, *(f"--set={each}" for each in _unusual(folder)))
+
+
+def _unusual(folder: Path) -> list[str]:
+    """The settings of a training, KEY=VALUE; none where its folder has no checkpoint."""
+    checkpoint = newest_checkpoint(folder)
+    if checkpoint is None:
+        return []
+    usual = dict(_flat(json.loads(json.dumps(asdict(TrainConfig())))))
+    own = _flat(json.loads((checkpoint / "run.json").read_text())["configuration"])
+    return [
+        f"{key}={value if isinstance(value, str) else json.dumps(value)}"
+        for key, value in own
+        if key in usual and usual[key] != value
+    ]
+
+
+def _flat(values: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{above}{key}.")
+        else:
+            yield f"{above}{key}", value

@@ -1,0 +1,21 @@
+"""The question that `robojackson metrics` asks by itself."""
+
+from robojackson.rl.evaluation.verdict import EASY, SHORTEST_S
+
+OVERVIEW = f"""
+WITH bodies AS (
+    SELECT study, move, setup, seed, policy, count(*) AS rollouts, avg(survived_s) AS survived_s,
+           avg(strict_success) AS strict_success, avg(skill) AS skill,
+           bool_or(success = 1 AND survived_s < {SHORTEST_S}) AS ended_early
+    FROM evaluations GROUP BY ALL
+), cells AS (
+    SELECT study, move, setup, seed, bool_or(ended_early) OR
+           coalesce(max(strict_success) FILTER (policy <> 'trained') >= {EASY}, false) AS too_short
+    FROM bodies GROUP BY ALL
+)
+SELECT study, move, setup, seed, rollouts, round(survived_s, 2) AS survived_s,
+       CASE WHEN NOT too_short THEN round(strict_success, 3) END AS strict_success,
+       CASE WHEN NOT too_short THEN round(skill, 3) END AS skill
+FROM bodies JOIN cells USING (study, move, setup, seed) WHERE policy = 'trained' ORDER BY ALL
+"""
+"""A line a cell; success and skill are empty where its rollouts are too short to judge."""
