@@ -85,8 +85,10 @@ def catalogue(
     as_json: Json = False,
 ) -> CommandResult:
     """Every video that was ever judged, and why it was danced or not."""
+    from flows.cli.verdicts import catalogue_verdict
     from flows.search import ranking_table
     from robojackson.cli import console
+    from robojackson.cli.cards import closing
     from storage import candidate_catalogue
     from storage.store import Store
 
@@ -99,8 +101,11 @@ def catalogue(
             {"rows": found}, text=console.table(named, list(found[0]) if found else [])
         )
     rows = candidate_catalogue.records(store, dance)
-    text = ranking_table.lines(rows) if rows else [nothing_judged(dance)]
-    return CommandResult({"candidates": rows}, text=text)
+    if not rows:
+        return CommandResult({"candidates": rows}, text=[nothing_judged(dance)])
+    verdict = catalogue_verdict(rows)
+    text = [*ranking_table.lines(rows), *closing(verdict)]
+    return CommandResult({"candidates": rows, **verdict}, text=text)
 
 
 def nothing_judged(dance: str | None) -> str:

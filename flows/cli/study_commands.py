@@ -55,6 +55,8 @@ def metrics(
     as_json: Json = False,
 ) -> CommandResult:
     """The tables of all studies; without a question, a line a cell."""
+    from flows.cli.verdicts import metrics_verdict
+    from robojackson.cli.cards import closing
     from storage import study_tables
     from storage.store import Store
     from storage.study_overview import OVERVIEW
@@ -63,9 +65,12 @@ def metrics(
     if not rows:
         return CommandResult({"rows": []}, text=["no rows; `robojackson ablation` makes some"])
     text = table({str(n): row for n, row in enumerate(rows, 1)}, tuple(rows[0]))
-    if sql is None and any(row["strict_success"] is None for row in rows):
+    if sql is not None:
+        return CommandResult({"rows": rows}, text=text)
+    if any(row["strict_success"] is None for row in rows):
         text.append("-: too short to judge, or bodies that do not dance succeed as well")
-    return CommandResult({"rows": rows}, text=text)
+    verdict = metrics_verdict(rows)
+    return CommandResult({"rows": rows, **verdict}, text=[*text, *closing(verdict)])
 
 
 @command
@@ -76,9 +81,15 @@ def deploy(
     as_json: Json = False,
 ) -> CommandResult:
     """Register pools, deployments and automations with the server of PREFECT_API_URL."""
+    from flows.cli.verdicts import deploy_verdict
     from flows.runtime.deployments import deploy as register
+    from robojackson.cli.cards import closing
+    from robojackson.cli.console import lines
 
-    return CommandResult(register(wait))
+    made = register(wait)
+    made |= deploy_verdict(made)
+    shown = {name: made[name] for name in ("pools", "automations", "deployments")}
+    return CommandResult(made, text=[*lines(shown), *closing(made)])
 
 
 @command

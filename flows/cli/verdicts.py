@@ -5,7 +5,7 @@ Everything is made from what a command answers; as `robojackson.cli.cards` does 
 
 import shlex
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from robojackson.cli.cards import command_line
@@ -40,6 +40,39 @@ def find_verdict(found: Facts) -> dict[str, Any]:
     reason, count = reasons.most_common(1)[0]
     sentence = f"None of {len(told)} videos may be danced; of {count} the reason is: {reason}."
     return _closing("none", sentence, with_option("--top", str(2 * len(told))))
+
+
+def catalogue_verdict(rows: Sequence[Facts]) -> dict[str, Any]:
+    """Return `verdict` and `next` of a catalogue that has rows."""
+    dances = sorted({row["dance"] for row in rows})
+    fit = [row for row in rows if row["decision"] in ("chosen", "accepted")]
+    sentence = (
+        f"{len(rows)} videos of {len(dances)} dance{'' if len(dances) == 1 else 's'} were judged, "
+        f"{len(fit)} may be danced."
+    )
+    if not fit:
+        return _closing("none", sentence, command_line("find", dances[0]))
+    return _closing("judged", sentence, command_line("dance", fit[0]["url"]))
+
+
+def metrics_verdict(rows: Sequence[Facts]) -> dict[str, Any]:
+    """Return `verdict` and `next` of the overview of all studies."""
+    studies = {row["study"] for row in rows}
+    trusted = sum(row["strict_success"] is not None for row in rows)
+    sentence = (
+        f"{len(rows)} cells of {len(studies)} stud{'y' if len(studies) == 1 else 'ies'}; "
+        f"{trusted} can be judged."
+    )
+    question = "SELECT move, setup, avg(skill) AS skill FROM evaluations GROUP BY ALL"
+    return _closing("overview", sentence, command_line("metrics", "--sql", question))
+
+
+def deploy_verdict(made: Facts) -> dict[str, Any]:
+    """Return `verdict` and `next` of a registration."""
+    sentence = (
+        f"{len(made['deployments'])} deployments are registered; a worker of each pool runs them."
+    )
+    return _closing("registered", sentence, "prefect worker start --pool flows")
 
 
 def refresh_lines(done: Facts) -> list[str]:

@@ -225,7 +225,8 @@ def test_a_broken_description_is_told_in_a_line_that_names_the_file(
     told, lines = robot_sheets.check_robot(str(path), None)
     assert not told["ok"]
     assert any(cause in line and str(path) in line for line in told["problems"])
-    assert told["problems"] == lines[1:]
+    assert told["problems"] == lines[1:-2]
+    assert told["verdict"]["kind"] == "problems"
 
 
 def test_wrong_keys_are_told_all_at_once(tmp_path: Path):
@@ -242,7 +243,7 @@ def test_new_writes_a_description_that_passes_and_keeps_a_file_that_is_there(
     monkeypatch.chdir(tmp_path)
     told, lines = robot_sheets.new_robot(model, None, force=False)
     assert (told["file"], told["ok"], told["left"]) == ("my_humanoid.yaml", True, [])
-    assert lines[-1] == "next     robojackson robots check my_humanoid.yaml -o my_humanoid.png"
+    assert lines[-1] == "next: robojackson robots check my_humanoid.yaml -o my_humanoid.png"
     Path("my_humanoid.yaml").write_text("mine")
     with pytest.raises(StoreError, match="there already; --force"):
         robot_sheets.new_robot(model, None, force=False)

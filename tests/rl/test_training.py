@@ -23,7 +23,8 @@ from robojackson.rl.config.train_config import (
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.env.vec_env import TrackingVecEnv
 from robojackson.rl.evaluation.controllers import drivers
-from robojackson.rl.evaluation.policy_evaluation import STAND, evaluate_policy
+from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
+from robojackson.rl.evaluation.starts import STAND
 from robojackson.rl.policy import Policy, load_policy
 from robojackson.rl.tqc.sb3_trainer import Sb3Trainer
 from robojackson.rl.tqc.sbx_trainer import SbxTrainer

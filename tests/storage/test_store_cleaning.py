@@ -145,8 +145,12 @@ def test_while_a_process_uses_the_store_only_work_goes(
 @pytest.mark.parametrize(("words", "used"), [("dance clip.mp4", True), ("server", False)])
 def test_a_command_that_works_with_the_store_is_found(words: str, used: bool, store: Store) -> None:
     environment = {**os.environ, "ROBOJACKSON_STORE": store.root}
-    sleeps = [sys.executable, "-c", "input()", "robojackson", *words.split()]
-    with subprocess.Popen(sleeps, env=environment, stdin=subprocess.PIPE) as process:
+    waits = "print(flush=True); input()"  # the first line: the process is what it was started as
+    sleeps = [sys.executable, "-c", waits, "robojackson", *words.split()]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen(sleeps, env=environment, **pipes) as process:  # type: ignore[call-overload]
+        assert process.stdout is not None
+        process.stdout.readline()
         found = users_of(Path(store.root))
         process.communicate(b"\n")
     assert found == ([f"robojackson dance (process {process.pid})"] if used else [])

@@ -4,6 +4,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from robojackson.cli.cards import closing, command_line
 from robojackson.errors import BadConfiguration, RoboJacksonError, StoreError
 from robojackson.files.file_tree import FileTree
 from robojackson.pipeline.robot_descriptions import describe_robot, is_file, robot_names
@@ -41,7 +42,8 @@ def check_robot(given: str, picture: Path | None) -> tuple[Figures, list[str]]:
     try:
         robot = load_robot(describe_robot(given))
     except RoboJacksonError:
-        return told, lines
+        told |= _verdict(given, True)
+        return told, [*lines, *closing(told)]
     figures = _figures(robot)
     told |= figures | {"picture": None}
     lines = (lines if found else []) + _table(figures)
@@ -52,7 +54,21 @@ def check_robot(given: str, picture: Path | None) -> tuple[Figures, list[str]]:
         FileTree(picture.parent).write(picture.name, png(robot_sheet(robot), opaque=True))
         told["picture"] = str(picture)
         lines.append(f"picture  {picture}")
-    return told, lines
+    told |= _verdict(given, bool(found))
+    return told, [*lines, *closing(told)]
+
+
+def _verdict(given: str, problems: bool) -> Figures:
+    """`verdict` and `next` of a check."""
+    if problems:
+        sentence = "The description cannot be used yet."
+        return {
+            "verdict": {"kind": "problems", "sentence": sentence},
+            "next": command_line("robots", "check", given),
+        }
+    sentence = f"Nothing is wrong with {given}: look at the picture before it dances."
+    following = command_line("dance", "clips/hip_shake.mp4", "--robot", given)
+    return {"verdict": {"kind": "whole", "sentence": sentence}, "next": following}
 
 
 def picture_of(given: str) -> Path:
@@ -85,10 +101,11 @@ def new_robot(model: Path, out: Path | None, force: bool) -> tuple[Figures, list
         head.append(f"left     {', '.join(draft.left)}: comments in the file, fill them in")
     if LEG in draft.left:
         head.append(f"hint     {NO_LEGS}")
-    tail = [f"next     robojackson robots check {target} -o {target.with_suffix('.png')}"]
-    lines = lines if told["problems"] else lines[:1]
+    picture = target.with_suffix(".png")
+    told["next"] = command_line("robots", "check", str(target), "-o", str(picture))
+    lines = told["problems"] or lines[:1]
     facts = {"file": str(target), "guessed": list(draft.guessed), "left": list(draft.left)}
-    return facts | told, [*head, *lines, *tail]
+    return facts | told, [*head, *lines, f"next: {told['next']}"]
 
 
 def _all_of(cause: BadConfiguration) -> list[str]:

@@ -9,8 +9,11 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.evaluate_config import EvaluateConfig
 from robojackson.robot.model import Robot
 
-POLICIES = 6
-"""That are judged: the trained one, a variant of it and four that do not dance."""
+LASTING, FALLING = 2, 4
+"""Bodies that are judged: the trained one and a variant of it, and those that do not dance."""
+FALLING_SHARE = 0.3
+"""Of a rollout, after which the bodies that do not dance lie on the floor."""
+PASSPORT_CASES = 20
 TIMED_STEPS = 400
 AROUND_A_STEP = 1.6
 """Time of a simulated step with control and scoring, in times of MuJoCo's alone."""
@@ -26,7 +29,10 @@ WALKS_M = 0.2
 def seconds_to_evaluate(robot: Robot, reference: ReferenceMotion, config: EvaluateConfig) -> float:
     """Return about how long an evaluation takes here, seconds; measured by a short simulation."""
     length = config.seconds if reference.cyclic else len(reference) * reference.dt
-    rollouts = POLICIES * (config.phases * config.resets + 1)
+    starts = config.phases * config.resets + 1
+    rollouts = (LASTING + FALLING_SHARE * FALLING) * starts
+    if config.passport:
+        rollouts += PASSPORT_CASES * (config.phases + 1)
     substeps = length / robot.model.opt.timestep
     return float(AROUND_A_STEP * rollouts * substeps * seconds_a_step(robot) / config.threads)
 

@@ -70,10 +70,11 @@ def test_a_dance_that_has_nothing_to_save_ends_at_once(moment: str, way: str, st
 
 @pytest.mark.slow
 def test_a_dance_that_learns_saves_its_checkpoint_and_says_so(store: Path) -> None:
+    others = set(store.glob("work/*/checkpoint/run.json"))  # of the dances above, on this store
     for text in (" steps ", "resuming at"):  # the second time from the checkpoint of the first
         end = interrupted(LEARN, store, text, 3.0, "group")
         assert "the training is saving its checkpoint" in answer(end)[0]
-        assert len(list(store.glob("work/*/checkpoint/run.json"))) == 1
+        assert len(set(store.glob("work/*/checkpoint/run.json")) - others) == 1
     with sqlite3.connect(store / "prefect" / "prefect.db") as database:
         assert database.execute("pragma integrity_check").fetchone() == ("ok",)
 

@@ -5,7 +5,15 @@ from typing import Any
 
 import pytest
 
-from flows.cli.verdicts import ablation_verdict, find_verdict, refresh_lines, refresh_verdict
+from flows.cli.verdicts import (
+    ablation_verdict,
+    catalogue_verdict,
+    deploy_verdict,
+    find_verdict,
+    metrics_verdict,
+    refresh_lines,
+    refresh_verdict,
+)
 
 
 def row(decision: str, **more: Any) -> dict[str, Any]:
@@ -85,3 +93,25 @@ def test_a_study_says_what_its_numbers_are_worth(
     assert told["verdict"]["kind"] == kind
     assert words in told["verdict"]["sentence"]
     assert told["next"]
+
+
+def test_a_catalogue_counts_what_may_be_danced_and_dances_the_first() -> None:
+    rows = [row("rejected", dance="APT"), row("accepted", dance="moonwalk", url="https://x.org/m")]
+    told = catalogue_verdict(rows)
+    assert told["verdict"]["sentence"] == "2 videos of 2 dances were judged, 1 may be danced."
+    assert shlex.split(told["next"]) == ["robojackson", "dance", "https://x.org/m"]
+    none = catalogue_verdict([row("rejected", dance="APT")])
+    assert shlex.split(none["next"]) == ["robojackson", "find", "APT"]
+
+
+def test_the_overview_of_studies_counts_what_can_be_judged() -> None:
+    rows = [{"study": "smoke", "strict_success": None}, {"study": "smoke", "strict_success": 0.5}]
+    told = metrics_verdict(rows)
+    assert told["verdict"]["sentence"] == "2 cells of 1 study; 1 can be judged."
+    assert shlex.split(told["next"])[:3] == ["robojackson", "metrics", "--sql"]
+
+
+def test_what_is_registered_needs_a_worker() -> None:
+    told = deploy_verdict({"deployments": ["a", "b"], "pools": ["flows"], "automations": []})
+    assert told["verdict"]["sentence"].startswith("2 deployments")
+    assert told["next"] == "prefect worker start --pool flows"
