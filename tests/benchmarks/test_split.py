@@ -1,13 +1,16 @@
 """What may be trained on: lists without overlap, and near-duplicates found by their movement."""
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from benchmarks.learning.motion_distance import contained_share, windows
+from benchmarks.learning.policies import FROZEN, MOVES, require_frozen
 from benchmarks.learning.split import DUPLICATE_SHARE, load_split, shares
 from robojackson.geometry.rotations import quat_to_matrix
+from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
 from tests.fixtures.robots import human
 
@@ -27,6 +30,19 @@ def test_no_motion_stands_in_two_lists() -> None:
 
 def test_the_three_dances_that_judge_are_judged() -> None:
     assert {"cmu_05_02", "cmu_05_09", "cmu_05_18"} <= set(SPLIT.judged)
+
+
+@pytest.mark.parametrize("path", sorted(FROZEN.glob("*.parquet")), ids=lambda path: path.stem)
+def test_a_frozen_reference_is_the_one_that_rows_are_measured_on(path: Path) -> None:
+    assert path.stem in MOVES
+    assert ReferenceMotion.load(path).robot == MOVES[path.stem].robot
+    require_frozen(path.stem, path)
+
+
+def test_another_reference_is_refused() -> None:
+    """A row that is measured on other poses is another row."""
+    with pytest.raises(SystemExit, match=r"g1_walk: .* measured on"):
+        require_frozen("g1_walk", FROZEN / "walk.parquet")
 
 
 def test_every_near_duplicate_is_one_of_a_judged_motion() -> None:
