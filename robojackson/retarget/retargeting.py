@@ -26,8 +26,8 @@ from robojackson.retarget.scorecard import hovers, score
 from robojackson.retarget.scorecard_gate import BARS, failures
 from robojackson.retarget.targets.cycle import Cycle, human_clip
 from robojackson.retarget.targets.human_clip import HumanClip
-from robojackson.retarget.targets.keypoint_targets import Targets, targets
-from robojackson.retarget.targets.tails import Tailed, settled, some_of, with_tails
+from robojackson.retarget.targets.keypoint_targets import Targets, select_steps, targets
+from robojackson.retarget.targets.tails import Tailed, settled, with_tails
 from robojackson.retarget.whole_clip import optimise, polished
 from robojackson.robot.model import Robot
 from robojackson.robot.resampling import velocities
@@ -149,7 +149,7 @@ def _without_tails(
     some = {name: parts[name][danced] for name in A_ROW_A_STEP}
     some["certificate"] = replace(found, slack=found.slack[danced], tempo=found.tempo[danced])
     motion = ReferenceMotion(**(parts | some))
-    card = score(motion, robot, some_of(aims, danced), some_of(upright, danced))
+    card = score(motion, robot, select_steps(aims, danced), select_steps(upright, danced))
     return {name: card[name] for name in card if name.startswith(OF_THE_CLIP)}
 
 

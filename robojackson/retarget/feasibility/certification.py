@@ -49,9 +49,7 @@ def certify(
     tolerance: Tolerance,
 ) -> Certified:
     """What the robot can and cannot do of a motion."""
-    force = inverse_dynamics.free_space(robot, qpos, dt, cycle_offset).at(1.0)
-    near = inverse_dynamics.touching(robot, qpos)
-    asked = inverse_dynamics.demand(robot, qpos, force, near, tolerance)
+    asked, near = _demand(robot, qpos, dt, cycle_offset, tolerance)
     found = contact_wrench.supply(asked)
     slack = tempo.slacks(robot, qpos, dt, cycle_offset, tolerance)
     free = _without_limits(asked)
@@ -77,10 +75,21 @@ def motor_torques(
     tolerance: Tolerance,
 ) -> Float[np.ndarray, "S J"]:
     """Torque of every hinge's motor that the motion asks for, within its limit, Nm."""
+    asked, _ = _demand(robot, qpos, dt, cycle_offset, tolerance)
+    return _motor_torque(asked, contact_wrench.supply(asked))
+
+
+def _demand(
+    robot: Robot,
+    qpos: Float[np.ndarray, "S nq"],
+    dt: float,
+    cycle_offset: np.ndarray | None,
+    tolerance: Tolerance,
+) -> tuple[contact_wrench.Demand, Bool[np.ndarray, "S C"]]:
+    """What a motion asks for at its own tempo, and which soles are near the floor."""
     force = inverse_dynamics.free_space(robot, qpos, dt, cycle_offset).at(1.0)
     near = inverse_dynamics.touching(robot, qpos)
-    asked = inverse_dynamics.demand(robot, qpos, force, near, tolerance)
-    return _motor_torque(asked, contact_wrench.supply(asked))
+    return inverse_dynamics.demand(robot, qpos, force, near, tolerance), near
 
 
 def fallen(robot: Robot, qpos: Float[np.ndarray, "S nq"]) -> Bool[np.ndarray, " S"]:

@@ -163,8 +163,8 @@ def every_second(wanted: Targets) -> Targets:
     return replace(select_steps(wanted, slice(None, None, 2)), dt=2 * wanted.dt)
 
 
-def select_steps(wanted: Targets, steps: slice) -> Targets:
-    """Some of the steps."""
+def select_steps(wanted: Targets, steps: slice | Bool[np.ndarray, " N"]) -> Targets:
+    """Some of the steps, or all of them in another order."""
     return replace(
         wanted,
         keypoints_w=wanted.keypoints_w[steps],

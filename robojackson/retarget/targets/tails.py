@@ -13,13 +13,13 @@ from typing import Literal
 
 import mujoco
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from pydantic import Field
 from scipy.spatial.transform import Rotation, Slerp
 
 from robojackson.config import config_dataclass
 from robojackson.motion.smpl_sequence import AIR, PLANTED
-from robojackson.retarget.targets.keypoint_targets import Targets
+from robojackson.retarget.targets.keypoint_targets import Targets, select_steps
 from robojackson.robot.model import Robot
 
 SETTLE_S = 0.3
@@ -211,19 +211,7 @@ def _about_up(yaw: float) -> Float[np.ndarray, "3 3"]:
 
 def _reversed(aims: Targets) -> Targets:
     """The same backwards in time."""
-    return some_of(aims, np.arange(len(aims))[::-1])
-
-
-def some_of(aims: Targets, steps: Bool[np.ndarray, " S"] | Int[np.ndarray, " S"]) -> Targets:
-    """The targets of some steps, chosen or in another order."""
-    return replace(
-        aims,
-        keypoints_w=aims.keypoints_w[steps],
-        weights=aims.weights[steps],
-        contact=aims.contact[steps],
-        heading=aims.heading[steps],
-        airborne=aims.airborne[steps],
-    )
+    return select_steps(aims, slice(None, None, -1))
 
 
 def _joined(parts: tuple[Targets, ...]) -> Targets:
