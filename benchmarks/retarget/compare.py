@@ -23,7 +23,7 @@ from rich.table import Table
 
 from benchmarks.mocap.truth import REAL, RENDERED, video_path
 from benchmarks.retarget import mink_peer
-from benchmarks.retarget.motions import lengthened, truth_motion
+from benchmarks.retarget.truth_motions import lengthened, truth_motion
 from robojackson.cli import importing, stages
 from robojackson.errors import BadConfiguration, MissingDependency
 from robojackson.motion.smpl_sequence import SmplSequence

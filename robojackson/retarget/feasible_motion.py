@@ -6,10 +6,12 @@ motion is slowed down locally and repaired again.
 """
 
 import logging
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
+from scipy.ndimage import maximum_filter1d
 
 from robojackson.metrics.retarget_error import keypoint_error_mm
 from robojackson.retarget.feasibility import tempo
@@ -27,6 +29,8 @@ _HELPS = 0.7  # share of the excess that slowing down may leave
 _GUARD = 1.03  # a warp ends with a whole step: all tempos fall by less than that
 _LOOSE = 1e-5  # first damping: repair moves whole bodies over many steps
 _HARDLY_SLOWER = 0.97  # a tempo that is not worth a warp
+_STILL_M = 1e-6  # targets that move less a step are a stand's
+_REACH_S = 0.8  # beside steps that need repair, others may change so far
 
 
 @dataclass(frozen=True)
@@ -44,13 +48,23 @@ class Feasible:
     aims: Targets
     steps: Float[np.ndarray, " S"]
     clip: slice
+    _slack: dict[int, np.ndarray] = field(default_factory=dict, init=False, compare=False)
 
     @property
     def danced(self) -> Bool[np.ndarray, " S"]:
-        """Steps that show the clip: tails would dilute the share of those that are feasible."""
+        """Steps that show the clip."""
         first, past = self.clip.start, self.clip.stop
         result: np.ndarray = (self.steps > first - 0.5) & (self.steps < past - 0.5)
         return result
+
+    @property
+    def parts(self) -> tuple[Bool[np.ndarray, " S"], ...]:
+        """Steps of the clip and, apart, those that lead into and out of it, without the stands:
+        none dilutes the other's share."""
+        points, danced = self.aims.keypoints_w, self.danced
+        moves = np.abs(np.diff(points, axis=0, append=points[-1:])).max((1, 2)) > _STILL_M
+        ways = moves & ~danced
+        return (danced, ways) if ways.any() else (danced,)
 
 
 def make_feasible(
@@ -68,40 +82,72 @@ def make_feasible(
         return given
     found = _accepted(robot, given, _solved(robot, given, how.weights[0], config), config)
     rounds = how.slow_rounds if config.tempo == "auto" else 0
+    declined = None
     for _ in range(rounds):
         slower = _slowed(robot, found, config)
-        if slower is None or _excess(robot, slower, config) > _HELPS * _excess(
-            robot, found, config
-        ):
+        if slower is None:
+            break
+        if _excess(robot, slower, config) > _HELPS * _excess(robot, found, config):
+            declined = slower
             break
         found = slower
-    return _repaired(robot, given, found, config)
+    best = _repaired(robot, given, found, config)
+    if declined is None or feasible_share(robot, best, config) >= how.target_share:
+        return best
+    # Slowing alone hardly helped, and neither did repair: together they may.
+    other = _repaired(robot, given, declined, config)
+    return max(best, other, key=lambda motion: feasible_share(robot, motion, config))
 
 
 def feasible_share(robot: Robot, motion: Feasible, config: RetargetConfig) -> float:
-    """Share of feasible steps."""
-    slack = _slack(robot, motion, config, tempo.GRID[:1])
-    return float((slack[0, motion.danced] <= 1.0).mean())
+    """Share of feasible steps of the clip or of its tails, whichever is less: a robot falls over
+    either."""
+    return _least_share(motion, _slack(robot, motion, config))
+
+
+def _least_share(motion: Feasible, slack: Float[np.ndarray, " S"]) -> float:
+    return min(float((slack[part] <= 1.0).mean()) for part in motion.parts)
 
 
 def _excess(robot: Robot, motion: Feasible, config: RetargetConfig) -> float:
     """Mean slack beyond the tolerance; one lost step counts as three tolerances."""
-    slack = _slack(robot, motion, config, tempo.GRID[:1])
-    return float(np.clip(slack[:, motion.danced] - 1.0, 0.0, 3.0).mean())
+    over = np.clip(_slack(robot, motion, config) - 1.0, 0.0, 3.0)
+    return float(over[np.logical_or.reduce(motion.parts)].mean())
 
 
-def _slack(robot: Robot, motion: Feasible, config: RetargetConfig, grid: np.ndarray) -> np.ndarray:
-    aims, tolerance = motion.aims, config.weights.tolerance
-    return tempo.slacks(robot, motion.qpos, aims.dt, aims.cycle_offset, tolerance, grid)
+def _slack(robot: Robot, motion: Feasible, config: RetargetConfig) -> Float[np.ndarray, " S"]:
+    """What is left over at the motion's own tempo, computed once a motion."""
+    return np.asarray(_slacks(robot, motion, config, tempo.GRID[:1])[0])
+
+
+def _slacks(
+    robot: Robot, motion: Feasible, config: RetargetConfig, grid: np.ndarray
+) -> Float[np.ndarray, "K S"]:
+    if len(grid) not in motion._slack:
+        aims, tolerance = motion.aims, config.weights.tolerance
+        motion._slack[len(grid)] = tempo.slacks(
+            robot, motion.qpos, aims.dt, aims.cycle_offset, tolerance, grid
+        )
+    return motion._slack[len(grid)]
 
 
 def _solved(robot: Robot, motion: Feasible, weight: float, config: RetargetConfig) -> Feasible:
-    """Solve with the dynamics term; the hard bars hold afterwards where they can."""
+    """Solve around the steps that need it with the dynamics term; the hard bars hold afterwards
+    where they can."""
     problem = Problem.of(robot, motion.aims, replace(config.weights, dynamics=weight))
     loose = replace(config.solver, damping=_LOOSE, tolerance=config.repair.tolerance)
-    rough = solve(problem, motion.qpos, loose, config.repair.iterations)
-    final = harden(problem, rough, config)
+    hard = _slack(robot, motion, config) > config.weights.dynamics_margin
+    spans = list(_spans(hard, round(_REACH_S / motion.aims.dt)))
+    rough = solve(problem, motion.qpos, loose, config.repair.iterations, spans=spans)
+    final = harden(problem, rough, config, spans)
     return replace(motion, qpos=continuous(clip_to_limits(robot, final.qpos)))
+
+
+def _spans(hard: Bool[np.ndarray, " S"], reach: int) -> Iterator[slice]:
+    """Steps that need repair and those within reach, as runs."""
+    near = maximum_filter1d(hard.astype(int), 2 * reach + 1, mode="constant")
+    edges = np.flatnonzero(np.diff(near, prepend=0, append=0))
+    return (slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True))
 
 
 def _slowed(robot: Robot, motion: Feasible, config: RetargetConfig) -> Feasible | None:
@@ -110,8 +156,8 @@ def _slowed(robot: Robot, motion: Feasible, config: RetargetConfig) -> Feasible 
     None where none asks, or where a hard bar would be broken.
     """
     aims = motion.aims
-    slack = _slack(robot, motion, config, tempo.GRID)
-    if (slack[0, motion.danced] <= 1.0).mean() >= config.repair.target_share:
+    slack = _slacks(robot, motion, config, tempo.GRID)
+    if _least_share(motion, slack[0]) >= config.repair.target_share:
         return None
     rate = tempo.smooth_rate(tempo.required_rate(slack), aims.dt, aims.cycle_offset is not None)
     so_far = np.gradient(motion.steps).clip(max=1.0)
@@ -167,7 +213,7 @@ def _repaired(robot: Robot, given: Feasible, found: Feasible, config: RetargetCo
 
 
 def _error_mm(robot: Robot, motion: Feasible) -> float:
-    """Mean keypoint error against the motion's own targets."""
-    at = pose(tree(robot), motion.qpos).site_pos
-    error = keypoint_error_mm(at, motion.aims.keypoints_w, robot.keypoint_weights > 0)
-    return float(error.mean())
+    """Mean keypoint error of the clip against the motion's own targets; tails may be bent."""
+    at = pose(tree(robot), motion.qpos[motion.danced]).site_pos
+    aims = motion.aims.keypoints_w[motion.danced]
+    return float(keypoint_error_mm(at, aims, robot.keypoint_weights > 0).mean())

@@ -6,7 +6,7 @@ with higher weights where a bar does not hold.
 """
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -197,8 +197,17 @@ def faults(problem: Problem, qpos: Float[np.ndarray, "T nq"], config: RetargetCo
     )
 
 
-def harden(problem: Problem, solution: Solution, config: RetargetConfig) -> Solution:
-    """Raise the weights of what is over its bar and solve again, a few rounds at most."""
+def harden(
+    problem: Problem,
+    solution: Solution,
+    config: RetargetConfig,
+    spans: Sequence[slice] | None = None,
+) -> Solution:
+    """Raise the weights of what is over its bar and solve again, a few rounds at most.
+
+    Args:
+        spans: The steps that may change; all when None.
+    """
     for _ in range(_HARDENING_ROUNDS):
         broken = faults(problem, solution.qpos, config)
         if not broken.heavier_weights_help:
@@ -213,7 +222,8 @@ def harden(problem: Problem, solution: Solution, config: RetargetConfig) -> Solu
             slip=old.slip * (4.0 if broken.slips else 1.0),
         )
         problem = replace(problem, weights=weights)
-        solution = solve(problem, solution.qpos, config.solver, config.solver.polish_iterations)
+        iterations = config.solver.polish_iterations
+        solution = solve(problem, solution.qpos, config.solver, iterations, spans=spans)
     return solution
 
 

@@ -14,9 +14,11 @@ from robojackson.geometry.rotations import quat_to_matrix
 from robojackson.motion.certificate import Cause, Certificate, Finding
 from robojackson.retarget.feasibility import contact_wrench, inverse_dynamics, tempo
 from robojackson.retarget.feasibility.contact_wrench import Supply, Tolerance
+from robojackson.retarget.feasibility.inverse_dynamics import FreeSpace
 from robojackson.retarget.targets.ground_contact import GRAVITY
 from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
+from robojackson.robot.tree_kinematics import pose
 
 _GAP_STEPS = 4  # findings so near to each other are one
 
@@ -49,10 +51,10 @@ def certify(
     tolerance: Tolerance,
 ) -> Certified:
     """What the robot can and cannot do of a motion."""
-    asked, near = _demand(robot, qpos, dt, cycle_offset, tolerance)
+    asked, near, forces = _demand(robot, qpos, dt, cycle_offset, tolerance)
     found = contact_wrench.supply(asked)
-    slack = tempo.slacks(robot, qpos, dt, cycle_offset, tolerance)
-    free = _without_limits(asked)
+    slack = tempo.slower_slacks(asked, forces, found.slack)
+    free = _without_limits(asked, found)
     failures = [
         _failure(robot, step, found, free, near, slack, tolerance)
         for step in range(len(qpos))
@@ -75,7 +77,7 @@ def motor_torques(
     tolerance: Tolerance,
 ) -> Float[np.ndarray, "S J"]:
     """Torque of every hinge's motor that the motion asks for, within its limit, Nm."""
-    asked, _ = _demand(robot, qpos, dt, cycle_offset, tolerance)
+    asked, *_ = _demand(robot, qpos, dt, cycle_offset, tolerance)
     return _motor_torque(asked, contact_wrench.supply(asked))
 
 
@@ -85,11 +87,14 @@ def _demand(
     dt: float,
     cycle_offset: np.ndarray | None,
     tolerance: Tolerance,
-) -> tuple[contact_wrench.Demand, Bool[np.ndarray, "S C"]]:
-    """What a motion asks for at its own tempo, and which soles are near the floor."""
-    force = inverse_dynamics.free_space(robot, qpos, dt, cycle_offset).at(1.0)
-    near = inverse_dynamics.touching(robot, qpos)
-    return inverse_dynamics.demand(robot, qpos, force, near, tolerance), near
+) -> tuple[contact_wrench.Demand, Bool[np.ndarray, "S C"], FreeSpace]:
+    """What a motion asks for at its own tempo, which soles are near the floor, and the parts of
+    the force."""
+    forces = inverse_dynamics.free_space(robot, qpos, dt, cycle_offset)
+    posed = pose(inverse_dynamics.linkage(robot), qpos)
+    near = inverse_dynamics.touching(robot, posed)
+    asked = inverse_dynamics.demand(robot, qpos, forces.at(1.0), near, tolerance, posed)
+    return asked, near, forces
 
 
 def fallen(robot: Robot, qpos: Float[np.ndarray, "S nq"]) -> Bool[np.ndarray, " S"]:
@@ -106,9 +111,17 @@ def _motor_torque(asked: contact_wrench.Demand, found: Supply) -> Float[np.ndarr
     return result
 
 
-def _without_limits(asked: contact_wrench.Demand) -> Supply:
-    endless = np.full_like(asked.upper, np.inf)
-    return contact_wrench.supply(replace(asked, lower=-endless, upper=endless))
+def _without_limits(asked: contact_wrench.Demand, found: Supply) -> Supply:
+    """What endless torques would leave over; steps that are feasible keep what they have."""
+    hard = np.flatnonzero(found.slack > 1.0)
+    if not len(hard):
+        return found
+    some = asked.at(hard)
+    endless = np.full_like(some.upper, np.inf)
+    free = contact_wrench.supply(replace(some, lower=-endless, upper=endless))
+    torque, left = found.torque.copy(), found.left.copy()
+    torque[hard], left[hard] = free.torque, free.left
+    return replace(found, torque=torque, left=left)
 
 
 def _failure(

@@ -6,17 +6,24 @@ free space (root 6, then the hinges). What is left is told in units of a toleran
 feasible when its slack is at most 1. Newtons, newton-metres; all steps are solved at once.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
 from pydantic import Field
 
 from robojackson.config import config_dataclass
-from robojackson.retarget.feasibility.interior_point import Box, left_over, solve_box, value
+from robojackson.retarget.feasibility.interior_point import (
+    Box,
+    Point,
+    left_over,
+    solve_box,
+    value,
+)
 
 _PUSH_PRICE = 1e-4  # of pushes that leave the same, the smallest are taken
 _TORQUE_PRICE = 1e-4  # ... and those with the smallest torques
+_SINGULAR = 1e-13  # share of what the feet can give that keeps its square root real
 
 
 @config_dataclass
@@ -40,7 +47,8 @@ class Demand:
 
     Attributes:
         force: Generalised force of the motion in free space.
-        columns: Generalised force of one body weight along each pyramid edge.
+        feet: Generalised force of a unit wrench at each foot, moments first.
+        spread: Wrench of one body weight along each pyramid edge.
         usable: Edges of contacts that touch.
         lower, upper: Torque limits of the hinges; infinite where a stop carries.
         scale: Of each row of the force: slack a newton or newton-metre.
@@ -48,12 +56,23 @@ class Demand:
     """
 
     force: Float[np.ndarray, "S nv"]
-    columns: Float[np.ndarray, "S nv E"]
+    feet: Float[np.ndarray, "S nv W"]
+    spread: Float[np.ndarray, "S W E"]
     usable: Bool[np.ndarray, "S E"]
     lower: Float[np.ndarray, "S J"]
     upper: Float[np.ndarray, "S J"]
     scale: Float[np.ndarray, " nv"]
     ease: Float[np.ndarray, " J"]
+
+    @property
+    def columns(self) -> Float[np.ndarray, "S nv E"]:
+        """Generalised force of one body weight along each pyramid edge."""
+        return np.asarray(self.feet @ self.spread)
+
+    def at(self, rows: np.ndarray) -> "Demand":
+        """Some of the steps."""
+        parts = ("force", "feet", "spread", "usable", "lower", "upper")
+        return replace(self, **{name: getattr(self, name)[rows] for name in parts})
 
 
 @dataclass(frozen=True)
@@ -85,46 +104,78 @@ class Relaxed:
         pushes: Along the edges, body weights.
         value: Half the square of what is left over, and the barrier.
         slope: Derivative of the value in the force.
-        root: Rows R with R^T R the second derivative, and
-        residual: r with R^T r the slope.
+        root: Rows R with R^T R the second derivative.
+        point: Where the solver has arrived; the start of a problem nearby.
     """
 
     pushes: Float[np.ndarray, "S E"]
     value: Float[np.ndarray, " S"]
     slope: Float[np.ndarray, "S nv"]
-    root: Float[np.ndarray, "S nv nv"]
-    residual: Float[np.ndarray, "S nv"]
+    root: "Root"
+    point: Point
+
+
+@dataclass(frozen=True)
+class Root:
+    """Rows R = (1 - U X^T U^T) D with R^T R = D (1 + U U^T)^-1 D (Andrews, 1968).
+
+    Attributes:
+        size: D, of each row.
+        wrench: U, what the feet can give beside the tolerances.
+        mix: X = L^-T (1 + L)^-1 with L L^T = 1 + U^T U.
+    """
+
+    size: Float[np.ndarray, "S nv"]
+    wrench: Float[np.ndarray, "S nv W"]
+    mix: Float[np.ndarray, "S W W"]
+
+    def __matmul__(self, matrix: Float[np.ndarray, "S nv M"]) -> Float[np.ndarray, "S nv M"]:
+        """R times a matrix a step."""
+        out = self.size[..., None] * matrix
+        out -= (self.wrench @ self.mix.swapaxes(1, 2)) @ (self.wrench.swapaxes(1, 2) @ out)
+        return np.asarray(out)
 
 
 def supply(demand: Demand) -> Supply:
     """The pushes that leave the least."""
     point = solve_box(_box(demand, 0.0))
-    pushes = point.x[:, : demand.columns.shape[2]] * demand.usable
-    left = demand.force - (demand.columns @ pushes[..., None])[..., 0]
+    pushes = point.x[:, : demand.usable.shape[1]] * demand.usable
+    given = (demand.feet @ (demand.spread @ pushes[..., None]))[..., 0]
+    left = demand.force - given
     torque = left[:, 6:].copy()
     left[:, 6:] -= np.clip(torque, demand.lower, demand.upper)
     return Supply(pushes, torque, left * demand.scale)
 
 
-def relaxed(demand: Demand, barrier: float) -> Relaxed:
+def relaxed(demand: Demand, barrier: float, start: Point | None = None) -> Relaxed:
     """The same, smooth: the second derivative tells how near all limits are.
 
     V(f) = min_x |S f - A x|^2 / 2 + ...: V' = S left, V'' = S (1 + A Q^-1 A^T)^-1 S with Q the
     curvature of prices and barrier.
+
+    Args:
+        start: Of a problem nearby.
     """
     box = _box(demand, barrier)
-    point = solve_box(box)
+    point = solve_box(box, start)
     left = left_over(box, point.x)
-    ease = 1.0 / (box.price + point.barrier(box))
-    inner = (box.columns * ease[:, None, : box.edges]) @ box.columns.swapaxes(1, 2)
-    rows, hinges = np.arange(inner.shape[1]), np.arange(6, inner.shape[1])
-    inner[:, hinges, hinges] += box.stiff**2 * ease[:, box.edges :]
-    inner[:, rows, rows] += 1.0
-    factor = np.linalg.cholesky(inner)
-    root = np.linalg.solve(factor, np.broadcast_to(np.diag(demand.scale), factor.shape))
-    residual = (factor.swapaxes(1, 2) @ left[..., None])[..., 0]
     pushes = point.x[:, : box.edges] * demand.usable
-    return Relaxed(pushes, value(box, point), left * demand.scale, root, residual)
+    return Relaxed(
+        pushes, value(box, point), left * demand.scale, _root(box, point, demand.scale), point
+    )
+
+
+def _root(box: Box, point: Point, scale: Float[np.ndarray, " nv"]) -> Root:
+    ease = 1.0 / (box.price + point.barrier(box))
+    own = np.ones(box.target.shape)
+    own[:, 6:] += box.stiff**2 * ease[:, box.edges :]
+    given = (box.spread * ease[:, None, : box.edges]) @ box.spread.swapaxes(1, 2)
+    unit = np.eye(given.shape[1])
+    floor = _SINGULAR * np.trace(given, axis1=1, axis2=2)[:, None, None] + _SINGULAR
+    wrench = (box.feet / np.sqrt(own)[..., None]) @ np.linalg.cholesky(given + floor * unit)
+    factor = np.linalg.cholesky(unit + wrench.swapaxes(1, 2) @ wrench)
+    mix = np.linalg.inv((unit + factor) @ factor.swapaxes(1, 2))
+    return Root(scale / np.sqrt(own), wrench, mix)
 
 
 def _box(demand: Demand, relax: float) -> Box:
@@ -134,7 +185,8 @@ def _box(demand: Demand, relax: float) -> Box:
     unit = np.where(demand.ease > 0, demand.ease, 1.0)
     prices = [np.full(count, _PUSH_PRICE), np.full(len(unit), _TORQUE_PRICE)]
     return Box(
-        columns=demand.columns * demand.usable[:, None] * demand.scale[:, None],
+        feet=demand.feet * demand.scale[:, None],
+        spread=demand.spread * demand.usable[:, None],
         stiff=demand.scale[6:] / unit,
         target=demand.force * demand.scale,
         lower=np.concatenate([edges, demand.lower * unit], axis=1),

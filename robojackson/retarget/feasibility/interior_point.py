@@ -2,7 +2,9 @@
 
 min |A x - b|^2 / 2 + prices x^2 / 2  with  lower <= x <= upper  (Nocedal and Wright, chapter 16.6).
 The unknowns are pushes, which are in all rows, and torques, each in one row of its own and taken
-out first. With `relax` the logarithmic barrier stays: mu sum(-log distance) belongs to the cost.
+out first. All pushes act through a few wrenches, A = feet x spread, so that a step's system is as
+small as these (Woodbury's identity). With `relax` the logarithmic barrier stays: mu sum(-log
+distance) belongs to the cost.
 """
 
 from dataclasses import dataclass, replace
@@ -23,7 +25,8 @@ class Box:
     """Many problems, one a row.
 
     Attributes:
-        columns: A of the pushes.
+        feet: What a wrench at each foot adds to each row.
+        spread: Wrench of each push.
         stiff: A of the torques, a diagonal under the six rows of the root.
         target: b.
         lower, upper: Bounds of pushes, then torques; infinite where there is none.
@@ -31,7 +34,8 @@ class Box:
         relax: Weight of the barrier, mu.
     """
 
-    columns: Float[np.ndarray, "S nv E"]
+    feet: Float[np.ndarray, "S nv W"]
+    spread: Float[np.ndarray, "S W E"]
     stiff: Float[np.ndarray, " J"]
     target: Float[np.ndarray, "S nv"]
     lower: Float[np.ndarray, "S n"]
@@ -42,8 +46,23 @@ class Box:
     @property
     def edges(self) -> int:
         """Number of pushes."""
-        result: int = self.columns.shape[2]
+        result: int = self.spread.shape[2]
         return result
+
+    def moved(self, pushes: Float[np.ndarray, "S E"]) -> Float[np.ndarray, "S nv"]:
+        """A times pushes."""
+        return _times(self.feet, _times(self.spread, pushes))
+
+    def felt(self, rows: Float[np.ndarray, "S nv"]) -> Float[np.ndarray, "S E"]:
+        """A transposed times rows."""
+        return _times(self.spread.swapaxes(1, 2), _times(self.feet.swapaxes(1, 2), rows))
+
+    def at(self, rows: np.ndarray) -> "Box":
+        """Some of the problems."""
+        if len(rows) == len(self.target):
+            return self
+        parts = ("feet", "spread", "target", "lower", "upper")
+        return replace(self, **{name: getattr(self, name)[rows] for name in parts})
 
 
 @dataclass(frozen=True)
@@ -68,14 +87,17 @@ class Point:
         return result
 
 
-def solve_box(box: Box) -> Point:
-    """The best unknowns of every row."""
-    x = np.zeros(box.lower.shape)
-    x[:, : box.edges] = 0.1
-    low, high = np.isfinite(box.lower) * 1.0, np.isfinite(box.upper) * 1.0
+def solve_box(box: Box, start: Point | None = None) -> Point:
+    """The best unknowns of every row.
+
+    Args:
+        start: Those of a problem nearby; only one with a barrier gains by it.
+    """
+    found = _first(box) if start is None else _begun(box, start)
+    x, low, high = found.x, found.low, found.high
     open_rows = np.arange(len(x))
     for _ in range(_ITERATIONS):
-        part, here = _rows(box, open_rows), Point(x[open_rows], low[open_rows], high[open_rows])
+        part, here = box.at(open_rows), Point(x[open_rows], low[open_rows], high[open_rows])
         gaps = _gaps(here, part)
         there, moved = _advanced(here, part, gaps)
         x[open_rows], low[open_rows], high[open_rows] = there.x, there.low, there.high
@@ -87,21 +109,30 @@ def solve_box(box: Box) -> Point:
     return Point(x, low, high)
 
 
-def _rows(box: Box, rows: np.ndarray) -> Box:
-    if len(rows) == len(box.target):
-        return box
-    return replace(
-        box,
-        columns=box.columns[rows],
-        target=box.target[rows],
-        lower=box.lower[rows],
-        upper=box.upper[rows],
-    )
+def _first(box: Box) -> Point:
+    x = np.zeros(box.lower.shape)
+    x[:, : box.edges] = 0.1
+    return Point(x, np.isfinite(box.lower) * 1.0, np.isfinite(box.upper) * 1.0)
+
+
+def _begun(box: Box, start: Point) -> Point:
+    """A start; rows that are not inside their bounds begin anew."""
+    found = _first(box)
+    bounded = np.array_equal(start.x.shape, found.x.shape)
+    if not bounded:
+        return found
+    same = ((start.low > 0) == np.isfinite(box.lower)).all(axis=1)
+    same &= ((start.high > 0) == np.isfinite(box.upper)).all(axis=1)
+    same &= ((start.above(box) > 0) & (start.below(box) > 0)).all(axis=1)
+    for mine, given in zip((found.x, found.low, found.high), (start.x, start.low, start.high),
+                           strict=True):  # fmt: skip
+        mine[same] = given[same]
+    return found
 
 
 def left_over(box: Box, x: Float[np.ndarray, "S n"]) -> Float[np.ndarray, "S nv"]:
     """b - A x."""
-    left = box.target - (box.columns @ x[:, : box.edges, None])[..., 0]
+    left = box.target - box.moved(x[:, : box.edges])
     left[:, 6:] -= box.stiff * x[:, box.edges :]
     return np.asarray(left)
 
@@ -147,22 +178,33 @@ def _room(value: np.ndarray, change: np.ndarray) -> np.ndarray:
 
 def _gradient(box: Box, x: np.ndarray) -> np.ndarray:
     left = left_over(box, x)
-    pushes = (box.columns.swapaxes(1, 2) @ left[..., None])[..., 0]
-    result: np.ndarray = np.concatenate([-pushes, -box.stiff * left[:, 6:]], axis=1) + box.price * x
+    result: np.ndarray = (
+        np.concatenate([-box.felt(left), -box.stiff * left[:, 6:]], axis=1) + box.price * x
+    )
     return result
 
 
 def _newton(box: Box, barrier: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Torques first, then (Q + G' C G) p = r with Q diagonal and C as small as the wrenches."""
     edges, stiff = box.edges, box.stiff
     own = stiff**2 + box.price[edges:] + barrier[:, edges:]
     weight = np.ones(box.target.shape)
     weight[:, 6:] = 1.0 - stiff**2 / own
-    turned = box.columns.swapaxes(1, 2)
-    matrix = turned @ (weight[..., None] * box.columns)
-    unit = np.arange(edges)
-    matrix[:, unit, unit] += box.price[:edges] + barrier[:, :edges]
-    shared = stiff * right[:, edges:] / own
-    reduced = right[:, :edges] - (turned[:, :, 6:] @ shared[..., None])[..., 0]
-    pushes = np.linalg.solve(matrix, reduced[..., None])[..., 0]
-    pulled = (box.columns[:, 6:] @ pushes[..., None])[..., 0]
+    shared = np.zeros(box.target.shape)
+    shared[:, 6:] = stiff * right[:, edges:] / own
+    ease = 1.0 / (box.price[:edges] + barrier[:, :edges])
+    turned, unspread = box.feet.swapaxes(1, 2), box.spread.swapaxes(1, 2)
+    felt = turned @ (weight[..., None] * box.feet)
+    given = (box.spread * ease[:, None]) @ unspread
+    reduced = ease * (right[:, :edges] - box.felt(shared))
+    unit = np.eye(felt.shape[1])
+    wrench = np.linalg.solve(
+        unit + felt @ given, _times(felt, _times(box.spread, reduced))[..., None]
+    )[..., 0]
+    pushes = reduced - ease * _times(unspread, wrench)
+    pulled = box.moved(pushes)[:, 6:]
     return np.concatenate([pushes, (right[:, edges:] - stiff * pulled) / own], axis=1)
+
+
+def _times(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    return np.asarray((matrix @ vector[..., None])[..., 0])

@@ -1,10 +1,10 @@
 """Inverse dynamics of a motion: what it asks for in free space, and what soles and motors can give.
 
 The force of a motion at another tempo k follows from two evaluations: gravity and springs do not
-change, damping goes with k, inertia and Coriolis with k^2. Newtons, newton-metres.
+change, damping goes with k, inertia and Coriolis with k^2. Soles push along the edges of friction
+pyramids, with the friction of the robot's own feet on its floor. Newtons, newton-metres.
 """
 
-import copy
 from dataclasses import dataclass
 
 import mujoco
@@ -12,16 +12,22 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from robojackson.retarget.feasibility.contact_wrench import Demand, Tolerance
+from robojackson.retarget.feasibility.force_model import once_a_robot
+from robojackson.retarget.feasibility.force_model import unconstrained as unconstrained
 from robojackson.retarget.targets.ground_contact import GRAVITY
 from robojackson.robot.model import Robot
 from robojackson.robot.resampling import accelerations, velocities
-from robojackson.robot.tree_kinematics import Posed, point_jacobian, pose, tree
+from robojackson.robot.tree_kinematics import Posed, pose, tree
 
 _EDGES = 8
-_FRICTION = 1.0
+_FRICTION = 1.0  # MuJoCo's default, of a foot without geoms
 NEAR_M = 0.02
 """A sole below this height may push, metres."""
 _STOP_RAD = 0.01  # so near to a limit of its range a hinge rests on its stop
+
+
+linkage = once_a_robot(tree)
+"""The constants of the robot's tree."""
 
 
 @dataclass(frozen=True)
@@ -55,15 +61,6 @@ def free_space(
     return FreeSpace(still, damped, whole - still - damped)
 
 
-def unconstrained(robot: Robot) -> mujoco.MjModel:
-    """The robot's model without contacts and stops."""
-    model = copy.copy(robot.model)
-    off = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT
-    model.opt.disableflags |= int(off)
-    model.opt.integrator = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)  # RK4 has no derivatives
-    return model
-
-
 def inverse(
     model: mujoco.MjModel, qpos: np.ndarray, speed: np.ndarray, acceleration: np.ndarray
 ) -> Float[np.ndarray, "S nv"]:
@@ -83,9 +80,14 @@ def demand(
     force: Float[np.ndarray, "S nv"],
     touching: Bool[np.ndarray, "S C"],
     tolerance: Tolerance,
+    posed: Posed | None = None,
 ) -> Demand:
-    """What a motion asks for beside what the touching soles and the motors may give."""
-    posed = pose(tree(robot), qpos)
+    """What a motion asks for beside what the touching soles and the motors may give.
+
+    Args:
+        posed: The kinematics, where they are known.
+    """
+    posed = pose(linkage(robot), qpos) if posed is None else posed
     limit = np.where(robot.actuated, robot.torque_limit, np.inf)
     lower, upper = np.tile(-limit, (len(qpos), 1)), np.tile(limit, (len(qpos), 1))
     upper[qpos[:, 7:] < robot.lower + _STOP_RAD] = np.inf
@@ -97,7 +99,8 @@ def demand(
     ease = np.where(robot.actuated, 1.0 / np.where(robot.actuated, robot.torque_limit, 1.0), 0.0)
     scale[6:] = ease / tolerance.torque
     usable = np.repeat(touching, _EDGES, axis=1)
-    return Demand(force, weight * edges(robot, posed), usable, lower, upper, scale, ease)
+    feet, spread = wrenches(robot, posed)
+    return Demand(force, feet, weight * spread, usable, lower, upper, scale, ease)
 
 
 def sole_points(robot: Robot, posed: Posed) -> Float[np.ndarray, "S C 3"]:
@@ -107,20 +110,69 @@ def sole_points(robot: Robot, posed: Posed) -> Float[np.ndarray, "S C 3"]:
     return np.asarray(ground)
 
 
-def touching(robot: Robot, qpos: Float[np.ndarray, "S nq"]) -> Bool[np.ndarray, "S C"]:
+def touching(robot: Robot, posed: Posed) -> Bool[np.ndarray, "S C"]:
     """Soles near the floor, whatever their labels."""
-    return np.asarray(sole_points(robot, pose(tree(robot), qpos))[..., 2] < NEAR_M)
+    return np.asarray(sole_points(robot, posed)[..., 2] < NEAR_M)
 
 
-def edges(robot: Robot, posed: Posed) -> Float[np.ndarray, "S nv E"]:
-    """Generalised force of a unit push along each edge of each sole's friction pyramid."""
-    shape = tree(robot)
-    jacobian = point_jacobian(shape, posed, sole_points(robot, posed), robot.contact_bodies)
-    force = jacobian.swapaxes(2, 3) @ directions()
-    return np.asarray(force.swapaxes(1, 2).reshape(len(force), force.shape[2], -1))
+def wrenches(
+    robot: Robot, posed: Posed
+) -> tuple[Float[np.ndarray, "S nv W"], Float[np.ndarray, "S W E"]]:
+    """Generalised force of a unit wrench at each foot (about the middle of its soles, moments
+    first), and the wrenches of a unit push along each edge of each sole's friction pyramid."""
+    points, count = sole_points(robot, posed), len(posed.axis)
+    bodies, foot = np.unique(robot.contact_bodies, return_inverse=True)
+    along = directions(robot)
+    axis, moment = posed.screws
+    moved = linkage(robot).moved_by[bodies]
+    feet = np.zeros((count, moved.shape[1], len(bodies), 6))
+    spread = np.zeros((count, len(bodies), 6, len(foot), _EDGES))
+    for index in range(len(bodies)):
+        own = np.flatnonzero(foot == index)
+        middle = points[:, own].mean(axis=1)
+        shift = moment + np.cross(axis, middle[:, :, None], axis=1)
+        feet[:, :, index] = np.concatenate([axis, shift], axis=1).swapaxes(1, 2)
+        feet[:, :, index] *= moved[index][:, None]
+        for sole in own:
+            arm = points[:, sole] - middle
+            spread[:, index, :3, sole] = np.cross(arm[:, :, None], along[None, sole], axis=1)
+            spread[:, index, 3:, sole] = along[sole]
+    return (
+        feet.reshape(count, -1, 6 * len(bodies)),
+        spread.reshape(count, 6 * len(bodies), -1),
+    )
 
 
-def directions() -> Float[np.ndarray, "3 E"]:
-    """The edges of a friction pyramid, upward part 1."""
+@once_a_robot
+def directions(robot: Robot) -> Float[np.ndarray, "C 3 E"]:
+    """The edges of each sole's friction pyramid, upward part 1."""
     angle = np.arange(_EDGES) * 2 * np.pi / _EDGES
-    return np.stack([_FRICTION * np.cos(angle), _FRICTION * np.sin(angle), np.ones(_EDGES)])
+    flat = sole_friction(robot)[:, None, None] * np.stack([np.cos(angle), np.sin(angle)])
+    return np.concatenate([flat, np.ones((len(flat), 1, _EDGES))], axis=1)
+
+
+@once_a_robot
+def sole_friction(robot: Robot) -> Float[np.ndarray, " C"]:
+    """Sliding friction of each sole on the floor, as MuJoCo pairs geoms: the larger of the two,
+    or that of the one with the higher priority. Of a foot's geoms the most slippery counts."""
+    model = robot.model
+    touches = (model.geom_contype | model.geom_conaffinity) != 0
+    plane = model.geom_type == int(mujoco.mjtGeom.mjGEOM_PLANE)
+    floor = np.flatnonzero((model.geom_bodyid == 0) & plane & touches)
+    found = np.empty(len(robot.contact_bodies))
+    for index, body in enumerate(robot.contact_bodies):
+        on_foot = model.body_weldid[model.geom_bodyid] == model.body_weldid[body]
+        pairs = [
+            _pair_friction(model, int(foot), int(ground))
+            for foot in np.flatnonzero(on_foot & touches)
+            for ground in floor
+        ]
+        found[index] = min(pairs, default=_FRICTION)
+    return found
+
+
+def _pair_friction(model: mujoco.MjModel, first: int, second: int) -> float:
+    rank, slides = model.geom_priority, model.geom_friction[:, 0]
+    if rank[first] != rank[second]:
+        return float(slides[first if rank[first] > rank[second] else second])
+    return float(max(slides[first], slides[second]))

@@ -14,9 +14,11 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
 from robojackson.retarget.feasibility import contact_wrench, inverse_dynamics
-from robojackson.retarget.feasibility.contact_wrench import Tolerance
+from robojackson.retarget.feasibility.contact_wrench import Demand, Tolerance
+from robojackson.retarget.feasibility.inverse_dynamics import FreeSpace
 from robojackson.retarget.targets.keypoint_targets import Targets
 from robojackson.robot.model import Robot
+from robojackson.robot.tree_kinematics import pose
 
 GRID = np.array([1.0, 0.9, 0.8, 0.7, 0.6, 0.5])
 """Tempos that are tried, beside the motion's own."""
@@ -34,11 +36,31 @@ def slacks(
     tolerance: Tolerance,
     grid: Float[np.ndarray, " K"] = GRID,
 ) -> Float[np.ndarray, "K S"]:
-    """What is left over at every tempo of the grid, in tolerances."""
+    """What is left over at every tempo of the grid, in tolerances.
+
+    A step that is feasible at the first one is tried at no other.
+    """
     forces = inverse_dynamics.free_space(robot, qpos, dt, cycle_offset)
-    near = inverse_dynamics.touching(robot, qpos)
-    asked = inverse_dynamics.demand(robot, qpos, forces.at(1.0), near, tolerance)
-    return np.stack([contact_wrench.supply(replace(asked, force=forces.at(k))).slack for k in grid])
+    posed = pose(inverse_dynamics.linkage(robot), qpos)
+    near = inverse_dynamics.touching(robot, posed)
+    asked = inverse_dynamics.demand(robot, qpos, forces.at(grid[0]), near, tolerance, posed)
+    return slower_slacks(asked, forces, contact_wrench.supply(asked).slack, grid)
+
+
+def slower_slacks(
+    asked: Demand,
+    forces: FreeSpace,
+    slack: Float[np.ndarray, " S"],
+    grid: Float[np.ndarray, " K"] = GRID,
+) -> Float[np.ndarray, "K S"]:
+    """What is left over at every tempo of the grid, where it is known at the first."""
+    found = np.repeat(slack[None], len(grid), axis=0)
+    hard = np.flatnonzero(slack > 1.0)
+    if len(hard):
+        some = asked.at(hard)
+        for row, k in zip(found[1:], grid[1:], strict=True):
+            row[hard] = contact_wrench.supply(replace(some, force=forces.at(k)[hard])).slack
+    return found
 
 
 def feasible_tempo(slack: Float[np.ndarray, "K S"], within: float = 1.0) -> Float[np.ndarray, " S"]:

@@ -54,6 +54,22 @@ class Normal:
             for j in range(i, len(jacobians)):
                 self.blocks[j - i][row] += transposed @ jacobians[j]
 
+    def add_square(
+        self,
+        gradient: Float[np.ndarray, "M 3nv"],
+        rows: Float[np.ndarray, "M R 3nv"],
+        first: Int[np.ndarray, " M"],
+    ) -> None:
+        """Add gradient and squared rows in the unknowns of three successive frames at once."""
+        unknowns = self.gradient.shape[1]
+        square = rows.swapaxes(1, 2) @ rows
+        part = [slice(k * unknowns, (k + 1) * unknowns) for k in range(_REACH)]
+        for i in range(_REACH):
+            row = _rows((first + i) % len(self.gradient))
+            self.gradient[row] += gradient[:, part[i]]
+            for j in range(i, _REACH):
+                self.blocks[j - i][row] += square[:, part[i], part[j]]
+
 
 def _rows(frames: Int[np.ndarray, " M"]) -> Int[np.ndarray, " M"] | slice:
     """A slice where it serves: it is faster."""

@@ -1,6 +1,6 @@
 """One clip to solve: the weights of the cost, and robot, targets and collision detection bound."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Float
@@ -8,11 +8,13 @@ from pydantic import Field
 
 from robojackson.config import config_dataclass
 from robojackson.retarget.feasibility.contact_wrench import Tolerance
+from robojackson.retarget.feasibility.interior_point import Point
+from robojackson.retarget.feasibility.inverse_dynamics import linkage
 from robojackson.retarget.solver.collision import Detector
 from robojackson.retarget.targets.keypoint_targets import Targets
 from robojackson.robot.model import Robot
 from robojackson.robot.resampling import forward_velocities
-from robojackson.robot.tree_kinematics import Tree, tree
+from robojackson.robot.tree_kinematics import Tree
 
 
 @config_dataclass
@@ -57,6 +59,13 @@ class Weights:
     tolerance: Tolerance = Field(default_factory=Tolerance)
 
 
+@dataclass
+class Warm:
+    """What one evaluation of the cost leaves to the next: where the pushes' solver has arrived."""
+
+    point: Point | None = None
+
+
 @dataclass(frozen=True)
 class Problem:
     """One clip to solve: robot, targets, weights."""
@@ -66,12 +75,13 @@ class Problem:
     targets: Targets
     weights: Weights
     detector: Detector
+    warm: Warm = field(default_factory=Warm)
 
     @classmethod
     def of(cls, robot: Robot, targets: Targets, weights: Weights) -> "Problem":
         """Bind the parts."""
         detector = Detector(robot, weights.clearance, feet=False)
-        return cls(robot, tree(robot), targets, weights, detector)
+        return cls(robot, linkage(robot), targets, weights, detector)
 
     @property
     def ring(self) -> bool:

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from robojackson.retarget.feasibility.force_model import once_a_robot
 from robojackson.robot.model import Robot
 from robojackson.robot.tree_kinematics import Posed, Tree, placed
 
@@ -37,6 +38,27 @@ class Touches:
     floor: Bool[np.ndarray, " M"]
 
 
+class _Models:
+    """Copies of a robot's model for the clearances in use: one with meshes is slow to copy."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._made: dict[tuple[float, bool], mujoco.MjModel] = {}
+
+    def with_margin(self, clearance: float, feet: bool) -> mujoco.MjModel:
+        """The copy in which geoms touch below the clearance."""
+        if (clearance, feet) not in self._made:
+            model = copy.copy(self._robot.model)
+            model.geom_margin[:] = clearance
+            if not feet:
+                _lift_feet(model, self._robot.foot_bodies)
+            self._made[clearance, feet] = model
+        return self._made[clearance, feet]
+
+
+_models = once_a_robot(_Models)
+
+
 class Detector:
     """Finds contacts of poses; the only state is MuJoCo's scratch data.
 
@@ -46,10 +68,7 @@ class Detector:
     """
 
     def __init__(self, robot: Robot, clearance: float, feet: bool = True) -> None:
-        self.model = copy.copy(robot.model)
-        self.model.geom_margin[:] = clearance
-        if not feet:
-            _lift_feet(self.model, robot.foot_bodies)
+        self.model = _models(robot).with_margin(clearance, feet)
         self.data = mujoco.MjData(self.model)
 
     def touches(self, qpos: Float[np.ndarray, "N nq"]) -> Touches:

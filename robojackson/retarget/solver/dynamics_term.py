@@ -1,8 +1,8 @@
 """The dynamics term of the cost: what neither soles nor motors can give costs its square.
 
 The value of `contact_wrench.relaxed` at F(q_t, v_t, a_t) - G(q_t) p_t: pushes and torques follow
-every change of the motion. F by finite differences of MuJoCo's inverse dynamics, with v and a the
-differences of three steps. Cauchy's loss: a step that no repair can save must not bend the motion.
+every change of the motion. F and its derivatives by `rigid_dynamics`, with v and a the differences
+of three steps. Cauchy's loss: a step that no repair can save must not bend the motion.
 """
 
 from dataclasses import dataclass
@@ -14,23 +14,17 @@ from scipy.special import expit
 
 from robojackson.motion.smpl_sequence import AIR
 from robojackson.retarget.feasibility import contact_wrench, inverse_dynamics
+from robojackson.retarget.feasibility.force_model import force_model, once_a_robot, unconstrained
+from robojackson.retarget.feasibility.rigid_dynamics import Slopes, slopes
 from robojackson.retarget.solver.block_banded import Normal
 from robojackson.retarget.solver.clip_problem import Problem, Weights
+from robojackson.robot.model import Robot
 from robojackson.robot.resampling import accelerations, velocities
-from robojackson.robot.tree_kinematics import Posed, point_jacobian
+from robojackson.robot.tree_kinematics import Posed, pose
 
 _NUDGE = 1e-6
+_PROBES = 3
 _SOFTNESS = 0.15  # of the corner of the hinge, squared tolerances
-
-
-@dataclass(frozen=True)
-class Slopes:
-    """Derivatives of the force of inverse dynamics, one matrix a step."""
-
-    force: Float[np.ndarray, "N nv"]
-    position: Float[np.ndarray, "N nv nv"]
-    velocity: Float[np.ndarray, "N nv nv"]
-    acceleration: Float[np.ndarray, "N nv nv"]
 
 
 def add_dynamics(
@@ -45,32 +39,56 @@ def add_dynamics(
         velocities(qpos, dt, cycle_offset)[inner],
         accelerations(qpos, dt, cycle_offset)[inner],
     )
-    model = inverse_dynamics.unconstrained(problem.robot)
-    slopes = inverse_slopes(model, qpos[inner], speed, rate)
+    at = posed[inner]
+    found_slopes = force_slopes(problem, at, qpos[inner], speed, rate)
     touching = problem.targets.contact[inner] != AIR
     asked = inverse_dynamics.demand(
-        problem.robot, qpos[inner], slopes.force, touching, problem.weights.tolerance
+        problem.robot, qpos[inner], found_slopes.force, touching, problem.weights.tolerance, at
     )
-    found = contact_wrench.relaxed(asked, problem.weights.dynamics_barrier)
+    found = contact_wrench.relaxed(asked, problem.weights.dynamics_barrier, problem.warm.point)
+    problem.warm.point = found.point
     loss = _loss(problem.weights, found.value)
-    grip, bend = np.sqrt(loss.slope), np.sqrt(loss.bend)
-    root = np.concatenate(
-        [grip[:, None, None] * found.root, (bend[:, None] * found.slope)[:, None]], axis=1
-    )
-    residual = np.concatenate([grip[:, None] * found.residual, np.zeros((len(inner), 1))], axis=1)
-    at = posed[inner]
-    here = slopes.position - 2 / dt**2 * slopes.acceleration
-    here -= pushed_slopes(problem, at, found.pushes)
-    aside, turn = slopes.acceleration / dt**2, slopes.velocity / (2 * dt)
-    rows = (root @ (aside - turn), root @ here, root @ (aside + turn))
-    out.cost += loss.cost - 0.5 * float(np.sum(residual**2))
-    out.add_chained(residual, rows, (inner - 1) % len(qpos))
+    here = found_slopes.position - 2 / dt**2 * found_slopes.acceleration
+    _take_pushes(problem, at, found.pushes, here)
+    aside, turn = found_slopes.acceleration / dt**2, found_slopes.velocity / (2 * dt)
+    columns = np.concatenate([aside - turn, here, aside + turn], axis=2)
+    gradient = (found.slope[:, None] @ columns)[:, 0]
+    rows = np.concatenate([found.root @ columns, np.empty((len(inner), 1, columns.shape[2]))], 1)
+    rows[:, :-1] *= np.sqrt(loss.slope)[:, None, None]
+    rows[:, -1] = np.sqrt(loss.bend)[:, None] * gradient
+    out.cost += loss.cost
+    out.add_square(loss.slope[:, None] * gradient, rows, (inner - 1) % len(qpos))
+
+
+def force_slopes(
+    problem: Problem, posed: Posed, qpos: np.ndarray, speed: np.ndarray, rate: np.ndarray
+) -> Slopes:
+    """The force and its derivatives in the tangent space of each step: analytic where the model
+    has nothing but rigid bodies, springs and damping, by finite differences of MuJoCo's otherwise.
+    """
+    robot = problem.robot
+    if rigid(robot):
+        return slopes(force_model(robot), posed, qpos[:, 7:], speed, rate)
+    return inverse_slopes(unconstrained(robot), qpos, speed, rate)
+
+
+@once_a_robot
+def rigid(robot: Robot) -> bool:
+    """Whether the analytic force is MuJoCo's: a model may have fluid, tendons or dry friction."""
+    rng = np.random.default_rng(0)
+    qpos = np.tile(robot.standing, (_PROBES, 1))
+    qpos[:, 7:] = rng.uniform(robot.lower, robot.upper, (_PROBES, len(robot.lower)))
+    speed, rate = rng.normal(size=(2, _PROBES, robot.model.nv))
+    expected = inverse_dynamics.inverse(unconstrained(robot), qpos, speed, rate)
+    at = pose(inverse_dynamics.linkage(robot), qpos)
+    found = slopes(force_model(robot), at, qpos[:, 7:], speed, rate).force
+    return bool(np.allclose(found, expected, rtol=1e-6, atol=1e-6))
 
 
 def inverse_slopes(
     model: mujoco.MjModel, qpos: np.ndarray, speed: np.ndarray, rate: np.ndarray
 ) -> Slopes:
-    """The force and its derivatives in the tangent space of each step."""
+    """The same by finite differences."""
     data, count = mujoco.MjData(model), speed.shape[1]
     force = np.empty_like(speed)
     matrices = np.empty((3, len(qpos), count, count))
@@ -84,38 +102,39 @@ def inverse_slopes(
     return Slopes(force, p, v, a)
 
 
-def pushed_slopes(
-    problem: Problem, posed: Posed, pushes: Float[np.ndarray, "N E"]
-) -> Float[np.ndarray, "N nv nv"]:
-    """Derivative of the generalised force of fixed pushes, d(J^T f)/dq.
+def _take_pushes(
+    problem: Problem,
+    posed: Posed,
+    pushes: Float[np.ndarray, "N E"],
+    slopes: Float[np.ndarray, "N nv nv"],
+) -> None:
+    """Subtract the derivative of the generalised force of fixed pushes, d(J^T f)/dq.
 
-    Turning dof k moves everything that hangs below it: d J_j / d q_k = a_k x J_j where k is above
-    j, and a_j x J_k where j is above k. The lowest point of a ball stays behind what is fixed to it
-    by r a_k x z.
+    Only the dofs above a foot count. With W the wrench of a foot's pushes about the origin and i
+    above j, or j itself, dS_j = S_i x S_j turns it by -S_j . (S_i x* W); and any i takes the points
+    where the pushes act along by v_i(centre of the ball), which adds v_i x f to the moment.
     """
     robot, tree = problem.robot, problem.tree
     points = inverse_dynamics.sole_points(robot, posed)
-    jacobian = point_jacobian(tree, posed, points, robot.contact_bodies)
-    edges = inverse_dynamics.directions() * inverse_dynamics.body_weight(robot)
-    force = pushes.reshape(*points.shape[:2], -1) @ edges.T
-    axes = np.concatenate([posed.body_rot[:, tree.root].swapaxes(1, 2), posed.axis], axis=1)
-    out = np.zeros((len(points), *[jacobian.shape[-1]] * 2))
-    for contact, body in enumerate(robot.contact_bodies):
-        moved = axes * np.concatenate([np.ones(3), tree.moves[body]])[:, None]
-        push = force[:, contact, None]
-        lever = np.cross(push, moved)  # f . (a_k x J_j) = J_j . (f x a_k)
-        turned = _symmetric(jacobian[:, contact, :, 3:].swapaxes(1, 2) @ lever.swapaxes(1, 2))
-        behind = robot.contact_radii[contact] * np.cross(moved, [0.0, 0.0, 1.0])
-        out[:, 3:, 3:] += turned + moved @ np.cross(behind, push).swapaxes(1, 2)
-    return out
-
-
-def _symmetric(slopes: np.ndarray) -> np.ndarray:
-    """Rows j, columns k: where j is above k, the mirrored entry counts; MuJoCo's dofs run down."""
-    lower = np.tril(slopes)
-    out = lower + np.tril(slopes, -1).swapaxes(1, 2)
-    out[:, :3, :3] = slopes[:, :3, :3]
-    return np.asarray(out)
+    edges = inverse_dynamics.directions(robot) * inverse_dynamics.body_weight(robot)
+    force = np.einsum("cxe,nce->ncx", edges, pushes.reshape(*points.shape[:2], -1))
+    model, (axis, moment) = force_model(robot), posed.screws
+    for body in np.unique(robot.contact_bodies):
+        own = robot.contact_bodies == body
+        dofs = np.flatnonzero(tree.moved_by[body])
+        turn, shift = (part[..., dofs].swapaxes(1, 2) for part in (axis, moment))
+        push = force[:, own].sum(axis=1)[:, None]
+        torque = np.cross(points[:, own], force[:, own]).sum(axis=1)[:, None]
+        twist = np.cross(turn, torque) + np.cross(shift, push)
+        shove = np.cross(turn, push)
+        lever = np.cross(shift, push)
+        for centre, along in zip(*(part[:, own].swapaxes(0, 1) for part in (posed.ball_pos, force)),
+                                 strict=True):  # fmt: skip
+            lever += np.cross(np.cross(turn, centre[:, None]), along[:, None])
+        found = turn @ lever.swapaxes(1, 2)
+        turned = turn @ twist.swapaxes(1, 2) + shift @ shove.swapaxes(1, 2)
+        found -= turned * model.above.T[np.ix_(dofs, dofs)]
+        slopes[:, dofs[:, None], dofs] -= found
 
 
 @dataclass(frozen=True)

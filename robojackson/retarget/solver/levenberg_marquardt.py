@@ -5,6 +5,7 @@ the limits, and only a step that lowers the cost is kept.
 """
 
 import logging
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -14,7 +15,7 @@ from pydantic import Field
 
 from robojackson.config import config_dataclass
 from robojackson.retarget.solver.block_banded import Chain, Normal
-from robojackson.retarget.solver.clip_problem import Problem
+from robojackson.retarget.solver.clip_problem import Problem, Warm
 from robojackson.retarget.solver.cost_terms import linearise
 from robojackson.retarget.targets.keypoint_targets import select_steps
 from robojackson.robot.model import Robot
@@ -63,6 +64,7 @@ def solve(
     config: SolverConfig,
     iterations: int,
     tolerance: float | None = None,
+    spans: Sequence[slice] | None = None,
 ) -> Solution:
     """Lower the cost from a start until the decrease is below the tolerance.
 
@@ -72,26 +74,49 @@ def solve(
 
     Args:
         tolerance: That of the configuration when None.
+        spans: The steps that may change, of a clip that does not repeat; all when None.
     """
     wanted = config.tolerance if tolerance is None else tolerance
     qpos = clip_to_limits(problem.robot, start)
-    windows = _windows(len(qpos)) if not problem.ring else [slice(0, len(qpos))]
     cost = 0.0
-    for window in windows:
-        part = replace(problem, targets=select_steps(problem.targets, window))
-        held = _HELD if window.start else 0
-        found = _solve_window(part, qpos[window], config, iterations, wanted, held)
-        qpos[window] = found.qpos
+    for window in _windows(len(qpos), None if problem.ring else spans, problem.ring):
+        part = replace(problem, targets=select_steps(problem.targets, window.all), warm=Warm())
+        found = _solve_window(part, qpos[window.all], config, iterations, wanted, window)
+        qpos[window.all] = found.qpos
         cost += found.normal.cost
-    _log.debug("%d frames, %d windows, cost %.5f", len(qpos), len(windows), cost)
+        _log.debug("steps %d-%d, cost %.5f", window.all.start, window.all.stop, found.normal.cost)
     return Solution(qpos, cost)
 
 
-def _windows(frames: int) -> list[slice]:
-    """Windows of about the same length that overlap."""
-    count = max(1, -(-(frames - _OVERLAP) // (_WINDOW - _OVERLAP)))
-    edges = np.linspace(0, frames - _OVERLAP, count + 1).astype(int)
-    return [slice(int(a), int(b) + _OVERLAP) for a, b in pairwise(edges)]
+@dataclass(frozen=True)
+class _Window:
+    """Steps that are solved at once; those beside the free ones are held."""
+
+    all: slice
+    free: slice
+
+    def held(self) -> Bool[np.ndarray, " N"]:
+        """Which of its steps stay as they are."""
+        step = np.arange(self.all.start, self.all.stop)
+        result: np.ndarray = (step < self.free.start) | (step >= self.free.stop)
+        return result
+
+
+def _windows(frames: int, spans: Sequence[slice] | None, ring: bool) -> Iterator[_Window]:
+    """Windows of about the same length that overlap, in each span."""
+    if ring:
+        yield _Window(slice(0, frames), slice(0, frames))
+        return
+    for span in [slice(0, frames)] if spans is None else spans:
+        length = span.stop - span.start
+        count = max(1, -(-(length - _OVERLAP) // (_WINDOW - _OVERLAP)))
+        edges = np.linspace(span.start, span.stop - _OVERLAP, count + 1).astype(int)
+        for start, end in pairwise(edges):
+            first = max(start - _HELD, 0) if start == span.start else start
+            stop = end + _OVERLAP if end < edges[-1] else span.stop
+            last = stop if stop < span.stop else min(stop + _HELD, frames)
+            free = start if start == span.start else start + _HELD
+            yield _Window(slice(int(first), int(last)), slice(int(free), int(stop)))
 
 
 def _solve_window(
@@ -100,8 +125,9 @@ def _solve_window(
     config: SolverConfig,
     iterations: int,
     tolerance: float,
-    held: int,
+    window: _Window,
 ) -> "_State":
+    held = window.held()
     chain = Chain(len(qpos), qpos.shape[1] - 1, problem.ring)
     state = _State(qpos, linearise(problem, qpos), config.damping)
     for _ in range(iterations):
@@ -132,7 +158,7 @@ class _State:
 
 
 def _descend(
-    problem: Problem, chain: Chain, state: _State, config: SolverConfig, held: int
+    problem: Problem, chain: Chain, state: _State, config: SolverConfig, held: np.ndarray
 ) -> _State | None:
     """One accepted step, more damped after each failure; None when nothing lowers the cost.
 
@@ -140,7 +166,7 @@ def _descend(
     """
     normal, damping, growth = state.normal, state.damping, 4.0
     free = free_unknowns(problem.robot, state.qpos, normal.gradient)
-    free[:held] = False
+    free[held] = False
     for _ in range(_TRIES):
         try:
             step = chain.step(normal, free, damping)

@@ -3,15 +3,15 @@
 A robot that is left alone when its motion ends falls. So a stand is put before and after the clip,
 with the feet where the clip has them: the targets go from one to the other in `blend_s` by
 fifth-order polynomials (minimum jerk; Flash & Hogan, 1985), planted feet stay, a foot in the air is
-put down below itself. The solver, the repair and the certificate see tails and clip as one motion.
-Metres, seconds, world frame.
+put down below itself. Where no robot stands well on such feet, steps lead on into its own stand
+(`footsteps`). The solver, the repair and the certificate see tails and clip as one motion. Metres,
+seconds, world frame.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 from pydantic import Field
@@ -19,6 +19,12 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from robojackson.config import config_dataclass
 from robojackson.motion.smpl_sequence import AIR, PLANTED
+from robojackson.retarget.targets.footsteps import (
+    SIDES,
+    feet_of,
+    stand_over,
+    steps_into_stand,
+)
 from robojackson.retarget.targets.keypoint_targets import Targets, select_steps
 from robojackson.robot.model import Robot
 
@@ -26,8 +32,10 @@ SETTLE_S = 0.3
 """From the way into the stand until nothing moves."""
 KNEE_SHARE = 0.2
 """Of its weight that a knee's target keeps where the stand is as wide as the clip left it."""
-LANDING_SHARE = 0.6
+LANDING_SHARE = 0.3
 """Of the blend in which a foot in the air is put down."""
+CARRIED_M_S = 0.6
+"""Speed over the floor that a body keeps at most on its way into the stand: it has to come back."""
 
 
 @config_dataclass
@@ -39,12 +47,14 @@ class TailConfig:
         lead_s: Stand before the clip, seconds.
         blend_s: From the stand into the clip, and back, seconds.
         stand_s: Stand after the clip, seconds.
+        steps: Whether steps lead from feet on which no robot stands well into the robot's stand.
     """
 
     use: Literal["auto", "yes", "no"] = "auto"
     lead_s: float = Field(default=0.4, ge=0)
     blend_s: float = Field(default=1.0, gt=0)
     stand_s: float = Field(default=3.0, ge=0)
+    steps: bool = True
 
     def wanted(self, robot: Robot) -> bool:
         """Whether a robot's motions get tails."""
@@ -77,8 +87,8 @@ def with_tails(aims: Targets, robot: Robot, config: TailConfig) -> Tailed:
     """Put a stand before and after the targets of a clip; a cycle has no ends and gets none."""
     if aims.cycle_offset is not None or not config.wanted(robot):
         return Tailed(aims, slice(0, len(aims)))
-    before = _tail(_reversed(aims), robot, config.blend_s, config.lead_s)
-    after = _tail(aims, robot, config.blend_s, config.stand_s)
+    before = _tail(_reversed(aims), robot, config, config.lead_s)
+    after = _tail(aims, robot, config, config.stand_s)
     parts = (_reversed(before), aims, after)
     first = len(before)
     lead, stand = (round(seconds / aims.dt) for seconds in (config.lead_s, config.stand_s))
@@ -115,23 +125,32 @@ def settled(
     return found
 
 
-def _tail(aims: Targets, robot: Robot, blend_s: float, stand_s: float) -> Targets:
+def _tail(aims: Targets, robot: Robot, config: TailConfig, stand_s: float) -> Targets:
     """What follows the last step: the way into the stand, and the stand."""
-    steps = max(2, round(blend_s / aims.dt))
+    steps = max(2, round(config.blend_s / aims.dt))
     held = round(stand_s / aims.dt)
     last, before = aims.keypoints_w[-1], aims.keypoints_w[-2]
-    stand = _stand(last, aims.heading[-1], robot)
+    yaw = _yaw(aims.heading[-1][:, 0])
+    found_feet = feet_of(last, yaw, robot)
+    stand = stand_over(found_feet, yaw, robot)
     feet = _columns_of_feet(robot)
     speed = (last - before) / aims.dt
+    speed *= min(1.0, CARRIED_M_S / max(float(np.linalg.norm(_pelvis(speed, robot)[:2])), 1e-9))
     speed[feet] = 0.0
     time = np.arange(1, steps + 1) / steps
-    way = _polynomial(last, speed * blend_s, stand, time)
+    way = _polynomial(last, speed * config.blend_s, stand, time)
     landing = np.minimum(time / LANDING_SHARE, 1.0)
     way[:, feet] = _polynomial(last[feet], 0 * last[feet], stand[feet], landing)
-    keypoints = np.concatenate([way, np.repeat(stand[None], held, 0)])
+    walk = steps_into_stand(found_feet, yaw, robot, aims.dt) if config.steps else None
+    between = walk.keypoints_w if walk else way[:0]
+    stand = stand_over(walk.feet, yaw, robot) if walk else stand
+    keypoints = np.concatenate([way, between, np.repeat(stand[None], held, 0)])
     contact = np.full((len(keypoints), aims.contact.shape[1]), PLANTED, aims.contact.dtype)
     lands = int(np.searchsorted(landing, 1.0))
     contact[:lands, aims.contact[-1] == AIR] = AIR
+    if walk:
+        sides = [SIDES.index(point.side) for point in robot.description.contacts.values()]
+        contact[steps : steps + len(between)][walk.in_air[:, sides]] = AIR
     weights = np.repeat(robot.keypoint_weights[None], len(keypoints), 0)
     weights[:, [robot.keypoint_names.index(f"{side}_knee") for side in ("left", "right")]] *= (
         KNEE_SHARE
@@ -141,35 +160,13 @@ def _tail(aims: Targets, robot: Robot, blend_s: float, stand_s: float) -> Target
         keypoints_w=keypoints,
         weights=weights,
         contact=contact,
-        heading=_headings(aims.heading[-1], steps, held),
+        heading=_headings(aims.heading[-1], steps, len(keypoints) - steps),
         airborne=np.zeros(len(keypoints), bool),
     )
 
 
-def _stand(
-    points: Float[np.ndarray, "K 3"], heading: Float[np.ndarray, "3 3"], robot: Robot
-) -> Float[np.ndarray, "K 3"]:
-    """The robot's stand over the feet of a pose, soles on the floor, feet where they are."""
-    names = robot.keypoint_names
-    data = mujoco.MjData(robot.model)
-    data.qpos[:] = robot.standing
-    mujoco.mj_kinematics(robot.model, data)
-    own = data.site_xpos[robot.keypoint_sites].copy()
-    ankles = [names.index("left_foot"), names.index("right_foot")]
-    soles = own[robot.contact_keypoints, 2] + robot.contact_arms[:, 2] - robot.contact_radii
-    own[:, 2] -= soles.min()
-    own[:, :2] -= own[ankles, :2].mean(0)
-    turn = _about_up(_yaw(heading[:, 0]))
-    found = own @ turn.T
-    found[:, :2] += points[ankles, :2].mean(0)
-    for side, ankle in zip(("left", "right"), ankles, strict=True):
-        found[ankle, :2] = points[ankle, :2]
-        toe = f"{side}_toe"
-        if toe in names:
-            column = names.index(toe)
-            ahead = _yaw(points[column] - points[ankle])
-            found[column] = found[ankle] + _about_up(ahead) @ robot.toe_arms[toe]
-    return np.asarray(found)
+def _pelvis(points: Float[np.ndarray, "K 3"], robot: Robot) -> Float[np.ndarray, "3"]:
+    return np.asarray(points[robot.keypoint_names.index("pelvis")])
 
 
 def _columns_of_feet(robot: Robot) -> Int[np.ndarray, " F"]:

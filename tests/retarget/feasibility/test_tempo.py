@@ -5,10 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from robojackson.retarget.feasibility import inverse_dynamics
+from robojackson.retarget.feasibility.contact_wrench import Tolerance, supply
 from robojackson.retarget.feasibility.tempo import (
     GRID,
     feasible_tempo,
     required_rate,
+    slacks,
     smooth_rate,
     times_at,
     warp,
@@ -19,6 +22,7 @@ from robojackson.retarget.retargeting import retarget_motion
 from robojackson.retarget.targets.cycle import human_clip
 from robojackson.retarget.targets.keypoint_targets import Targets, targets
 from robojackson.robot.model import Robot
+from robojackson.robot.tree_kinematics import pose, tree
 from tests.fixtures.robots import human, robot_motion
 
 DT = 0.015
@@ -119,3 +123,17 @@ def test_auto_keeps_a_tempo_that_fits():
 def _aims(robot: Robot) -> Targets:
     clip, _ = human_clip(human("walk"), DT, "auto", 1.0, RetargetConfig().cycle)
     return targets(clip, robot)
+
+
+def test_slower_tempos_are_tried_where_the_own_one_is_too_fast(robot: Robot):
+    """The same as solving every step at every tempo."""
+    qpos = robot_motion("walk").qpos[::2]  # twice as fast
+    found = slacks(robot, qpos, DT, None, Tolerance())
+    hard = found[0] > 1.0
+    assert 0 < hard.sum() < len(hard)
+    np.testing.assert_array_equal(found[:, ~hard], np.tile(found[0, ~hard], (len(GRID), 1)))
+    forces = inverse_dynamics.free_space(robot, qpos, DT, None)
+    near = inverse_dynamics.touching(robot, pose(tree(robot), qpos))
+    for row, k in zip(found, GRID, strict=True):
+        asked = inverse_dynamics.demand(robot, qpos, forces.at(k), near, Tolerance())
+        np.testing.assert_allclose(row[hard], supply(asked).slack[hard], atol=1e-6)

@@ -1,5 +1,6 @@
 """The dynamics term has the gradient it claims, and repair makes motions feasible."""
 
+import copy
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ from robojackson.retarget.retargeting import retarget_motion
 from robojackson.retarget.solver import dynamics_term
 from robojackson.retarget.solver.block_banded import Normal
 from robojackson.retarget.solver.clip_problem import Problem
+from robojackson.retarget.solver.levenberg_marquardt import solve
 from robojackson.retarget.targets.cycle import human_clip
 from robojackson.retarget.targets.keypoint_targets import targets
 from robojackson.retarget.whole_clip import faults
@@ -63,6 +65,24 @@ def test_the_slopes_of_inverse_dynamics_are_its_differences(robot: Robot):
     nudge[:, 12] = 1e-6
     rise = (inverse(model, integrate(qpos, nudge), zero, zero) - slopes.force) / 1e-6
     np.testing.assert_allclose(slopes.position[:, :, 12], rise, atol=1e-3)
+
+
+def test_a_model_with_dry_friction_is_differentiated_by_mujoco(robot: Robot):
+    model = copy.copy(robot.model)
+    model.dof_frictionloss[9] = 1.0
+    assert dynamics_term.rigid(robot)
+    assert not dynamics_term.rigid(replace(robot, model=model))
+
+
+def test_steps_outside_the_spans_stay_as_they_are(robot: Robot):
+    problem = _problem(robot)
+    aims = replace(problem.targets, cycle_offset=None)
+    problem, qpos = replace(problem, targets=aims), robot_motion("walk").qpos
+    config = replace(RetargetConfig().solver, damping=1e-5)
+    found = solve(problem, qpos, config, 3, spans=[slice(30, 60)]).qpos
+    outside = np.r_[0:30, 60 : len(qpos)]
+    np.testing.assert_allclose(found[outside], qpos[outside], atol=1e-12)
+    assert np.abs(found[30:60] - qpos[30:60]).max() > 1e-4
 
 
 @pytest.mark.medium

@@ -15,7 +15,7 @@ from robojackson.robot.description import FallRule
 from robojackson.robot.model import Robot, load_robot
 from tests.fixtures.robots import human, stock
 
-TAILS = TailConfig(use="yes", lead_s=0.3, blend_s=0.6, stand_s=0.9)
+TAILS = TailConfig(use="yes", lead_s=0.3, blend_s=0.6, stand_s=0.9, steps=False)
 FEET = ("left_foot", "right_foot")
 
 
@@ -93,7 +93,7 @@ def test_by_itself_a_robot_that_is_judged_beside_the_reference_gets_them(robot: 
 
 def test_a_retargeted_motion_stands_at_its_end(robot: Robot) -> None:
     """The last second hardly moves; the card's shares are the clip's."""
-    short = TailConfig(use="yes", lead_s=0.1, blend_s=0.6, stand_s=1.0)
+    short = TailConfig(use="yes", lead_s=0.1, blend_s=0.6, stand_s=1.0, steps=False)
     config = RetargetConfig(cyclic="no", tails=short)
     config = replace(config, repair=replace(config.repair, weights=()))
     motion = retarget_motion(human("dance_b"), robot, config)
