@@ -5,22 +5,47 @@ What the file holds decides which formats fit: a robot's motion, a person's moti
 
 import shlex
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from robojackson.cli import cards
+from robojackson.errors import BadConfiguration
 from robojackson.files.table_file import require_file
 from robojackson.formats import registry
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.retarget.scorecard_gate import BARS, scorecard_record
 
-POLICY_SUFFIX = ".safetensors"
+POLICY_SUFFIX, LEAST_STRICT = ".safetensors", 0.9
+DEPLOY = "deploy"
+"""The format that is a folder: a policy with all that a robot needs to run it."""
 
 
-def export(source: Path, to: str, out: Path, robot: str | None = None) -> dict[str, Any]:
-    """Write a robot's motion, a person's motion or a policy as `to`.
+@dataclass(frozen=True)
+class PackInputs:
+    """What goes into a deploy pack beside the policy.
+
+    Attributes:
+        reference: The motion; beside the policy when None.
+        evaluation: evaluation.json; beside the policy when None.
+        licences: Licences of inputs by kind.
+    """
+
+    reference: Path | None = None
+    evaluation: Path | None = None
+    licences: Mapping[str, str] = field(default_factory=dict)
+
+
+def export(
+    source: Path,
+    to: str,
+    out: Path,
+    robot: str | None = None,
+    pack: PackInputs | None = None,
+) -> dict[str, Any]:
+    """Write a robot's motion, a person's motion or a policy as `to`; `deploy` writes a folder.
 
     Raises:
         UnknownName: no such format, or none for what the file holds.
@@ -32,6 +57,10 @@ def export(source: Path, to: str, out: Path, robot: str | None = None) -> dict[s
     from robojackson.api.motions import read_motion, require_another, write_motion
 
     began = time.monotonic()
+    if to == DEPLOY and source.suffix == POLICY_SUFFIX:
+        return _deploy(source, out, robot, pack or PackInputs(), began)
+    if pack is not None and pack != PackInputs():
+        raise BadConfiguration("--reference, --evaluation and --licence are for --to deploy")
     require_another(source, out)
     require_file(source)
     about: dict[str, Any]
@@ -55,21 +84,61 @@ def export(source: Path, to: str, out: Path, robot: str | None = None) -> dict[s
     return figures | {"seconds": time.monotonic() - began}
 
 
-def _policy_verdict(out: Path) -> dict[str, Any]:
+def _deploy(
+    source: Path, out: Path, robot: str | None, pack: PackInputs, began: float
+) -> dict[str, Any]:
+    """Write a deploy pack; its verdict names what is missing before anybody relies on it."""
+    from robojackson.api.deploy_pack import write_deploy_pack
+
+    made = write_deploy_pack(
+        source,
+        out,
+        reference=pack.reference,
+        robot=robot,
+        evaluation=pack.evaluation,
+        licences=pack.licences,
+    )
+    missing = _open_points(made)
+    kind = "incomplete" if missing else "written"
+    sentence = "The pack runs without RoboJackson. " + (
+        f"Open: {'; '.join(missing)}." if missing else "Nothing is open; read its README.md."
+    )
+    rights = {f"may_{name}": answer for name, answer in made.pop("licences").items()}
+    made["files"] = len(made["files"])
+    verdict = {"verdict": {"kind": kind, "sentence": sentence}}
+    following = {"next": shlex.join(["python", str(out / "run.py"), "--view"])}
+    figures = {"folder": str(out), "format": DEPLOY, **made, **rights}
+    return figures | {"seconds": time.monotonic() - began} | verdict | following
+
+
+def _open_points(made: Mapping[str, Any]) -> list[str]:
+    """List what a deploy pack lacks before anybody relies on it."""
+    found, weakest = [], made["weakest_strict_success"]
+    if weakest is None:
+        found.append("no sim-to-sim passport (evaluate --passport)")
+    elif weakest < LEAST_STRICT:
+        row = f"{made['weakest_case']}, strict success {100 * weakest:.0f} %"
+        found.append(f"the passport's weakest row: {row} (train --robust)")
+    if made["unknown_licences"]:
+        found.append(f"licences unknown: {', '.join(made['unknown_licences'])} (--licence)")
+    return found
+
+
+def _policy_verdict(out: Path) -> dict[str, object]:
     sentence = "The file computes what the policy does: observations in, actions out."
     check = f"import onnxruntime as o; print(o.InferenceSession({str(out)!r}).get_inputs())"
     following = shlex.join(["python", "-c", check])
     return {"verdict": {"kind": "written", "sentence": sentence}, "next": following}
 
 
-def _person_verdict(motion: SmplSequence, out: Path) -> dict[str, Any]:
+def _person_verdict(motion: SmplSequence, out: Path) -> dict[str, object]:
     seconds, fps = len(motion) / motion.fps, motion.fps
     sentence = f"The whole motion is in the file: {seconds:.1f} s at {fps:.4g} frames a second."
     following = cards.command_line("import", out, "-o", out.with_suffix(""))
     return {"verdict": {"kind": "written", "sentence": sentence}, "next": following}
 
 
-def _robot_verdict(motion: ReferenceMotion, source: Path) -> dict[str, Any]:
+def _robot_verdict(motion: ReferenceMotion, source: Path) -> dict[str, object]:
     """Judge a robot's motion by its own score card: an export keeps what is wrong with it."""
     card, words = scorecard_record(motion), ("train", source, "-o", source.parent / "training")
     verdict = cards.retarget_verdict(card)
@@ -81,11 +150,24 @@ def _robot_verdict(motion: ReferenceMotion, source: Path) -> dict[str, Any]:
     return {"verdict": verdict, "next": cards.command_line(*words)}
 
 
+def licences_from(declared: Sequence[str]) -> dict[str, str]:
+    """Return the licences that a user declared as KIND=LICENCE.
+
+    Raises:
+        BadConfiguration: one of them has no kind.
+    """
+    pairs = [one.partition("=") for one in declared]
+    for kind, equals, licence in pairs:
+        if not (kind.strip() and equals and licence.strip()):
+            raise BadConfiguration(f"--licence {kind}: wants KIND=LICENCE, as clip=CC-BY-4.0")
+    return {kind.strip(): licence.strip() for kind, _, licence in pairs}
+
+
 def names() -> list[str]:
     """Return the formats that something can be written in, by what a file has to hold."""
     kinds: dict[str, Mapping[str, object]] = {
         "a robot's motion": registry.robot_exporters(),
         "a person's motion": registry.person_exporters(),
-        "a policy": registry.policy_exporters(),
+        "a policy": {**registry.policy_exporters(), DEPLOY: None},
     }
     return [f"{kind}: {', '.join(sorted(found))}" for kind, found in kinds.items()]

@@ -27,20 +27,33 @@ class ExportCommand(TyperCommand):
 def export(
     motion: Annotated[
         Path,
-        typer.Argument(
-            help="reference.parquet of a robot, smpl.parquet of a person, or a policy (onnx)."
-        ),
+        typer.Argument(help="reference.parquet of a robot, smpl.parquet of a person, or a policy."),
     ],
     to: Annotated[str, typer.Option(help="The format.")],
-    out: Annotated[Path, typer.Option("-o", "--out", help="File for the result.")],
+    out: Annotated[
+        Path, typer.Option("-o", "--out", help="File for the result; for deploy a folder.")
+    ],
     robot: MotionRobot = None,
+    reference: Annotated[
+        Path | None,
+        typer.Option(help="deploy: the policy's motion, where it is not beside the policy."),
+    ] = None,
+    evaluation: Annotated[
+        Path | None,
+        typer.Option(help="deploy: evaluation.json, where it is not beside the policy."),
+    ] = None,
+    licence: Annotated[
+        list[str] | None,
+        typer.Option(help="deploy: a licence that no file records: --licence clip=CC-BY-4.0."),
+    ] = None,
     as_json: Json = False,
 ) -> CommandResult:
     """A robot's or a person's motion, or a policy, in the file format of another project."""
     from robojackson.cli import exporting
 
     log_to_stderr()
-    made = exporting.export(motion, to, out, robot)
+    pack = exporting.PackInputs(reference, evaluation, exporting.licences_from(licence or []))
+    made = exporting.export(motion, to, out, robot, pack)
     return CommandResult(made, text=_text(made))
 
 

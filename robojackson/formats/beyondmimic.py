@@ -25,7 +25,11 @@ def write(reference: ReferenceMotion, model: mujoco.MjModel) -> bytes:
         UnknownName: the model has other joints than the reference motion.
     """
     require_same_joints(reference, model)
-    motion = sampled(reference, FPS)
+    return npz_archive.pack(motion_arrays(sampled(reference, FPS), model))
+
+
+def motion_arrays(motion: SampledMotion, model: mujoco.MjModel) -> dict[str, np.ndarray]:
+    """The arrays of the .npz of a motion whose velocities are known."""
     qvel = np.asarray(motion.qvel)
     states = body_states(model, motion.qpos, qvel)
     figures = {
@@ -36,8 +40,8 @@ def write(reference: ReferenceMotion, model: mujoco.MjModel) -> bytes:
         "body_lin_vel_w": states.linear[:, 1:],
         "body_ang_vel_w": states.angular[:, 1:],
     }
-    return npz_archive.pack(
-        {"fps": np.array([FPS])}
+    return (
+        {"fps": np.array([round(motion.fps)])}
         | {name: values.astype(np.float32) for name, values in figures.items()}
         | {"joint_names": np.array(names(model, "joint")[1:])}
         | {"body_names": np.array(names(model, "body")[1:])}

@@ -1,0 +1,225 @@
+"""From a trained policy to a deploy pack: a folder that runs it without RoboJackson."""
+
+import json
+from collections.abc import Mapping
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from robojackson.api.arguments import FilePath, RobotLike, require_robot, robot_of
+from robojackson.api.policy_ingredients import policy_ingredients
+from robojackson.api.robots import load_robot
+from robojackson.errors import BadConfiguration, BadPolicy, StoreError
+from robojackson.files.file_tree import results_in
+from robojackson.files.table_file import require_file
+from robojackson.formats.deploy.deployed_policy import (
+    DeployedPolicy,
+    chain_between,
+    places_in_mjcf,
+)
+from robojackson.formats.deploy.licence_passport import together, with_declared
+from robojackson.formats.deploy.pack_files import pack_files
+from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
+from robojackson.rl.config.train_config import ControlConfig
+from robojackson.rl.evaluation.controllers import control_of, mode_of, observation_of
+from robojackson.rl.modes.observation import CLIP, HINGE_SPEED_SCALE, SPEED_SCALE
+from robojackson.rl.policy import Policy, load_policy
+from robojackson.rl.sim.feedforward import lead_of
+from robojackson.rl.sim.motors import Motors, gains, residual_scale
+from robojackson.robot.fall import Fall
+from robojackson.robot.model import Robot
+
+REFERENCE, EVALUATION = "reference.parquet", "evaluation.json"
+LAST_ACTION_SCALE = 0.5
+"""As in the observation of mode `track`."""
+
+
+def write_deploy_pack(
+    policy: FilePath,
+    folder: FilePath,
+    *,
+    reference: FilePath | None = None,
+    robot: RobotLike | None = None,
+    evaluation: FilePath | None = None,
+    licences: Mapping[str, str] | None = None,
+) -> dict[str, Any]:
+    """Write a policy that sees what a robot measures by itself, as a pack that runs alone.
+
+    Args:
+        policy: policy.safetensors of a training with `track.observation=onboard`.
+        folder: For the pack.
+        reference: The motion that it was trained on; None looks beside the policy.
+        robot: The one that the motion was made for; None finds it.
+        evaluation: evaluation.json of `robojackson evaluate`, whose figures and passport go into
+            the pack; None looks beside the policy.
+        licences: Licences of inputs by kind, where nothing records them: `{"clip": "CC-BY-4.0"}`.
+
+    Returns:
+        What was written: files, inputs, layout, the passport's cases and its weakest, and what the
+        licences allow.
+
+    Raises:
+        BadPolicy: a policy of another mode, observation, law, robot or motion.
+        StoreError: a file is missing or cannot be written.
+        BadConfiguration: a robot or a licence that cannot go into a pack.
+        MissingDependency: the onnx package is not installed.
+    """
+    path = Path(policy)
+    found = load_policy(path)
+    _require_onboard(found)
+    source = _beside(path, reference, REFERENCE, "--reference")
+    motion = ReferenceMotion.load(source)
+    _require_same_motion(found, motion, source)
+    machine = robot_of(motion) if robot is None else require_robot(motion, load_robot(robot))
+    parts = deployed_policy(found, motion, machine)
+    ingredients = with_declared(policy_ingredients(found, path, source, machine), licences or {})
+    judged = _evaluation(path, evaluation)
+    files = pack_files(parts, machine, ingredients, judged)
+    with results_in(Path(folder)) as tree:
+        for name, content in files.items():
+            tree.write(name, content)
+    rows = (judged or {}).get("passport") or []
+    return {
+        "files": sorted(files),
+        "robot": motion.robot,
+        "observations": parts.observation_size,
+        "layout_sha256": parts.layout_sha256,
+        "passport_cases": len(rows),
+        "weakest_case": min(rows, key=_strict_of)["case"] if rows else None,
+        "weakest_strict_success": min(map(_strict_of, rows)) if rows else None,
+        "licences": together(ingredients),
+        "unknown_licences": sorted({one.kind for one in ingredients if one.licence == "unknown"}),
+    }
+
+
+def deployed_policy(policy: Policy, reference: ReferenceMotion, robot: Robot) -> DeployedPolicy:
+    """Put together what a pack is made from, in the order of the hinges.
+
+    Raises:
+        BadPolicy: it was trained for another robot, or the robot has hinges without a motor.
+    """
+    control = control_of(policy, robot)
+    hinge, count = Motors.of(robot.model).hinge, len(robot.joint_names)
+    if sorted(hinge.tolist()) != list(range(count)):
+        raise BadPolicy(
+            f"robot {robot.description.name!r} has {len(hinge)} motors for {count} hinges: a "
+            "deploy pack wants one motor a hinge"
+        )
+    motor = np.argsort(hinge)
+    lead = lead_of(robot, reference, control)
+    stiffness, damping = (each[motor] for each in gains(robot, control))
+    names, own = robot.keypoint_names, robot.actuation
+    body_of = robot.model.site_bodyid[robot.keypoint_sites]
+    anchor = robot.model.body(body_of[names.index("head")]).name
+    bodies = sorted({*body_of.tolist(), robot.model.body(robot.description.root_body).id})
+    layers, scale = _network(policy, motor)
+    return DeployedPolicy(
+        layers=layers,
+        input_scale=scale,
+        input_clip=CLIP,
+        model=robot.model,
+        reference=reference,
+        lead=np.zeros((len(reference), count)) if lead is None else lead[:, motor],
+        root=robot.description.root_body,
+        anchor=anchor,
+        chain=chain_between(robot.model, robot.description.root_body, anchor),
+        bodies=tuple(robot.model.body(index).name for index in bodies),
+        default=robot.standing[7:],
+        action_scale=residual_scale(robot, control)[motor],
+        stiffness=stiffness,
+        damping=damping,
+        torque_limit=Motors.of(robot.model).limit[motor],
+        speed_limit=own.speed_limit,
+        fall_tilt=Fall.of(robot).tilt,
+        places=places_in_mjcf(robot),
+        facts=dict(policy.facts),
+    )
+
+
+def _network(
+    policy: Policy, motor: np.ndarray
+) -> tuple[tuple[tuple[np.ndarray, np.ndarray], ...], np.ndarray]:
+    """The layers with inputs in the order of the pack's terms and hinges, and the inputs' scales.
+
+    The policy sees gyroscope, attitude, angles, speeds, target angles, target speeds, last action
+    (`Observer`); the pack has targets, attitude, gyroscope, angles, speeds, last action.
+    """
+    count = len(motor)
+    ends = np.cumsum([0, 3, 6, count, count, count, count, count])
+    gyro, turn, angle, speed, aim, aim_speed, last = (
+        np.arange(start, end) for start, end in pairwise(ends)
+    )
+    order = np.concatenate([aim, aim_speed, turn, gyro, angle, speed, last[motor]])
+    joints = [(1.0, count), (HINGE_SPEED_SCALE, count)]
+    parts = [*joints, (1.0, 6), (SPEED_SCALE, 3), *joints, (LAST_ACTION_SCALE, count)]
+    scale = np.concatenate([np.full(size, factor) for factor, size in parts])
+    layers = [(weight.copy(), bias.copy()) for weight, bias in policy.layers]
+    layers[0] = layers[0][0][order], layers[0][1]
+    weight, bias = layers[-1]
+    layers[-1] = weight[:, motor], bias[motor]
+    return tuple(layers), scale
+
+
+def _require_onboard(policy: Policy) -> None:
+    """Refuse what a real robot cannot run.
+
+    Raises:
+        BadPolicy: another mode, observation or law.
+    """
+    law = policy.facts.get("control")
+    kind = law.get("law") if isinstance(law, Mapping) else ControlConfig().law
+    if mode_of(policy) == "track" and observation_of(policy) != "onboard":
+        raise BadPolicy(
+            f"the policy takes {policy.observation_size} inputs of the full observation, which no "
+            "real robot measures (place, velocity): train with --set track.observation=onboard"
+        )
+    if mode_of(policy) != "track" or kind != "pd":
+        raise BadPolicy(
+            f"a policy of mode {mode_of(policy)} and law {kind}: a deploy pack wants mode track, "
+            "law pd and --set track.observation=onboard"
+        )
+
+
+def _require_same_motion(policy: Policy, motion: ReferenceMotion, source: Path) -> None:
+    learnt = policy.facts.get("reference_sha256")
+    if learnt != poses_sha256(motion):
+        raise BadPolicy(
+            f"{source} is not the motion that the policy was trained on (sha256 "
+            f"{str(learnt)[:12]}, here {poses_sha256(motion)[:12]}): give it with --reference"
+        )
+
+
+def _beside(policy: Path, given: FilePath | None, name: str, option: str) -> Path:
+    """The file given, or the one of that name beside the policy or one folder up."""
+    places = [Path(given)] if given else [f / name for f in (policy.parent, policy.parent.parent)]
+    path = next((place for place in places if place.is_file()), None)
+    if path is None:
+        raise StoreError(
+            f"no {name} at {' or '.join(map(str, places))}: give it with {option} FILE"
+        )
+    return path
+
+
+def _evaluation(policy: Path, given: FilePath | None) -> dict[str, Any] | None:
+    """The figures of an evaluation; None where there is none beside the policy."""
+    path = Path(given) if given else policy.parent / EVALUATION
+    path = path / EVALUATION if path.is_dir() else path
+    if given is None and not path.is_file():
+        return None
+    require_file(path)
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise BadConfiguration(
+            f"{path}: not what `robojackson evaluate` writes ({error})"
+        ) from error
+    if not isinstance(found, dict):
+        raise BadConfiguration(f"{path}: not what `robojackson evaluate` writes")
+    return found
+
+
+def _strict_of(row: Mapping[str, Any]) -> float:
+    """Strict success of a row of the passport."""
+    return float(row["strict_success"])

@@ -1,0 +1,76 @@
+"""What a policy was made from, as far as the files around it tell: for the licence passport."""
+
+import hashlib
+from pathlib import Path
+
+from robojackson.formats.deploy.licence_passport import UNKNOWN, Ingredient, robot_ingredient
+from robojackson.motion.smpl_sequence import SmplSequence
+from robojackson.rl.policy import Policy
+from robojackson.robot.model import Robot
+
+LANDMARKS, PERSON = "landmarks.parquet", "smpl.parquet"
+NETWORK_NOTE = "pose by the network"
+"""Beginning of the note of a motion that a user's networks recovered."""
+
+
+def policy_ingredients(
+    policy: Policy, path: Path, reference: Path, robot: Robot
+) -> list[Ingredient]:
+    """List the inputs of a policy; what no file records is unknown.
+
+    Args:
+        path: The policy's file.
+        reference: The motion's file, beside or above which its landmarks lie if it is of a video.
+    """
+    digest = hashlib.sha256(reference.read_bytes()).hexdigest()
+    note = "no file records it: declare it with --licence clip=LICENCE"
+    return [
+        Ingredient("clip", "the video or recording that is danced", UNKNOWN, note),
+        *_body_models(reference),
+        Ingredient("motion", "reference motion", "own", "made here, from the clip", digest),
+        Ingredient("weights", "the policy", "own", "trained here", _sha256(path)),
+        *_start(str(policy.facts.get("start", UNKNOWN))),
+        robot_ingredient(robot.description, robot.sha256),
+        *_tracker(policy),
+        Ingredient("software", "run.py and the texts of the pack", "Apache-2.0", "RoboJackson"),
+    ]
+
+
+def _body_models(reference: Path) -> list[Ingredient]:
+    """The networks that recovered the motion, if it is of a video."""
+    folders = reference.parent, reference.parent.parent
+    folder = next((folder for folder in folders if (folder / LANDMARKS).is_file()), None)
+    if folder is None or not (folder / PERSON).is_file():
+        note = "no landmarks and motion of a person lie beside it: declare them"
+        return [Ingredient("body models", "what recovered the motion", UNKNOWN, note)]
+    notes = SmplSequence.load(folder / PERSON).notes
+    networks = [note for note in notes if note.startswith(NETWORK_NOTE)]
+    note = f"{PERSON} beside the motion says so"
+    found = [Ingredient("body models", "MediaPipe's pose landmarker", "Apache-2.0", LANDMARKS)]
+    if networks:
+        return found + [Ingredient("body models", name, UNKNOWN, note) for name in networks]
+    ours = "temporal network and skeleton of RoboJackson"
+    return [*found, Ingredient("body models", ours, "Apache-2.0", f"{PERSON} names no other")]
+
+
+def _start(start: str) -> list[Ingredient]:
+    """The weights that the training began with."""
+    if start == "scratch":
+        return []
+    if start == "walker":
+        note = "RoboJackson's walker (assets/PROVENANCE.md)"
+        return [Ingredient("weights", "start: walker", "Apache-2.0", note)]
+    return [Ingredient("weights", f"start: {Path(start).name}", UNKNOWN, "the training began so")]
+
+
+def _tracker(policy: Policy) -> list[Ingredient]:
+    """The general tracker that a training polished."""
+    tracker = policy.facts.get("tracker")
+    if not tracker:
+        return []
+    note = "its motions' licences count, too: declare them"
+    return [Ingredient("tracker", f"tracker {tracker}", UNKNOWN, note)]
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()

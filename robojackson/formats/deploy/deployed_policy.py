@@ -1,0 +1,130 @@
+"""What a deploy pack is made from: network, motion, limits and the layout of the observation.
+
+Everything is in the order of the robot's hinges, which is that of qpos. Metres, radians, seconds,
+newton-metres.
+"""
+
+import hashlib
+import json
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.robot.mjcf import mjcf_path, read_spec
+from robojackson.robot.model import Robot
+
+Layers = tuple[tuple[np.ndarray, np.ndarray], ...]
+TERMS = ("command", "motion_anchor_ori_b", "base_ang_vel", "joint_pos", "joint_vel", "actions")
+"""Terms of mjlab's tracking observation without state estimation, in its order."""
+
+
+@dataclass(frozen=True)
+class Link:
+    """A fixed turn or a hinge between the root body and the anchor body.
+
+    Attributes:
+        turn: Fixed rotation before the hinge.
+        hinge: Index of the hinge; None where there is none.
+        axis: Of the hinge, in its body.
+        zero: Angle at which the hinge is at its zero, rad.
+    """
+
+    turn: Float[np.ndarray, "3 3"]
+    hinge: int | None = None
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    zero: float = 0.0
+
+
+@dataclass(frozen=True)
+class DeployedPolicy:
+    """A policy that sees what a robot measures by itself, and how it is run.
+
+    Attributes:
+        layers: (weight (in, out), bias (out,)); ReLU between them, tanh at the end. Inputs are in
+            the order of `TERMS`, times `input_scale` and clipped to +-`input_clip`; outputs are
+            residuals, -1..1.
+        model: The compiled robot.
+        reference: The motion.
+        lead: Offset of the targets from the reference's angles at every step, rad.
+        root, anchor: Bodies: of the free joint, and the one whose attitude the observation holds.
+        chain: From the root to the anchor.
+        bodies: Names of the bodies whose poses the policy file holds.
+        default: Angles that the observation and the action are relative to, rad.
+        action_scale: Radians a unit of the action; a residual of 1 is as much.
+        stiffness, damping: Gains of the PD law, Nm/rad and Nm s/rad.
+        torque_limit, speed_limit: Nm and rad/s.
+        fall_tilt: Between the up axes of robot and reference, from which on a robot falls, rad.
+        places: Place of every hinge in the MJCF, in which welded hinges count, too.
+        facts: What the policy was trained for.
+    """
+
+    layers: Layers
+    input_scale: Float[np.ndarray, " D"]
+    input_clip: float
+    model: mujoco.MjModel
+    reference: ReferenceMotion
+    lead: Float[np.ndarray, "S J"]
+    root: str
+    anchor: str
+    chain: tuple[Link, ...]
+    bodies: tuple[str, ...]
+    default: Float[np.ndarray, " J"]
+    action_scale: Float[np.ndarray, " J"]
+    stiffness: Float[np.ndarray, " J"]
+    damping: Float[np.ndarray, " J"]
+    torque_limit: Float[np.ndarray, " J"]
+    speed_limit: Float[np.ndarray, " J"]
+    fall_tilt: float
+    places: tuple[int, ...]
+    facts: dict[str, Any]
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the hinges."""
+        return self.reference.joint_names
+
+    @property
+    def terms(self) -> list[tuple[str, int]]:
+        """Names and sizes of the terms of the observation."""
+        count = len(self.joints)
+        return list(zip(TERMS, (2 * count, 6, 3, count, count, count), strict=True))
+
+    @property
+    def observation_size(self) -> int:
+        """Length of the observation."""
+        return sum(size for _, size in self.terms)
+
+    @property
+    def layout_sha256(self) -> str:
+        """Digest of terms, joints and anchor, as the runner computes it."""
+        text = json.dumps([self.terms, list(self.joints), self.anchor])
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+def places_in_mjcf(robot: Robot) -> tuple[int, ...]:
+    """Return the place of every hinge among those of the MJCF, which has the hinges that the
+    description welds: the motors of a robot keep their numbers when one of them is missing."""
+    spec = read_spec(mjcf_path(robot.description), robot.description)
+    hinge = mujoco.mjtJoint.mjJNT_HINGE
+    names = [joint.name for joint in spec.joints if joint.type == hinge]
+    return tuple(names.index(name) for name in robot.joint_names)
+
+
+def chain_between(model: mujoco.MjModel, root: str, anchor: str) -> tuple[Link, ...]:
+    """Return the turns from one body to another that hangs from it."""
+    body, end, links = int(model.body(anchor).id), int(model.body(root).id), []
+    while body != end and body != 0:
+        turn = np.zeros(9)
+        mujoco.mju_quat2Mat(turn, model.body_quat[body])
+        first = int(model.body_jntadr[body])
+        for joint in reversed(range(first, first + int(model.body_jntnum[body]))):
+            x, y, z = (float(value) for value in model.jnt_axis[joint])
+            place = int(model.jnt_qposadr[joint])
+            links.append(Link(np.eye(3), place - 7, (x, y, z), float(model.qpos0[place])))
+        links.append(Link(turn.reshape(3, 3)))
+        body = int(model.body_parentid[body])
+    return tuple(reversed(links))

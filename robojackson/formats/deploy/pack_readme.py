@@ -1,0 +1,120 @@
+"""`README.md` of a deploy pack: its files, its figures, and what to do before a real robot."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from robojackson.formats.deploy.deployed_policy import DeployedPolicy
+
+FILES = """\
+| file | what |
+|---|---|
+| `run.py` | runs it: `pip install numpy onnxruntime mujoco`, `python run.py --view` |
+| `policy.onnx` | `obs`, `time_step` in; `actions` and the motion out, as mjlab exports |
+| `policy_obs.onnx` | the same function, `obs` in, `actions` out, for Unitree's C++ runner |
+| `motion.npz` | the motion for mjlab; the command of a control step is one row ahead |
+| `deploy.yaml` | joint order, gains, limits, scale, layout; Unitree's keys first |
+| `robot.xml` | the robot that it was trained on, without meshes |
+| `LICENCES.md`, `licences.json` | what it was made from, and what the licences allow |
+| `licences/` | the texts that go with the robot's model |
+"""
+SAFETY = """\
+## Before a real robot
+
+Nothing here has been on a real robot. All figures above are of simulations.
+
+1. Run `run.py --view` and watch the whole dance. Stop here if a row of the passport is bad.
+2. Hang the robot from a gantry with slack for the dance, feet just off the floor, 3 m free around
+   it, nobody within reach, and a second person at the emergency stop of the robot itself.
+3. `Runner(robot=...)` drives any object with `joints` (names, in order), `read()` (attitude wxyz,
+   gyroscope in the root's axes, joint angles and speeds), `drive(target, stiffness, damping)`.
+   Your `drive` must keep the limits of `deploy.yaml`, as `SimulatedRobot.drive` does, and return
+   after one control step: a loop that is late is another robot.
+4. First with the stop in your hand and damping alone (`drive` with stiffness 0), then the soft
+   start, then one second of the dance, then more.
+5. It stops by itself when robot and motion lean apart more than `stop_tilt`, when a joint is twice
+   as fast as its limit, and when a value is no number; Ctrl-C and SIGTERM stop it as well. To stop
+   is to damp: the robot sinks down. It neither stands up again nor catches itself.
+6. It refuses to start when names, sizes or order of the observation or of the joints differ from
+   what the policy was trained with. Do not pad or cut an observation to make it start.
+"""
+
+
+def pack_readme(
+    policy: DeployedPolicy, figures: Mapping[str, Any] | None, passport: Sequence[Mapping[str, Any]]
+) -> bytes:
+    """Return the content of the file.
+
+    Args:
+        figures: Of the evaluation on stock physics; None where none was given.
+        passport: Rows of `evaluate --passport`; empty where none was made.
+    """
+    reference = policy.reference
+    kind = "repeats" if reference.cyclic else "ends"
+    head = (
+        f"# Deploy pack: {reference.robot}, {len(reference) * reference.dt:.1f} s of motion that "
+        f"{kind}\n\nMade by `robojackson export --to deploy`. Control step "
+        f"{1e3 * reference.dt:g} ms, {len(policy.joints)} joints, {policy.observation_size} inputs "
+        f"(layout `{policy.layout_sha256[:12]}`), "
+        "target = default_joint_pos + action_scale * action."
+    )
+    parts = [head, FILES, _terms(policy), _judged(figures), _passport(passport), SAFETY]
+    return "\n\n".join(part.strip() for part in parts if part).encode() + b"\n"
+
+
+def _terms(policy: DeployedPolicy) -> str:
+    lines = ["## Observation", "", "| term | from | size |", "|---|---|---|"]
+    at = 0
+    for name, size in policy.terms:
+        lines.append(f"| `{name}` | {at} | {size} |")
+        at += size
+    tail = (
+        "`motion_anchor_ori_b`: first two columns, row by row, of the rotation of the motion's "
+        f"`{policy.anchor}` in the robot's; the motion is turned to where the robot faces at the "
+        "start. Joint angles are relative to `default_joint_pos`, those of the command are not; "
+        "speeds are rad/s, nothing is scaled; `actions` is the last output, zero at first."
+    )
+    return "\n".join([*lines, "", tail])
+
+
+def _judged(figures: Mapping[str, Any] | None) -> str:
+    if not figures:
+        return "## Evaluation\n\nNone was given: `robojackson evaluate` makes one."
+    rows = [("success", "%", 100.0), ("strict_success", "%", 100.0), ("skill", "", 1.0)]
+    rows += [("site_error_m", "mm", 1e3), ("mpjpe_l_m", "mm", 1e3)]
+    lines = ["## Evaluation", "", "| figure | mean |", "|---|---|"]
+    for name, unit, factor in rows:
+        if isinstance(figures.get(name), int | float):
+            lines.append(f"| {name.removesuffix('_m')} | {factor * figures[name]:.3g} {unit} |")
+    return "\n".join(lines)
+
+
+def _passport(rows: Sequence[Mapping[str, Any]]) -> str:
+    if not rows:
+        return (
+            "## Sim-to-sim passport\n\nNone was made: `robojackson evaluate --passport` makes it."
+        )
+    lines = [
+        "## Sim-to-sim passport",
+        "",
+        "The same policy under other physics (`passport.json`).",
+        "",
+    ]
+    lines += ["| case | strict success % | success % | skill | site error mm | kept % |"]
+    lines += ["|---|---|---|---|---|---|"]
+    for row in rows:
+        strict, held, skill, error, kept = (
+            _figure(row.get(name), factor)
+            for name, factor in (
+                ("strict_success", 100),
+                ("success", 100),
+                ("skill", 1),
+                ("site_error_m", 1e3),
+                ("kept", 100),
+            )
+        )
+        lines.append(f"| {row['case']} | {strict} | {held} | {skill} | {error} | {kept} |")
+    return "\n".join(lines)
+
+
+def _figure(value: Any, factor: float) -> str:
+    return f"{factor * value:.3g}" if isinstance(value, int | float) else "-"

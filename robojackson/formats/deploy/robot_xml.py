@@ -1,0 +1,68 @@
+"""The robot of a deploy pack as one MJCF without meshes: what collides, weighs and drives.
+
+The physics is that of the compiled robot: gains stay outside, as in training.
+"""
+
+import mujoco
+import numpy as np
+
+from robojackson.errors import BadConfiguration
+from robojackson.robot.mjcf import mjcf_path, read_spec
+from robojackson.robot.model import Robot
+from robojackson.robot.physics import apply_physics, is_plane
+
+TOLERANCE = 1e-4
+"""Relative difference between a figure of the robot and of its MJCF, which has few digits."""
+FIGURES = ("body_mass", "body_inertia", "body_ipos", "body_pos", "dof_armature", "dof_damping",
+           "jnt_range", "actuator_gear")  # fmt: skip
+
+
+def robot_xml(robot: Robot) -> bytes:
+    """Return the MJCF of a robot, which needs no other file.
+
+    Raises:
+        BadConfiguration: it collides with meshes, or what is written is not the same robot.
+    """
+    description = robot.description
+    spec = read_spec(mjcf_path(description), description)
+    if not any(is_plane(geom) for geom in spec.worldbody.geoms):
+        plane = mujoco.mjtGeom.mjGEOM_PLANE
+        spec.worldbody.add_geom(name="floor", type=plane, size=[40, 40, 1], rgba=[0.5] * 3 + [1])
+    apply_physics(spec, description)
+    for actuator in spec.actuators:
+        actuator.gear = np.asarray(actuator.gear) * description.gear_scale
+    _strip_looks(spec)
+    spec.compile()
+    text: str = spec.to_xml()
+    try:
+        again = mujoco.MjModel.from_xml_string(text)
+    except ValueError as error:
+        raise BadConfiguration(
+            f"robot {description.name!r} cannot be written as one file "
+            f"({str(error).splitlines()[0]}): a deploy pack wants collision shapes without meshes"
+        ) from error
+    _require_same(robot, again)
+    return text.encode()
+
+
+def _strip_looks(spec: mujoco.MjSpec) -> None:
+    """Remove what is only seen: geoms that collide with nothing and weigh nothing, and meshes."""
+    for geom in list(spec.geoms):
+        weighs = geom.density and not geom.parent.explicitinertial
+        collides = geom.contype or geom.conaffinity
+        if geom.type == mujoco.mjtGeom.mjGEOM_MESH and not (collides or weighs):
+            spec.delete(geom)
+    used = {geom.meshname for geom in spec.geoms}
+    for mesh in list(spec.meshes):
+        if mesh.name not in used:
+            spec.delete(mesh)
+
+
+def _require_same(robot: Robot, written: mujoco.MjModel) -> None:
+    model = robot.model
+    for name in FIGURES:
+        ours, theirs = getattr(model, name), getattr(written, name)
+        if ours.shape != theirs.shape or not np.allclose(ours, theirs, TOLERANCE, TOLERANCE**2):
+            raise BadConfiguration(
+                f"robot {robot.description.name!r} cannot be written as one MJCF: {name} changes"
+            )

@@ -1,0 +1,150 @@
+"""Run this deploy pack in MuJoCo: python run.py [--seconds S] [--view]. Ctrl-C damps and stops.
+
+Needs numpy, onnxruntime and mujoco alone. README.md says what a robot in place of MuJoCo's needs.
+"""
+
+import argparse
+import hashlib
+import json
+import signal
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import mujoco.viewer
+import numpy as np
+import onnxruntime
+
+
+class SimulatedRobot:
+    """MuJoCo's robot behind the interface of a real one; its limits always hold."""
+
+    def __init__(self, model: mujoco.MjModel, cfg: dict[str, Any]) -> None:
+        self.model, self.data, self.viewer = model, mujoco.MjData(model), None
+        self.hung: Any = None  # pose of the root while it hangs
+        self.joints = [model.joint(i).name for i in range(1, model.njnt)]
+        self.motors = np.argsort(model.actuator_trnid[:, 0])
+        self.limits = {name: np.array(value) for name, value in cfg["limits"].items()}
+        self.substeps = round(cfg["step_dt"] / model.opt.timestep)
+
+    def read(self) -> tuple[np.ndarray, ...]:
+        """Attitude of the root (wxyz), gyroscope in its axes, joint angles and speeds."""
+        qpos, qvel = self.data.qpos.copy(), self.data.qvel.copy()
+        return qpos[3:7], qvel[3:6], qpos[7:], qvel[6:]
+
+    def drive(self, target: np.ndarray, stiffness: np.ndarray, damping: np.ndarray) -> None:
+        """One control step of the PD law, inside the limits of joints, torque and speed."""
+        most, fastest = self.limits["torque"], self.limits["speed"]
+        target = np.clip(target, self.limits["lower"], self.limits["upper"])
+        for _ in range(self.substeps):
+            angle, rate = self.data.qpos[7:], self.data.qvel[6:]
+            torque = np.clip(stiffness * (target - angle) - damping * rate, -most, most)
+            torque[(np.abs(rate) > fastest) & (torque * rate > 0)] = 0.0
+            self.data.ctrl[self.motors] = torque / self.model.actuator_gear[self.motors, 0]
+            mujoco.mj_step(self.model, self.data)
+            if self.hung is not None:
+                self.data.qpos[:7], self.data.qvel[:6] = self.hung, 0.0
+        if self.viewer:
+            self.viewer.sync()
+            time.sleep(self.substeps * self.model.opt.timestep)
+
+
+class Runner:
+    """The policy and its motion on a robot; a pack whose parts do not fit each other is refused."""
+
+    def __init__(self, folder: Path = Path(__file__).parent, robot: Any = None) -> None:
+        lines = (folder / "deploy.yaml").read_text(encoding="utf-8").splitlines()
+        pairs = (line.partition(": ") for line in lines if line and line[0] != "#")
+        self.cfg = cfg = {key: json.loads(value) for key, _, value in pairs}
+        self.model = mujoco.MjModel.from_xml_path(str(folder / "robot.xml"))
+        self.pose, self.robot = mujoco.MjData(self.model), robot or SimulatedRobot(self.model, cfg)
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = 1
+        self.session = onnxruntime.InferenceSession(str(folder / "policy.onnx"), options)
+        motion = np.load(folder / "motion.npz")
+        self.command = np.hstack([motion["joint_pos"], motion["joint_vel"]]).astype(float)
+        poses = np.concatenate([motion["body_pos_w"], motion["body_quat_w"]], 2).astype(float)
+        names, self.anchor = motion["body_names"].tolist(), cfg["anchor_body_name"]
+        self.roots, self.anchors = poses[:, 0], poses[:, names.index(self.anchor), 3:]
+        keys = ("default_joint_pos", "action_scale", "stiffness", "damping")
+        self.default, self.scale, self.kp, self.kd = (np.array(cfg[key]) for key in keys)
+        if self.robot.joints != cfg["joint_names"]:
+            raise SystemExit(f"refused: the robot's joints are {self.robot.joints}")
+        self.begin(0)
+        terms = {name: value.size for name, value in self.observe(*self.robot.read()).items()}
+        layout = json.dumps([list(terms.items()), self.robot.joints, self.anchor])
+        given = [hashlib.sha256(layout.encode()).hexdigest(), sum(terms.values())]
+        made, size = self.session.get_modelmeta(), self.session.get_inputs()[0].shape[1]
+        of_policy = [made.custom_metadata_map.get("observation_layout_sha256"), size]
+        for file, wanted in {"policy.onnx": of_policy, "deploy.yaml": cfg["layout"]}.items():
+            if wanted != given:
+                raise SystemExit(f"refused: {file} is for {wanted}, not for {given}: {terms}")
+
+    def begin(self, row: int) -> None:
+        """Start at a row of the motion, which is turned to where the robot faces."""
+        there, turn = np.zeros(4), np.zeros(4)
+        mujoco.mju_negQuat(there, self.roots[row, 3:])
+        mujoco.mju_mulQuat(turn, self.robot.read()[0], there)
+        self.turn = turn * [1, 0, 0, 1] / np.hypot(turn[0], turn[3])
+        self.row, self.action, self.tilt = row, np.zeros(len(self.default)), 0.0
+
+    def observe(self, quat: Any, gyro: Any, angle: Any, rate: Any) -> dict[str, np.ndarray]:
+        """The terms of the observation, in their order."""
+        self.pose.qpos[:] = [0, 0, 0, *quat, *angle]
+        mujoco.mj_kinematics(self.model, self.pose)
+        wanted, there = np.zeros(4), np.zeros(9)
+        mujoco.mju_mulQuat(wanted, self.turn, self.anchors[self.row])
+        mujoco.mju_quat2Mat(there, wanted)
+        apart = self.pose.body(self.anchor).xmat.reshape(3, 3).T @ there.reshape(3, 3)
+        self.tilt = float(np.arccos(np.clip(apart[2, 2], -1, 1)))
+        terms = {"command": self.command[self.row], "motion_anchor_ori_b": apart[:, :2].ravel()}
+        terms |= {"base_ang_vel": gyro, "joint_pos": angle - self.default, "joint_vel": rate}
+        return terms | {"actions": self.action}
+
+    def step(self) -> str:
+        """One control step towards the next row; why the robot has to stop, else nothing."""
+        ahead, last = self.row + 1, len(self.command) - 1
+        self.row = ahead % (last + 1) if self.cfg["cyclic"] else min(ahead, last)
+        terms = self.observe(*self.robot.read())
+        obs = np.concatenate(list(terms.values())).astype(np.float32)[None]
+        feed = {"obs": obs, "time_step": np.full((1, 1), self.row, np.float32)}
+        self.action = self.session.run(["actions"], feed)[0][0].astype(float)
+        fast = np.abs(terms["joint_vel"]) > 2 * np.array(self.cfg["limits"]["speed"])
+        known = np.isfinite([*obs[0], *self.action]).all()
+        if self.tilt > self.cfg["stop_tilt"] or fast.any() or not known:
+            return f"leans {self.tilt:.2f} rad from the motion, {fast.sum()} joints too fast"
+        self.robot.drive(self.default + self.scale * self.action, self.kp, self.kd)
+        return ""
+
+
+def main(seconds: float, soft_start: float, view: bool) -> str:
+    """Hang, fade the gains in, move to the first pose, let go, dance, damp; say why it ended."""
+    runner, stop = Runner(), list[str]()
+    robot, dt = runner.robot, runner.cfg["step_dt"]
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.append("stopped by hand"))
+    robot.data.qpos[:] = [*runner.roots[0], *runner.default]
+    robot.viewer = mujoco.viewer.launch_passive(robot.model, robot.data) if view else None
+    robot.hung, here = runner.roots[0], robot.read()[2]
+    for share in np.linspace(0, 1, max(2, round(soft_start / dt))):
+        goal = here + share * (runner.command[0, : len(here)] - here)
+        if not stop:
+            robot.drive(goal, min(1.0, 2 * share) * runner.kp, runner.kd)
+    robot.hung, steps = None, 0
+    runner.begin(0)
+    while not stop and steps < round(seconds / dt):
+        stop += filter(None, [runner.step()])
+        steps += 1
+    for _ in range(round(2.0 / dt)):  # no stiffness: the joints only brake
+        robot.drive(runner.default, 0.0 * runner.kp, runner.kd)
+    return f"danced {steps * dt:.2f} s, then damped: {(*stop, 'the end')[0]}"
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=float, default=10.0, help="of the dance")
+    parser.add_argument("--soft-start", type=float, default=3.0, help="seconds, hung up")
+    parser.add_argument("--view", action="store_true", help="MuJoCo's viewer, in real time")
+    sys.stdout.write(main(**vars(parser.parse_args())) + "\n")

@@ -1,0 +1,111 @@
+"""`robojackson export POLICY --to deploy`: what it writes, and what it refuses in one line."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from robojackson.cli.exporting import PackInputs, export, licences_from
+from robojackson.errors import BadConfiguration, BadPolicy, StoreError
+from robojackson.rl.policy import Policy
+from tests.fixtures.commands import in_process, robojackson
+from tests.fixtures.deploy_policies import random_policy, swaying
+from tests.fixtures.robots import stock
+
+FILES = {"policy.onnx", "policy_obs.onnx", "motion.npz", "deploy.yaml", "robot.xml", "run.py",
+         "README.md", "LICENCES.md", "licences.json"}  # fmt: skip
+COLUMNS = ("case", "strict_success", "success", "skill", "site_error_m", "kept")
+ROWS = [("nominal", 1.0, 1.0, 0.5, 0.02, 1.0), ("gains x 0.8", 0.75, 0.8, 0.4, 0.03, None)]
+
+
+def cases(weakest: float) -> list[dict[str, object]]:
+    """A passport of two rows."""
+    found = [dict(zip(COLUMNS, row, strict=True)) for row in ROWS]
+    found[1]["strict_success"] = weakest
+    return found
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A policy with its motion beside it."""
+    reference = swaying(stock())
+    reference.save(tmp_path / "reference.parquet")
+    random_policy(stock(), reference).save(tmp_path / "policy.safetensors")
+    return tmp_path
+
+
+def test_the_command_writes_the_pack_and_tells_what_is_open(folder: Path) -> None:
+    words = ("export", folder / "policy.safetensors", "--to", "deploy", "-o", folder / "pack")
+    said = in_process(*words, "--json")
+    assert said.code == 0, said.err
+    answer = json.loads(said.out)
+    assert {path.name for path in (folder / "pack").iterdir()} == FILES | {"licences"}
+    assert answer["verdict"]["kind"] == "incomplete"
+    assert "no sim-to-sim passport" in answer["verdict"]["sentence"]
+    assert "licences unknown: clip, body models" in answer["verdict"]["sentence"].replace(
+        "body models, clip", "clip, body models"
+    )
+
+
+def test_an_evaluation_beside_the_policy_brings_its_passport(folder: Path) -> None:
+    (folder / "evaluation.json").write_text(json.dumps({"success": 1.0, "passport": cases(0.75)}))
+    inputs = PackInputs(licences={"clip": "own", "body models": "Apache-2.0"})
+    made = export(folder / "policy.safetensors", "deploy", folder / "pack", pack=inputs)
+    assert json.loads((folder / "pack" / "passport.json").read_text()) == cases(0.75)
+    assert "| gains x 0.8 | 75 | 80 | 0.4 | 30 | - |" in (folder / "pack" / "README.md").read_text()
+    assert made["weakest_case"] == "gains x 0.8"
+    assert "gains x 0.8, strict success 75 %" in made["verdict"]["sentence"]
+    (folder / "evaluation.json").write_text(json.dumps({"success": 1.0, "passport": cases(1.0)}))
+    made = export(folder / "policy.safetensors", "deploy", folder / "pack", pack=inputs)
+    assert made["verdict"]["kind"] == "written"
+
+
+def test_a_policy_that_sees_what_no_robot_measures_is_refused(folder: Path) -> None:
+    random_policy(stock(), swaying(stock()), "full").save(folder / "full.safetensors")
+    with pytest.raises(BadPolicy, match=r"train with --set track\.observation=onboard") as told:
+        export(folder / "full.safetensors", "deploy", folder / "pack")
+    assert "\n" not in str(told.value)
+    assert not (folder / "pack").exists()
+
+
+@pytest.mark.parametrize("facts", [{"mode": "paper"}, {"control": {"law": "hold"}}])
+def test_another_mode_or_law_is_refused(folder: Path, facts: dict) -> None:
+    policy = random_policy(stock(), swaying(stock()))
+    Policy(policy.layers, {**policy.facts, **facts}).save(folder / "other.safetensors")
+    with pytest.raises(BadPolicy, match="wants mode track, law pd"):
+        export(folder / "other.safetensors", "deploy", folder / "pack")
+
+
+def test_another_motion_than_the_policys_is_refused(folder: Path) -> None:
+    swaying(stock(), cyclic=False).save(folder / "reference.parquet")
+    with pytest.raises(BadPolicy, match=r"is not the motion .* give it with --reference"):
+        export(folder / "policy.safetensors", "deploy", folder / "pack")
+
+
+def test_a_policy_without_its_motion_tells_the_option(folder: Path) -> None:
+    (folder / "reference.parquet").rename(folder / "elsewhere.parquet")
+    with pytest.raises(StoreError, match="--reference FILE"):
+        export(folder / "policy.safetensors", "deploy", folder / "pack")
+    inputs = PackInputs(reference=folder / "elsewhere.parquet")
+    assert export(folder / "policy.safetensors", "deploy", folder / "pack", pack=inputs)["files"]
+
+
+def test_options_of_the_pack_are_refused_for_another_format(folder: Path) -> None:
+    inputs = PackInputs(licences={"clip": "own"})
+    with pytest.raises(BadConfiguration, match="for --to deploy"):
+        export(folder / "policy.safetensors", "onnx", folder / "policy.onnx", pack=inputs)
+
+
+def test_a_declared_licence_wants_its_kind() -> None:
+    assert licences_from(["clip=CC-BY-4.0", "body models = MIT"]) == {
+        "clip": "CC-BY-4.0",
+        "body models": "MIT",
+    }
+    with pytest.raises(BadConfiguration, match="wants KIND=LICENCE"):
+        licences_from(["CC-BY-4.0"])
+
+
+@pytest.mark.slow
+def test_the_help_lists_the_pack_among_the_formats_of_policies() -> None:
+    said = robojackson("export", "--help")
+    assert "a policy: deploy, onnx" in " ".join(said.out.replace("│", " ").split())
