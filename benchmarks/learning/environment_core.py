@@ -1,8 +1,11 @@
 """The environment beside a bare `mj_step` loop, which gets the controls that the environment wrote
 and the states that it put fallen robots into: both are in the same state at every substep, to the
-bit. Their turns alternate on one core; CPU time.
+bit. Their turns alternate on one core; CPU time of the thread.
+
+    python -m benchmarks.learning.environment_core g1 20     # robot, repeats
 """
 
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,19 +13,28 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from robojackson.pipeline.yaml_loader import load
+from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.rl.config.train_config import TqcConfig, TrackConfig
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.modes.standing_motion import make_standing_motion
-from robojackson.robot.model import Robot, RobotDescription, load_robot
+from robojackson.robot.model import Robot, load_robot
 
 BLOCK = 10
 """Control steps of one turn."""
 
 
+def named(robot: str) -> Robot:
+    """Return a robot of `configs/robots`.
+
+    Raises:
+        BadConfiguration: its model is not here.
+    """
+    return load_robot(describe_robot(robot))
+
+
 def humanoid() -> Robot:
-    """The stock robot."""
-    return load_robot(load(RobotDescription, "robots/humanoid"))
+    """Return the stock robot."""
+    return named("humanoid")
 
 
 @dataclass(frozen=True)
@@ -54,9 +66,13 @@ class Speeds:
     ratio_batched: float
 
 
-def core(repeats: int, steps: int = 60) -> Speeds:
-    """The environment beside both loops, turn by turn."""
-    robot, n = humanoid(), TqcConfig().n_envs
+def core(repeats: int, steps: int = 60, robot: Robot | None = None) -> Speeds:
+    """Time the environment beside both loops, turn by turn.
+
+    Args:
+        robot: The stock one when None.
+    """
+    robot, n = robot or humanoid(), TqcConfig().n_envs
     script = recorded(_core(robot, n), steps)
     rates = [_turns(robot, script, n, steps) for _ in range(repeats)]
     found = [float(np.median(column)) for column in zip(*rates, strict=True)]
@@ -90,10 +106,10 @@ def _action(core: TrackingCore) -> np.ndarray:
 
 def _timed(core: TrackingCore, steps: int) -> float:
     action = _action(core)
-    began = time.process_time()
+    began = time.thread_time()
     for _ in range(steps):
         core.step(action)
-    return time.process_time() - began
+    return time.thread_time() - began
 
 
 def recorded(core: TrackingCore, steps: int) -> Script:
@@ -158,13 +174,13 @@ class Bare:
         """CPU seconds of some control steps; putting robots elsewhere is not counted."""
         spent, model, step = 0.0, self._model, mujoco.mj_step
         for t in range(first, first + steps):
-            began = time.process_time()
+            began = time.thread_time()
             for robots, told in zip(self._robots, self._controls[t], strict=True):
                 for controls in told:
                     for (data, ctrl), control in zip(robots, controls, strict=True):
                         ctrl[:] = control
                         step(model, data)
-            spent += time.process_time() - began
+            spent += time.thread_time() - began
             self._place(t + 1)
         return spent
 
@@ -174,3 +190,7 @@ class Bare:
             mujoco.mj_resetData(self._model, data)
             data.qpos[:], data.qvel[:] = qpos, qvel
             mujoco.mj_forward(self._model, data)
+
+
+if __name__ == "__main__":
+    print(core(int(sys.argv[2]), robot=named(sys.argv[1])))

@@ -9,7 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.learning.environment_core import core, humanoid
+from benchmarks.learning.environment_core import core, humanoid, named
+from robojackson.errors import BadConfiguration
+from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.rl.config.train_config import ControlConfig, PaperConfig, TqcConfig, TrackConfig
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.env.vec_env import TrackingVecEnv
@@ -17,6 +19,7 @@ from robojackson.rl.modes.standing_motion import make_standing_motion
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.rl.tqc.replay_files import buffer_of
 from robojackson.rl.tqc.trainers import make_trainer
+from robojackson.robot.mjcf import mjcf_path
 
 Row = dict[str, Any]
 
@@ -25,7 +28,7 @@ def speed(repeats: int, seconds: float) -> list[Row]:
     """One row a comparison: ours, the peer's, their ratio and the bar."""
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     rows = [updates(repeats, seconds, layer_norm) for layer_norm in (False, True)]
-    rows += [paper_steps(repeats, seconds), told_core(repeats)]
+    rows += [paper_steps(repeats, seconds), *cores(repeats)]
     return [{**row, "load_average": os.getloadavg()[0]} for row in rows]
 
 
@@ -100,14 +103,32 @@ def interleaved(
     return tuple(float(np.median(found)) for found in rates.values())
 
 
-def told_core(repeats: int) -> Row:
+CORES = {"humanoid": ">= 0.88", "g1": ">= 0.85"}
+"""Bars of the environment over a bare loop, by robot."""
+
+
+def cores(repeats: int) -> list[Row]:
+    """Return the row of every robot whose model is here."""
+    return [told_core(repeats, name) for name in CORES if _is_here(name)]
+
+
+def _is_here(robot: str) -> bool:
+    try:
+        return mjcf_path(describe_robot(robot)).is_file()
+    except BadConfiguration:
+        return False
+
+
+def told_core(repeats: int, robot: str = "humanoid") -> Row:
     """Substeps a CPU second of the whole environment over a bare mj_step loop, same physics.
 
     `ratio_batched` is told beside it: over a bare loop in the order of our batches.
     """
-    speeds = core(repeats)
+    speeds = core(repeats, robot=named(robot))
     what = "environment, substeps/s, over a bare mj_step loop"
-    row = told(what, speeds.ours, speeds.bare, speeds.ratio, ">= 0.88")
+    if robot != "humanoid":
+        what = f"{what}, {robot}"
+    row = told(what, speeds.ours, speeds.bare, speeds.ratio, CORES[robot])
     return {**row, "peer_batched": speeds.batched, "ratio_batched": speeds.ratio_batched}
 
 

@@ -64,7 +64,7 @@ def measure(reference: Path, out: Path, options: list[str], until: float, minute
     from robojackson.rl.training import Hooks, train_policy
 
     fixed = {"cpu_minutes": minutes, "checkpoint_seconds": 1e5, "track.threads": 1}
-    config = load(TrainConfig, None, dict(o.split("=", 1) for o in options) | fixed)
+    config = load(TrainConfig, None, {**dict(o.split("=", 1) for o in options), **fixed})
     motion = ReferenceMotion.load(reference)
     curve = Curve(until)
     with tempfile.TemporaryDirectory() as folder:

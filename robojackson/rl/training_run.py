@@ -209,6 +209,7 @@ class Run:
             "steps": self.trainer.steps(),
             "updates": self.trainer.updates(),
             "control": asdict(self.core.sim.control),
+            "actuation": self.core.sim.actuation,
             "repeats": self.core.mode.repeats,
             "environment": json.loads(json.dumps(asdict(config.environment))),
         }

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from robojackson.robot.description import Offset
-from robojackson.robot.limbs import ARM_WORDS, SIDES, Limb, Skeleton, names_of, path, says
+from robojackson.robot.limbs import ARM_WORDS, SIDES, Limb, Skeleton, names_any, names_of, path
 
 FAR_SHARE = 0.1
 """Axes whose closest point is further from their hinges than this share of the limb do not meet."""
@@ -116,7 +116,7 @@ def _hand(skeleton: Skeleton, arm: Limb) -> Guess | None:
     model = skeleton.model
     forearm = int(model.jnt_bodyid[arm.parts["elbow"][0]])
     beyond = arm.bodies[arm.bodies.index(forearm) :]
-    hands = [b for b in beyond if says(names_of(model, b)[:1], ARM_WORDS["wrist"])]
+    hands = [b for b in beyond if names_any(names_of(model, b)[:1], ARM_WORDS["wrist"])]
     body = hands[-1] if hands else beyond[-1]
     ends = [end for geom in geoms_of(model, body) for end in _ends(skeleton, geom)]
     elbow = skeleton.data.xanchor[arm.parts["elbow"][0]]
@@ -138,7 +138,7 @@ def _pelvis(skeleton: Skeleton, found: dict[str, Guess]) -> Guess | None:
 def _head(skeleton: Skeleton) -> Guess | None:
     """What is called head, else the highest geom of the trunk."""
     model, data, trunk = skeleton.model, skeleton.data, skeleton.trunk
-    named = [body for body in trunk if says(names_of(model, body), HEAD)]
+    named = [body for body in trunk if names_any(names_of(model, body), HEAD)]
     if named:
         body = max(named, key=lambda b: len(path(model, b)))
         geoms = geoms_of(model, body)
@@ -147,7 +147,7 @@ def _head(skeleton: Skeleton) -> Guess | None:
     geoms = [geom for body in trunk for geom in geoms_of(model, body)]
     if not geoms:
         return None
-    called = [geom for geom in geoms if says(_geom_names(model, geom), HEAD)]
+    called = [geom for geom in geoms if names_any(_geom_names(model, geom), HEAD)]
     geom = max(called or geoms, key=lambda geom: float(data.geom_xpos[geom][2]))
     told = next((name for name in _geom_names(model, geom) if name), "without a name")
     why = f"geom {told}" if called else f"highest geom of the trunk, {told}"

@@ -110,7 +110,7 @@ def names_of(model: mujoco.MjModel, body: int) -> list[str]:
     return [model.body(body).name, *joints]
 
 
-def says(names: Iterable[str], words: Iterable[str]) -> bool:
+def names_any(names: Iterable[str], words: Iterable[str]) -> bool:
     """Whether one of the names has one of the words in it."""
     plain = [re.sub(r"[^a-z]", "", name.lower()) for name in names]
     return any(word in name for name in plain for word in words)
@@ -146,7 +146,7 @@ def _arm(skeleton: Skeleton, paths: list[list[int]]) -> list[int]:
     words = [word for part in ARM_WORDS.values() for word in part]
 
     def rank(found: list[int]) -> tuple[bool, int]:
-        named = any(says(names_of(model, body), words) for body in found)
+        named = any(names_any(names_of(model, body), words) for body in found)
         return named, len(hinges_of(model, found))
 
     return max(paths, key=rank, default=[])
@@ -158,7 +158,7 @@ def _limb(skeleton: Skeleton, bodies: tuple[int, ...], words: Words) -> Limb:
     parts: dict[str, list[int]] = {name: [] for name in words}
     for hinge in hinges:
         own, body = [model.joint(hinge).name], [model.body(model.jnt_bodyid[hinge]).name]
-        told = (name for called in (own, body) for name in words if says(called, words[name]))
+        told = (name for called in (own, body) for name in words if names_any(called, words[name]))
         name = next(told, None)
         if name is not None:
             parts[name].append(hinge)

@@ -22,7 +22,7 @@ class ControlConfig:
         damping: Derivative gain, multiples of the proportional one, seconds; the robot's when
             null.
         feedforward: Share of the torques that the reference asks for by which the targets lead its
-            joint angles, unitless; 0 follows the angles alone.
+            joint angles, unitless; 0 follows the angles alone; the robot's when null.
         residual: Largest offset that the policy adds to the reference's joint angles, rad; the
             robot's action scale when null.
         arm_residual: Largest offset that the policy adds to the arms' angles, rad.
@@ -32,7 +32,7 @@ class ControlConfig:
     substeps: int | None = Field(default=None, ge=1)
     stiffness: float | None = Field(default=None, gt=0)
     damping: float | None = Field(default=None, ge=0)
-    feedforward: float = Field(default=0.0, ge=0, le=2)
+    feedforward: float | None = Field(default=None, ge=0, le=2)
     residual: float | None = Field(default=None, gt=0)
     arm_residual: float | None = Field(default=None, gt=0)
 

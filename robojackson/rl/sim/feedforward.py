@@ -12,7 +12,7 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.retarget.feasibility.certification import motor_torques
 from robojackson.retarget.feasibility.contact_wrench import Tolerance
 from robojackson.rl.config.train_config import ControlConfig
-from robojackson.rl.sim.motors import Motors, gains
+from robojackson.rl.sim.motors import Motors, feedforward_share, gains
 from robojackson.robot.model import Robot
 
 
@@ -20,12 +20,13 @@ def lead_of(
     robot: Robot, reference: ReferenceMotion, control: ControlConfig
 ) -> Float[np.ndarray, "S nu"] | None:
     """Offsets of the motors' targets at every step of the reference; None without feed-forward."""
-    if not control.feedforward:
+    share = feedforward_share(robot, control)
+    if not share:
         return None
     offset = np.asarray(reference.cycle_offset, float) if reference.cyclic else None
     qpos, hinge = np.asarray(reference.qpos, float), Motors.of(robot.model).hinge
     torque = motor_torques(robot, qpos, reference.dt, offset, Tolerance())[:, hinge]
     kp, kd = gains(robot, control)
     speed = np.asarray(reference.qvel, float)[:, 6:][:, hinge]
-    result: np.ndarray = control.feedforward * (torque + kd * speed) / kp
+    result: np.ndarray = share * (torque + kd * speed) / kp
     return result

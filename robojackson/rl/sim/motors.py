@@ -69,6 +69,20 @@ def residual_scale(robot: Robot, control: ControlConfig) -> Float[np.ndarray, " 
     return scale
 
 
+def feedforward_share(robot: Robot, control: ControlConfig) -> float:
+    """Share of the reference's torques by which the targets lead: the robot's own, unless the
+    configuration names one."""
+    named = control.feedforward
+    return robot.description.feedforward if named is None else named
+
+
+def actuation_facts(robot: Robot, control: ControlConfig) -> dict[str, list[float]]:
+    """What a policy's actions mean, in the robot's order of motors, for the policy's file."""
+    kp, kd = gains(robot, control)
+    found = {"stiffness": kp, "damping": kd, "action_scale": residual_scale(robot, control)}
+    return {name: values.tolist() for name, values in found.items()}
+
+
 def _moved_by(robot: Robot, keypoints: tuple[str, ...]) -> set[int]:
     """Joints between the root and the bodies that carry the keypoints."""
     model, found = robot.model, set()

@@ -72,7 +72,8 @@ class Batch:
         shape = (2, len(datas), len(self._state[0]))
         self._hinges = np.zeros(shape)
         self._flat = self._hinges.reshape(-1)
-        self._driven = np.zeros((2, len(datas), len(motors.hinge)))
+        self._in_order = np.array_equal(motors.hinge, np.arange(shape[-1]))
+        self._driven = self._hinges if self._in_order else np.zeros((*shape[:2], len(motors.hinge)))
         self._least = -motors.limit
 
     def advance(
@@ -113,7 +114,8 @@ class Batch:
             return targets
         motors, (torque, braking) = self._motors, self._driven
         np.concatenate(self._state, out=self._flat)
-        self._hinges.take(motors.hinge, 2, out=self._driven, mode="clip")
+        if not self._in_order:
+            self._hinges.take(motors.hinge, 2, out=self._driven, mode="clip")
         np.subtract(targets, torque, out=torque)
         np.multiply(self._driven, self._gains, out=self._driven)
         np.subtract(torque, braking, out=torque)

@@ -9,6 +9,7 @@ World frame, metres, radians, seconds, newton-metres. MuJoCo releases the interp
 `mj_step`, so two threads keep two cores busy.
 """
 
+import copy
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import pairwise
@@ -20,7 +21,13 @@ from jaxtyping import Bool, Float, Int
 from robojackson.errors import BadPolicy
 from robojackson.rl.config.train_config import ControlConfig, RandomConfig
 from robojackson.rl.sim.disturbances import Disturbances
-from robojackson.rl.sim.motors import Motors, gains, residual_scale
+from robojackson.rl.sim.motors import (
+    Motors,
+    actuation_facts,
+    feedforward_share,
+    gains,
+    residual_scale,
+)
 from robojackson.rl.sim.reference_clip import ClipStep
 from robojackson.rl.sim.robot_batch import SIZE, Batch, Views, centre_of_mass
 from robojackson.rl.sim.variation import varied_models
@@ -37,9 +44,10 @@ BAD_STATE = [
 """Warnings at which MuJoCo resets a state by itself."""
 
 
-def with_substeps(control: ControlConfig, robot: Robot) -> ControlConfig:
-    """The law of control with the robot's substeps where it names none."""
-    return control if control.substeps else replace(control, substeps=robot.substeps)
+def resolved(control: ControlConfig, robot: Robot) -> ControlConfig:
+    """The law of control with the robot's substeps and feed-forward where it names none."""
+    share = feedforward_share(robot, control)
+    return replace(control, substeps=control.substeps or robot.substeps, feedforward=share)
 
 
 def control_step(robot: Robot, control: ControlConfig) -> float:
@@ -60,12 +68,25 @@ def require_same_clock(simulation_dt: float, reference_dt: float) -> None:
         )
 
 
+def without_sensors(model: mujoco.MjModel) -> mujoco.MjModel:
+    """Return the model with its sensors off: `mj_step` moves it the same, to the bit, and faster.
+
+    An accelerometer alone needs the accelerations and forces of all bodies in every substep.
+    """
+    if not model.nsensor:
+        return model
+    quick = copy.copy(model)
+    quick.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
+    return quick
+
+
 class Simulation:
     """N copies of a robot.
 
     Attributes:
         control: The law of control.
         residual: Radians that a full action moves each motor's target.
+        actuation: Nominal gains and action scale, as a policy's file keeps them.
         qpos, qvel: State of every copy after the last `step` or `place`.
         previous: Targets of the control step before.
         count, push_at: What the disturbances count by (`Disturbances`).
@@ -86,7 +107,7 @@ class Simulation:
         seed: int = 0,
         delay_s: float = 0.0,
     ) -> None:
-        model, control = robot.model, with_substeps(control, robot)
+        model, control = without_sensors(robot.model), resolved(control, robot)
         self.model, self.n, self._sites, self.control = model, n, robot.keypoint_sites, control
         self.motors = Motors.of(model)
         self.kp, self.kd = gains(robot, control)
@@ -95,7 +116,7 @@ class Simulation:
         self.dt = control_step(robot, control)
         if random != RandomConfig():
             rng = np.random.default_rng(seed)
-            self._models = varied_models(robot, random, n, rng)
+            self._models = varied_models(replace(robot, model=model), random, n, rng)
             factor = 1 + random.gains * rng.uniform(-1, 1, (n, 1))
             self.kp, self.kd = self.kp * factor, self.kd * factor
             longest = min(round(random.delay / model.opt.timestep), control.substeps or 1)
@@ -108,6 +129,7 @@ class Simulation:
         self.datas = [mujoco.MjData(own) for own in self._models]
         self._views = Views.of(self.datas)
         self.residual = residual_scale(robot, control)
+        self.actuation = actuation_facts(robot, control)
         bounds = np.linspace(0, n, min(threads, n) + 1).astype(int)
         self.chunks = [self._batches(lo, hi) for lo, hi in pairwise(bounds)]
         self._pool = ThreadPoolExecutor(len(self.chunks)) if len(self.chunks) > 1 else None

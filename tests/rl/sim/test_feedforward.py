@@ -1,5 +1,7 @@
 """Feed-forward: the PD law gives the torque that the reference asks for."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,8 +13,9 @@ from robojackson.rl.evaluation.rollouts import Driver, Starts, roll_out
 from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.motors import Motors, gains
 from robojackson.rl.sim.reference_clip import Clip
+from robojackson.rl.sim.simulation import resolved
 from robojackson.robot.fall import Fall
-from robojackson.robot.model import Robot
+from robojackson.robot.model import Robot, load_robot
 
 AHEAD = ControlConfig(feedforward=1.0)
 
@@ -54,3 +57,13 @@ def test_a_replay_keeps_closer_to_the_reference(
         done = roll_out(robot, clip, replay, starts, np.full(1, 30), 1, Fall.of(robot))
         errors.append(np.abs(done.qpos[..., 7:] - done.target_qpos[..., 7:]).mean())
     assert errors[1] < 0.7 * errors[0]
+
+
+def test_a_robot_names_its_own_share(robot: Robot, sway: ReferenceMotion) -> None:
+    leading = load_robot(replace(robot.description, feedforward=0.5))
+    half, whole = (lead_of(leading, sway, control) for control in (ControlConfig(), AHEAD))
+    assert half is not None
+    assert whole is not None
+    np.testing.assert_allclose(half, 0.5 * whole)
+    assert lead_of(leading, sway, ControlConfig(feedforward=0.0)) is None
+    assert resolved(ControlConfig(), leading).feedforward == 0.5

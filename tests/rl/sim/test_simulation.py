@@ -1,12 +1,21 @@
+from dataclasses import replace
+from pathlib import Path
+
 import gymnasium
 import mujoco
 import numpy as np
 
 from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.rl.config.train_config import ControlConfig, RandomConfig
 from robojackson.rl.sim.motors import Motors, residual_scale
+from robojackson.rl.sim.robot_batch import Batch
 from robojackson.rl.sim.simulation import Simulation
-from robojackson.robot.model import Robot
+from robojackson.robot.model import Robot, load_robot
+from tests.fixtures.own_robot import own_robot
+
+SENSORS = """<sensor><framelinacc objtype="body" objname="torso"/>
+<subtreeangmom body="torso"/></sensor></mujoco>"""
 
 
 def placed(robot: Robot, sway: ReferenceMotion, n: int, threads: int) -> Simulation:
@@ -41,6 +50,37 @@ def test_the_model_is_the_stock_one_in_every_number_that_moves_it(robot: Robot) 
         np.testing.assert_array_equal(getattr(robot.model, field), getattr(stock, field), field)
     assert robot.model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
     assert robot.model.opt.timestep == stock.opt.timestep == 0.003
+
+
+def test_sensors_of_a_model_are_not_computed_and_move_nothing(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    file = own_robot(tmp_path)
+    model = tmp_path / "model.xml"
+    model.write_text(model.read_text().replace("</mujoco>", SENSORS))
+    sensing = load_robot(describe_robot(str(file)))
+    sims = [placed(each, sway, 2, 1) for each in (robot, sensing)]
+    for sim in sims:
+        for step in range(5):
+            sim.step(np.repeat(sway.qpos[step : step + 1, 7:][:, sim.motors.hinge], 2, 0))
+    np.testing.assert_array_equal(sims[0].qpos, sims[1].qpos)
+    np.testing.assert_array_equal(sims[0].qvel, sims[1].qvel)
+    assert sensing.model.nsensor
+    assert not sims[1].datas[0].sensordata.any()
+    assert not sensing.model.opt.disableflags
+
+
+def test_motors_in_the_order_of_the_hinges_follow_the_pd_law(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    sim, rng = placed(robot, sway, 2, 1), np.random.default_rng(3)
+    motors = replace(sim.motors, hinge=np.arange(17))
+    batch = Batch([sim.model] * 2, sim.datas, motors, sim.control, sim.kp, sim.kd)
+    targets = sway.qpos[5:7, 7:] + rng.normal(0, 0.1, (2, 17))
+    torque = (targets - sim.qpos[:, 7:]) * sim.kp - sim.qvel[:, 6:] * sim.kd
+    told = np.clip(torque, -motors.limit, motors.limit) / motors.gear
+    for _ in range(2):  # the memory that a call leaves is not read by the next
+        np.testing.assert_array_equal(batch.controls(targets), told)
 
 
 def test_threads_do_not_change_the_result(robot: Robot, sway: ReferenceMotion) -> None:

@@ -1,6 +1,6 @@
 """What learning costs and what comes out of it (`make bench-learning`).
 
-    python -m benchmarks.learning.suite PART ... [--folder FOLDER]
+    python -m benchmarks.learning.learning_suite PART ... [--folder FOLDER]
 
 `speed`, `threads`: our parts beside their peers (`speed`). `policies`: one row a move
 and a seed, trained for the row's CPU minutes and judged on stock physics (`policies`).
@@ -46,7 +46,7 @@ def main() -> None:
     given = _arguments()
     folders = Folders.at(given.folder)
     wanted = given.what or list(PARTS)
-    command = f"python -m benchmarks.learning.suite {' '.join(sys.argv[1:])}".strip()
+    command = f"python -m benchmarks.learning.learning_suite {' '.join(sys.argv[1:])}".strip()
     speed = folders.results / "learning_speed.json"
     if "threads" in wanted:
         _write(speed, [learning_speed.threads()], command)

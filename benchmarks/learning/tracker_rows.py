@@ -1,0 +1,120 @@
+"""Downloaded trackers on the frozen references, with our judge: no training at all.
+
+    python -m benchmarks.learning.tracker_rows [--moves g1_walk ...] [--folder FOLDER]
+
+A row is a tracker, a reference motion at its own tempo and a friction; what exists is not computed
+again. A tracker is measured where its file is: in the store (`robojackson trackers add`), or in the
+folder that ROBOJACKSON_TRACKERS names.
+"""
+
+import argparse
+import json
+import os
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.learning.policies import FROZEN, MOVES, Folders, require_frozen
+from robojackson.api.robots import load_robot
+from robojackson.errors import BadConfiguration, BadPolicy
+from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
+from robojackson.pipeline.tracker_descriptions import describe_tracker, tracker_names
+from robojackson.rl.config.evaluate_config import EvaluateConfig
+from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
+from robojackson.rl.sim.variation import Variation, varied
+from robojackson.rl.trackers.tracker import Tracker
+from robojackson.rl.trackers.tracker_file import open_tracker
+
+FILES = "ROBOJACKSON_TRACKERS"
+"""Variable that names a folder with the files of trackers."""
+FRICTIONS = (1.0, 0.6)
+"""Of the soles on the floor; the second is what mjlab trains with."""
+JUDGE = EvaluateConfig(resets=1)
+"""24 phases and the stand."""
+FIGURES = (
+    *("survived_s", "success", "strict_success", "skill", "site_error_m", "mpjpe_l_m"),
+    *("mpjpe_l_alive_m", "mpjpe_g_alive_m", "drift_m", "limb_gain", "acceleration_ratio"),
+)
+SHOWN = ("tracker", "move", "friction", *FIGURES, "cpu_s")
+
+
+def main() -> None:
+    """Measure every row that is not there and print all."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    frozen = sorted(path.stem for path in FROZEN.glob("*.parquet"))
+    parser.add_argument("--moves", nargs="*", default=frozen, choices=frozen)
+    parser.add_argument("--folder", type=Path, help="for everything, instead of the usual places")
+    given = parser.parse_args()
+    path = Folders.at(given.folder).results / "trackers.json"
+    held = json.loads(path.read_text())["rows"] if path.is_file() else []
+    command = f"python -m benchmarks.learning.tracker_rows {' '.join(sys.argv[1:])}".strip()
+    for row in measured(given.moves, held):
+        held.append(row)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps({"command": command, "rows": held}, indent=1) + "\n")
+    _show(held)
+
+
+def measured(moves: list[str], held: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    """Rows that are not held yet, of the trackers that are here."""
+    known = {(row["tracker"], row["move"], row["friction"], row["poses"]) for row in held}
+    for name in tracker_names():
+        tracker = present(name)
+        for move in moves if tracker is not None else ():
+            reference = FROZEN / f"{move}.parquet"
+            require_frozen(move, reference)
+            motion = ReferenceMotion.load(reference)
+            if tracker is None or MOVES[move].robot != tracker.description.robot:
+                continue
+            for friction in FRICTIONS:
+                key = (name, move, friction, poses_sha256(motion))
+                if key not in known:
+                    labels = dict(zip(("tracker", "move", "friction", "poses"), key, strict=True))
+                    yield labels | judged(tracker, motion, friction)
+
+
+def judged(tracker: Tracker, motion: ReferenceMotion, friction: float) -> dict[str, Any]:
+    """The figures of a tracker on one motion."""
+    robot = load_robot(tracker.description.robot)
+    usual = robot.description.simulation.friction
+    if usual is None:
+        raise BadConfiguration(f"robot {motion.robot!r} does not say its friction")
+    began = time.process_time()
+    found = evaluate_policy(
+        tracker, motion, varied(robot, Variation(friction=friction / usual)), JUDGE
+    )
+    figures = {name: found.summary[name] for name in FIGURES}
+    facts = {"sha256": tracker.description.file.sha256, "steps": len(motion), "dt": motion.dt}
+    starts = sum(row["policy"] == "trained" for row in found.rows)
+    return {**facts, "starts": starts, **figures, "cpu_s": time.process_time() - began}
+
+
+def present(name: str) -> Tracker | None:
+    """A tracker whose file is here; None, with a line why, where it is not."""
+    description = describe_tracker(name)
+    folder = os.environ.get(FILES)
+    file = Path(folder) / description.file.name if folder else None
+    try:
+        return open_tracker(description, file)
+    except BadPolicy as cause:
+        print(cause, file=sys.stderr)
+        return None
+
+
+def _show(rows: list[dict[str, Any]]) -> None:
+    table = Table(*SHOWN, title="Trackers, not trained on these motions")
+    for row in rows:
+        cells = [row[key] for key in SHOWN]
+        table.add_row(*(f"{c:.3g}" if isinstance(c, float) else str(c) for c in cells))
+    Console(width=200).print(table)
+
+
+if __name__ == "__main__":
+    main()
