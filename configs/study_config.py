@@ -28,6 +28,7 @@ Setup = Literal["scratch", "pretrain", "curiosity", "scratch-curiosity"]
 Executor = Literal["local", "work-pool"]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][\w.-]*$", max_length=60)]
 Seed = Annotated[int, Field(ge=0)]
+Steps = Annotated[int, Field(ge=1)]
 
 
 def _each_once(values: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -84,6 +85,7 @@ class Study:
         seeds: Seeds of the trainings; a seed is the same for all setups, so that they are paired.
         mode: `paper`: its reward, observation and torques; `track`: the method that dances.
         steps: Control steps of each training. No clock ends one: the tables are repeatable.
+        move_steps: Move -> control steps of its trainings, where they are not `steps`.
         trainer: `sbx` (JAX, fast) or `sb3` (the reference).
         robot: Name of `configs/robots/*.yaml`, or path, where the worker is, of your own YAML.
         pipeline: Name of the configuration that makes the reference motions and judges.
@@ -110,7 +112,8 @@ class Study:
     )
     seeds: Annotated[tuple[Seed, ...], Field(min_length=1), Distinct] = (0, 1, 2)
     mode: Literal["paper", "track"] = "paper"
-    steps: Annotated[int, Field(ge=1)] = 50_000
+    steps: Steps = 50_000
+    move_steps: dict[Name, Steps] = Field(default_factory=dict)
     trainer: Literal["sbx", "sb3"] = "sbx"
     robot: str = field(default="humanoid", compare=False)
     pipeline: str = "base"
@@ -120,3 +123,15 @@ class Study:
     slots: Annotated[int, Field(ge=1)] | None = field(default=None, compare=False)
     timeout_minutes: Annotated[float, Field(gt=0)] = field(default=240.0, compare=False)
     retries: Annotated[int, Field(ge=0)] = field(default=2, compare=False)
+
+    @property
+    def steps_label(self) -> str:
+        """Return the control steps of each training as text, move by move where they differ."""
+        by_move = {move: self.steps_of(move) for move in self.moves}
+        if len(set(by_move.values())) == 1:
+            return f"{by_move[self.moves[0]]:,}"
+        return ", ".join(f"{move} {steps:,}" for move, steps in by_move.items())
+
+    def steps_of(self, move: str) -> int:
+        """Return the control steps of each training on a move."""
+        return self.move_steps.get(move, self.steps)

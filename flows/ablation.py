@@ -22,7 +22,7 @@ from flows.runtime.launch import launch
 from flows.runtime.run_artifacts import show_study
 from flows.runtime.tracebacks import without_tracebacks
 from flows.study.progress_table import ProgressTable
-from flows.study.study_plan import training
+from flows.study.study_plan import trainings_of
 from flows.video_pass.motion_stages import to_reference
 from robojackson.errors import RejectedReference, StudyFailed
 from robojackson.pipeline.pipeline_config import PipelineConfig
@@ -65,13 +65,14 @@ async def ablation(study: Study) -> Facts:
         study: What is compared with what.
     Raises:
         UnknownName, BadConfiguration: a move or setup does not exist; no cell was started.
+        BadPolicy: a setup starts from a walker and the robot has none; no cell was started.
         RejectedReference: the gate refuses motions; no cell was started.
         StudyFailed: cells failed; the message names each.
     """
     without_tracebacks()
     sweep(Store.from_environment())
     moves = {name: load(Move, f"moves/{name}") for name in study.moves}
-    trainings: dict[str, TrainConfig] = {s: training(study, s) for s in study.setups}
+    trainings = trainings_of(study, describe_robot(study.robot))
     with SyncClientContext.get_or_create():  # one connection for all stages of all motions
         motions = {name: motion(name, move, study, trainings) for name, move in moves.items()}
     cells = cells_of(study, {n: made["reference"] for n, made in motions.items()}, trainings)
@@ -158,7 +159,7 @@ def cells_of(
             seed=seed,
             reference=references[name],
             robot=study.robot,
-            train=replace(trainings[setup], seed=seed),
+            train=replace(trainings[setup], seed=seed, steps=study.steps_of(name)),
             evaluate=evaluate,
             timeout_minutes=study.timeout_minutes,
             retries=study.retries,

@@ -57,12 +57,12 @@ async def cell(cell: Cell) -> Result:
             deadline,
         )
         policy = trained["policy"]
-        judged = await with_retries(
+        evaluated = await with_retries(
             lambda s: evaluate_policy(policy, cell.reference, robot, cell.evaluate, limit_s=s),
             cell,
             deadline,
         )
-    made = publish(cell, _run_id(cell), {**trained, **judged})
+    made = publish(cell, _run_id(cell), {**trained, **evaluated})
     sweep(store, parts=False)
     return made
 
@@ -99,16 +99,16 @@ def _robot(name: str) -> RobotDescription:
     return describe_robot(name)
 
 
-async def run_locally(wanted: Cell) -> Result:
+async def run_locally(requested: Cell) -> Result:
     """The cell as a subflow of the flow that calls.
 
     Raises:
         Exception: whatever the cell failed of.
     """
-    return await cell(wanted)
+    return await cell(requested)
 
 
-async def run_on_worker(wanted: Cell) -> Result:
+async def run_on_worker(requested: Cell) -> Result:
     """The cell as a run that a worker of the pool takes; another one, if the worker dies with it.
 
     One that was done before is read here: a worker would take seconds to start for nothing.
@@ -120,14 +120,14 @@ async def run_on_worker(wanted: Cell) -> Result:
         TrainingCrashed: it did not end well; a failed child does not raise by itself.
         StoreError: it ended well and left nothing in this store; the message names why.
     """
-    if await asyncio.to_thread(is_recorded, wanted):
-        return await run_locally(wanted)
-    left_s = 60 * wanted.timeout_minutes
-    for _ in range(1 + wanted.retries):
-        given = replace(wanted, timeout_minutes=left_s / 60)
+    if await asyncio.to_thread(is_recorded, requested):
+        return await run_locally(requested)
+    left_s = 60 * requested.timeout_minutes
+    for _ in range(1 + requested.retries):
+        given = replace(requested, timeout_minutes=left_s / 60)
         plain = TypeAdapter(Cell).dump_python(given, mode="json")
         begun = await arun_deployment(
-            DEPLOYMENT, parameters={"cell": plain}, flow_run_name=wanted.name, timeout=0
+            DEPLOYMENT, parameters={"cell": plain}, flow_run_name=requested.name, timeout=0
         )
         run = await WATCHER.of(begun)
         left_s -= run.total_run_time.total_seconds()
@@ -135,22 +135,22 @@ async def run_on_worker(wanted: Cell) -> Result:
             break
     if run.state is None or not run.state.is_completed():
         said = "has no state" if run.state is None else f"{run.state.name}: {run.state.message}"
-        raise TrainingCrashed(f"{wanted.name} on a worker: {said}")
-    return await asyncio.to_thread(published, wanted, _run_id(wanted))
+        raise TrainingCrashed(f"{requested.name} on a worker: {said}")
+    return await asyncio.to_thread(published, requested, _run_id(requested))
 
 
-def is_recorded(wanted: Cell) -> bool:
+def is_recorded(requested: Cell) -> bool:
     """Return whether everything that takes time was done before and is still in the store."""
-    given = (wanted.reference, _robot(wanted.robot))
-    trained = train_policy.recorded(*given, wanted.train)
+    given = (requested.reference, _robot(requested.robot))
+    trained = train_policy.recorded(*given, requested.train)
     if trained is None:
         return False
-    return evaluate_policy.recorded(trained["policy"], *given, wanted.evaluate) is not None
+    return evaluate_policy.recorded(trained["policy"], *given, requested.evaluate) is not None
 
 
-def _run_id(wanted: Cell) -> str:
-    labels = RunLabels(wanted.move, wanted.setup)
-    return run_id_of(wanted.reference, _robot(wanted.robot), wanted.train, labels)
+def _run_id(requested: Cell) -> str:
+    labels = RunLabels(requested.move, requested.setup)
+    return run_id_of(requested.reference, _robot(requested.robot), requested.train, labels)
 
 
 EXECUTORS: dict[str, Any] = {"local": run_locally, "work-pool": run_on_worker}

@@ -53,6 +53,7 @@ async def dance(
     minutes: Minutes | None = None,
     search: Search = Search(),  # noqa: B008 (frozen)
     robot: str | None = None,
+    instant: bool = False,
 ) -> dict[str, Any]:
     """From the name of a dance, or a video of it, to a robot that dances it.
 
@@ -65,10 +66,12 @@ async def dance(
         minutes: Budget of the whole pass; that of the configuration if absent.
         search: How a dance is looked for that is given by its name.
         robot: Name of one of configs/robots; or path, where the worker is, of the YAML of your own.
+        instant: Whether a tracker (`robojackson trackers`) dances at once and nothing is trained.
     """
     store = Store.from_environment()
     sweep(store, work=False)
     given: dict[str, Any] = {"minutes": minutes, "robot": yaml_text(robot)}
+    given["instant"] = instant or None
     given = {**(overrides or {}), **{k: v for k, v in given.items() if v is not None}}
     settings = load(PipelineConfig, config, given)
     async with videos_of(source, search) as paths:

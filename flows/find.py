@@ -54,14 +54,14 @@ async def find(
     return summarise(found)
 
 
-def run(wanted: Dance, config: str, overrides: Mapping[str, Any]) -> dict[str, Any]:
+def run(requested: Dance, config: str, overrides: Mapping[str, Any]) -> dict[str, Any]:
     """The flow from the command line.
 
     Raises:
         SearchFailed: the source does not answer.
         DeploymentFailed: the Prefect server that is named does not answer, or refuses us.
     """
-    return launch(find, wanted.name, asdict(wanted), config, dict(overrides))
+    return launch(find, requested.name, asdict(requested), config, dict(overrides))
 
 
 @flow(name="best", flow_run_name="best-{name}", task_runner=HUNTERS)  # type: ignore[arg-type]
@@ -73,17 +73,17 @@ async def best(
 ) -> dict[str, str]:
     """Search, and bring the chosen video in good quality: its artifact."""
     settings = load(FindConfig, config, overrides)
-    wanted = build(Dance, dance, "dance")
+    requested = build(Dance, dance, "dance")
     store = Store.from_environment()
     try:
-        found = search_and_rank(wanted, settings, run_id("dance"))
+        found = search_and_rank(requested, settings, run_id("dance"))
     except SearchFailed:
-        reigning = candidate_catalogue.champion(store, wanted.name)
+        reigning = candidate_catalogue.champion(store, requested.name)
         if reigning is None:
             raise
         return {"key": reigning["video_key"], "sha256": reigning["video_sha256"]}
     told = rows(found)
-    await publish_search(wanted.name, told, told[0] if found.chosen else None)
+    await publish_search(requested.name, told, told[0] if found.chosen else None)
     if found.chosen is None:
         raise NoPersonFound(nothing(found))
     return asdict(in_good_quality(found.chosen, settings))

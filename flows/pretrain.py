@@ -5,9 +5,10 @@ import json
 import os
 import shutil
 import sys
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from prefect import flow
+from pydantic import Field
 
 from robojackson.cli.walker_training import PIPELINE, ROBOT
 from robojackson.pipeline.folder_lock import A_MOMENT, locked
@@ -15,6 +16,8 @@ from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.pipeline.yaml_loader import load
 from robojackson.rl.config.train_config import TrainConfig
+from robojackson.rl.walkers import is_shipped, walker_key
+from robojackson.robot.description import RobotDescription
 from storage.store import Store
 from tasks.runtime.child_process import run_process
 from tasks.runtime.stage import identity
@@ -23,19 +26,32 @@ DIGITS = 12
 """Of the digest in the name of a folder of work."""
 
 
-@flow(name="pretrain", flow_run_name="walker-{kind}-s{seed}")
+@flow(name="pretrain", flow_run_name="walker-{kind}-{robot}-s{seed}")
 async def pretrain(
-    kind: Literal["track", "paper"] = "track", steps: int = 400_000, seed: int = 0
+    kind: Literal["track", "paper"] = "track",
+    steps: Annotated[int, Field(ge=1)] = 400_000,
+    seed: Annotated[int, Field(ge=0)] = 0,
+    robot: str = ROBOT,
 ) -> str:
-    """A walker of a kind; the same call goes on from the last checkpoint.
+    """Train a walker of a kind; the same call resumes from the last checkpoint.
 
+    Args:
+        kind: The mode whose trainings start from it.
+        steps: Control steps in all.
+        seed: Of the training.
+        robot: Name of `configs/robots/*.yaml`, or path, where the worker is, of your own YAML; for
+            `paper` only Humanoid-v5. A walker of a robot for which none ships is what trainings of
+            that robot start from with `start: walker`.
     Returns:
         The key of its networks in the store.
     Raises:
         StoreError: the same walker is being trained already.
+        UnknownName, BadConfiguration: no such robot, or its model is not here.
     """
     store = Store.from_environment()
-    name = name_of(kind, steps, seed)
+    description = describe_robot(robot)
+    shipped = is_shipped(description, kind)
+    name = name_of(kind, steps, seed, description)
     work = store.work(name)
     command = [
         sys.executable,
@@ -48,20 +64,23 @@ async def pretrain(
         str(work),
     ]
     options: dict[str, Any] = {"--steps": steps, "--seed": seed, "--parent": os.getpid()}
+    if robot != ROBOT:
+        options["--robot"] = description.file or robot
     words = [str(word) for pair in options.items() for word in pair]
     with locked(work, "task.lock", A_MOMENT):
         await run_process([*command, *words, "--json"], name, work)
         made = f"walker_{kind}.safetensors"
         store.save("pretrain", "walker.json", work / "walker.json")
         key = store.save("pretrain", made, work / made).key
+        if not shipped:
+            key = store.put(walker_key(description, kind), work / made).key
         shutil.rmtree(work, ignore_errors=True)
     return key
 
 
-def name_of(kind: str, steps: int, seed: int) -> str:
-    """What a walker's folder of work is called: all that makes its training what it is."""
+def name_of(kind: str, steps: int, seed: int, robot: RobotDescription) -> str:
+    """Return the name of a walker's folder of work: all that makes its training what it is."""
     config = load(TrainConfig, f"setups/walker-{kind}", {"steps": steps, "seed": seed})
-    robot = describe_robot(ROBOT)
     facts = json.dumps(identity([config, robot, load(PipelineConfig, PIPELINE)]), sort_keys=True)
     digest = hashlib.sha256(facts.encode()).hexdigest()[:DIGITS]
     return f"walker-{kind}-{steps}-s{seed}-{digest}"

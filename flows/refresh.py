@@ -44,7 +44,7 @@ from tasks.probe_video import SourceFile, probe_video
 KIND = "refresh"
 """Beginning of the ids of its runs in the catalogue."""
 FOLDER = "refresh"
-TOLD_OF_CHOSEN = ("video_id", "url", "title", "score_per_second", "stability_score")
+CHOSEN_COLUMNS = ("video_id", "url", "title", "score_per_second", "stability_score")
 SLACK = 0.1
 """Share of the days between two searches that a nightly run may come early."""
 Facts = dict[str, Any]

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from robojackson.api.motions import write_motion as write_motion
     from robojackson.api.policy_training import train_policy as train_policy
     from robojackson.api.robots import load_robot as load_robot
+    from robojackson.api.trackers import load_tracker as load_tracker
     from robojackson.api.trained_policy import TrainedPolicy as TrainedPolicy
     from robojackson.api.videos import detect_landmarks as detect_landmarks
     from robojackson.api.videos import probe_video as probe_video
@@ -45,6 +46,7 @@ _MODULES = {
     "api.motions": ("read_motion", "recover_motion", "retarget_motion", "write_motion"),
     "api.robots": ("load_robot",),
     "api.policy_training": ("train_policy",),
+    "api.trackers": ("load_tracker",),
     "api.trained_policy": ("TrainedPolicy",),
     "api.videos": ("detect_landmarks", "probe_video"),
     "clips.video": ("VideoInfo",),

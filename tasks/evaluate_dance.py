@@ -1,12 +1,14 @@
-"""The verdict on a policy, on stock physics, beside its baselines."""
+"""The verdict on a policy, or on a tracker that was not trained on this dance."""
 
 import json
+from dataclasses import replace
 
 from robojackson.files import tables
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.rollout import Rollout
 from robojackson.pipeline.table_schemas import EVALUATION_RECORD
 from robojackson.rl.config.train_config import EvaluateConfig
+from robojackson.rl.trackers.tracker_description import TrackerDescription
 from robojackson.robot.model import RobotDescription, load_robot
 from storage import artifact_tables
 from storage.artifact import Artifact
@@ -14,6 +16,9 @@ from storage.store import Store
 from tasks.runtime.robot_digests import robot_models
 from tasks.runtime.stage import stage
 from tasks.train_policy import RunLabels
+
+FEW_PHASES = 8
+"""Start phases of a first look; with the stand nine starts."""
 
 
 @stage(models=robot_models, unkeyed=("labels",))
@@ -43,3 +48,39 @@ def evaluate_dance(
         "evaluation": store.save("evaluate", "evaluation.json", summary),
         "rollout": artifact_tables.save(store, "evaluate", "rollout.parquet", rollout),
     }
+
+
+@stage(models=robot_models, unkeyed=("labels",))
+def evaluate_tracker(
+    tracker: TrackerDescription,
+    reference: Artifact,
+    robot: RobotDescription,
+    config: EvaluateConfig,
+    labels: RunLabels,
+) -> dict[str, Artifact]:
+    """`evaluations`: EvaluationRecord; `evaluation`: means, as JSON; `rollout`: Rollout.
+
+    Raises:
+        BadPolicy: the tracker's file is not here, or it is for another robot.
+    """
+    from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
+    from robojackson.rl.trackers.tracker_file import open_tracker
+
+    store = Store.from_environment()
+    motion = artifact_tables.read(ReferenceMotion, store, reference)
+    verdict = evaluate_policy(open_tracker(tracker), motion, load_robot(robot), config)
+    names = {"run_id": f"{labels.move}-{tracker.name}", "move": labels.move}
+    common = {**names, "setup": tracker.name, "seed": 0, "step": None}
+    rows = tables.encode_rows(EVALUATION_RECORD, [{**common, **r} for r in verdict.rows])
+    summary = json.dumps(verdict.summary, indent=1).encode()
+    rollout = Rollout(motion.dt, verdict.rollout_qpos)
+    return {
+        "evaluations": store.save("track", "tracker_evaluations.parquet", rows),
+        "evaluation": store.save("track", "tracker_evaluation.json", summary),
+        "rollout": artifact_tables.save(store, "track", "tracker_rollout.parquet", rollout),
+    }
+
+
+def first_look(config: EvaluateConfig) -> EvaluateConfig:
+    """Return the same evaluation from a few starts."""
+    return replace(config, phases=min(FEW_PHASES, config.phases), resets=1, passport=False)

@@ -43,10 +43,10 @@ def recover_motion_by_networks(
 def _teller() -> Callable[[int, int], None]:
     told = 0
 
-    def tell(done: int, total: int) -> None:
+    def report(done: int, total: int) -> None:
         nonlocal told
         if done * REPORTS // total > told:
             told = done * REPORTS // total
             log.info("networks: %d of %d frames", done, total)
 
-    return tell
+    return report

@@ -4,7 +4,7 @@ from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.rollout import Rollout
 from robojackson.motion.smpl_sequence import SmplSequence
-from robojackson.report.video.side_by_side import VideoConfig, side_by_side
+from robojackson.report.video.side_by_side import TRAINED_TITLE, VideoConfig, side_by_side
 from robojackson.robot.model import RobotDescription, load_robot
 from storage import artifact_tables
 from storage.artifact import Artifact
@@ -22,8 +22,15 @@ def render_video(
     rollout: Artifact,
     robot: RobotDescription,
     config: VideoConfig,
+    title: str = TRAINED_TITLE,
+    name: str = "dance.mp4",
 ) -> Artifact:
-    """An mp4."""
+    """An mp4.
+
+    Args:
+        title: Over the panel of the rollout.
+        name: Of the file.
+    """
     store = Store.from_environment()
     with store.local(source) as path, store.scratch() as folder:
         film = side_by_side(
@@ -32,8 +39,9 @@ def render_video(
             artifact_tables.read(SmplSequence, store, sequence),
             artifact_tables.read(ReferenceMotion, store, reference),
             artifact_tables.read(Rollout, store, rollout).qpos,
-            folder / "dance.mp4",
+            folder / name,
             model=load_robot(robot).model,
             config=config,
+            title=title,
         )
         return store.save("dance", film.name, film)

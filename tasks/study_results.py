@@ -24,9 +24,9 @@ Figures = dict[str, dict[Key, dict[int, float]]]
 Baselines = dict[str, dict[str, dict[str, float]]]
 
 
-def grid_of(study: Study) -> np.ndarray:
-    """Ends of the intervals of the learning curves, control steps."""
-    return np.linspace(0, study.steps, INTERVALS + 1)
+def grids_of(study: Study) -> dict[str, np.ndarray]:
+    """By move: ends of the intervals of its learning curves, control steps."""
+    return {move: np.linspace(0, study.steps_of(move), INTERVALS + 1) for move in study.moves}
 
 
 def learning(ask: RunQuery, study: Study) -> dict[Key, dict[int, dict[str, np.ndarray]]]:
@@ -35,12 +35,16 @@ def learning(ask: RunQuery, study: Study) -> dict[Key, dict[int, dict[str, np.nd
         "SELECT move, setup, seed, step, episode_return, episode_length FROM episodes "
         "WHERE study = $study ORDER BY step"
     )
-    grid = grid_of(study)
+    grids = grids_of(study)
     found: dict[Key, dict[int, dict[str, np.ndarray]]] = {}
     for (move, setup, seed), rows in _grouped(ask(sql, {"study": study.name})):
+        if move not in grids:
+            continue
         steps = np.array([row["step"] for row in rows], float)
         found.setdefault((move, setup), {})[seed] = {
-            name: learning_curve.curve(steps, np.array([row[name] for row in rows], float), grid)
+            name: learning_curve.curve(
+                steps, np.array([row[name] for row in rows], float), grids[move]
+            )
             for name in ("episode_return", "episode_length")
         }
     return found
@@ -48,7 +52,7 @@ def learning(ask: RunQuery, study: Study) -> dict[Key, dict[int, dict[str, np.nd
 
 def of_learning(curves: Mapping[Key, Seeds], study: Study) -> Figures:
     """Final return, area under the curve, and steps to the threshold, of every seed."""
-    grid = grid_of(study)
+    grids = grids_of(study)
     last = max(1, round(LAST * INTERVALS))
     goal = {move: _goal(curves, move) for move in study.moves}
     return {
@@ -56,7 +60,9 @@ def of_learning(curves: Mapping[Key, Seeds], study: Study) -> Figures:
         "area": _each(curves, lambda key, seed: learning_curve.area(seed["episode_return"])),
         "steps_to": _each(
             curves,
-            lambda key, seed: learning_curve.steps_to(grid, seed["episode_length"], goal[key[0]]),
+            lambda key, seed: learning_curve.steps_to(
+                grids[key[0]], seed["episode_length"], goal[key[0]]
+            ),
         ),
     }
 
@@ -102,18 +108,20 @@ def too_short_moves(ask: RunQuery, study: Study, baselines: Baselines) -> list[s
     ]
 
 
-def judged(figures: Figures, unjudged: Collection[str]) -> Figures:
+def without_unassessed(figures: Figures, unassessed: Collection[str]) -> Figures:
     """The figures without the success and skill of moves that are too short to judge."""
     return {
         name: {
-            k: v for k, v in by_key.items() if name not in verdict.UNJUDGED or k[0] not in unjudged
+            k: v
+            for k, v in by_key.items()
+            if name not in verdict.UNJUDGED or k[0] not in unassessed
         }
         for name, by_key in figures.items()
     }
 
 
 def _means(ask: RunQuery) -> str:
-    """SQL of the means of the judged figures; one that no table has is null."""
+    """SQL of the means of the evaluated figures; one that no table has is null."""
     known = [row["column_name"] for row in ask("DESCRIBE evaluations")]
     gains = [name for name in known if name.startswith("limb_gain_")]
     terms = {name: f"avg({name})" for name in EVALUATED if name in known}

@@ -21,7 +21,6 @@ from robojackson.files.json_types import to_json_types
 from robojackson.files.local_folder import sha256_of_file
 from robojackson.pipeline.folder_lock import A_MOMENT, locked
 from robojackson.rl.config.train_config import TrainConfig
-from robojackson.rl.pretrained import start_file
 from robojackson.robot.model import RobotDescription
 from storage.artifact import Artifact
 from storage.store import Store
@@ -30,6 +29,7 @@ from tasks.runtime.code_digest import digest
 from tasks.runtime.robot_digests import robot_file
 from tasks.runtime.run_logger import run_logger
 from tasks.runtime.stage import identity, stage
+from tasks.runtime.start_networks import local_start_file
 from tasks.runtime.training_progress import show_progress
 
 CODE = ("robojackson.rl.training",)
@@ -74,7 +74,7 @@ def _models(parameters: Mapping[str, Any]) -> list[str]:
     """Of the networks to start from. The minutes in the key are those that were asked for, not
     those that the clock left: the same call again does not train again.
     """
-    return _start(parameters["config"])
+    return _start(parameters["config"], parameters["robot"])
 
 
 @stage(models=_models, reaches=CODE, unkeyed=("labels", "time_left", "limit_s"))
@@ -122,15 +122,15 @@ def run_id_of(
     """Names and a digest of all that makes the training what it is, its code too; no clock, no
     machine.
     """
-    parts = [identity([reference, robot, config]), _start(config), digest(CODE)]
+    parts = [identity([reference, robot, config]), _start(config, robot), digest(CODE)]
     facts = json.dumps(parts, sort_keys=True)
     short = hashlib.sha256(facts.encode()).hexdigest()[:DIGITS]
     return f"{labels.move}-{labels.setup}-s{config.seed}-{short}"
 
 
-def _start(config: TrainConfig) -> list[str]:
+def _start(config: TrainConfig, robot: RobotDescription) -> list[str]:
     """The digest of the networks that it starts from, if it does."""
-    path = start_file(config.start, config.mode)
+    path = local_start_file(Store.from_environment(), config, robot)
     return [] if path is None else [sha256_of_file(path)]
 
 

@@ -15,6 +15,7 @@ from configs.study_config import Move, Study
 from robojackson.errors import RoboJacksonError
 from robojackson.files.json_types import to_json_types
 from robojackson.metrics import ablation_statistics
+from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.report.pages import study_page, study_table
 from robojackson.report.pages.run_page import Plot
 from robojackson.report.pages.study_figures import curve_plots, evaluation_plots
@@ -27,13 +28,13 @@ from tasks.runtime.code_digest import digest, template_digests
 from tasks.runtime.stage import stage
 from tasks.study_results import (
     EVALUATED,
-    grid_of,
-    judged,
+    grids_of,
     learning,
     of_baselines,
     of_evaluations,
     of_learning,
     too_short_moves,
+    without_unassessed,
 )
 
 FOLDER = "studies"
@@ -90,7 +91,7 @@ def report(
         baselines, facts = of_baselines(ask, study), _facts(ask, study)
         short = too_short_moves(ask, study, baselines)
         notes = [*_meaningless(study), *_too_short(short), *_few(study), *_starts(ask, study)]
-    figures = judged(figures, short)
+    figures = without_unassessed(figures, short)
     for move in short:
         baselines[move] = {
             policy: {name: value for name, value in found.items() if name not in UNJUDGED}
@@ -109,7 +110,7 @@ def report(
         comparisons=compared,
         reward_audits=reward_audits or {},
         moves=[_picture(name, moves[name], png) for name, png in (pictures or {}).items()],
-        curves=curve_plots(curves, grid_of(study), study.moves, study.setups),
+        curves=curve_plots(curves, grids_of(study), study.moves, study.setups),
         evaluation_plots=evaluation_plots(evaluated, baselines, study.moves, study.setups),
         notes=notes,
     )
@@ -128,20 +129,21 @@ def _facts(ask: study_tables.RunQuery, study: Study) -> dict[str, Any]:
     sql = "SELECT DISTINCT git_commit FROM runs WHERE study = $study"
     commits = [row["git_commit"] or "?" for row in ask(sql, {"study": study.name})]
     return {
+        "robot": describe_robot(study.robot).name,
         "mode": study.mode,
         "trainer": study.trainer,
-        "steps": f"{study.steps:,}",
+        "steps": study.steps_label,
         "seeds": ", ".join(map(str, study.seeds)),
         "code": ", ".join(sorted(commit[:10] for commit in commits)),
     }
 
 
 def _meaningless(study: Study) -> list[str]:
-    if study.steps >= LEAST_STEPS:
+    if min(map(study.steps_of, study.moves)) >= LEAST_STEPS:
         return []
     return [
-        f"Trainings of {study.steps:,} control steps: this study shows that every part runs; its "
-        "numbers mean nothing."
+        f"Trainings of {study.steps_label} control steps: this study shows that every part runs; "
+        "its numbers mean nothing."
     ]
 
 
@@ -181,7 +183,7 @@ def _starts(ask: study_tables.RunQuery, study: Study) -> list[str]:
 
 def _steps_of(start: str, study: Study) -> str:
     try:
-        networks = pretrained(start, study.mode)
+        networks = pretrained(start, study.mode, describe_robot(study.robot))
     except RoboJacksonError:
         networks = None
     steps = networks.facts.get("steps") if networks else None

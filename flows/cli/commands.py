@@ -4,6 +4,7 @@ Like `robojackson.cli.app`, each imports what it needs inside itself.
 """
 
 import shlex
+import sys
 from typing import Annotated, Any
 
 import typer
@@ -31,6 +32,9 @@ from robojackson.cli.options import (
 
 LONGER_MINUTES = 15
 """Least that a pass is advised to take whose robot does not dance."""
+INSTANT_MINUTES = 1.0
+"""About what an instant dance takes, for its bar."""
+INSTANT = "--instant"
 LONG_ENOUGH_S = 10.0
 """Rollouts that are advised where the settings' are too short to judge, seconds."""
 
@@ -51,6 +55,9 @@ def dance(
     end: Annotated[float | None, typer.Option(min=0, help="Trim: end here, seconds.")] = None,
     config: Config = "base",
     force: Force = False,
+    instant: Annotated[
+        bool, typer.Option(INSTANT, help="A general tracker dances at once; no training.")
+    ] = False,
     set_: Set = None,
     as_json: Json = False,
 ) -> CommandResult:
@@ -66,6 +73,7 @@ def dance(
         "robot": yaml_text(robot),
         "train.trainer": trainer,
         "train.seed": seed,
+        "instant": instant or None,
     }
     overrides = overrides_from(set_, given | {"dancer.number": person, "detector": quality})
     if force:
@@ -87,7 +95,8 @@ def dance(
         quiet_prefect()
         from flows.dance import run
 
-        with dance_bar(settings.minutes, Store.from_environment().here):
+        minutes = INSTANT_MINUTES if settings.instant else settings.minutes
+        with dance_bar(minutes, Store.from_environment().here):
             made = run(str(found or source), config, overrides, start, end)
     return _concluded(made, settings.minutes, settings.evaluate.seconds)
 
@@ -115,6 +124,10 @@ def _next(kind: str, page: str, minutes: float, seconds: float) -> str:
         from robojackson.cli.lifetime.interruption import python
 
         return shlex.join([python(), "-m", "webbrowser", page])
+    if kind != "too_short" and INSTANT in sys.argv:
+        from robojackson.cli.lifetime.interruption import program
+
+        return shlex.join([program(), *(word for word in sys.argv[1:] if word != INSTANT)])
     if kind == "too_short":
         from robojackson.cli.lifetime.interruption import same_command
         from robojackson.rl.evaluation.verdict import SHORTEST_S

@@ -24,7 +24,7 @@ HANDLERS = ("CONSOLE", "CONSOLE_FLOW_RUNS", "CONSOLE_TASK_RUNS")
 REFRESH_S = 0.5
 TRAININGS = "work/train-*/progress.json"
 """What trainings leave of how far they are, in a store on this machine."""
-TASK_LOG = "prefect.task_runs"
+TASK_LOG, FLOW_LOG = "prefect.task_runs", "prefect.flow_runs"
 
 
 def quiet_prefect() -> None:
@@ -53,35 +53,39 @@ def dance_bar(minutes: float, store: Path) -> Iterator[None]:
         watch = _Watch(progress, task, minutes, store, over)
         threading.Thread(target=watch.run, daemon=True).start()
         try:
-            with listening(watch.at), _budget_told(progress):
+            with listening(watch.at), _budget_printed(progress):
                 yield
         finally:
             over.set()
 
 
 @contextmanager
-def _budget_told(progress: Progress) -> Iterator[None]:
-    """Print above the bar what training gets of the minutes; Prefect's line of it is hidden."""
-    notes, tasks = _Budget(progress), logging.getLogger(TASK_LOG)
-    tasks.addHandler(notes)
+def _budget_printed(progress: Progress) -> Iterator[None]:
+    """Print above the bar what training gets of the minutes, and where a tracker's dance is to be
+    seen; Prefect's lines of it are hidden."""
+    notes, loggers = _Budget(progress), [logging.getLogger(name) for name in (TASK_LOG, FLOW_LOG)]
+    for each in loggers:
+        each.addHandler(notes)
     try:
         yield
     finally:
-        tasks.removeHandler(notes)
+        for each in loggers:
+            each.removeHandler(notes)
 
 
 class _Budget(logging.Handler):
-    """Prints the line that says what a training gets, and no other."""
+    """Prints these lines, and no other."""
 
     def __init__(self, progress: Progress) -> None:
         super().__init__(logging.INFO)
         self._progress = progress
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Print the record if it is that line."""
+        """Print the record if it is one of them."""
+        from flows.video_pass.tracker_stages import FIRST_PAGE
         from tasks.train_policy import BUDGET
 
-        if record.msg == BUDGET:
+        if record.msg in (BUDGET, FIRST_PAGE):
             self._progress.console.print(record.getMessage(), highlight=False)
 
 

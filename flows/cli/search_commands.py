@@ -84,7 +84,7 @@ def catalogue(
     ] = None,
     as_json: Json = False,
 ) -> CommandResult:
-    """Every video that was ever judged, and why it was danced or not."""
+    """Every video that was ever assessed, and why it was danced or not."""
     from flows.cli.verdicts import catalogue_verdict
     from flows.search import ranking_table
     from robojackson.cli import console
@@ -102,13 +102,13 @@ def catalogue(
         )
     rows = candidate_catalogue.records(store, dance)
     if not rows:
-        return CommandResult({"candidates": rows}, text=[nothing_judged(dance)])
+        return CommandResult({"candidates": rows}, text=[empty_catalogue_text(dance)])
     verdict = catalogue_verdict(rows)
     text = [*ranking_table.lines(rows), *closing(verdict)]
     return CommandResult({"candidates": rows, **verdict}, text=text)
 
 
-def nothing_judged(dance: str | None) -> str:
+def empty_catalogue_text(dance: str | None) -> str:
     """What fills a catalogue that has no rows, or none of a dance."""
     from robojackson.clips.web.untrusted_text import clean_text
 
@@ -119,6 +119,7 @@ def nothing_judged(dance: str | None) -> str:
             "network."
         )
     return (
-        f"No video of {clean_text(dance)} was ever judged: `robojackson find {shlex.quote(dance)}` "
-        "looks for some; `robojackson catalogue` lists all dances."
+        f"No video of {clean_text(dance)} was ever assessed: "
+        f"`robojackson find {shlex.quote(dance)}` looks for some; "
+        "`robojackson catalogue` lists all dances."
     )

@@ -41,7 +41,8 @@ def ablation(
     from tasks.write_study_page import LEAST_STEPS
 
     made = run(wanted)
-    made |= ablation_verdict(made, wanted.steps, len(wanted.seeds), LEAST_STEPS)
+    shortest = min(map(wanted.steps_of, wanted.moves))
+    made |= ablation_verdict(made, shortest, len(wanted.seeds), LEAST_STEPS)
     where = [f"page    {made['page']}", f"tables  {made['tables']}"]
     return CommandResult(made, text=[*where, *closing(made)])
 

@@ -47,12 +47,12 @@ def catalogue_verdict(rows: Sequence[Facts]) -> dict[str, Any]:
     dances = sorted({row["dance"] for row in rows})
     fit = [row for row in rows if row["decision"] in ("chosen", "accepted")]
     sentence = (
-        f"{len(rows)} videos of {len(dances)} dance{'' if len(dances) == 1 else 's'} were judged, "
-        f"{len(fit)} may be danced."
+        f"{len(rows)} videos of {len(dances)} dance{'' if len(dances) == 1 else 's'} "
+        f"were assessed, {len(fit)} may be danced."
     )
     if not fit:
         return _closing("none", sentence, command_line("find", dances[0]))
-    return _closing("judged", sentence, command_line("dance", fit[0]["url"]))
+    return _closing("assessed", sentence, command_line("dance", fit[0]["url"]))
 
 
 def metrics_verdict(rows: Sequence[Facts]) -> dict[str, Any]:
@@ -61,7 +61,7 @@ def metrics_verdict(rows: Sequence[Facts]) -> dict[str, Any]:
     trusted = sum(row["strict_success"] is not None for row in rows)
     sentence = (
         f"{len(rows)} cells of {len(studies)} stud{'y' if len(studies) == 1 else 'ies'}; "
-        f"{trusted} can be judged."
+        f"{trusted} can be evaluated."
     )
     question = "SELECT move, setup, avg(skill) AS skill FROM evaluations GROUP BY ALL"
     return _closing("overview", sentence, command_line("metrics", "--sql", question))
@@ -120,12 +120,12 @@ def ablation_verdict(made: Facts, steps: int, seeds: int, least_steps: int) -> d
     show = shlex.join([python(), "-m", "webbrowser", made["page"]])
     if seeds < FEW_SEEDS:
         sentence = (
-            f"{made['cells']} cells are judged, but {seeds} seed{'' if seeds == 1 else 's'} can "
+            f"{made['cells']} cells are evaluated, but {seeds} seed{'' if seeds == 1 else 's'} can "
             f"show no difference between setups; {MANY_SEEDS} can. The page has the figures."
         )
         return _closing("few_seeds", sentence, show)
-    sentence = f"{made['cells']} cells are judged; the page says which claims hold."
-    return _closing("judged", sentence, show)
+    sentence = f"{made['cells']} cells are evaluated; the page says which claims hold."
+    return _closing("evaluated", sentence, show)
 
 
 def _closing(kind: str, sentence: str, following: str) -> dict[str, Any]:

@@ -64,12 +64,16 @@ def load_settings(config: str, overrides: Mapping[str, Any]) -> "PipelineConfig"
         BadConfiguration, UnknownName: it cannot be used.
     """
     from robojackson.pipeline.pipeline_config import PipelineConfig
+    from robojackson.pipeline.tracker_descriptions import require_tracker
     from robojackson.pipeline.yaml_loader import load
     from robojackson.rl.sim.trainable import require_trainable
     from robojackson.robot.model import load_robot
 
     settings = load(PipelineConfig, config, overrides)
-    require_trainable(load_robot(describe_robot(settings.robot)))
+    robot = describe_robot(settings.robot)
+    require_trainable(load_robot(robot))
+    if settings.instant:
+        require_tracker(robot.name, settings.tracker)
     return settings
 
 

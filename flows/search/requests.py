@@ -17,7 +17,7 @@ from storage import candidate_catalogue
 from storage.store import Store
 
 ALL = 10_000
-"""Files of a folder are all judged: nobody counted who watched them."""
+"""Files of a folder are all assessed: nobody counted who watched them."""
 
 
 def find_dance(query: str, source: str, address: str, top: int | None, config: FindConfig) -> Dance:

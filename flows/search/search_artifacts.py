@@ -18,7 +18,7 @@ async def publish_search(
 ) -> None:
     """Three artifacts under keys that stay the same for a dance, so that there is a history."""
     slug = slug_of(name)
-    told = f"Videos judged for {in_markdown(clean_text(name))}"
+    told = f"Videos assessed for {in_markdown(clean_text(name))}"
     table = ranking_table.plain_rows(rows)
     await acreate_table_artifact(key=f"candidates-{slug}", table=table, description=told)
     text = ranking_table.markdown(name, rows)

@@ -28,7 +28,7 @@ class Entry:
         reason: Why not; empty for those that may be danced.
         video: Its file, scored; None when it could not be had.
         artifacts: What the judge made of it.
-        score, quality: The figures; None when it could not be judged.
+        score, quality: The figures; None when it could not be assessed.
     """
 
     candidate: VideoCandidate
@@ -75,7 +75,7 @@ def summary(found: Sequence[VideoCandidate], selection: Selection) -> str:
     words = {rejection.kind: str(rejection) for _, rejection in selection.dropped}
     words["too_long"] = "too long"
     dropped = ", ".join(f"{count} {words[kind]}" for kind, count in kinds.items())
-    line = f"{len(found)} found, {len(selection.selected)} judged"
+    line = f"{len(found)} found, {len(selection.selected)} assessed"
     return f"{line} ({dropped})" if dropped else line
 
 

@@ -53,7 +53,7 @@ def search_and_rank(
         dance: What to look for.
         settings: How.
         run_id: For the catalogue.
-        known: Videos that were judged before and need not be again.
+        known: Videos that were assessed before and need not be again.
         reigning: Row of the catalogue of the video chosen last, which a new one has to beat.
         failed: Videos that failed before and are tried again where there is nothing else.
     Raises:
@@ -65,31 +65,31 @@ def search_and_rank(
     found = search_videos(dance.source, dance.full_query, dance.address, limits.searched, web)
     selection = select(found, known, limits, failed)
     get_run_logger().info("%s: %s", dance.name, summary(found, selection))
-    had = download_candidates(selection.selected, "score", source)
-    entries = challenged(ranked(assess_candidates(had, source), source), reigning, source)
+    downloaded = download_candidates(selection.selected, "score", source)
+    entries = challenged(ranked(assess_candidates(downloaded, source), source), reigning, source)
     made = SearchResult(dance, run_id, tuple(entries), selection)
     candidate_catalogue.append(Store.from_environment(), rows(made))
     return made
 
 
 def download_candidates(
-    kept: Sequence[VideoCandidate], purpose: Purpose, settings: FindConfig
+    candidates: Sequence[VideoCandidate], purpose: Purpose, settings: FindConfig
 ) -> list[tuple[VideoCandidate, Artifact | str]]:
-    """The files of candidates in one format; the reason instead of one that cannot be had."""
+    """The files of candidates in one format; the reason instead of one that fails."""
     waiting: list[PrefectFuture[Any] | str] = []
-    for candidate in kept:
+    for candidate in candidates:
         waiting.append(_submitted(candidate, purpose, settings))
-    return [(c, _outcome(w)) for c, w in zip(kept, waiting, strict=True)]
+    return [(c, _outcome(w)) for c, w in zip(candidates, waiting, strict=True)]
 
 
 def assess_candidates(
-    had: Sequence[tuple[VideoCandidate, Artifact | str]], settings: FindConfig
+    downloaded: Sequence[tuple[VideoCandidate, Artifact | str]], settings: FindConfig
 ) -> list[Entry]:
     """All candidates with their figures, or with the reason why there are none."""
-    there = [video for _, video in had if isinstance(video, Artifact)]
+    there = [video for _, video in downloaded if isinstance(video, Artifact)]
     outcomes = iter(assess_video.outcomes([(video, settings.assessment) for video in there]))
     entries = []
-    for candidate, video in had:
+    for candidate, video in downloaded:
         if isinstance(video, str):
             entries.append(Entry(candidate, reason=video))
             continue
@@ -128,7 +128,7 @@ def challenged(
         return list(entries)
     first = entries[0]
     old = Stability(**{f.name: reigning[f.name] for f in fields(Stability)})
-    if old.score_per_second is None:  # judged before there was such a column
+    if old.score_per_second is None:  # assessed before there was such a column
         seconds = reigning["duration_s"] or reigning["frames"] / USUAL_FPS
         old = replace(old, score_per_second=old.stability_score / seconds)
     assert first.score

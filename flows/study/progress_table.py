@@ -26,7 +26,7 @@ class ProgressTable:
 
     def __init__(self, study: Study, cells: list[Cell]) -> None:
         self.key = f"ablation-{study.name.lower().replace('_', '-').replace('.', '-')}"
-        self._told = f"Study {study.name}: {len(cells)} cells of {study.steps:,} steps"
+        self._told = f"Study {study.name}: {len(cells)} cells of {study.steps_label} steps"
         self._changed = asyncio.Event()
         self._begun = RUNNING if study.executor == "local" else ON_WORKERS
         self._rows: dict[str, dict[str, Any]] = {

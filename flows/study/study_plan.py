@@ -10,7 +10,13 @@ from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.pipeline.yaml_loader import load
 from robojackson.rl.config.train_config import TrainConfig
+from robojackson.robot.description import RobotDescription
 from robojackson.robot.model import load_robot
+from storage.store import Store
+from tasks.runtime.start_networks import local_start_file
+
+WALKER = "walker"
+"""Start whose networks depend on the robot."""
 
 
 def study_of(name: str, overrides: Mapping[str, Any]) -> Study:
@@ -18,16 +24,32 @@ def study_of(name: str, overrides: Mapping[str, Any]) -> Study:
 
     Raises:
         UnknownName, BadConfiguration: something that it names does not exist or cannot be used.
+        BadPolicy: a setup starts from a walker and the robot has none.
         UnreadableVideo: the clip of a move is not there.
     """
+    if overrides.get("steps") is not None:
+        overrides = {"move_steps": {}, **overrides}  # of all moves
     study = load(Study, f"studies/{name}" if "." not in name else name, overrides)
     robot = describe_robot(study.robot)
     load_robot(robot)
-    for move in study.moves:
+    for move in {*study.moves, *study.move_steps}:
         require_move(move, study.pipeline)
-    for setup in study.setups:
-        training(study, setup)
+    trainings_of(study, robot)
     return replace(study, robot=robot.file or study.robot)
+
+
+def trainings_of(study: Study, robot: RobotDescription) -> dict[str, TrainConfig]:
+    """Return how the cells of each setup are trained; all of them can begin.
+
+    Raises:
+        UnknownName, BadConfiguration: a setup does not exist, or the model of the robot is missing.
+        BadPolicy: a setup starts from a walker and the robot has none.
+    """
+    found: dict[str, TrainConfig] = {s: training(study, s) for s in study.setups}
+    for config in found.values():
+        if config.start == WALKER:
+            local_start_file(Store.from_environment(), config, robot)
+    return found
 
 
 def training(study: Study, setup: str) -> TrainConfig:

@@ -15,6 +15,7 @@ from flows.video_pass.motion_stages import to_reference
 from flows.video_pass.pass_progress import announce
 from flows.video_pass.scored_candidates import Candidate, choose, score_all
 from flows.video_pass.time_budget import training_time
+from flows.video_pass.tracker_stages import TrackedDance, chosen_tracker, track
 from robojackson.clips.quality.advice import advise
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.pipeline.pipeline_config import PipelineConfig
@@ -31,7 +32,7 @@ from tasks.evaluate_dance import evaluate_dance
 from tasks.render_video import render_video
 from tasks.runtime.stage import labelled
 from tasks.train_policy import RunLabels, train_policy
-from tasks.write_page import write_page
+from tasks.write_page import joined_evaluation, write_page
 
 Artifacts = dict[str, Artifact]
 Facts = dict[str, Any]
@@ -84,32 +85,52 @@ async def perform(
     labels: RunLabels,
     began: float,
 ) -> Artifacts:
-    """Run every stage after the choice, in order.
+    """Run every stage after the choice, in order; where there is a tracker, it dances first.
 
     Args:
         labels: Names of the dance and the setup.
         began: When the budget of the pass began, Unix time, seconds.
     """
+    tracker = chosen_tracker(robot, settings)
     with labelled(labels.move):
         announce("motion capture and retargeting")
         moved = to_reference(best.clip, robot, settings)
-        reference = moved["reference"]
         if settings.gate:
             check(json.loads(Store.from_environment().read(moved["scorecard"].key)))
-        announce("training")
-        config, whole_pass = _budgeted(settings)
-        trained = await train_policy(
-            reference, robot, config, labels,
-            time_left=training_time(reference, robot, settings, began), whole_pass=whole_pass,
-        )  # fmt: skip
-        announce("evaluation")
-        judged = evaluate_dance(trained["policy"], reference, robot, settings.evaluate, labels)
-        shown = (best.clip["video"], moved["landmarks"], moved["smpl"], reference)
-        announce("video")
-        film = render_video(*shown, judged["rollout"], robot, settings.render)
-        made = {**best.clip, "stability": best.stability, **moved, **trained, **judged}
-        made |= {"dance": film, "still": draw_snapshot(film)}
-        return {**made, **write_page(made, labels.move, best.name)}
+        tracked = None if tracker is None else track(tracker, best, moved, robot, settings, labels)
+        if tracked is not None and settings.instant:
+            made = tracked.made
+        else:
+            made = await _trained(best, moved, robot, settings, labels, began, tracked)
+        folder = "" if tracked is None else tracked.folder
+        return {**made, **write_page(made, labels.move, best.name, folder)}
+
+
+async def _trained(
+    best: Candidate,
+    moved: Artifacts,
+    robot: RobotDescription,
+    settings: PipelineConfig,
+    labels: RunLabels,
+    began: float,
+    tracked: TrackedDance | None,
+) -> Artifacts:
+    """Train, evaluate and film a policy; what a tracker danced stays beside it."""
+    reference = moved["reference"]
+    announce("training")
+    config, whole_pass = _budgeted(settings)
+    trained = await train_policy(
+        reference, robot, config, labels,
+        time_left=training_time(reference, robot, settings, began), whole_pass=whole_pass,
+    )  # fmt: skip
+    announce("evaluation")
+    evaluated = evaluate_dance(trained["policy"], reference, robot, settings.evaluate, labels)
+    shown = (best.clip["video"], moved["landmarks"], moved["smpl"], reference)
+    announce("video")
+    film = render_video(*shown, evaluated["rollout"], robot, settings.render)
+    made = {**best.clip, "stability": best.stability, **moved, **trained, **evaluated}
+    beside = {} if tracked is None else tracked.joined
+    return made | {"dance": film, "still": draw_snapshot(film), **beside}
 
 
 def conclude(
@@ -120,15 +141,17 @@ def conclude(
     labels: RunLabels,
 ) -> Facts:
     """Add the pass to the catalogue of runs and return its answer."""
-    summary = json.loads(store.read(made["evaluation"].key))
-    seed = settings.train.seed
-    run_id = f"{labels.move}-{labels.setup}-s{seed}-{made['policy'].sha256[:8]}"
+    summary = joined_evaluation(store, made)
+    tracker = summary.get("tracker")
+    setup, seed = (tracker, 0) if tracker else (labels.setup, settings.train.seed)
+    danced = made["evaluation" if tracker else "policy"]
+    run_id = f"{labels.move}-{setup}-s{seed}-{danced.sha256[:8]}"
     robot = describe_robot(settings.robot).name
     names = {"run_id": run_id, "move": labels.move, "robot": robot}
     track = artifact_tables.read(LandmarkTrack, store, made["landmarks"])
     when = datetime.now(UTC)
     entry = run_catalogue.Run(
-        **names, setup=labels.setup, seed=seed, finished_at=when, artifacts=made, summary=summary
+        **names, setup=setup, seed=seed, finished_at=when, artifacts=made, summary=summary
     )
     run_catalogue.record(store, entry)
     return {

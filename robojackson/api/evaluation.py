@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,7 @@ from robojackson.report.video.side_by_side import VideoConfig, side_by_side
 from robojackson.rl.config.evaluate_config import EvaluateConfig
 from robojackson.rl.evaluation import policy_evaluation
 from robojackson.rl.policy import Policy, load_policy
+from robojackson.rl.trackers.tracker import Tracker
 
 PartProgress = Callable[[str, int, int], None]
 """Called with (name of the part, done, in all)."""
@@ -84,7 +86,7 @@ class PolicyEvaluation:
 
 
 def evaluate_policy(
-    policy: FilePath | Policy,
+    policy: FilePath | Policy | Tracker,
     reference: FilePath | ReferenceMotion,
     robot: RobotLike | None = None,
     *,
@@ -96,8 +98,8 @@ def evaluate_policy(
     """Judge a policy on stock physics from many starts, beside baselines that do not dance.
 
     Args:
-        policy: A policy, or the policy.safetensors of a training.
-        reference: The motion that it was trained on, or its file.
+        policy: A policy, or the policy.safetensors of a training; or a tracker (`load_tracker`).
+        reference: The motion that it was trained on, or its file; any motion for a tracker.
         robot: The one that the motion was made for; None finds it by name.
         config: Starts, horizon and noise.
         move: Name of the dance in the tables.
@@ -109,12 +111,12 @@ def evaluate_policy(
         site error in metres, and one row a rollout.
 
     Raises:
-        BadPolicy: no policy file of ours, or one for another robot.
+        BadPolicy: no policy file of ours, or a policy or tracker for another robot.
         RejectedReference: the robot's model has changed since the motion was made.
     """
     motion = read_if_path(ReferenceMotion, reference)
     machine = robot_of(motion) if robot is None else require_robot(motion, load_robot(robot))
-    trained = policy if isinstance(policy, Policy) else load_policy(Path(policy))
+    trained = load_policy(Path(policy)) if isinstance(policy, str | PathLike) else policy
     with counter(progress is True, "evaluation") as count:
         tell: PartProgress = (lambda name, done, total: None) if progress is False else progress  # type: ignore[assignment]
         if count is not None:
@@ -123,8 +125,12 @@ def evaluate_policy(
             trained, motion, machine, config or EvaluateConfig(), tell
         )
     name = move or ("motion" if isinstance(reference, ReferenceMotion) else motion_name(reference))
-    labels = run_labels(name, trained.setup or setup or "scratch", trained.training["seed"])
-    rows = [{**labels, **trained.training, **row} for row in judged.rows]
+    if isinstance(trained, Policy):
+        learnt, said = trained.training, trained.setup or setup or "scratch"
+    else:
+        learnt, said = {"seed": 0, "step": None}, trained.description.name
+    labels = run_labels(name, said, learnt["seed"])
+    rows = [{**labels, **learnt, **row} for row in judged.rows]
     return PolicyEvaluation(dict(judged.summary), rows, Rollout(motion.dt, judged.rollout_qpos))
 
 
@@ -138,6 +144,7 @@ def render_video(
     landmarks: FilePath | LandmarkTrack | None = None,
     robot: RobotLike | None = None,
     config: VideoConfig | None = None,
+    plain: bool = False,
     progress: Progress = False,
 ) -> VideoInfo:
     """Write an mp4 of the reference robot, beside whatever else is given, at the same moment.
@@ -151,6 +158,7 @@ def render_video(
         landmarks: What was detected in it.
         robot: The one that the motion was made for; None finds it by name.
         config: Size, rate, length and camera.
+        plain: Show the source without marks, too, and `motion` over it instead of the landmarks.
         progress: True shows a bar; a function is called with (pictures done, pictures in all).
 
     Returns:
@@ -174,6 +182,6 @@ def render_video(
     with results_in(path.parent), counter(progress, path.name) as count:
         side_by_side(
             source, track, person, target, qpos, path,
-            model=machine.model, config=config, progress=count,
+            model=machine.model, config=config, progress=count, plain=plain,
         )  # fmt: skip
     return video_files.probe(path, video_files.VideoLimits(max_duration_s=None, min_frames=1))

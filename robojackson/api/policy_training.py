@@ -106,8 +106,8 @@ def train_policy(
     name = move or ("motion" if isinstance(reference, ReferenceMotion) else motion_name(reference))
     labels = _labels(wanted, name, setup, run_id)
     heard = replace(hooks or Hooks(), setup=labels["setup"], rewards=_named(reward))
-    with _folder(out) as folder, _telling(progress, f"training {name}") as tell:
-        return _trained(motion, machine, wanted, folder, labels, heard, tell)
+    with _folder(out) as folder, _telling(progress, f"training {name}") as report:
+        return _trained(motion, machine, wanted, folder, labels, heard, report)
 
 
 def _labels(config: TrainConfig, move: str, setup: str | None, run_id: str) -> dict[str, Any]:
@@ -122,9 +122,9 @@ def _trained(
     robot: Robot,
     config: TrainConfig,
     folder: Path,
-    labels: Mapping[str, Any],
+    labels: Mapping[str, object],
     hooks: Hooks,
-    tell: Callable[[Row], None],
+    report: Callable[[Row], None],
 ) -> TrainedPolicy:
     """Train in a folder that nobody else may use meanwhile; its table is saved in any case."""
     with results_in(folder) as files, locked(folder):
@@ -132,7 +132,7 @@ def _trained(
         audit = audit_record(audit_both_readings(robot, motion, config.environment))
         hooks.audited(audit)
         try:
-            told = _joined(hooks, rows, tell)
+            told = _joined(hooks, rows, report)
             result = training.train_policy(motion, robot, config, folder, told)
         finally:
             if len(rows):
@@ -177,12 +177,12 @@ def _named(
     return reward if isinstance(reward, Mapping) else {OWN_REWARD: reward}
 
 
-def _joined(hooks: Hooks, rows: EpisodeLog, tell: Callable[[Row], None]) -> Hooks:
+def _joined(hooks: Hooks, rows: EpisodeLog, report: Callable[[Row], None]) -> Hooks:
     """The caller's hooks, with the table of episodes and the bar of ours."""
 
     def progress(row: Row) -> None:
         hooks.progress(row)
-        tell(row)
+        report(row)
 
     def sink(new: list[Row]) -> None:
         rows.add(new)
@@ -203,12 +203,12 @@ def _telling(progress: bool | Callable[[Row], None], label: str) -> Iterator[Cal
     shown: Progress = progress
     with counter(shown, label) as count:
 
-        def tell(row: Row) -> None:
+        def report(row: Row) -> None:
             if count is not None:
                 spent = row["steps"] / max(row["steps_per_s"], 1e-9)
                 count(round(spent), round(spent + row["seconds_left"]))
 
-        yield tell
+        yield report
 
 
 @contextmanager

@@ -58,7 +58,7 @@ class TrainedPolicy:
         Raises:
             StoreError: it cannot be written.
         """
-        facts: dict[str, Any] = {
+        facts: dict[str, object] = {
             "steps": self.steps,
             "updates": self.updates,
             "seconds": self.seconds,

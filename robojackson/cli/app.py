@@ -37,6 +37,7 @@ from robojackson.cli.options import (
     yaml_text,
 )
 from robojackson.cli.robot_commands import robots
+from robojackson.cli.trackers.tracker_commands import trackers
 
 
 @command
@@ -199,8 +200,9 @@ def _common(
 
 
 def add_stages(app: typer.Typer) -> None:
-    """Add the commands of this module, and the group `robots`."""
+    """Add the commands of this module, and the groups `robots` and `trackers`."""
     app.add_typer(robots, name="robots")
+    app.add_typer(trackers, name="trackers")
     for name, stage in STAGES.items():
         app.command(name, cls=ExportCommand if stage is export else None)(stage)
 

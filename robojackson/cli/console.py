@@ -105,7 +105,7 @@ def print_result(answer: CommandResult, as_json: bool) -> None:
     sys.stdout.flush()
 
 
-def lines(data: Mapping[str, Any], indent: int = 0) -> Iterator[str]:
+def lines(data: Mapping[str, object], indent: int = 0) -> Iterator[str]:
     """A mapping for people: one line a value, numbers with four digits."""
     width = max((len(str(key)) for key in data), default=0)
     for key, value in data.items():
@@ -121,7 +121,7 @@ def lines(data: Mapping[str, Any], indent: int = 0) -> Iterator[str]:
             yield f"{head:<{width + indent}}  {_format_value(value)}"
 
 
-def table(rows: Mapping[str, Mapping[str, Any]], columns: Sequence[str]) -> list[str]:
+def table(rows: Mapping[str, Mapping[str, object]], columns: Sequence[str]) -> list[str]:
     """Rows by name under a head, columns aligned."""
     cells = [["", *columns]]
     cells += [
@@ -146,11 +146,11 @@ def ticker() -> Iterator[Callable[[str], None]]:
     """A line on stderr that replaces itself; line after line where there is no terminal."""
     live = sys.stderr.isatty()
 
-    def tell(line: str) -> None:
+    def write_line(line: str) -> None:
         sys.stderr.write(f"\r\x1b[2K{line}" if live else f"{line}\n")
         sys.stderr.flush()
 
-    yield tell
+    yield write_line
     if live:
         sys.stderr.write("\n")
 
@@ -161,14 +161,14 @@ def stages() -> Iterator[Callable[[str, int, int], None]]:
     told: dict[str, int] = {}
     last = time.monotonic()
     every_s = 0.0 if sys.stderr.isatty() else SECONDS_BETWEEN_LINES
-    with ticker() as tell:
+    with ticker() as write_line:
 
         def advance(name: str, done: int, total: int) -> None:
             nonlocal last
             tenth, now = 10 * done // max(total, 1), time.monotonic()
             if tenth > told.get(name, 0) and now - last >= every_s:
                 told[name], last = tenth, now
-                tell(f"{name} {tenth}0 %")
+                write_line(f"{name} {tenth}0 %")
 
         yield advance
 

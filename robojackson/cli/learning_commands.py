@@ -110,8 +110,16 @@ def pretrain(
 
 @command
 def evaluate(
-    policy: Annotated[Path, typer.Argument(help="policy.safetensors of `robojackson train`.")],
-    reference: Annotated[Path, typer.Argument(help="The reference.parquet it was trained on.")],
+    policy: Annotated[
+        Path,
+        typer.Argument(
+            help="policy.safetensors of `robojackson train`, or the name of a tracker "
+            "(`robojackson trackers`)."
+        ),
+    ],
+    reference: Annotated[
+        Path, typer.Argument(help="The reference.parquet it was trained on; a tracker takes any.")
+    ],
     robot: MotionRobot = None,
     seconds: Annotated[float | None, typer.Option(min=0.1, help="Length of a rollout, s.")] = None,
     passport: Annotated[
@@ -125,7 +133,7 @@ def evaluate(
     verbose: Verbose = False,
     as_json: Json = False,
 ) -> CommandResult:
-    """Judge a policy on stock physics from many starts, beside baselines that do not dance."""
+    """Evaluate a policy or a tracker on stock physics from many starts, beside bare baselines."""
     from robojackson.cli import cards, stages
     from robojackson.cli.training_process import end_with
 
@@ -135,7 +143,7 @@ def evaluate(
     log_to_stderr()
     given = {"evaluate.seconds": seconds, "evaluate.passport": passport or None}
     overrides = overrides_from(set_, given)
-    judged = stages.evaluate(policy, reference, out, config, overrides, robot)
-    lines = [*stages.verdict_lines(judged), *stages.passport_lines(judged)]
-    table = [*lines, *cards.closing(judged)]
-    return CommandResult(judged, text=cards.shown(judged, table, verbose))
+    evaluated = stages.evaluate(policy, reference, out, config, overrides, robot)
+    lines = [*stages.verdict_lines(evaluated), *stages.passport_lines(evaluated)]
+    table = [*lines, *cards.closing(evaluated)]
+    return CommandResult(evaluated, text=cards.shown(evaluated, table, verbose))

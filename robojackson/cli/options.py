@@ -1,6 +1,6 @@
 """Options that several commands of `robojackson` share, and how they override a configuration."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -116,7 +116,9 @@ TrainMinutes = Annotated[
 ]
 
 
-def overrides_from(pairs: list[str] | None, given: dict[str, Any] | None = None) -> dict[str, Any]:
+def overrides_from(
+    pairs: list[str] | None, given: Mapping[str, object] | None = None
+) -> dict[str, object]:
     """`--set key=value` pairs and options that were given, as one mapping."""
     overrides = {key: value for key, value in (given or {}).items() if value is not None}
     for pair in pairs or []:

@@ -15,7 +15,6 @@ import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
-from typing import Any
 
 from robojackson.errors import BadConfiguration, DownloadFailed, RoboJacksonError, StoreError
 from robojackson.files.local_folder import sha256_of_file
@@ -26,12 +25,12 @@ from robojackson.robot.mjcf import added_folder, mjcf_path
 _ROOM_MB = 200
 
 
-def list_robots() -> list[dict[str, Any]]:
+def list_robots() -> list[dict[str, object]]:
     """Every shipped robot: whether its model is here, and how to get it."""
     return [_entry(describe_robot(name)) for name in robot_names()]
 
 
-def _entry(description: RobotDescription) -> dict[str, Any]:
+def _entry(description: RobotDescription) -> dict[str, object]:
     try:
         model = str(mjcf_path(description))
         return {"robot": description.name, "ready": True, "model": model, "note": ""}
@@ -39,7 +38,7 @@ def _entry(description: RobotDescription) -> dict[str, Any]:
         return {"robot": description.name, "ready": False, "model": "", "note": str(cause)}
 
 
-def add_robot(name: str) -> dict[str, Any]:
+def add_robot(name: str) -> dict[str, object]:
     """Bring the model of a robot into the store; one that is there already is left alone.
 
     Raises:

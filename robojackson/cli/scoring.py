@@ -1,4 +1,8 @@
-"""Algorithm 1 for the videos that a user names, with no Prefect in memory."""
+"""Algorithm 1 for the videos that a user names, with no Prefect in memory.
+
+The landmarks are those of the detector alone, as in the paper and in a search: the public
+`detect_landmarks` also looks for others and follows the camera, passes that no score needs.
+"""
 
 from dataclasses import asdict
 from pathlib import Path

@@ -141,26 +141,38 @@ def evaluate(
     overrides: Overrides,
     robot: str | None = None,
 ) -> Figures:
-    """The verdict on a policy; with a folder, also its tables and the rollout."""
+    """The verdict on a policy or a tracker; with a folder, also its tables and the rollout."""
     from robojackson.api.evaluation import evaluate_policy
+    from robojackson.api.trackers import load_tracker
     from robojackson.cli.training_words import train_longer
     from robojackson.pipeline.pipeline_config import PipelineConfig
 
     settings = load(PipelineConfig, config, overrides)
+    tracker = load_tracker(str(policy)) if is_tracker(policy) else None
     with console.stages() as progress:
         verdict = evaluate_policy(
-            policy, reference, robot, config=settings.evaluate, setup=settings.setup,
+            tracker or policy, reference, robot, config=settings.evaluate, setup=settings.setup,
             progress=progress,
         )  # fmt: skip
     if out is not None:
         verdict.save(out)
     summary = to_json_types(verdict.summary)
-    if summary["verdict"]["kind"] == "dances":
+    if tracker is not None:
+        training = reference.parent / "training"
+        following = cards.command_line("train", reference, "-o", training)
+    elif summary["verdict"]["kind"] == "dances":
         words = ("export", policy, "--to", "onnx", "-o", policy.with_suffix(".onnx"))
         following = cards.command_line(*words)
     else:
         following = train_longer(reference, policy.parent, LONGER_MINUTES)
     return {"policy": str(policy), "reference": str(reference), **summary, "next": following}
+
+
+def is_tracker(policy: Path) -> bool:
+    """Whether a policy is given by the name of a tracker: a file of that name goes first."""
+    from robojackson.pipeline.tracker_descriptions import tracker_names
+
+    return str(policy) in tracker_names() and not policy.is_file()
 
 
 VERDICT = ("survived_s", "success", "strict_success", "skill", "site_error_m", "limb_gain")
@@ -169,7 +181,8 @@ VERDICT = ("survived_s", "success", "strict_success", "skill", "site_error_m", "
 def verdict_lines(evaluation: Mapping[str, Any]) -> list[str]:
     """The table of an evaluation: the policy, then its baselines."""
     short = evaluation.get("verdict", {}).get("kind") == "too_short"
-    rows = {"trained": evaluation, **evaluation["baselines"]}
+    name = evaluation.get("tracker", "trained")
+    rows = {name: evaluation, **evaluation.get("trackers", {}), **evaluation["baselines"]}
     if short:
         shown = dict.fromkeys(UNJUDGED, "too short")
         rows = {name: {**row, **shown} for name, row in rows.items()}

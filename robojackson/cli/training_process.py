@@ -42,7 +42,7 @@ def train(
     reference: Path,
     out: Path,
     setup: str | None,
-    overrides: Mapping[str, Any],
+    overrides: Mapping[str, object],
     run_id: str = "",
     move: str = "",
     force: bool = False,
@@ -68,12 +68,12 @@ def train(
 
     wanted = requested(config, setup, overrides)
     stop = _StopRequest(out)
-    with stop.listening(), console.ticker() as tell:
+    with stop.listening(), console.ticker() as write_line:
         hooks = Hooks(
-            progress=partial(_report_progress, out=out, tell=tell),
+            progress=partial(_report_progress, out=out, write_line=write_line),
             on_learning=stop.mark_unsaved,
             stop=stop,
-            audited=lambda audit: tell(format_reward_audit(audit)) if audit else None,
+            audited=lambda audit: write_line(format_reward_audit(audit)) if audit else None,
         )
         try:
             trained = train_policy(
@@ -102,7 +102,7 @@ class Requested:
     gate: bool = True
 
 
-def requested(config: str | None, setup: str | None, overrides: Mapping[str, Any]) -> Requested:
+def requested(config: str | None, setup: str | None, overrides: Mapping[str, object]) -> Requested:
     """Return what files, `--set` and options ask of a training; the latter win.
 
     Raises:
@@ -171,9 +171,11 @@ def format_reward_audit(found: Mapping[str, Mapping[str, float]]) -> str:
     return f"of a perfect dance's reward: {'; '.join(parts)}"
 
 
-def _report_progress(row: Mapping[str, float], out: Path, tell: Callable[[str], None]) -> None:
+def _report_progress(
+    row: Mapping[str, float], out: Path, write_line: Callable[[str], None]
+) -> None:
     """Say how far it is, and leave it for whoever watches the folder."""
-    tell(status(row))
+    write_line(status(row))
     finite = {k: v if math.isfinite(v) else None for k, v in row.items()}
     whole = out / f".{PROGRESS}"
     with suppress(OSError):

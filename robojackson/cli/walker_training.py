@@ -1,7 +1,8 @@
 """The walkers that trainings start from, made from files to files with no Prefect.
 
 `paper` learns Humanoid-v5's own reward from the first 45 of its observations; the file that is kept
-takes all 348, the others with weight zero. `track` imitates the bundled walk.
+takes all 348, the others with weight zero. `track` imitates the bundled walk, on any robot; that of
+a robot for which none ships is kept where `start: walker` finds it.
 """
 
 import json
@@ -22,6 +23,7 @@ from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.pipeline.yaml_loader import load
 
 if TYPE_CHECKING:
+    from robojackson.robot.description import RobotDescription
     from robojackson.robot.model import Robot
 
 Figures = dict[str, Any]
@@ -35,7 +37,7 @@ def pretrain(
     kind: str,
     out: Path,
     reference: Path | None,
-    overrides: Mapping[str, Any],
+    overrides: Mapping[str, object],
     robot: str | None = None,
 ) -> Figures:
     """Train a walker: walker_<kind>.safetensors and walker.json with command, curve, evaluation.
@@ -48,12 +50,11 @@ def pretrain(
     from robojackson.rl.policy import load_policy
     from robojackson.rl.sim.stock_humanoid import stock_observation_size
     from robojackson.rl.tqc.network_arrays import load_networks, widened
-    from robojackson.robot.model import load_robot
 
     _require_fitting(
         kind, load(TrainConfig, f"setups/walker-{kind}", overrides).mode, reference, robot
     )
-    machine = load_robot(describe_robot(robot or ROBOT))
+    machine = _robot(reference, robot)
     motion = reference or _reference(kind, out, machine)
     given = None if reference is not None and robot is None else robot or ROBOT
     stands = kind == "paper"  # a motion that only stands has no score card
@@ -66,9 +67,9 @@ def pretrain(
         model = machine.model
         size = stock_observation_size(model.nq, model.nv, model.nbody)
         networks = widened(networks, size)
-        judged = _evaluate_walk(policy, machine)
+        evaluated = _evaluate_walk(policy, machine)
     else:
-        judged = stages.evaluate(out / "policy.safetensors", motion, out, PIPELINE, {}, given)
+        evaluated = stages.evaluate(out / "policy.safetensors", motion, out, PIPELINE, {}, given)
     made = out / f"walker_{kind}.safetensors"
     made.write_bytes(networks.to_bytes())
     words = ["--kind", kind, *_command_options(overrides)]
@@ -79,10 +80,30 @@ def pretrain(
         "steps": trained["steps"],
         "updates": trained["updates"],
         "curve": curve(out),
-        "evaluation": judged,
+        "evaluation": evaluated,
     }
     (out / "walker.json").write_text(json.dumps(facts, indent=1, default=float))
-    return {"walker": str(made)} | facts
+    return {"walker": str(made)} | _installed(made, machine.description, kind) | facts
+
+
+def _robot(reference: Path | None, robot: str | None) -> "Robot":
+    """Return the robot that is named, else that of the motion, else the paper's."""
+    from robojackson.api.arguments import read_if_path, robot_of
+    from robojackson.motion.reference_motion import ReferenceMotion
+    from robojackson.robot.model import load_robot
+
+    if robot is None and reference is not None:
+        return robot_of(read_if_path(ReferenceMotion, reference))
+    return load_robot(describe_robot(robot or ROBOT))
+
+
+def _installed(made: Path, robot: "RobotDescription", kind: str) -> Figures:
+    """Keep the walker of a robot for which none ships, where `start: walker` finds it."""
+    from robojackson.rl.walkers import is_shipped, keep_walker
+
+    if is_shipped(robot, kind):
+        return {}
+    return {"kept": str(keep_walker(robot, kind, made.read_bytes()))}
 
 
 def _require_fitting(kind: str, mode: str, reference: Path | None, robot: str | None) -> None:
@@ -153,7 +174,7 @@ def _evaluate_walk(policy: Any, robot: "Robot") -> Figures:
     return asdict(walk(policy, robot))
 
 
-def _command_options(overrides: Mapping[str, Any]) -> list[str]:
+def _command_options(overrides: Mapping[str, object]) -> list[str]:
     """The options of a command that override what the setup says."""
     options = {"steps": "--steps", "minutes": "--minutes", "seed": "--seed", "trainer": "--trainer"}
     words: list[str] = []

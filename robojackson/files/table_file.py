@@ -1,7 +1,6 @@
 """What a table of its own knows: its schema, and how it is taken apart and put together."""
 
 import json
-from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -11,6 +10,7 @@ import numpy as np
 from robojackson.errors import StoreError
 from robojackson.files import tables
 from robojackson.files.file_tree import FileTree, results_in
+from robojackson.files.json_types import to_json_types
 from robojackson.files.table_types import TableSchema
 
 Columns = dict[str, np.ndarray]
@@ -93,14 +93,6 @@ def numbered(index: str, rows: int, period_s: float) -> Columns:
 
 
 def json_facts(value: Facts) -> Facts:
-    """Return metadata in JSON's types, arrays as lists; `TypeError` names what does not fit."""
-    found: Facts = json.loads(json.dumps(value, default=_plain))
+    """Return metadata in JSON's types; what JSON has no type for as `to_json_types` writes it."""
+    found: Facts = json.loads(json.dumps(value, default=to_json_types))
     return found
-
-
-def _plain(value: object) -> Any:
-    if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
-    if isinstance(value, Mapping):
-        return dict(value)
-    raise TypeError(f"{type(value).__name__} does not fit into a table's metadata")

@@ -21,7 +21,7 @@ class EpisodeLog:
         resumes: Whether the rows of an earlier sitting come first.
     """
 
-    def __init__(self, files: FileTree, common: Mapping[str, Any], resumes: bool) -> None:
+    def __init__(self, files: FileTree, common: Mapping[str, object], resumes: bool) -> None:
         self._log = RecordLog(files, "episodes.parquet", EPISODE_RECORD, common, resumes)
         self._saved = time.monotonic()
 

@@ -27,6 +27,9 @@ class PipelineConfig:
         scoring_detector: Size of the pose model that scores candidates.
         detector: Pose model that feeds mocap; best lets two vote.
         dancer: Who of several people is danced.
+        instant: Whether a tracker dances at once and nothing is trained.
+        tracker: Name of the tracker (`configs/trackers`) whose dance is on the page first; null is
+            the first for the robot whose file is here, `none` is no tracker.
         gate: Refuse to train on a reference motion that breaks a hard bar of its score card.
         network: Published networks whose weights the user brings; none by default.
         video, stability, mocap, retarget, train, evaluate, render: Of the stages.
@@ -38,6 +41,8 @@ class PipelineConfig:
     scoring_detector: Size = "lite"
     detector: Quality = "full"
     dancer: DancerConfig = Field(default_factory=DancerConfig)
+    instant: bool = False
+    tracker: str | None = None
     gate: bool = True
     video: VideoLimits = Field(default_factory=VideoLimits)
     stability: StabilityConfig = Field(default_factory=StabilityConfig)

@@ -24,7 +24,7 @@ class RecordLog:
     files: FileTree
     key: str
     schema: TableSchema
-    common: Mapping[str, Any]
+    common: Mapping[str, object]
     resumes: bool = True
     _rows: list[dict[str, Any]] = field(default_factory=list)
     _earlier: bool = True

@@ -5,7 +5,6 @@ import re
 import unicodedata
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 NAME_LENGTH = 60
 
@@ -26,7 +25,7 @@ def slug_of(name: str) -> str:
     return re.sub(r"[^a-z0-9]+", "-", run_name(name).lower()).strip("-")
 
 
-def run_labels(move: str, setup: str, seed: int | None) -> dict[str, Any]:
+def run_labels(move: str, setup: str, seed: int | None) -> dict[str, object]:
     """The columns by which episodes and evaluations of a run are joined."""
     move, setup = run_name(move), run_name(setup)
     return {"run_id": f"{move}-{setup}-s{seed}", "move": move, "setup": setup, "seed": seed}

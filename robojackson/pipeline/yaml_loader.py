@@ -28,7 +28,9 @@ EXTENDS = "extends"
 
 
 def load(
-    cls: type[Config], name_or_path: str | Path | None, overrides: Mapping[str, Any] | None = None
+    cls: type[Config],
+    name_or_path: str | Path | None,
+    overrides: Mapping[str, object] | None = None,
 ) -> Config:
     """A configuration, with its defaults where the file says nothing.
 
@@ -59,10 +61,10 @@ def load(
             in_question = tuple(f"{key}{each}" for each in _conflict(cause))
             named = [g for g in blamed if g.startswith(in_question)]
             where = f"--set {', '.join(named or blamed)}"
-        raise BadConfiguration(f"{where}: {_explain(cls, cause)}") from cause
+        raise _refusal(cls, cause, where) from cause
 
 
-def build(cls: type[Config], values: Mapping[str, Any], where: str) -> Config:
+def build(cls: type[Config], values: Mapping[str, object], where: str) -> Config:
     """A configuration from a mapping.
 
     Raises:
@@ -71,7 +73,7 @@ def build(cls: type[Config], values: Mapping[str, Any], where: str) -> Config:
     try:
         return TypeAdapter(cls).validate_python(dict(values))
     except ValidationError as cause:
-        raise BadConfiguration(f"{where}: {_explain(cls, cause)}") from cause
+        raise _refusal(cls, cause, where) from cause
 
 
 def find(name_or_path: str | Path) -> Path:
@@ -145,7 +147,7 @@ def _read(path: Path) -> dict[str, Any]:
     return values
 
 
-def _parsed(value: Any, where: str) -> Any:
+def _parsed(value: object, where: str) -> Any:
     if not isinstance(value, str):
         return value
     try:
@@ -154,7 +156,7 @@ def _parsed(value: Any, where: str) -> Any:
         raise BadConfiguration(f"{where}: {' '.join(str(cause).split())}") from cause
 
 
-def _set(values: dict[str, Any], keys: list[str], value: Any) -> None:
+def _set(values: dict[str, Any], keys: list[str], value: object) -> None:
     for key in keys[:-1]:
         inner = values.get(key)
         values[key] = dict(inner) if isinstance(inner, dict) else {}
@@ -166,6 +168,10 @@ def _conflict(cause: ValidationError) -> tuple[str, ...]:
     """The keys of values that do not go together, from the section that refuses them."""
     error = cause.errors()[0].get("ctx", {}).get("error")
     return error.keys if isinstance(error, ConflictingValues) else ()
+
+
+def _refusal(cls: type, cause: ValidationError, where: str) -> BadConfiguration:
+    return BadConfiguration(_explain(cls, cause), where, key=".".join(_keys(cause)))
 
 
 def _explain(cls: type, cause: ValidationError) -> str:

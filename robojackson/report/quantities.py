@@ -126,7 +126,7 @@ def decimal(value: float, digits: int) -> str:
     return f"\N{MINUS SIGN}{text[1:]}" if text.strip("-0.,") else text[1:]
 
 
-def quantities(values: Mapping[str, Any], only: tuple[str, ...] = ()) -> list[Quantity]:
+def quantities(values: Mapping[str, object], only: tuple[str, ...] = ()) -> list[Quantity]:
     """A table of figures, in the order of `only` where it is given."""
     keys = [key for key in only if key in values] if only else list(values)
     return [quantity(key, values[key]) for key in keys]

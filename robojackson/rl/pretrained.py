@@ -24,35 +24,40 @@ from robojackson.rl.tqc.network_arrays import (
     load_networks,
     require_complete,
 )
+from robojackson.rl.walkers import shipped_walker, walker_file
+from robojackson.robot.description import RobotDescription
 
 log = logging.getLogger(__name__)
 
-ASSETS = Path(__file__).parent.parent / "assets"
-WALKERS = {"track": "walker_track.safetensors", "paper": "walker_paper.safetensors"}
 HUB = re.compile(r"^[\w.-]+/[\w.-]+(?<!\.safetensors)(?<!\.zip)$")
 
 
-def pretrained(start: str, mode: str) -> Networks | None:
+def pretrained(start: str, mode: str, robot: RobotDescription | None = None) -> Networks | None:
     """The networks that a start names; None for `scratch`.
 
+    Args:
+        robot: Whose walker `walker` is; None for the one that ships.
     Raises:
-        BadPolicy: nothing of that name, or a file that does not hold an actor of TQC.
+        BadPolicy: nothing of that name, no walker for the robot, or a file that does not hold an
+            actor of TQC.
         MissingDependency: the hub cannot be reached or its client is not installed.
     """
-    path = start_file(start, mode)
+    path = start_file(start, mode, robot)
     if path is None:
         return None
     return from_sb3_zip(path) if zipfile.is_zipfile(path) else load_networks(path)
 
 
-def start_file(start: str, mode: str) -> Path | None:
+def start_file(start: str, mode: str, robot: RobotDescription | None = None) -> Path | None:
     """The file of a start, fetched where it is of the hub; None for `scratch`."""
     if start == "scratch":
         return None
-    path = ASSETS / WALKERS[mode] if start == "walker" else Path(start)
+    if start == "walker":
+        return shipped_walker(mode) if robot is None else walker_file(robot, mode)
+    path = Path(start)
     if path.is_file():
         return path
-    if start == "walker" or not HUB.match(start):
+    if not HUB.match(start):
         raise BadPolicy(
             f"start {start!r}: no such file; use scratch, walker, a networks.safetensors, "
             "an SB3 zip, or owner/name of the hub"
@@ -92,7 +97,7 @@ def from_sb3_zip(path: Path) -> Networks:
 
     try:
         with zipfile.ZipFile(path) as archive:
-            told = json.loads(archive.read("data"))
+            header = json.loads(archive.read("data"))
             raw = torch.load(
                 io.BytesIO(archive.read("policy.pth")), weights_only=True, map_location="cpu"
             )
@@ -106,12 +111,12 @@ def from_sb3_zip(path: Path) -> Networks:
     except Exception as error:  # a damaged file fails in any way
         cause = str(error).partition("\n")[0]
         raise BadPolicy(f"{path} is no SB3 zip that can be read ({cause})") from error
-    _require_relu(path, told)
+    _require_relu(path, header)
     try:
         tensors = _renamed(state)
     except (KeyError, ValueError) as error:
         raise BadPolicy(f"{path} does not hold an actor and critics of TQC ({error})") from error
-    facts = {"from": path.name, "steps": told.get("num_timesteps")}
+    facts = {"from": path.name, "steps": header.get("num_timesteps")}
     return require_complete(Networks(tensors | alpha, facts), path)
 
 
@@ -125,9 +130,9 @@ def _alpha(archive: zipfile.ZipFile, torch: object) -> Tensors:
     return {} if found is None else {"log_alpha": found.detach().numpy().reshape(()).copy()}
 
 
-def _require_relu(path: Path, told: Mapping[str, object]) -> None:
+def _require_relu(path: Path, header: Mapping[str, object]) -> None:
     """SB3 writes the policy's arguments as text beside the pickle."""
-    arguments = told.get("policy_kwargs")
+    arguments = header.get("policy_kwargs")
     activation = str(arguments.get("activation_fn", "ReLU")) if isinstance(arguments, dict) else ""
     if activation and "ReLU" not in activation:
         raise BadPolicy(f"{path} has {activation} layers; only ReLU is known")

@@ -44,7 +44,7 @@ def train_policy(
     if not config.has_budget:
         raise BadConfiguration("training needs a budget: steps, minutes or cpu_minutes")
     hooks = hooks or Hooks()
-    networks = pretrained(config.start, config.mode)
+    networks = pretrained(config.start, config.mode, robot.description)
     out.mkdir(parents=True, exist_ok=True)
     of_tqc = (config.tqc.n_envs, config.seed)
     core = TrackingCore(robot, reference, config.environment, *of_tqc, hooks.rewards)

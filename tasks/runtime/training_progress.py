@@ -27,7 +27,7 @@ async def show_progress(work: Path, name: str) -> AsyncIterator[None]:
         watcher.cancel()
         with suppress(asyncio.CancelledError):
             await watcher
-    await bar.tell()
+    await bar.publish()
 
 
 class _Bar:
@@ -48,9 +48,9 @@ class _Bar:
         while self._artifact is not None:
             lasted = time.monotonic() - began
             await asyncio.sleep(min(max(EVERY_S, SHARE * lasted), LATER_S))
-            await self.tell()
+            await self.publish()
 
-    async def tell(self) -> None:
+    async def publish(self) -> None:
         """What the file says now."""
         from prefect.artifacts import aupdate_progress_artifact
 

@@ -58,7 +58,7 @@ def test_the_version_is_that_of_the_package() -> None:
     ("words", "offered"),
     [
         ("robojackson ret", ["retarget"]),
-        ("robojackson retarget smpl.parquet --robot humanoid_", ["humanoid_strong"]),
+        ("robojackson retarget smpl.parquet --robot humanoid_st", ["humanoid_strong"]),
         ("robojackson train reference.parquet --setup scratch-", ["scratch-curiosity"]),
         ("robojackson train --traine", ["--trainer"]),
     ],

@@ -9,9 +9,11 @@ import pytest
 from flows import pretrain
 from robojackson.cli import stages, walker_training
 from robojackson.pipeline.robot_descriptions import describe_robot
+from robojackson.rl.walkers import walker_file
 from robojackson.robot.model import load_robot
 from storage.store import Store
 from tests.fixtures.commands import robojackson
+from tests.fixtures.own_robot import own_robot
 
 
 @pytest.fixture
@@ -30,7 +32,7 @@ def asked(store_folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[list[str]
     return commands
 
 
-def train(kind: str = "paper", **given: int) -> str:
+def train(kind: str = "paper", **given: Any) -> str:
     return asyncio.run(pretrain.pretrain.fn(kind, **given))
 
 
@@ -53,6 +55,18 @@ def test_trainings_that_differ_share_no_folder(asked: list[list[str]]) -> None:
         train(**given)
     train("track", steps=64)
     assert len({folder_of(command) for command in asked}) == len(asked)
+
+
+def test_the_walker_of_another_robot_is_what_its_trainings_start_from(
+    asked: list[list[str]], store_folder: Path, tmp_path: Path
+) -> None:
+    file = own_robot(tmp_path / "mine")
+    model = file.parent / "model.xml"
+    model.write_text(model.read_text().replace('armature="1"', 'armature="2"'))
+    key = train("track", steps=64, robot=str(file))
+    (command,) = asked
+    assert command[command.index("--robot") + 1] == str(file)
+    assert walker_file(describe_robot(str(file)), "track") == store_folder / key
 
 
 def test_a_configuration_that_was_changed_begins_anew(

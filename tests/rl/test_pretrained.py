@@ -19,7 +19,6 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 from robojackson.errors import BadPolicy, MissingDependency
 from robojackson.formats import onnx_policy
 from robojackson.motion.reference_motion import ReferenceMotion
-from robojackson.rl import pretrained as starting
 from robojackson.rl.config.train_config import PaperConfig, TqcConfig, TrainConfig
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.env.vec_env import TrackingVecEnv
@@ -28,6 +27,7 @@ from robojackson.rl.pretrained import from_sb3_zip, pretrained
 from robojackson.rl.tqc.network_arrays import Networks, fitted, load_networks, widened
 from robojackson.rl.tqc.trainers import make_trainer
 from robojackson.rl.training import train_policy
+from robojackson.rl.walkers import shipped_walker
 from robojackson.robot.model import Robot
 
 SMALL = TqcConfig(n_envs=2, warmup=8, batch=8, buffer=1000, actor=(12, 8), critic=(10,))
@@ -274,7 +274,7 @@ def test_the_shipped_walker_fits_its_mode(robot: Robot, sway: ReferenceMotion, m
     core = TrackingCore(robot, sway, config.environment, 1, 0)
     assert (walker.observation_size, walker.action_size) == (core.observation_size, 17)
     assert fitted(config.tqc, walker, critics=True) == config.tqc
-    assert (starting.ASSETS / starting.WALKERS[mode]).stat().st_size < 10e6
+    assert shipped_walker(mode).stat().st_size < 10e6
 
 
 def small_policy() -> Policy:

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from robojackson.files.file_tree import FileTree
 from robojackson.pipeline.yaml_loader import load
@@ -11,7 +10,7 @@ PICTURE, VIDEO = "mocap.png", "mocap.mp4"
 
 
 def draw_mocap(
-    video: Path, out: Path, config: str, overrides: Mapping[str, Any], film: bool
+    video: Path, out: Path, config: str, overrides: Mapping[str, object], film: bool
 ) -> dict[str, str]:
     """Draw what `stages.mocap` wrote into a folder: over the source, from the front, from the side.
 

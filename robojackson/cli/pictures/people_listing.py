@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 from robojackson.cli import console
 from robojackson.files.file_tree import results_in
@@ -13,8 +12,8 @@ PICTURE = "people.png"
 
 
 def list_people(
-    video: Path, out: Path, config: str, overrides: Mapping[str, Any]
-) -> tuple[dict[str, Any], list[str]]:
+    video: Path, out: Path, config: str, overrides: Mapping[str, object]
+) -> tuple[dict[str, object], list[str]]:
     """Everybody in a video, as an answer and as lines; `--person N` follows one of them.
 
     Raises:
@@ -36,5 +35,6 @@ def list_people(
             raise NoPersonFound(f"{cast}", video)
         files.write(PICTURE, draw_people(video, cast))
     people, picture = cast.people, str(out / PICTURE)
-    told = {"video": str(video), "people": [asdict(p) for p in people], "picture": picture}
-    return told, [*(f"person {person}" for person in people), f"picture  {picture}"]
+    rows = [asdict(person) for person in people]
+    answer: dict[str, object] = {"video": str(video), "people": rows, "picture": picture}
+    return answer, [*(f"person {person}" for person in people), f"picture  {picture}"]

@@ -5,7 +5,7 @@ contacts, torques and feasibility.
 import logging
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from robojackson.cli.pictures.motion_source import source_of
 from robojackson.errors import MissingDependency
@@ -44,19 +44,18 @@ def draw_poses(smpl: Path, out: Path) -> dict[str, str]:
 
 
 def draw_retargeting(
-    smpl: Path, out: Path, config: str, overrides: Mapping[str, Any]
-) -> dict[str, Any]:
+    smpl: Path, out: Path, config: str, overrides: Mapping[str, object]
+) -> dict[str, str]:
     """Draw what `stages.retarget` wrote into a folder, beside the person it was made from.
 
     Raises:
         MissingDependency: no way to draw without a screen.
     """
     from robojackson.api.arguments import robot_of
-    from robojackson.api.progress_bar import bar
+    from robojackson.api.evaluation import render_video
     from robojackson.motion.reference_motion import ReferenceMotion
     from robojackson.motion.smpl_sequence import SmplSequence
     from robojackson.pipeline.pipeline_config import PipelineConfig
-    from robojackson.report.video.side_by_side import side_by_side
 
     settings = load(PipelineConfig, config, overrides)
     sequence = SmplSequence.load(smpl)
@@ -65,11 +64,10 @@ def draw_retargeting(
     drawn = _plots(sequence, reference, robot, out)
     found = source_of(smpl)
     video, track = (found.video, found.track) if found else (None, None)
-    with bar(VIDEO) as progress:
-        side_by_side(
-            video, track, sequence, reference, None, out / VIDEO,
-            model=robot.model, config=settings.render, progress=progress, plain=True,
-        )  # fmt: skip
+    render_video(
+        out / VIDEO, reference, motion=sequence, video=video, landmarks=track, robot=robot,
+        config=settings.render, plain=True, progress=True,
+    )  # fmt: skip
     return {"video": str(out / VIDEO), **drawn}
 
 

@@ -37,25 +37,25 @@ def check_robot(given: str, picture: Path | None) -> tuple[Figures, list[str]]:
         found = problems(description)
     except BadConfiguration as cause:
         found = _all_of(cause)
-    told: Figures = {"robot": given, "ok": not found, "problems": found}
+    answer: Figures = {"robot": given, "ok": not found, "problems": found}
     lines = [f"{given}: {len(found)} problem{'s' if len(found) > 1 else ''}", *found]
     try:
         robot = load_robot(describe_robot(given))
     except RoboJacksonError:
-        told |= _verdict(given, True)
-        return told, [*lines, *closing(told)]
+        answer |= _verdict(given, True)
+        return answer, [*lines, *closing(answer)]
     figures = _figures(robot)
-    told |= figures | {"picture": None}
+    answer |= figures | {"picture": None}
     lines = (lines if found else []) + _table(figures)
     if picture is not None:
         from robojackson.report.plots.robot_sheet import robot_sheet
         from robojackson.report.plots.run_plots import png
 
         FileTree(picture.parent).write(picture.name, png(robot_sheet(robot), opaque=True))
-        told["picture"] = str(picture)
+        answer["picture"] = str(picture)
         lines.append(f"picture  {picture}")
-    told |= _verdict(given, bool(found))
-    return told, [*lines, *closing(told)]
+    answer |= _verdict(given, bool(found))
+    return answer, [*lines, *closing(answer)]
 
 
 def _verdict(given: str, problems: bool) -> Figures:
@@ -93,7 +93,7 @@ def new_robot(model: Path, out: Path | None, force: bool) -> tuple[Figures, list
     if target.exists() and not force:
         raise StoreError(f"{target} is there already; --force overwrites it, -o names another")
     FileTree(target.parent).write(target.name, draft.text.encode())
-    told, lines = check_robot(str(target), None)
+    answer, lines = check_robot(str(target), None)
     head = [f"wrote    {target}"]
     if draft.guessed:
         head.append(f"guessed  {', '.join(draft.guessed)}: no name says them; look at the picture")
@@ -102,10 +102,10 @@ def new_robot(model: Path, out: Path | None, force: bool) -> tuple[Figures, list
     if LEG in draft.left:
         head.append(f"hint     {NO_LEGS}")
     picture = target.with_suffix(".png")
-    told["next"] = command_line("robots", "check", str(target), "-o", str(picture))
-    lines = told["problems"] or lines[:1]
+    answer["next"] = command_line("robots", "check", str(target), "-o", str(picture))
+    lines = answer["problems"] or lines[:1]
     facts = {"file": str(target), "guessed": list(draft.guessed), "left": list(draft.left)}
-    return facts | told, [*head, *lines, f"next: {told['next']}"]
+    return facts | answer, [*head, *lines, f"next: {answer['next']}"]
 
 
 def _all_of(cause: BadConfiguration) -> list[str]:
@@ -114,12 +114,11 @@ def _all_of(cause: BadConfiguration) -> list[str]:
 
     found = [str(cause)]
     if isinstance(cause.__cause__, ValidationError):
-        where = str(cause).partition(": ")[0]
         for error in cause.__cause__.errors()[1:]:
             key = ".".join(str(part) for part in error["loc"])
             unknown = error["type"] == "unexpected_keyword_argument"
             words = f"unknown key {key!r}.{_close(key)}" if unknown else f"{key!r}: {error['msg']}"
-            found.append(f"{where}: {words}")
+            found.append(f"{cause.source}: {words}")
     return found
 
 
@@ -158,21 +157,22 @@ def _figures(robot: Robot) -> Figures:
     }
 
 
-def _table(told: Figures) -> list[str]:
-    width = max(map(len, (*told["joints"], *told["keypoints"], *told["contacts"])))
+def _table(answer: Figures) -> list[str]:
+    width = max(map(len, (*answer["joints"], *answer["keypoints"], *answer["contacts"])))
     lines = [
-        f"{told['name']}: {told['hinges']} hinges, {told['motors']} with a torque limit, "
-        f"{told['mass_kg']:.1f} kg, {told['height_m']:.2f} m tall at rest",
+        f"{answer['name']}: {answer['hinges']} hinges, {answer['motors']} with a torque limit, "
+        f"{answer['mass_kg']:.1f} kg, {answer['height_m']:.2f} m tall at rest",
         f"{'joint':<{width}}  {'from':>7}  {'to':>7}  {'rest':>7}  {'Nm':>6}   degrees",
     ]
-    for name, joint in told["joints"].items():
+    for name, joint in answer["joints"].items():
         low, high, rest = (57.29578 * float(joint[key]) for key in ("low", "high", "rest"))
         torque = f"{joint['torque']:.0f}" if joint["torque"] < float("inf") else "-"
         lines.append(f"{name:<{width}}  {low:>7.1f}  {high:>7.1f}  {rest:>7.1f}  {torque:>6}")
     lines.append(f"{'keypoint':<{width}}  body")
-    lines += [f"{key:<{width}}  {body}" for key, body in told["keypoints"].items()]
+    lines += [f"{key:<{width}}  {body}" for key, body in answer["keypoints"].items()]
     lines.append(f"{'contact ball':<{width}}  mm above the floor at rest")
     lines += [
-        f"{name:<{width}}  {round(1e3 * at, 1) + 0.0:.1f}" for name, at in told["contacts"].items()
+        f"{name:<{width}}  {round(1e3 * at, 1) + 0.0:.1f}"
+        for name, at in answer["contacts"].items()
     ]
     return lines

@@ -13,7 +13,7 @@ from robojackson.clips.quality.stability import Stability
 from robojackson.clips.video import VideoInfo
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import AIR, PLANTED, SmplSequence
-from robojackson.report.pages.run_page import PageContent, Plot
+from robojackson.report.pages.run_page import PageContent, Plot, dancer_of
 from robojackson.report.plots import run_plots
 from robojackson.report.plots.feasibility_plot import feasibility_strip
 
@@ -39,6 +39,7 @@ class Results:
         evaluations: Rows of EvaluationRecord.
         rollout_qpos: The trained robot from the first step, or None.
         advice: What to do better when the clip is filmed again.
+        tracker_video: Name of the film of a tracker beside a trained robot, or None.
     """
 
     title: str
@@ -52,6 +53,7 @@ class Results:
     evaluations: Sequence[Mapping[str, Any]]
     rollout_qpos: Float[np.ndarray, "S nq"] | None
     advice: Sequence[Advice] = ()
+    tracker_video: str | None = None
 
 
 def page_content(results: Results, video: str | None) -> PageContent:
@@ -65,6 +67,7 @@ def page_content(results: Results, video: str | None) -> PageContent:
         training=results.training,
         evaluation=results.evaluation,
         video=video,
+        tracker_video=results.tracker_video,
         plots=_plots(results),
         versions=versions(),
         notes=results.sequence.notes,
@@ -83,7 +86,7 @@ def versions(programs: Sequence[str] = PROGRAMS) -> dict[str, str]:
     return found
 
 
-def _source(info: VideoInfo) -> dict[str, Any]:
+def _source(info: VideoInfo) -> dict[str, object]:
     return {
         "file": info.path.name,
         "size": f"{info.width} × {info.height}",
@@ -93,7 +96,7 @@ def _source(info: VideoInfo) -> dict[str, Any]:
     }
 
 
-def _mocap(sequence: SmplSequence) -> dict[str, Any]:
+def _mocap(sequence: SmplSequence) -> dict[str, object]:
     rest = sequence.rest_joints
     return {
         "frames": len(sequence),
@@ -110,7 +113,8 @@ def _plots(results: Results) -> list[Plot]:
         figure = run_plots.training_curve(results.episodes, reference.dt)
         made.append(_plot("Training", "Median and quartiles of the training episodes.", figure))
     if results.evaluations:
-        figure = run_plots.survival_by_phase(results.evaluations, reference.dt)
+        dancer = dancer_of(results.evaluation)
+        figure = run_plots.survival_by_phase(results.evaluations, reference.dt, dancer)
         caption = (
             "Mean survival from every start phase: a low bar is a moment at which it cannot begin."
         )
@@ -124,7 +128,7 @@ def _plots(results: Results) -> list[Plot]:
         made.append(_plot("How lively the limbs are", caption, figure))
     if results.rollout_qpos is not None and len(results.rollout_qpos):
         figure = run_plots.joint_tracking(reference, results.rollout_qpos)
-        caption = "The six hinges that move most: grey the reference, blue the trained robot."
+        caption = "The six hinges that move most: grey the reference, blue the robot in simulation."
         made.append(_plot("Joint tracking", caption, figure))
     figure = run_plots.contact_strip(results.sequence, reference)
     made.append(_plot("Contacts", "Feet on the floor, of the person and of the robot.", figure))

@@ -21,6 +21,8 @@ VERDICT_COLUMNS = (
     "survived_s", "success", "strict_success", "skill", "site_error_m", "limb_gain", "drift_m",
     "heading_error_deg",
 )  # fmt: skip
+NOT_TRAINED = "follows any motion, not trained on this one"
+"""What a tracker does."""
 TOO_SHORT = "too short"
 """In place of a figure that rollouts are too short to judge."""
 SCORECARD_LINES = (
@@ -60,6 +62,7 @@ class PageContent:
         training: trainer, steps, updates, training_s, seed, ...
         evaluation: Summary of `Evaluation`, its `baselines` inside.
         video: Address of the mp4 relative to the page, or None.
+        tracker_video: The same of a tracker's dance beside a trained one.
         plots: In the order they are shown.
         versions: Of programs and models.
         notes: Warnings for the reader.
@@ -74,6 +77,7 @@ class PageContent:
     training: Mapping[str, Any] = field(default_factory=dict)
     evaluation: Mapping[str, Any] = field(default_factory=dict)
     video: str | None = None
+    tracker_video: str | None = None
     plots: Sequence[Plot] = ()
     versions: Mapping[str, str] = field(default_factory=dict)
     notes: Sequence[str] = ()
@@ -105,6 +109,8 @@ def render(content: PageContent) -> str:
         content=content,
         style=here.joinpath("page.css").read_text("utf-8"),
         headline=headline(content.evaluation),
+        dancer=dancer_of(content.evaluation),
+        trackers=list(content.evaluation.get("trackers", {})),
         tiles=_tiles(content.evaluation),
         columns=[Quantity("", "")] + quantities(dict.fromkeys(VERDICT_COLUMNS)),
         verdicts=verdicts(content.evaluation),
@@ -123,6 +129,12 @@ def write_page(content: PageContent, out: Path) -> Path:
     return out
 
 
+def dancer_of(evaluation: Mapping[str, Any]) -> str:
+    """Return who dances: the trained robot, or a tracker by its name."""
+    name = evaluation.get("tracker")
+    return POLICY_TITLES[TRAINED][0] if name is None else f"tracker {name}"
+
+
 def headline(evaluation: Mapping[str, Any]) -> str:
     """Return one sentence that says how well it went, beside the best of the baselines."""
     if not evaluation:
@@ -132,7 +144,7 @@ def headline(evaluation: Mapping[str, Any]) -> str:
         return said
     said += " " if said else ""
     said += (
-        f"The trained robot finished {format_value('success', evaluation['success'])} of "
+        f"The {dancer_of(evaluation)} finished {format_value('success', evaluation['success'])} of "
         f"{format_value('rollouts', evaluation['rollouts'])} rollouts without a fall"
     )
     baselines = evaluation.get("baselines", {})
@@ -167,10 +179,13 @@ def verdicts(evaluation: Mapping[str, Any]) -> list[Verdict]:
     """Return the figures of the trained policy and of its baselines, ready to read."""
     if not evaluation:
         return []
-    policies = {TRAINED: evaluation, **evaluation.get("baselines", {})}
+    trackers = evaluation.get("trackers", {})
+    policies = {TRAINED: evaluation, **trackers, **evaluation.get("baselines", {})}
     rows = []
     for name, figures in policies.items():
         title, meaning = POLICY_TITLES.get(name, (name, ""))
+        if "tracker" in figures:
+            title, meaning = dancer_of(figures), NOT_TRAINED
         short = evaluation.get("verdict", {}).get("kind") == "too_short"
         values = [
             TOO_SHORT if short and column in UNJUDGED else format_value(column, figures.get(column))

@@ -14,19 +14,22 @@ SeedCurves = Mapping[tuple[str, str], Mapping[int, Mapping[str, np.ndarray]]]
 
 
 def curve_plots(
-    curves: SeedCurves, grid: Float[np.ndarray, " G"], moves: Sequence[str], setups: Sequence[str]
+    curves: SeedCurves,
+    grids: Mapping[str, Float[np.ndarray, " G"]],
+    moves: Sequence[str],
+    setups: Sequence[str],
 ) -> list[Plot]:
     """Draw the learning curves of each move that has any.
 
     Args:
-        grid: Ends of the intervals of the curves, control steps.
+        grids: By move, ends of the intervals of its curves, control steps.
     """
     from robojackson.report.plots.run_plots import png  # matplotlib: only when something is drawn
     from robojackson.report.plots.study_plots import Curves, learning_curves
 
-    middle = (grid[1:] + grid[:-1]) / 2
     made = []
     for move in moves:
+        middle = (grids[move][1:] + grids[move][:-1]) / 2
         drawn: dict[str, Curves] = {
             setup: Curves(
                 middle,

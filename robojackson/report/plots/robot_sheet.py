@@ -143,12 +143,12 @@ def _names(
         axes.text(column, y, name, color=colour, bbox=box, **where)
 
 
-def _spread(wanted: list[float], span: tuple[float, float]) -> list[float]:
-    """Heights as near to the wanted as they can be without two names on one another."""
+def _spread(preferred: list[float], span: tuple[float, float]) -> list[float]:
+    """Heights as near to the preferred as they can be without two names on one another."""
     low, high = span
-    gap = min((high - low) / max(len(wanted), 1), (high - low) / 24)
+    gap = min((high - low) / max(len(preferred), 1), (high - low) / 24)
     found: list[float] = []
-    for height in wanted:
+    for height in preferred:
         found.append(max(height, found[-1] + gap if found else low))
     for index in range(len(found) - 1, -1, -1):
         most = found[index + 1] - gap if index + 1 < len(found) else high

@@ -51,8 +51,10 @@ def training_curve(episodes: Sequence[Row], dt: float) -> Figure:
     return figure
 
 
-def survival_by_phase(rows: Sequence[Row], dt: float) -> Figure:
-    """Mean survival from each start phase: the trained robot as bars, under another law of its
+def survival_by_phase(
+    rows: Sequence[Row], dt: float, dancer: str = POLICY_TITLES[TRAINED][0]
+) -> Figure:
+    """Mean survival from each start phase: the dancer as bars, under another law of its
     torque as a dashed line, its baselines as lines.
     """
     figure, (axes,) = figure_of(7.0, 2.8)
@@ -64,9 +66,9 @@ def survival_by_phase(rows: Sequence[Row], dt: float) -> Figure:
         if policy == TRAINED:
             width = 0.8 * dt * float(np.diff(phases).min()) if len(phases) > 1 else 0.1
             place = phases * dt
-            axes.bar(place, mean, width, align="edge", color=ACCENT, label=title)
+            axes.bar(place, mean, width, align="edge", color=ACCENT, label=dancer)
         elif policy in VARIANTS:
-            title = f"{POLICY_TITLES[TRAINED][0]}, {title}"
+            title = f"{dancer}, {title}"
             axes.plot(phases * dt, mean, ".--", lw=1, color=SECOND, label=title)
         else:
             colour = BASELINE_COLOURS.get(policy, INK)

@@ -113,8 +113,9 @@ class Film:
         model: mujoco.MjModel,
         tint: Tint,
         turn_deg: float = 0.0,
+        is_rollout: bool = False,
     ) -> None:
-        """A robot at every moment."""
+        """A robot at every moment; a rollout has an end."""
         key = (id(model), tint)
         if key not in self._views:
             view = RobotView(model, *self._size, tint)
@@ -125,7 +126,7 @@ class Film:
 
         def draw(index: int, framing: Framing) -> canvas.Picture:
             panel = view.picture(qpos[index], target[index], azimuth, framing)
-            over = title.startswith("trained") and bool(self._when.ended[index])
+            over = is_rollout and bool(self._when.ended[index])
             canvas.label(panel, title, "ended" if over else f"{self._when.time_s[index]:.1f} s")
             return panel
 

@@ -11,6 +11,7 @@ import sys
 from types import TracebackType
 from typing import Any
 
+import cv2
 import mujoco
 import numpy as np
 from jaxtyping import Float
@@ -27,6 +28,9 @@ GRAPHICS_INSTALL = (
 REFERENCE_TINT: Tint = (0.55, 0.66, 0.86)
 TRAINED_TINT: Tint = (0.93, 0.62, 0.33)
 """RGB 0..1."""
+FINER = 2
+"""Pixels drawn for each that is shown, along an edge: smoother than the renderer's multisampling
+and, where it is software, twice as fast."""
 
 
 class RobotView:
@@ -37,9 +41,10 @@ class RobotView:
     """
 
     def __init__(self, model: mujoco.MjModel, width: int, height: int, tint: Tint) -> None:
-        self.model = dressed(model, width, height, tint)
+        self._size, size = (width, height), (FINER * width, FINER * height)
+        self.model = dressed(model, *size, tint)
         self._data = mujoco.MjData(self.model)
-        self._gl = _gl_context(width, height)
+        self._gl = _gl_context(*size)
         self._gl.make_current()
         self._context = mujoco.MjrContext(self.model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
@@ -49,7 +54,7 @@ class RobotView:
             self._scene.flags[flag] = 0
         self._camera, self._options = mujoco.MjvCamera(), mujoco.MjvOption()
         self._options.sitegroup[:] = 0
-        self._rect = mujoco.MjrRect(0, 0, width, height)
+        self._rect = mujoco.MjrRect(0, 0, *size)
 
     def picture(
         self,
@@ -73,7 +78,8 @@ class RobotView:
         out = np.empty((self._rect.height, self._rect.width, 3), np.uint8)
         depth = np.empty((self._rect.height, self._rect.width), np.float32)
         mujoco.mjr_readPixels(out, depth, self._rect, self._context)
-        return np.ascontiguousarray(on_backdrop(out, depth)[::-1])
+        picture = cv2.resize(on_backdrop(out, depth), self._size, interpolation=cv2.INTER_AREA)
+        return np.ascontiguousarray(picture[::-1])
 
     def close(self) -> None:
         """Free what the graphics driver holds."""

@@ -6,11 +6,13 @@ none of it is drawn. Metres; RGB 0..1.
 
 import copy
 
+import cv2
 import mujoco
 import numpy as np
 from jaxtyping import Float
 
 from robojackson.report.video.canvas import BACKDROP, Picture
+from robojackson.report.video.mesh_detail import simplify
 from robojackson.report.video.panel_camera import FOCAL
 
 Tint = tuple[float, float, float]
@@ -24,6 +26,8 @@ FLOOR_REACH, LINE_REACH, LINE_CELL, LINE_WIDTH, LINE_HEIGHT = 60.0, 8, 0.5, 0.01
 HEAD_AMBIENT, HEAD_DIFFUSE, KEY_DIFFUSE, KEY_SPECULAR = 0.28, 0.42, 0.42, 0.15
 KEY_DIRECTION = (-0.45, -0.35, -0.82)
 """Where the second light shines to, world; the first is the camera's."""
+DETAIL_M = 0.005
+"""Smallest detail of a robot's meshes; a pixel of a panel is about as large."""
 FAR = 1.0
 """Depth of what is not there."""
 
@@ -31,6 +35,8 @@ FAR = 1.0
 def dressed(model: mujoco.MjModel, width: int, height: int, tint: Tint) -> mujoco.MjModel:
     """A copy of the model with our lens, the robot in one colour, and no floor."""
     dressed = copy.copy(model)
+    simplify(dressed, DETAIL_M)
+    dressed.vis.quality.offsamples = 0
     dressed.vis.global_.offwidth = max(width, dressed.vis.global_.offwidth)
     dressed.vis.global_.offheight = max(height, dressed.vis.global_.offheight)
     dressed.vis.global_.fovy = float(np.degrees(2.0 * np.arctan(0.5 / FOCAL)))
@@ -66,8 +72,9 @@ def shadowing(model: mujoco.MjModel) -> np.ndarray:
 
 
 def on_backdrop(picture: Picture, depth: Float[np.ndarray, "H W"]) -> Picture:
-    """The picture with our background where nothing was drawn."""
-    return np.where((depth >= FAR)[..., None], np.array(BACKDROP, np.uint8), picture)
+    """The picture with our background where nothing was drawn, in place."""
+    ours = np.full_like(picture, BACKDROP)
+    return cv2.copyTo(ours, (depth >= FAR).astype(np.uint8), picture)
 
 
 def _light(scene: mujoco.MjvScene) -> None:

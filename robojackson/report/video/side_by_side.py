@@ -23,6 +23,7 @@ from robojackson.report.video.robot_panel import REFERENCE_TINT, TRAINED_TINT
 from robojackson.report.video.timeline import clip_timeline, reference_qpos, timeline
 
 Progress = Callable[[int, int], None]
+TRAINED_TITLE = "trained robot"
 
 
 def side_by_side(
@@ -37,6 +38,7 @@ def side_by_side(
     config: VideoConfig | None = None,
     progress: Progress | None = None,
     plain: bool = False,
+    title: str = TRAINED_TITLE,
 ) -> Path:
     """Write the mp4; what is None has no panel.
 
@@ -49,6 +51,7 @@ def side_by_side(
         progress: Called with (pictures done, pictures in all).
         plain: Show the source as it is, too, and the recovered skeleton over it instead of the
             landmarks.
+        title: Over the panel of the rollout.
     Raises:
         MissingDependency: no way to draw without a screen.
     """
@@ -65,7 +68,8 @@ def side_by_side(
             film.add_body(sequence)
         film.add_robot("reference robot", reference_qpos(reference, when), model, REFERENCE_TINT)
         if rollout_qpos is not None and steps:
-            film.add_robot("trained robot", rollout_qpos[when.rollout], model, TRAINED_TINT)
+            qpos = rollout_qpos[when.rollout]
+            film.add_robot(title, qpos, model, TRAINED_TINT, is_rollout=True)
         return _written(film, len(when), config, out, progress)
 
 

@@ -12,15 +12,19 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.evaluate_config import TRAINED
 from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.evaluation.rollouts import Driver
+from robojackson.rl.evaluation.tracker_driver import CONTROL, tracker_driver
 from robojackson.rl.modes.observation import Kind, Observer
 from robojackson.rl.policy import Policy
-from robojackson.rl.sim.motors import Motors, residual_scale
+from robojackson.rl.sim.motors import Motors, actuation_facts, residual_scale
 from robojackson.rl.sim.reference_clip import ClipStep
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.rl.sim.stock_humanoid import stock_observation, stock_observation_size
+from robojackson.rl.trackers.tracker import Tracker
 from robojackson.robot.model import Robot
 
 T = TypeVar("T")
+Evaluated = Policy | Tracker
+"""Who may be evaluated: a policy that was trained on a motion, or a tracker of any."""
 Command = Callable[[Simulation, ClipStep, np.ndarray, np.ndarray], np.ndarray]
 
 
@@ -29,12 +33,23 @@ def mode_of(policy: Policy) -> str:
     return str(policy.facts.get("mode", "track"))
 
 
-def control_of(policy: Policy, robot: Robot) -> ControlConfig:
-    """The control law that a policy was trained with.
+def equipped(policy: Evaluated, robot: Robot) -> Robot:
+    """The robot with the gains of a tracker; itself for a policy.
+
+    Raises:
+        BadPolicy: the tracker is for another robot.
+    """
+    return robot if isinstance(policy, Policy) else policy.equip(robot)
+
+
+def control_of(policy: Evaluated, robot: Robot) -> ControlConfig:
+    """The control law that a policy was trained with; a tracker follows the PD law.
 
     Raises:
         BadPolicy: the policy was trained for another robot, or its file says no control law.
     """
+    if not isinstance(policy, Policy):
+        return CONTROL
     trained_for = policy.facts.get("robot", robot.description.name)
     if trained_for != robot.description.name:
         raise BadPolicy(
@@ -53,7 +68,33 @@ def control_of(policy: Policy, robot: Robot) -> ControlConfig:
             f"the policy gives {policy.action_size} actions and robot {robot.description.name!r} "
             f"takes {robot.model.nu}: it was trained for another robot"
         )
-    return fact(policy, "control", ControlConfig)
+    control = fact(policy, "control", ControlConfig)
+    _require_same_actuation(policy, robot, control)
+    return control
+
+
+def _require_same_actuation(policy: Policy, robot: Robot, control: ControlConfig) -> None:
+    """Refuse a robot whose gains or action scale have changed since the policy was trained.
+
+    Raises:
+        BadPolicy: naming the first motor that differs.
+    """
+    recorded = policy.facts.get("actuation")
+    if mode_of(policy) != "track" or not isinstance(recorded, Mapping):
+        return
+    motors = [robot.joint_names[hinge] for hinge in Motors.of(robot.model).hinge]
+    for name, now in actuation_facts(robot, control).items():
+        then = np.asarray(recorded.get(name, now), float)
+        if then.shape == (len(motors),) and np.allclose(then, now, rtol=1e-6):
+            continue
+        same_shape = then.shape == (len(motors),)
+        worst = int(np.argmax(np.abs(then - now))) if same_shape else 0
+        was = f"{then[worst]:g}" if same_shape else f"{then.size} numbers"
+        raise BadPolicy(
+            f"the policy was trained with {name} {was} of {motors[worst]} and robot "
+            f"{robot.description.name!r} has {now[worst]:g} now: restore the robot's YAML or train "
+            "anew"
+        )
 
 
 def fact(policy: Policy, name: str, kind: type[T]) -> T:
@@ -74,23 +115,25 @@ def fact(policy: Policy, name: str, kind: type[T]) -> T:
 
 
 def drivers(
-    policy: Policy, reference: ReferenceMotion, robot: Robot, seed: int
+    policy: Evaluated, reference: ReferenceMotion, robot: Robot, seed: int
 ) -> dict[str, Driver]:
     """The policy, its variants and the baselines by name; each baseline follows the PD law."""
     control = control_of(policy, robot)
-    found = {TRAINED: _trained(policy, robot, control)}
-    if control.law == "pd":
+    found = {TRAINED: trained_driver(policy, robot, reference)}
+    if control.law == "pd" and isinstance(policy, Policy):
         found["hold"] = replace(found[TRAINED], control=replace(control, law="hold"))
     usual = control if control.law == "pd" else ControlConfig(substeps=control.substeps)
     return found | _baselines(reference, robot, usual, seed)
 
 
-def trained_driver(policy: Policy, robot: Robot) -> Driver:
-    """The policy as it was trained.
+def trained_driver(policy: Evaluated, robot: Robot, reference: ReferenceMotion) -> Driver:
+    """The policy as it was trained, or the tracker.
 
     Raises:
         BadPolicy: it was trained for another robot.
     """
+    if not isinstance(policy, Policy):
+        return tracker_driver(policy, robot, reference)
     return _trained(policy, robot, control_of(policy, robot))
 
 

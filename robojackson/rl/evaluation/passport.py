@@ -10,11 +10,10 @@ from typing import Any
 
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import EvaluateConfig, RandomConfig
-from robojackson.rl.evaluation.controllers import trained_driver
+from robojackson.rl.evaluation.controllers import Evaluated, trained_driver
 from robojackson.rl.evaluation.rollout_records import RolloutScorer
 from robojackson.rl.evaluation.rollouts import Conditions, roll_out
 from robojackson.rl.evaluation.starts import starts_of, summarise
-from robojackson.rl.policy import Policy
 from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.variation import Variation, varied
@@ -87,7 +86,7 @@ def _signals(robot: Robot, seed: int) -> Iterator[Case]:
 
 
 def passport(
-    policy: Policy,
+    policy: Evaluated,
     reference: ReferenceMotion,
     robot: Robot,
     config: EvaluateConfig,
@@ -115,10 +114,11 @@ def passport(
 
 
 def _judged(
-    policy: Policy, reference: ReferenceMotion, robot: Robot, config: EvaluateConfig, case: Case
+    policy: Evaluated, reference: ReferenceMotion, robot: Robot, config: EvaluateConfig, case: Case
 ) -> dict[str, float]:
     """Means over the rollouts of a case; the driver's gains are the varied robot's."""
-    other, driver = varied(robot, case.variation), trained_driver(policy, robot)
+    other = varied(robot, case.variation)
+    driver = trained_driver(policy, robot, reference)
     clip = Clip(reference, lead_of(robot, reference, driver.control))
     driver = replace(driver, control=replace(driver.control, substeps=other.substeps))
     starts, labels = starts_of(robot, clip, config)

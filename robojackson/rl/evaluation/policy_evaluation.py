@@ -23,7 +23,14 @@ from robojackson.rl.config.train_config import (
     PaperConfig,
     TrackConfig,
 )
-from robojackson.rl.evaluation.controllers import control_of, drivers, fact, mode_of
+from robojackson.rl.evaluation.controllers import (
+    Evaluated,
+    control_of,
+    drivers,
+    equipped,
+    fact,
+    mode_of,
+)
 from robojackson.rl.evaluation.passport import passport
 from robojackson.rl.evaluation.reward_audit import RewardAudit, audit_both_readings, audit_record
 from robojackson.rl.evaluation.reward_meter import RewardMeter, without_curiosity
@@ -63,17 +70,20 @@ class Evaluation:
 
 
 def evaluate_policy(
-    policy: Policy,
+    policy: Evaluated,
     reference: ReferenceMotion,
     robot: Robot,
     config: EvaluateConfig,
     progress: Callable[[str, int, int], None] = lambda name, step, total: None,
 ) -> Evaluation:
-    """Judge a policy and its baselines on one reference motion.
+    """Judge a policy or a tracker and its baselines on one reference motion.
+
+    The baselines beside a tracker have the tracker's gains.
 
     Raises:
-        BadPolicy: the policy's observation does not fit this robot.
+        BadPolicy: the policy's observation does not fit this robot, or the tracker is for another.
     """
+    robot = equipped(policy, robot)
     control = control_of(policy, robot)
     require_same_clock(control_step(robot, control), reference.dt)
     _warn_about_other_motion(policy, reference)
@@ -106,20 +116,25 @@ def evaluate_policy(
     variants = {name: summaries.pop(name) for name in VARIANTS if name in summaries}
     reward = reward_report(robot, reference, environment, own, float(horizon.mean()))
     length = config.seconds if clip.cyclic else clip.steps * clip.dt
-    verdict = verdict_on(own, summaries, length, policy.updates)
+    updates = policy.updates if isinstance(policy, Policy) else None
+    verdict = verdict_on(own, summaries, length, updates)
     shown: dict[str, object] = dict(own)
     baselines: dict[str, object] = dict(summaries)
     if verdict.kind == "too_short":
         shown = without_unjudged(own)
         baselines = {name: without_unjudged(found) for name, found in summaries.items()}
     told: dict[str, object] = {"variants": variants, "baselines": baselines, "reward": reward}
+    if not isinstance(policy, Policy):
+        told["tracker"] = policy.description.name
     if config.passport:
         told["passport"] = passport(policy, reference, robot, config, progress)
     return Evaluation({**shown, **told, "verdict": verdict.as_facts()}, rows, qpos)
 
 
-def environment_of(policy: Policy, control: ControlConfig) -> TrackConfig | PaperConfig:
+def environment_of(policy: Evaluated, control: ControlConfig) -> TrackConfig | PaperConfig:
     """The environment whose reward a policy is measured with: its own, without curiosity."""
+    if not isinstance(policy, Policy):
+        return TrackConfig(control=control)
     held = policy.facts.get("environment")
     paper = mode_of(policy) == "paper"
     if not isinstance(held, Mapping):
@@ -158,8 +173,10 @@ def reward_report(
     }
 
 
-def _warn_about_other_motion(policy: Policy, reference: ReferenceMotion) -> None:
+def _warn_about_other_motion(policy: Evaluated, reference: ReferenceMotion) -> None:
     """A policy may be judged on another motion than it learnt, but not without a word."""
+    if not isinstance(policy, Policy):
+        return
     learnt = policy.facts.get("reference_sha256")
     if learnt is not None and learnt != poses_sha256(reference):
         log.warning(

@@ -18,7 +18,7 @@ from tests.fixtures.commands import environment
 from tools.stack.interrupted_command import living_with
 
 ACKNOWLEDGED_S, ENDED_S = 5.0, 10.0
-"""Generous multiples of 1 and 3 s, for a busy machine; benchmarks.orchestration.interruption
+"""Generous multiples of 1 and 3 s, for a busy machine; benchmarks.orchestration.interruption_times
 measures."""
 SCRIPT = """
 import itertools, os, signal, subprocess, sys, time

@@ -83,7 +83,7 @@ def test_a_refresh_with_nothing_due_says_what_waits() -> None:
     [
         (400, 1, "meaningless", "mean nothing"),
         (50_000, 3, "few_seeds", "3 seeds can show no difference"),
-        (50_000, 10, "judged", "which claims hold"),
+        (50_000, 10, "evaluated", "which claims hold"),
     ],
 )
 def test_a_study_says_what_its_numbers_are_worth(
@@ -98,16 +98,16 @@ def test_a_study_says_what_its_numbers_are_worth(
 def test_a_catalogue_counts_what_may_be_danced_and_dances_the_first() -> None:
     rows = [row("rejected", dance="APT"), row("accepted", dance="moonwalk", url="https://x.org/m")]
     told = catalogue_verdict(rows)
-    assert told["verdict"]["sentence"] == "2 videos of 2 dances were judged, 1 may be danced."
+    assert told["verdict"]["sentence"] == "2 videos of 2 dances were assessed, 1 may be danced."
     assert shlex.split(told["next"]) == ["robojackson", "dance", "https://x.org/m"]
     none = catalogue_verdict([row("rejected", dance="APT")])
     assert shlex.split(none["next"]) == ["robojackson", "find", "APT"]
 
 
-def test_the_overview_of_studies_counts_what_can_be_judged() -> None:
+def test_the_overview_of_studies_counts_what_can_be_evaluated() -> None:
     rows = [{"study": "smoke", "strict_success": None}, {"study": "smoke", "strict_success": 0.5}]
     told = metrics_verdict(rows)
-    assert told["verdict"]["sentence"] == "2 cells of 1 study; 1 can be judged."
+    assert told["verdict"]["sentence"] == "2 cells of 1 study; 1 can be evaluated."
     assert shlex.split(told["next"])[:3] == ["robojackson", "metrics", "--sql"]
 
 

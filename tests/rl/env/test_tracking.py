@@ -17,7 +17,12 @@ from robojackson.rl.config.train_config import (
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.env.vec_env import TrackingEnv, TrackingVecEnv
 from robojackson.rl.modes.reset_states import StartPhases, default_standing_pose, standing_pose_at
-from robojackson.rl.modes.rewards import TrackedPoints, reward_terms, tracking_errors
+from robojackson.rl.modes.rewards import (
+    TrackedPoints,
+    reward_terms,
+    tracked_points,
+    tracking_errors,
+)
 from robojackson.rl.modes.track_mode import SETTLED_STATES_NEEDED
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.robot.fall import Fall
@@ -86,6 +91,22 @@ def test_the_reward_is_greatest_at_the_reference(sway: ReferenceMotion) -> None:
     weights = [getattr(RewardConfig(), f.name.removesuffix("_width")) for f in
                dataclasses.fields(RewardConfig()) if f.name.endswith("_width")]  # fmt: skip
     assert best == pytest.approx(sum(weights))
+
+
+@pytest.mark.parametrize("term", RewardConfig.terms())
+def test_an_error_costs_every_term(sway: ReferenceMotion, term: str) -> None:
+    """Paid alone it is its weight at the reference, and next to nothing where all is wrong."""
+    config = RewardConfig(**{name: float(name == term) for name in RewardConfig.terms()})
+    target, rng = Clip(sway).at(np.array([10])), np.random.default_rng(0)
+    right = (target.qpos, target.qvel, target.points, target.moved)
+    wrong = [state + rng.normal(0, 2.0, state.shape) for state in right]
+    wrong[0][:, 3:7] /= np.linalg.norm(wrong[0][:, 3:7])
+    which = tracked_points(sway.keypoint_names)
+    paid = [
+        reward_terms(tracking_errors(*states, target, which), np.zeros(1), config)[term][0]
+        for states in (right, wrong)
+    ]
+    assert paid == [pytest.approx(1.0), pytest.approx(0.0, abs=0.5)]
 
 
 def test_the_hands_are_compared(sway: ReferenceMotion) -> None:

@@ -12,14 +12,16 @@ from robojackson.rl.config.train_config import (
     EvaluateConfig,
     PaperConfig,
 )
+from robojackson.rl.evaluation.controllers import control_of
 from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
 from robojackson.rl.evaluation.rollout_records import RolloutScorer
 from robojackson.rl.evaluation.rollouts import Driver, Rollouts, Starts, roll_out
 from robojackson.rl.modes.observation import Observer
 from robojackson.rl.policy import Policy
+from robojackson.rl.sim.motors import actuation_facts
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.robot.fall import Fall
-from robojackson.robot.model import Robot
+from robojackson.robot.model import Robot, load_robot
 
 STEPS = 160
 
@@ -199,6 +201,18 @@ def test_a_policy_for_a_robot_of_another_name_is_refused(
 
 
 @pytest.mark.medium
+def test_a_robot_whose_gains_changed_since_the_training_is_refused(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    policy = idle(robot, sway)
+    facts = dict(policy.facts) | {"actuation": actuation_facts(robot, ControlConfig())}
+    known = dataclasses.replace(policy, facts=facts)
+    assert control_of(known, robot) == ControlConfig()
+    softer = load_robot(dataclasses.replace(robot.description, action_scale={"*_knee": 0.2}))
+    with pytest.raises(BadPolicy, match=r"action_scale 0\.5 of right_knee .* has 0\.2 now"):
+        control_of(known, softer)
+
+
 def test_a_policy_that_learnt_another_dance_is_judged_with_a_word(
     robot: Robot, sway: ReferenceMotion, caplog: pytest.LogCaptureFixture
 ) -> None:

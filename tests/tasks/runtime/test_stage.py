@@ -19,6 +19,7 @@ from storage.store import Store
 from tasks import recover_motion, train_policy
 from tasks.runtime import stage as caching
 from tasks.runtime.code_digest import digest
+from tests.fixtures.robots import description
 
 FORMULA = '"""A formula."""\n\ndef formula(x):\n    """Twice."""\n    return 2 * x\n'
 MODULES = {
@@ -242,7 +243,9 @@ def test_the_weights_of_the_temporal_network_are_part_of_the_key(tmp_path: Path)
 def test_the_key_of_a_training_holds_the_minutes_that_were_asked_for() -> None:
     """Not those that the clock left, so that the same call again does not train again."""
     recipe = train_policy.train_policy.recipe
-    given = {"config": TrainConfig(minutes=20.0), "whole_pass": True, "limit_s": None}
+    robot = description("humanoid")
+    given = {"config": TrainConfig(minutes=20.0), "robot": robot} | {"whole_pass": True}
+    given |= {"limit_s": None}
     clocks = [None, *(train_policy.TrainingTime(at, 10.0) for at in (0.0, 1e9))]
     keys = {recipe.key({**given, "time_left": clock}) for clock in clocks}
     other = recipe.key({**given, "config": TrainConfig(minutes=30.0)})

@@ -1,0 +1,117 @@
+"""What a tracker dances at once: a first look on the page, then the full evaluation.
+
+The page is written before anything else is evaluated or trained, and again when more is known, at
+the same address.
+"""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from flows.video_pass.pass_progress import announce
+from flows.video_pass.scored_candidates import Candidate
+from robojackson.errors import BadPolicy, MissingDependency
+from robojackson.pipeline.pipeline_config import PipelineConfig
+from robojackson.pipeline.tracker_descriptions import require_tracker
+from robojackson.rl.trackers.tracker_description import TrackerDescription
+from robojackson.robot.model import RobotDescription
+from storage.artifact import Artifact
+from tasks.draw_pictures import draw_snapshot
+from tasks.evaluate_dance import evaluate_tracker, first_look
+from tasks.render_video import render_video
+from tasks.runtime.run_logger import run_logger
+from tasks.runtime.stage import identity, is_records_only
+from tasks.train_policy import RunLabels
+from tasks.write_page import write_first_page
+
+Artifacts = dict[str, Artifact]
+FILM = "tracker.mp4"
+TITLE = "tracker {}"
+"""Over the tracker's panel of the film."""
+FIRST_PAGE = "the tracker's dance is on %s; what follows is added there"
+"""Log line with the address of the page, which the bar of `robojackson dance` shows as well."""
+JOINED = {"evaluation": "tracker_evaluation", "dance": "tracker_dance"}
+"""What of a tracker stays beside a trained policy, by its name alone and by its name there."""
+
+
+@dataclass(frozen=True)
+class TrackedDance:
+    """A dance that a tracker has danced.
+
+    Attributes:
+        tracker: Which.
+        made: What its stages left, by the names that a trained policy's have.
+        folder: Of the page.
+    """
+
+    tracker: TrackerDescription
+    made: Artifacts
+    folder: str
+
+    @property
+    def joined(self) -> Artifacts:
+        """What stays of it on the page of a trained policy."""
+        return {there: self.made[alone] for alone, there in JOINED.items()}
+
+
+def chosen_tracker(robot: RobotDescription, settings: PipelineConfig) -> TrackerDescription | None:
+    """Return the tracker that dances at once; None where there is none and none is needed.
+
+    Raises:
+        BadPolicy: `instant` needs one that is not here, or there is none for the robot.
+        MissingDependency: `instant` needs one, and what runs it is not installed.
+        UnknownName: no tracker of that name.
+    """
+    try:
+        return require_tracker(robot.name, settings.tracker)
+    except (BadPolicy, MissingDependency):
+        if settings.instant:
+            raise
+        return None
+
+
+def track(
+    tracker: TrackerDescription,
+    best: Candidate,
+    moved: Mapping[str, Artifact],
+    robot: RobotDescription,
+    settings: PipelineConfig,
+    labels: RunLabels,
+) -> TrackedDance:
+    """Dance, film it, show it, then evaluate it from all starts.
+
+    Args:
+        moved: `landmarks`, `smpl`, `reference` and `scorecard` of the clip.
+    """
+    reference = moved["reference"]
+    announce("tracking")
+    look = evaluate_tracker(tracker, reference, robot, first_look(settings.evaluate), labels)
+    announce("video")
+    shown = (best.clip["video"], moved["landmarks"], moved["smpl"], reference)
+    title = TITLE.format(tracker.name)
+    film = render_video(*shown, look["rollout"], robot, settings.render, title, FILM)
+    made = {**best.clip, "stability": best.stability, **moved, **look}
+    made |= {"dance": film, "still": draw_snapshot(film)}
+    folder = _folder(made, tracker, robot, settings, labels)
+    if not is_records_only():
+        page = write_first_page(made, labels.move, best.name, folder)
+        if page is not None:
+            run_logger().info(FIRST_PAGE, page)
+    announce("evaluation")
+    whole = evaluate_tracker(tracker, reference, robot, settings.evaluate, labels)
+    return TrackedDance(tracker, {**made, **whole, "rollout": look["rollout"]}, folder)
+
+
+def _folder(
+    made: Artifacts,
+    tracker: TrackerDescription,
+    robot: RobotDescription,
+    settings: PipelineConfig,
+    labels: RunLabels,
+) -> str:
+    """Return a folder for the page that is known before all that will be on it."""
+    parts = [made["video"], made["reference"], tracker, robot, settings.train, settings.evaluate]
+    parts += [settings.render, settings.minutes, settings.instant, labels]
+    text = json.dumps(identity(parts), sort_keys=True)
+    return f"dances/{labels.move}-{hashlib.sha256(text.encode()).hexdigest()[:8]}"

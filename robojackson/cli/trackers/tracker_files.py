@@ -1,0 +1,79 @@
+"""Trackers of `configs/trackers`: which there are, and getting the file of one."""
+
+from pathlib import Path
+
+from robojackson.errors import BadPolicy, StoreError
+from robojackson.files.download import download
+from robojackson.files.file_tree import FileTree, in_one_line
+from robojackson.files.local_folder import sha256_of_file
+from robojackson.pipeline.folder_lock import A_MOMENT, locked
+from robojackson.pipeline.tracker_descriptions import describe_tracker, tracker_names
+from robojackson.rl.trackers.tracker_description import TrackerDescription
+from robojackson.rl.trackers.tracker_file import is_present, open_tracker, tracker_path
+
+LOCK = ".add.lock"
+Entry = dict[str, str | bool]
+"""Facts of a tracker by name."""
+
+
+def list_trackers() -> list[Entry]:
+    """Every tracker: its robot, its licence, what it was trained on, whether it is here."""
+    return [_entry(describe_tracker(name)) for name in tracker_names()]
+
+
+def tracker_lines(found: list[Entry]) -> list[str]:
+    """The same for people."""
+    lines: list[str] = []
+    for entry in found:
+        name = entry["tracker"]
+        state = "ready" if entry["ready"] else f"robojackson trackers add {name}"
+        lines.append(f"{name:<10} {entry['robot']:<8} {state}")
+        facts = {"licence": entry["licence"], "trained on": entry["trained_on"]}
+        lines += [f"{'':<10} {key:<10} {value}" for key, value in facts.items()]
+        lines.append(f"{'':<10} {entry['homepage']}")
+    return lines
+
+
+def add_tracker(name: str, file: Path | None = None) -> Entry:
+    """Bring the file of a tracker into the store; the pinned one that is there is left alone.
+
+    Args:
+        file: A copy that is on this machine, instead of the web's.
+
+    Raises:
+        UnknownName: there is no such tracker.
+        DownloadFailed: the file cannot be had, or the server gives another.
+        BadPolicy: the copy is not the pinned file.
+        StoreError: the store cannot be written.
+    """
+    tracker = describe_tracker(name)
+    path = tracker_path(tracker)
+    told = {"tracker": name, "file": str(path), "licence": tracker.licence}
+    with in_one_line(f"cannot write {path.parent}"):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    with locked(path.parent, LOCK, A_MOMENT):
+        if path.is_file() and sha256_of_file(path) == tracker.file.sha256:
+            return {**told, "added": False}
+        if file is not None:
+            _copy(tracker, file, path)
+        else:
+            with in_one_line(f"cannot write {path}"):
+                download(tracker.file.url, path, tracker.file.size, tracker.file.sha256)
+    open_tracker(tracker)  # a file that cannot be run is reported now
+    return {**told, "added": True}
+
+
+def _copy(tracker: TrackerDescription, file: Path, path: Path) -> None:
+    with in_one_line(f"cannot read {file}", StoreError):
+        digest = sha256_of_file(file)
+    if digest != tracker.file.sha256:
+        raise BadPolicy(
+            f"{file} is not the file that tracker {tracker.name!r} pins: its sha256 is {digest}, "
+            f"expected {tracker.file.sha256}; {tracker.file.url} is its address"
+        )
+    FileTree(path.parent).write(path.name, file)
+
+
+def _entry(tracker: TrackerDescription) -> Entry:
+    facts = {key: getattr(tracker, key) for key in ("robot", "licence", "trained_on", "homepage")}
+    return {"tracker": tracker.name, **facts, "ready": is_present(tracker)}

@@ -1,0 +1,63 @@
+"""The trackers of `configs/trackers`, by name."""
+
+from robojackson.errors import BadConfiguration, BadPolicy
+from robojackson.pipeline.yaml_loader import load, names
+from robojackson.rl.trackers.onnx_network import require_runtime
+from robojackson.rl.trackers.tracker_description import TrackerDescription
+from robojackson.rl.trackers.tracker_file import is_present, require_file
+
+FOLDER = "trackers"
+NONE = "none"
+"""In place of a name: no tracker."""
+
+
+def tracker_names() -> tuple[str, ...]:
+    """Return the names of all trackers."""
+    return names(FOLDER)
+
+
+def describe_tracker(name: str) -> TrackerDescription:
+    """Return the description of a tracker.
+
+    Raises:
+        UnknownName: there is no such tracker; the message lists those that are.
+        BadConfiguration: a wrong key or value, or another name in the file than that of the file.
+    """
+    found = load(TrackerDescription, f"{FOLDER}/{name}")
+    if found.name != name:
+        raise BadConfiguration(
+            f"configs/{FOLDER}/{name}.yaml: name is {found.name!r}; it must be that of the file, "
+            f"{name!r}"
+        )
+    return found
+
+
+def trackers_of(robot: str) -> list[TrackerDescription]:
+    """Return the trackers that drive a robot, in the order of their names."""
+    return [each for each in map(describe_tracker, tracker_names()) if each.robot == robot]
+
+
+def require_tracker(robot: str, name: str | None = None) -> TrackerDescription | None:
+    """Return a tracker of a robot that can be run at once.
+
+    Args:
+        name: Of the tracker; the first whose file is here when None, no tracker when `none`.
+
+    Raises:
+        UnknownName: there is no such tracker.
+        BadPolicy: it is for another robot, or there is none for this one; its file is not here, or
+            was altered.
+        MissingDependency: what runs it is not installed.
+    """
+    if name == NONE:
+        return None
+    known = trackers_of(robot) if name is None else [describe_tracker(name)]
+    if not known:
+        every = [f"{each.name} ({each.robot})" for each in map(describe_tracker, tracker_names())]
+        raise BadPolicy(f"there is no tracker for robot {robot!r}; trackers: {', '.join(every)}")
+    chosen = next((each for each in known if is_present(each)), known[0])
+    if chosen.robot != robot:
+        raise BadPolicy(f"tracker {name!r} drives robot {chosen.robot!r}, not {robot!r}")
+    require_file(chosen)
+    require_runtime()
+    return chosen

@@ -1,0 +1,72 @@
+"""What `configs/trackers/<name>.yaml` holds: where a network comes from, how it drives its robot.
+
+Names of hinges are bound to a robot by `equipment.equip`. Metres, radians, seconds.
+"""
+
+from collections.abc import Mapping
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from robojackson.config import config_dataclass
+from robojackson.robot.description import Digest, Positive, Weight
+
+
+@config_dataclass
+class TrackerFile:
+    """The file of a network; `robojackson trackers add NAME` downloads it.
+
+    Attributes:
+        url: Address of the file, of one commit.
+        name: What it is called in the store.
+        size: Bytes.
+        sha256: Digest of its content; another file is refused.
+    """
+
+    url: Annotated[str, Field(pattern=r"^https?://")]
+    name: Annotated[str, Field(pattern=r"^[\w.-]+$")]
+    size: Annotated[int, Field(ge=1)]
+    sha256: Digest
+
+
+@config_dataclass
+class TrackerDescription:
+    """A network that follows any reference motion with one robot.
+
+    Attributes:
+        name: Name of the tracker.
+        robot: Name of the robot that it drives.
+        network: Layout of its observation and action.
+        file: Where the network comes from.
+        homepage: Where its authors describe it.
+        licence: Under which its authors publish the file.
+        trained_on: Motions that its authors name.
+        control_dt: Seconds a control step.
+        timestep: Seconds a physics step, where the PD law with these gains is not stable at the
+            robot's own; the robot's when null.
+        action_scale: Radians that an action of 1 moves a hinge's target from the default pose.
+        action_limit: Largest action that counts, unitless.
+        joints: Hinges in the order of observation and action.
+        default_pose: Hinge, or pattern with `*`, -> angle that an action of 0 holds, radians; zero
+            where it is not named. Here and below the last pattern that matches counts.
+        stiffness: Hinge -> proportional gain of the PD law that it was trained with, Nm/rad.
+        damping: Hinge -> derivative gain, Nm s/rad.
+        unmeasured_speeds: Hinges, or patterns, whose speeds it gets as zero.
+    """
+
+    name: str
+    robot: str
+    network: Literal["twist2"]
+    file: TrackerFile
+    licence: str
+    trained_on: str
+    homepage: str
+    control_dt: Positive
+    action_scale: Positive
+    action_limit: Positive
+    joints: tuple[str, ...]
+    stiffness: Mapping[str, Positive]
+    damping: Mapping[str, Weight]
+    default_pose: Mapping[str, float] = Field(default_factory=dict)
+    unmeasured_speeds: tuple[str, ...] = ()
+    timestep: Positive | None = None

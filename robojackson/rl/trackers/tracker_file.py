@@ -1,0 +1,56 @@
+"""The file of a tracker in the store, and the tracker that it makes."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from robojackson.errors import BadPolicy
+from robojackson.files.local_folder import sha256_of_file
+from robojackson.rl.trackers.tracker import Tracker
+from robojackson.rl.trackers.tracker_description import TrackerDescription
+from robojackson.rl.trackers.twist2 import Twist2Tracker
+from robojackson.robot.mjcf import robots_folder
+
+NETWORKS: Mapping[str, Callable[[TrackerDescription, Path], Tracker]] = {"twist2": Twist2Tracker}
+"""By `TrackerDescription.network`."""
+
+
+def tracker_path(description: TrackerDescription) -> Path:
+    """Return where `robojackson trackers add` puts the file of a tracker."""
+    return robots_folder().parent / "trackers" / description.name / description.file.name
+
+
+def is_present(description: TrackerDescription) -> bool:
+    """Whether the file of a tracker is here; whether it is the pinned one is not checked."""
+    return tracker_path(description).is_file()
+
+
+def require_file(description: TrackerDescription, file: Path | None = None) -> Path:
+    """Return the file of a tracker.
+
+    Args:
+        file: Where it is, if not in the store.
+
+    Raises:
+        BadPolicy: it is not here, or is not the one that was pinned.
+    """
+    path, name = file or tracker_path(description), description.name
+    how = f"run: robojackson trackers add {name}"
+    if not path.is_file():
+        raise BadPolicy(f"tracker {name!r} is not here ({path}); {how}")
+    if sha256_of_file(path) != description.file.sha256:
+        raise BadPolicy(f"tracker {name!r}: {path} has been altered; {how}")
+    return path
+
+
+def open_tracker(description: TrackerDescription, file: Path | None = None) -> Tracker:
+    """Load the network of a tracker.
+
+    Args:
+        file: The pinned file where it is not in the store.
+
+    Raises:
+        BadPolicy: its file is not here, altered, or no network of its kind.
+        MissingDependency: what runs it is not installed.
+    """
+    path = require_file(description, file)
+    return NETWORKS[description.network](description, path)

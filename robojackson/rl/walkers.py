@@ -1,0 +1,87 @@
+"""The walker of a robot: the networks that a training with `start: walker` begins from.
+
+Those that ship learnt on one robot. `robojackson pretrain --robot NAME` keeps that of any other
+beside the added robots, by the robot's name, the digest of its model and the mode.
+"""
+
+from pathlib import Path
+
+from robojackson.errors import BadPolicy
+from robojackson.files.file_tree import FileTree
+from robojackson.rl.tqc.network_arrays import load_networks
+from robojackson.robot.description import RobotDescription
+from robojackson.robot.mjcf import mjcf_path, model_sha256, robots_folder
+
+ASSETS = Path(__file__).parent.parent / "assets"
+WALKERS = {"track": "walker_track.safetensors", "paper": "walker_paper.safetensors"}
+FOLDER = "pretrain"
+DIGITS = 12
+"""Of the model's digest in the name of a walker's folder."""
+
+
+def shipped_walker(mode: str) -> Path:
+    """Return the file of the walker that ships for a mode."""
+    return ASSETS / WALKERS[mode]
+
+
+def is_shipped(robot: RobotDescription, mode: str) -> bool:
+    """Return whether the walker that ships for a mode learnt on this robot or on its model.
+
+    Raises:
+        BadConfiguration: the model of the robot is not here.
+    """
+    facts = load_networks(shipped_walker(mode)).facts
+    return facts.get("robot") == robot.name or facts.get("model_sha256") == _model(robot)
+
+
+def walker_file(robot: RobotDescription, mode: str) -> Path:
+    """Return the file of a robot's own walker, else of the one that ships and fits it.
+
+    Raises:
+        BadConfiguration: the model of the robot is not here.
+        BadPolicy: there is no walker; the message names the command that trains one.
+    """
+    own = walkers_root() / walker_key(robot, mode)
+    if own.is_file():
+        return own
+    if is_shipped(robot, mode):
+        return shipped_walker(mode)
+    if mode != "track":
+        raise BadPolicy(
+            f"start 'walker': mode {mode} has no walker for robot {robot.name!r}; take mode=track "
+            "or a setup that starts from scratch"
+        )
+    named = robot.file or robot.name
+    raise BadPolicy(
+        f"start 'walker': robot {robot.name!r} has no walker yet; run: "
+        f"robojackson pretrain --robot {named} -o walker_{robot.name}"
+    )
+
+
+def keep_walker(robot: RobotDescription, mode: str, content: bytes) -> Path:
+    """Write the walker that trainings of this robot start from; return its file.
+
+    Raises:
+        StoreError: it cannot be written.
+    """
+    FileTree(walkers_root()).write(walker_key(robot, mode), content)
+    return walkers_root() / walker_key(robot, mode)
+
+
+def walker_key(robot: RobotDescription, mode: str) -> str:
+    """Return the key of a robot's own walker in a store.
+
+    Raises:
+        BadConfiguration: the model of the robot is not here.
+    """
+    return f"{FOLDER}/{robot.name}-{_model(robot)[:DIGITS]}/{WALKERS[mode]}"
+
+
+def walkers_root() -> Path:
+    """Return the folder whose `pretrain` holds walkers: the store, or the cache where that is no
+    folder."""
+    return robots_folder().parent
+
+
+def _model(robot: RobotDescription) -> str:
+    return model_sha256(mjcf_path(robot))

@@ -1,0 +1,54 @@
+"""`robojackson evaluate NAME REFERENCE`: a tracker by its name, in the table of policies."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robojackson.cli.trackers.tracker_files import add_tracker
+from robojackson.files import tables
+from robojackson.pipeline.table_schemas import EVALUATION_RECORD
+from tests.fixtures.commands import robojackson
+from tests.fixtures.robots import robot_motion
+from tests.fixtures.stand_in_tracker import NAME, stand_in, write_yaml
+
+SHORT = ("--set", "evaluate.phases=1", "--set", "evaluate.resets=1", "--seconds", "0.2")
+
+
+@pytest.fixture
+def reference(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A motion of the humanoid, and the stand-in in the store."""
+    monkeypatch.setenv("ROBOJACKSON_STORE", str(tmp_path / "store"))
+    monkeypatch.setenv("ROBOJACKSON_CONFIGS", str(tmp_path / "configs"))
+    file, description = stand_in(tmp_path)
+    write_yaml(description, tmp_path / "configs")
+    add_tracker(NAME, file)
+    path = tmp_path / "reference.parquet"
+    path.write_bytes(robot_motion("hip_shake").to_bytes())
+    return path
+
+
+@pytest.mark.slow
+def test_a_tracker_is_a_row_of_the_table_under_its_name(reference: Path, tmp_path: Path) -> None:
+    said = robojackson("evaluate", NAME, reference, "-o", tmp_path / "out", *SHORT)
+    assert said.code == 0, said.err
+    assert said.out.splitlines()[1].startswith(NAME)
+    table = tmp_path / "out" / "evaluations.parquet"
+    rows = tables.decode_rows(EVALUATION_RECORD, table.read_bytes(), str(table))
+    own = [row for row in rows if row["policy"] == "trained"]
+    assert {(row["setup"], row["seed"]) for row in own} == {(NAME, 0)}
+    assert np.isfinite([row["site_error_m"] for row in own]).all()
+
+
+@pytest.mark.slow
+def test_twist2_refuses_a_motion_of_the_humanoid_or_says_how_to_get_it(reference: Path) -> None:
+    said = robojackson("evaluate", "twist2", reference, *SHORT)
+    assert (said.code, said.out) == (1, "")
+    assert "run: robojackson trackers add twist2" in said.err
+
+
+@pytest.mark.slow
+def test_what_is_neither_file_nor_tracker_is_one_line(reference: Path) -> None:
+    said = robojackson("evaluate", "twist3", reference)
+    assert said.code == 1
+    assert "robojackson: BadPolicy: twist3: no such file\n" in said.err
