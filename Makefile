@@ -13,7 +13,8 @@
 #   make chaos    20 studies whose processes, services, disk and wires are cut at random moments
 #   make deploy   pools, deployments and automations on the server of PREFECT_API_URL
 #   make lint     ruff, mypy and the order of imports (docs/architecture.md)
-#   make docs     the reference of the Python functions, from their docstrings, in build/site
+#   make docs     from the docstrings: docs/settings.md, and the reference of the Python functions
+#                 in build/site
 #   make wheel    the package, checked as the index would, in dist/
 #   make doctor   what is installed and what is missing
 #   make clean    remove the environment and all caches; the store stays
@@ -53,13 +54,13 @@ bench-retarget: setup
 
 bench: setup
 	@$(PY) -m benchmarks.mocap.accuracy $(ARGS)
-	@$(PY) -m benchmarks.search.suite
+	@$(PY) -m benchmarks.search.assessment_costs
 
 bench-learning: setup
-	@$(PY) -m benchmarks.learning.suite $(ARGS)
+	@$(PY) -m benchmarks.learning.learning_suite $(ARGS)
 
 bench-orchestration: setup
-	@$(PY) -m benchmarks.orchestration.suite $(ARGS)
+	@$(PY) -m benchmarks.orchestration.orchestration_suite $(ARGS)
 
 chaos: setup
 	@$(PY) -m tests.chaos.run --trials 20 --seed 0 $(ARGS)
@@ -74,6 +75,7 @@ lint: setup
 	@.venv/bin/lint-imports --no-cache
 
 docs: setup
+	@$(PY) -m tools.assets.settings_page
 	@$(PY) -m mkdocs build --strict --quiet
 
 wheel: setup

@@ -26,7 +26,9 @@ class RoboJacksonError(Exception):
         return _rebuilt, (type(self), self.args, self.__dict__)
 
 
-def _rebuilt(cls: type[RoboJacksonError], args: tuple[Any, ...], fields: dict[str, Any]) -> Any:
+def _rebuilt(
+    cls: type[RoboJacksonError], args: tuple[object, ...], fields: dict[str, object]
+) -> Any:
     error = cls.__new__(cls)
     error.args = args
     error.__dict__.update(fields)
@@ -62,7 +64,15 @@ class UnknownName(RoboJacksonError):
 
 
 class BadConfiguration(RoboJacksonError):
-    """A YAML key or value that is not allowed; the message has the path of the key."""
+    """A YAML key or value that is not allowed; the message has the path of the key.
+
+    Attributes:
+        key: Path of the key in `source`; empty where the whole file is in question.
+    """
+
+    def __init__(self, reason: str, source: object = None, *, key: str = "") -> None:
+        super().__init__(reason, source)
+        self.key = key
 
 
 class ConflictingValues(ValueError):

@@ -5,11 +5,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 ROOT = Path(__file__).parents[1]
 MOST_WORKERS = 4
 """A worker takes up to 3.5 GB of memory."""
 
+settings.register_profile("any-machine", deadline=None)
+settings.load_profile("any-machine")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 # What JAX compiles is kept for the child processes that train, and for the next run of the tests.
 os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(ROOT / ".pytest_cache" / "jax"))

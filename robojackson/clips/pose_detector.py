@@ -78,10 +78,10 @@ def detect(
     Raises:
         MissingDependency: no model bundle, or no EGL and GLES libraries.
     """
-    with video_landmarker(size) as look:
+    with video_landmarker(size) as detect_frame:
         rows, times = [], []
         for index, (time_s, image) in enumerate(timed_frames(path, short_side=SHORT_SIDE)):
-            rows.append(look(image, time_s if info.uneven else index / info.fps))
+            rows.append(detect_frame(image, time_s if info.uneven else index / info.fps))
             times.append(time_s)
             if watch:
                 watch(index, image, rows[-1])
@@ -119,7 +119,7 @@ def track_of(
 
 @contextmanager
 def video_landmarker(size: str) -> Iterator[Callable[[np.ndarray, float], np.ndarray]]:
-    """A detector that follows one person from frame to frame: look(image, seconds) -> (33, 7).
+    """A detector that follows one person through the frames: call(image, seconds) -> (33, 7).
 
     Raises:
         MissingDependency: no model bundle, or no EGL and GLES libraries.
@@ -128,7 +128,7 @@ def video_landmarker(size: str) -> Iterator[Callable[[np.ndarray, float], np.nda
     with _landmarker(model_path(size)) as landmarker:
         last_ms = -1
 
-        def look(image: np.ndarray, time_s: float) -> np.ndarray:
+        def detect_frame(image: np.ndarray, time_s: float) -> np.ndarray:
             import mediapipe
 
             nonlocal last_ms
@@ -141,7 +141,7 @@ def video_landmarker(size: str) -> Iterator[Callable[[np.ndarray, float], np.nda
             row = first_person(result)
             return np.full((LANDMARKS, 7), np.nan) if row is None else row
 
-        yield look
+        yield detect_frame
 
 
 class _QuietAtFirst:

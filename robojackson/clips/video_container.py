@@ -79,10 +79,10 @@ def declared_rate(stream: VideoStream) -> float:
     return float(stream.average_rate or stream.guessed_rate or 0)
 
 
-def rate(stamps: np.ndarray, told: float) -> float:
+def rate(stamps: np.ndarray, stated: float) -> float:
     """Frames a second: what the file tells, unless its timestamps contradict it."""
     span_s = stamps[-1] if len(stamps) > 1 else 0.0
     if not span_s > 0.0:
-        return told
+        return stated
     measured = float((len(stamps) - 1) / span_s)
-    return told if abs(told / measured - 1.0) <= RATE_TOLERANCE else measured
+    return stated if abs(stated / measured - 1.0) <= RATE_TOLERANCE else measured

@@ -8,7 +8,7 @@ import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -109,7 +109,7 @@ class Content:
             ) from cause
 
     @cached_property
-    def pickled(self) -> Mapping[str, Any]:
+    def pickled(self) -> Mapping[str, object]:
         """The dictionary in a pickle, read without running anything; empty for another file.
 
         Raises:

@@ -5,8 +5,6 @@ metres, radians. The file does not say its frame rate; GVHMR's demo makes 30 of 
 written has the camera's part only where the motion knows its camera, and our skeleton beside it.
 """
 
-from typing import Any
-
 import numpy as np
 
 from robojackson.errors import BadTable
@@ -35,7 +33,7 @@ WORLD = "smpl_params_global"
 
 def write(sequence: SmplSequence) -> bytes:
     """The `.pt` of a motion."""
-    content: dict[str, Any] = {WORLD: _parameters(sequence, Y_UP_TO_WORLD.T, np.zeros(3))}
+    content: dict[str, object] = {WORLD: _parameters(sequence, Y_UP_TO_WORLD.T, np.zeros(3))}
     camera = sequence.camera
     known = {"rotation_w", "position_w", "focal_px", "width", "height"} <= set(camera)
     if known and not camera.get("moved"):  # only the first frame's is kept

@@ -27,5 +27,5 @@ def acceleration_ratio(
     target that does not accelerate."""
     if len(points) < 3:
         return float("nan")
-    own, wanted = (np.linalg.norm(np.diff(p, 2, axis=0), axis=-1).mean() for p in (points, target))
-    return float(own / wanted) if wanted > 0 else float("nan")
+    own, goal = (np.linalg.norm(np.diff(p, 2, axis=0), axis=-1).mean() for p in (points, target))
+    return float(own / goal) if goal > 0 else float("nan")

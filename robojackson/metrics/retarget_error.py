@@ -10,20 +10,20 @@ from robojackson.metrics import motion_quality
 
 
 def keypoint_error_mm(
-    actual: Float[np.ndarray, "S K 3"], wanted: Float[np.ndarray, "S K 3"], weighted: np.ndarray
+    actual: Float[np.ndarray, "S K 3"], target: Float[np.ndarray, "S K 3"], weighted: np.ndarray
 ) -> Float[np.ndarray, "S W"]:
     """Distance of each weighted keypoint to its target, millimetres."""
-    return np.asarray(1e3 * np.linalg.norm(actual - wanted, axis=-1)[:, weighted])
+    return np.asarray(1e3 * np.linalg.norm(actual - target, axis=-1)[:, weighted])
 
 
 def bone_angles_deg(
     actual: Float[np.ndarray, "S K 3"],
-    wanted: Float[np.ndarray, "S K 3"],
+    target: Float[np.ndarray, "S K 3"],
     bones: list[tuple[int, int]],
 ) -> Float[np.ndarray, "S M"]:
     """Angle between each bone and its target, degrees."""
     start, end = np.array(bones).T
-    a, b = actual[:, end] - actual[:, start], wanted[:, end] - wanted[:, start]
+    a, b = actual[:, end] - actual[:, start], target[:, end] - target[:, start]
     cosine = np.sum(a * b, -1) / (np.linalg.norm(a, axis=-1) * np.linalg.norm(b, axis=-1))
     return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
 

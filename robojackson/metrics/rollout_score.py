@@ -46,21 +46,21 @@ def heading_frame(
 
 
 def site_error(
-    points: Float[np.ndarray, "*T K 3"], wanted: Float[np.ndarray, "*T K 3"]
+    points: Float[np.ndarray, "*T K 3"], target: Float[np.ndarray, "*T K 3"]
 ) -> Float[np.ndarray, "*T"]:
     """Mean distance of the points, metres, both in the pelvis-heading frame."""
-    result: np.ndarray = np.mean(np.linalg.norm(points - wanted, axis=-1), -1)
+    result: np.ndarray = np.mean(np.linalg.norm(points - target, axis=-1), -1)
     return result
 
 
-def best_frozen_error(wanted: Float[np.ndarray, "T K 3"]) -> float:
+def best_frozen_error(target: Float[np.ndarray, "T K 3"]) -> float:
     """The lowest mean site error of a pose that never moves, metres.
 
     Candidates are the mean of the points and up to `FROZEN_CANDIDATES` poses of the clip itself.
     """
-    chosen = np.linspace(0, len(wanted) - 1, min(len(wanted), FROZEN_CANDIDATES)).astype(int)
-    candidates = np.concatenate([wanted.mean(0, keepdims=True), wanted[chosen]])
-    return float(min(site_error(wanted, pose[None]).mean() for pose in candidates))
+    chosen = np.linspace(0, len(target) - 1, min(len(target), FROZEN_CANDIDATES)).astype(int)
+    candidates = np.concatenate([target.mean(0, keepdims=True), target[chosen]])
+    return float(min(site_error(target, pose[None]).mean() for pose in candidates))
 
 
 STILL_M = 1e-3
@@ -77,7 +77,7 @@ def skill(error_m: float, frozen_error_m: float) -> float:
 
 def limb_response(
     limb: Float[np.ndarray, "T 3"],
-    wanted: Float[np.ndarray, "T 3"],
+    target: Float[np.ndarray, "T 3"],
     dt: float,
     fast: float,
     max_lag: float,
@@ -85,7 +85,7 @@ def limb_response(
     """Compare the velocities of one limb end with the reference's; None when too short.
 
     Args:
-        limb, wanted: Positions in the pelvis-heading frame, metres.
+        limb, target: Positions in the pelvis-heading frame, metres.
         dt: Seconds a step.
         fast: Reference speed from which a frame counts as moving, m/s.
         max_lag: Longest delay that is tried, seconds.
@@ -93,7 +93,7 @@ def limb_response(
     lags = range(int(max_lag / dt + 1e-9) + 1)
     if len(limb) < 4 * len(lags):
         return None
-    speed, goal = np.diff(limb, axis=0) / dt, np.diff(wanted, axis=0) / dt
+    speed, goal = np.diff(limb, axis=0) / dt, np.diff(target, axis=0) / dt
     misses = [float(np.mean((speed[lag:] - goal[: len(goal) - lag]) ** 2)) for lag in lags]
     lag = int(np.argmin(misses))
     speed, goal = speed[lag:], goal[: len(goal) - lag]

@@ -41,8 +41,8 @@ def test_an_empty_room_gives_rows_of_nan(write_video) -> None:
 
 def test_frames_a_fraction_of_a_millisecond_apart_are_looked_at_in_order() -> None:
     room = np.zeros((96, 128, 3), np.uint8)
-    with pose_detector.video_landmarker("lite") as look:
-        rows = [look(room, time_s) for time_s in (0.0, 0.0003, 0.0003, 0.0006, 0.2)]
+    with pose_detector.video_landmarker("lite") as detect_frame:
+        rows = [detect_frame(room, time_s) for time_s in (0.0, 0.0003, 0.0003, 0.0006, 0.2)]
     assert np.isnan(rows).all()
 
 

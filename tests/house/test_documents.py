@@ -1,6 +1,7 @@
-"""What the documents of the layout name is there."""
+"""What the documents name is there."""
 
 import re
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -39,3 +40,46 @@ def test_the_new_names_of_modules_are_those_of_files() -> None:
     new = re.findall(r"(?m)^\| `[\w.]+` \| `([\w.]+)` \|$", table)
     assert len(new) > 300
     assert [m for m in new if not (ROOT / (m.replace(".", "/") + ".py")).is_file()] == []
+
+
+def documents() -> list[Path]:
+    """Markdown of the repository: what git has or would take."""
+    words = ("git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", "*.md")
+    names = subprocess.run(words, cwd=ROOT, capture_output=True, check=True).stdout.decode()
+    return [path for name in filter(None, names.split("\0")) if (path := ROOT / name).is_file()]
+
+
+def links(text: str) -> list[str]:
+    """Targets of links and pictures that are no address and no place in the same page."""
+    plain = re.sub(r"(?ms)^```.*?^```|`[^`\n]*`", "", text)
+    found = re.findall(r"\]\(<?([^)\s>]+)", plain) + re.findall(r"(?m)^\[[^]]+\]:\s*(\S+)", plain)
+    found += re.findall(r"<(?:img|a|source|video)\b[^>]*?(?:src|href)=\"([^\"]+)\"", plain)
+    return [link for link in found if not re.match(r"[a-z][a-z+.-]*:|#|//", link)]
+
+
+def test_every_relative_link_leads_to_a_file() -> None:
+    assert len(documents()) > 20
+    dead = [
+        f"{path.relative_to(ROOT)}: {link}"
+        for path in documents()
+        for link in links(path.read_text(encoding="utf-8"))
+        if not (path.parent / link.partition("#")[0]).exists()
+    ]
+    assert dead == []
+
+
+def test_links_are_found_in_all_their_forms() -> None:
+    text = '[a](b.md#c) ![d](e.png "f") [g]\n\n[g]: h.md\n<img src="i.svg"> `[x](y)` [z](https://z.org)'
+    assert links(text) == ["b.md#c", "e.png", "h.md", "i.svg"]
+
+
+def test_the_new_names_of_functions_are_those_of_the_code() -> None:
+    table = (
+        (ROOT / "docs" / "renames.md").read_text().split("## Functions")[1].split("## Fields")[0]
+    )
+    rows = re.findall(r"(?m)^\| `([\w.]+)` \| `[\w.]+` \| `([\w.]+)` \|$", table)
+    assert len(rows) > 150
+    files = {module: ROOT / (module.replace(".", "/") + ".py") for module, _ in rows}
+    text = {module: file.read_text(encoding="utf-8") for module, file in files.items()}
+    lost = [f"{m}: {n}" for m, n in rows if not re.search(rf"\b{n.split('.')[-1]}\b", text[m])]
+    assert lost == []

@@ -35,7 +35,7 @@ class Installed:
         return next((self.root / "lib").glob("python*/site-packages"))
 
     def run(
-        self, *words: object, cwd: Path, code: int = 0, **extra: str
+        self, *words: object, cwd: Path, code: int = 0, limit_s: float = 280, **extra: str
     ) -> subprocess.CompletedProcess[str]:
         """Run a program of the environment, away from the checkout."""
         kept = {k: os.environ[k] for k in ("PATH", "LANG", "LD_LIBRARY_PATH") if k in os.environ}
@@ -43,7 +43,7 @@ class Installed:
         program, *rest = map(str, words)
         done = subprocess.run(
             [self.root / "bin" / program, *rest], cwd=cwd, env={**kept, **fixed, **extra},
-            capture_output=True, text=True, timeout=280, check=False,
+            capture_output=True, text=True, timeout=limit_s, check=False,
         )  # fmt: skip
         assert done.returncode == code, done.stdout[-2000:] + done.stderr[-3000:]
         return done

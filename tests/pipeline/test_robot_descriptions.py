@@ -19,7 +19,7 @@ def test_every_shipped_robot_has_the_name_of_its_file() -> None:
 
 
 def test_an_unknown_robot_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(UnknownName, match="g1, g1_23, humanoid, humanoid_strong, t1"):
+    with pytest.raises(UnknownName, match=", ".join(robot_names())):
         describe_robot("g2")
 
 

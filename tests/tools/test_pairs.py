@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tools.pairs import bvh, gestures, sources
+from tools.pairs import cmu_bvh, gestures, sources
 from tools.render import deepmimic
 
 BVH = """HIERARCHY
@@ -73,7 +73,7 @@ def test_the_mirror_of_a_mirror_is_the_motion() -> None:
 
 
 def test_a_bvh_in_t_pose_has_arms_out_and_legs_down(t_pose: Path) -> None:
-    motion = bvh.read(t_pose)
+    motion = cmu_bvh.read(t_pose)
     limbs = {
         name: motion.rotations[name].apply(gestures.DOWN)[0]
         for name in ("left_shoulder", "right_elbow", "left_hip", "right_knee")

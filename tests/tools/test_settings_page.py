@@ -13,7 +13,7 @@ from tools.assets.settings_page import CHAPTERS, PAGE, Chapter, Setting
 
 
 def test_the_page_is_up_to_date() -> None:
-    """Else: python -m tools.assets.settings_page."""
+    """Else: make docs."""
     assert PAGE.read_text() == settings_page.page()
 
 

@@ -86,9 +86,9 @@ def make_clip(
     view = scenery.film(posed, rng)
     truth = view.see(person.landmarks(posed, LANDMARK_NAMES))
     boxes = scenery.occluders(truth, LIMBS, view, FPS, rng)
-    with video_landmarker("full") as look:
+    with video_landmarker("full") as detect_frame:
         pictures = studio.frames(person, posed, view, boxes, rng)
-        rows = [look(picture, index / FPS) for index, picture in enumerate(pictures)]
+        rows = [detect_frame(picture, index / FPS) for index, picture in enumerate(pictures)]
     return {
         "seen": np.array(rows, np.float32),
         "truth": truth.astype(np.float32),

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tools.pairs import bvh
+from tools.pairs import cmu_bvh
 from tools.render import deepmimic
 
 DEEPMIMIC = (
@@ -60,7 +60,7 @@ def read(path: Path, fps: float) -> deepmimic.Motion:
     """A motion of the list at a frame rate."""
     check_allowed(path)
     if path.suffix == ".bvh":
-        return deepmimic.resampled(bvh.read(path), fps)
+        return deepmimic.resampled(cmu_bvh.read(path), fps)
     return deepmimic.read(path, fps)
 
 

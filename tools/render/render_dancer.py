@@ -4,7 +4,7 @@
     python -m tools.render.render_dancer hip_shake.txt -o out/tall --phenotype height=0.8 gender=1
 
 Reads DeepMimic's format (`tools/render/deepmimic.py`), poses Anny's body
-(`tools/render/anny_body.py`), draws with EGL on any machine (`tools/render/stage.py`). Writes
+(`tools/render/anny_body.py`), draws with EGL on any machine (`tools/render/dance_floor.py`). Writes
 OUT.mp4 and OUT_gt.npz with: joints (T, 12, 3) and names; all_bones (T, 104, 3) and bone_names;
 view and proj, the camera's matrices; fps. Metres, z up, the body faces -y, the floor at z = 0.
 Needs `tools/requirements.txt`.
@@ -20,7 +20,7 @@ from pathlib import Path
 import imageio_ffmpeg
 import numpy as np
 
-from tools.render import deepmimic, stage
+from tools.render import dance_floor, deepmimic
 from tools.render.anny_body import DANCER, JOINT_BONES, Body, PosedBody
 
 logger = logging.getLogger("render_dancer")
@@ -51,8 +51,8 @@ def render(motion_file: Path, out: Path, shot: Shot, phenotype: dict[str, float]
     body = Body(phenotype)
     posed = body.posed(deepmimic.read(motion_file, shot.fps, shot.loops))
     hips = posed.bones[:, body.bone_names.index("root")]
-    camera = stage.camera_for(hips, shot.yaw, shot.width, shot.height)
-    pictures = stage.frames(posed, stage.colours(body), camera, shot.width, shot.height)
+    camera = dance_floor.camera_for(hips, shot.yaw, shot.width, shot.height)
+    pictures = dance_floor.frames(posed, dance_floor.colours(body), camera, shot.width, shot.height)
     write_video(out.with_name(out.name + ".mp4"), pictures, shot)
     write_truth(out.with_name(out.name + "_gt.npz"), body, posed, camera, shot.fps)
     logger.info("%s.mp4: %d frames", out, len(posed.vertices))
@@ -74,7 +74,9 @@ def write_video(path: Path, pictures: Iterable[np.ndarray], shot: Shot) -> None:
     writer.close()
 
 
-def write_truth(path: Path, body: Body, posed: PosedBody, camera: stage.Camera, fps: int) -> None:
+def write_truth(
+    path: Path, body: Body, posed: PosedBody, camera: dance_floor.Camera, fps: int
+) -> None:
     """The joints that the video shows, and the camera that shows them."""
     columns = [body.bone_names.index(bone) for bone in JOINT_BONES.values()]
     np.savez_compressed(

@@ -6,7 +6,7 @@ advice is given by `mocap`, by `dance` and by the page of a run.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -55,7 +55,7 @@ class Advice:
         return _WORDS[self.kind](self)
 
     @property
-    def record(self) -> dict[str, Any]:
+    def record(self) -> dict[str, object]:
         """Kind, figures and words, for JSON."""
         return {"kind": self.kind, "value": self.value, "limit": self.limit, "words": str(self)}
 

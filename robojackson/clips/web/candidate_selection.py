@@ -53,9 +53,9 @@ def select(
 
     Args:
         found: In the order of the search, which breaks ties of the view count.
-        known: Keys of videos that were judged before.
+        known: Keys of videos that were assessed before.
         config: Limits.
-        failed: Keys of videos that could not be had or judged before.
+        failed: Keys of videos that could not be had or assessed before.
     """
     fit: list[VideoCandidate] = []
     dropped: list[tuple[VideoCandidate, Rejection]] = []

@@ -37,8 +37,8 @@ def explain(failure: BaseException) -> Failure:
         if isinstance(cause, HTTPError):
             asked = str(cause.response.headers.get("Retry-After") or "")
             wait_s = float(asked) if asked.isdigit() else 0.0
-            told = clean_text(cause.reason or "", 60)
-            return Failure(_status(cause.status, told), _is_passing(cause.status), wait_s)
+            answered = clean_text(cause.reason or "", 60)
+            return Failure(_status(cause.status, answered), _is_passing(cause.status), wait_s)
         if isinstance(cause, IncompleteRead | ContentTooShortError):
             return Failure("the server cut the file short", True, 0.0)
         if isinstance(cause, TimeoutError) or "timed out" in str(cause).lower():
@@ -67,9 +67,9 @@ def _causes(failure: BaseException) -> list[BaseException]:
     return found[::-1]
 
 
-def _status(status: int, told: str) -> str:
+def _status(status: int, answered: str) -> str:
     kind = {404: "not found", 410: "gone", BUSY: "too many requests", 403: "forbidden"}
-    usual = "redirects without end" if 300 <= status < 400 else told
+    usual = "redirects without end" if 300 <= status < 400 else answered
     return f"HTTP {status} {kind.get(status, usual)}".rstrip()
 
 

@@ -30,7 +30,7 @@ def pack(arrays: Mapping[str, np.ndarray]) -> bytes:
 
 
 def unpack(
-    data: bytes, needed: Iterable[str], where: str, wanted: Collection[str] | None = None
+    data: bytes, needed: Iterable[str], where: str, requested: Collection[str] | None = None
 ) -> dict[str, np.ndarray]:
     """The arrays of an .npz.
 
@@ -38,7 +38,7 @@ def unpack(
         data: Of the file.
         needed: Names that must be there.
         where: For the message.
-        wanted: Names that are read; None reads all. The others may hold anything.
+        requested: Names that are read; None reads all. The others may hold anything.
 
     Raises:
         BadTable: no .npz, one that holds Python objects, or a needed array is missing.
@@ -46,7 +46,7 @@ def unpack(
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             found = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
-            chosen = [name for name in found if wanted is None or name in wanted]
+            chosen = [name for name in found if requested is None or name in requested]
             arrays = {name: _member(archive, found[name]) for name in chosen}
     except ZIP_FAILURES as cause:
         raise BadTable(f"{where}: not an .npz of plain arrays ({cause})") from cause

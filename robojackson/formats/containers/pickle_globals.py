@@ -4,7 +4,7 @@ NumPy's types and functions become classes of our own, holding a shape and bytes
 or joblib's is called, and an array is made only when as many bytes are there as its shape says.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -60,7 +60,7 @@ class Wrapper:
         self.state = dict(state)
 
 
-def from_bytes(data: Any, kind: Any, shape: Any, order: str) -> np.ndarray:
+def from_bytes(data: object, kind: object, shape: Iterable[int], order: str) -> np.ndarray:
     """An array of plain numbers; the bytes must be as many as the shape says."""
     if not isinstance(kind, NumberType):
         raise Refused("refused, it asks for an array of objects")
@@ -72,7 +72,7 @@ def from_bytes(data: Any, kind: Any, shape: Any, order: str) -> np.ndarray:
     return result
 
 
-def _number(kind: NumberType, data: Any) -> float:
+def _number(kind: NumberType, data: object) -> float:
     value: float = from_bytes(data, kind, (1,), "C")[0].item()
     return value
 
@@ -89,17 +89,19 @@ def _no_bytes() -> bytes:
     return b""
 
 
-def _array(*_: Any) -> Holder:
+def _array(*_: object) -> Holder:
     return Holder()
 
 
-def _type(name: Any, *_: Any) -> NumberType:
+def _type(name: object, *_: object) -> NumberType:
     made = NumberType(str(name))
     assert made.dtype
     return made
 
 
-def _from_buffer(data: Any, kind: Any, shape: Any, order: str, *_: Any) -> np.ndarray:
+def _from_buffer(
+    data: object, kind: object, shape: Iterable[int], order: str, *_: object
+) -> np.ndarray:
     return from_bytes(data, kind, shape, order)
 
 

@@ -100,7 +100,7 @@ TORCH: Mapping[tuple[str, str], Any] = {
 """What a file may name, and what stands for it here."""
 
 
-def save(content: Mapping[str, Any]) -> bytes:
+def save(content: Mapping[str, object]) -> bytes:
     """Return a `.pt` that `torch.load(weights_only=True)` reads; arrays become float32 tensors."""
     import torch
 

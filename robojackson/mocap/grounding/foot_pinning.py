@@ -128,29 +128,29 @@ def pin_offsets(
     offsets = np.zeros((len(feet), 2, 3))
     for side, points in enumerate(((0, 1), (2, 3))):
         down = planted[:, points]
-        wanted = np.full((len(feet), 3), np.nan)
+        target = np.full((len(feet), 3), np.nan)
         for start, end in stretches(np.any(down, axis=1)):
             weight = down[start:end, :, None].astype(float)
             here = feet[start:end, points]
             home = (here * weight).sum(0) / np.maximum(weight.sum(0), 1.0)
             home[..., 2] -= home[down[start:end].any(0), 2].min()
             off = ((home - here) * weight).sum(1) / np.maximum(weight.sum(1), 1.0)
-            wanted[start:end] = off
-        offsets[:, side] = faded(wanted, ramp)
+            target[start:end] = off
+        offsets[:, side] = faded(target, ramp)
     return offsets
 
 
-def faded(wanted: Float[np.ndarray, "T N"], ramp: float) -> Float[np.ndarray, "T N"]:
+def faded(target: Float[np.ndarray, "T N"], ramp: float) -> Float[np.ndarray, "T N"]:
     """Values where they are known; elsewhere those of both neighbours, falling smoothly to zero.
 
     Args:
-        wanted: NaN where nothing is known.
+        target: NaN where nothing is known.
         ramp: Frames over which a value fades.
     """
-    known = np.flatnonzero(~np.isnan(wanted[:, 0]))
+    known = np.flatnonzero(~np.isnan(target[:, 0]))
     if not len(known):
-        return np.zeros_like(wanted)
-    frames = np.arange(len(wanted))
+        return np.zeros_like(target)
+    frames = np.arange(len(target))
     after = np.searchsorted(known, frames).clip(max=len(known) - 1)
     before = (np.searchsorted(known, frames, side="right") - 1).clip(min=0)
     shares = []
@@ -159,7 +159,7 @@ def faded(wanted: Float[np.ndarray, "T N"], ramp: float) -> Float[np.ndarray, "T
         shares.append((part * part * (3.0 - 2.0 * part))[:, None])
     total = np.maximum(shares[0] + shares[1], 1.0)
     result: np.ndarray = (
-        shares[0] * wanted[known[before]] + shares[1] * wanted[known[after]]
+        shares[0] * target[known[before]] + shares[1] * target[known[after]]
     ) / total
     return result
 
@@ -202,13 +202,13 @@ def tip_angles(
         goal = sole[:, 2] - feet[:, 2 * side + 1, 2]
         now, then = (np.arcsin(np.clip(z / length, -1.0, 1.0)) for z in (sole[:, 2], goal))
         angles[alone, side] = np.clip(now - then, -LARGEST_TIP, LARGEST_TIP)[alone]
-    wanted = np.concatenate([faded(column[:, None], ramp) for column in angles.T], 1)
-    return lowpass(wanted, fps, TIP_HZ)
+    target = np.concatenate([faded(column[:, None], ramp) for column in angles.T], 1)
+    return lowpass(target, fps, TIP_HZ)
 
 
-def _bridged(wanted: np.ndarray) -> np.ndarray:
-    known = ~np.isnan(wanted[:, 0])
+def _bridged(target: np.ndarray) -> np.ndarray:
+    known = ~np.isnan(target[:, 0])
     if not known.any():
-        return np.zeros_like(wanted)
-    time = np.arange(len(wanted))
-    return np.stack([np.interp(time, time[known], column[known]) for column in wanted.T], -1)
+        return np.zeros_like(target)
+    time = np.arange(len(target))
+    return np.stack([np.interp(time, time[known], column[known]) for column in target.T], -1)

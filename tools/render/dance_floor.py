@@ -1,4 +1,4 @@
-"""A small stage: one person on a checkered floor before a plain backdrop, drawn without a screen.
+"""One person on a checkered floor before a plain backdrop, drawn without a screen.
 
 World: z up, metres, the floor at z = 0. Matrices take column vectors, as OpenGL does; the camera
 looks along its own -z.

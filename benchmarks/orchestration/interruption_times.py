@@ -1,4 +1,6 @@
-"""How fast Ctrl-C is acknowledged and obeyed (`python -m benchmarks.orchestration.interruption`).
+"""How fast Ctrl-C is acknowledged and obeyed.
+
+    python -m benchmarks.orchestration.interruption_times
 
 Every command is started with an empty store and interrupted at moments spread over the time that it
 takes, by turns with SIGINT and SIGTERM, to the process group and to the process alone. Bars:
@@ -152,7 +154,7 @@ def main() -> None:
                 continue
             how = {
                 "command": " ".join(
-                    ["python -m benchmarks.orchestration.interruption", *sys.argv[1:]]
+                    ["python -m benchmarks.orchestration.interruption_times", *sys.argv[1:]]
                 ),
                 "date": datetime.now(UTC).isoformat(timespec="seconds"),
                 "load_before": round(os.getloadavg()[0], 2),

@@ -196,7 +196,13 @@ def main() -> None:
     wanted = parser.parse_args()
     if wanted.part is None:  # Prefect knows one server a process
         for part in PARTS:
-            words = [sys.executable, "-m", "benchmarks.orchestration.suite", "--part", part]
+            words = [
+                sys.executable,
+                "-m",
+                "benchmarks.orchestration.orchestration_suite",
+                "--part",
+                part,
+            ]
             subprocess.run([*words, *sys.argv[1:]], check=True)
         return
     made = measured(wanted.part, wanted)
@@ -210,7 +216,9 @@ def measured(part: str, wanted: argparse.Namespace) -> dict[str, Any]:
     folder = Path(tempfile.mkdtemp(prefix="robojackson-bench-"))
     with _server(folder, wanted.workers if part == "pool" else 0) as stack:
         return {
-            "command": " ".join(["python -m benchmarks.orchestration.suite", *sys.argv[1:]]),
+            "command": " ".join(
+                ["python -m benchmarks.orchestration.orchestration_suite", *sys.argv[1:]]
+            ),
             "date": datetime.now(UTC).isoformat(timespec="seconds"),
             "load_before": [round(one, 2) for one in os.getloadavg()],
             **globals()[part](stack, wanted),

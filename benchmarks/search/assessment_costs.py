@@ -57,14 +57,14 @@ def scored(path: Path) -> float:
     return stability(track, StabilityConfig()).stability_score
 
 
-def judged(path: Path) -> float:
+def assessed(path: Path) -> float:
     """Algorithm 1 and every filter."""
     from robojackson.clips.quality.assessment import AssessmentConfig, assess_video
 
     return assess_video(path, AssessmentConfig()).stability.stability_score
 
 
-WAYS: dict[str, Callable[[Path], float]] = {"bare": bare, "scored": scored, "judged": judged}
+WAYS: dict[str, Callable[[Path], float]] = {"bare": bare, "scored": scored, "assessed": assessed}
 
 
 def seconds(way: Callable[[Path], float], path: Path) -> float:
@@ -95,9 +95,9 @@ def batch(cores: Sequence[int]) -> float:
     os.sched_setaffinity(0, cores)
     try:
         with ProcessPoolExecutor(len(cores), context, initializer=_begin) as pool:
-            list(pool.map(judged, paths[: len(cores)] * 2))
+            list(pool.map(assessed, paths[: len(cores)] * 2))
             began = time.perf_counter()
-            list(pool.map(judged, paths))
+            list(pool.map(assessed, paths))
             return time.perf_counter() - began
     finally:
         os.sched_setaffinity(0, before)
@@ -122,7 +122,7 @@ def main() -> None:
     total = {way: sum(clip[way] for clip in best.values()) for way in WAYS}
     found = {
         "scored_over_bare": total["scored"] / total["bare"],
-        "judged_over_bare": total["judged"] / total["bare"],
+        "assessed_over_bare": total["assessed"] / total["bare"],
         "two_cores_over_one": two[1] / two[0],
         "batch_s": {"two_cores": two[0], "one_core": two[1]},
         "clips": best,
