@@ -114,7 +114,7 @@ def without_unassessed(figures: Figures, unassessed: Collection[str]) -> Figures
         name: {
             k: v
             for k, v in by_key.items()
-            if name not in verdict.UNJUDGED or k[0] not in unassessed
+            if name not in verdict.NEEDS_FULL_LENGTH or k[0] not in unassessed
         }
         for name, by_key in figures.items()
     }

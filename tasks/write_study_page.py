@@ -19,7 +19,7 @@ from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.report.pages import study_page, study_table
 from robojackson.report.pages.run_page import Plot
 from robojackson.report.pages.study_figures import curve_plots, evaluation_plots
-from robojackson.rl.evaluation.verdict import UNJUDGED
+from robojackson.rl.evaluation.verdict import NEEDS_FULL_LENGTH
 from robojackson.rl.pretrained import pretrained
 from storage import study_tables
 from storage.artifact import Artifact
@@ -94,7 +94,7 @@ def report(
     figures = without_unassessed(figures, short)
     for move in short:
         baselines[move] = {
-            policy: {name: value for name, value in found.items() if name not in UNJUDGED}
+            policy: {name: value for name, value in found.items() if name not in NEEDS_FULL_LENGTH}
             for policy, found in baselines[move].items()
         }
     walking = {name: move.walking for name, move in moves.items()}

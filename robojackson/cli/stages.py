@@ -17,7 +17,7 @@ from robojackson.errors import NoPersonFound, RejectedReference, TrackTooShort
 from robojackson.files.file_tree import results_in
 from robojackson.files.json_types import to_json_types
 from robojackson.pipeline.yaml_loader import load
-from robojackson.rl.evaluation.verdict import UNJUDGED
+from robojackson.rl.evaluation.verdict import NEEDS_FULL_LENGTH
 
 if TYPE_CHECKING:
     from robojackson.motion.smpl_sequence import SmplSequence
@@ -184,7 +184,7 @@ def verdict_lines(evaluation: Mapping[str, Any]) -> list[str]:
     name = evaluation.get("tracker", "trained")
     rows = {name: evaluation, **evaluation.get("trackers", {}), **evaluation["baselines"]}
     if short:
-        shown = dict.fromkeys(UNJUDGED, "too short")
+        shown = dict.fromkeys(NEEDS_FULL_LENGTH, "too short")
         rows = {name: {**row, **shown} for name, row in rows.items()}
     return console.table(rows, VERDICT)
 

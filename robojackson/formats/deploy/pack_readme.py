@@ -57,7 +57,7 @@ def pack_readme(
         f"(layout `{policy.layout_sha256[:12]}`), "
         "target = default_joint_pos + action_scale * action."
     )
-    parts = [head, FILES, _terms(policy), _judged(figures), _passport(passport), SAFETY]
+    parts = [head, FILES, _terms(policy), _evaluation(figures), _passport(passport), SAFETY]
     return "\n\n".join(part.strip() for part in parts if part).encode() + b"\n"
 
 
@@ -76,7 +76,7 @@ def _terms(policy: DeployedPolicy) -> str:
     return "\n".join([*lines, "", tail])
 
 
-def _judged(figures: Mapping[str, Any] | None) -> str:
+def _evaluation(figures: Mapping[str, Any] | None) -> str:
     if not figures:
         return "## Evaluation\n\nNone was given: `robojackson evaluate` makes one."
     rows = [("success", "%", 100.0), ("strict_success", "%", 100.0), ("skill", "", 1.0)]

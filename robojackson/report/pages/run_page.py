@@ -15,7 +15,7 @@ import jinja2
 
 from robojackson.report.quantities import POLICY_TITLES, Quantity, format_value, quantities
 from robojackson.rl.config.evaluate_config import TRAINED
-from robojackson.rl.evaluation.verdict import UNJUDGED
+from robojackson.rl.evaluation.verdict import NEEDS_FULL_LENGTH
 
 VERDICT_COLUMNS = (
     "survived_s", "success", "strict_success", "skill", "site_error_m", "limb_gain", "drift_m",
@@ -188,7 +188,9 @@ def verdicts(evaluation: Mapping[str, Any]) -> list[Verdict]:
             title, meaning = dancer_of(figures), NOT_TRAINED
         short = evaluation.get("verdict", {}).get("kind") == "too_short"
         values = [
-            TOO_SHORT if short and column in UNJUDGED else format_value(column, figures.get(column))
+            TOO_SHORT
+            if short and column in NEEDS_FULL_LENGTH
+            else format_value(column, figures.get(column))
             for column in VERDICT_COLUMNS
         ]
         rows.append(Verdict(title, meaning, values, name == TRAINED))

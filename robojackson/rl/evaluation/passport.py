@@ -27,7 +27,7 @@ ROBUST = RandomConfig(
 """What `train --robust` draws from."""
 ROBUST_FIELDS = ("friction", "gains", "mass", "com", "delay", "sensor_noise", "pushes")
 NOMINAL = "nominal"
-KEPT_SHARE = 0.9
+LEAST_SHARE = 0.9
 """Of the nominal strict success that a robust policy keeps in every case."""
 FIGURES = ("strict_success", "success", "skill", "survived_s", "site_error_m")
 TIMESTEPS_S = (0.0015, 0.002, 0.004, 0.005)
@@ -106,14 +106,14 @@ def passport(
     every = cases(robot, config.seed)
     for number, case in enumerate(every):
         progress(case.name, number, len(every))
-        rows.append({"case": case.name, **_judged(policy, reference, robot, config, case)})
+        rows.append({"case": case.name, **_evaluate_case(policy, reference, robot, config, case)})
     nominal = rows[0]["strict_success"]
     for row in rows:
         row["kept"] = row["strict_success"] / nominal if nominal else None
     return rows
 
 
-def _judged(
+def _evaluate_case(
     policy: Evaluated, reference: ReferenceMotion, robot: Robot, config: EvaluateConfig, case: Case
 ) -> dict[str, float]:
     """Means over the rollouts of a case; the driver's gains are the varied robot's."""

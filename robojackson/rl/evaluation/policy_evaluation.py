@@ -37,7 +37,7 @@ from robojackson.rl.evaluation.reward_meter import RewardMeter, without_curiosit
 from robojackson.rl.evaluation.rollout_records import RolloutScorer
 from robojackson.rl.evaluation.rollouts import Rollouts, Starts, roll_out
 from robojackson.rl.evaluation.starts import starts_of, summarise
-from robojackson.rl.evaluation.verdict import verdict_on, without_unjudged
+from robojackson.rl.evaluation.verdict import verdict_on, without_short_figures
 from robojackson.rl.modes.paper_mode import facing_ahead
 from robojackson.rl.policy import Policy
 from robojackson.rl.sim.feedforward import lead_of
@@ -121,8 +121,8 @@ def evaluate_policy(
     shown: dict[str, object] = dict(own)
     baselines: dict[str, object] = dict(summaries)
     if verdict.kind == "too_short":
-        shown = without_unjudged(own)
-        baselines = {name: without_unjudged(found) for name, found in summaries.items()}
+        shown = without_short_figures(own)
+        baselines = {name: without_short_figures(found) for name, found in summaries.items()}
     told: dict[str, object] = {"variants": variants, "baselines": baselines, "reward": reward}
     if not isinstance(policy, Policy):
         told["tracker"] = policy.description.name

@@ -16,7 +16,7 @@ from robojackson.metrics.rollout_score import (
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import EvaluateConfig
 from robojackson.rl.evaluation.rollouts import Rollouts
-from robojackson.rl.evaluation.strict_success import StrictJudge
+from robojackson.rl.evaluation.strict_success import StrictEvaluator
 from robojackson.rl.modes.rewards import EXTREMITIES, FEET, PELVIS
 from robojackson.robot.model import KEYPOINTS, Robot
 
@@ -38,7 +38,7 @@ class RolloutScorer:
         names = robot.keypoint_names
         self._config, self._dt = config, reference.dt
         self._pelvis = names.index(PELVIS)
-        self._strict = StrictJudge(robot, reference, config)
+        self._strict = StrictEvaluator(robot, reference, config)
         self._limbs = {name: names.index(name) for name in LIMB_ENDS}
         self._model, self._joints = robot.model, robot.joint_names
         asked, slowed = (reference.scorecard.get(key, 1.0) for key in ("tempo", "tempo_mean"))

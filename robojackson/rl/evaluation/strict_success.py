@@ -47,7 +47,7 @@ class StrictFindings:
         return self.sites or self.ends or self.kneels or self.floor
 
 
-class StrictJudge:
+class StrictEvaluator:
     """Applies a robot's rule to its rollouts on one reference motion."""
 
     def __init__(self, robot: Robot, reference: ReferenceMotion, config: EvaluateConfig) -> None:

@@ -7,7 +7,7 @@ from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.evaluation.rollouts import Driver
 from robojackson.rl.sim.reference_clip import Clip, ClipStep
 from robojackson.rl.sim.simulation import Simulation
-from robojackson.rl.trackers.tracker import Follower, Seen, Tracker
+from robojackson.rl.trackers.tracker import Follower, Tracker, TrackerInput
 from robojackson.robot.model import Robot
 
 CONTROL = ControlConfig(feedforward=0.0)
@@ -43,4 +43,4 @@ class _Command:
             following if k == 1 else self._clip.at(following.step + k - 1)
             for k in self._tracker.window
         )
-        return self._follower.targets(Seen(*sim.sensed(), sim.points, ahead))
+        return self._follower.targets(TrackerInput(*sim.sensed(), sim.points, ahead))

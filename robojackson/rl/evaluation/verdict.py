@@ -14,7 +14,7 @@ DANCES = 0.95
 PARTLY = 0.5
 NO_BETTER = 1.25
 """Times the survival of the best baseline up to which a robot is no better."""
-UNJUDGED = ("success", "strict_success", "skill")
+NEEDS_FULL_LENGTH = ("success", "strict_success", "skill")
 """Figures that are empty where the rollouts are too short to judge."""
 TITLES = {
     "statue": "a statue",
@@ -121,6 +121,6 @@ def _kind(
     return "falls" if own["survived_s"] <= NO_BETTER * baseline_s else "learning"
 
 
-def without_unjudged(figures: Mapping[str, Any]) -> dict[str, Any]:
+def without_short_figures(figures: Mapping[str, Any]) -> dict[str, Any]:
     """Return figures with those empty that say nothing in rollouts that are too short."""
-    return {**figures, **{name: None for name in UNJUDGED if name in figures}}
+    return {**figures, **{name: None for name in NEEDS_FULL_LENGTH if name in figures}}

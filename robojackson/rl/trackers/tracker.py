@@ -16,7 +16,7 @@ from robojackson.robot.model import Robot
 
 
 @dataclass(frozen=True)
-class Seen:
+class TrackerInput:
     """What N robots see before a control step.
 
     Attributes:
@@ -34,7 +34,7 @@ class Seen:
 class Follower(Protocol):
     """N robots that follow; remembers what the network needs of their past."""
 
-    def targets(self, seen: Seen) -> Float[np.ndarray, "N nu"]:
+    def targets(self, seen: TrackerInput) -> Float[np.ndarray, "N nu"]:
         """Return target hinge angles of the PD law, rad, in actuator order; once a control step."""
 
 

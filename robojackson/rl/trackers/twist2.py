@@ -22,7 +22,7 @@ from robojackson.geometry.rotations import quat_to_matrix
 from robojackson.rl.sim.reference_clip import ClipStep
 from robojackson.rl.trackers.equipment import Layout, equip, layout_of
 from robojackson.rl.trackers.onnx_network import OnnxNetwork
-from robojackson.rl.trackers.tracker import Follower, Seen
+from robojackson.rl.trackers.tracker import Follower, TrackerInput
 from robojackson.rl.trackers.tracker_description import TrackerDescription
 from robojackson.robot.model import Robot
 
@@ -71,7 +71,7 @@ class _Twist2Follower:
         self._action = np.zeros((n, len(layout.order)))
         self._history: Float[np.ndarray, "N H F"] | None = None
 
-    def targets(self, seen: Seen) -> Float[np.ndarray, "N nu"]:
+    def targets(self, seen: TrackerInput) -> Float[np.ndarray, "N nu"]:
         (step,) = seen.window
         target = target_of(step, self._layout)
         frame = frame_of(target, seen.qpos, seen.qvel, self._action, self._layout)

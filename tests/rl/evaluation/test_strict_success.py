@@ -9,7 +9,7 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import ControlConfig, EvaluateConfig
 from robojackson.rl.evaluation.rollout_records import RolloutScorer
 from robojackson.rl.evaluation.rollouts import Driver, Rollouts, Starts, roll_out
-from robojackson.rl.evaluation.strict_success import StrictJudge
+from robojackson.rl.evaluation.strict_success import StrictEvaluator
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.robot.description import FallRule, StrictRule
 from robojackson.robot.fall import Fall
@@ -37,7 +37,7 @@ def perfect(sway: ReferenceMotion, start: int = 0) -> Rollouts:
 
 
 def findings(robot: Robot, sway: ReferenceMotion, rollouts: Rollouts, start: int = 0):
-    judge = StrictJudge(robot, sway, EvaluateConfig())
+    judge = StrictEvaluator(robot, sway, EvaluateConfig())
     return judge.findings(rollouts, 0, slice(0, STEPS), start, np.zeros(STEPS))
 
 

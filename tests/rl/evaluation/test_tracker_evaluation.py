@@ -14,7 +14,7 @@ from robojackson.rl.evaluation.tracker_driver import tracker_driver
 from robojackson.rl.sim.motors import Motors
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.simulation import Simulation
-from robojackson.rl.trackers.tracker import Seen
+from robojackson.rl.trackers.tracker import TrackerInput
 from robojackson.rl.trackers.tracker_description import TrackerDescription
 from robojackson.rl.trackers.twist2 import Twist2Tracker
 from robojackson.robot.model import Robot
@@ -31,7 +31,7 @@ class Replay:
     def __init__(self, description: TrackerDescription) -> None:
         self.description = description
         self.begun: list[int] = []
-        self.shown: list[Seen] = []
+        self.shown: list[TrackerInput] = []
 
     def equip(self, robot: Robot) -> Robot:
         return robot
@@ -41,7 +41,7 @@ class Replay:
         self.begun.append(n)
         return self
 
-    def targets(self, seen: Seen) -> np.ndarray:
+    def targets(self, seen: TrackerInput) -> np.ndarray:
         self.shown.append(seen)
         return seen.window[0].qpos[:, 7:][:, self._hinge]
 

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from robojackson.rl.sim.reference_clip import ClipStep
 from robojackson.rl.trackers import twist2
-from robojackson.rl.trackers.tracker import Seen
+from robojackson.rl.trackers.tracker import TrackerInput
 from robojackson.rl.trackers.tracker_description import TrackerDescription
 from robojackson.robot.model import Robot
 from tests.fixtures.robots import stock
@@ -83,7 +83,7 @@ def test_the_network_sees_frame_history_and_target_as_they_are_written_by_hand(m
     for count in range(13):
         qpos, qvel = random_state(robot, rng)
         wanted = random_state(robot, rng)
-        follower.targets(Seen(qpos, qvel, np.zeros((N, 14, 3)), (step_of(*wanted),)))
+        follower.targets(TrackerInput(qpos, qvel, np.zeros((N, 14, 3)), (step_of(*wanted),)))
         target = target_by_hand(robot, description.joints, wanted[0][1], wanted[1][1])
         frame = frame_by_hand(robot, description, target, qpos[1], qvel[1], action[1])
         past = frames[-10:] if frames else []
@@ -101,7 +101,9 @@ def test_an_action_is_limited_scaled_and_added_to_the_default_pose(made) -> None
     spy = Spy(len(description.joints))
     tracker._network = spy
     told = tracker.follow(robot, N).targets(
-        Seen(*random_state(robot, rng), np.zeros((N, 14, 3)), (step_of(*random_state(robot, rng)),))
+        TrackerInput(
+            *random_state(robot, rng), np.zeros((N, 14, 3)), (step_of(*random_state(robot, rng)),)
+        )
     )
     default = {"right_knee": -0.4, "left_knee": -0.4, "left_elbow": -1.0, "abdomen_z": 0.1}
     for motor in range(robot.model.nu):
@@ -119,7 +121,7 @@ def test_a_network_that_says_zero_holds_the_default_pose(tmp_path: Path) -> None
     held = {"right_knee": -0.4, "left_knee": -0.4, "left_elbow": -1.0, "abdomen_z": 0.1}
     for _ in range(3):
         state, wanted = random_state(robot, rng), random_state(robot, rng)
-        told = follower.targets(Seen(*state, np.zeros((N, 14, 3)), (step_of(*wanted),)))
+        told = follower.targets(TrackerInput(*state, np.zeros((N, 14, 3)), (step_of(*wanted),)))
         np.testing.assert_allclose(told, [[held.get(name, 0.0) for name in names]] * N)
 
 
@@ -130,8 +132,8 @@ def test_robots_that_begin_together_move_as_if_each_was_alone(made) -> None:
     together, alone = tracker.follow(robot, N), tracker.follow(robot, 1)
     points = np.zeros((N, 14, 3))
     for state, wanted in states:
-        told = together.targets(Seen(*state, points, (step_of(*wanted),)))
+        told = together.targets(TrackerInput(*state, points, (step_of(*wanted),)))
         one = ClipStep(np.zeros(1, int), *(a[1:2] for a in wanted), points[:1], points[:1],
                        np.zeros(1))  # fmt: skip
-        single = alone.targets(Seen(state[0][1:2], state[1][1:2], points[:1], (one,)))
+        single = alone.targets(TrackerInput(state[0][1:2], state[1][1:2], points[:1], (one,)))
         np.testing.assert_allclose(told[1:2], single, atol=1e-6)
