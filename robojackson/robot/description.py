@@ -160,6 +160,8 @@ class RobotDescription:
         natural_frequency: Hinge -> natural frequency of armature and PD law, Hz.
         damping_ratio: Hinge -> damping ratio of the same; 2 where only the frequency is named.
         action_scale: Hinge -> how far a full action of a policy moves its target, rad.
+        robust_action_factor: Factor on `action_scale` where a training pushes the robot: pushes
+            need more torque than a dance.
         feedforward: Share of the torques that a reference asks for by which the targets of the PD
             law lead its joint angles, unitless.
         stand_pose: Hinge -> angle of the default stand, radians; zero where it is not named.
@@ -191,6 +193,7 @@ class RobotDescription:
     natural_frequency: Mapping[str, Positive] = Field(default_factory=dict)
     damping_ratio: Mapping[str, Positive] = Field(default_factory=dict)
     action_scale: Mapping[str, Positive] = Field(default_factory=dict)
+    robust_action_factor: Positive = 1.0
     feedforward: float = Field(default=0.0, ge=0, le=2)
     stand_pose: Mapping[str, float] = Field(default_factory=dict)
     simulation: SimulationDescription = Field(default_factory=SimulationDescription)

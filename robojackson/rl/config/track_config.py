@@ -25,6 +25,8 @@ class ControlConfig:
             joint angles, unitless; 0 follows the angles alone; the robot's when null.
         residual: Largest offset that the policy adds to the reference's joint angles, rad; the
             robot's action scale when null.
+        action_factor: Factor on the robot's action scale; when null 1, or the robot's
+            `robust_action_factor` where the training pushes it.
         arm_residual: Largest offset that the policy adds to the arms' angles, rad.
     """
 
@@ -35,6 +37,7 @@ class ControlConfig:
     feedforward: float | None = Field(default=None, ge=0, le=2)
     residual: float | None = Field(default=None, gt=0)
     arm_residual: float | None = Field(default=None, gt=0)
+    action_factor: float | None = Field(default=None, gt=0)
 
 
 @config_dataclass

@@ -62,6 +62,7 @@ def residual_scale(robot: Robot, control: ControlConfig) -> Float[np.ndarray, " 
     joints = model.actuator_trnid[:, 0]
     is_arm = np.array([int(joint) in arms - legs for joint in joints])
     scale: np.ndarray = robot.actuation.action_scale[Motors.of(model).hinge]
+    scale = scale * (control.action_factor or 1.0)
     if control.residual is not None:
         scale = np.where(is_arm, scale, control.residual)
     if control.arm_residual is not None:

@@ -44,10 +44,19 @@ BAD_STATE = [
 """Warnings at which MuJoCo resets a state by itself."""
 
 
-def resolved(control: ControlConfig, robot: Robot) -> ControlConfig:
-    """The law of control with the robot's substeps and feed-forward where it names none."""
-    share = feedforward_share(robot, control)
-    return replace(control, substeps=control.substeps or robot.substeps, feedforward=share)
+def resolved(
+    control: ControlConfig, robot: Robot, random: RandomConfig | None = None
+) -> ControlConfig:
+    """The law of control with the robot's substeps, feed-forward and action factor where it names
+    none."""
+    pushed = random is not None and random.pushes > 0
+    usual = robot.description.robust_action_factor if pushed else 1.0
+    return replace(
+        control,
+        substeps=control.substeps or robot.substeps,
+        feedforward=feedforward_share(robot, control),
+        action_factor=control.action_factor or usual,
+    )
 
 
 def control_step(robot: Robot, control: ControlConfig) -> float:
@@ -107,7 +116,7 @@ class Simulation:
         seed: int = 0,
         delay_s: float = 0.0,
     ) -> None:
-        model, control = without_sensors(robot.model), resolved(control, robot)
+        model, control = without_sensors(robot.model), resolved(control, robot, random)
         self.model, self.n, self._sites, self.control = model, n, robot.keypoint_sites, control
         self.motors = Motors.of(model)
         self.kp, self.kd = gains(robot, control)

@@ -156,3 +156,14 @@ def test_randomised_robots_differ_and_leave_the_stock_one_alone(
     assert 1e-6 < spread < 0.2
     np.testing.assert_array_equal(robot.model.geom_friction, stock)
     assert robot.model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
+
+
+def test_a_training_with_pushes_may_act_more_strongly(robot: Robot) -> None:
+    stronger = load_robot(replace(robot.description, robust_action_factor=2.0))
+    pushed, calm = RandomConfig(pushes=1.0), RandomConfig(friction=0.1)
+    sims = [Simulation(stronger, ControlConfig(), 1, 1, random) for random in (pushed, calm)]
+    np.testing.assert_allclose(sims[0].residual, 2 * sims[1].residual)
+    np.testing.assert_array_equal(sims[1].residual, residual_scale(robot, ControlConfig()))
+    kept = sims[0].control
+    assert kept.action_factor == 2.0
+    np.testing.assert_array_equal(residual_scale(stronger, kept), sims[0].residual)
