@@ -1,7 +1,9 @@
 """The verdict on a policy, or on a tracker that was not trained on this dance."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from robojackson.files import tables
 from robojackson.motion.reference_motion import ReferenceMotion
@@ -17,6 +19,10 @@ from tasks.runtime.robot_digests import robot_models
 from tasks.runtime.stage import stage
 from tasks.train_policy import RunLabels
 
+if TYPE_CHECKING:
+    from robojackson.rl.evaluation.policy_evaluation import Evaluation
+
+Row = Mapping[str, object]
 FEW_PHASES = 8
 """Start phases of a first look; with the stand nine starts."""
 
@@ -40,14 +46,7 @@ def evaluate_dance(
     verdict = evaluate_policy(trained, motion, load_robot(robot), config)
     run_id = f"{labels.move}-{labels.setup}-s{trained.training['seed']}"
     common = {"run_id": run_id, "move": labels.move, "setup": labels.setup, **trained.training}
-    rows = tables.encode_rows(EVALUATION_RECORD, [{**common, **r} for r in verdict.rows])
-    summary = json.dumps(verdict.summary, indent=1).encode()
-    rollout = Rollout(motion.dt, verdict.rollout_qpos)
-    return {
-        "evaluations": store.save("evaluate", "evaluations.parquet", rows),
-        "evaluation": store.save("evaluate", "evaluation.json", summary),
-        "rollout": artifact_tables.save(store, "evaluate", "rollout.parquet", rollout),
-    }
+    return _saved(store, "evaluate", "", verdict, motion.dt, common)
 
 
 @stage(models=robot_models, unkeyed=("labels",))
@@ -71,13 +70,20 @@ def evaluate_tracker(
     verdict = evaluate_policy(open_tracker(tracker), motion, load_robot(robot), config)
     names = {"run_id": f"{labels.move}-{tracker.name}", "move": labels.move}
     common = {**names, "setup": tracker.name, "seed": 0, "step": None}
-    rows = tables.encode_rows(EVALUATION_RECORD, [{**common, **r} for r in verdict.rows])
+    return _saved(store, "track", "tracker_", verdict, motion.dt, common)
+
+
+def _saved(
+    store: Store, stage_name: str, prefix: str, verdict: "Evaluation", dt: float, common: Row
+) -> dict[str, Artifact]:
+    """The artifacts of an evaluation; `common` are the columns that all its rows share."""
+    rows = tables.encode_rows(EVALUATION_RECORD, [{**common, **row} for row in verdict.rows])
     summary = json.dumps(verdict.summary, indent=1).encode()
-    rollout = Rollout(motion.dt, verdict.rollout_qpos)
+    rollout, name = Rollout(dt, verdict.rollout_qpos), f"{prefix}rollout.parquet"
     return {
-        "evaluations": store.save("track", "tracker_evaluations.parquet", rows),
-        "evaluation": store.save("track", "tracker_evaluation.json", summary),
-        "rollout": artifact_tables.save(store, "track", "tracker_rollout.parquet", rollout),
+        "evaluations": store.save(stage_name, f"{prefix}evaluations.parquet", rows),
+        "evaluation": store.save(stage_name, f"{prefix}evaluation.json", summary),
+        "rollout": artifact_tables.save(store, stage_name, name, rollout),
     }
 
 

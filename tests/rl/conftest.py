@@ -9,6 +9,7 @@ import pytest
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.pipeline.yaml_loader import load
 from robojackson.robot.model import Robot, RobotDescription, load_robot
+from tests.fixtures.robot_motions import motion_of
 
 DT = 0.015
 
@@ -46,34 +47,9 @@ def make_reference(
     qpos = np.tile(model.qpos0, (steps, 1))
     for name, curve in angles(2 * np.pi * np.arange(steps) / steps).items():
         qpos[:, model.joint(name).qposadr[0]] = curve
-    points = np.zeros((steps, len(robot.keypoint_names), 3))
-    bodies = np.zeros((steps, model.nbody, 3))
     for t in range(steps):
         data.qpos[:] = qpos[t]
         mujoco.mj_kinematics(model, data)
         feet = data.site_xpos[robot.keypoint_sites][robot.contact_keypoints]
         qpos[t, 2] -= (feet[:, 2] - robot.contact_radii).min()
-        data.qpos[:] = qpos[t]
-        mujoco.mj_kinematics(model, data)
-        points[t], bodies[t] = data.site_xpos[robot.keypoint_sites], data.xpos
-    qvel = np.zeros((steps, model.nv))
-    for t in range(steps):
-        mujoco.mj_differentiatePos(model, qvel[t], 2 * DT, qpos[t - 1], qpos[(t + 1) % steps])
-    return ReferenceMotion(
-        robot=robot.description.name,
-        model_sha256=robot.sha256,
-        dt=DT,
-        cyclic=cyclic,
-        cycle_offset=np.zeros(3),
-        qpos=qpos,
-        qvel=qvel,
-        body_pos_w=bodies[:, 1:],
-        keypoints_w=points,
-        contact=np.ones((steps, 2), np.int8),
-        torque_ratio=np.zeros((steps, model.nu)),
-        source_time_s=np.arange(steps) * DT,
-        joint_names=robot.joint_names,
-        body_names=robot.body_names,
-        keypoint_names=robot.keypoint_names,
-        contact_names=robot.contact_names,
-    )
+    return motion_of(robot, qpos, DT, cyclic)

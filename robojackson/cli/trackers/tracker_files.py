@@ -49,13 +49,16 @@ def add_tracker(name: str, file: Path | None = None) -> Entry:
     tracker = describe_tracker(name)
     path = tracker_path(tracker)
     told = {"tracker": name, "file": str(path), "licence": tracker.licence}
+    if file is not None and not path.is_file():
+        _require_pinned(tracker, file)
     with in_one_line(f"cannot write {path.parent}"):
         path.parent.mkdir(parents=True, exist_ok=True)
     with locked(path.parent, LOCK, A_MOMENT):
         if path.is_file() and sha256_of_file(path) == tracker.file.sha256:
             return {**told, "added": False}
         if file is not None:
-            _copy(tracker, file, path)
+            _require_pinned(tracker, file)
+            FileTree(path.parent).write(path.name, file)
         else:
             with in_one_line(f"cannot write {path}"):
                 download(tracker.file.url, path, tracker.file.size, tracker.file.sha256)
@@ -63,7 +66,7 @@ def add_tracker(name: str, file: Path | None = None) -> Entry:
     return {**told, "added": True}
 
 
-def _copy(tracker: TrackerDescription, file: Path, path: Path) -> None:
+def _require_pinned(tracker: TrackerDescription, file: Path) -> None:
     with in_one_line(f"cannot read {file}", StoreError):
         digest = sha256_of_file(file)
     if digest != tracker.file.sha256:
@@ -71,7 +74,6 @@ def _copy(tracker: TrackerDescription, file: Path, path: Path) -> None:
             f"{file} is not the file that tracker {tracker.name!r} pins: its sha256 is {digest}, "
             f"expected {tracker.file.sha256}; {tracker.file.url} is its address"
         )
-    FileTree(path.parent).write(path.name, file)
 
 
 def _entry(tracker: TrackerDescription) -> Entry:

@@ -118,8 +118,7 @@ def _first(box: Box) -> Point:
 def _begun(box: Box, start: Point) -> Point:
     """A start; rows that are not inside their bounds begin anew."""
     found = _first(box)
-    bounded = np.array_equal(start.x.shape, found.x.shape)
-    if not bounded:
+    if start.x.shape != found.x.shape:
         return found
     same = ((start.low > 0) == np.isfinite(box.lower)).all(axis=1)
     same &= ((start.high > 0) == np.isfinite(box.upper)).all(axis=1)

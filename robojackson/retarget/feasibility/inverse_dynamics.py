@@ -12,8 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from robojackson.retarget.feasibility.contact_wrench import Demand, Tolerance
-from robojackson.retarget.feasibility.force_model import once_a_robot
-from robojackson.retarget.feasibility.force_model import unconstrained as unconstrained
+from robojackson.retarget.feasibility.force_model import once_a_robot, unconstrained
 from robojackson.retarget.targets.ground_contact import GRAVITY
 from robojackson.robot.model import Robot
 from robojackson.robot.resampling import accelerations, velocities

@@ -71,14 +71,14 @@ def feet_of(points: Float[np.ndarray, "K 3"], heading: float, robot: Robot) -> F
     found = {}
     for side in SIDES:
         ankle, toe = names.index(f"{side}_foot"), f"{side}_toe"
-        yaw = _yaw(points[names.index(toe)] - points[ankle]) if toe in names else heading
+        yaw = yaw_of(points[names.index(toe)] - points[ankle]) if toe in names else heading
         found[side] = Placement(points[ankle, :2], yaw)
     return found
 
 
 def stand_over(feet: Feet, heading: float, robot: Robot) -> Float[np.ndarray, "K 3"]:
     """Keypoints of the robot's stand between the feet, soles on the floor."""
-    found = own_stand(robot) @ _about_up(heading).T
+    found = own_stand(robot) @ about_up(heading).T
     found[:, :2] += np.mean([feet[side].place for side in SIDES], 0)
     place_feet(found, feet, robot)
     return np.asarray(found)
@@ -104,13 +104,13 @@ def place_feet(points: Float[np.ndarray, "K 3"], feet: Feet, robot: Robot) -> No
         ankle = names.index(f"{side}_foot")
         points[ankle, :2] = foot.place
         if (toe := f"{side}_toe") in names:
-            points[names.index(toe)] = points[ankle] + _about_up(foot.yaw) @ robot.toe_arms[toe]
+            points[names.index(toe)] = points[ankle] + about_up(foot.yaw) @ robot.toe_arms[toe]
 
 
 def stand_feet(feet: Feet, heading: float, robot: Robot) -> Feet:
     """Where the robot's stand has its feet, around the middle of those given."""
     middle = np.mean([feet[side].place for side in SIDES], 0)
-    own, names = own_stand(robot) @ _about_up(heading).T, robot.keypoint_names
+    own, names = own_stand(robot) @ about_up(heading).T, robot.keypoint_names
     return {
         side: Placement(middle + own[names.index(f"{side}_foot"), :2], heading) for side in SIDES
     }
@@ -120,7 +120,7 @@ def stands_badly(feet: Feet, heading: float, robot: Robot) -> bool:
     """Whether the feet are crossed, close, far apart, staggered or turned away."""
     wanted = stand_feet(feet, heading, robot)
     width = float(np.linalg.norm(wanted["left"].place - wanted["right"].place))
-    apart = _about_up(heading)[:2, :2].T @ (feet["left"].place - feet["right"].place)
+    apart = about_up(heading)[:2, :2].T @ (feet["left"].place - feet["right"].place)
     turned = max(abs(_turn(heading, foot.yaw)) for foot in feet.values())
     across = float(apart[1]) / width
     staggered = abs(float(apart[0])) > STAGGERED * width
@@ -138,7 +138,7 @@ def steps_into_stand(feet: Feet, heading: float, robot: Robot, dt: float) -> Wal
     if not stands_badly(feet, heading, robot):
         return None
     wanted = stand_feet(feet, heading, robot)
-    ahead = _about_up(heading)[:2, 0]
+    ahead = about_up(heading)[:2, 0]
     order = sorted(SIDES, key=lambda side: -float(feet[side].place @ ahead))
     now, body, parts, air = dict(feet), _middle(feet), [], []
     for side in (side for side in order if not feet[side].near(wanted[side])):
@@ -213,10 +213,12 @@ def _turn(start: float, end: float) -> float:
     return float(wrapped(np.asarray(end - start)))
 
 
-def _yaw(ahead: Float[np.ndarray, "3"]) -> float:
+def yaw_of(ahead: Float[np.ndarray, "3"]) -> float:
+    """Heading of a direction, rad."""
     return float(np.arctan2(ahead[1], ahead[0]))
 
 
-def _about_up(yaw: float) -> Float[np.ndarray, "3 3"]:
+def about_up(yaw: float) -> Float[np.ndarray, "3 3"]:
+    """Rotation matrix about the vertical."""
     c, s = np.cos(yaw), np.sin(yaw)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

@@ -21,9 +21,11 @@ from robojackson.config import config_dataclass
 from robojackson.motion.smpl_sequence import AIR, PLANTED
 from robojackson.retarget.targets.footsteps import (
     SIDES,
+    about_up,
     feet_of,
     stand_over,
     steps_into_stand,
+    yaw_of,
 )
 from robojackson.retarget.targets.keypoint_targets import Targets, select_steps
 from robojackson.robot.model import Robot
@@ -130,7 +132,7 @@ def _tail(aims: Targets, robot: Robot, config: TailConfig, stand_s: float) -> Ta
     steps = max(2, round(config.blend_s / aims.dt))
     held = round(stand_s / aims.dt)
     last, before = aims.keypoints_w[-1], aims.keypoints_w[-2]
-    yaw = _yaw(aims.heading[-1][:, 0])
+    yaw = yaw_of(aims.heading[-1][:, 0])
     found_feet = feet_of(last, yaw, robot)
     stand = stand_over(found_feet, yaw, robot)
     feet = _columns_of_feet(robot)
@@ -191,19 +193,10 @@ def _polynomial(
 def _headings(
     heading: Float[np.ndarray, "3 3"], steps: int, held: int
 ) -> Float[np.ndarray, "S 3 3"]:
-    upright = _about_up(_yaw(heading[:, 0]))
+    upright = about_up(yaw_of(heading[:, 0]))
     turns = Rotation.from_matrix(np.stack([heading, upright]))
     way = Slerp([0.0, 1.0], turns)(np.arange(1, steps + 1) / steps).as_matrix()
     return np.concatenate([way, np.repeat(upright[None], held, 0)])
-
-
-def _yaw(ahead: Float[np.ndarray, "3"]) -> float:
-    return float(np.arctan2(ahead[1], ahead[0]))
-
-
-def _about_up(yaw: float) -> Float[np.ndarray, "3 3"]:
-    c, s = np.cos(yaw), np.sin(yaw)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _reversed(aims: Targets) -> Targets:

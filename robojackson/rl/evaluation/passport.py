@@ -12,7 +12,7 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import EvaluateConfig, RandomConfig
 from robojackson.rl.evaluation.controllers import Evaluated, trained_driver
 from robojackson.rl.evaluation.rollout_records import RolloutScorer
-from robojackson.rl.evaluation.rollouts import Conditions, roll_out
+from robojackson.rl.evaluation.rollouts import Conditions, Driver, roll_out
 from robojackson.rl.evaluation.starts import starts_of, summarise
 from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.reference_clip import Clip
@@ -103,10 +103,13 @@ def passport(
     """
     config = replace(config, resets=1)
     rows: list[dict[str, Any]] = []
+    driver = trained_driver(policy, robot, reference)
+    clip = Clip(reference, lead_of(robot, reference, driver.control))
     every = cases(robot, config.seed)
     for number, case in enumerate(every):
         progress(case.name, number, len(every))
-        rows.append({"case": case.name, **_evaluate_case(policy, reference, robot, config, case)})
+        figures = _evaluate_case(driver, clip, reference, robot, config, case)
+        rows.append({"case": case.name, **figures})
     nominal = rows[0]["strict_success"]
     for row in rows:
         row["kept"] = row["strict_success"] / nominal if nominal else None
@@ -114,12 +117,15 @@ def passport(
 
 
 def _evaluate_case(
-    policy: Evaluated, reference: ReferenceMotion, robot: Robot, config: EvaluateConfig, case: Case
+    driver: Driver,
+    clip: Clip,
+    reference: ReferenceMotion,
+    robot: Robot,
+    config: EvaluateConfig,
+    case: Case,
 ) -> dict[str, float]:
     """Means over the rollouts of a case; the driver's gains are the varied robot's."""
     other = varied(robot, case.variation)
-    driver = trained_driver(policy, robot, reference)
-    clip = Clip(reference, lead_of(robot, reference, driver.control))
     driver = replace(driver, control=replace(driver.control, substeps=other.substeps))
     starts, labels = starts_of(robot, clip, config)
     horizon = clip.horizon(starts.step, config.seconds)

@@ -8,6 +8,7 @@ from scipy.optimize import lsq_linear
 
 from robojackson.retarget.feasibility import contact_wrench, inverse_dynamics
 from robojackson.retarget.feasibility.contact_wrench import Demand, Tolerance
+from robojackson.retarget.feasibility.force_model import unconstrained
 from robojackson.robot.model import Robot
 from robojackson.robot.tree_kinematics import integrate, pose, tree
 from tests.fixtures.robots import robot_motion
@@ -126,9 +127,7 @@ def test_the_force_at_another_tempo_is_that_of_the_slower_motion(tempo: float, r
 
     speed = tempo * velocities(motion.qpos, motion.dt, motion.cycle_offset)
     rate = tempo**2 * accelerations(motion.qpos, motion.dt, motion.cycle_offset)
-    slower = inverse_dynamics.inverse(
-        inverse_dynamics.unconstrained(robot), motion.qpos, speed, rate
-    )
+    slower = inverse_dynamics.inverse(unconstrained(robot), motion.qpos, speed, rate)
     np.testing.assert_allclose(parts.at(tempo), slower, atol=1e-6)
 
 

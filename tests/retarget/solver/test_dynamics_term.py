@@ -57,7 +57,8 @@ def test_the_terms_gradient_is_that_of_its_cost(robot: Robot, rng: np.random.Gen
 def test_the_slopes_of_inverse_dynamics_are_its_differences(robot: Robot):
     problem, qpos = _problem(robot), robot_motion("walk").qpos[:4]
     zero = np.zeros((4, robot.model.nv))
-    from robojackson.retarget.feasibility.inverse_dynamics import inverse, unconstrained
+    from robojackson.retarget.feasibility.force_model import unconstrained
+    from robojackson.retarget.feasibility.inverse_dynamics import inverse
 
     model = unconstrained(problem.robot)
     slopes = dynamics_term.inverse_slopes(model, qpos, zero, zero)
