@@ -133,6 +133,7 @@ def test_a_foreign_copy_is_one_line(pin, tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="cannot read"):
         add_tracker(NAME, tmp_path / "none.onnx")
     assert not path.exists()
+    assert not path.parent.exists()
 
 
 def test_an_altered_file_is_refused_and_added_again(pin, tmp_path: Path, network: Path) -> None:
