@@ -185,12 +185,13 @@ class TrackConfig:
 
     Attributes:
         observation: What the policy sees: `full`, all that a simulation knows, or `onboard`, what a
-            real robot measures by itself (the critics see all).
+            real robot measures by itself (the critics see all), or `preview`, that and the
+            reference ahead.
         episode_seconds: Time limit of a training episode, s; its end is bootstrapped.
         threads: Threads that step the simulations.
     """
 
-    observation: Literal["full", "onboard"] = "full"
+    observation: Literal["full", "onboard", "preview"] = "full"
     control: ControlConfig = Field(default_factory=ControlConfig)
     reset: ResetConfig = Field(default_factory=ResetConfig)
     reward: RewardConfig = Field(default_factory=RewardConfig)

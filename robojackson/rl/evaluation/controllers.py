@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TypeVar
+from typing import TypeVar, get_args
 
 import numpy as np
 from pydantic import PositiveInt, TypeAdapter, ValidationError
@@ -189,7 +189,13 @@ def observation_of(policy: Policy) -> Kind:
     """Which inputs a policy of mode `track` takes."""
     held = policy.facts.get("environment")
     said = held.get("observation", "full") if isinstance(held, Mapping) else "full"
-    return "onboard" if said == "onboard" else "full"
+    kinds: dict[object, Kind] = {kind: kind for kind in get_args(Kind)}
+    return kinds.get(said, "full")
+
+
+def sees_ahead(policy: Evaluated) -> bool:
+    """Whether a policy takes a preview of the reference."""
+    return isinstance(policy, Policy) and observation_of(policy) == "preview"
 
 
 def _observation_sizes(policy: Policy, robot: Robot) -> tuple[int, ...]:

@@ -5,7 +5,7 @@ to the reference's next hinge angles and followed by the PD law of `Simulation`.
 `observation.Observer`. Reward: `rewards.reward_terms`. Episodes start as `reset_states` says.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
@@ -35,8 +35,8 @@ from robojackson.rl.modes.rewards import (
     tracked_points,
     tracking_errors,
 )
-from robojackson.rl.sim.feedforward import lead_of
-from robojackson.rl.sim.reference_clip import Clip, ClipStep
+from robojackson.rl.sim.preview import driven_clip
+from robojackson.rl.sim.reference_clip import ClipStep
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
@@ -47,21 +47,22 @@ PERFECT_OF_THE_PAPER = 5.0
 
 
 class TrackMode:
-    """Tracking of one reference motion by N robots (`Mode` protocol)."""
+    """Tracking of one reference motion or several by N robots (`Mode` protocol)."""
 
     repeats = 1
 
     def __init__(
         self,
         robot: Robot,
-        reference: ReferenceMotion,
+        reference: ReferenceMotion | Sequence[ReferenceMotion],
         config: TrackConfig,
         n: int,
         seed: int,
         rewards: Mapping[str, RewardFunction] = MappingProxyType({}),
     ) -> None:
         self._config, self._rewards = config, rewards
-        self.clip = Clip(reference, lead_of(robot, reference, config.control))
+        ahead = config.observation == "preview"
+        self.clip = driven_clip(robot, reference, config.control, ahead)
         names = robot.keypoint_names
         self._which = tracked_points(names)
         self.sim = Simulation(robot, config.control, n, config.threads, config.random, seed)
@@ -119,13 +120,13 @@ class TrackMode:
         return {}
 
     def record_finished(self, indices: Int[np.ndarray, " I"], step: Int[np.ndarray, " I"]) -> None:
-        """Keep the last states of episodes that reached the time limit of a cyclic clip."""
-        if not self.clip.cyclic:
-            return
+        """Keep the last states of episodes that reached the time limit of a cyclic motion."""
         for i, at in zip(indices, step, strict=True):
-            qpos = self.sim.qpos[i].copy()
-            qpos[:2] -= self.clip.at(np.array([at])).qpos[0, :2]
-            self._settled.add(qpos, self.sim.qvel[i], int(at % self.clip.steps))
+            now = np.array([at])
+            if self.clip.repeats(now)[0]:
+                qpos = self.sim.qpos[i].copy()
+                qpos[:2] -= self.clip.at(now).qpos[0, :2]
+                self._settled.add(qpos, self.sim.qvel[i], int(self.clip.folded(now)[0]))
 
     def forget(self) -> None:
         self.starts.forget()
