@@ -23,9 +23,10 @@ from robojackson.formats.deploy.licence_passport import together, with_declared
 from robojackson.formats.deploy.pack_files import pack_files
 from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
 from robojackson.rl.config.train_config import ControlConfig
-from robojackson.rl.evaluation.controllers import control_of, mode_of, observation_of
+from robojackson.rl.evaluation.controllers import control_of
 from robojackson.rl.modes.observation import CLIP, HINGE_SPEED_SCALE, SPEED_SCALE
 from robojackson.rl.policy import Policy, load_policy
+from robojackson.rl.policy_facts import mode_of, observation_of
 from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.motors import Motors, gains, residual_scale
 from robojackson.robot.fall import Fall

@@ -164,6 +164,8 @@ class RobotDescription:
             need more torque than a dance.
         feedforward: Share of the torques that a reference asks for by which the targets of the PD
             law lead its joint angles, unitless.
+        feedback: Share of the linear-quadratic feedback along a reference by which the targets of
+            the PD law move, for policies that see all, unitless.
         stand_pose: Hinge -> angle of the default stand, radians; zero where it is not named.
         simulation: How the physics is stepped.
         fall: When the robot has fallen.
@@ -195,6 +197,7 @@ class RobotDescription:
     action_scale: Mapping[str, Positive] = Field(default_factory=dict)
     robust_action_factor: Positive = 1.0
     feedforward: float = Field(default=0.0, ge=0, le=2)
+    feedback: float = Field(default=0.0, ge=0, le=2)
     stand_pose: Mapping[str, float] = Field(default_factory=dict)
     simulation: SimulationDescription = Field(default_factory=SimulationDescription)
     fall: FallRule = Field(default_factory=FallRule)

@@ -47,8 +47,11 @@ def add_tracker(name: str, file: Path | None = None) -> Entry:
         StoreError: the store cannot be written.
     """
     tracker = describe_tracker(name)
-    path = tracker_path(tracker)
+    path, url = tracker_path(tracker), tracker.file.url
     told = {"tracker": name, "file": str(path), "licence": tracker.licence}
+    if url is None:
+        open_tracker(tracker)
+        return {**told, "added": False}
     if file is not None and not path.is_file():
         _require_pinned(tracker, file)
     with in_one_line(f"cannot write {path.parent}"):
@@ -61,7 +64,7 @@ def add_tracker(name: str, file: Path | None = None) -> Entry:
             FileTree(path.parent).write(path.name, file)
         else:
             with in_one_line(f"cannot write {path}"):
-                download(tracker.file.url, path, tracker.file.size, tracker.file.sha256)
+                download(url, path, tracker.file.size, tracker.file.sha256)
     open_tracker(tracker)  # a file that cannot be run is reported now
     return {**told, "added": True}
 

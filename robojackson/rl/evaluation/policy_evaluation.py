@@ -28,8 +28,6 @@ from robojackson.rl.evaluation.controllers import (
     control_of,
     drivers,
     equipped,
-    fact,
-    mode_of,
     sees_ahead,
 )
 from robojackson.rl.evaluation.passport import passport
@@ -41,6 +39,7 @@ from robojackson.rl.evaluation.starts import starts_of, summarise
 from robojackson.rl.evaluation.verdict import verdict_on, without_short_figures
 from robojackson.rl.modes.paper_mode import facing_ahead
 from robojackson.rl.policy import Policy
+from robojackson.rl.policy_facts import fact, mode_of
 from robojackson.rl.sim.preview import driven_clip
 from robojackson.rl.sim.simulation import control_step, require_same_clock
 from robojackson.robot.fall import Fall

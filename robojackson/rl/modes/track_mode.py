@@ -6,6 +6,7 @@ to the reference's next hinge angles and followed by the PD law of `Simulation`.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
@@ -14,7 +15,7 @@ from jaxtyping import Float, Int
 
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.paper_config import BETA
-from robojackson.rl.config.train_config import RewardConfig, TrackConfig
+from robojackson.rl.config.train_config import ControlConfig, RewardConfig, TrackConfig
 from robojackson.rl.modes.mode import EpisodeStart, Score
 from robojackson.rl.modes.observation import Observer
 from robojackson.rl.modes.reset_states import (
@@ -61,11 +62,11 @@ class TrackMode:
         rewards: Mapping[str, RewardFunction] = MappingProxyType({}),
     ) -> None:
         self._config, self._rewards = config, rewards
-        ahead = config.observation == "preview"
-        self.clip = driven_clip(robot, reference, config.control, ahead)
+        ahead, control = config.observation == "preview", control_of(config)
+        self.clip = driven_clip(robot, reference, control, ahead)
         names = robot.keypoint_names
         self._which = tracked_points(names)
-        self.sim = Simulation(robot, config.control, n, config.threads, config.random, seed)
+        self.sim = Simulation(robot, control, n, config.threads, config.random, seed)
         self.starts = StartPhases(self.clip, config.reset.failure_share)
         self._settled = SettledStates(robot.model.nq, robot.model.nv)
         self._stand = default_standing_pose(robot)
@@ -138,6 +139,14 @@ class TrackMode:
     def restore(self, state: dict[str, Any]) -> None:
         self.starts.failures = np.array(state["failures"])
         self._settled.restore(state)
+
+
+def control_of(config: TrackConfig) -> ControlConfig:
+    """The control law of a training: feedback of all that a simulation knows is for policies that
+    see as much."""
+    if config.observation == "full" or config.control.feedback is not None:
+        return config.control
+    return replace(config.control, feedback=0.0)
 
 
 def evaluate_step(

@@ -14,6 +14,7 @@ from jaxtyping import Float
 from robojackson.geometry.rotations import heading, quat_to_matrix
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import ControlConfig
+from robojackson.rl.sim.feedback import feedback_of
 from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.robot.model import Robot
@@ -57,10 +58,10 @@ def driven_clip(
     control: ControlConfig,
     ahead: bool = False,
 ) -> Clip:
-    """Return the clip with its feed-forward and, if `ahead`, the preview."""
+    """Return the clip with its feed-forward, its feedback and, if `ahead`, the preview."""
     motions = [references] if isinstance(references, ReferenceMotion) else list(references)
     leads = [lead_of(robot, motion, control) for motion in motions]
     driven = [lead for lead in leads if lead is not None]
     lead = np.concatenate(driven) if driven else None
     seen = np.concatenate([preview_of(motion, robot) for motion in motions]) if ahead else None
-    return Clip(motions, lead, seen)
+    return Clip(motions, lead, seen, feedback_of(robot, motions, control))

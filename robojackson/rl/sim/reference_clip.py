@@ -5,8 +5,9 @@ offsets. A motion that is not cyclic holds its last step. Step s of the m-th mot
 `m * STRIDE + s`. Frames and units as in `ReferenceMotion`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -19,6 +20,22 @@ STRIDE = 1_000_000
 """Steps by which the motions of a clip are told apart; no episode is as long."""
 
 
+class StepLaw(Protocol):
+    """What moves the targets of N robots at one step of their references."""
+
+    def targets(
+        self, qpos: Float[np.ndarray, "N nq"], qvel: Float[np.ndarray, "N nv"]
+    ) -> Float[np.ndarray, "N nu"]:
+        """Return by how much the motors' targets move, rad."""
+
+
+class Law(Protocol):
+    """A feedback along the joined motions of a clip (`feedback.Feedback`)."""
+
+    def at(self, row: Int[np.ndarray, " N"], shift: Float[np.ndarray, "N 3"]) -> StepLaw:
+        """Return it at rows whose cycles have moved them by `shift`, m."""
+
+
 @dataclass(frozen=True)
 class ClipStep:
     """The reference at one step for each of N environments.
@@ -28,6 +45,8 @@ class ClipStep:
         phase: 0..1 of the motion.
         lead: Offset of the motors' targets from the reference's angles, rad; None without one.
         preview: What the policy sees of the steps ahead (`preview.preview_of`); None without one.
+        feedback: How the targets move on the way to this step, given qpos and qvel now, rad; None
+            without one.
     """
 
     step: Int[np.ndarray, " N"]
@@ -38,6 +57,7 @@ class ClipStep:
     phase: Float[np.ndarray, " N"]
     lead: Float[np.ndarray, "N nu"] | None = None
     preview: Float[np.ndarray, "N P"] | None = None
+    feedback: Callable[[np.ndarray, np.ndarray], Float[np.ndarray, "N nu"]] | None = None
 
 
 class Clip:
@@ -48,6 +68,7 @@ class Clip:
         lead: Offset of the motors' targets from the reference's angles at every step, rad; the
             steps of all motions, one after the other.
         preview: What the policy sees of the steps ahead, of the same steps.
+        law: Feedback along the same steps.
 
     Attributes:
         steps: Of all motions together.
@@ -63,6 +84,7 @@ class Clip:
         references: ReferenceMotion | Sequence[ReferenceMotion],
         lead: Float[np.ndarray, "S nu"] | None = None,
         preview: Float[np.ndarray, "S P"] | None = None,
+        law: Law | None = None,
     ) -> None:
         motions = [references] if isinstance(references, ReferenceMotion) else list(references)
         for motion in motions:
@@ -77,7 +99,7 @@ class Clip:
         self._qvel = np.concatenate([np.asarray(motion.qvel, float) for motion in motions])
         self._points = np.concatenate([np.asarray(m.keypoints_w, float) for m in motions])
         self._moved = np.concatenate([_velocities(motion) for motion in motions])
-        self._lead, self._preview = lead, preview
+        self._lead, self._preview, self._law = lead, preview, law
         self._last: ClipStep | None = None
 
     def starts(self) -> Int[np.ndarray, " R"]:
@@ -118,8 +140,23 @@ class Clip:
         arrays = qpos, self._qvel[row], points, self._moved[row], phase
         for array in arrays:
             array.setflags(write=False)
-        own = (None if held is None else held[row] for held in (self._lead, self._preview))
-        return ClipStep(step, *arrays, *own)
+        lead = None if self._lead is None else self._lead[row]
+        preview = None if self._preview is None else self._preview[row]
+        return ClipStep(step, *arrays, lead, preview, self._feedback(step))
+
+    def _feedback(
+        self, step: np.ndarray
+    ) -> Callable[[np.ndarray, np.ndarray], Float[np.ndarray, "N nu"]] | None:
+        """The feedback on the way to each step."""
+        law = self._law
+        if law is None:
+            return None
+
+        def targets(qpos: np.ndarray, qvel: np.ndarray) -> Float[np.ndarray, "N nu"]:
+            row, shift, _ = self._split(step - 1)
+            return law.at(row, shift).targets(qpos, qvel)
+
+        return targets
 
     def gather(
         self, values: Float[np.ndarray, "S P 3"], step: Int[np.ndarray, " N"]

@@ -14,19 +14,19 @@ from robojackson.robot.description import Digest, Positive, Weight
 
 @config_dataclass
 class TrackerFile:
-    """The file of a network; `robojackson trackers add NAME` downloads it.
+    """The file of a network; `robojackson trackers add NAME` downloads it where it does not ship.
 
     Attributes:
-        url: Address of the file, of one commit.
-        name: What it is called in the store.
+        url: Address of the file, of one commit; null for one that ships with RoboJackson.
+        name: What it is called in the store, or among the assets.
         size: Bytes.
         sha256: Digest of its content; another file is refused.
     """
 
-    url: Annotated[str, Field(pattern=r"^https?://")]
     name: Annotated[str, Field(pattern=r"^[\w.-]+$")]
     size: Annotated[int, Field(ge=1)]
     sha256: Digest
+    url: Annotated[str, Field(pattern=r"^https?://")] | None = None
 
 
 @config_dataclass
@@ -36,7 +36,8 @@ class TrackerDescription:
     Attributes:
         name: Name of the tracker.
         robot: Name of the robot that it drives.
-        network: Layout of its observation and action.
+        network: Layout of its observation and action: `twist2`, or `policy`, a policy file of ours,
+            which knows its own (then nothing is given from `action_scale` on).
         file: Where the network comes from.
         homepage: Where its authors describe it.
         licence: Under which its authors publish the file.
@@ -56,17 +57,17 @@ class TrackerDescription:
 
     name: str
     robot: str
-    network: Literal["twist2"]
+    network: Literal["twist2", "policy"]
     file: TrackerFile
     licence: str
     trained_on: str
     homepage: str
     control_dt: Positive
-    action_scale: Positive
-    action_limit: Positive
-    joints: tuple[str, ...]
-    stiffness: Mapping[str, Positive]
-    damping: Mapping[str, Weight]
+    action_scale: Positive = 1.0
+    action_limit: Positive = 1.0
+    joints: tuple[str, ...] = ()
+    stiffness: Mapping[str, Positive] = Field(default_factory=dict)
+    damping: Mapping[str, Weight] = Field(default_factory=dict)
     default_pose: Mapping[str, float] = Field(default_factory=dict)
     unmeasured_speeds: tuple[str, ...] = ()
     timestep: Positive | None = None

@@ -5,17 +5,24 @@ from pathlib import Path
 
 from robojackson.errors import BadPolicy
 from robojackson.files.local_folder import sha256_of_file
+from robojackson.rl.trackers.policy_tracker import PolicyTracker
 from robojackson.rl.trackers.tracker import Tracker
 from robojackson.rl.trackers.tracker_description import TrackerDescription
 from robojackson.rl.trackers.twist2 import Twist2Tracker
 from robojackson.robot.mjcf import robots_folder
 
-NETWORKS: Mapping[str, Callable[[TrackerDescription, Path], Tracker]] = {"twist2": Twist2Tracker}
+NETWORKS: Mapping[str, Callable[[TrackerDescription, Path], Tracker]] = {
+    "twist2": Twist2Tracker,
+    "policy": PolicyTracker,
+}
 """By `TrackerDescription.network`."""
+ASSETS = Path(__file__).parent.parent.parent / "assets"
 
 
 def tracker_path(description: TrackerDescription) -> Path:
-    """Return where `robojackson trackers add` puts the file of a tracker."""
+    """Return where the file of a tracker ships, or where `robojackson trackers add` puts it."""
+    if description.file.url is None:
+        return ASSETS / description.file.name
     return robots_folder().parent / "trackers" / description.name / description.file.name
 
 
@@ -35,6 +42,8 @@ def require_file(description: TrackerDescription, file: Path | None = None) -> P
     """
     path, name = file or tracker_path(description), description.name
     how = f"run: robojackson trackers add {name}"
+    if description.file.url is None:
+        how = "install RoboJackson again"
     if not path.is_file():
         raise BadPolicy(f"tracker {name!r} is not here ({path}); {how}")
     if sha256_of_file(path) != description.file.sha256:
