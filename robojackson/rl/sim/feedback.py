@@ -30,8 +30,9 @@ from robojackson.robot.mjcf import robots_folder
 from robojackson.robot.model import Robot
 
 FOLDER = "feedback"
-LARGEST = 9.0
-"""Full actions of a policy that the feedback moves a target at most."""
+LARGEST = 2.0
+"""Full actions of a policy that the feedback moves a target at most: so much that a policy of a few
+minutes can still correct it."""
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ VELOCITY_STEP, SPIN_STEP, HINGE_SPEED_STEP, TARGET_STEP = 0.2, 0.4, 0.8, 0.1
 """Half-widths of the differences: m, rad, rad, m/s, rad/s, rad/s, rad."""
 PLACE, ATTITUDE, HINGE, VELOCITY, HINGE_SPEED = 20.0, 40.0, 4.0, 0.5, 0.02
 """Weights of squared errors in the cost: m-2, rad-2, rad-2, (m/s or rad/s)-2, (rad/s)-2."""
-EFFORT = 50.0 * 0.0333**2
+EFFORT = 0.45
 """Weight of a squared offset of the targets, in full actions of the policy."""
 LAPS, STILL = 3, 200
 """Backward passes over a motion that repeats; steps of the stand after one that ends."""
