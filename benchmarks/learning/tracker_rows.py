@@ -91,7 +91,8 @@ def judged(tracker: Tracker, motion: ReferenceMotion, friction: float) -> dict[s
         tracker, motion, varied(robot, Variation(friction=friction / usual)), JUDGE
     )
     figures = {name: found.summary[name] for name in FIGURES}
-    facts = {"sha256": tracker.description.file.sha256, "steps": len(motion), "dt": motion.dt}
+    pinned = tracker.description.file
+    facts = {"sha256": pinned.sha256 if pinned else "", "steps": len(motion), "dt": motion.dt}
     starts = sum(row["policy"] == "trained" for row in found.rows)
     return {**facts, "starts": starts, **figures, "cpu_s": time.process_time() - began}
 
@@ -100,7 +101,7 @@ def present(name: str) -> Tracker | None:
     """A tracker whose file is here; None, with a line why, where it is not."""
     description = describe_tracker(name)
     folder = os.environ.get(FILES)
-    file = Path(folder) / description.file.name if folder else None
+    file = Path(folder) / description.file.name if folder and description.file else None
     try:
         return open_tracker(description, file)
     except BadPolicy as cause:

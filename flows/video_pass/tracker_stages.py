@@ -56,7 +56,8 @@ class TrackedDance:
 
 
 def chosen_tracker(robot: RobotDescription, settings: PipelineConfig) -> TrackerDescription | None:
-    """Return the tracker that dances at once; None where there is none and none is needed.
+    """Return the tracker that dances at once; None where there is none and none is needed: before a
+    training, a fallback is taken by name alone.
 
     Raises:
         BadPolicy: `instant` needs one that is not here, or there is none for the robot.
@@ -64,11 +65,13 @@ def chosen_tracker(robot: RobotDescription, settings: PipelineConfig) -> Tracker
         UnknownName: no tracker of that name.
     """
     try:
-        return require_tracker(robot.name, settings.tracker)
+        found = require_tracker(robot.name, settings.tracker)
     except (BadPolicy, MissingDependency):
         if settings.instant:
             raise
         return None
+    unasked = found is not None and found.fallback and settings.tracker is None
+    return None if unasked and not settings.instant else found
 
 
 def track(

@@ -30,6 +30,8 @@ from robojackson.robot.mjcf import robots_folder
 from robojackson.robot.model import Robot
 
 FOLDER = "feedback"
+VARIED = ("body_mass", "body_ipos", "body_inertia", "geom_friction", "dof_armature")
+"""Arrays of a model that `variation` changes."""
 LARGEST = 2.0
 """Full actions of a policy that the feedback moves a target at most: so much that a policy of a few
 minutes can still correct it."""
@@ -123,4 +125,9 @@ def _digest(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> st
     named = {name: getattr(law, name) for name in ("substeps", "feedforward")}
     facts = [poses_sha256(motion), robot.sha256, named, actuation_facts(robot, ControlConfig()),
              actuation_facts(robot, control), settings(), asdict(robot.description)]  # fmt: skip
-    return hashlib.sha256(json.dumps(facts, sort_keys=True, default=str).encode()).hexdigest()[:32]
+    digest = hashlib.sha256(json.dumps(facts, sort_keys=True, default=str).encode())
+    model = robot.model
+    for name in VARIED:  # a variation of the robot has its name and its file
+        digest.update(np.ascontiguousarray(getattr(model, name)).tobytes())
+    digest.update(f"{model.opt.timestep} {model.opt.integrator}".encode())
+    return digest.hexdigest()[:32]

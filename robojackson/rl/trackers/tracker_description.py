@@ -6,9 +6,10 @@ Names of hinges are bound to a robot by `equipment.equip`. Metres, radians, seco
 from collections.abc import Mapping
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from robojackson.config import config_dataclass
+from robojackson.errors import ConflictingValues
 from robojackson.robot.description import Digest, Positive, Weight
 
 
@@ -36,9 +37,11 @@ class TrackerDescription:
     Attributes:
         name: Name of the tracker.
         robot: Name of the robot that it drives.
-        network: Layout of its observation and action: `twist2`, or `policy`, a policy file of ours,
-            which knows its own (then nothing is given from `action_scale` on).
-        file: Where the network comes from.
+        network: Layout of its observation and action: `twist2`; `policy`, a policy file of ours; or
+            `regulator`, linear-quadratic feedback without a network. The last two take gains and
+            scales from their file or robot: nothing is given from `action_scale` on.
+        file: Where the network comes from; null for `regulator`, which has none.
+        fallback: Whether it is taken by itself only where no other tracker of its robot is here.
         homepage: Where its authors describe it.
         licence: Under which its authors publish the file.
         trained_on: Motions that its authors name.
@@ -57,12 +60,13 @@ class TrackerDescription:
 
     name: str
     robot: str
-    network: Literal["twist2", "policy"]
-    file: TrackerFile
+    network: Literal["twist2", "policy", "regulator"]
     licence: str
     trained_on: str
     homepage: str
     control_dt: Positive
+    file: TrackerFile | None = None
+    fallback: bool = False
     action_scale: Positive = 1.0
     action_limit: Positive = 1.0
     joints: tuple[str, ...] = ()
@@ -71,3 +75,11 @@ class TrackerDescription:
     default_pose: Mapping[str, float] = Field(default_factory=dict)
     unmeasured_speeds: tuple[str, ...] = ()
     timestep: Positive | None = None
+
+    @model_validator(mode="after")
+    def _complete(self) -> "TrackerDescription":
+        if self.file is None and self.network != "regulator":
+            raise ConflictingValues(f"network {self.network!r} needs a file", "network", "file")
+        if self.network == "twist2" and not self.joints:
+            raise ConflictingValues("network 'twist2' needs the joints", "network", "joints")
+        return self
