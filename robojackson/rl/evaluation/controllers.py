@@ -17,7 +17,7 @@ from robojackson.rl.policy import Policy
 from robojackson.rl.policy_facts import fact, observation_of, policy_control
 from robojackson.rl.sim.motors import Motors, residual_scale
 from robojackson.rl.sim.reference_clip import ClipStep
-from robojackson.rl.sim.simulation import Simulation
+from robojackson.rl.sim.simulation import Simulation, resolved
 from robojackson.rl.sim.stock_humanoid import stock_observation
 from robojackson.rl.trackers.tracker import Tracker
 from robojackson.robot.model import Robot
@@ -55,7 +55,9 @@ def drivers(
     if control.law == "pd" and isinstance(policy, Policy):
         found["hold"] = replace(found[TRAINED], control=replace(control, law="hold"))
     usual = control if control.law == "pd" else ControlConfig(substeps=control.substeps)
-    return found | _baselines(reference, robot, usual, seed)
+    if resolved(usual, robot).feedback and isinstance(policy, Policy):
+        found["regulator"] = Driver(usual, _follow)
+    return found | _baselines(reference, robot, replace(usual, feedback=0.0), seed)
 
 
 def trained_driver(policy: Evaluated, robot: Robot, reference: ReferenceMotion) -> Driver:
@@ -109,12 +111,19 @@ def _baselines(
         "mean_pose": lambda sim, following, start, last: np.repeat(
             poses.mean(0, keepdims=True), sim.n, 0
         ),
-        "zero_residual": lambda sim, following, start, last: sim.reference_angles(following),
+        "zero_residual": _follow,
         "random": lambda sim, following, start, last: (
             sim.reference_angles(following) + scale * rng.uniform(-1, 1, (sim.n, len(hinge)))
         ),
     }
     return {name: Driver(control, command) for name, command in commands.items()}
+
+
+def _follow(
+    sim: Simulation, following: ClipStep, start: np.ndarray, last: np.ndarray
+) -> np.ndarray:
+    """The control law without a policy."""
+    return sim.reference_angles(following)
 
 
 def sees_ahead(policy: Evaluated) -> bool:

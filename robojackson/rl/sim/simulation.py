@@ -196,7 +196,7 @@ class Simulation:
         angles: np.ndarray = step.qpos[:, 7:][:, self.motors.hinge]
         if step.lead is not None:
             angles = angles + step.lead
-        if step.feedback is not None:
+        if step.feedback is not None and self.control.feedback:
             angles = angles + step.feedback(*self.sensed())
         return angles
 

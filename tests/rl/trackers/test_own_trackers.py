@@ -44,7 +44,7 @@ def test_the_regulator_is_evaluated_like_a_policy(motion: ReferenceMotion) -> No
     baselines = found["baselines"]
     assert isinstance(baselines, dict)
     assert found["survived_s"] > 0.4
-    assert found["survived_s"] == pytest.approx(baselines["zero_residual"]["survived_s"])
+    assert found["survived_s"] > 1.2 * baselines["zero_residual"]["survived_s"]
 
 
 def test_the_regulator_is_for_its_robot() -> None:
