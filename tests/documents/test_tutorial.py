@@ -44,7 +44,16 @@ def test_the_tutorial_ends_with_a_dancing_robot(
     monkeypatch.chdir(tmp_path)
     commands = section("docs/tutorial.md", "robojackson")
     stages = [each.words[1] for each in commands]
-    assert stages == ["doctor", "score", "mocap", "retarget", "train", "evaluate", "export", "dance"]
+    assert stages == [
+        "doctor",
+        "score",
+        "mocap",
+        "retarget",
+        "train",
+        "evaluate",
+        "export",
+        "dance",
+    ]
     store = str(tmp_path / "store")
     for each in commands:
         done = robojackson(*shortened(each.words[1:], short_clip), ROBOJACKSON_STORE=store)
