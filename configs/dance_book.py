@@ -63,7 +63,7 @@ class DanceBook:
             raise BadConfiguration(f"dances: {', '.join(twice)} stands twice")
 
     def pick(self, names: Sequence[str] | None) -> tuple[Dance, ...]:
-        """The dances of these names in their order; all of them when no names are given.
+        """Return the dances of these names in their order; all of them when no names are given.
 
         Raises:
             UnknownName: one is not in the book; the message lists those that are.
@@ -73,7 +73,7 @@ class DanceBook:
         return tuple(self._of(name) for name in names)
 
     def find(self, words: str) -> Dance:
-        """The dance that a person means by its name or query, or one that is made of the words."""
+        """Return the dance with this name or query, or one that is made of the words."""
         for dance in self.dances:
             if words.casefold() in (dance.name.casefold(), dance.query.casefold()):
                 return dance

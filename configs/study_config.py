@@ -32,7 +32,7 @@ Steps = Annotated[int, Field(ge=1)]
 
 
 def _each_once(values: tuple[Any, ...]) -> tuple[Any, ...]:
-    """Twins would be one cell, which two runs want to train at once."""
+    """Refuse duplicates: twins would be one cell, which two runs train at once."""
     twice = sorted({value for value in values if values.count(value) > 1})
     if twice:
         told = ", ".join(map(str, twice))

@@ -48,7 +48,7 @@ REASON = 200
 
 
 def run(study: Study) -> Facts:
-    """The flow from the command line.
+    """Return the flow from the command line.
 
     Raises:
         DeploymentFailed: the server that is named does not answer, or refuses us.
@@ -149,7 +149,8 @@ def gate(study: Study, scorecards: Mapping[str, Artifact]) -> None:
 def cells_of(
     study: Study, references: Mapping[str, Artifact], trainings: Mapping[str, TrainConfig]
 ) -> list[Cell]:
-    """Every move x setup x seed, seed by seed, so that an early look compares like with like."""
+    """Return every move x setup x seed, seed by seed, so that an early look compares like with
+    like."""
     evaluate = load(PipelineConfig, study.pipeline).evaluate
     return [
         Cell(
@@ -208,7 +209,7 @@ async def conclude(
 
 
 def _slots(study: Study) -> int:
-    """Cores of this machine; a pool's workers set their own limits."""
+    """Return the cores of this machine; a pool's workers set their own limits."""
     if study.executor == "work-pool":
         return 10_000
     return cores()

@@ -70,7 +70,8 @@ async def cell(cell: Cell) -> Result:
 async def with_retries(
     stage: Callable[[float], Awaitable[Result]], cell: Cell, deadline: float
 ) -> Result:
-    """A stage of a cell, again when its process was killed; an attempt gets the time that is left.
+    """Return a stage of a cell, again when its process was killed; an attempt gets the time that is
+    left.
 
     Prefect's own retries would give every attempt the time of the first.
 
@@ -100,7 +101,7 @@ def _robot(name: str) -> RobotDescription:
 
 
 async def run_locally(requested: Cell) -> Result:
-    """The cell as a subflow of the flow that calls.
+    """Return the cell as a subflow of the flow that calls.
 
     Raises:
         Exception: whatever the cell failed of.
@@ -109,7 +110,8 @@ async def run_locally(requested: Cell) -> Result:
 
 
 async def run_on_worker(requested: Cell) -> Result:
-    """The cell as a run that a worker of the pool takes; another one, if the worker dies with it.
+    """Return the cell as a run that a worker of the pool takes; another one, if the worker dies
+    with it.
 
     One that was done before is read here: a worker would take seconds to start for nothing.
 

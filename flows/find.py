@@ -38,7 +38,7 @@ async def find(
     config: str = "finding",
     overrides: dict[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """The ranked videos of one dance.
+    """Return the ranked videos of one dance.
 
     Args:
         name: Shown as the name of the run.
@@ -55,7 +55,7 @@ async def find(
 
 
 def run(requested: Dance, config: str, overrides: Mapping[str, Any]) -> dict[str, Any]:
-    """The flow from the command line.
+    """Return the flow from the command line.
 
     Raises:
         SearchFailed: the source does not answer.
@@ -90,14 +90,14 @@ async def best(
 
 
 def in_good_quality(chosen: Entry, settings: FindConfig) -> Artifact:
-    """The file that is danced: the best format, or the scored one when that cannot be had."""
+    """Return the file to dance: the best format, or the scored one when that is not available."""
     return of_candidate(chosen.candidate, chosen.video, settings)
 
 
 def of_candidate(
     candidate: VideoCandidate, scored: Artifact | None, settings: FindConfig
 ) -> Artifact:
-    """The best format of a video, or its scored file when that cannot be had.
+    """Return the best format of a video, or its scored file when that cannot be had.
 
     Raises:
         SearchFailed: neither is there.
@@ -111,7 +111,7 @@ def of_candidate(
 
 
 def nothing(found: SearchResult) -> str:
-    """Why no video of a search may be danced, in one line."""
+    """Return in one line why no video of a search may be danced."""
     if not found.entries:
         return f"{found.dance.name}: no video is left of the search"
     told = (f"{e.candidate.title or e.candidate.video_id}: {e.reason}" for e in found.entries)
@@ -121,7 +121,7 @@ def nothing(found: SearchResult) -> str:
 
 
 def summarise(found: SearchResult) -> dict[str, Any]:
-    """What the command says."""
+    """Return the answer of the command."""
     told = rows(found)
     every = [*found.selection.selected, *(c for c, _ in found.selection.dropped)]
     return {
@@ -139,5 +139,5 @@ def summarise(found: SearchResult) -> dict[str, Any]:
 
 
 def run_id(kind: str) -> str:
-    """A name that no other run has."""
+    """Return a name that no other run has."""
     return f"{kind}-{datetime.now(UTC):%Y%m%d-%H%M%S}-{uuid.uuid4().hex[:6]}"

@@ -99,7 +99,7 @@ async def refresh(
 
 
 def run(dances: list[str] | None, config: str, overrides: Mapping[str, Any]) -> Facts:
-    """The flow from the command line.
+    """Return the flow from the command line.
 
     Raises:
         DeploymentFailed: the Prefect server that is named does not answer, or refuses us.
@@ -111,7 +111,7 @@ def run(dances: list[str] | None, config: str, overrides: Mapping[str, Any]) -> 
 async def refresh_dance(
     name: str, dance: Facts, config: Facts, pipeline: str, pipeline_overrides: Facts
 ) -> Facts:
-    """One dance, from its name to a reference motion.
+    """Refresh one dance, from its name to a reference motion.
 
     Raises:
         SearchFailed: the source does not answer, or has no new video and none was chosen before.
@@ -154,7 +154,7 @@ async def refresh_dance(
 
 
 def motion(store: Store, video: Artifact, settings: PipelineConfig) -> Facts:
-    """Mocap and retargeting of a video: what a training starts from."""
+    """Return the mocap and retargeting of a video: what a training starts from."""
     with store.local(video) as path:
         clip = probe_video(SourceFile(path, video.sha256), settings.video, None, None)
     moved = to_reference(clip, describe_robot(settings.robot), settings)
@@ -167,13 +167,13 @@ def motion(store: Store, video: Artifact, settings: PipelineConfig) -> Facts:
 
 
 def _failed(cause: RoboJacksonError) -> Facts:
-    """What the catalogue says of a choice of which no motion could be made."""
+    """Return the catalogue's entry for a choice of which no motion could be made."""
     reason = clean_text(f"no motion could be made of it: {reason_of(cause)}", REASON_LENGTH)
     return {"decision": "failed", "reason": reason, "decided_at": datetime.now(UTC)}
 
 
 def _video(chosen: Entry | None, reigning: Facts | None, settings: FindConfig) -> Artifact:
-    """The file to dance: of the new choice, or of the video that still reigns."""
+    """Return the file to dance: of the new choice, or of the video chosen before."""
     if chosen:
         return in_good_quality(chosen, settings)
     assert reigning
@@ -189,7 +189,7 @@ def _video(chosen: Entry | None, reigning: Facts | None, settings: FindConfig) -
 
 
 def _require_distinct(book: DanceBook) -> DanceBook:
-    """The book, if no two dances would share what is noted of them."""
+    """Return the book, or raise if two dances would share a catalogue key."""
     by_slug: dict[str, str] = {}
     for dance in book.dances:
         other = by_slug.setdefault(slug_of(dance.name), dance.name)
@@ -201,7 +201,7 @@ def _require_distinct(book: DanceBook) -> DanceBook:
 
 
 def _is_due(dance: Dance) -> bool:
-    """Whether it was last searched long enough ago."""
+    """Return whether it was last searched long enough ago."""
     store, key = Store.from_environment(), _key(dance)
     if not store.exists(key):
         return True
@@ -221,7 +221,7 @@ def _key(dance: Dance) -> str:
 
 
 async def _log_summary(done: dict[str, Facts], failed: dict[str, str]) -> None:
-    """One table of all dances."""
+    """Log one table of all dances."""
     table = [
         {"dance": name, "result": "new" if facts["is_new"] else "as before",
          "video": clean_text(facts["chosen"]["title"]), "reason": ""}

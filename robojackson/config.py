@@ -32,7 +32,7 @@ SCALARS = (bool, int, float)
 
 @dataclass_transform(frozen_default=True, field_specifiers=(pydantic.Field, field))
 def config_dataclass(cls: type[Config]) -> type[Config]:
-    """A frozen dataclass whose values are checked when it is made.
+    """Return a frozen dataclass whose values are checked when it is made.
 
     Args:
         cls: Fields with types, defaults and, by `pydantic.Field`, limits.
@@ -47,7 +47,7 @@ def config_dataclass(cls: type[Config]) -> type[Config]:
 
 
 def _strict(kind: Any) -> Any:
-    """A type whose numbers and booleans are not converted."""
+    """Return a type whose numbers and booleans are not converted."""
     if kind in SCALARS:
         return Annotated[kind, Strict()]
     origin, inner = get_origin(kind), get_args(kind)

@@ -48,7 +48,7 @@ def sweep(store: Store, parts: bool = True, work: bool = True) -> list[Path]:
 
 
 def _parts(store: Store) -> Iterator[Path]:
-    """Files whose writing was not finished."""
+    """Yield the files whose writing was not finished."""
     if not isinstance(store.place, LocalFolder):
         return
     for folder, _, names in os.walk(store.place.root):  # a folder may go away while it is read
@@ -68,7 +68,8 @@ def _scratch(store: Store) -> Iterator[Path]:
 
 
 def _work(store: Store) -> Iterator[Path]:
-    """Folders of judgements, which begin anew, and of trainings that were finished elsewhere."""
+    """Yield folders of evaluations, which start again, and of trainings that were finished
+    elsewhere."""
     left = [f for f in _folders(store, f"{TRAINING}*") if not is_held(f / TASK)]
     finished = _finished(store) if left else set()
     unneeded = [folder for folder in left if folder.name.removeprefix(TRAINING) in finished]
@@ -82,7 +83,7 @@ def _work(store: Store) -> Iterator[Path]:
 
 
 def _finished(store: Store) -> set[str]:
-    """Digests of the trainings whose cells are in the tables."""
+    """Return the digests of the trainings whose cells are in the tables."""
     tables = [
         {_digest(key) for key in store.list(f"{study_tables.FOLDER}/{t}")}
         for t in study_tables.TABLES
@@ -106,7 +107,7 @@ def _age_s(path: Path) -> float:
 
 
 def is_held(path: Path) -> bool:
-    """Whether a living process has locked the file."""
+    """Return whether a living process has locked the file."""
     try:
         with path.open("rb") as file:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -16,7 +16,7 @@ PUT_IS_ATOMIC = frozenset(("s3", "s3a", "gs", "gcs", "abfs", "az", "memory"))
 
 
 def place_at(root: str) -> "LocalFolder | Remote":
-    """The place of an address: a URL is fsspec's, all else is a folder."""
+    """Return the place of an address: a URL is fsspec's, all else is a folder."""
     if "://" in root and not root.startswith("file://"):
         return Remote(root)
     return LocalFolder(Path(root.removeprefix("file://")))

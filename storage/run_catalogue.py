@@ -47,7 +47,7 @@ def record(store: Store, run: Run) -> Artifact:
 
 
 def list_runs(store: Store) -> list[Run]:
-    """All runs, the latest last.
+    """Return all runs, the latest last.
 
     Raises:
         BadTable: a file of the catalogue is not a run.

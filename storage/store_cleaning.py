@@ -99,7 +99,7 @@ def _content(path: Path) -> bytes:
 
 
 def _command(words: list[str]) -> str:
-    """What a process of ours does; empty for any other process."""
+    """Return the command of a process of ours; empty for any other process."""
     for place, word in enumerate(words):
         if word == FLOW:
             return "a run of a worker"
@@ -110,7 +110,7 @@ def _command(words: list[str]) -> str:
 
 
 def _store_of(process: Path) -> Path:
-    """The folder that a process takes for its store."""
+    """Return the folder that a process uses as its store."""
     variables = (process / "environ").read_bytes().decode(errors="replace").split("\0")
     named = dict(each.partition("=")[::2] for each in variables)
     return (Path(os.readlink(process / "cwd")) / (named.get(VARIABLE) or DEFAULT_ROOT)).resolve()

@@ -57,7 +57,7 @@ class WebVideo:
 def download_video(
     video: WebVideo, purpose: Purpose, formats: FormatConfig, web: WebConfig, limits: VideoLimits
 ) -> Artifact:
-    """A video file, in the format that serves the purpose."""
+    """Return a video file, in the format that serves the purpose."""
     store = Store.from_environment()
     chosen = offer(video.url, purpose, formats, web)
     had = _earlier_download(store, video, chosen)
@@ -66,13 +66,13 @@ def download_video(
 
 @stage()
 def take_file(file: SourceFile) -> Artifact:
-    """A video of a folder."""
+    """Return a video of a folder."""
     suffix = safe_name(file.path.suffix.lstrip(".").lower() or "mp4")
     return Store.from_environment().save("video", f"clip.{suffix}", file.path)
 
 
 def _earlier_download(store: Store, video: WebVideo, chosen: Offer) -> Artifact | None:
-    """The file of an earlier download, if it is there unaltered."""
+    """Return the file of an earlier download, if it is there unaltered."""
     note = f"{video.folder}/{chosen.name}.json"
     if not store.exists(note):
         return None
@@ -85,7 +85,7 @@ def _earlier_download(store: Store, video: WebVideo, chosen: Offer) -> Artifact 
 def _download_or_reuse(
     store: Store, video: WebVideo, chosen: Offer, web: WebConfig, limits: VideoLimits
 ) -> Artifact:
-    """The file that another run has brought meanwhile, or else from the web."""
+    """Return the file that another run has downloaded meanwhile, or download it."""
     folder = store.work(f"{video.folder}.{chosen.name}")
     with locked(folder, patience_s=FOR_EVER):
         had = _earlier_download(store, video, chosen)

@@ -77,7 +77,7 @@ def published(cell: Cell, run_id: str) -> Result:
 def provenance(
     cell: Cell, place: study_tables.Place, made: Mapping[str, Artifact]
 ) -> dict[str, Any]:
-    """Where the numbers of a cell come from: code, configuration, inputs, machine, time."""
+    """Return where the numbers of a cell come from: code, configuration, inputs, machine, time."""
     return {
         **asdict(place),
         "mode": cell.train.mode,
@@ -104,8 +104,8 @@ def _digests(made: Mapping[str, Artifact]) -> dict[str, str]:
 
 @cache
 def _commit() -> str:
-    """Of the checkout, `-dirty` where files differ from it; without git, as in a container, what
-    ROBOJACKSON_COMMIT says.
+    """Return the commit of the checkout, `-dirty` where files differ from it; without git, as in a
+    container, the value of ROBOJACKSON_COMMIT.
     """
     if not is_checkout():  # the commit of whoever keeps an environment in a repository is not ours
         return os.environ.get(COMMIT, "")

@@ -30,7 +30,7 @@ def _models(parameters: Mapping[str, Any]) -> list[str]:
 def recover_motion_by_networks(
     video: Artifact, landmarks: Artifact, network: NetworkConfig, config: MocapConfig
 ) -> Artifact:
-    """SmplSequence."""
+    """Return the SmplSequence of the dancer, by HybrIK's and NIKI's networks."""
     store = Store.from_environment()
     track = artifact_tables.read(LandmarkTrack, store, landmarks)
     networks = load_networks(network)

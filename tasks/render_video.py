@@ -25,7 +25,7 @@ def render_video(
     title: str = TRAINED_TITLE,
     name: str = "dance.mp4",
 ) -> Artifact:
-    """An mp4.
+    """Return the video as mp4.
 
     Args:
         title: Over the panel of the rollout.

@@ -10,7 +10,7 @@ from tasks.runtime.stage import stage
 
 @stage()
 def score_stability(landmarks: Artifact, config: StabilityConfig) -> Artifact:
-    """StabilityScore."""
+    """Return the StabilityScore of a track."""
     store = Store.from_environment()
     track = artifact_tables.read(LandmarkTrack, store, landmarks)
     return artifact_tables.save(store, "stability", "stability.parquet", stability(track, config))

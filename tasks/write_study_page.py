@@ -57,7 +57,7 @@ def write_study_page(
     pictures: dict[str, Artifact],
     reward_audits: dict[str, Artifact],
 ) -> dict[str, Artifact]:
-    """The files of `report`.
+    """Write the files of `report`.
 
     Args:
         rows: Files of the tables of the cells that count (`storage.study_tables.files_of`).
@@ -168,7 +168,8 @@ def _few(study: Study) -> list[str]:
 
 
 def _starts(ask: study_tables.RunQuery, study: Study) -> list[str]:
-    """What was learnt before the first step of a cell: it belongs to the price of pretraining."""
+    """Return what was learnt before the first step of a cell: it belongs to the price of
+    pretraining."""
     sql = "SELECT DISTINCT setup, config FROM runs WHERE config IS NOT NULL ORDER BY ALL"
     setups: dict[str, set[str]] = {}
     for row in ask(sql):

@@ -21,7 +21,8 @@ BAR = "<= 0.02"
 
 
 def checkpoints(folders: Folders, minutes: float = 5.0) -> dict[str, Any]:
-    """Wall seconds of a checkpoint (median) over those between two of them, as they are by default.
+    """Return wall seconds of a checkpoint (median) over those between two of them, as they are by
+    default.
 
     `slowest_s` is the longest, `megabytes` what one adds to the replay on the disk, `steps` those
     between two.

@@ -81,7 +81,8 @@ def core(repeats: int, steps: int = 60, robot: Robot | None = None) -> Speeds:
 
 
 def _turns(robot: Robot, script: Script, n: int, steps: int) -> tuple[float, float, float]:
-    """Substeps a CPU second of the environment, of the plain loop and of the batched one."""
+    """Return the substeps a CPU second of the environment, of the plain loop and of the batched
+    one."""
     environment = _core(robot, n)
     loops = [Bare(robot.model, n, script, batched) for batched in (False, True)]
     environment.reset()
@@ -144,7 +145,7 @@ class _Spy:
         return told
 
     def taken(self) -> np.ndarray:
-        """What was written since the last call."""
+        """Return what was written since the last call."""
         wrote, self._wrote = np.array(self._wrote), []
         return wrote
 
@@ -171,7 +172,7 @@ class Bare:
         self._place(0)
 
     def run(self, first: int, steps: int) -> float:
-        """CPU seconds of some control steps; putting robots elsewhere is not counted."""
+        """Return CPU seconds of some control steps; putting robots elsewhere is not counted."""
         spent, model, step = 0.0, self._model, mujoco.mj_step
         for t in range(first, first + steps):
             began = time.thread_time()

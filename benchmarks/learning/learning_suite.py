@@ -123,7 +123,7 @@ def _table(title: str, columns: tuple[str, ...], rows: list[dict[str, Any]]) -> 
 
 
 def _limbs(rows: list[dict[str, Any]]) -> Table:
-    """Gain, R2 and excess speed of every limb, with a mark where the bar is missed."""
+    """Return the gain, R2 and excess speed of every limb, with a mark where the bar is missed."""
     table = Table(
         "move", *LIMBS, title=f"gain {GAIN[0]}-{GAIN[1]} / R2 >= {R2} / excess <= {EXCESS}"
     )
@@ -138,7 +138,7 @@ def _limbs(rows: list[dict[str, Any]]) -> Table:
 
 
 def _beside(rows: list[dict[str, Any]]) -> Table:
-    """Those that do not dance, and the authors' robot."""
+    """Return the baselines that do not dance, and the authors' robot."""
     table = Table("move", "who", *TOLD, title="Beside the policy")
     for row in rows:
         for who, figures in row["beside"].items():

@@ -97,7 +97,7 @@ class Folders:
 
     @staticmethod
     def at(folder: Path | None) -> "Folders":
-        """The usual ones, or both within one folder."""
+        """Return the usual ones, or both within one folder."""
         if folder is None:
             return Folders(ROOT / "store" / "bench-learning", Path(__file__).parents[1] / "results")
         return Folders(folder.absolute() / "work", folder.absolute() / "results")
@@ -108,18 +108,19 @@ class Folders:
         return self.results / "learning"
 
     def row(self, name: str, seed: int | str, seconds: float, minutes: float | None = None) -> Path:
-        """The file of a row; one of another budget than the move's own is in no table."""
+        """Return the file of a row; one of another budget than the move's own is in no table."""
         suffix = "" if seconds == HORIZONS_S[0] else f"-{seconds:g}s"
         return self.rows / f"{name}{budget(minutes)}-s{seed}{suffix}.parquet"
 
 
 def budget(minutes: float | None) -> str:
-    """What the name of a row says of CPU minutes that are not the move's own."""
+    """Return the CPU minutes that the name of a row gives, where they are not the move's own."""
     return "" if minutes is None else f"-{minutes:g}min"
 
 
 def command(*words: object, core: int | None = None) -> int:
-    """One of our commands on one thread, pinned to a core where one is named; its exit status."""
+    """Run one of our commands on one thread, pinned to a core where one is named; return its exit
+    status."""
     line = [sys.executable, "-m", "robojackson", *map(str, words)]
     if core is not None:
         line = ["taskset", "-c", str(core), *line]
@@ -128,13 +129,13 @@ def command(*words: object, core: int | None = None) -> int:
 
 
 def must(*words: object, core: int | None = None) -> None:
-    """The same for a command without which nothing goes on."""
+    """Run a command without which the rest cannot go on."""
     if status := command(*words, core=core):
         raise SystemExit(f"`robojackson {' '.join(map(str, words))}` ended with {status}")
 
 
 def source_of(move: Move) -> Path | None:
-    """The file that a move comes from; None where the authors' are not at hand."""
+    """Return the file that a move comes from; None where the authors' are not at hand."""
     if not move.is_foreign:
         return ROOT / move.clip
     variable, suffix = (CMU, ".bvh") if move.cmu else (PAPER, ".pt")
@@ -143,7 +144,8 @@ def source_of(move: Move) -> Path | None:
 
 
 def reference_of(name: str, folders: Folders) -> Path:
-    """The motion of a move for the robot, made once; `gate.json` beside it tells the verdict."""
+    """Return the motion of a move for the robot, made once; `gate.json` beside it tells the
+    verdict."""
     move, work = MOVES[name], folders.work / name
     reference = work / "reference.parquet"
     if (work / "gate.json").is_file():
@@ -175,7 +177,7 @@ def require_frozen(name: str, reference: Path) -> None:
 
 
 def load(reference: Path) -> ReferenceMotion:
-    """A reference motion."""
+    """Return a reference motion."""
     return ReferenceMotion.load(reference)
 
 
@@ -189,7 +191,7 @@ def _made(move: Move, work: Path) -> int:
 
 
 def forced(name: str, folders: Folders) -> bool:
-    """Whether the gate refused the move's motion, so that it was forced."""
+    """Return whether the gate refused the move's motion, so that it was forced."""
     told = folders.work / name / "gate.json"
     return told.is_file() and bool(json.loads(told.read_text())["forced"])
 
@@ -219,7 +221,8 @@ def train_and_judge(
 def policies(
     names: Iterable[str], seeds: Iterable[int], minutes: float | None, jobs: int, folders: Folders
 ) -> None:
-    """All rows, `jobs` at a time, each on a core of its own; Ctrl-C keeps checkpoints."""
+    """Train and evaluate all rows, `jobs` at a time, each on a core of its own; Ctrl-C keeps
+    checkpoints."""
     present = [name for name in names if source_of(MOVES[name]) is not None]
     for name in present:
         reference_of(name, folders)

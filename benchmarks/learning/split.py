@@ -65,7 +65,7 @@ def load_split(path: Path = FILE) -> Split:
 
 
 def shares(motions: Mapping[str, SmplSequence], judged: Iterable[str]) -> list[dict[str, Any]]:
-    """For every judged motion, the others that contain some of it, plain or mirrored."""
+    """Return, for every evaluated motion, the others that contain some of it, plain or mirrored."""
     plain = {name: windows(motion) for name, motion in motions.items()}
     mirrored = {name: windows(motion, mirrored=True) for name, motion in motions.items()}
     rows = []

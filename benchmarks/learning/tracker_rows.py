@@ -63,7 +63,7 @@ def main() -> None:
 
 
 def measured(moves: list[str], held: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
-    """Rows that are not held yet, of the trackers that are here."""
+    """Yield rows that are not held yet, of the trackers that are here."""
     known = {(row["tracker"], row["move"], row["friction"], row["poses"]) for row in held}
     for name in tracker_names():
         tracker = present(name)
@@ -81,7 +81,7 @@ def measured(moves: list[str], held: list[dict[str, Any]]) -> Iterator[dict[str,
 
 
 def judged(tracker: Tracker, motion: ReferenceMotion, friction: float) -> dict[str, Any]:
-    """The figures of a tracker on one motion."""
+    """Return the figures of a tracker on one motion."""
     robot = load_robot(tracker.description.robot)
     usual = robot.description.simulation.friction
     if usual is None:
@@ -97,7 +97,7 @@ def judged(tracker: Tracker, motion: ReferenceMotion, friction: float) -> dict[s
 
 
 def present(name: str) -> Tracker | None:
-    """A tracker whose file is here; None, with a line why, where it is not."""
+    """Return a tracker whose file is here; None, with a line why, where it is not."""
     description = describe_tracker(name)
     folder = os.environ.get(FILES)
     file = Path(folder) / description.file.name if folder else None

@@ -34,7 +34,7 @@ ROOT = (keypoint("pelvis"),)
 
 
 def agreement(ours: Float[np.ndarray, "T 24 3"], theirs: HybrikMotion) -> dict[str, float]:
-    """Distances over the frames that both have, millimetres.
+    """Return the distances over the frames that both have, millimetres.
 
     Args:
         ours: Joints of every frame of the video, metres, any fixed axes.
@@ -58,7 +58,7 @@ def agreement(ours: Float[np.ndarray, "T 24 3"], theirs: HybrikMotion) -> dict[s
 def rows(
     video: Path, track: LandmarkTrack, theirs: HybrikMotion, network: NetworkConfig
 ) -> Mapping[str, Mapping[str, float]]:
-    """Every row of the table."""
+    """Return every row of the table."""
     marks = repair(track)
     raw = build(marks.local, marks.visibility).points[:, : len(JOINT_NAMES)]
     joints = {"raw landmarks": raw, "ours": recover_motion(track, MocapConfig()).joints}

@@ -25,7 +25,7 @@ FILES, VIDEOS = (".pt", ".pk"), (".mp4", ".mov", ".avi", ".webm")
 
 
 def compare(folder: Path) -> dict[str, dict[str, object]]:
-    """Figures of every file of a folder."""
+    """Return the figures of every file of a folder."""
     files = sorted(file for file in folder.iterdir() if file.suffix in FILES)
     return {file.name: _compared(file) for file in files}
 

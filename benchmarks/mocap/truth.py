@@ -52,12 +52,12 @@ class Truth:
 
 
 def video_path(clip: str) -> Path:
-    """The video of a clip."""
+    """Return the video of a clip."""
     return _folder(clip) / f"{clip}.mp4"
 
 
 def load_truth(clip: str) -> Truth:
-    """The truth of a bundled clip."""
+    """Return the truth of a bundled clip."""
     return _real(clip) if clip in REAL else _rendered(clip)
 
 
@@ -92,7 +92,7 @@ def _real(clip: str) -> Truth:
 
 
 def _own_name(name: str) -> str:
-    """L_Hip of the renderer and LHip of the TRC are our left_hip."""
+    """Return our name of a joint: L_Hip of the renderer and LHip of the TRC are left_hip."""
     match = re.fullmatch(r"([LR])_?([A-Z].*)", name)
     if not match:
         return name.lower()

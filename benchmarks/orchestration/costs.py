@@ -70,12 +70,12 @@ class Begun:
         self.count += 1
 
     def busy(self, cores: int) -> float:
-        """Share of the cores that work used while cells waited for a slot."""
+        """Return the share of the cores that work used while cells waited for a slot."""
         work, wall = self.work_s[-1] - self.work_s[0], self.wall_s[-1] - self.wall_s[0]
         return round(work / (cores * wall), 4)
 
     def by_parts(self, parts: int) -> dict[str, list[float]]:
-        """Cells begun a second, and what one cost, in equal parts of all of them."""
+        """Return the cells begun a second, and what one cost, in equal parts of all of them."""
         last = len(self.wall_s) - 1
         ends = [round(n * last / parts) for n in range(parts + 1)]
         found: dict[str, list[float]] = {"cells_a_second": [], "cpu_ms_a_cell": []}
@@ -89,7 +89,7 @@ class Begun:
 
 
 def each(used: dict[str, float], count: int) -> dict[str, float]:
-    """The same for one of `count` cells."""
+    """Return the same for one of `count` cells."""
     figures = {"wall_ms": 1e3 * used["wall_s"], "cpu_ms": 1e3 * used["orchestration_cpu_s"]}
     figures |= {"calls": used["api_calls"], "database_kb": used["database_kb"]}
     return {f"{name}_each": round(value / count, 1) for name, value in figures.items()}
@@ -101,19 +101,19 @@ def _own_cpu_s() -> float:
 
 
 def _below_cpu_s() -> float:
-    """Of all processes below this one: the cells', and the services of the stack."""
+    """Return the CPU time of all processes below this one: cells and services of the stack."""
     return cpu_seconds(os.getpid()) - _own_cpu_s()
 
 
 def _machine_cpu_s() -> float:
-    """Of all processes, ours or not: what was not ours spoils wall times."""
+    """Return the CPU time of all processes; other people's work spoils wall times."""
     ticks = list(map(int, Path("/proc/stat").read_text().split("\n", 1)[0].split()[1:9]))
     user, nice, system, _idle, _iowait, irq, softirq, _steal = ticks
     return (user + nice + system + irq + softirq) / os.sysconf("SC_CLK_TCK")
 
 
 def _database_kb(stack: Stack) -> float:
-    """What the database takes on its disk."""
+    """Return what the database takes on its disk."""
     ask = ["psql", "-U", "prefect", "-d", "prefect", "-Atc", "select pg_database_size('prefect')"]
     access = stack.services["postgres"].environment
     run = subprocess.run(ask, env=access, capture_output=True, text=True, check=True)

@@ -43,12 +43,12 @@ QUARTERS = 4
 
 
 def sleepers(count: int) -> dict[str, Any]:
-    """A grid of about so many cells of one move."""
+    """Return a grid of about so many cells of one move."""
     return {"moves": ("walk",), "setups": SETUPS, "seeds": tuple(range(count // len(SETUPS)))}
 
 
 def study(name: str, grid: dict[str, Any], **more: Any) -> dict[str, Any]:
-    """A study whose motions are as short as can be, if they are made."""
+    """Return a study whose motions are as short as can be, if they are made."""
     return {"name": name, **grid, "pipeline": "smoke", "gate": False, **more}
 
 
@@ -73,7 +73,7 @@ def ablate(
 
 
 def cached(stack: Stack, wanted: argparse.Namespace) -> dict[str, Any]:
-    """Nine cells again, three times in this process, then three times by the command."""
+    """Run nine cached cells, three times in this process, then three times by the command."""
     nine = study("cached", NINE, slots=2)
     ablate(nine, 0.0, False, motions=True)
     rounds, commands = [], []
@@ -93,7 +93,7 @@ def cached(stack: Stack, wanted: argparse.Namespace) -> dict[str, Any]:
 
 
 def busy(stack: Stack, wanted: argparse.Namespace) -> dict[str, Any]:
-    """Nine cells of work on two slots."""
+    """Run nine cells of work on two slots."""
     ablate(study("first", {**sleepers(3), "seeds": (10_000,)}, slots=2), 0.0, False)
     costs, began = Costs(stack), Begun(stack)
     ablate(study(f"busy-{wanted.seconds:g}", NINE, slots=2), wanted.seconds, True, began)
@@ -110,7 +110,7 @@ def busy(stack: Stack, wanted: argparse.Namespace) -> dict[str, Any]:
 
 
 def local(stack: Stack, wanted: argparse.Namespace) -> dict[str, Any]:
-    """More and more sleeping cells, many at once."""
+    """Run more and more sleeping cells, many at once."""
     ablate(study("first", {**sleepers(3), "seeds": (10_000,)}, slots=2), 0.0, False)
     rows: list[dict[str, Any]] = []
     for count in wanted.counts:
@@ -124,7 +124,7 @@ def local(stack: Stack, wanted: argparse.Namespace) -> dict[str, Any]:
 
 
 def pool(stack: Stack, wanted: argparse.Namespace) -> dict[str, Any]:
-    """Sleeping cells on workers, each a process of its own."""
+    """Run sleeping cells on workers, each a process of its own."""
     from flows import cells
 
     ablate(study("first", {**sleepers(3), "seeds": (10_000,)}, slots=2), 0.0, False)
@@ -138,7 +138,7 @@ def pool(stack: Stack, wanted: argparse.Namespace) -> dict[str, Any]:
 
 
 def _command(stack: Stack, wanted: dict[str, Any]) -> float:
-    """Wall time of `robojackson ablation`, from the shell to its last word."""
+    """Return wall time of `robojackson ablation`, from the shell to its last word."""
     file = stack.folder / "study.yaml"
     file.write_text(yaml.safe_dump(json.loads(json.dumps(wanted))))
     began = time.monotonic()
@@ -169,7 +169,7 @@ def _deploy() -> None:
 
 @contextmanager
 def _server(folder: Path, workers: int) -> Iterator[Stack]:
-    """A stack whose server counts its calls, and this process as its client.
+    """Yield a stack whose server counts its calls, and this process as its client.
 
     With workers the store is the stack's; else it is a folder, as for one machine.
     """
@@ -212,7 +212,7 @@ def main() -> None:
 
 
 def measured(part: str, wanted: argparse.Namespace) -> dict[str, Any]:
-    """A part on a stack of its own, with how and when it was measured."""
+    """Return a part on a stack of its own, with how and when it was measured."""
     folder = Path(tempfile.mkdtemp(prefix="robojackson-bench-"))
     with _server(folder, wanted.workers if part == "pool" else 0) as stack:
         return {

@@ -85,6 +85,6 @@ def motionless() -> Iterator[None]:
 
 @flow(name="cell", flow_run_name="{cell.name}")
 async def pooled(cell: Cell) -> dict[str, Artifact]:
-    """A cell on a worker that sleeps in place of learning."""
+    """Run a cell on a worker that sleeps in place of learning."""
     with played(NAP_S, burn=False):
         return await cells.cell.fn(cell)

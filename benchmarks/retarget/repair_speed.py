@@ -32,7 +32,7 @@ _CALLS = 4000
 
 
 def ruler(robot: Robot) -> float:
-    """`mj_inverse` calls a CPU second in a pose that moves."""
+    """Return `mj_inverse` calls a CPU second in a pose that moves."""
     model, data = robot.model, mujoco.MjData(robot.model)
     rng = np.random.default_rng(0)
     data.qpos[:] = robot.standing
@@ -44,7 +44,7 @@ def ruler(robot: Robot) -> float:
 
 
 def rows_of(robot: Robot, clip: str, lengths: list[float]) -> Iterator[dict[str, Any]]:
-    """One row a length."""
+    """Yield one row a length."""
     for seconds in lengths:
         sequence = lengthened(truth_motion(clip), seconds)
         before, started = ruler(robot), time.process_time()

@@ -44,7 +44,7 @@ def clean(
     ] = False,
     as_json: Json = False,
 ) -> CommandResult:
-    """What is in the store, how old and how big; removes what is old, with --delete alone.
+    """Show what is in the store, how old and how big; with --delete remove what is old.
 
     What a record, a run or a table refers to stays unless its kind is named; so does what a
     process works on.

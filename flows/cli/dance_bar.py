@@ -121,7 +121,7 @@ class _Watch:
             )
 
     def _training(self) -> str:
-        """Rate and survival of the training that runs."""
+        """Return the rate and survival of the training that runs."""
         if self.stage != "training":
             return ""
         rows = [p for p in self._store.glob(TRAININGS) if p.stat().st_mtime > self._began_unix]

@@ -26,7 +26,7 @@ def ablation(
     set_: SetStudy = None,
     as_json: Json = False,
 ) -> CommandResult:
-    """Moves x setups x seeds, each trained and judged, and a page that compares them."""
+    """Train and evaluate moves x setups x seeds, and write a page that compares them."""
     from flows.cli.verdicts import ablation_verdict
     from flows.runtime.environment import prepare
     from flows.study.study_plan import study_of
@@ -55,7 +55,7 @@ def metrics(
     ] = None,
     as_json: Json = False,
 ) -> CommandResult:
-    """The tables of all studies; without a question, a line a cell."""
+    """Query the tables of all studies; without --sql, show one line a cell."""
     from flows.cli.verdicts import metrics_verdict
     from robojackson.cli.cards import closing
     from storage import study_tables
@@ -104,7 +104,7 @@ def server(
     port: Annotated[int, typer.Option(envvar="PREFECT_SERVER_API_PORT", min=1, max=65535)] = 4200,
     as_json: Json = False,
 ) -> CommandResult:
-    """Prefect's server and pages, with the results of the store; Ctrl-C ends it."""
+    """Start Prefect's server and pages, with the results of the store; Ctrl-C ends it."""
     from flows.runtime.environment import prepare_server
     from storage.store import Store
 

@@ -68,7 +68,7 @@ async def _prepare() -> dict[str, Any]:
 
 
 def automations() -> list[dict[str, Any]]:
-    """The automations that are shipped, with the silence that the environment allows a run.
+    """Return the automations that are shipped, with the silence that the environment allows a run.
 
     Raises:
         DeploymentFailed: less than two signs of life would have to be missing.
@@ -84,7 +84,7 @@ def automations() -> list[dict[str, Any]]:
 
 
 def _with_silence(facts: dict[str, Any], silence_s: int) -> dict[str, Any]:
-    """An automation as it would be written for another silence."""
+    """Return an automation as it would be written for another silence."""
     shipped = facts["trigger"]["within"]
     wanted = shipped * silence_s // SILENT_S
     facts["trigger"]["within"] = wanted
@@ -94,7 +94,7 @@ def _with_silence(facts: dict[str, Any], silence_s: int) -> dict[str, Any]:
 
 
 async def _pool(client: PrefectClient, name: str, description: str) -> None:
-    """A pool that is new, or the one that is there with the heartbeat of our runs."""
+    """Create a pool, or add the heartbeat of our runs to the existing one."""
     try:
         known = await client.read_work_pool(name)
     except ObjectNotFound:
@@ -110,7 +110,7 @@ async def _pool(client: PrefectClient, name: str, description: str) -> None:
 
 
 def with_heartbeat(template: Mapping[str, Any]) -> dict[str, Any]:
-    """A job template whose runs get our heartbeat, whatever environment their worker has."""
+    """Return a job template whose runs get our heartbeat, whatever environment their worker has."""
     made = deepcopy(dict(template))
     env = made["variables"]["properties"]["env"]
     env["default"] = {**env.get("default", {}), **HEARTBEAT}
@@ -130,7 +130,7 @@ async def _automation(facts: Mapping[str, Any]) -> str:
 
 
 def _register() -> list[str]:
-    """prefect.yaml by Prefect's own command, from the folder it stands in."""
+    """Register prefect.yaml by Prefect's own command, in the folder of the file."""
     command = [sys.executable, "-m", "prefect", "--no-prompt", "deploy", "--all"]
     run = subprocess.run(command, cwd=app_folder(), capture_output=True, text=True, check=False)
     if run.returncode:

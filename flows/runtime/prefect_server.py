@@ -46,7 +46,7 @@ def await_server(seconds: float) -> None:
 
 @contextmanager
 def answering() -> Iterator[None]:
-    """Whatever a server says or does not say, as one line with what to do.
+    """Turn failures of a server into one line with the next step.
 
     Raises:
         DeploymentFailed: it does not answer, refuses us or something that we ask for.

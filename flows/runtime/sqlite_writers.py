@@ -29,7 +29,7 @@ class QueuedSqlite(AioSqliteConfiguration):
 
 @contextmanager
 def queued_writers() -> Iterator[None]:
-    """Inside, a server of this process whose database is SQLite lets its writers wait."""
+    """Let the writers of a server of this process with an SQLite database wait for each other."""
     address = str(PREFECT_API_DATABASE_CONNECTION_URL.value())
     if get_dialect(address).name != "sqlite":
         yield

@@ -57,7 +57,7 @@ def _without_traceback(record: logging.LogRecord) -> bool:
 
 
 def _error_of(record: logging.LogRecord) -> RoboJacksonError | None:
-    """The fault of the input that a record is about."""
+    """Return the fault of the input that a record is about."""
     error = record.exc_info[1] if record.exc_info else getattr(record, "input_error", None)
     return error if isinstance(error, RoboJacksonError) else None
 

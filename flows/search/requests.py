@@ -21,7 +21,7 @@ ALL = 10_000
 
 
 def find_dance(query: str, source: str, address: str, top: int | None, config: FindConfig) -> Dance:
-    """The dance to look for; a query that `configs/dances.yaml` knows means that dance.
+    """Return the dance to look for; a query that `configs/dances.yaml` knows means that dance.
 
     Raises:
         UnknownName: there is no such source.

@@ -18,7 +18,7 @@ THREADS = 2
 
 
 def scorers(environment: Mapping[str, str] = os.environ) -> TaskRunner[Any]:
-    """The task runner that the environment asks for.
+    """Return the task runner that the environment names.
 
     Raises:
         MissingDependency: it asks for Dask, which is not installed.

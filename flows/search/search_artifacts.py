@@ -16,7 +16,8 @@ from robojackson.pipeline.run_names import slug_of
 async def publish_search(
     name: str, rows: list[dict[str, Any]], chosen: dict[str, Any] | None
 ) -> None:
-    """Three artifacts under keys that stay the same for a dance, so that there is a history."""
+    """Publish three artifacts under keys that stay the same for a dance, so that they have a
+    history."""
     slug = slug_of(name)
     told = f"Videos assessed for {in_markdown(clean_text(name))}"
     table = ranking_table.plain_rows(rows)

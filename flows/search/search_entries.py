@@ -63,14 +63,14 @@ class SearchResult:
 
 
 def rows(found: SearchResult) -> list[dict[str, Any]]:
-    """The entries as rows of the catalogue."""
+    """Return the entries as rows of the catalogue."""
     now = datetime.now(UTC)
     labels = {"run_id": found.run_id, "dance": found.dance.name, "decided_at": now}
     return [{**labels, **_row(entry)} for entry in found.entries]
 
 
 def summary(found: Sequence[VideoCandidate], selection: Selection) -> str:
-    """What the selection did, in one line."""
+    """Return what the selection did, in one line."""
     kinds = Counter(rejection.kind for _, rejection in selection.dropped)
     words = {rejection.kind: str(rejection) for _, rejection in selection.dropped}
     words["too_long"] = "too long"
@@ -80,7 +80,7 @@ def summary(found: Sequence[VideoCandidate], selection: Selection) -> str:
 
 
 def reason_of(error: BaseException) -> str:
-    """An error as the reason in a table: one line, without the path of our own copy."""
+    """Return an error as the reason in a table: one line, without the path of our own copy."""
     if not isinstance(error, RoboJacksonError):
         return clean_text(f"unexpected {type(error).__name__}: {error}", REASON_LENGTH)
     return clean_text(error.reason, REASON_LENGTH)

@@ -43,17 +43,17 @@ class ProgressTable:
         }
 
     def running(self, cell: Cell) -> None:
-        """The cell has begun, or waits for a worker that takes it."""
+        """Record that the cell has begun, or waits for a worker."""
         self._change(cell, state=self._begun)
 
     def done(self, cell: Cell, made: Mapping[str, Artifact]) -> None:
-        """The cell has ended well; its figures go into the table."""
+        """Record that the cell has succeeded, with its figures."""
         summary = json.loads(Store.from_environment().read(made["evaluation"].key))
         figures = {name: _short(summary.get(name)) for name in COLUMNS}
         self._change(cell, state=DONE, **figures)
 
     def failed(self, cell: Cell, reason: str) -> None:
-        """The cell has failed."""
+        """Record that the cell has failed."""
         self._change(cell, state=FAILED, reason=reason)
 
     @asynccontextmanager

@@ -33,7 +33,7 @@ class RunWatcher:
         self._asking: asyncio.Task[None] | None = None
 
     async def of(self, run: FlowRun) -> FlowRun:
-        """The run as it ended.
+        """Return the run as it ended.
 
         Raises:
             Exception: the server does not answer any more.
@@ -75,7 +75,7 @@ class RunWatcher:
 
 
 async def _ended(waiting: list[UUID]) -> list[FlowRun]:
-    """Those of the runs that have ended; the server tells of at most 200 at a time."""
+    """Return the runs that have ended; the server returns at most 200 at a time."""
     over = FlowRunFilterStateType(any_=sorted(TERMINAL_STATES))
     wanted = FlowRunFilter(id=FlowRunFilterId(any_=waiting), state=FlowRunFilterState(type=over))
     async with get_client() as client:

@@ -48,7 +48,7 @@ class Search:
 
 @asynccontextmanager
 async def videos_of(source: str, search: Search) -> AsyncIterator[tuple[Path, ...]]:
-    """The files that are meant, here for the time of the block.
+    """Yield the local files of the inputs.
 
     Raises:
         UnreadableVideo: it looks like a path and is not there, or holds no video.
@@ -67,7 +67,7 @@ async def videos_of(source: str, search: Search) -> AsyncIterator[tuple[Path, ..
 
 
 async def of_name(words: str, search: Search) -> tuple[str, Artifact]:
-    """The best video of a dance in good quality, and what it is called.
+    """Return the best video of a dance in good quality, and its name.
 
     When the search fails, the video that an earlier one chose is taken.
     """
@@ -77,7 +77,7 @@ async def of_name(words: str, search: Search) -> tuple[str, Artifact]:
 
 
 def of_address(address: str, search: Search) -> tuple[str, Artifact]:
-    """A video of the web in good quality, and what it is called.
+    """Return a video of the web in good quality, and its name.
 
     Raises:
         SearchFailed: it cannot be had; the message has the reason.
@@ -103,7 +103,7 @@ def name_of(source: str) -> str:
 
 @contextmanager
 def _file(name: str, video: Artifact) -> Iterator[Path]:
-    """An artifact as a file that has a name."""
+    """Yield an artifact as a file that has a name."""
     store = Store.from_environment()
     with store.scratch() as folder:
         path = folder / f"{name or 'dance'}{Path(video.name).suffix}"

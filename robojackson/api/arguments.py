@@ -27,7 +27,7 @@ Table = TypeVar("Table", LandmarkTrack, SmplSequence, ReferenceMotion)
 
 
 def read_if_path(kind: type[Table], given: FilePath | Table) -> Table:
-    """The value itself, or what its Parquet file holds.
+    """Return the value itself, or what its Parquet file holds.
 
     Raises:
         StoreError: no such file.
@@ -37,7 +37,7 @@ def read_if_path(kind: type[Table], given: FilePath | Table) -> Table:
 
 
 def robot_of(reference: ReferenceMotion) -> Robot:
-    """The robot that a reference motion was made for.
+    """Return the robot that a reference motion was made for.
 
     Raises:
         UnknownName: its description is not here; the message says what to give.
@@ -55,7 +55,7 @@ def robot_of(reference: ReferenceMotion) -> Robot:
 
 
 def require_robot(reference: ReferenceMotion, robot: Robot) -> Robot:
-    """The robot itself, if the reference motion was made for its model.
+    """Return the robot itself, if the reference motion was made for its model.
 
     Raises:
         RejectedReference: it was made for another.
@@ -71,7 +71,7 @@ def require_robot(reference: ReferenceMotion, robot: Robot) -> Robot:
 
 @contextmanager
 def counter(progress: Progress, label: str) -> Iterator[Counter | None]:
-    """What a stage calls with (done, in all); None where nobody wants to know."""
+    """Yield what a stage calls with (done, in all); None where no progress is requested."""
     if progress is True:
         with bar(label) as advance:
             yield advance

@@ -142,7 +142,8 @@ def deployed_policy(policy: Policy, reference: ReferenceMotion, robot: Robot) ->
 def _network(
     policy: Policy, motor: np.ndarray
 ) -> tuple[tuple[tuple[np.ndarray, np.ndarray], ...], np.ndarray]:
-    """The layers with inputs in the order of the pack's terms and hinges, and the inputs' scales.
+    """Return the layers with inputs in the order of the pack's terms and hinges, and the inputs'
+    scales.
 
     The policy sees gyroscope, attitude, angles, speeds, target angles, target speeds, last action
     (`Observer`); the pack has targets, attitude, gyroscope, angles, speeds, last action.
@@ -193,7 +194,7 @@ def _require_same_motion(policy: Policy, motion: ReferenceMotion, source: Path) 
 
 
 def _beside(policy: Path, given: FilePath | None, name: str, option: str) -> Path:
-    """The file given, or the one of that name beside the policy or one folder up."""
+    """Return the file given, or the one of that name beside the policy or one folder up."""
     places = [Path(given)] if given else [f / name for f in (policy.parent, policy.parent.parent)]
     path = next((place for place in places if place.is_file()), None)
     if path is None:
@@ -204,7 +205,7 @@ def _beside(policy: Path, given: FilePath | None, name: str, option: str) -> Pat
 
 
 def _evaluation(policy: Path, given: FilePath | None) -> dict[str, Any] | None:
-    """The figures of an evaluation; None where there is none beside the policy."""
+    """Return the figures of an evaluation; None where there is none beside the policy."""
     path = Path(given) if given else policy.parent / EVALUATION
     path = path / EVALUATION if path.is_dir() else path
     if given is None and not path.is_file():
@@ -222,5 +223,5 @@ def _evaluation(policy: Path, given: FilePath | None) -> dict[str, Any] | None:
 
 
 def _strict_of(row: Mapping[str, Any]) -> float:
-    """Strict success of a row of the passport."""
+    """Return strict success of a row of the passport."""
     return float(row["strict_success"])

@@ -84,7 +84,7 @@ def read_foreign(file: Path, fps: float | None, up: Up | None, config: MocapConf
 
 
 def holds_a_person(source: Path) -> bool:
-    """Whether a Parquet file has SMPL's columns.
+    """Return whether a Parquet file has SMPL's columns.
 
     Raises:
         StoreError: no such file.
@@ -130,7 +130,7 @@ def write_policy(policy: FilePath | Policy, file: Path, to: str) -> Path:
 
 @contextmanager
 def _naming_the_file(file: Path) -> Iterator[None]:
-    """What is wrong is told with the file's name."""
+    """Add the file's name to errors."""
     try:
         yield
     except BadTable as cause:
@@ -147,7 +147,7 @@ def _bytes_of(file: Path) -> bytes:
 def _rate(
     motion: ForeignMotion | HybrikMotion, importer: Importer, given: float | None
 ) -> tuple[float, list[str]]:
-    """Frames a second, and what the user should know of them."""
+    """Return frames a second, and a note about them for the user."""
     told = motion.fps if isinstance(motion, ForeignMotion) else None
     rate = given or told or importer.fps
     if rate is None:

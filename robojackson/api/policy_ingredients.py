@@ -37,7 +37,7 @@ def policy_ingredients(
 
 
 def _body_models(reference: Path) -> list[Ingredient]:
-    """The networks that recovered the motion, if it is of a video."""
+    """Return the networks that recovered the motion, if it is of a video."""
     folders = reference.parent, reference.parent.parent
     folder = next((folder for folder in folders if (folder / LANDMARKS).is_file()), None)
     if folder is None or not (folder / PERSON).is_file():
@@ -54,7 +54,7 @@ def _body_models(reference: Path) -> list[Ingredient]:
 
 
 def _start(start: str) -> list[Ingredient]:
-    """The weights that the training began with."""
+    """Return the weights that the training began with."""
     if start == "scratch":
         return []
     if start == "walker":
@@ -64,7 +64,7 @@ def _start(start: str) -> list[Ingredient]:
 
 
 def _tracker(policy: Policy) -> list[Ingredient]:
-    """The general tracker that a training polished."""
+    """Return the general tracker that a training polished."""
     tracker = policy.facts.get("tracker")
     if not tracker:
         return []

@@ -111,7 +111,7 @@ def train_policy(
 
 
 def _labels(config: TrainConfig, move: str, setup: str | None, run_id: str) -> dict[str, Any]:
-    """What the rows of the run are known by."""
+    """Return the labels of the run's rows."""
     usual = SETUPS[config.start != "scratch", config.curiosity != "off"]
     labels = run_labels(move, Path(setup).stem if setup else usual, config.seed)
     return labels | ({"run_id": run_id} if run_id else {})
@@ -152,7 +152,8 @@ def _configured(
     minutes: float | None,
     seed: int | None,
 ) -> TrainConfig:
-    """The configuration with what was given over it, and the usual budget where it has none."""
+    """Return the configuration with what was given over it, and the usual budget where it has
+    none."""
     found = config or load(TrainConfig, setup_file(setup))
     found = replace(
         found,
@@ -164,7 +165,7 @@ def _configured(
 
 
 def setup_file(name: str | None) -> str | None:
-    """What the loader finds: a bare name is one of configs/setups."""
+    """Return the name for the loader: a bare name is one of configs/setups."""
     bare = name is not None and not {"/", "."} & set(name)
     return f"setups/{name}" if bare else name
 
@@ -178,7 +179,7 @@ def _named(
 
 
 def _joined(hooks: Hooks, rows: EpisodeLog, report: Callable[[Row], None]) -> Hooks:
-    """The caller's hooks, with the table of episodes and the bar of ours."""
+    """Return the caller's hooks, with the table of episodes and the bar of ours."""
 
     def progress(row: Row) -> None:
         hooks.progress(row)
@@ -213,7 +214,7 @@ def _telling(progress: bool | Callable[[Row], None], label: str) -> Iterator[Cal
 
 @contextmanager
 def _folder(out: FilePath | None) -> Iterator[Path]:
-    """The folder of a training: the caller's, or one that goes away."""
+    """Yield the folder of a training: the caller's, or a temporary one."""
     if out is not None:
         yield Path(out)
         return

@@ -25,7 +25,7 @@ log = logging.getLogger("robojackson")
 
 @contextmanager
 def bar(label: str) -> Iterator[Callable[[int, int], None]]:
-    """A progress bar on stderr; a few lines where stderr is no terminal."""
+    """Yield a progress bar on stderr; a few lines where stderr is no terminal."""
     console = Console(stderr=True)
     if not console.is_terminal:
         yield _plain_bar(label)

@@ -83,7 +83,7 @@ def detect_landmarks(
 
 @contextmanager
 def _as_file(video: FilePath | Frames, fps: float | None) -> Iterator[Path]:
-    """The path of a video; an array is a lossless file meanwhile."""
+    """Yield the path of a video; an array becomes a temporary lossless file."""
     if not isinstance(video, np.ndarray):
         yield Path(video)
         return

@@ -28,7 +28,7 @@ TwistRule = Callable[[int, np.ndarray], np.ndarray]
 
 
 def _levels() -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Joints 1..23 in groups that do not hang on one another."""
+    """Return the joints 1..23 in groups that do not hang on one another."""
     depth = [0]
     for parent in PARENTS[1 : len(JOINT_NAMES)]:
         depth.append(depth[parent] + 1)
@@ -49,7 +49,8 @@ def solve(
     twist: Float[np.ndarray, "T 23 2"],
     method: Method = "adaptive",
 ) -> Float[np.ndarray, "T 24 3 3"]:
-    """Local rotation matrices that pose `rest_joints` (T or 1 of them) onto the keypoints.
+    """Return the local rotation matrices that pose `rest_joints` (T or 1 of them) onto the
+    keypoints.
 
     Args:
         keypoints: Targets, metres, order of `KEYPOINT_NAMES`.
@@ -67,7 +68,7 @@ def solve_with(
     twist_rule: TwistRule,
     method: Method = "adaptive",
 ) -> Float[np.ndarray, "T 24 3 3"]:
-    """As `solve`, with each twist decided when the joint's swing is known."""
+    """Return the same as `solve`, with each twist decided when the joint's swing is known."""
     goal = np.asarray(keypoints, float)
     count = len(goal)
     rest = np.broadcast_to(np.asarray(rest_joints, float), (count, 29, 3))
@@ -94,7 +95,7 @@ def solve_with(
 def _target_directions(
     child: np.ndarray, start: np.ndarray, end: np.ndarray, bone: np.ndarray, method: Method
 ) -> np.ndarray:
-    """The direction along which the bones of some joints shall lie.
+    """Return the direction along which the bones of some joints shall lie.
 
     Args:
         child: Where the bones should end.
@@ -134,6 +135,6 @@ def _root(goal: np.ndarray, rest: np.ndarray, method: Method) -> np.ndarray:
 
 
 def _across(vector: np.ndarray, axis: np.ndarray) -> np.ndarray:
-    """The part of a vector at right angles to a unit axis."""
+    """Return the part of a vector at right angles to a unit axis."""
     result: np.ndarray = vector - np.sum(vector * axis, -1, keepdims=True) * axis
     return result

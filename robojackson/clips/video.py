@@ -94,7 +94,7 @@ class VideoInfo:
 
 
 def list_videos(source: Path) -> tuple[Path, ...]:
-    """The file itself, or the videos directly inside a folder, by name.
+    """Return the file itself, or the videos directly inside a folder, by name.
 
     Raises:
         UnreadableVideo: no such file, or a folder without videos.
@@ -111,7 +111,7 @@ def list_videos(source: Path) -> tuple[Path, ...]:
 
 
 def probe(path: Path, limits: VideoLimits) -> VideoInfo:
-    """Size, rate and number of frames of a video, counted and not believed.
+    """Return the size, rate and number of frames of a video, counted and not believed.
 
     Raises:
         UnreadableVideo: missing, empty, or not a video.
@@ -146,7 +146,7 @@ def probe(path: Path, limits: VideoLimits) -> VideoInfo:
 def read_frames(
     path: Path, start_s: float | None = None, end_s: float | None = None
 ) -> Iterator[np.ndarray]:
-    """RGB images, uint8, upright, from `start_s` (included) to `end_s` (excluded), in order.
+    """Return RGB images, uint8, upright, from `start_s` (included) to `end_s` (excluded), in order.
 
     Raises:
         UnreadableVideo, TruncatedVideo: the file cannot be decoded to its end.
@@ -160,7 +160,7 @@ def timed_frames(
     end_s: float | None = None,
     short_side: int | None = None,
 ) -> Iterator[tuple[float, np.ndarray]]:
-    """The same with the time of each since the first frame; damaged frames are left out.
+    """Yield the same with the time of each since the first frame; damaged frames are left out.
 
     Args:
         path: Video file.
@@ -178,7 +178,7 @@ def timed_frames(
 
 
 def _decoded(path: Path) -> Iterator[tuple[float, VideoFrame]]:
-    """Frames and their timestamps."""
+    """Yield frames and their timestamps."""
     with opened(path) as container:
         stream = video_stream(container, path)
         stream.thread_type = "NONE"

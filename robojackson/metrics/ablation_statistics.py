@@ -61,7 +61,7 @@ def claims(
     walking: Mapping[str, bool],
     rng: np.random.Generator,
 ) -> list[Claim]:
-    """The paper's three claims, and the same two effects where the others are absent.
+    """Return the paper's three claims, and the same two effects where the others are absent.
 
     Args:
         figures: By (move, setup), the figure of each seed; higher is better.
@@ -86,8 +86,8 @@ def comparisons(
     moves: Sequence[str],
     rng: np.random.Generator,
 ) -> list[Comparison]:
-    """The four effects of the 2 x 2 on every move alone, where a mean over moves may hide that one
-    gains what another loses.
+    """Return the four effects of the 2 x 2 on every move alone, where a mean over moves may hide
+    that one gains what another loses.
     """
     return [
         Comparison(
@@ -106,7 +106,7 @@ def _effect(
     moves: Sequence[str],
     rng: np.random.Generator,
 ) -> Effect | None:
-    """Pairs are seeds, each the mean over the moves that both setups have."""
+    """Return one effect; pairs are seeds, each the mean over the moves that both setups have."""
     pairs = _pairs(figures, treated, control, moves)
     return effect([a for a, _ in pairs], [b for _, b in pairs], rng) if pairs else None
 
@@ -132,7 +132,7 @@ def _pairs(
     control: str,
     moves: Sequence[str],
 ) -> list[tuple[float, float]]:
-    """For each seed that every move has in both setups, the means over the moves."""
+    """Return the means over the moves, for each seed that every move has in both setups."""
     columns = [figures.get((move, setup), {}) for setup in (treated, control) for move in moves]
     if not columns or not all(columns):
         return []

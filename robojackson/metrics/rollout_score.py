@@ -37,7 +37,8 @@ class LimbResponse:
 def heading_frame(
     points: Float[np.ndarray, "*T K 3"], root: Float[np.ndarray, "*T 4"], pelvis: int
 ) -> Float[np.ndarray, "*T K 3"]:
-    """Points relative to the pelvis, turned by minus the root's heading (quaternion wxyz)."""
+    """Return the points relative to the pelvis, turned by minus the root's heading (quaternion
+    wxyz)."""
     yaw = heading(root)
     c, s = np.cos(yaw)[..., None], np.sin(yaw)[..., None]
     offset = points - points[..., pelvis, None, :]
@@ -48,13 +49,13 @@ def heading_frame(
 def site_error(
     points: Float[np.ndarray, "*T K 3"], target: Float[np.ndarray, "*T K 3"]
 ) -> Float[np.ndarray, "*T"]:
-    """Mean distance of the points, metres, both in the pelvis-heading frame."""
+    """Return the mean distance of the points, metres, both in the pelvis-heading frame."""
     result: np.ndarray = np.mean(np.linalg.norm(points - target, axis=-1), -1)
     return result
 
 
 def best_frozen_error(target: Float[np.ndarray, "T K 3"]) -> float:
-    """The lowest mean site error of a pose that never moves, metres.
+    """Return the lowest mean site error of a pose that never moves, metres.
 
     Candidates are the mean of the points and up to `FROZEN_CANDIDATES` poses of the clip itself.
     """
@@ -68,7 +69,7 @@ STILL_M = 1e-3
 
 
 def skill(error_m: float, frozen_error_m: float) -> float:
-    """1 - error / error of the best frozen pose: 1 is perfect, 0 no better than a statue.
+    """Return 1 - error / error of the best frozen pose: 1 is perfect, 0 no better than a statue.
 
     NaN where the reference itself hardly moves: a statue is perfect there.
     """

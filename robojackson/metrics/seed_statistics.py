@@ -51,7 +51,8 @@ class Effect:
 
 
 def estimate(samples: Sequence[float], rng: np.random.Generator) -> Estimate:
-    """Mean and percentile-bootstrap interval of the finite ones of independent samples."""
+    """Return the mean and percentile-bootstrap interval of the finite ones of independent
+    samples."""
     told = np.asarray(samples, float)
     values = told[np.isfinite(told)]
     if len(values) < 2:
@@ -67,7 +68,7 @@ def estimate(samples: Sequence[float], rng: np.random.Generator) -> Estimate:
 
 
 def effect(treated: Sequence[float], control: Sequence[float], rng: np.random.Generator) -> Effect:
-    """How much better the treated are, pair by pair.
+    """Return how much better the treated are, pair by pair.
 
     Raises:
         ValueError: the samples are not pairs.
@@ -88,7 +89,8 @@ def effect(treated: Sequence[float], control: Sequence[float], rng: np.random.Ge
 def probability_of_improvement(
     first: Float[np.ndarray, " N"], second: Float[np.ndarray, " M"]
 ) -> float:
-    """Share of pairs (x, y) with x > y, ties counted half (Mann and Whitney's U over N M)."""
+    """Return the share of pairs (x, y) with x > y, ties counted half (Mann and Whitney's U over N
+    M)."""
     if not len(first) or not len(second):
         return np.nan
     return float(stats.mannwhitneyu(first, second).statistic) / (len(first) * len(second))

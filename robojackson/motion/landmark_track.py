@@ -113,24 +113,25 @@ class LandmarkTrack(TableFile):
         )
 
     def nearest(self, time_s: float) -> int:
-        """The frame that was taken next to a time, seconds since the first."""
+        """Return the frame that was taken next to a time, seconds since the first."""
         return int(np.abs(self.times - time_s).argmin())
 
 
 def uneven(time_s: Float[np.ndarray, " T"], fps: float) -> bool:
-    """Whether frames lie off an even grid of that rate, as in a phone's variable frame rate."""
+    """Return whether frames lie off an even grid of that rate, as in a phone's variable frame
+    rate."""
     grid = np.arange(len(time_s)) / fps
     return bool((np.abs(time_s - grid) * fps > EVEN).any())
 
 
 def even_times(track: LandmarkTrack) -> Float[np.ndarray, " T"]:
-    """Times at equal spaces of 1 / fps from the first frame to the last, seconds."""
+    """Return the times at equal spaces of 1 / fps from the first frame to the last, seconds."""
     last = float(track.times[-1])
     return np.minimum(np.arange(round(last * track.fps) + 1) / track.fps, last)
 
 
 def evenly(track: LandmarkTrack) -> LandmarkTrack:
-    """The same motion at equal spaces of 1 / fps, as the stages after this one need it.
+    """Return the same motion at equal spaces of 1 / fps, as the stages after this one need it.
 
     Linear between two frames; a frame between which and its neighbour nobody was found has nobody.
     """

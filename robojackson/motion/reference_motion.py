@@ -146,6 +146,7 @@ def _certificate(facts: Facts) -> Certificate | None:
 
 
 def poses_sha256(reference: ReferenceMotion) -> str:
-    """Digest of what a robot is asked to do: the poses, and whether they go on for ever."""
+    """Return the digest of what a robot is asked to do: the poses, and whether they go on for
+    ever."""
     poses = np.ascontiguousarray(reference.qpos, float).tobytes()
     return hashlib.sha256(poses + bytes([reference.cyclic])).hexdigest()

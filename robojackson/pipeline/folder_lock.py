@@ -35,7 +35,7 @@ def locked(folder: Path, name: str = "lock", patience_s: float = 0.0) -> Iterato
 
 
 def _held(path: Path, until: float) -> IO[str]:
-    """The locked file; one that was taken away between opening and locking is made anew."""
+    """Return the locked file; one that was removed between opening and locking is created again."""
     while True:
         path.parent.mkdir(parents=True, exist_ok=True)
         file = path.open("w")

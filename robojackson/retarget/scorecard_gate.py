@@ -43,18 +43,20 @@ _MENDING = {
 
 
 def failures(card: Mapping[str, float]) -> list[str]:
-    """Names of the gated figures over their bars; one that is missing or not a number fails."""
+    """Return the names of the gated figures over their bars; a missing or non-finite figure
+    fails."""
     return [name for name, bar in BARS.items() if not card.get(name, np.nan) <= bar]
 
 
 def scorecard_record(motion: ReferenceMotion) -> dict[str, Any]:
-    """The card as it is written beside the motion: the figures, and the findings in words."""
+    """Return the card as it is written beside the motion: its figures, and its findings in
+    words."""
     found = motion.certificate
     return {**motion.scorecard, "findings": [str(f) for f in found.findings] if found else []}
 
 
 def check(card: Mapping[str, Any]) -> None:
-    """The gate of training: a card with its figures and findings, as `scorecard_record` makes it.
+    """Apply the gate of training to a card with figures and findings (`scorecard_record`).
 
     Raises:
         RejectedReference: A figure is over its bar; the message names it and what may mend it.
@@ -83,7 +85,7 @@ def check(card: Mapping[str, Any]) -> None:
 
 
 def _reasons(name: str, card: Mapping[str, Any]) -> str:
-    """The first findings, where they are the reason."""
+    """Return the first findings, where they are the reason of the refusal."""
     findings = card.get("findings", ())
     if name not in ("infeasible_share", "fallen_share") or not findings:
         return ""

@@ -76,7 +76,7 @@ def optimise(aims: Targets, robot: Robot, config: RetargetConfig) -> tuple[Optim
 
 
 def _sketch(coarse: Problem) -> Problem:
-    """The clip at a quarter of the control rate, where that leaves enough steps."""
+    """Return the clip at a quarter of the control rate, where that leaves enough steps."""
     count = len(coarse.targets)
     if count < _SKETCHED or (coarse.ring and count % 2):
         return coarse
@@ -84,7 +84,7 @@ def _sketch(coarse: Problem) -> Problem:
 
 
 def _refined(coarse: Problem, drawn: Solution, config: RetargetConfig) -> Solution:
-    """A sketch at twice its rate."""
+    """Return a sketch at twice its rate."""
     start = resample(drawn.qpos, np.arange(len(coarse.targets)) / 2, coarse.targets.cycle_offset)
     how = config.solver
     return solve(coarse, start, how, how.polish_iterations, how.rough_tolerance)
@@ -121,7 +121,8 @@ def polished(
 def _solutions(
     problem: Problem, free: Float[np.ndarray, "N nq"], config: RetargetConfig
 ) -> Iterator[Solution]:
-    """Coarse solutions, cheapest first; last, one that never lets limbs pass through each other.
+    """Yield the coarse solutions, cheapest first; last, one that never lets limbs pass through each
+    other.
 
     Limbs that have tunnelled stay tangled whatever the weights; from the rest pose, where they are
     free, a strong repulsion keeps them so.
@@ -228,8 +229,8 @@ def harden(
 
 
 def _acceleration(points: Float[np.ndarray, "T K 3"], aims: Targets) -> float:
-    """Largest acceleration of a keypoint, m/s2, over a cycle's seam as well: a limb that has come
-    out on another's far side has passed through it between two steps."""
+    """Return the largest acceleration of a keypoint, m/s2, over a cycle's seam as well: a limb that
+    has come out on another's far side has passed through it between two steps."""
     if aims.cycle_offset is not None:
         points = np.concatenate([points, points[:2] + aims.cycle_offset])
     change = np.linalg.norm(np.diff(points, 2, axis=0), axis=-1) / aims.dt**2
@@ -237,7 +238,8 @@ def _acceleration(points: Float[np.ndarray, "T K 3"], aims: Targets) -> float:
 
 
 def _slip(problem: Problem, posed: Posed) -> tuple[float, float]:
-    """Speed of the soles that are planted in two successive steps: mean, 95th percentile, m/s."""
+    """Return the speed of the soles that are planted in two successive steps: mean, 95th
+    percentile, m/s."""
     aims = problem.targets
     speed = sole_velocities(problem.robot, posed, aims.dt, aims.cycle_offset)
     slip = slip_cm_s(speed, aims.contact == PLANTED) / 100

@@ -27,7 +27,8 @@ PAIRS = tuple(key.removeprefix("left_") for key in (*KEYPOINTS, *TOES) if key.st
 
 
 def problems(description: RobotDescription) -> list[str]:
-    """What is wrong, a line each; a description without problems is that of a robot that loads."""
+    """Return what is wrong, a line each; a description without problems is that of a robot that
+    loads."""
     found = list(dict.fromkeys(_unknown_names(description)))
     if found:
         return found
@@ -39,7 +40,7 @@ def problems(description: RobotDescription) -> list[str]:
 
 
 def _unknown_names(description: RobotDescription) -> Iterator[str]:
-    """What the model or the description has no name for."""
+    """Yield what the model or the description has no name for."""
     try:
         spec = read_spec(mjcf_path(description), description)
         fix_joints(spec, description)
@@ -76,7 +77,7 @@ def _error(check: Callable[..., Any], *given: Any) -> Iterator[str]:
 
 
 def _upright(robot: Robot) -> Iterator[str]:
-    """A root whose own axes are others: its heading and its falls would be measured wrong."""
+    """Yield a root whose own axes are others: its heading and its falls would be measured wrong."""
     data = mujoco.MjData(robot.model)
     mujoco.mj_kinematics(robot.model, data)
     axes = data.xmat[robot.model.body(robot.description.root_body).id].reshape(3, 3)
@@ -89,7 +90,8 @@ def _upright(robot: Robot) -> Iterator[str]:
 
 
 def _out_of_range(robot: Robot) -> Iterator[str]:
-    """Rest angles beyond a limit: the robot would stand otherwise than its soles were checked."""
+    """Yield the rest angles beyond a limit: the robot would stand otherwise than its soles were
+    checked."""
     place = where(robot.description, "rest_pose")
     for name, rest, low, high in zip(
         robot.joint_names, robot.rest, robot.lower, robot.upper, strict=True
@@ -99,7 +101,7 @@ def _out_of_range(robot: Robot) -> Iterator[str]:
 
 
 def _sides(robot: Robot) -> Iterator[str]:
-    """Keypoints that are on the other side, or not mirrored, in the zero pose."""
+    """Yield the keypoints that are on the other side, or not mirrored, in the zero pose."""
     description, data = robot.description, mujoco.MjData(robot.model)
     mujoco.mj_kinematics(robot.model, data)
     at = dict(zip(robot.keypoint_names, data.site_xpos[robot.keypoint_sites], strict=True))

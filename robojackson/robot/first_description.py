@@ -96,7 +96,8 @@ def first_description(path: Path, folder: Path, name: str) -> Draft:
 
 
 def guess_rest(skeleton: Skeleton) -> dict[str, float]:
-    """Knees a little bent over level feet, radians; hinges that cannot be at zero at a limit."""
+    """Return knees a little bent over level feet, radians; hinges that cannot be zero are at a
+    limit."""
     model, found = skeleton.model, dict[str, float]()
     for hinge in np.flatnonzero(model.jnt_type == int(mujoco.mjtJoint.mjJNT_HINGE)):
         low, high = model.jnt_range[hinge]
@@ -135,7 +136,7 @@ def _model(path: Path) -> mujoco.MjModel:
 
 
 def name_of_model(path: Path) -> str:
-    """What a model calls itself, else the name of its file, as a robot's name."""
+    """Return what a model calls itself, else the name of its file, as a robot's name."""
     text = path.read_text(errors="replace") if path.is_file() else ""
     told = re.search(r"<mujoco[^>]*\bmodel=\"([^\"]+)\"", text)
     name = re.sub(r"\W+", "_", told.group(1) if told else path.stem).strip("_").lower()
@@ -143,13 +144,15 @@ def name_of_model(path: Path) -> str:
 
 
 def _place(path: Path, folder: Path) -> str:
-    """The model's path from the folder of its description, or from the root where it is outside."""
+    """Return the model's path from the folder of its description, or from the root where it is
+    outside."""
     whole, base = Path(os.path.abspath(path)), Path(os.path.abspath(folder))
     return whole.relative_to(base).as_posix() if whole.is_relative_to(base) else str(whole)
 
 
 def _undriven(model: mujoco.MjModel) -> dict[str, float | None]:
-    """Hinges that no motor of the model drives -> their own torque limit, None without one."""
+    """Return the hinges that no motor of the model drives -> their own torque limit, None without
+    one."""
     hinges = np.flatnonzero(model.jnt_type == int(mujoco.mjtJoint.mjJNT_HINGE))
     joint = int(mujoco.mjtTrn.mjTRN_JOINT)
     driven = set(model.actuator_trnid[model.actuator_trntype == joint, 0].tolist())
@@ -216,7 +219,8 @@ def _rest_lines(rest: Mapping[str, float]) -> list[str]:
 
 
 def _torque_lines(undriven: Mapping[str, float | None]) -> list[str]:
-    """Limits that the hinges have themselves; the others as comments, both sides in one."""
+    """Return the limits that the hinges have themselves; the others as comments, both sides in
+    one."""
     known = {name: limit for name, limit in undriven.items() if limit is not None}
     lines = ["torque_limits: # newton-metres, of the hinges themselves: no motor drives them"]
     lines += [f"  {_text(name)}: {limit:g}" for name, limit in known.items()]

@@ -39,7 +39,8 @@ class SampledMotion:
 
 
 def sampled(reference: ReferenceMotion, fps: float | None = None) -> SampledMotion:
-    """The reference motion at `fps`, by the splines of the solver; None keeps its control steps."""
+    """Return the reference motion at `fps`, by the splines of the solver; None keeps its control
+    steps."""
     if fps is None:
         return SampledMotion(1.0 / reference.dt, reference.qpos, reference.qvel)
     qpos = np.asarray(reference.qpos, float)
@@ -54,7 +55,8 @@ def sampled(reference: ReferenceMotion, fps: float | None = None) -> SampledMoti
 
 
 def _steps(reference: ReferenceMotion, fps: float) -> Float[np.ndarray, " T"]:
-    """Fractional steps of the frames: up to the last step, or all before the next cycle begins."""
+    """Return the fractional steps of the frames: up to the last step, or all before the next cycle
+    begins."""
     per_frame = 1.0 / (fps * reference.dt)
     if reference.cyclic:
         return np.arange(int(np.ceil(len(reference) / per_frame - 1e-6))) * per_frame

@@ -12,7 +12,7 @@ from robojackson.robot.model import load_robot
 
 
 def robot_models(parameters: Mapping[str, Any]) -> list[str]:
-    """Digest of the model of the parameter `robot`."""
+    """Return the digest of the model of the parameter `robot`."""
     return [load_robot(parameters["robot"]).sha256]
 
 

@@ -56,7 +56,7 @@ def records_only() -> Iterator[None]:
 
 
 def is_records_only() -> bool:
-    """Whether calls are answered from records alone (`records_only`)."""
+    """Return whether calls are answered from records alone (`records_only`)."""
     return _records_only.get()
 
 
@@ -89,7 +89,7 @@ class KeyRecipe:
     unkeyed: tuple[str, ...]
 
     def key(self, parameters: Mapping[str, Any]) -> str:
-        """The cache key of a call; a path below the folder of records."""
+        """Return the cache key of a call; a path below the folder of records."""
         keyed = {k: v for k, v in parameters.items() if k not in self.unkeyed}
         facts = {
             "task": [self.name, self.text],
@@ -182,7 +182,7 @@ class Stage(Generic[P, R]):
             raise NotRecorded(key) from cause
 
     def run_name(self) -> str:
-        """Name a task run after `labelled`; without it a few random digits tell runs apart."""
+        """Name a task run after `labelled`; without it random digits distinguish runs."""
         return f"{self.name}-{_label.get() or uuid.uuid4().hex[:3]}"
 
 
@@ -212,12 +212,12 @@ def stage(
 
 @cache
 def versions() -> dict[str, str]:
-    """Of the packages whose version is part of every key."""
+    """Return the versions of the packages that are part of every key."""
     return {name: version(name) for name in VERSIONED}
 
 
 def identity(value: Any) -> Any:
-    """What a value is, in JSON: artifacts by content, configurations by class and fields.
+    """Return what a value is, in JSON: artifacts by content, configurations by class and fields.
 
     Raises:
         TypeError: a value whose content cannot be told, such as a path.

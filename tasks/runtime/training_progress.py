@@ -51,7 +51,7 @@ class _Bar:
             await self.publish()
 
     async def publish(self) -> None:
-        """What the file says now."""
+        """Publish what the file contains now."""
         from prefect.artifacts import aupdate_progress_artifact
 
         with suppress(Exception):
@@ -62,13 +62,13 @@ class _Bar:
 
 
 def done(row: Mapping[str, Any]) -> float:
-    """Percent of the budget that is used up."""
+    """Return the percentage of the budget that is used."""
     used, left = float(row["seconds"]), float(row["seconds_left"])
     return round(100.0 * used / max(used + left, 1e-9), 1)
 
 
 def format_row(name: str, row: Mapping[str, Any]) -> str:
-    """A row of progress for a person."""
+    """Return a row of progress for a person."""
     minutes, seconds = divmod(int(row["seconds_left"]), 60)
     survived = row.get("survived_s")
     lived = "no episode has ended" if survived is None else f"survives {survived:.2f} s"

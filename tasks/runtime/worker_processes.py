@@ -24,7 +24,7 @@ _pool: ProcessPoolExecutor | None = None
 
 
 def cores() -> int:
-    """The cores that this process may use."""
+    """Return the cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -69,7 +69,7 @@ def _processes(count: int) -> ProcessPoolExecutor:
 
 
 def _begin(parent: int) -> None:
-    """One thread a library, Ctrl-C left to the parent, and no life after its death."""
+    """Use one thread a library, leave Ctrl-C to the parent, and end with it."""
     os.environ["OMP_NUM_THREADS"] = "1"
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     watch_parent(parent)

@@ -1,4 +1,4 @@
-"""The site is built from docs and docstrings without a warning, and every link in it leads somewhere."""
+"""The site is built without a warning, and every link in it leads somewhere."""
 
 import shutil
 import subprocess

@@ -18,7 +18,7 @@ USER = "postgres"
 
 
 def service(wanted: Mapping[str, str], check: str, port: int, folder: Path, log: Path) -> Service:
-    """The database server of a stack.
+    """Return the database server of a stack.
 
     Args:
         wanted: Environment of the image: POSTGRES_USER, POSTGRES_PASSWORD, POSTGRES_DB.
@@ -48,7 +48,7 @@ def remove(folder: Path) -> None:
 
 
 def program(name: str) -> str:
-    """Path of one of PostgreSQL's programs.
+    """Return the path of one of PostgreSQL's programs.
 
     Raises:
         StackError: it is not installed.
@@ -71,7 +71,8 @@ def _initialise(home: Path, wanted: Mapping[str, str], user: str | None) -> None
 
 
 def _database(wanted: Mapping[str, str]) -> str:
-    """Shell that makes the database, as the image does at its first start, and asks it."""
+    """Return the shell that makes the database, as the image does at its first start, and asks
+    it."""
     user, name = wanted["POSTGRES_USER"], wanted["POSTGRES_DB"]
     asked = f"psql -U {user} -d {name} -c 'select 1'"
     return f"{{ {asked} 2>/dev/null || createdb -U {user} {name}; {asked}; }}"

@@ -59,7 +59,8 @@ class Service:
             )
 
     def healthy(self) -> bool:
-        """Whether its own check says so; for one that ends by itself, whether it ended well."""
+        """Return whether its health check succeeds; for a one-shot service, whether it ended
+        well."""
         assert self.process is not None
         code = self.process.poll()
         if self.check is None:
@@ -96,7 +97,7 @@ class Service:
             signal_group(self.process.pid, how)
 
     def murder(self) -> bool:
-        """SIGKILL; whether it was that which ended the process."""
+        """Send SIGKILL; return whether that ended the process."""
         if self.process is None or self.process.poll() is not None:
             return False
         self.kill()
@@ -110,7 +111,7 @@ class Service:
 
 
 def interpolate(value: Any, given: Mapping[str, str]) -> Any:
-    """Compose's `${NAME:?message}` and `${NAME:-default}` in all strings of a value.
+    """Return the compose's `${NAME:?message}` and `${NAME:-default}` in all strings of a value.
 
     Raises:
         StackError: a variable that must be set is not.
@@ -132,7 +133,7 @@ def _variable(found: re.Match[str], given: Mapping[str, str]) -> str:
 
 
 def free_port() -> int:
-    """A port that nobody listens on now."""
+    """Return a port that nobody listens on now."""
     with socket.socket() as found:
         found.bind(("127.0.0.1", 0))
         return int(found.getsockname()[1])

@@ -43,7 +43,7 @@ def check_motions(examples: list[Example]) -> None:
 
 
 def truths_of(folder: Path, motions: list[Path], count: int, seed: int) -> list[Truth]:
-    """The truths without pictures, made once."""
+    """Return the truths without pictures, made once."""
     path = folder / f"truths-{seed}-{count}.npz"
     if not path.exists():
         from tools.temporal import truths  # needs tools/requirements.txt, as the rendering does
@@ -104,7 +104,7 @@ def train(
 
 
 def save(lifter: Lifter, flow: Flow, path: Path) -> None:
-    """Both in one file, half precision but for the normalisation of the input."""
+    """Write both networks to one file, half precision but for the normalisation of the input."""
     arrays = dict(lifter.state_dict())
     arrays |= {f"flow.{name}": value for name, value in flow.state_dict().items()}
     keep_exact = ("mean", "scale")
@@ -147,7 +147,7 @@ def resume(progress: fit.Progress, path: Path) -> None:
 
 
 def draw_curve(report: dict[str, object], path: Path) -> None:
-    """The curve as a picture."""
+    """Draw the curve as a picture."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -169,7 +169,7 @@ def draw_curve(report: dict[str, object], path: Path) -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Command line."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -47,7 +47,7 @@ class CameraMotion:
         self.displacements: list[float] = []
 
     def add_frame(self, index: int, image: np.ndarray, xy: Float[np.ndarray, "33 2"]) -> None:
-        """Frame number `index`, RGB, with the landmarks of the person in it."""
+        """Add frame number `index`, RGB, with the landmarks of the person in it."""
         if self._before is not None:
             after = self._small(image)
             self.displacements.append(displacement(self._before, after, xy, self._config.corners))
@@ -73,7 +73,8 @@ def displacement(
     xy: Float[np.ndarray, "33 2"],
     corners: int,
 ) -> float:
-    """How far the background moved, in diagonals; NaN where nothing in it could be followed."""
+    """Return how far the background moved, in diagonals; NaN where nothing in it could be
+    followed."""
     height, width = before.shape
     mask = np.full_like(before, 255)
     person = box(xy, PERSON_MARGIN, width, height)
@@ -95,6 +96,7 @@ def displacement(
 
 
 def spread(frames: int, fps: float, per_second: float, fewest: int) -> frozenset[int]:
-    """Numbers of frames, evenly spread over a clip: so many a second, and at least so many."""
+    """Return the numbers of frames, evenly spread over a clip: so many a second, and at least so
+    many."""
     wanted = min(max(round(frames / fps * per_second), fewest), max(frames, 0))
     return frozenset(int((i + 0.5) * frames / wanted) for i in range(wanted))

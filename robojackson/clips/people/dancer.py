@@ -63,7 +63,7 @@ def track_dancer(
     config: DancerConfig,
     progress: Progress | None = None,
 ) -> LandmarkTrack:
-    """Landmarks of one person, NaN rows where he is not seen.
+    """Return the landmarks of one person, NaN rows where they are not visible.
 
     Args:
         path: Video file.
@@ -97,7 +97,8 @@ def track_dancer(
 def _scouted(
     path: Path, info: VideoInfo, size: str, config: DancerConfig, progress: Progress | None
 ) -> tuple[LandmarkTrack, bool]:
-    """The track of a person who is alone, and whether somebody else was seen in a few frames."""
+    """Return the track of a person who is alone, and whether somebody else was seen in a few
+    frames."""
     with still_landmarker(SCOUT) as landmarker:
         scouts = People(info.frames, info.fps, landmarker, config.scouts)
 
@@ -116,8 +117,8 @@ def _followed(
     config: DancerConfig,
     progress: Progress | None,
 ) -> Float[np.ndarray, "T 33 7"]:
-    """Rows of one person, the others painted over; what is known of everybody where that goes
-    astray."""
+    """Return rows of one person, the others painted over; what is known of everybody where that
+    goes astray."""
     known = cast.rows[chosen]
     others = np.array([rows for number, rows in enumerate(cast.rows) if number != chosen])
     wanted = near_known(known, cast.time_s, config.longest_gap_s)
@@ -139,7 +140,7 @@ def _followed(
 def near_known(
     known: Float[np.ndarray, "T 33 7"], time_s: Float[np.ndarray, " T"], gap_s: float
 ) -> Bool[np.ndarray, " T"]:
-    """Frames that are no further from one in which he was seen."""
+    """Return the frames that are near enough to one in which the person was detected."""
     seen = time_s[~np.isnan(known[:, 0, 0])]
     return np.asarray(np.abs(time_s[:, None] - seen).min(1) <= gap_s)
 
@@ -150,7 +151,7 @@ def mask_others(
     others: Float[np.ndarray, "P 33 7"],
     limb_width: float,
 ) -> UInt8[np.ndarray, "H W 3"]:
-    """The picture with all others painted over where they do not cover the person."""
+    """Return the picture with all others painted over where they do not cover the person."""
     height, width = image.shape[:2]
     clear = image.copy()
     kept = np.zeros((height, width), bool)
@@ -170,7 +171,8 @@ def checked(
     size: tuple[int, int],
     config: DancerConfig,
 ) -> Float[np.ndarray, "T 33 7"]:
-    """What was found of a person, what was known where that is astray, NaN where neither is.
+    """Return the detections of a person, the known position where one is astray, NaN where neither
+    exists.
 
     While nobody saw him he may be found on the line from the place before to the place after, if no
     other's line comes near.
@@ -201,7 +203,7 @@ def _course(
 
 
 def _shifted(progress: Progress | None, frames: int, before: int, passes: int) -> Progress | None:
-    """Progress of one pass over the frames, so many of which are done before it."""
+    """Return the progress of one pass over the frames, so many of which are done before it."""
     if progress is None:
         return None
     return lambda done, total: progress(before * frames + done, passes * frames)

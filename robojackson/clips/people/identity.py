@@ -63,7 +63,7 @@ def identify(
     size: tuple[int, int],
     config: IdentityConfig,
 ) -> list[Float[np.ndarray, "T 33 7"]]:
-    """One track a person, NaN where he is not seen, the largest steady one first.
+    """Return one track a person, NaN where they are not visible, the largest steady one first.
 
     Args:
         frames: All detections of every frame.
@@ -86,7 +86,8 @@ def identify(
 def by_size(
     tracks: Sequence[Float[np.ndarray, "T 33 7"]], size: tuple[int, int]
 ) -> list[Float[np.ndarray, "T 33 7"]]:
-    """The largest steady person first: median stature in the image times the share of frames."""
+    """Return the largest steady person first: median stature in the image times the share of
+    frames."""
 
     def weight(track: np.ndarray) -> float:
         seen = ~np.isnan(track[:, 0, 0])
@@ -100,7 +101,7 @@ def _lasts(tracklet: Tracklet, shortest_s: float, period_s: float) -> bool:
 
 
 def chains(tracklets: list[Tracklet], config: IdentityConfig) -> list[list[Tracklet]]:
-    """Tracklets in order, one list a person."""
+    """Return the tracklets in order, one list a person."""
     from scipy.optimize import linear_sum_assignment
 
     count = len(tracklets)
@@ -127,7 +128,7 @@ def chains(tracklets: list[Tracklet], config: IdentityConfig) -> list[list[Track
 def assign_merged(
     blends: list[Tracklet], chains: list[list[Tracklet]], config: IdentityConfig
 ) -> list[list[Tracklet]]:
-    """Each tracklet of two seen as one to the person whom it fits best and who has no other
+    """Return each tracklet of two seen as one to the person whom it fits best and who has no other
     there."""
     told = [list(chain) for chain in chains]
     for blend in sorted(blends, key=lambda tracklet: -len(tracklet.frames)):
@@ -138,7 +139,8 @@ def assign_merged(
 
 
 def _fit(tracklet: Tracklet, chain: list[Tracklet], config: IdentityConfig) -> float:
-    """Cost of a tracklet in a gap of a chain: the mean of the links to both of its neighbours."""
+    """Return the cost of a tracklet in a gap of a chain: the mean of the links to both of its
+    neighbours."""
     first, last = tracklet.frames[0], tracklet.frames[-1]
     if any(p.frames[0] <= last and p.frames[-1] >= first for p in chain):
         return IMPOSSIBLE
@@ -150,7 +152,7 @@ def _fit(tracklet: Tracklet, chain: list[Tracklet], config: IdentityConfig) -> f
 
 
 def _link(before: Tracklet, after: Tracklet, config: IdentityConfig) -> float:
-    """Sum of the changes across a gap, each over what it may be."""
+    """Return the sum of the changes across a gap, each over its allowed change."""
     gap_s = after.time_s[0] - before.time_s[-1]
     tall = float(np.median(before.tall[-NEAR:])), float(np.median(after.tall[:NEAR]))
     reach = min(config.reach + config.reach_speed * gap_s, config.farthest) * max(tall)
@@ -166,7 +168,7 @@ def _link(before: Tracklet, after: Tracklet, config: IdentityConfig) -> float:
 
 
 def _led(tracklet: Tracklet, gap_s: float, config: IdentityConfig, ends: bool) -> np.ndarray:
-    """Where a tracklet leads to after its end, or came from before its beginning, pixels."""
+    """Return where a tracklet leads to after its end, or came from before its beginning, pixels."""
     time_s, place = np.array(tracklet.time_s), np.array(tracklet.place)
     edge = -1 if ends else 0
     close = np.abs(time_s - time_s[edge]) <= config.memory_s
@@ -179,7 +181,7 @@ def _led(tracklet: Tracklet, gap_s: float, config: IdentityConfig, ends: bool) -
 
 
 def _mean(colours: list[np.ndarray]) -> np.ndarray:
-    """Mean of those that were seen."""
+    """Return the mean of the visible values."""
     table = np.array(colours)
     known = ~np.isnan(table)
     total = np.where(known, table, 0.0).sum(0)

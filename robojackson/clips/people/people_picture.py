@@ -15,7 +15,7 @@ MARGIN = 0.08
 
 
 def draw_people(path: Path, cast: TrackedPeople) -> bytes:
-    """PNG."""
+    """Return the picture as PNG."""
     wanted = best_frame(cast)
     frames = timed_frames(path, short_side=LONG_SIDE)
     image = next(image for index, (_, image) in enumerate(frames) if index == wanted)
@@ -30,7 +30,8 @@ def draw_people(path: Path, cast: TrackedPeople) -> bytes:
 
 
 def best_frame(cast: TrackedPeople) -> int:
-    """The frame with most people in it, and among those the one with the largest distances."""
+    """Return the frame with most people in it, and among those the one with the largest
+    distances."""
     places = np.array([rows[:, 0, 0] for rows in cast.rows])
     count = (~np.isnan(places)).sum(0)
     apart = np.array([_nearest(column[~np.isnan(column)]) for column in places.T])

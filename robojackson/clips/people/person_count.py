@@ -47,7 +47,7 @@ class People:
         self.counts: list[int] = []
 
     def add_frame(self, index: int, image: np.ndarray, xy: Float[np.ndarray, "33 2"]) -> None:
-        """Frame number `index`, RGB, with the landmarks of the person in it."""
+        """Add frame number `index`, RGB, with the landmarks of the person in it."""
         if index in self._chosen:
             self.counts.append(self._count(image, xy))
 
@@ -75,7 +75,7 @@ class People:
         return found
 
     def _look(self, small: np.ndarray) -> np.ndarray | None:
-        """Landmarks of a person who is still in the picture, columns x, y, visibility."""
+        """Return landmarks of a person who is still in the picture, columns x, y, visibility."""
         import mediapipe
 
         picture = mediapipe.Image(image_format=mediapipe.ImageFormat.SRGB, data=small)

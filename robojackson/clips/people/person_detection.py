@@ -66,7 +66,7 @@ class PersonDetection:
 def detect_people(
     image: UInt8[np.ndarray, "H W 3"], landmarker: Any, config: PersonDetectionConfig
 ) -> list[PersonDetection]:
-    """All people in a picture, the one that the detector likes best first."""
+    """Return all people in a picture, in the detector's order."""
     factor = min(1.0, config.short_side / min(image.shape[:2]))
     small = cv2.resize(image, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
     painted = np.zeros(small.shape[:2], bool)
@@ -84,7 +84,7 @@ def detect_people(
 
 
 def detect_person(landmarker: Any, image: np.ndarray) -> np.ndarray | None:
-    """One person in a single picture, (33, 7); None for nobody."""
+    """Return one person in a single picture, (33, 7); None for nobody."""
     import mediapipe
 
     rows = np.ascontiguousarray(image)
@@ -95,7 +95,7 @@ def detect_person(landmarker: Any, image: np.ndarray) -> np.ndarray | None:
 def silhouette(
     xy: Float[np.ndarray, "33 2"], width: int, height: int, limb_width: float
 ) -> Bool[np.ndarray, "H W"]:
-    """The pixels that a person covers, limbs `limb_width` body heights wide."""
+    """Return the pixels that a person covers, limbs `limb_width` body heights wide."""
     points = np.round(xy * [width, height]).astype(np.int32)
     tall = float(stature(points))
     thick = max(2, round(limb_width * tall))
@@ -120,7 +120,7 @@ def paint(image: UInt8[np.ndarray, "H W 3"], mask: Bool[np.ndarray, "H W"]) -> N
 def mean_colours(
     image: UInt8[np.ndarray, "H W 3"], xy: Float[np.ndarray, "33 2"], hidden: np.ndarray
 ) -> Float[np.ndarray, " 6"]:
-    """Mean colour of trunk and thighs where nothing hides them."""
+    """Return the mean colour of trunk and thighs where nothing hides them."""
     height, width = image.shape[:2]
     points = np.round(xy * [width, height]).astype(np.int32)
     upper, lower = np.zeros((2, height, width), np.uint8)
@@ -143,7 +143,7 @@ def _colour(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
 def _near(
     found: list[PersonDetection], size: tuple[int, ...], smallest: float
 ) -> list[PersonDetection]:
-    """Without the people of the background."""
+    """Return the detections without the people of the background."""
     tall = [float(stature(other.row[:, :2] * size)) for other in found]
     limit = smallest * max(tall, default=0.0)
     return [other for other, height in zip(found, tall, strict=True) if height >= limit]

@@ -92,7 +92,7 @@ def track_people(
     identity: IdentityConfig,
     progress: Callable[[int, int], None] | None = None,
 ) -> TrackedPeople:
-    """Everybody in every frame, told apart."""
+    """Return all people in every frame, with their identities."""
     found: list[list[PersonDetection]] = []
     times: list[float] = []
     with still_landmarker(SCOUT) as landmarker:

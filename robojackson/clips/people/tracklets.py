@@ -77,7 +77,7 @@ def find_tracklets(
     size: tuple[int, int],
     config: TrackletConfig,
 ) -> list[Tracklet]:
-    """Stretches without doubt, and those of two seen as one."""
+    """Return the stretches without doubt, and those of two seen as one."""
     done: list[Tracklet] = []
     alive: list[Tracklet] = []
     for index, detections in enumerate(frames):
@@ -108,7 +108,7 @@ def _tracklet_of(index: int, now: float, seen: PersonDetection, size: tuple[int,
 def _claims(
     alive: Sequence[Tracklet], seen: Sequence[Tracklet], config: TrackletConfig
 ) -> dict[int, int]:
-    """Which tracklet goes on with which detection, the least change in all."""
+    """Return which tracklet continues with which detection, with the least total change."""
     from scipy.optimize import linear_sum_assignment
 
     if not alive or not seen:
@@ -124,7 +124,7 @@ def _touches(
     resumes: dict[int, int],
     config: TrackletConfig,
 ) -> tuple[set[int], set[int]]:
-    """Tracklets that end because people touch, and detections that may be either of two.
+    """Return the tracklets that end because people touch, and detections that may be either of two.
 
     Beside somebody who just vanished a detection may be his; beside somebody who just appeared both
     are seen apart again.
@@ -153,7 +153,7 @@ def _near(one: Tracklet, other: Tracklet, config: TrackletConfig) -> bool:
 
 
 def _step(before: Tracklet, after: Tracklet, config: TrackletConfig) -> float:
-    """How far a detection is from a tracklet, 1 is as far as it may be."""
+    """Return how far a detection is from a tracklet, 1 is as far as it may be."""
     away_s = after.time_s[0] - before.time_s[-1]
     tall = max(before.tall[-1], after.tall[0])
     moved = np.linalg.norm(after.place[0] - before.place[-1]) / tall

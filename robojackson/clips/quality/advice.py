@@ -61,7 +61,8 @@ class Advice:
 
 
 def advise(track: LandmarkTrack) -> tuple[Advice, ...]:
-    """What to do better, the gravest kinds of a list by hand first; nothing for a good clip."""
+    """Return what to do better, the gravest kinds of a list by hand first; nothing for a good
+    clip."""
     return tuple(
         Advice(kind, value, LIMITS[kind])
         for kind, value in _figures(track).items()
@@ -70,7 +71,7 @@ def advise(track: LandmarkTrack) -> tuple[Advice, ...]:
 
 
 def _figures(track: LandmarkTrack) -> dict[Kind, float | None]:
-    """Every figure that advice is about; None where it was not measured."""
+    """Return every figure that advice is about; None where it was not measured."""
     seen = track.detected
     height = float(np.median(heights_px(track)[seen])) if seen.any() else None
     moved = None if track.to_first is None else stray_of(track.to_first, track.width, track.height)
@@ -88,7 +89,7 @@ def _figures(track: LandmarkTrack) -> dict[Kind, float | None]:
 
 
 def _outside(track: LandmarkTrack) -> float:
-    """Share of the frames with a person in which head, trunk or legs leave the image."""
+    """Return the share of the frames with a person in which head, trunk or legs leave the image."""
     xy = track.landmarks[track.detected][:, indices(BODY), :2]
     return float(((xy < 0.0) | (xy > 1.0)).any((1, 2)).mean())
 

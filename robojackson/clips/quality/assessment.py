@@ -114,13 +114,13 @@ class _Eyes:
         self._paint = Paint(info.frames, info.fps, config.drawing)
 
     def add_frame(self, index: int, image: np.ndarray, row: np.ndarray) -> None:
-        """Frame number `index`, RGB, and the landmarks found in it, NaN for nobody."""
+        """Add frame number `index`, RGB, and the landmarks found in it, NaN for nobody."""
         self._changes.add_frame(image)
         for eye in (self._camera, self._people, self._paint):
             eye.add_frame(index, image, row[:, :2])
 
     def quality(self, track: LandmarkTrack) -> Quality:
-        """What they saw in the whole clip."""
+        """Return the figures of the whole clip."""
         config = self._config
         apart = round(config.cuts.shortest_scene_s * self._info.fps)
         cuts = together(self._changes.cuts, leaps(track, config.cuts), apart)
@@ -141,6 +141,6 @@ class _Eyes:
 
 
 def _median(values: np.ndarray) -> float:
-    """Median of the numbers that are there, 0 when there are none."""
+    """Return the median of the numbers that are there, 0 when there are none."""
     known = values[~np.isnan(values)]
     return float(np.median(known)) if len(known) else 0.0

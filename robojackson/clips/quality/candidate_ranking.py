@@ -81,7 +81,7 @@ def objections(score: Stability, quality: Quality, config: FilterConfig) -> list
 
 
 def order(scores: Mapping[str, Stability], config: FilterConfig) -> list[str]:
-    """Names of the clips, the steadiest first; those without a person last."""
+    """Return names of the clips, the steadiest first; those without a person last."""
 
     def figure(name: str) -> tuple[bool, float]:
         score = scores[name]
@@ -100,7 +100,7 @@ def rank(
     against: Mapping[str, Sequence[Rejection]],
     copied: Mapping[str, Rejection],
 ) -> list[Ranked]:
-    """Places of all clips: those that nothing speaks against first, then the rejected ones.
+    """Return the places of all clips: accepted ones first, then the rejected ones.
 
     Args:
         ordered: The steadiest first.

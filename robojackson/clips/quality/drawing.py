@@ -47,7 +47,7 @@ class Paint:
         self._shares: list[float] = []
 
     def add_frame(self, index: int, image: np.ndarray, xy: Float[np.ndarray, "33 2"]) -> None:
-        """Frame number `index`, RGB, with the landmarks of the person in it."""
+        """Add frame number `index`, RGB, with the landmarks of the person in it."""
         if index in self._chosen and not np.isnan(xy).any():
             factor = min(1.0, self._config.short_side / min(image.shape[:2]))
             small = cv2.resize(image, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
@@ -60,7 +60,7 @@ class Paint:
 
 
 def flat_share(image: UInt8[np.ndarray, "H W 3"], xy: np.ndarray, level: int) -> float:
-    """Share of the body's pixels whose 3 x 3 neighbours have the same colour."""
+    """Return the share of the body's pixels whose 3 x 3 neighbours have the same colour."""
     square = np.ones((3, 3), np.uint8)
     apart = cv2.subtract(cv2.dilate(image, square), cv2.erode(image, square)).max(-1)
     inside = apart[body(xy, image.shape[1], image.shape[0])]
@@ -68,7 +68,7 @@ def flat_share(image: UInt8[np.ndarray, "H W 3"], xy: np.ndarray, level: int) ->
 
 
 def body(xy: Float[np.ndarray, "33 2"], width: int, height: int) -> Bool[np.ndarray, "H W"]:
-    """The pixels of trunk and limbs."""
+    """Return the pixels of trunk and limbs."""
     points = np.round(xy * [width, height]).astype(np.int32)
     mask = np.zeros((height, width), np.uint8)
     trunk = indices(("left_shoulder", "right_shoulder", "left_hip", "right_hip"))

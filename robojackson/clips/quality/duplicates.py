@@ -59,7 +59,8 @@ def find_duplicates(
 
 
 def poses(track: LandmarkTrack, rate: float) -> Poses:
-    """Landmarks relative to the middle of the hips, in body heights, `rate` times a second."""
+    """Return landmarks relative to the middle of the hips, in body heights, `rate` times a
+    second."""
     size = np.array([track.width, track.height])
     xy = track.landmarks[..., :2] * size
     hips = xy[:, indices(("left_hip", "right_hip"))].mean(1, keepdims=True)
@@ -71,13 +72,14 @@ def poses(track: LandmarkTrack, rate: float) -> Poses:
 
 
 def mirrored(seen: Poses) -> Poses:
-    """The same poses in a mirror: left is right, in the image and in the names."""
+    """Return the same poses in a mirror: left is right, in the image and in the names."""
     result: Poses = seen[:, list(MIRROR)] * np.array([-1.0, 1.0])
     return result
 
 
 def distance(one: Poses, two: Poses, config: DuplicateConfig) -> float:
-    """Least mean distance over all delays, which cost a little; infinite when nothing overlaps."""
+    """Return the least mean distance over all delays, which cost a little; infinite when nothing
+    overlaps."""
     shortest = min(len(one), len(two))
     least = max(2, int(config.overlap * shortest))
     longest = int(config.lag_s * config.rate)
@@ -87,7 +89,7 @@ def distance(one: Poses, two: Poses, config: DuplicateConfig) -> float:
 
 
 def _at(one: Poses, two: Poses, lag: int, least: int) -> float:
-    """Mean distance when the second clip starts `lag` poses after the first."""
+    """Return the mean distance when the second clip starts `lag` poses after the first."""
     begin, end = max(0, lag), min(len(one), len(two) + lag)
     if end - begin < least:
         return np.inf

@@ -35,7 +35,7 @@ class PictureQuality:
     def watch(
         self, images: Iterable[UInt8[np.ndarray, "H W 3"]]
     ) -> Iterator[UInt8[np.ndarray, "H W 3"]]:
-        """The same pictures, RGB, one a frame."""
+        """Yield the same pictures, RGB, one a frame."""
         for index, image in enumerate(images):
             if index in self._chosen:
                 self._look(image, self._landmarks[index])
@@ -61,7 +61,7 @@ class PictureQuality:
 
 
 def detail_share(grey: UInt8[np.ndarray, "H W"]) -> float:
-    """Standard deviation of the Laplacian over that of the grey levels, at one size."""
+    """Return the standard deviation of the Laplacian over that of the grey levels, at one size."""
     factor = TALL / grey.shape[0]
     way = cv2.INTER_AREA if factor < 1.0 else cv2.INTER_CUBIC
     width = max(round(grey.shape[1] * factor), 3)

@@ -74,7 +74,7 @@ class Stability(TableFile):
 
 
 def stability(track: LandmarkTrack, config: StabilityConfig) -> Stability:
-    """M + J of a track; a clip without a person has M = 33 T and J = 0."""
+    """Return M + J of a track; a clip without a person has M = 33 T and J = 0."""
     frames = len(track)
     missing = missing_joints(track.visibility, config.visibility_threshold)
     moved = jitter(track.landmarks[..., :2])
@@ -91,12 +91,12 @@ def stability(track: LandmarkTrack, config: StabilityConfig) -> Stability:
 
 
 def missing_joints(visibility: Float[np.ndarray, "T 33"], threshold: float) -> int:
-    """M: landmarks under the threshold, and all 33 of every undetected (NaN) frame."""
+    """Return M: landmarks under the threshold, and all 33 of every undetected (NaN) frame."""
     return int(np.count_nonzero(~(visibility >= threshold)))
 
 
 def jitter(xy: Float[np.ndarray, "T 33 2"]) -> float:
-    """Mean landmark displacement between consecutive frames, summed over the clip.
+    """Return the mean landmark displacement between consecutive frames, summed over the clip.
 
     J = sum_t 1/N sum_j |L_j,t - L_j,t-1|_2   (Algorithm 1; N = 33)
 

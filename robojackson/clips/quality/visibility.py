@@ -38,7 +38,7 @@ PARTS = {
 
 
 def weigh_visibility(track: LandmarkTrack) -> LandmarkTrack:
-    """The track with the visibility that the picture allows, and notes of what was not seen.
+    """Return the track with the visibility that the picture allows, and notes of what was not seen.
 
     Raises:
         NoPersonFound: the hips are hardly ever seen, as in a clip of a face.
@@ -58,7 +58,7 @@ def weigh_visibility(track: LandmarkTrack) -> LandmarkTrack:
 
 
 def inside(track: LandmarkTrack) -> Float[np.ndarray, "T 33"]:
-    """1 for landmarks inside the image, 0 for those further beyond its edge than `EDGE`."""
+    """Return 1 for landmarks inside the image, 0 for those further beyond its edge than `EDGE`."""
     scale = np.array([track.width, track.height]) / track.height
     xy = track.landmarks[..., :2]
     beyond = np.maximum(np.maximum(-xy, xy - 1.0), 0.0) * scale
@@ -66,7 +66,8 @@ def inside(track: LandmarkTrack) -> Float[np.ndarray, "T 33"]:
 
 
 def turned_away(track: LandmarkTrack) -> Bool[np.ndarray, " T"]:
-    """Frames in which left shoulder and left hip are both at the left in the image: a back."""
+    """Return frames in which left shoulder and left hip are both at the left in the image: a
+    back."""
     points = track.landmarks[..., :2] * (track.width, track.height)
     across = [
         points[:, POINTS[f"left_{name}"], :] - points[:, POINTS[f"right_{name}"], :]
@@ -81,14 +82,15 @@ def turned_away(track: LandmarkTrack) -> Bool[np.ndarray, " T"]:
 
 
 def steady(track: LandmarkTrack) -> Float[np.ndarray, " T"]:
-    """1, less in the frames beside a gap, where the detector is about to lose the person."""
+    """Return 1, less in the frames beside a gap, where the detector is about to lose the person."""
     lost = ~track.detected
     near = np.convolve(lost, np.ones(2 * GAP_FRAMES + 1), mode="same")[: len(lost)] > 0
     return np.where(near, BESIDE_GAP, 1.0)
 
 
 def unseen(track: LandmarkTrack) -> tuple[str, ...]:
-    """Parts of the body that are not seen, and in how many of the frames with a person."""
+    """Return the parts of the body that are not visible, and in how many of the frames with a
+    person."""
     visibility = track.visibility[track.detected]
     unseen_share = {
         part: float((visibility[:, indices(names)] < VISIBLE).all(1).mean())

@@ -22,7 +22,7 @@ class Source(Protocol):
     def search(
         self, query: str, address: str, count: int, config: WebConfig, now: datetime
     ) -> list[VideoCandidate]:
-        """Videos for a query, in the source's own order, nothing downloaded.
+        """Return videos for a query, in the source's own order, nothing downloaded.
 
         Args:
             query: Words to look for; a source that cannot look for words offers all it has.
@@ -36,12 +36,12 @@ class Source(Protocol):
 
 
 def names() -> tuple[str, ...]:
-    """All sources."""
+    """Return all sources."""
     return tuple(sorted(module.name for module in iter_modules(__path__)))
 
 
 def source(name: str) -> Source:
-    """The source of a name.
+    """Return the source of a name.
 
     Raises:
         UnknownName: there is no such file; the message lists those that are.

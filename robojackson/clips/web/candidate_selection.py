@@ -44,7 +44,8 @@ def select(
     config: SelectionConfig,
     failed: Collection[tuple[str, str]] = (),
 ) -> Selection:
-    """The videos to download: no long ones, no live streams, each once, the most watched first.
+    """Return the videos to download: no long ones, no live streams, each once, the most watched
+    first.
 
     One that failed before waits until there is no other: or a few that always fail would take all
     places every night.

@@ -18,13 +18,13 @@ ADVICE = (
 
 
 def runtimes() -> dict[str, str]:
-    """Those that are installed, beside Python or on the path: name to program."""
+    """Return the installed runtimes, beside Python or on the path: name to program."""
     found = {name: _place(program) for name, program in PROGRAMS.items()}
     return {name: place for name, place in found.items() if place}
 
 
 def usable() -> str | None:
-    """The best one that is new enough, None where there is none."""
+    """Return the best one that is new enough, None where there is none."""
     for name, program in runtimes().items():
         if name not in OLDEST or _version(program) >= OLDEST[name]:
             return name
@@ -37,7 +37,7 @@ def _place(program: str) -> str | None:
 
 
 def _version(program: str) -> tuple[int, ...]:
-    """(22, 1, 0) of what it says of itself; () when it says nothing."""
+    """Return (22, 1, 0) of what it says of itself; () when it says nothing."""
     try:
         said = subprocess.run(
             [program, "--version"],

@@ -39,7 +39,7 @@ def require_reachable(page: str, proxy: str | None = None, patience_s: float = P
 
 
 def _usual_proxy(page: str, host: str) -> str:
-    """The proxy that the environment names for a page; empty where it names none."""
+    """Return the proxy that the environment names for a page; empty where it names none."""
     if urllib.request.proxy_bypass(host):
         return ""
     proxies = urllib.request.getproxies()
@@ -47,7 +47,7 @@ def _usual_proxy(page: str, host: str) -> str:
 
 
 def _refusal(address: str, patience_s: float) -> str:
-    """Why no connection could be made; empty where one was.
+    """Return why no connection could be made; empty where one was.
 
     In a thread, since name resolution has no time limit of its own.
     """
@@ -70,6 +70,6 @@ def _attempt(address: str, patience_s: float) -> str:
 
 
 def _place(address: str) -> tuple[str, int]:
-    """Host and port of an address; one without a scheme is a proxy's."""
+    """Return the host and port of an address; one without a scheme is a proxy's."""
     parts = urlsplit(address if "://" in address else f"http://{address}")
     return parts.hostname or "", parts.port or PORTS.get(parts.scheme, 80)

@@ -29,7 +29,7 @@ class Failure(NamedTuple):
 
 
 def explain(failure: BaseException) -> Failure:
-    """What an error of yt-dlp, or one inside it, means."""
+    """Return what an error of yt-dlp, or one inside it, means."""
     from yt_dlp.networking.exceptions import HTTPError, IncompleteRead, TransportError
     from yt_dlp.utils import ContentTooShortError
 
@@ -54,7 +54,7 @@ def explain(failure: BaseException) -> Failure:
 
 
 def _causes(failure: BaseException) -> list[BaseException]:
-    """An error and all that yt-dlp hid inside it, the innermost first."""
+    """Return an error and all that yt-dlp hid inside it, the innermost first."""
     found: list[BaseException] = []
     waiting: list[Any] = [failure]
     while waiting:
@@ -78,7 +78,7 @@ def _is_passing(status: int) -> bool:
 
 
 def _line(error: BaseException) -> str:
-    """yt-dlp's message without its prefixes and its advice about reporting bugs."""
+    """Return yt-dlp's message without its prefixes and its advice about reporting bugs."""
     text = clean_text(str(error) or type(error).__name__, 10 * REASON_LENGTH)
     text = text.removeprefix("ERROR: ").split("; please report this issue")[0]
     return clean_text(text.split(" (caused by")[0], REASON_LENGTH)

@@ -74,7 +74,8 @@ class Offer:
 
 
 def listing(address: str, config: WebConfig) -> dict[str, Any]:
-    """What a search or a page holds, flat: no page of a video is opened, no video downloaded.
+    """Return what a search or a page holds, flat: no page of a video is opened, no video
+    downloaded.
 
     Raises:
         SearchFailed: the message has the address and the reason.
@@ -87,7 +88,7 @@ def listing(address: str, config: WebConfig) -> dict[str, Any]:
 
 
 def offer(url: str, purpose: Purpose, formats: FormatConfig, config: WebConfig) -> Offer:
-    """The format of a video that would be downloaded.
+    """Return the format of a video that would be downloaded.
 
     Raises:
         DownloadFailed: there is none, or the page cannot be had; the message is the reason.
@@ -103,7 +104,7 @@ def offer(url: str, purpose: Purpose, formats: FormatConfig, config: WebConfig) 
 
 
 def fetch(chosen: Offer, folder: Path, config: WebConfig, progress: Progress | None = None) -> Path:
-    """The file of an offer; what an interrupted download left in the folder is continued.
+    """Return the file of an offer; what an interrupted download left in the folder is continued.
 
     Raises:
         DownloadFailed: the message is the reason.
@@ -125,7 +126,7 @@ def fetch(chosen: Offer, folder: Path, config: WebConfig, progress: Progress | N
 
 
 def entries(info: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """The videos of a listing; a page of one video is a listing of one."""
+    """Return the videos of a listing; a page of one video is a listing of one."""
     found = info.get("entries")
     return [info] if found is None else [entry for entry in found if entry]
 
@@ -177,7 +178,7 @@ def _download(info: Mapping[str, Any], options: dict[str, Any]) -> None:
 
 
 def _selector(purpose: Purpose, formats: FormatConfig) -> Callable[[Mapping[str, Any]], Any]:
-    """Our choice in the form in which yt-dlp asks for it."""
+    """Return our choice in the form in which yt-dlp asks for it."""
 
     def select(context: Mapping[str, Any]) -> Any:
         chosen = choose(context["formats"], purpose, formats)
@@ -187,7 +188,7 @@ def _selector(purpose: Purpose, formats: FormatConfig) -> Callable[[Mapping[str,
 
 
 def _watch(progress: Progress | None, config: WebConfig) -> Callable[[Mapping[str, Any]], None]:
-    """A hook for yt-dlp that passes bytes on and stops a download that takes too long."""
+    """Return a hook for yt-dlp that passes bytes on and stops a download that takes too long."""
     began = time.monotonic()
 
     def hook(state: Mapping[str, Any]) -> None:
@@ -203,7 +204,7 @@ def _watch(progress: Progress | None, config: WebConfig) -> Callable[[Mapping[st
 
 
 def _patiently(attempt: Callable[[], Result], config: WebConfig) -> Result:
-    """The result of an attempt, repeated while what goes wrong may go right later."""
+    """Return the result of an attempt, repeated while the failure may be temporary."""
     from yt_dlp.utils import YoutubeDLError
 
     for number in range(config.retries + 1):

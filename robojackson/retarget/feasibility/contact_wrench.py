@@ -70,7 +70,7 @@ class Demand:
         return np.asarray(self.feet @ self.spread)
 
     def at(self, rows: np.ndarray) -> "Demand":
-        """Some of the steps."""
+        """Return the demand of some of the steps."""
         parts = ("force", "feet", "spread", "usable", "lower", "upper")
         return replace(self, **{name: getattr(self, name)[rows] for name in parts})
 
@@ -130,14 +130,14 @@ class Root:
     mix: Float[np.ndarray, "S W W"]
 
     def __matmul__(self, matrix: Float[np.ndarray, "S nv M"]) -> Float[np.ndarray, "S nv M"]:
-        """R times a matrix a step."""
+        """Return R times a matrix a step."""
         out = self.size[..., None] * matrix
         out -= (self.wrench @ self.mix.swapaxes(1, 2)) @ (self.wrench.swapaxes(1, 2) @ out)
         return np.asarray(out)
 
 
 def supply(demand: Demand) -> Supply:
-    """The pushes that leave the least."""
+    """Return the pushes that leave the smallest residual."""
     point = solve_box(_box(demand, 0.0))
     pushes = point.x[:, : demand.usable.shape[1]] * demand.usable
     given = (demand.feet @ (demand.spread @ pushes[..., None]))[..., 0]
@@ -148,7 +148,7 @@ def supply(demand: Demand) -> Supply:
 
 
 def relaxed(demand: Demand, barrier: float, start: Point | None = None) -> Relaxed:
-    """The same, smooth: the second derivative tells how near all limits are.
+    """Return the same, smooth: the second derivative grows near every limit.
 
     V(f) = min_x |S f - A x|^2 / 2 + ...: V' = S left, V'' = S (1 + A Q^-1 A^T)^-1 S with Q the
     curvature of prices and barrier.
@@ -179,7 +179,7 @@ def _root(box: Box, point: Point, scale: Float[np.ndarray, " nv"]) -> Root:
 
 
 def _box(demand: Demand, relax: float) -> Box:
-    """The problem in tolerances; torques as shares of their limits."""
+    """Return the problem in tolerances; torques as shares of their limits."""
     steps, count = demand.usable.shape
     edges = np.zeros((steps, count))
     unit = np.where(demand.ease > 0, demand.ease, 1.0)

@@ -69,7 +69,7 @@ class _Same:
 
 
 def once_a_robot(read: Callable[[Robot], _T]) -> Callable[[Robot], _T]:
-    """Cache what is read of a robot; its model must not be changed afterwards."""
+    """Cache what is computed from a robot; its model must not be changed afterwards."""
     cached = lru_cache(maxsize=_CACHED_ROBOTS)(lambda key: read(key.robot))
 
     @wraps(read)
@@ -81,7 +81,7 @@ def once_a_robot(read: Callable[[Robot], _T]) -> Callable[[Robot], _T]:
 
 @once_a_robot
 def unconstrained(robot: Robot) -> mujoco.MjModel:
-    """The robot's model without contacts and stops."""
+    """Return the robot's model without contacts and stops."""
     out = copy.copy(robot.model)
     off = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT
     out.opt.disableflags |= int(off)
@@ -136,7 +136,7 @@ def _parents(model: mujoco.MjModel) -> Int[np.ndarray, " nv"]:
 
 
 def _lowest_dofs(model: mujoco.MjModel) -> Int[np.ndarray, " B"]:
-    """Of every body the lowest dof that moves it, -1 where none does."""
+    """Return the lowest dof that moves each body, -1 where none does."""
     lowest = np.full(model.nbody, -1)
     for body in range(1, model.nbody):
         count, first = model.body_dofnum[body], model.body_dofadr[body]

@@ -63,8 +63,9 @@ def add_dynamics(
 def force_slopes(
     problem: Problem, posed: Posed, qpos: np.ndarray, speed: np.ndarray, rate: np.ndarray
 ) -> Slopes:
-    """The force and its derivatives in the tangent space of each step: analytic where the model
-    has nothing but rigid bodies, springs and damping, by finite differences of MuJoCo's otherwise.
+    """Return the force and its derivatives in the tangent space of each step: analytic where the
+    model has nothing but rigid bodies, springs and damping, by finite differences of MuJoCo's
+    otherwise.
     """
     robot = problem.robot
     if rigid(robot):
@@ -74,7 +75,8 @@ def force_slopes(
 
 @once_a_robot
 def rigid(robot: Robot) -> bool:
-    """Whether the analytic force is MuJoCo's: a model may have fluid, tendons or dry friction."""
+    """Return whether the analytic force is MuJoCo's: a model may have fluid, tendons or dry
+    friction."""
     rng = np.random.default_rng(0)
     qpos = np.tile(robot.standing, (_PROBES, 1))
     qpos[:, 7:] = rng.uniform(robot.lower, robot.upper, (_PROBES, len(robot.lower)))
@@ -88,7 +90,7 @@ def rigid(robot: Robot) -> bool:
 def inverse_slopes(
     model: mujoco.MjModel, qpos: np.ndarray, speed: np.ndarray, rate: np.ndarray
 ) -> Slopes:
-    """The same by finite differences."""
+    """Return the same by finite differences."""
     data, count = mujoco.MjData(model), speed.shape[1]
     force = np.empty_like(speed)
     matrices = np.empty((3, len(qpos), count, count))

@@ -62,7 +62,7 @@ class Targets:
 def targets(
     clip: HumanClip, robot: Robot, hovering: Bool[np.ndarray, " N"] | None = None
 ) -> Targets:
-    """Bone-direction targets, contact states of the soles and the ground refit.
+    """Return the bone-direction targets, contact states of the soles and the ground refit.
 
     Args:
         clip: The human.
@@ -100,7 +100,8 @@ def targets(
 
 
 def leg_ratio(human: Mapping[str, np.ndarray], robot: Robot) -> float:
-    """Robot leg over human leg, hip to sole; the lowest 2 % of ankles give the ankle's height."""
+    """Return robot leg over human leg, hip to sole; the lowest 2 % of ankles give the ankle's
+    height."""
     length = robot.lengths
     robot_leg = length["left_hip", "left_knee"] + length["left_knee", "left_foot"]
     ankles = np.minimum(human["left_ankle"][:, 2], human["right_ankle"][:, 2])
@@ -138,7 +139,8 @@ def _chain(
 
 
 def _trunk_length(robot: Robot) -> float:
-    """Hip centre to shoulder centre: both are centres of mirrored pairs, so Pythagoras serves."""
+    """Return hip centre to shoulder centre: both are centres of mirrored pairs, so Pythagoras
+    serves."""
     length = robot.lengths
     slope = length["left_hip", "left_shoulder"]
     half = (length["left_hip", "right_hip"] - length["left_shoulder", "right_shoulder"]) / 2
@@ -159,12 +161,12 @@ def _trunk_frame(human: Mapping[str, np.ndarray]) -> Float[np.ndarray, "N 3 3"]:
 
 
 def every_second(wanted: Targets) -> Targets:
-    """The same targets at half the rate."""
+    """Return the same targets at half the rate."""
     return replace(select_steps(wanted, slice(None, None, 2)), dt=2 * wanted.dt)
 
 
 def select_steps(wanted: Targets, steps: slice | Bool[np.ndarray, " N"]) -> Targets:
-    """Some of the steps, or all of them in another order."""
+    """Return some of the steps, or all of them in another order."""
     return replace(
         wanted,
         keypoints_w=wanted.keypoints_w[steps],
