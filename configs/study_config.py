@@ -35,8 +35,8 @@ def _each_once(values: tuple[Any, ...]) -> tuple[Any, ...]:
     """Refuse duplicates: twins would be one cell, which two runs train at once."""
     twice = sorted({value for value in values if values.count(value) > 1})
     if twice:
-        told = ", ".join(map(str, twice))
-        raise PydanticCustomError("twice", "{told} stands twice", {"told": told})
+        listed = ", ".join(map(str, twice))
+        raise PydanticCustomError("twice", "{told} stands twice", {"told": listed})
     return values
 
 

@@ -81,14 +81,14 @@ async def ablation(study: Study) -> Facts:
     slots = asyncio.Semaphore(study.slots or _slots(study))
     execute = EXECUTORS[study.executor]
 
-    async def one(wanted: Cell) -> Any:
+    async def one(each: Cell) -> Any:
         async with slots:
-            board.running(wanted)
+            board.running(each)
             try:
-                made = await execute(wanted)
-                board.done(wanted, made)
+                made = await execute(each)
+                board.done(each, made)
             except Exception as cause:
-                board.failed(wanted, _line(cause))
+                board.failed(each, _line(cause))
                 raise
             return made
 
@@ -137,13 +137,13 @@ def gate(study: Study, scorecards: Mapping[str, Artifact]) -> None:
             refused.append(f"{name}: {cause.without_force}")
     if not refused:
         return
-    told = f"study {study.name}: {len(refused)} of {len(scorecards)} motions are refused"
+    summary = f"study {study.name}: {len(refused)} of {len(scorecards)} motions are refused"
     if study.gate:
         raise RejectedReference(
-            f"{told} ({'; '.join(refused)}). No cell was started; `gate: false` (--set gate=false) "
-            "trains on them all the same"
+            f"{summary} ({'; '.join(refused)}). No cell was started; `gate: false` "
+            "(--set gate=false) trains on them anyway"
         )
-    get_run_logger().warning("%s and trained on: %s", told, "; ".join(refused))
+    get_run_logger().warning("%s and trained on: %s", summary, "; ".join(refused))
 
 
 def cells_of(

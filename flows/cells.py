@@ -86,8 +86,8 @@ async def with_retries(
             return await stage(max(deadline - time.monotonic(), SHORTEST_S))
         except TrainingFailed as cause:
             if time.monotonic() >= deadline:
-                told = f"{cell.name} did not end within {cell.timeout_minutes:g} minutes"
-                raise TrainingFailed(f"{told}: {cause}") from cause
+                reason = f"{cell.name} did not end within {cell.timeout_minutes:g} minutes"
+                raise TrainingFailed(f"{reason}: {cause}") from cause
             if not tries_left or not isinstance(cause, TrainingCrashed):
                 raise
         await asyncio.sleep(SECONDS_BEFORE_RETRY)

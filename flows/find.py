@@ -49,8 +49,8 @@ async def find(
     sweep(Store.from_environment(), work=False)
     settings = load(FindConfig, config, overrides)
     found = search_and_rank(build(Dance, dance, "dance"), settings, run_id("find"))
-    told = rows(found)
-    await publish_search(found.dance.name, told, told[0] if found.chosen else None)
+    table = rows(found)
+    await publish_search(found.dance.name, table, table[0] if found.chosen else None)
     return summarise(found)
 
 
@@ -82,8 +82,8 @@ async def best(
         if reigning is None:
             raise
         return {"key": reigning["video_key"], "sha256": reigning["video_sha256"]}
-    told = rows(found)
-    await publish_search(requested.name, told, told[0] if found.chosen else None)
+    table = rows(found)
+    await publish_search(requested.name, table, table[0] if found.chosen else None)
     if found.chosen is None:
         raise NoPersonFound(nothing(found))
     return asdict(in_good_quality(found.chosen, settings))
@@ -114,23 +114,23 @@ def nothing(found: SearchResult) -> str:
     """Return in one line why no video of a search may be danced."""
     if not found.entries:
         return f"{found.dance.name}: no video is left of the search"
-    told = (f"{e.candidate.title or e.candidate.video_id}: {e.reason}" for e in found.entries)
+    table = (f"{e.candidate.title or e.candidate.video_id}: {e.reason}" for e in found.entries)
     return (
-        f"{found.dance.name}: none of {len(found.entries)} videos may be danced: {'; '.join(told)}"
+        f"{found.dance.name}: none of {len(found.entries)} videos may be danced: {'; '.join(table)}"
     )
 
 
 def summarise(found: SearchResult) -> dict[str, Any]:
     """Return the answer of the command."""
-    told = rows(found)
+    table = rows(found)
     every = [*found.selection.selected, *(c for c, _ in found.selection.dropped)]
     return {
         "dance": found.dance.name,
         "query": found.dance.full_query,
         "source": found.dance.source,
         "run_id": found.run_id,
-        "chosen": told[0] if found.chosen else None,
-        "candidates": told,
+        "chosen": table[0] if found.chosen else None,
+        "candidates": table,
         "dropped": [
             {"title": c.title, "url": c.url, "reason": str(r)} for c, r in found.selection.dropped
         ],

@@ -117,17 +117,17 @@ async def refresh_dance(
         SearchFailed: the source does not answer, or has no new video and none was chosen before.
         NoPersonFound: no video may be danced; the message has the reasons.
     """
-    wanted = build(Dance, dance, "dance")
+    entry = build(Dance, dance, "dance")
     settings = build(FindConfig, config, "config")
     store = Store.from_environment()
     stages = load(PipelineConfig, pipeline, pipeline_overrides)
-    mine = (store, wanted.name, KIND)  # what `find` judges is nothing to this
+    mine = (store, entry.name, KIND)  # what `find` judges is nothing to this
     reigning = candidate_catalogue.champion(*mine)
     seen, failing = candidate_catalogue.known(*mine), candidate_catalogue.failed(*mine)
-    found = search_and_rank(wanted, settings, run_id(KIND), seen, reigning, failing)
-    told = rows(found)
-    chosen = told[0] if found.chosen else reigning
-    await publish_search(wanted.name, told, chosen)
+    found = search_and_rank(entry, settings, run_id(KIND), seen, reigning, failing)
+    listing = rows(found)
+    chosen = listing[0] if found.chosen else reigning
+    await publish_search(entry.name, listing, chosen)
     if chosen is None:
         raise NoPersonFound(nothing(found))
     try:
@@ -135,15 +135,15 @@ async def refresh_dance(
     except RoboJacksonError as cause:
         if not found.chosen:
             raise
-        candidate_catalogue.append(store, [{**told[0], **_failed(cause)}])
+        candidate_catalogue.append(store, [{**listing[0], **_failed(cause)}])
         if reigning is None:
             raise
-        get_run_logger().warning("%s: %s; the one before is danced", wanted.name, cause)
+        get_run_logger().warning("%s: %s; the one before is danced", entry.name, cause)
         chosen = reigning
         made = motion(store, _video(None, reigning, settings), stages)
     return {
         "run_id": found.run_id,
-        "assessed": len(told),
+        "assessed": len(listing),
         "is_new": chosen is not reigning,
         "chosen": {
             key: chosen[key]

@@ -207,8 +207,8 @@ def _notes(store: Store, study: str | None, runs: Collection[str] | None) -> lis
     found = [key for key in store.list(RUNS) if study is None or key.endswith(f"-{study}.json")]
     if runs is None:
         return found
-    wanted = {f"{run}-{study}.json" for run in runs}
-    return [key for key in found if key.rpartition("/")[2] in wanted]
+    note_names = {f"{run}-{study}.json" for run in runs}
+    return [key for key in found if key.rpartition("/")[2] in note_names]
 
 
 def _runs(store: Store, study: str | None, runs: Collection[str] | None) -> pa.Table:

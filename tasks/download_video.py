@@ -115,24 +115,24 @@ class _Progress:
         self._what = f"{clean_text(video.title, 60) or video.video_id} ({name})"
         self._key = "download-" + hashlib.sha256(video.folder.encode()).hexdigest()[:12]
         self._artifact: Any = None
-        self._told = 0.0
+        self._logged = 0.0
         self._in_run = TaskRunContext.get() is not None
 
     def __call__(self, done: int, total: int | None) -> None:
         share = min(done / total, 1.0) if total else 0.0
-        if share < self._told + STEP and share < 1.0:
+        if share < self._logged + STEP and share < 1.0:
             return
-        if share >= 1.0 and self._told >= 1.0:
+        if share >= 1.0 and self._logged >= 1.0:
             return
-        self._told = share
+        self._logged = share
         self._log().info("%s: %.0f %% of %.1f MB", self._what, 100 * share, (total or 0) / 1e6)
         if self._in_run:
             self._show(100 * share)
 
     def _show(self, percent: float) -> None:
         if self._artifact is None:
-            told = in_markdown(self._what)
-            self._artifact = create_progress_artifact(percent, key=self._key, description=told)
+            label = in_markdown(self._what)
+            self._artifact = create_progress_artifact(percent, key=self._key, description=label)
         else:
             update_progress_artifact(self._artifact, percent)
 

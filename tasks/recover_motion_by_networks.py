@@ -41,12 +41,12 @@ def recover_motion_by_networks(
 
 
 def _teller() -> Callable[[int, int], None]:
-    told = 0
+    reported = 0
 
     def report(done: int, total: int) -> None:
-        nonlocal told
-        if done * REPORTS // total > told:
-            told = done * REPORTS // total
+        nonlocal reported
+        if done * REPORTS // total > reported:
+            reported = done * REPORTS // total
             log.info("networks: %d of %d frames", done, total)
 
     return report

@@ -182,6 +182,6 @@ def _command(
 def _facts(answer: bytes, labels: RunLabels) -> bytes:
     """Return the facts of a training, without the paths of this machine."""
     said = json.loads(answer)
-    told = ("trainer", "seed", "steps", "updates", "stopped", "episodes")
-    facts = {key: said[key] for key in told} | {"training_s": said["seconds"]}
+    public_keys = ("trainer", "seed", "steps", "updates", "stopped", "episodes")
+    facts = {key: said[key] for key in public_keys} | {"training_s": said["seconds"]}
     return json.dumps({"setup": labels.setup, **facts}, indent=1).encode()

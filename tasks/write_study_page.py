@@ -65,7 +65,7 @@ def write_study_page(
     """
     store = Store.from_environment()
     shown = {name: store.read(png.key) for name, png in pictures.items()}
-    paid = {name: json.loads(store.read(told.key)) for name, told in reward_audits.items()}
+    paid = {name: json.loads(store.read(text.key)) for name, text in reward_audits.items()}
     return report(study, moves, shown, study_tables.runs_of(rows), paid)
 
 
@@ -193,8 +193,8 @@ def _steps_of(start: str, study: Study) -> str:
 
 def _picture(name: str, move: Move, png: bytes) -> Plot:
     stands = f" (for the paper's {move.paper})" if move.paper else ""
-    told = "The video, the body recovered from it, and the same moment on the robot."
-    return Plot(f"{name}{stands}", told, png)
+    text = "The video, the body recovered from it, and the same moment on the robot."
+    return Plot(f"{name}{stands}", text, png)
 
 
 def _json(
@@ -202,13 +202,13 @@ def _json(
     compared: Sequence[ablation_statistics.Comparison],
     lines: Sequence[study_page.Line],
 ) -> bytes:
-    told = {
+    text = {
         "primary": PRIMARY,
         "claims": [{**asdict(claim), "sentence": study_page.sentence(claim)} for claim in claims],
         "comparisons": [asdict(comparison) for comparison in compared],
         "lines": [asdict(line) for line in lines],
     }
-    return json.dumps(to_json_types(told), indent=1, allow_nan=False).encode()
+    return json.dumps(to_json_types(text), indent=1, allow_nan=False).encode()
 
 
 def _file(title: str) -> str:

@@ -140,9 +140,9 @@ class _Spy:
         self._controls, self._wrote = controls, list[np.ndarray]()
 
     def __call__(self, targets: np.ndarray) -> np.ndarray:
-        told = self._controls(targets)
-        self._wrote.append(told.copy())
-        return told
+        commands = self._controls(targets)
+        self._wrote.append(commands.copy())
+        return commands
 
     def taken(self) -> np.ndarray:
         """Return what was written since the last call."""
@@ -165,7 +165,7 @@ class Bare:
         ends = np.cumsum([batch.shape[1] for batch in script.controls[0]])
         split = np.split(np.arange(n), ends[:-1]) if batched else [np.arange(n)]
         self._robots = [[robots[i] for i in which] for which in split]
-        merged = lambda told: [np.concatenate(told, 1)]  # noqa: E731
+        merged = lambda commands: [np.concatenate(commands, 1)]  # noqa: E731
         self._controls = (
             script.controls if batched else [merged(t) for t in script.controls]  # type: ignore[no-untyped-call]
         )
@@ -176,8 +176,8 @@ class Bare:
         spent, model, step = 0.0, self._model, mujoco.mj_step
         for t in range(first, first + steps):
             began = time.thread_time()
-            for robots, told in zip(self._robots, self._controls[t], strict=True):
-                for controls in told:
+            for robots, commands in zip(self._robots, self._controls[t], strict=True):
+                for controls in commands:
                     for (data, ctrl), control in zip(robots, controls, strict=True):
                         ctrl[:] = control
                         step(model, data)

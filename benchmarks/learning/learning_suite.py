@@ -31,7 +31,7 @@ from benchmarks.learning import (
     speed as learning_speed,
 )
 from benchmarks.learning.policies import MOVES, Folders
-from benchmarks.learning.summary import AUTHORS_ROBOT, EXCESS, GAIN, LIMBS, R2, TOLD, summary
+from benchmarks.learning.summary import AUTHORS_ROBOT, COLUMNS, EXCESS, GAIN, LIMBS, R2, summary
 
 PARTS = ("speed", "threads", "policies", "survival", "pretraining", "checkpoints", "table")
 SPEED = ("what", "ours", "peer", "ratio", "bar", "holds", "load_average")
@@ -45,25 +45,25 @@ def main() -> None:
     """Measure the parts that are asked for and print all that there is."""
     given = _arguments()
     folders = Folders.at(given.folder)
-    wanted = given.what or list(PARTS)
+    parts = given.what or list(PARTS)
     command = f"python -m benchmarks.learning.learning_suite {' '.join(sys.argv[1:])}".strip()
     speed = folders.results / "learning_speed.json"
-    if "threads" in wanted:
+    if "threads" in parts:
         _write(speed, [learning_speed.threads()], command)
-    if "speed" in wanted:
+    if "speed" in parts:
         _write(speed, learning_speed.speed(given.repeats, given.seconds), command)
-    if "survival" in wanted:
+    if "survival" in parts:
         _write(speed, [races.survival(folders, given.cpu_minutes or 10)], command)
-    if "pretraining" in wanted:
+    if "pretraining" in parts:
         minutes = given.cpu_minutes or 5
         row = races.pretraining(folders, given.seeds, minutes, given.walker_cpu_seconds)
         _write(speed, [row], command)
-    if "checkpoints" in wanted:
+    if "checkpoints" in parts:
         _write(speed, [checkpoint_cost.checkpoints(folders)], command)
-    if "policies" in wanted:
+    if "policies" in parts:
         minutes, jobs = given.cpu_minutes, given.jobs
         learning_policies.policies(given.moves, given.seeds, minutes, jobs, folders)
-    if {"policies", "table"} & set(wanted) and (rows := summary(folders)):
+    if {"policies", "table"} & set(parts) and (rows := summary(folders)):
         held = {"command": command, "authors_robot": AUTHORS_ROBOT, "rows": rows}
         (folders.results / "learning.json").write_text(json.dumps(held, indent=1) + "\n")
     _show(folders, Console())
@@ -139,10 +139,10 @@ def _limbs(rows: list[dict[str, Any]]) -> Table:
 
 def _beside(rows: list[dict[str, Any]]) -> Table:
     """Return the baselines that do not dance, and the authors' robot."""
-    table = Table("move", "who", *TOLD, title="Beside the policy")
+    table = Table("move", "who", *COLUMNS, title="Beside the policy")
     for row in rows:
         for who, figures in row["beside"].items():
-            table.add_row(_name(row), who, *(_cell(figures[key]) for key in TOLD))
+            table.add_row(_name(row), who, *(_cell(figures[key]) for key in COLUMNS))
     table.add_row(
         "authors' logs", "authors' robot", _cell(AUTHORS_ROBOT["survived_s"]), "-", "-", "-"
     )

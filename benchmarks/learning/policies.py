@@ -167,12 +167,13 @@ def reference_of(name: str, folders: Folders) -> Path:
 
 def require_frozen(name: str, reference: Path) -> None:
     """Refuse a reference that is not the one that the row was frozen with (`split.yaml`)."""
-    asked = load_split().references.get(name)
+    frozen_reference = load_split().references.get(name)
     found = poses_sha256(load(reference))
-    if asked is not None and asked != found:
+    if frozen_reference is not None and frozen_reference != found:
         raise SystemExit(
-            f"{name}: {reference} has the poses {found[:12]}, the row is measured on {asked[:12]}: "
-            "another mocap or retargeting made it; freeze it anew or use the old one"
+            f"{name}: {reference} has the poses {found[:12]}, the row is measured on "
+            f"{frozen_reference[:12]}: another mocap or retargeting made it; freeze it again or use "
+            "the old one"
         )
 
 
@@ -192,8 +193,8 @@ def _made(move: Move, work: Path) -> int:
 
 def forced(name: str, folders: Folders) -> bool:
     """Return whether the gate refused the move's motion, so that it was forced."""
-    told = folders.work / name / "gate.json"
-    return told.is_file() and bool(json.loads(told.read_text())["forced"])
+    gate = folders.work / name / "gate.json"
+    return gate.is_file() and bool(json.loads(gate.read_text())["forced"])
 
 
 def train_and_judge(
@@ -210,11 +211,11 @@ def train_and_judge(
     must("train", reference, "-o", out, *options, core=core)
     folders.rows.mkdir(parents=True, exist_ok=True)
     for seconds, path in kept.items():
-        judged = out / f"judged-{seconds:g}s"
+        evaluated = out / f"judged-{seconds:g}s"
         policy = out / "policy.safetensors"
-        must("evaluate", policy, reference, "-o", judged, "--seconds", seconds, core=core)
+        must("evaluate", policy, reference, "-o", evaluated, "--seconds", seconds, core=core)
         part = path.with_suffix(".part")
-        part.write_bytes((judged / "evaluations.parquet").read_bytes())
+        part.write_bytes((evaluated / "evaluations.parquet").read_bytes())
         part.replace(path)
 
 

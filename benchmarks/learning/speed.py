@@ -39,7 +39,7 @@ def updates(repeats: int, seconds: float, layer_norm: bool) -> Row:
     work = {name: _rounds(name, TrackConfig(threads=1), tqc) for name in ("sbx", "sb3")}
     ours, theirs = interleaved(work, repeats, seconds)
     what = "updates/s, sbx over sb3-contrib" + ", layer normalisation" * layer_norm
-    return told(what, ours, theirs, ours / theirs, ">= 4")
+    return comparison(what, ours, theirs, ours / theirs, ">= 4")
 
 
 def paper_steps(repeats: int, seconds: float) -> Row:
@@ -49,7 +49,7 @@ def paper_steps(repeats: int, seconds: float) -> Row:
     work = {name: _rounds(name, PaperConfig(), tqc, step=True) for name in ("sbx", "sb3")}
     ours, theirs = (1 / rate for rate in interleaved(work, repeats, seconds))
     what = "paper mode, CPU s a step, sbx over sb3-contrib"
-    return told(what, ours, theirs, ours / theirs, "<= 0.45")
+    return comparison(what, ours, theirs, ours / theirs, "<= 0.45")
 
 
 def _rounds(
@@ -110,7 +110,7 @@ CORES = {"humanoid": ">= 0.88", "g1": ">= 0.85"}
 
 def cores(repeats: int) -> list[Row]:
     """Return the row of every robot whose model is here."""
-    return [told_core(repeats, name) for name in CORES if _is_here(name)]
+    return [core_row(repeats, name) for name in CORES if _is_here(name)]
 
 
 def _is_here(robot: str) -> bool:
@@ -120,17 +120,17 @@ def _is_here(robot: str) -> bool:
         return False
 
 
-def told_core(repeats: int, robot: str = "humanoid") -> Row:
+def core_row(repeats: int, robot: str = "humanoid") -> Row:
     """Return the substeps a CPU second of the whole environment over a bare mj_step loop, same
     physics.
 
-    `ratio_batched` is told beside it: over a bare loop in the order of our batches.
+    `ratio_batched` stands beside it: over a bare loop in the order of our batches.
     """
     speeds = core(repeats, robot=named(robot))
     what = "environment, substeps/s, over a bare mj_step loop"
     if robot != "humanoid":
         what = f"{what}, {robot}"
-    row = told(what, speeds.ours, speeds.bare, speeds.ratio, CORES[robot])
+    row = comparison(what, speeds.ours, speeds.bare, speeds.ratio, CORES[robot])
     return {**row, "peer_batched": speeds.batched, "ratio_batched": speeds.ratio_batched}
 
 
@@ -151,11 +151,13 @@ def threads(repeats: int = 5, n: int = 32, steps: int = 100) -> Row:
             found.append(n * steps / (time.perf_counter() - began))
             sim.close()
     one, two = (float(np.median(found)) for found in rates.values())
-    row = told("environment steps/s, two threads over one (wall)", two, one, two / one, ">= 1.6")
+    row = comparison(
+        "environment steps/s, two threads over one (wall)", two, one, two / one, ">= 1.6"
+    )
     return {**row, "load_average": os.getloadavg()[0]}
 
 
-def told(name: str, ours: float, theirs: float, ratio: float, bar: str) -> Row:
+def comparison(name: str, ours: float, theirs: float, ratio: float, bar: str) -> Row:
     """Return a comparison as a row, and whether its bar holds."""
     word, limit = bar.split()
     holds = ratio >= float(limit) if word == ">=" else ratio <= float(limit)

@@ -19,7 +19,7 @@ AUTHORS_ROBOT = {
     "note": "at best: 27 steps of 0.06 s in the authors' own logs; nothing else can be told of it",
 }
 BESIDE = ("statue", "mean_pose", "zero_residual", "random", "hold")
-TOLD = (
+COLUMNS = (
     "survived_s", "strict_success", "skill", "velocity_score", "mpjpe_l_m", "mpjpe_g_m",
     "acceleration_ratio",
 )  # fmt: skip
@@ -41,7 +41,7 @@ def summary(folders: Folders) -> Rows:
 def line(name: str, move: Move, seconds: float, seeds: Sequence[Rows]) -> dict[str, Any]:
     """Return the figures of a move and whether each of its bars holds."""
     trained = [of_policy(rows, "trained") for rows in seeds]
-    by_seed = {key: [mean(r.get(key) for r in rows) for rows in trained] for key in TOLD}
+    by_seed = {key: [mean(r.get(key) for r in rows) for rows in trained] for key in COLUMNS}
     success = [value or 0.0 for value in by_seed["strict_success"]]
     taken = [row.get("step") for rows in trained for row in rows]
     found: dict[str, Any] = {
@@ -63,7 +63,8 @@ def line(name: str, move: Move, seconds: float, seeds: Sequence[Rows]) -> dict[s
     found["holds"] = all(found["bars"].values())
     found["beside"] = {
         policy: {
-            key: mean(r.get(key) for rows in seeds for r in of_policy(rows, policy)) for key in TOLD
+            key: mean(r.get(key) for rows in seeds for r in of_policy(rows, policy))
+            for key in COLUMNS
         }
         for policy in BESIDE
     }

@@ -34,7 +34,7 @@ FILES = "ROBOJACKSON_TRACKERS"
 """Variable that names a folder with the files of trackers."""
 FRICTIONS = (1.0, 0.6)
 """Of the soles on the floor; the second is what mjlab trains with."""
-JUDGE = EvaluateConfig(resets=1)
+EVALUATION = EvaluateConfig(resets=1)
 """24 phases and the stand."""
 FIGURES = (
     *("survived_s", "success", "strict_success", "skill", "site_error_m", "mpjpe_l_m"),
@@ -77,10 +77,10 @@ def measured(moves: list[str], held: list[dict[str, Any]]) -> Iterator[dict[str,
                 key = (name, move, friction, poses_sha256(motion))
                 if key not in known:
                     labels = dict(zip(("tracker", "move", "friction", "poses"), key, strict=True))
-                    yield labels | judged(tracker, motion, friction)
+                    yield labels | evaluated(tracker, motion, friction)
 
 
-def judged(tracker: Tracker, motion: ReferenceMotion, friction: float) -> dict[str, Any]:
+def evaluated(tracker: Tracker, motion: ReferenceMotion, friction: float) -> dict[str, Any]:
     """Return the figures of a tracker on one motion."""
     robot = load_robot(tracker.description.robot)
     usual = robot.description.simulation.friction
@@ -88,7 +88,7 @@ def judged(tracker: Tracker, motion: ReferenceMotion, friction: float) -> dict[s
         raise BadConfiguration(f"robot {motion.robot!r} does not say its friction")
     began = time.process_time()
     found = evaluate_policy(
-        tracker, motion, varied(robot, Variation(friction=friction / usual)), JUDGE
+        tracker, motion, varied(robot, Variation(friction=friction / usual)), EVALUATION
     )
     figures = {name: found.summary[name] for name in FIGURES}
     facts = {"sha256": tracker.description.file.sha256, "steps": len(motion), "dt": motion.dt}

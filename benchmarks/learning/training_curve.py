@@ -74,10 +74,10 @@ def measure(reference: Path, out: Path, options: list[str], until: float, minute
         except KeyboardInterrupt:
             if not curve.reached():
                 raise
-    told = {"options": options, "reached": curve.reached(), "points": curve.points}
+    record = {"options": options, "reached": curve.reached(), "points": curve.points}
     out.parent.mkdir(parents=True, exist_ok=True)
     part = out.with_suffix(".part")
-    part.write_text(json.dumps(told))
+    part.write_text(json.dumps(record))
     part.replace(out)
 
 

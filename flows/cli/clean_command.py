@@ -54,8 +54,8 @@ def clean(
     from storage.store_inventory import KINDS
 
     store = Store.from_environment()
-    wanted = [kind for kind in KINDS if kind in (kinds or ())]
-    found = plan(store, wanted or USUAL, older_than * DAY_S)
+    chosen = [kind for kind in KINDS if kind in (kinds or ())]
+    found = plan(store, chosen or USUAL, older_than * DAY_S)
     gone = remove(store, found) if delete else found.going
     data = {
         "store": store.root,

@@ -46,9 +46,9 @@ def dance_bar(minutes: float, store: Path) -> Iterator[None]:
     if not console.is_terminal:
         yield
         return
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[told]}"))
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[note]}"))
     with Progress(*columns, console=console, transient=True) as progress:
-        task = progress.add_task("starting", total=60 * minutes, told="")
+        task = progress.add_task("starting", total=60 * minutes, note="")
         over = threading.Event()
         watch = _Watch(progress, task, minutes, store, over)
         threading.Thread(target=watch.run, daemon=True).start()
@@ -115,9 +115,9 @@ class _Watch:
         while not self._over.wait(REFRESH_S):
             spent = time.monotonic() - self._began
             left = max(0, round(self._seconds - spent))
-            told = f"{self._training()}{left // 60}:{left % 60:02d} left"
+            note = f"{self._training()}{left // 60}:{left % 60:02d} left"
             self._progress.update(
-                self._task, completed=min(spent, self._seconds), description=self.stage, told=told
+                self._task, completed=min(spent, self._seconds), description=self.stage, note=note
             )
 
     def _training(self) -> str:

@@ -35,14 +35,14 @@ def ablation(
 
     given: dict[str, Any] = {"moves": moves, "setups": setups, "seeds": seeds}
     given |= {"steps": steps, "executor": executor, "slots": slots, "robot": yaml_text(robot)}
-    wanted = study_of(study, overrides_from(set_, given))
+    requested = study_of(study, overrides_from(set_, given))
     prepare(Store.from_environment())
     from flows.ablation import run
     from tasks.write_study_page import LEAST_STEPS
 
-    made = run(wanted)
-    shortest = min(map(wanted.steps_of, wanted.moves))
-    made |= ablation_verdict(made, shortest, len(wanted.seeds), LEAST_STEPS)
+    made = run(requested)
+    shortest = min(map(requested.steps_of, requested.moves))
+    made |= ablation_verdict(made, shortest, len(requested.seeds), LEAST_STEPS)
     where = [f"page    {made['page']}", f"tables  {made['tables']}"]
     return CommandResult(made, text=[*where, *closing(made)])
 

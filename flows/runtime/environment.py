@@ -60,8 +60,8 @@ def prepare(store: Store) -> None:
 
 
 def _set_home(store: Store) -> None:
-    wanted = {"PREFECT_HOME": str(store.here / HOME), **FIXED}
-    for name, value in wanted.items():
+    settings = {"PREFECT_HOME": str(store.here / HOME), **FIXED}
+    for name, value in settings.items():
         os.environ.setdefault(name, value)
     # Without it the server's database cannot be opened.
     Path(os.environ["PREFECT_HOME"]).expanduser().mkdir(parents=True, exist_ok=True)

@@ -55,9 +55,9 @@ def answering() -> Iterator[None]:
     try:
         yield
     except TransportError as cause:
-        told = str(cause) or type(cause).__name__
+        reason = str(cause) or type(cause).__name__
         raise DeploymentFailed(
-            f"{named} does not answer ({told}); start it (`robojackson server`) or correct "
+            f"{named} does not answer ({reason}); start it (`robojackson server`) or correct "
             "the address; where it is not set, flows start a server of their own"
         ) from cause
     except HTTPStatusError as cause:

@@ -96,8 +96,8 @@ def _is_allowed(request: Request) -> bool:
     password = get_current_settings().server.api.auth_string
     if password is None:
         return True
-    wanted = b"Basic " + b64encode(password.get_secret_value().encode())
-    return secrets.compare_digest(request.headers.get("Authorization", "").encode(), wanted)
+    expected = b"Basic " + b64encode(password.get_secret_value().encode())
+    return secrets.compare_digest(request.headers.get("Authorization", "").encode(), expected)
 
 
 def _key(path: str) -> str | None:

@@ -88,12 +88,12 @@ def reason_of(error: BaseException) -> str:
 
 def _row(entry: Entry) -> dict[str, Any]:
     candidate = entry.candidate
-    told = {f.name: getattr(candidate, f.name) for f in fields(candidate) if f.name != "live"}
+    columns = {f.name: getattr(candidate, f.name) for f in fields(candidate) if f.name != "live"}
     measured = asdict(entry.quality) if entry.quality else {}
     scored = asdict(entry.score) if entry.score else {}
     video = entry.video
     return {
-        **told,
+        **columns,
         **measured,
         **scored,
         "decision": entry.decision,

@@ -26,7 +26,7 @@ class ProgressTable:
 
     def __init__(self, study: Study, cells: list[Cell]) -> None:
         self.key = f"ablation-{study.name.lower().replace('_', '-').replace('.', '-')}"
-        self._told = f"Study {study.name}: {len(cells)} cells of {study.steps_label} steps"
+        self._caption = f"Study {study.name}: {len(cells)} cells of {study.steps_label} steps"
         self._changed = asyncio.Event()
         self._begun = RUNNING if study.executor == "local" else ON_WORKERS
         self._rows: dict[str, dict[str, Any]] = {
@@ -81,10 +81,10 @@ class ProgressTable:
     async def _show(self) -> None:
         self._changed.clear()
         ended = sum(row["state"] in (DONE, FAILED) for row in self._rows.values())
-        told = f"{self._told}; {ended} of {len(self._rows)} have ended"
+        caption = f"{self._caption}; {ended} of {len(self._rows)} have ended"
         rows = list(self._rows.values())
         try:
-            await acreate_table_artifact(key=self.key, table=rows, description=told)
+            await acreate_table_artifact(key=self.key, table=rows, description=caption)
         except Exception as cause:  # a server that is away is no reason to fail a cell
             get_run_logger().warning("the table on Prefect's page is not up to date: %s", cause)
 

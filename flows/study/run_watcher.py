@@ -77,6 +77,6 @@ class RunWatcher:
 async def _ended(waiting: list[UUID]) -> list[FlowRun]:
     """Return the runs that have ended; the server returns at most 200 at a time."""
     over = FlowRunFilterStateType(any_=sorted(TERMINAL_STATES))
-    wanted = FlowRunFilter(id=FlowRunFilterId(any_=waiting), state=FlowRunFilterState(type=over))
+    criteria = FlowRunFilter(id=FlowRunFilterId(any_=waiting), state=FlowRunFilterState(type=over))
     async with get_client() as client:
-        return await client.read_flow_runs(flow_run_filter=wanted)
+        return await client.read_flow_runs(flow_run_filter=criteria)

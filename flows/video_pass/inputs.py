@@ -83,9 +83,9 @@ def of_address(address: str, search: Search) -> tuple[str, Artifact]:
         SearchFailed: it cannot be had; the message has the reason.
     """
     settings = load(FindConfig, search.config)
-    (wanted,) = urls.search("", address, 1, settings.web, datetime.now(UTC))
-    get_run_logger().info("bringing %s", wanted.url)
-    return slug_of(Path(wanted.title).stem), of_candidate(wanted, None, settings)
+    (candidate,) = urls.search("", address, 1, settings.web, datetime.now(UTC))
+    get_run_logger().info("bringing %s", candidate.url)
+    return slug_of(Path(candidate.title).stem), of_candidate(candidate, None, settings)
 
 
 def name_of(source: str) -> str:

@@ -71,8 +71,8 @@ def choose(candidates: list[Candidate]) -> Candidate:
     danced = [candidate for candidate in candidates if candidate.score.detected]
     if not danced:
         frames = {candidate.name: candidate.score.frames for candidate in candidates}
-        told = (f"{name}: no person found in {n} of {n} frames" for name, n in frames.items())
-        raise NoPersonFound("; ".join(told))
+        reasons = (f"{name}: no person found in {n} of {n} frames" for name, n in frames.items())
+        raise NoPersonFound("; ".join(reasons))
     return min(danced, key=lambda candidate: candidate.score.score_per_second)
 
 

@@ -50,8 +50,8 @@ def robot_of(reference: ReferenceMotion) -> Robot:
         where = "the motion does not say where its description is"
     else:
         return require_robot(reference, bind_robot(describe_robot(file or name)))
-    told = f"{where}; give --robot FILE, in Python robot="
-    raise UnknownName("robot", name, told, robot_names())
+    advice = f"{where}; give --robot FILE, in Python robot="
+    raise UnknownName("robot", name, advice, robot_names())
 
 
 def require_robot(reference: ReferenceMotion, robot: Robot) -> Robot:

@@ -76,12 +76,12 @@ def write_deploy_pack(
     machine = robot_of(motion) if robot is None else require_robot(motion, load_robot(robot))
     parts = deployed_policy(found, motion, machine)
     ingredients = with_declared(policy_ingredients(found, path, source, machine), licences or {})
-    judged = _evaluation(path, evaluation)
-    files = pack_files(parts, machine, ingredients, judged)
+    evaluated = _evaluation(path, evaluation)
+    files = pack_files(parts, machine, ingredients, evaluated)
     with results_in(Path(folder)) as tree:
         for name, content in files.items():
             tree.write(name, content)
-    rows = (judged or {}).get("passport") or []
+    rows = (evaluated or {}).get("passport") or []
     return {
         "files": sorted(files),
         "robot": motion.robot,

@@ -148,8 +148,8 @@ def _rate(
     motion: ForeignMotion | HybrikMotion, importer: Importer, given: float | None
 ) -> tuple[float, list[str]]:
     """Return frames a second, and a note about them for the user."""
-    told = motion.fps if isinstance(motion, ForeignMotion) else None
-    rate = given or told or importer.fps
+    stored_fps = motion.fps if isinstance(motion, ForeignMotion) else None
+    rate = given or stored_fps or importer.fps
     if rate is None:
         raise BadConfiguration(
             f"this {importer.name} file does not say its frame rate: give it with --fps"
@@ -158,8 +158,8 @@ def _rate(
         raise BadConfiguration(
             f"{rate:g} frames a second: wanted {SLOWEST:g} to {FASTEST:g}; give it with --fps"
         )
-    if given and told and abs(given - told) > 0.01:
-        return rate, [f"the file says {told:g} frames a second: {given:g} was given"]
-    if not given and not told:
+    if given and stored_fps and abs(given - stored_fps) > 0.01:
+        return rate, [f"the file says {stored_fps:g} frames a second: {given:g} was given"]
+    if not given and not stored_fps:
         return rate, [f"the file does not say its frame rate: taken as {rate:g}; --fps changes it"]
     return rate, []

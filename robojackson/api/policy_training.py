@@ -97,17 +97,17 @@ def train_policy(
         StoreError: another training holds the folder.
         KeyboardInterrupt: Ctrl-C, after a checkpoint was written to `out`.
     """
-    wanted = _configured(config, setup, steps, minutes, seed)
+    settings = _configured(config, setup, steps, minutes, seed)
     motion = read_if_path(ReferenceMotion, reference)
     machine = robot_of(motion) if robot is None else require_robot(motion, load_robot(robot))
     require_trainable(machine)
     if not force:
         check(scorecard_record(motion))
     name = move or ("motion" if isinstance(reference, ReferenceMotion) else motion_name(reference))
-    labels = _labels(wanted, name, setup, run_id)
+    labels = _labels(settings, name, setup, run_id)
     heard = replace(hooks or Hooks(), setup=labels["setup"], rewards=_named(reward))
     with _folder(out) as folder, _telling(progress, f"training {name}") as report:
-        return _trained(motion, machine, wanted, folder, labels, heard, report)
+        return _trained(motion, machine, settings, folder, labels, heard, report)
 
 
 def _labels(config: TrainConfig, move: str, setup: str | None, run_id: str) -> dict[str, Any]:
@@ -132,8 +132,8 @@ def _trained(
         audit = audit_record(audit_both_readings(robot, motion, config.environment))
         hooks.audited(audit)
         try:
-            told = _joined(hooks, rows, report)
-            result = training.train_policy(motion, robot, config, folder, told)
+            joined = _joined(hooks, rows, report)
+            result = training.train_policy(motion, robot, config, folder, joined)
         finally:
             if len(rows):
                 rows.save()

@@ -45,13 +45,13 @@ class _Rate(ProgressColumn):
 
 
 def _plain_bar(label: str) -> Callable[[int, int], None]:
-    told, began = 0, time.monotonic()
+    reported, began = 0, time.monotonic()
 
     def advance(done: int, total: int) -> None:
-        nonlocal told
+        nonlocal reported
         share = done * STEPS_WITHOUT_TERMINAL // max(total, 1)
-        if share > told:
-            told = share
+        if share > reported:
+            reported = share
             rate = done / max(time.monotonic() - began, 1e-9)
             left = (total - done) / rate
             log.info("%s %d/%d, %.1f/s, %.0f s left", label, done, total, rate, left)

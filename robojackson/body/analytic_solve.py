@@ -81,8 +81,8 @@ def solve_with(
         above = world[:, parents]
         ends = position[:, parents] + apply(above, rest[:, joints] - rest[:, parents])
         bone = rest[:, children] - rest[:, joints]
-        wanted = _target_directions(goal[:, children], goal[:, joints], ends, bone, method)
-        swung = swing(bone, apply(np.swapaxes(above, -1, -2), wanted))
+        target = _target_directions(goal[:, children], goal[:, joints], ends, bone, method)
+        swung = swing(bone, apply(np.swapaxes(above, -1, -2), target))
         ahead = above @ swung
         turns = [twist_rule(int(joint), ahead[:, k]) for k, joint in enumerate(joints)]
         turn = twist(bone, np.stack(turns, 1))
@@ -119,13 +119,13 @@ def _target_directions(
 def _root(goal: np.ndarray, rest: np.ndarray, method: Method) -> np.ndarray:
     children = list(ROOT_CHILDREN)
     bones = rest[:, children] - rest[:, :1]
-    wanted = goal[:, children] - goal[:, :1]
+    target = goal[:, children] - goal[:, :1]
     if method == "adaptive":
-        return kabsch(bones, wanted)
-    swung = swing(bones[:, 0], wanted[:, 0])
-    axis = unit(wanted[:, 0])
+        return kabsch(bones, target)
+    swung = swing(bones[:, 0], target[:, 0])
+    axis = unit(target[:, 0])
     before = _across(apply(swung, bones[:, 1:].mean(1)), axis)
-    after = _across(wanted[:, 1:].mean(1), axis)
+    after = _across(target[:, 1:].mean(1), axis)
     cosine = np.sum(before * after, -1)
     sine = np.sum(np.cross(before, after) * axis, -1)
     size = np.hypot(cosine, sine)

@@ -92,11 +92,11 @@ def level_feet(
         level = np.stack([left, np.broadcast_to(ABOVE, left.shape), forward], -1)
         for end in ends:
             measured = body_points[:, end] - body_points[:, ankle]
-            wanted = apply(
+            target = apply(
                 level, np.broadcast_to(rest_joints[end] - rest_joints[ankle], left.shape)
             )
-            mixed = measured + share[:, side, None] * (wanted - measured)
-            length = np.linalg.norm(wanted, axis=-1, keepdims=True)
+            mixed = measured + share[:, side, None] * (target - measured)
+            length = np.linalg.norm(target, axis=-1, keepdims=True)
             held[:, end] = held[:, ankle] + unit(mixed) * length
     return held, share
 

@@ -120,7 +120,7 @@ def probe(path: Path, limits: VideoLimits) -> VideoInfo:
     """
     with opened(path) as container:
         stream = video_stream(container, path)
-        told = declared_rate(stream)
+        declared = declared_rate(stream)
         promised = stream.frames
     stamps = packet_times(path)
     _require_complete(path, len(stamps), promised)
@@ -132,7 +132,7 @@ def probe(path: Path, limits: VideoLimits) -> VideoInfo:
             "with a frame rate (ffmpeg -r 30 -i IN OUT.mp4)",
             path,
         )
-    fps = rate(stamps, told)
+    fps = rate(stamps, declared)
     if not fps:
         raise UnreadableVideo("the file tells no frame rate", path)
     rotation = -first.rotation % 360
@@ -182,7 +182,7 @@ def _decoded(path: Path) -> Iterator[tuple[float, VideoFrame]]:
     with opened(path) as container:
         stream = video_stream(container, path)
         stream.thread_type = "NONE"
-        told = declared_rate(stream) or 1.0  # where frames have no times
+        declared = declared_rate(stream) or 1.0  # where frames have no times
         time_s, good, bad = 0.0, 0, 0
         packets = container.demux(stream)
         while True:
@@ -198,7 +198,7 @@ def _decoded(path: Path) -> Iterator[tuple[float, VideoFrame]]:
                 return
             for frame in frames:
                 good += 1
-                time_s = good / told if frame.time is None else float(frame.time)
+                time_s = good / declared if frame.time is None else float(frame.time)
                 yield time_s, frame
 
 

@@ -70,7 +70,7 @@ def claims(
     dances = [move for move, walks in walking.items() if not walks]
     walks = [move for move, is_walking in walking.items() if is_walking]
     every, alone = list(walking), ("scratch-curiosity", "scratch")
-    asked = [
+    questions = [
         ("Pretraining helps", "pretrain", "scratch", 1, every),
         ("Curiosity helps on dances", "curiosity", "pretrain", 1, dances),
         ("Curiosity hurts on walking", "curiosity", "pretrain", -1, walks),
@@ -78,7 +78,7 @@ def claims(
         ("Curiosity hurts on walking, without pretraining", *alone, -1, walks),
         ("Pretraining helps, with curiosity", "curiosity", "scratch-curiosity", 1, every),
     ]  # fmt: skip
-    return [_claim(figures, *question, rng) for question in asked]
+    return [_claim(figures, *question, rng) for question in questions]
 
 
 def comparisons(

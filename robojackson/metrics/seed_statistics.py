@@ -53,10 +53,10 @@ class Effect:
 def estimate(samples: Sequence[float], rng: np.random.Generator) -> Estimate:
     """Return the mean and percentile-bootstrap interval of the finite ones of independent
     samples."""
-    told = np.asarray(samples, float)
-    values = told[np.isfinite(told)]
+    numbers = np.asarray(samples, float)
+    values = numbers[np.isfinite(numbers)]
     if len(values) < 2:
-        beyond = np.inf if np.isinf(told).any() else np.nan
+        beyond = np.inf if np.isinf(numbers).any() else np.nan
         return Estimate(float(values[0]) if len(values) else beyond, np.nan, np.nan, len(values))
     if np.ptp(values) == 0:
         return Estimate(float(values[0]), float(values[0]), float(values[0]), len(values))

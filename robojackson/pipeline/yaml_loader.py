@@ -199,8 +199,10 @@ def _expected(cause: ValidationError) -> str:
     key = errors[0]["loc"]
     if not key or not _is_branch(key[-1]):
         return errors[0]["msg"]
-    told = [error["msg"] for error in errors if error["loc"][:-1] == key[:-1]]
-    return " or ".join([told[0], *(each.removeprefix("Input should be ") for each in told[1:])])
+    messages = [error["msg"] for error in errors if error["loc"][:-1] == key[:-1]]
+    return " or ".join(
+        [messages[0], *(each.removeprefix("Input should be ") for each in messages[1:])]
+    )
 
 
 def _keys(cause: ValidationError) -> list[str]:

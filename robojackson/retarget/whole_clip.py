@@ -185,13 +185,13 @@ def faults(problem: Problem, qpos: Float[np.ndarray, "T nq"], config: RetargetCo
     fastest = float(np.abs(problem.velocity(qpos)[:, 6:]).max())
     posed, aims = pose(problem.tree, qpos), problem.targets
     slip, fast_slip = _slip(problem, posed)
-    found, asked = (_acceleration(p, aims) for p in (posed.site_pos, aims.keypoints_w))
+    found, required = (_acceleration(p, aims) for p in (posed.site_pos, aims.keypoints_w))
     return Faults(
         deepest_m=deepest,
         fastest=fastest,
         slip_m_s=slip,
         acceleration_m_s2=found,
-        jumps=found > max(config.jump_bar_m_s2, _OWN_ACCELERATION * asked),
+        jumps=found > max(config.jump_bar_m_s2, _OWN_ACCELERATION * required),
         deep=deepest > config.depth_bar_m,
         fast=fastest > problem.robot.description.max_joint_speed,
         slips=slip > config.slip_bar_m_s or fast_slip > _FAST_SLIP * config.slip_bar_m_s,

@@ -138,8 +138,8 @@ def _model(path: Path) -> mujoco.MjModel:
 def name_of_model(path: Path) -> str:
     """Return what a model calls itself, else the name of its file, as a robot's name."""
     text = path.read_text(errors="replace") if path.is_file() else ""
-    told = re.search(r"<mujoco[^>]*\bmodel=\"([^\"]+)\"", text)
-    name = re.sub(r"\W+", "_", told.group(1) if told else path.stem).strip("_").lower()
+    named = re.search(r"<mujoco[^>]*\bmodel=\"([^\"]+)\"", text)
+    name = re.sub(r"\W+", "_", named.group(1) if named else path.stem).strip("_").lower()
     return name or "robot"
 
 
@@ -228,11 +228,11 @@ def _torque_lines(undriven: Mapping[str, float | None]) -> list[str]:
     if not unknown:
         return lines if known else []
     patterns = Counter(SIDE.sub("*", name) for name in unknown)
-    told = [
+    named = [
         p if n > 1 else next(x for x in unknown if SIDE.sub("*", x) == p)
         for p, n in patterns.items()
     ]
-    rest = [f"{_text(name)}: 50.0" for name in told]
+    rest = [f"{_text(name)}: 50.0" for name in named]
     note = "newton-metres, of hinges that no motor of the MJCF drives: fill in your motors'"
     if known:
         return [*lines, f"  # {note}", *(f"  # {line}" for line in rest)]
@@ -244,5 +244,5 @@ def _clock_lines(timestep: float) -> list[str]:
     if not SHORTEST_S <= steps * timestep <= LONGEST_S:
         steps = max(1, round(USUAL_S / timestep))
         note = f"; to train: --set track.control.substeps={steps}"
-    told = f"{steps} steps of {1e3 * timestep:g} ms of the model"
-    return [f"control_dt: {steps * timestep:g} # seconds: {told}{note}"]
+    named = f"{steps} steps of {1e3 * timestep:g} ms of the model"
+    return [f"control_dt: {steps * timestep:g} # seconds: {named}{note}"]

@@ -149,8 +149,8 @@ def _head(skeleton: Skeleton) -> Guess | None:
         return None
     called = [geom for geom in geoms if names_any(_geom_names(model, geom), HEAD)]
     geom = max(called or geoms, key=lambda geom: float(data.geom_xpos[geom][2]))
-    told = next((name for name in _geom_names(model, geom) if name), "without a name")
-    why = f"geom {told}" if called else f"highest geom of the trunk, {told}"
+    label = next((name for name in _geom_names(model, geom) if name), "without a name")
+    why = f"geom {label}" if called else f"highest geom of the trunk, {label}"
     return _guess(skeleton, int(model.geom_bodyid[geom]), data.geom_xpos[geom], why, bool(called))
 
 

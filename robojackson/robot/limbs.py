@@ -159,8 +159,8 @@ def _limb(skeleton: Skeleton, bodies: tuple[int, ...], words: Words) -> Limb:
     parts: dict[str, list[int]] = {name: [] for name in words}
     for hinge in hinges:
         own, body = [model.joint(hinge).name], [model.body(model.jnt_bodyid[hinge]).name]
-        told = (name for called in (own, body) for name in words if names_any(called, words[name]))
-        name = next(told, None)
+        kinds = (name for called in (own, body) for name in words if names_any(called, words[name]))
+        name = next(kinds, None)
         if name is not None:
             parts[name].append(hinge)
     first, second, _ = parts

@@ -83,11 +83,11 @@ async def _read(process: Process) -> bytes:
 
 def _cause(run_id: str, code: int, work: Path, last: deque[str]) -> TrainingFailed:
     """Return the error of a run: which one died, why, and where its log is."""
-    told = f"log: {work / LOG}"
+    log = f"log: {work / LOG}"
     if code < 0:
         how = f"was killed by {signal.Signals(-code).name}"
         if -code == signal.SIGKILL:
             how += " (by hand, or out of memory)"
-        return TrainingCrashed(f"run {run_id} {how}; {told}; the same command resumes it")
+        return TrainingCrashed(f"run {run_id} {how}; {log}; the same command resumes it")
     said = last[-1] if last else "it said nothing"
-    return TrainingFailed(f"run {run_id} ended with exit code {code}: {said}; {told}")
+    return TrainingFailed(f"run {run_id} ended with exit code {code}: {said}; {log}")

@@ -40,10 +40,10 @@ def digest(roots: Iterable[str], package: str = PACKAGE, folder: Path | None = N
         package: The package whose modules count.
         folder: Where the package is; found by its name when not given.
     """
-    wanted = (tuple(roots), package, folder)
-    known = _known.get(wanted)
+    key = (tuple(roots), package, folder)
+    known = _known.get(key)
     if known is None or not known.holds():
-        known = _known[wanted] = _digested(*wanted)
+        known = _known[key] = _digested(*key)
     return known.digest
 
 

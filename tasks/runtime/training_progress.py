@@ -41,9 +41,9 @@ class _Bar:
         from prefect.artifacts import acreate_progress_artifact
 
         key = re.sub(r"[^a-z0-9]+", "-", self._name.lower()).strip("-")
-        told = f"{self._name}: starting"
+        text = f"{self._name}: starting"
         with suppress(Exception):
-            self._artifact = await acreate_progress_artifact(0.0, key=key, description=told)
+            self._artifact = await acreate_progress_artifact(0.0, key=key, description=text)
         began = time.monotonic()
         while self._artifact is not None:
             lasted = time.monotonic() - began

@@ -150,8 +150,8 @@ class Stack:
         log = self.folder / f"{full}.log"
         if name == "postgres":
             test = self.file[name]["healthcheck"]["test"][1]
-            wanted = self.file[name]["environment"]
-            return postgres.service(wanted, test, self.ports[name], self.folder, log)
+            arguments = self.file[name]["environment"]
+            return postgres.service(arguments, test, self.ports[name], self.folder, log)
         if name == "s3":
             return self._s3(log)
         environment = self._environment(name, full)
@@ -222,9 +222,9 @@ def main() -> None:
     )
     parser.add_argument("--folder", type=Path, default=None)
     parser.add_argument("--scale", action="append", default=[], metavar="SERVICE=N")
-    wanted = parser.parse_args()
-    scale = {name: int(count) for name, count in (text.split("=") for text in wanted.scale)}
-    folder = wanted.folder or Path(tempfile.mkdtemp(prefix="robojackson-"))
+    arguments = parser.parse_args()
+    scale = {name: int(count) for name, count in (text.split("=") for text in arguments.scale)}
+    folder = arguments.folder or Path(tempfile.mkdtemp(prefix="robojackson-"))
     for how in (signal.SIGINT, signal.SIGTERM):  # a shell's `&` takes the first away
         signal.signal(how, signal.default_int_handler)
     with suppress(KeyboardInterrupt), running(folder, scale=scale) as stack:

@@ -17,7 +17,7 @@ from tools.stack.service import Service, StackError
 USER = "postgres"
 
 
-def service(wanted: Mapping[str, str], check: str, port: int, folder: Path, log: Path) -> Service:
+def service(settings: Mapping[str, str], check: str, port: int, folder: Path, log: Path) -> Service:
     """Return the database server of a stack.
 
     Args:
@@ -28,14 +28,18 @@ def service(wanted: Mapping[str, str], check: str, port: int, folder: Path, log:
     home = _home(folder)
     user = USER if os.geteuid() == 0 else None
     if not (home / "data").exists():
-        _initialise(home, wanted, user)
-    access = {"PGPORT": str(port), "PGHOST": "127.0.0.1", "PGPASSWORD": wanted["POSTGRES_PASSWORD"]}
+        _initialise(home, settings, user)
+    access = {
+        "PGPORT": str(port),
+        "PGHOST": "127.0.0.1",
+        "PGPASSWORD": settings["POSTGRES_PASSWORD"],
+    }
     command = [program("postgres"), "-D", str(home / "data"), "-p", str(port), "-h", "127.0.0.1"]
     return Service(
         "postgres",
         [*command, "-k", str(home)],
         {**os.environ, **access},
-        ["sh", "-c", f"{check} && {_database(wanted)}"],
+        ["sh", "-c", f"{check} && {_database(settings)}"],
         log,
         user,
     )
@@ -59,23 +63,23 @@ def program(name: str) -> str:
     return str(found[-1])
 
 
-def _initialise(home: Path, wanted: Mapping[str, str], user: str | None) -> None:
+def _initialise(home: Path, settings: Mapping[str, str], user: str | None) -> None:
     secret = home / "password"
-    secret.write_text(wanted["POSTGRES_PASSWORD"])
+    secret.write_text(settings["POSTGRES_PASSWORD"])
     if user:
         shutil.chown(secret, user)
-    words = ["--username", wanted["POSTGRES_USER"], "--pwfile", str(secret)]
+    words = ["--username", settings["POSTGRES_USER"], "--pwfile", str(secret)]
     making = [program("initdb"), "-D", str(home / "data"), "-A", "scram-sha-256", *words]
     subprocess.run(making, user=user, check=True, capture_output=True, cwd="/")
     secret.unlink()
 
 
-def _database(wanted: Mapping[str, str]) -> str:
+def _database(settings: Mapping[str, str]) -> str:
     """Return the shell that makes the database, as the image does at its first start, and asks
     it."""
-    user, name = wanted["POSTGRES_USER"], wanted["POSTGRES_DB"]
-    asked = f"psql -U {user} -d {name} -c 'select 1'"
-    return f"{{ {asked} 2>/dev/null || createdb -U {user} {name}; {asked}; }}"
+    user, name = settings["POSTGRES_USER"], settings["POSTGRES_DB"]
+    probe = f"psql -U {user} -d {name} -c 'select 1'"
+    return f"{{ {probe} 2>/dev/null || createdb -U {user} {name}; {probe}; }}"
 
 
 def _home(folder: Path) -> Path:

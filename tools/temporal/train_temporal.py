@@ -80,8 +80,8 @@ def train(
         if now.step % 300 == 0 or now.step == config.steps:
             now.curve[-1] |= fit.validate(fit.averaged(now), validation)
         keep(now, state)
-        told = ", ".join(f"{k} {v:.4g}" for k, v in now.curve[-1].items())
-        log.info("%s; %.0f CPU s left", told, (config.steps - now.step) * step_s)
+        figures = ", ".join(f"{k} {v:.4g}" for k, v in now.curve[-1].items())
+        log.info("%s; %.0f CPU s left", figures, (config.steps - now.step) * step_s)
 
     synthetic = truths_of(pairs, motions, count, seed) if count else []
     where = fit.source(training, synthetic, seed)
@@ -157,11 +157,11 @@ def draw_curve(report: dict[str, object], path: Path) -> None:
     assert isinstance(curve, list)
     figure, axes = pyplot.subplots(figsize=(7, 4))
     axes.plot([c["step"] for c in curve], [1e3 * c["place"] for c in curve], label="training")
-    judged = [c for c in curve if "rr_network" in c]
+    evaluated = [c for c in curve if "rr_network" in c]
     for key, label in (("rr_network", "validation"), ("pa_network", "validation, PA")):
-        axes.plot([c["step"] for c in judged], [c[key] for c in judged], "o-", label=label)
+        axes.plot([c["step"] for c in evaluated], [c[key] for c in evaluated], "o-", label=label)
     for key in ("rr_detector", "pa_detector"):
-        axes.axhline(judged[-1][key], ls=":", c="grey")
+        axes.axhline(evaluated[-1][key], ls=":", c="grey")
     axes.set(xlabel="step", ylabel="MPJPE, mm (dotted: the detector)", ylim=(0, None))
     axes.legend()
     figure.tight_layout()

@@ -74,23 +74,23 @@ class CameraPath:
     @property
     def notes(self) -> tuple[str, ...]:
         """What the user must know; nothing where the camera stood."""
-        told = []
+        messages = []
         lost = np.flatnonzero(self.jumps)
         if len(lost):
-            told.append(
+            messages.append(
                 f"the background jumps in {len(lost)} frames (first: {lost[0]}), a cut or a "
                 "violent shake: the path through the room is not to be trusted"
             )
         if self.blind.mean() > BLIND_SHARE:
-            told.append(
+            messages.append(
                 f"whether the camera moved cannot be seen in {self.blind.mean():.0%} of the "
                 "frames: the background shows no corners"
             )
         if self.moved:
-            told.append(
+            messages.append(
                 f"the camera moved by {self.stray:.0%} of the image: taken out by its background"
             )
-        return tuple(told)
+        return tuple(messages)
 
 
 def camera_path(

@@ -121,12 +121,12 @@ def _followed(
     goes astray."""
     known = cast.rows[chosen]
     others = np.array([rows for number, rows in enumerate(cast.rows) if number != chosen])
-    wanted = near_known(known, cast.time_s, config.longest_gap_s)
+    needed = near_known(known, cast.time_s, config.longest_gap_s)
     found = np.full_like(known, np.nan)
     with video_landmarker(size) as detect_frame:
         frames = timed_frames(path, short_side=SHORT_SIDE)
         for index, (time_s, image) in zip(range(len(known)), frames, strict=False):
-            if wanted[index]:
+            if needed[index]:
                 width = config.detection.limb_width
                 found[index] = detect_frame(
                     mask_others(image, known[index], others[:, index], width), time_s

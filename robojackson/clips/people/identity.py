@@ -130,12 +130,12 @@ def assign_merged(
 ) -> list[list[Tracklet]]:
     """Return each tracklet of two seen as one to the person whom it fits best and who has no other
     there."""
-    told = [list(chain) for chain in chains]
+    merged = [list(chain) for chain in chains]
     for blend in sorted(blends, key=lambda tracklet: -len(tracklet.frames)):
-        costs = [_fit(blend, chain, config) for chain in told]
+        costs = [_fit(blend, chain, config) for chain in merged]
         if costs and min(costs) < IMPOSSIBLE:
-            told[int(np.argmin(costs))].append(blend)
-    return told
+            merged[int(np.argmin(costs))].append(blend)
+    return merged
 
 
 def _fit(tracklet: Tracklet, chain: list[Tracklet], config: IdentityConfig) -> float:

@@ -69,8 +69,8 @@ class TrackedPeople:
         return [self._person(number, rows) for number, rows in enumerate(self.rows, start=1)]
 
     def __str__(self) -> str:
-        told = "; ".join(str(person) for person in self.people)
-        return told or "nobody is seen for long enough"
+        listed = "; ".join(str(person) for person in self.people)
+        return listed or "nobody is seen for long enough"
 
     def _person(self, number: int, rows: np.ndarray) -> Person:
         seen = np.flatnonzero(~np.isnan(rows[:, 0, 0]))

@@ -47,8 +47,8 @@ def _page(address: str, config: WebConfig) -> str:
         with opener.open(address, timeout=config.timeout_s) as answer:
             return bytes(answer.read(LARGEST_PAGE)).decode("utf-8", "replace")
     except (OSError, ValueError) as cause:
-        told = f"HTTP {cause.code}" if isinstance(cause, urllib.error.HTTPError) else cause
-        raise SearchFailed(f"server: {clean_text(address)}: {clean_text(told)}") from cause
+        reason = f"HTTP {cause.code}" if isinstance(cause, urllib.error.HTTPError) else cause
+        raise SearchFailed(f"server: {clean_text(address)}: {clean_text(reason)}") from cause
 
 
 def _is_video(url: str, page: str) -> bool:

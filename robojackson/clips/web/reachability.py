@@ -64,8 +64,8 @@ def _attempt(address: str, patience_s: float) -> str:
     try:
         socket.create_connection(_place(address), patience_s).close()
     except (OSError, ValueError) as cause:
-        told = cause.strerror if isinstance(cause, OSError) and cause.strerror else str(cause)
-        return clean_text(told or type(cause).__name__)
+        detail = cause.strerror if isinstance(cause, OSError) and cause.strerror else str(cause)
+        return clean_text(detail or type(cause).__name__)
     return ""
 
 

@@ -35,8 +35,8 @@ def explain(failure: BaseException) -> Failure:
 
     for cause in _causes(failure):
         if isinstance(cause, HTTPError):
-            asked = str(cause.response.headers.get("Retry-After") or "")
-            wait_s = float(asked) if asked.isdigit() else 0.0
+            retry_after = str(cause.response.headers.get("Retry-After") or "")
+            wait_s = float(retry_after) if retry_after.isdigit() else 0.0
             answered = clean_text(cause.reason or "", 60)
             return Failure(_status(cause.status, answered), _is_passing(cause.status), wait_s)
         if isinstance(cause, IncompleteRead | ContentTooShortError):

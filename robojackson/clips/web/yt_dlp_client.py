@@ -211,11 +211,11 @@ def _patiently(attempt: Callable[[], Result], config: WebConfig) -> Result:
         try:
             return attempt()
         except (YoutubeDLError, OSError, ValueError, RecursionError) as cause:
-            reason, transient, asked_s, most = explain(cause)
+            reason, transient, retry_after_s, most = explain(cause)
             if not transient or number >= min(config.retries, most):
                 tried = f" ({number + 1} attempts)" if number else ""
                 raise DownloadFailed(f"{reason}{tried}") from cause
-            wait_s = min(max(config.backoff_s * 2**number, asked_s), config.longest_wait_s)
+            wait_s = min(max(config.backoff_s * 2**number, retry_after_s), config.longest_wait_s)
             log.info("%s; again in %.3g s", reason, wait_s)
             time.sleep(wait_s)
     raise AssertionError("unreachable")

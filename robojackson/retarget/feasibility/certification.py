@@ -51,17 +51,17 @@ def certify(
     tolerance: Tolerance,
 ) -> Certified:
     """Return what the robot can and cannot do of a motion."""
-    asked, near, forces = _demand(robot, qpos, dt, cycle_offset, tolerance)
-    found = contact_wrench.supply(asked)
-    slack = tempo.slower_slacks(asked, forces, found.slack)
-    free = _without_limits(asked, found)
+    needs, near, forces = _demand(robot, qpos, dt, cycle_offset, tolerance)
+    found = contact_wrench.supply(needs)
+    slack = tempo.slower_slacks(needs, forces, found.slack)
+    free = _without_limits(needs, found)
     failures = [
         _failure(robot, step, found, free, near, slack, tolerance)
         for step in range(len(qpos))
     ]  # fmt: skip
     falls = _falls(robot, qpos)
     findings = sorted((*_joined(failures), *_joined(falls)), key=lambda finding: finding.start)
-    ratio = np.abs(_motor_torque(asked, found)) / robot.torque_limit
+    ratio = np.abs(_motor_torque(needs, found)) / robot.torque_limit
     return Certified(
         Certificate(found.slack, tempo.feasible_tempo(slack), tuple(findings)),
         ratio[:, robot.actuated],
@@ -77,8 +77,8 @@ def motor_torques(
     tolerance: Tolerance,
 ) -> Float[np.ndarray, "S J"]:
     """Return the torque of every hinge's motor that the motion needs, within its limit, Nm."""
-    asked, *_ = _demand(robot, qpos, dt, cycle_offset, tolerance)
-    return _motor_torque(asked, contact_wrench.supply(asked))
+    needs, *_ = _demand(robot, qpos, dt, cycle_offset, tolerance)
+    return _motor_torque(needs, contact_wrench.supply(needs))
 
 
 def _demand(
@@ -93,8 +93,8 @@ def _demand(
     forces = inverse_dynamics.free_space(robot, qpos, dt, cycle_offset)
     posed = pose(inverse_dynamics.linkage(robot), qpos)
     near = inverse_dynamics.touching(robot, posed)
-    asked = inverse_dynamics.demand(robot, qpos, forces.at(1.0), near, tolerance, posed)
-    return asked, near, forces
+    needs = inverse_dynamics.demand(robot, qpos, forces.at(1.0), near, tolerance, posed)
+    return needs, near, forces
 
 
 def fallen(robot: Robot, qpos: Float[np.ndarray, "S nq"]) -> Bool[np.ndarray, " S"]:
@@ -102,21 +102,21 @@ def fallen(robot: Robot, qpos: Float[np.ndarray, "S nq"]) -> Bool[np.ndarray, " 
     return np.array([failure is not None for failure in _falls(robot, qpos)])
 
 
-def _motor_torque(asked: contact_wrench.Demand, found: Supply) -> Float[np.ndarray, "S J"]:
+def _motor_torque(needs: contact_wrench.Demand, found: Supply) -> Float[np.ndarray, "S J"]:
     """Return the torque of the motors; beyond its limit a hinge on its stop is held by the stop."""
-    limit = 1.0 / np.where(asked.ease > 0, asked.ease, np.inf)
-    upper = np.where(np.isinf(asked.upper) & (asked.ease > 0), limit, np.inf)
-    lower = np.where(np.isinf(asked.lower) & (asked.ease > 0), -limit, -np.inf)
+    limit = 1.0 / np.where(needs.ease > 0, needs.ease, np.inf)
+    upper = np.where(np.isinf(needs.upper) & (needs.ease > 0), limit, np.inf)
+    lower = np.where(np.isinf(needs.lower) & (needs.ease > 0), -limit, -np.inf)
     result: np.ndarray = np.clip(found.torque, lower, upper)
     return result
 
 
-def _without_limits(asked: contact_wrench.Demand, found: Supply) -> Supply:
+def _without_limits(needs: contact_wrench.Demand, found: Supply) -> Supply:
     """Return the slack with unlimited torques; steps that are feasible keep their slack."""
     hard = np.flatnonzero(found.slack > 1.0)
     if not len(hard):
         return found
-    some = asked.at(hard)
+    some = needs.at(hard)
     endless = np.full_like(some.upper, np.inf)
     free = contact_wrench.supply(replace(some, lower=-endless, upper=endless))
     torque, left = found.torque.copy(), found.left.copy()

@@ -43,12 +43,12 @@ def slacks(
     forces = inverse_dynamics.free_space(robot, qpos, dt, cycle_offset)
     posed = pose(inverse_dynamics.linkage(robot), qpos)
     near = inverse_dynamics.touching(robot, posed)
-    asked = inverse_dynamics.demand(robot, qpos, forces.at(grid[0]), near, tolerance, posed)
-    return slower_slacks(asked, forces, contact_wrench.supply(asked).slack, grid)
+    needs = inverse_dynamics.demand(robot, qpos, forces.at(grid[0]), near, tolerance, posed)
+    return slower_slacks(needs, forces, contact_wrench.supply(needs).slack, grid)
 
 
 def slower_slacks(
-    asked: Demand,
+    needs: Demand,
     forces: FreeSpace,
     slack: Float[np.ndarray, " S"],
     grid: Float[np.ndarray, " K"] = GRID,
@@ -57,7 +57,7 @@ def slower_slacks(
     found = np.repeat(slack[None], len(grid), axis=0)
     hard = np.flatnonzero(slack > 1.0)
     if len(hard):
-        some = asked.at(hard)
+        some = needs.at(hard)
         for row, k in zip(found[1:], grid[1:], strict=True):
             row[hard] = contact_wrench.supply(replace(some, force=forces.at(k)[hard])).slack
     return found
@@ -81,10 +81,10 @@ def required_rate(slack: Float[np.ndarray, "K S"]) -> Float[np.ndarray, " S"]:
     return np.where(fits > 0, fits, partly)
 
 
-def smooth_rate(wanted: Float[np.ndarray, " S"], dt: float, ring: bool) -> Float[np.ndarray, " S"]:
+def smooth_rate(rates: Float[np.ndarray, " S"], dt: float, ring: bool) -> Float[np.ndarray, " S"]:
     """Return the target tempos, spread over their neighbours and smoothed; never faster than 1."""
     mode = "wrap" if ring else "nearest"
-    spread = minimum_filter1d(wanted, 2 * round(_REACH_S / dt) + 1, mode=mode)
+    spread = minimum_filter1d(rates, 2 * round(_REACH_S / dt) + 1, mode=mode)
     return np.asarray(gaussian_filter1d(spread, _SMOOTH_S / dt, mode=mode))
 
 

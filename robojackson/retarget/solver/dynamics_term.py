@@ -42,10 +42,10 @@ def add_dynamics(
     at = posed[inner]
     found_slopes = force_slopes(problem, at, qpos[inner], speed, rate)
     touching = problem.targets.contact[inner] != AIR
-    asked = inverse_dynamics.demand(
+    needs = inverse_dynamics.demand(
         problem.robot, qpos[inner], found_slopes.force, touching, problem.weights.tolerance, at
     )
-    found = contact_wrench.relaxed(asked, problem.weights.dynamics_barrier, problem.warm.point)
+    found = contact_wrench.relaxed(needs, problem.weights.dynamics_barrier, problem.warm.point)
     problem.warm.point = found.point
     loss = _loss(problem.weights, found.value)
     here = found_slopes.position - 2 / dt**2 * found_slopes.acceleration

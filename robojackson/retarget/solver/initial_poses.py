@@ -70,8 +70,8 @@ def frame_start(problem: Problem, rng: np.random.Generator, seeds: int) -> Frame
     pick = viterbi(cost.reshape(seeds, -1).T, _jump_costs(poses[..., 7:].swapaxes(0, 1)))
     picked = continuous(poses[pick, np.arange(len(frames))])
     best = poses[cost.reshape(seeds, -1).argmin(axis=0), np.arange(len(frames))]
-    at, wanted = pose(problem.tree, best).site_pos, problem.targets.keypoints_w[frames]
-    floor = keypoint_error_mm(at, wanted, problem.robot.keypoint_weights > 0).mean()
+    at, target = pose(problem.tree, best).site_pos, problem.targets.keypoints_w[frames]
+    floor = keypoint_error_mm(at, target, problem.robot.keypoint_weights > 0).mean()
     between = np.arange(len(problem.targets)) / stride
     motion = picked if stride == 1 else resample(picked, between, None)
     return FrameStart(motion, float(floor))

@@ -76,12 +76,12 @@ def solve(
         tolerance: That of the configuration when None.
         spans: The steps that may change, of a clip that does not repeat; all when None.
     """
-    wanted = config.tolerance if tolerance is None else tolerance
+    stop_at = config.tolerance if tolerance is None else tolerance
     qpos = clip_to_limits(problem.robot, start)
     cost = 0.0
     for window in _windows(len(qpos), None if problem.ring else spans, problem.ring):
         part = replace(problem, targets=select_steps(problem.targets, window.all), warm=Warm())
-        found = _solve_window(part, qpos[window.all], config, iterations, wanted, window)
+        found = _solve_window(part, qpos[window.all], config, iterations, stop_at, window)
         qpos[window.all] = found.qpos
         cost += found.normal.cost
         _log.debug("steps %d-%d, cost %.5f", window.all.start, window.all.stop, found.normal.cost)

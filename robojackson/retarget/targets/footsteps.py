@@ -119,8 +119,8 @@ def stand_feet(feet: Feet, heading: float, robot: Robot) -> Feet:
 
 def stands_badly(feet: Feet, heading: float, robot: Robot) -> bool:
     """Return whether the feet are crossed, close, far apart, staggered or turned away."""
-    wanted = stand_feet(feet, heading, robot)
-    width = float(np.linalg.norm(wanted["left"].place - wanted["right"].place))
+    goal = stand_feet(feet, heading, robot)
+    width = float(np.linalg.norm(goal["left"].place - goal["right"].place))
     apart = about_up(heading)[:2, :2].T @ (feet["left"].place - feet["right"].place)
     turned = max(abs(_turn(heading, foot.yaw)) for foot in feet.values())
     across = float(apart[1]) / width
@@ -138,14 +138,14 @@ def steps_into_stand(feet: Feet, heading: float, robot: Robot, dt: float) -> Wal
     """
     if not stands_badly(feet, heading, robot):
         return None
-    wanted = stand_feet(feet, heading, robot)
+    goal = stand_feet(feet, heading, robot)
     ahead = about_up(heading)[:2, 0]
     order = sorted(SIDES, key=lambda side: -float(feet[side].place @ ahead))
     now, body, parts, air = dict(feet), _middle(feet), [], []
-    for side in (side for side in order if not feet[side].near(wanted[side])):
+    for side in (side for side in order if not feet[side].near(goal[side])):
         other = now[SIDES[1 - SIDES.index(side)]]
         parts.append(_shifted(now, body, other.place, heading, robot, dt))
-        body, step = other.place, now | {side: wanted[side]}
+        body, step = other.place, now | {side: goal[side]}
         parts.append(_swung(now, step, side, body, heading, robot, dt))
         air += [np.zeros((len(parts[-2]), 2), bool), np.zeros((len(parts[-1]), 2), bool)]
         air[-1][:, SIDES.index(side)] = True

@@ -160,20 +160,20 @@ def _trunk_frame(human: Mapping[str, np.ndarray]) -> Float[np.ndarray, "N 3 3"]:
     return np.stack([np.cross(across, up), across, up], axis=-1)
 
 
-def every_second(wanted: Targets) -> Targets:
+def every_second(clip_targets: Targets) -> Targets:
     """Return the same targets at half the rate."""
-    return replace(select_steps(wanted, slice(None, None, 2)), dt=2 * wanted.dt)
+    return replace(select_steps(clip_targets, slice(None, None, 2)), dt=2 * clip_targets.dt)
 
 
-def select_steps(wanted: Targets, steps: slice | Bool[np.ndarray, " N"]) -> Targets:
+def select_steps(clip_targets: Targets, steps: slice | Bool[np.ndarray, " N"]) -> Targets:
     """Return some of the steps, or all of them in another order."""
     return replace(
-        wanted,
-        keypoints_w=wanted.keypoints_w[steps],
-        weights=wanted.weights[steps],
-        contact=wanted.contact[steps],
-        heading=wanted.heading[steps],
-        airborne=wanted.airborne[steps],
+        clip_targets,
+        keypoints_w=clip_targets.keypoints_w[steps],
+        weights=clip_targets.weights[steps],
+        contact=clip_targets.contact[steps],
+        heading=clip_targets.heading[steps],
+        airborne=clip_targets.airborne[steps],
     )
 
 

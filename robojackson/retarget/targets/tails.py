@@ -60,8 +60,8 @@ class TailConfig:
 
     def wanted(self, robot: Robot) -> bool:
         """Return whether a robot's motions get tails."""
-        judged = robot.description.fall.frame == "reference"
-        return self.use == "yes" or (self.use == "auto" and judged)
+        by_reference = robot.description.fall.frame == "reference"
+        return self.use == "yes" or (self.use == "auto" and by_reference)
 
 
 @dataclass(frozen=True)
