@@ -17,8 +17,8 @@ class Dance:
         name: What it is called here and in the catalogue.
         query: What is searched for; may be empty where a source needs no more than an address.
         added_words: Added to the query.
-        language: Two letters in which titles are asked for; empty is the site's own choice.
-        top: How many videos are judged; None is the usual number.
+        language: Language of the titles, two letters; empty is the site's own choice.
+        top: How many videos are assessed; None is the default number.
         every_days: Days between two searches.
         source: A file of robojackson/clips/sources.
         address: Of the folder, list, site or server; empty is the source's usual one.
@@ -60,7 +60,7 @@ class DanceBook:
         names = [dance.name.casefold() for dance in self.dances]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
-            raise BadConfiguration(f"dances: {', '.join(twice)} stands twice")
+            raise BadConfiguration(f"dances: {', '.join(twice)} is listed twice")
 
     def pick(self, names: Sequence[str] | None) -> tuple[Dance, ...]:
         """Return the dances of these names in their order; all of them when no names are given.

@@ -1,4 +1,4 @@
-"""How a dance is found: what is kept of a search, what is downloaded, how it is judged."""
+"""Configuration of searches: selection, downloads and assessment."""
 
 from pydantic import Field
 

@@ -59,7 +59,7 @@ def run(study: Study) -> Facts:
 
 @flow(name="ablation", flow_run_name="{study.name}")
 async def ablation(study: Study) -> Facts:
-    """Train and judge every cell, then write the page of the study.
+    """Train and evaluate every cell, then write the page of the study.
 
     Args:
         study: What is compared with what.
@@ -123,7 +123,7 @@ def motion(
 
 
 def gate(study: Study, scorecards: Mapping[str, Artifact]) -> None:
-    """Refuse motions that no robot can follow, or say that they are trained on all the same.
+    """Refuse motions that no robot can follow, or log that they are trained on anyway.
 
     Raises:
         RejectedReference: the message names each and the figure that failed.

@@ -1,4 +1,4 @@
-"""One cell of an ablation: a training, its judgement, its rows. Here or on any other machine.
+"""One cell of an ablation: a training, its evaluation, its rows. Here or on another machine.
 
 Entry point of the deployment `cell/pool`: `flows.cells.cell`.
 """
@@ -37,7 +37,7 @@ WATCHER = RunWatcher()
 
 @flow(name="cell", flow_run_name="{cell.name}")
 async def cell(cell: Cell) -> Result:
-    """Train, judge, publish; what was done before is cached.
+    """Train, evaluate, publish; what was done before is cached.
 
     Args:
         cell: What to train, on which motion.
@@ -104,7 +104,7 @@ async def run_locally(requested: Cell) -> Result:
     """Return the cell as a subflow of the flow that calls.
 
     Raises:
-        Exception: whatever the cell failed of.
+        Exception: the failure of the cell.
     """
     return await cell(requested)
 

@@ -1,4 +1,4 @@
-"""Find the best video of a dance: search, download, judge and rank, nothing after that.
+"""Find the best video of a dance: search, download, assess and rank, nothing after that.
 
 Entry point of the deployment: `flows.find.find`.
 """
@@ -28,7 +28,7 @@ from storage.store import Store
 from tasks.runtime.worker_processes import cores
 
 HUNTERS: ThreadPoolTaskRunner[Any] = ThreadPoolTaskRunner(max_workers=2 * cores())
-"""Downloads wait for servers and judges for their processes: more threads than cores."""
+"""Downloads wait for servers, assessments for their processes: more threads than cores."""
 
 
 @flow(name="find", flow_run_name="find-{name}", task_runner=HUNTERS)  # type: ignore[arg-type]
@@ -71,7 +71,7 @@ async def best(
     config: str = "finding",
     overrides: dict[str, Any] | None = None,
 ) -> dict[str, str]:
-    """Search, and bring the chosen video in good quality: its artifact."""
+    """Search, and download the chosen video in good quality; return its artifact."""
     settings = load(FindConfig, config, overrides)
     requested = build(Dance, dance, "dance")
     store = Store.from_environment()

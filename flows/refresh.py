@@ -1,7 +1,7 @@
 """The nightly flow: for every dance the best new video, as a motion that is ready to train.
 
 Entry point of the deployments: `flows.refresh.refresh`. A dance whose search fails does not stop
-the others; the result says which failed and why.
+the others; the result names which failed and why.
 """
 
 import json
@@ -121,7 +121,7 @@ async def refresh_dance(
     settings = build(FindConfig, config, "config")
     store = Store.from_environment()
     stages = load(PipelineConfig, pipeline, pipeline_overrides)
-    mine = (store, entry.name, KIND)  # what `find` judges is nothing to this
+    mine = (store, entry.name, KIND)  # assessments of `find` do not count here
     reigning = candidate_catalogue.champion(*mine)
     seen, failing = candidate_catalogue.known(*mine), candidate_catalogue.failed(*mine)
     found = search_and_rank(entry, settings, run_id(KIND), seen, reigning, failing)

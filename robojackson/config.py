@@ -1,7 +1,7 @@
 """The decorator of every configuration: frozen, strict, no unknown keys, no NaN or infinity.
 
 Strict means that no number, text or boolean is converted into another: `"3"` is no number, `3.0` no
-integer and `1` no boolean. What YAML and JSON cannot say is taken for what the field asks for: a
+integer and `1` no boolean. What YAML and JSON cannot express is converted to the field's type: a
 list for a tuple, a mapping for a section, text for a path.
 """
 

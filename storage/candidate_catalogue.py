@@ -1,4 +1,4 @@
-"""The catalogue of every video that was ever judged: a row a judgement, never changed, only added.
+"""The catalogue of all assessed videos: a row an assessment, never changed, only added.
 
 Each refresh writes its rows as one new Parquet file under a name that no other can have, so two
 refreshes at once never touch the same file, on a disk or in an object store. Compaction writes what
@@ -40,7 +40,7 @@ QUALITY = (
 )
 CANDIDATE_RECORD = TableSchema(
     "CandidateRecord",
-    "judgement of a video",
+    "assessment of a video",
     (
         Column("record_id", TEXT),
         Column("run_id", TEXT),
@@ -50,7 +50,7 @@ CANDIDATE_RECORD = TableSchema(
         Column("thumbnail", TEXT, nullable=True),
         *(Column(c.name, c.type, c.unit, nullable=True) for c in STABILITY_SCORE.columns),
         *QUALITY,
-        # chosen, accepted, rejected (a filter says why) or failed (could not be downloaded or read)
+        # chosen, accepted, rejected (by a filter) or failed (could not be downloaded or read)
         Column("decision", TEXT),
         Column("reason", TEXT, nullable=True),
         Column("decided_at", TIME),
@@ -62,7 +62,7 @@ Row = Mapping[str, Any]
 
 
 def append(store: Store, rows: Iterable[Row]) -> Artifact | None:
-    """Add judgements; a `record_id` is made for each. None when there are no rows.
+    """Add assessments; a `record_id` is made for each. None when there are no rows.
 
     Raises:
         BadTable: a row lacks a column or has one too many.

@@ -1,6 +1,6 @@
-"""Where artifacts live: a local folder by default, any fsspec address by configuration.
+"""The store of artifacts: a local folder by default, any fsspec address by configuration.
 
-Keys are relative to the root. Whatever goes wrong in a place is one `StoreError` with one line.
+Keys are relative to the root. Every failure of a place is one `StoreError` with one line.
 """
 
 import hashlib
@@ -29,7 +29,7 @@ class Store(FileTree):
 
     Attributes:
         root: Path or URL, as given.
-        place: The folder or whatever else keeps the files.
+        place: The folder or other place that keeps the files.
     """
 
     def __init__(self, root: str | Path, place: Place | None = None) -> None:

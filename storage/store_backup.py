@@ -24,7 +24,7 @@ NO_FILES: dict[str, Content] = {}
 
 @dataclass(frozen=True)
 class BackupResult:
-    """What a backup did.
+    """Result of a backup.
 
     Attributes:
         name: Of the backup.

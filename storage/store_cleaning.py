@@ -1,6 +1,6 @@
 """Removing from a store what is old: unfinished work and unused results; by request more kinds.
 
-A folder of work is removed by whoever holds its locks, as in `leftovers`. The other kinds stay
+A folder of work is removed under its locks, as in `leftovers`. The other kinds stay
 while a process works with the store: it may know of results that no record names yet.
 """
 
@@ -26,7 +26,7 @@ FLOW = "prefect.flow_engine"
 
 @dataclass(frozen=True)
 class Cleaning:
-    """What would go and what stays.
+    """Plan of what to remove and what to keep.
 
     Attributes:
         items: Everything in the store.
@@ -59,7 +59,7 @@ def plan(store: Store, kinds: Collection[Kind], older_than_s: float) -> Cleaning
 
 
 def remove(store: Store, cleaning: Cleaning) -> list[Item]:
-    """Remove what a plan says; return what is gone. What is held meanwhile stays."""
+    """Remove what a plan lists; return what was removed. What is locked meanwhile stays."""
     root = root_of(store)
     return [item for item in cleaning.going if _removed(root / item.key, item.kind == WORK)]
 

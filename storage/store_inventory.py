@@ -1,4 +1,4 @@
-"""What is in a store on a disk: how old, how big, and what still refers to it.
+"""Inventory of a store on a disk: age, size, and references.
 
 Reference means: a file of JSON in the store, or the catalogue of videos, names the folder of an
 artifact. The folder is named by the digest of its content, so no other text looks like it.
@@ -21,7 +21,7 @@ Kind = Literal["work", "unused", "videos", "cache", "runs", "kept"]
 KINDS: dict[Kind, str] = {
     "work": "unfinished trainings, downloads and scratch files that no process holds",
     "unused": "results that no record, run or table refers to",
-    "videos": "downloaded videos that only their catalogue refers to; loaded again if wanted",
+    "videos": "downloaded videos that only their catalogue refers to; downloaded again if needed",
     "cache": "records of finished stages and what only they refer to; made again if needed",
     "runs": "pages and videos of finished dances, and what only they refer to",
     "kept": "tables, studies, walkers, robots, Prefect's database, what is in use: never removed",

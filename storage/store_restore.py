@@ -16,7 +16,7 @@ from storage.store_listing import entries
 
 @dataclass(frozen=True)
 class Restored:
-    """What a restore did.
+    """Result of a restore.
 
     Attributes:
         files, size_mb: That were written.

@@ -34,12 +34,12 @@ FOLDER = "metrics"
 TABLES: Mapping[str, TableSchema] = {"episodes": EPISODE_RECORD, "evaluations": EVALUATION_RECORD}
 RUNS = f"{FOLDER}/runs"
 ALWAYS = ("run_id", "study", "move", "setup", "config")
-"""Columns of `runs`, whatever is known."""
+"""Columns of `runs` that always exist."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where the rows of a cell stand.
+    """Place of the rows of a cell.
 
     Attributes:
         study, move, setup, seed: The partition.
@@ -66,7 +66,7 @@ def write(store: Store, place: Place, given: Mapping[str, Artifact]) -> dict[str
     Args:
         given: `episodes` and `evaluations`, as the stages left them.
     Raises:
-        BadTable: one is not what its schema says.
+        BadTable: one does not match its schema.
         StoreError: the store refuses it; nothing half-written is left.
     """
     made = {}

@@ -1,4 +1,4 @@
-"""What the rewards of a study pay to bodies that do not dance."""
+"""Audit what the rewards of a study pay to bodies that do not dance."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Bring a video into the store: from the web in one format, or from a folder as it is.
+"""Put a video into the store: from the web in one format, or from a folder as it is.
 
 A download is cached by the video's id and format: by the task's record, and where that is lost by a
 note in the store, so that a file comes over the net once, also when two runs want it at once: one
@@ -49,7 +49,7 @@ class WebVideo:
 
     @property
     def folder(self) -> str:
-        """Where it is kept; both parts are made safe once more, whoever made the object."""
+        """Where it is kept; both parts are made safe again, however the object was made."""
         return f"{FOLDER}/{safe_name(self.source)}/{safe_name(self.video_id)}"
 
 

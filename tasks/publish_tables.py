@@ -57,7 +57,7 @@ def publish(cell: Cell, run_id: str, made: Mapping[str, Artifact]) -> Result:
 
 
 def published(cell: Cell, run_id: str) -> Result:
-    """Return what `publish` returned, on whatever machine that was.
+    """Return what `publish` returned, on any machine.
 
     Raises:
         StoreError: this store has nothing of that run.
@@ -107,7 +107,9 @@ def _commit() -> str:
     """Return the commit of the checkout, `-dirty` where files differ from it; without git, as in a
     container, the value of ROBOJACKSON_COMMIT.
     """
-    if not is_checkout():  # the commit of whoever keeps an environment in a repository is not ours
+    if (
+        not is_checkout()
+    ):  # an environment inside another repository has that one's commit, which is not ours
         return os.environ.get(COMMIT, "")
     command = ["git", "-C", str(app_folder()), "describe", "--always", "--dirty", "--abbrev=40"]
     try:

@@ -1,4 +1,4 @@
-"""From landmarks to the motion of the person."""
+"""Recover the motion of the person from landmarks."""
 
 from collections.abc import Mapping
 from typing import Any

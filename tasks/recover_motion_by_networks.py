@@ -1,4 +1,4 @@
-"""From a video to the motion of the person, by published networks whose weights a user brings."""
+"""Recover the motion of the person by published networks with weights of the user."""
 
 import logging
 from collections.abc import Callable, Mapping

@@ -1,4 +1,4 @@
-"""From the motion of a person to the reference motion of a robot."""
+"""Retarget the motion of a person to the reference motion of a robot."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""How steady the dancer of a clip is seen."""
+"""Score how steadily the dancer of a clip is tracked."""
 
 from robojackson.clips.quality.stability import StabilityConfig, stability
 from robojackson.motion.landmark_track import LandmarkTrack

@@ -1,4 +1,4 @@
-"""Ask a source for videos of a dance. Never cached: tomorrow's answer is another one."""
+"""Search a source for videos of a dance. Never cached: results change from day to day."""
 
 from datetime import UTC, datetime
 

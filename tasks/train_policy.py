@@ -46,7 +46,7 @@ OVERTIME_S = 300.0
 
 @dataclass(frozen=True)
 class RunLabels:
-    """What the rows of a run are known by.
+    """Labels of the rows of a run.
 
     Attributes:
         move: Name of the dance.
@@ -59,7 +59,7 @@ class RunLabels:
 
 @dataclass(frozen=True)
 class TrainingTime:
-    """What the clock of a pass leaves for its training.
+    """Time that a pass leaves for its training.
 
     Attributes:
         deadline: Unix time at which the training ends in any case, seconds.

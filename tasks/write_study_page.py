@@ -1,4 +1,4 @@
-"""The results of a study out of its tables: numbers, figures, and a page that says what they show.
+"""The results of a study out of its tables: numbers, figures, and a page that explains them.
 
 Drawing takes seconds, so it is done again only when the rows, or the code that reads them, are
 others.
@@ -76,7 +76,7 @@ def report(
     runs: Collection[str] | None = None,
     reward_audits: Mapping[str, study_page.RewardAudits] | None = None,
 ) -> dict[str, Artifact]:
-    """Write `studies/<name>/` anew: `page`, `table` (CSV), `results` (JSON) and the figures.
+    """Write `studies/<name>/` again: `page`, `table` (CSV), `results` (JSON) and the figures.
 
     Args:
         moves: Of the study, by name.
@@ -151,7 +151,7 @@ def _too_short(moves: Sequence[str]) -> list[str]:
     if not moves:
         return []
     return [
-        f"{', '.join(moves)}: too short to judge. Bodies that do not dance succeed as well, so "
+        f"{', '.join(moves)}: too short to evaluate. Bodies that do not dance succeed as well, so "
         "success and skill are left out."
     ]
 

@@ -39,7 +39,7 @@ def humanoid() -> Robot:
 
 @dataclass(frozen=True)
 class Script:
-    """What an environment told MuJoCo, control step by control step.
+    """The commands of an environment to MuJoCo, control step by control step.
 
     Attributes:
         controls: For every batch of robots its controls, (substeps, robots, nu).
@@ -114,7 +114,7 @@ def _timed(core: TrackingCore, steps: int) -> float:
 
 
 def recorded(core: TrackingCore, steps: int) -> Script:
-    """Run an environment and write down what it tells MuJoCo."""
+    """Run an environment and record its commands to MuJoCo."""
     script, place = Script([], [[]]), core.sim.place
     batches = [_Spy(batch.controls) for _, _, batch in core.sim.chunks[0]]
     for (_, _, batch), spy in zip(core.sim.chunks[0], batches, strict=True):

@@ -1,9 +1,9 @@
-"""What learning costs and what comes out of it (`make bench-learning`).
+"""Measure cost and results of learning (`make bench-learning`).
 
     python -m benchmarks.learning.learning_suite PART ... [--folder FOLDER]
 
 `speed`, `threads`: our parts beside their peers (`speed`). `policies`: one row a move
-and a seed, trained for the row's CPU minutes and judged on stock physics (`policies`).
+and a seed, trained for the row's CPU minutes and evaluated on stock physics (`policies`).
 `survival`, `pretraining`: races (`races`). `checkpoints`: what they cost a training
 (`checkpoint_cost`). `table` only prints what there is. What exists is not computed again, so
 that all of it may take several sittings. The authors' clips are measured where ROBOJACKSON_PAPER
@@ -42,7 +42,7 @@ POLICY = (
 
 
 def main() -> None:
-    """Measure the parts that are asked for and print all that there is."""
+    """Measure the requested parts and print all rows."""
     given = _arguments()
     folders = Folders.at(given.folder)
     parts = given.what or list(PARTS)
@@ -90,7 +90,7 @@ def _arguments() -> argparse.Namespace:
 
 
 def _write(path: Path, rows: list[dict[str, Any]], command: str) -> None:
-    """Put rows in the place of those that told the same."""
+    """Replace the rows of the same comparisons."""
     old = json.loads(path.read_text()) if path.exists() else []
     named = {row["what"]: row for row in old} | {
         row["what"]: {**row, "command": command} for row in rows

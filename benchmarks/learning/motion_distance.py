@@ -1,4 +1,4 @@
-"""How near two human motions are: the share of one that the other contains, mirrored or not.
+"""Nearness of two human motions: the share of one that the other contains, mirrored or not.
 
 A window of a motion is one second of SMPL joints at 10 Hz, relative to the pelvis and turned by the
 heading of its first frame. Its distance to another is the mean distance of the joints, metres.
@@ -51,7 +51,7 @@ def distances(
 def _turned(joints: Float[np.ndarray, "F 24 3"]) -> Float[np.ndarray, "F 24 3"]:
     """Return relative to each frame's pelvis, the first frame facing +x."""
     across = joints[0, LEFT_HIP] - joints[0, RIGHT_HIP]
-    yaw = np.arctan2(-across[0], across[1])  # the left hip is at +y of who faces +x
+    yaw = np.arctan2(-across[0], across[1])  # the left hip is at +y of a body that faces +x
     c, s = np.cos(yaw), np.sin(yaw)
     offset = joints - joints[:, :1]
     x, y, z = np.moveaxis(offset, -1, 0)

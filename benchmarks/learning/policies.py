@@ -1,8 +1,8 @@
-"""Policies of the bundled dances and of the authors' clips, trained and judged: one cached row a
+"""Policies of the bundled dances and of the authors' clips, trained and evaluated: one cached row a
 move and a seed, so that it may take several sittings.
 
 A row's training is pinned to a core of its own and ended by the CPU minutes of its bar. A motion
-that the gate refuses is trained on all the same, and the row says so.
+that the gate refuses is trained on anyway, and the row is marked.
 """
 
 import json
@@ -36,8 +36,8 @@ class Move:
         success, worst: Least strict success, of the mean over seeds and of the worst seed.
         skill: Least skill.
         cyclic: Whether it is danced for a time; else to its end.
-        authors: Whether it is a file of the authors': limbs are told and not asked for.
-        robot: Who dances it.
+        authors: Whether it is a file of the authors': limbs are reported without a bar.
+        robot: Name of the robot.
         mpjpe_mm: Largest mpjpe_l, fallen robots counted to the horizon; none for Humanoid-v5.
         cmu: Whether it is a BVH file of CMU.
     """
@@ -55,7 +55,7 @@ class Move:
 
     @property
     def horizons_s(self) -> tuple[float, ...]:
-        """Seconds that it is judged over, a row each."""
+        """Seconds that it is evaluated over, a row each."""
         return HORIZONS_S if self.cyclic else HORIZONS_S[:1]
 
     @property
@@ -85,7 +85,7 @@ MOVES = {
 
 @dataclass(frozen=True)
 class Folders:
-    """Where a benchmark keeps its things.
+    """Folders of a benchmark.
 
     Attributes:
         work: Motions, checkpoints, policies: not for the repository.
@@ -172,8 +172,8 @@ def require_frozen(name: str, reference: Path) -> None:
     if frozen_reference is not None and frozen_reference != found:
         raise SystemExit(
             f"{name}: {reference} has the poses {found[:12]}, the row is measured on "
-            f"{frozen_reference[:12]}: another mocap or retargeting made it; freeze it again or use "
-            "the old one"
+            f"{frozen_reference[:12]}: another mocap or retargeting made it; freeze it again or "
+            "use the old one"
         )
 
 

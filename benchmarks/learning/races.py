@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.learning.policies import Folders, reference_of
-from benchmarks.learning.speed import told
+from benchmarks.learning.speed import comparison
 from benchmarks.learning.summary import cluster_interval
 from benchmarks.learning.training_curve import STOCK, area, curve_of, first_at
 
@@ -33,7 +33,7 @@ def survival(folders: Folders, minutes: float, seed: int = 0) -> dict[str, Any]:
     peer = curve_of(reference, work / name, [f"seed={seed}", *STOCK], GOAL_S, limit)
     theirs = peer["points"][-1][0] if peer["reached"] else 60 * limit
     what = "CPU s to a mean survival of 5 s on hip_shake, ours over sb3-contrib's default"
-    row = told(what, spent, theirs, spent / theirs, "<= 0.1")
+    row = comparison(what, spent, theirs, spent / theirs, "<= 0.1")
     best = [max(survived for _, _, survived in curve["points"]) for curve in (ours, peer)]
     return {
         **row,

@@ -1,5 +1,5 @@
 """Speed of learning beside its peers, interleaved in one process on one core, in CPU time, so that
-a busy machine changes both alike; `threads` alone is wall time and wants two idle cores.
+a busy machine changes both alike; `threads` alone is wall time and needs two idle cores.
 """
 
 import os
@@ -55,7 +55,7 @@ def paper_steps(repeats: int, seconds: float) -> Row:
 def _rounds(
     trainer_name: str, environment: TrackConfig | PaperConfig, tqc: TqcConfig, step: bool = False
 ) -> Callable[[], int]:
-    """Return a function that does one round (its steps, too, where asked) and tells its updates."""
+    """Return a function that does one round (with steps, if requested) and returns its updates."""
     robot = humanoid()
     env = TrackingVecEnv(
         TrackingCore(robot, make_standing_motion(robot), environment, tqc.n_envs, 0)

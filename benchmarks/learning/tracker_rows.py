@@ -1,4 +1,4 @@
-"""Downloaded trackers on the frozen references, with our judge: no training at all.
+"""Downloaded trackers on the frozen references, with our evaluation: no training at all.
 
     python -m benchmarks.learning.tracker_rows [--moves g1_walk ...] [--folder FOLDER]
 
@@ -85,7 +85,7 @@ def evaluated(tracker: Tracker, motion: ReferenceMotion, friction: float) -> dic
     robot = load_robot(tracker.description.robot)
     usual = robot.description.simulation.friction
     if usual is None:
-        raise BadConfiguration(f"robot {motion.robot!r} does not say its friction")
+        raise BadConfiguration(f"robot {motion.robot!r} does not give its friction")
     began = time.process_time()
     found = evaluate_policy(
         tracker, motion, varied(robot, Variation(friction=friction / usual)), EVALUATION

@@ -1,4 +1,4 @@
-"""How a training gets on: seconds survived by training episodes against CPU seconds and steps.
+"""Curve of a training: seconds survived by training episodes against CPU seconds and steps.
 
 A process of its own, so that its CPU time is its own:
 

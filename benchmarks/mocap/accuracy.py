@@ -81,7 +81,7 @@ def look(clip: str) -> Seen:
 
 
 def heavy_installed() -> bool:
-    """Return whether the larger pose model is there; `tools.assets.build_pose_models` brings it."""
+    """Return whether the larger pose model is there; `tools.assets.build_pose_models` builds it."""
     return (ASSETS / "pose_landmarker_heavy.task").is_file()
 
 

@@ -2,7 +2,7 @@
 benchmarks.mocap.hidden_limb`).
 
 Forty cases of clip, limb, onset and length (0.2 to 1 s), drawn with a seed. In each, the landmarks
-of a whole limb are taken away: their visibility is 0 and their places are interpolated in time.
+of a whole limb are hidden: their visibility is 0 and their places are interpolated in time.
 Rows: interpolation (the motion of step 2 with the limb's joints interpolated in time, seen from
 the pelvis), step 2 and step 3 on the clip with the hidden limb. Figures: mean distance of the
 limb's joints from the truth in the hidden frames, mm, after the similarity that brings the ten

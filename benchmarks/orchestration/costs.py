@@ -1,4 +1,4 @@
-"""What a stack and a flow use: wall time, processor time, calls of the server's API, disk."""
+"""Costs of a stack and a flow: wall time, processor time, calls of the server's API, disk."""
 
 import os
 import re
@@ -16,12 +16,13 @@ WORK = ("work_cpu_s", "workers_cpu_s", "store_cpu_s")
 
 
 class Costs:
-    """What is used from now on."""
+    """Costs from now on."""
 
     def __init__(self, stack: Stack) -> None:
         self._stack, self._first = stack, self._read(stack)
 
     def so_far(self) -> dict[str, float]:
+        """Return what was used since the beginning."""
         now = self._read(self._stack)
         used = {name: round(now[name] - self._first[name], 2) for name in now}
         known = sum(used[name] for name in (*ORCHESTRATION, *WORK))
@@ -47,7 +48,7 @@ class Costs:
 
 
 class Begun:
-    """What had been used when cells began, of every so many of them; it costs 30 ms a time."""
+    """Costs at the start of every so many cells; a reading takes 30 ms."""
 
     def __init__(self, stack: Stack, every: int = 1) -> None:
         self._every = every
@@ -60,6 +61,7 @@ class Begun:
         self.orchestration_s: list[float] = []
 
     def __call__(self) -> None:
+        """Count one cell, and read the costs at every so many."""
         if self.count % self._every == 0:
             own = _own_cpu_s()
             self.wall_s.append(time.monotonic())

@@ -1,4 +1,4 @@
-"""What Prefect costs around the work (`make bench-orchestration`; results/orchestration.json).
+"""Measure the cost of Prefect around the work (`make bench-orchestration`).
 
 On the PostgreSQL and the server of tools/stack/compose_stack.py, with played cells
 (benchmarks/orchestration/played.py):
@@ -10,7 +10,7 @@ On the PostgreSQL and the server of tools/stack/compose_stack.py, with played ce
     pool     200 sleeping cells through a work pool with 8 workers of one run each
 
 Processor time of this process, of the server and of PostgreSQL is what orchestration costs; it is
-told beside wall time, which other work on the machine would make longer.
+reported beside wall time, which other work on the machine would make longer.
 """
 
 import argparse
@@ -184,6 +184,7 @@ def _server(folder: Path, workers: int) -> Iterator[Stack]:
 
 
 def main() -> None:
+    """Run the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )

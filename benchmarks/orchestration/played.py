@@ -36,10 +36,10 @@ NAP_S = 1.0
 
 @contextmanager
 def played(seconds: float, burn: bool, began: Callable[[], None] = lambda: None) -> Iterator[None]:
-    """Let every training and judgement of this process be played.
+    """Replace every training and evaluation of this process by a stand-in.
 
     Args:
-        seconds: That a training takes, of processor time if it burns; a judgement takes none.
+        seconds: That a training takes, of processor time if it burns; an evaluation takes none.
         began: Called whenever a training begins.
     """
     code = (BURN if burn else SLEEP).format(seconds=seconds)

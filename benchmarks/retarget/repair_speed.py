@@ -1,8 +1,8 @@
-"""What retargeting with repair, tempo and certificate costs: CPU seconds a second of clip.
+"""Cost of retargeting with repair, tempo and certificate: CPU seconds a second of clip.
 
     python -m benchmarks.retarget.repair_speed --robots humanoid g1 --lengths 2 10 30 60
 
-A clip goes back and forth until it is as long as a row says. Each row has a ruler beside it that
+A clip goes back and forth until it has the length of its row. Each row has a ruler beside it that
 the code under test has no part in: `mj_inverse` calls a CPU second on the robot's model, measured
 just before and after the row on the same core, since a busy machine slows both down.
 """

@@ -1,4 +1,4 @@
-"""What judging a clip costs, as ratios within one run (`make bench`; results/search.json).
+"""The cost of assessing a clip, as ratios within one run (`make bench`; results/search.json).
 
 1. Algorithm 1 through our code over a bare loop of decode + PoseLandmarker lite: at most 1.1.
 2. The same with every filter: at most 1.35.

@@ -36,7 +36,7 @@ INSTANT_MINUTES = 1.0
 """About what an instant dance takes, for its bar."""
 INSTANT = "--instant"
 LONG_ENOUGH_S = 10.0
-"""Rollouts that are advised where the settings' are too short to judge, seconds."""
+"""Advised rollout length where the settings' is too short to evaluate, seconds."""
 
 
 @command

@@ -15,7 +15,7 @@ from robojackson.cli.options import Json, SetFind, overrides_from
 @command
 def find(
     query: Annotated[str, typer.Argument(help="A dance; or the folder, or list, of the source.")],
-    top: Annotated[int | None, typer.Option(min=1, help="How many videos to judge.")] = None,
+    top: Annotated[int | None, typer.Option(min=1, help="How many videos to assess.")] = None,
     source: Annotated[
         str, typer.Option(help="youtube, folder, urls, site, server, or a file of your own.")
     ] = "youtube",

@@ -69,7 +69,7 @@ def metrics(
     if sql is not None:
         return CommandResult({"rows": rows}, text=text)
     if any(row["strict_success"] is None for row in rows):
-        text.append("-: too short to judge, or bodies that do not dance succeed as well")
+        text.append("-: too short to evaluate, or bodies that do not dance succeed as well")
     verdict = metrics_verdict(rows)
     return CommandResult({"rows": rows, **verdict}, text=[*text, *closing(verdict)])
 

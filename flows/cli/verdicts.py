@@ -1,4 +1,4 @@
-"""What searches and studies say at their end: a sentence that judges, the command to type next.
+"""Closing lines of searches and studies: a sentence that rates the result, and the next command.
 
 Everything is made from what a command answers; as `robojackson.cli.cards` does for single stages.
 """
@@ -126,7 +126,7 @@ def ablation_verdict(made: Facts, steps: int, seeds: int, least_steps: int) -> d
             f"show no difference between setups; {MANY_SEEDS} can. The page has the figures."
         )
         return _closing("few_seeds", sentence, show)
-    sentence = f"{made['cells']} cells are evaluated; the page says which claims hold."
+    sentence = f"{made['cells']} cells are evaluated; the page lists which claims hold."
     return _closing("evaluated", sentence, show)
 
 

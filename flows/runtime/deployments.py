@@ -1,4 +1,4 @@
-"""What a Prefect server must know of us: pools, deployments, automations.
+"""Register pools, deployments and automations with a Prefect server.
 
 Everything is registered by name and may be registered again: only what has changed is changed.
 """
@@ -76,7 +76,7 @@ def automations() -> list[dict[str, Any]]:
     target = os.environ.get(SILENCE, str(SILENT_S))
     if not target.isdecimal() or int(target) < SHORTEST_S:
         raise DeploymentFailed(
-            f"{SILENCE}={target!r}: whole seconds, {SHORTEST_S} at least; runs say every "
+            f"{SILENCE}={target!r}: whole seconds, {SHORTEST_S} at least; runs report every "
             f"{HEARTBEAT_S} s that they live"
         )
     shipped = yaml.safe_load(find("automations").read_text())
@@ -110,7 +110,7 @@ async def _pool(client: PrefectClient, name: str, description: str) -> None:
 
 
 def with_heartbeat(template: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a job template whose runs get our heartbeat, whatever environment their worker has."""
+    """Return a job template whose runs get our heartbeat, in any environment of their worker."""
     made = deepcopy(dict(template))
     env = made["variables"]["properties"]["env"]
     env["default"] = {**env.get("default", {}), **HEARTBEAT}
@@ -135,6 +135,8 @@ def _register() -> list[str]:
     run = subprocess.run(command, cwd=app_folder(), capture_output=True, text=True, check=False)
     if run.returncode:
         said = (run.stdout + run.stderr).strip().splitlines()
-        raise DeploymentFailed(f"prefect deploy failed: {said[-1] if said else 'without a word'}")
+        raise DeploymentFailed(
+            f"prefect deploy failed: {said[-1] if said else 'without a message'}"
+        )
     entries = yaml.safe_load((app_folder() / "prefect.yaml").read_text())["deployments"]
     return [f"{entry['entrypoint'].rsplit('.', 1)[1]}/{entry['name']}" for entry in entries]

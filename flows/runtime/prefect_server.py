@@ -12,11 +12,11 @@ from robojackson.errors import DeploymentFailed
 
 EVERY_S = 0.5
 REFUSED = (401, 403)
-"""Codes of HTTP with which a server refuses who asks."""
+"""HTTP codes with which a server refuses access."""
 
 
 def require_server() -> None:
-    """Ask the server that PREFECT_API_URL names, if it names one, whether a run may begin there.
+    """Check that a run may begin on the server that PREFECT_API_URL names, if it names one.
 
     Raises:
         DeploymentFailed: it does not answer, or refuses us.
@@ -49,7 +49,7 @@ def answering() -> Iterator[None]:
     """Turn failures of a server into one line with the next step.
 
     Raises:
-        DeploymentFailed: it does not answer, refuses us or something that we ask for.
+        DeploymentFailed: it does not answer, or refuses access or a request.
     """
     named = f"the Prefect server of PREFECT_API_URL={PREFECT_API_URL.value()}"
     try:

@@ -22,7 +22,7 @@ class QueuedSqlite(AioSqliteConfiguration):
     async def begin_transaction(
         self, session: AsyncSession, with_for_update: bool = True
     ) -> AsyncIterator[AsyncSessionTransaction]:
-        """Begin a transaction of a session as a writer, whatever it is asked for."""
+        """Begin a transaction of a session as a writer, for any query."""
         async with super().begin_transaction(session, with_for_update=True) as transaction:
             yield transaction
 

@@ -1,4 +1,4 @@
-"""What the SOURCE of a dance means: a file, a folder, or the name of a dance."""
+"""Resolve the SOURCE of a dance: a file, a folder, or the name of a dance."""
 
 import os
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""What Prefect's pages show of a search: the table, the pictures, the link to the chosen video."""
+"""Prefect artifacts of a search: the table, the pictures, the link to the chosen video."""
 
 from typing import Any
 

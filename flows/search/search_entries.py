@@ -1,4 +1,4 @@
-"""What became of every video of a search, and the same as rows of the catalogue."""
+"""Outcome of every video of a search, and the same as rows of the catalogue."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ class Entry:
         decision: chosen, accepted, rejected or failed.
         reason: Why not; empty for those that may be danced.
         video: Its file, scored; None when it could not be had.
-        artifacts: What the judge made of it.
+        artifacts: Results of the assessment.
         score, quality: The figures; None when it could not be assessed.
     """
 
@@ -42,7 +42,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class SearchResult:
-    """What came out of a search.
+    """Result of a search.
 
     Attributes:
         dance: What was looked for.

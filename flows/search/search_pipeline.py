@@ -1,6 +1,6 @@
-"""From a query to a ranked table of videos and the one to dance: what `find` and `refresh` share.
+"""The search that `find` and `refresh` share: from a query to ranked videos and the one to dance.
 
-Search, select, download, judge, rank, write down. A video that fails on the way gets its reason and
+Search, select, download, assess, rank, record. A video that fails on the way gets its reason and
 harms no other; only a search that fails is an error.
 """
 
@@ -47,7 +47,7 @@ def search_and_rank(
     reigning: Mapping[str, Any] | None = None,
     failed: Collection[tuple[str, str]] = (),
 ) -> SearchResult:
-    """Find, judge and rank the videos of a dance; every one of them goes into the catalogue.
+    """Find, assess and rank the videos of a dance; every one of them goes into the catalogue.
 
     Args:
         dance: What to look for.

@@ -1,4 +1,4 @@
-"""What a person sees of an ablation while it runs: one table that grows as its cells end."""
+"""Progress table of an ablation, which grows as its cells end."""
 
 import asyncio
 import json
@@ -16,7 +16,7 @@ from tasks.study_cell import Cell
 
 COLUMNS = ("survived_s", "strict_success", "skill", "limb_gain")
 SECONDS_A_ROW, SECONDS_BETWEEN = 0.05, (1.0, 60.0)
-"""What lies between two versions of the table: longer for a longer one, within bounds."""
+"""Time between two versions of the table: longer for a longer one, within bounds."""
 WAITING, RUNNING, DONE, FAILED = "waiting", "running", "done", "failed"
 ON_WORKERS = "with the workers"
 

@@ -1,6 +1,6 @@
 """Waiting for many runs at once: one question to the server, however many runs there are.
 
-Prefect's own `run_deployment` asks for each of its runs every 5 s: a thousand that wait would be
+Prefect's own `run_deployment` polls each of its runs every 5 s: a thousand that wait would be
 200 calls a second, more than one server answers.
 """
 
@@ -26,7 +26,7 @@ log = logging.getLogger(__name__)
 
 
 class RunWatcher:
-    """The runs that somebody waits for."""
+    """The runs that are waited for."""
 
     def __init__(self) -> None:
         self._waiting: dict[UUID, asyncio.Future[FlowRun]] = {}
@@ -50,7 +50,7 @@ class RunWatcher:
             del self._waiting[run.id]
 
     async def _poll(self) -> None:
-        """Ask until nobody waits; a server that is away for a while is asked again."""
+        """Poll until no run is waited for; a server that is away for a while is polled again."""
         answered = time.monotonic()
         while self._waiting:
             await asyncio.sleep(EVERY_S)
@@ -61,7 +61,7 @@ class RunWatcher:
                 if time.monotonic() - answered > PATIENCE_S:
                     self._give_up(cause)
                     return
-                log.warning("the runs on workers cannot be asked for, will try again: %s", cause)
+                log.warning("the runs on workers cannot be polled, will try again: %s", cause)
                 continue
             for run in found:
                 waits = self._waiting.get(run.id)

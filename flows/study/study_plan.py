@@ -1,4 +1,4 @@
-"""What a study trains, read and checked before Prefect is imported."""
+"""Plan of a study, read and checked before Prefect is imported."""
 
 from collections.abc import Mapping
 from dataclasses import replace

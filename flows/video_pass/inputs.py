@@ -1,7 +1,7 @@
-"""From what somebody asked to be danced to video files of this machine.
+"""Turn the SOURCE of a dance into video files of this machine.
 
 That may be the name of a dance, the address of a video on the web, or the path of a file or folder.
-Names are searched and their steadiest video is brought; an address is brought as it is.
+Names are searched and their steadiest video is downloaded; an address is downloaded as it is.
 """
 
 from collections.abc import AsyncIterator, Iterator
@@ -35,7 +35,7 @@ Minutes = Annotated[float, Field(gt=0)]
 
 @config_dataclass
 class Search:
-    """How a dance is looked for that is given by its name.
+    """Search settings for a dance that is given by its name.
 
     Attributes:
         config: Name or path of the configuration of the search.

@@ -1,4 +1,4 @@
-"""What of the minutes of a pass is left for its training; no part of a cache key."""
+"""Minutes of a pass that remain for its training; no part of a cache key."""
 
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.pipeline.pipeline_config import PipelineConfig

@@ -1,4 +1,4 @@
-"""What a tracker dances at once: a first look on the page, then the full evaluation.
+"""Stages of a tracker's dance: a first look on the page, then the full evaluation.
 
 The page is written before anything else is evaluated or trained, and again when more is known, at
 the same address.

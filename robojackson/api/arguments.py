@@ -1,4 +1,4 @@
-"""What the public functions take: a path, or what an earlier function returned."""
+"""Arguments of the public functions: a path, or the result of an earlier function."""
 
 import platform
 from collections.abc import Callable, Iterator
@@ -40,14 +40,14 @@ def robot_of(reference: ReferenceMotion) -> Robot:
     """Return the robot that a reference motion was made for.
 
     Raises:
-        UnknownName: its description is not here; the message says what to give.
+        UnknownName: its description is missing; the message names the option.
         RejectedReference: its model has changed since.
     """
     name, file = reference.robot, reference.robot_file
     if file and not Path(file).is_file():
         where = f"the motion was made for {file}, which is not on {platform.node()}"
     elif not file and name not in robot_names():
-        where = "the motion does not say where its description is"
+        where = "the motion does not name its description"
     else:
         return require_robot(reference, bind_robot(describe_robot(file or name)))
     advice = f"{where}; give --robot FILE, in Python robot="

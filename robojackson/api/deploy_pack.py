@@ -1,4 +1,4 @@
-"""From a trained policy to a deploy pack: a folder that runs it without RoboJackson."""
+"""Write a deploy pack: a folder that runs a trained policy without RoboJackson."""
 
 import json
 from collections.abc import Mapping
@@ -106,7 +106,7 @@ def deployed_policy(policy: Policy, reference: ReferenceMotion, robot: Robot) ->
     if sorted(hinge.tolist()) != list(range(count)):
         raise BadPolicy(
             f"robot {robot.description.name!r} has {len(hinge)} motors for {count} hinges: a "
-            "deploy pack wants one motor a hinge"
+            "deploy pack needs one motor a hinge"
         )
     motor = np.argsort(hinge)
     lead = lead_of(robot, reference, control)
@@ -179,7 +179,7 @@ def _require_onboard(policy: Policy) -> None:
         )
     if mode_of(policy) != "track" or kind != "pd":
         raise BadPolicy(
-            f"a policy of mode {mode_of(policy)} and law {kind}: a deploy pack wants mode track, "
+            f"a policy of mode {mode_of(policy)} and law {kind}: a deploy pack needs mode track, "
             "law pd and --set track.observation=onboard"
         )
 

@@ -1,4 +1,4 @@
-"""Judgement and video: how well a policy dances, and what that looks like."""
+"""Evaluate policies, and render videos of them."""
 
 import json
 from collections.abc import Callable
@@ -59,7 +59,7 @@ class PolicyEvaluation:
     def __repr__(self) -> str:
         figures = self.summary
         if figures["verdict"]["kind"] == "too_short":
-            said = "too short to judge"
+            said = "too short to evaluate"
         else:
             said = f"strict_success={figures['strict_success']:.0%}, skill={figures['skill']:.2f}"
         return (
@@ -95,7 +95,7 @@ def evaluate_policy(
     setup: str = "",
     progress: bool | PartProgress = False,
 ) -> PolicyEvaluation:
-    """Judge a policy on stock physics from many starts, beside baselines that do not dance.
+    """Evaluate a policy on stock physics from many starts, beside baselines that do not dance.
 
     Args:
         policy: A policy, or the policy.safetensors of a training; or a tracker (`load_tracker`).
@@ -103,7 +103,7 @@ def evaluate_policy(
         robot: The one that the motion was made for; None finds it by name.
         config: Starts, horizon and noise.
         move: Name of the dance in the tables.
-        setup: Name of the training in the tables, where the policy's file does not say.
+        setup: Name of the training in the tables, where the policy's file does not give it.
         progress: True shows a bar; a function is called with (name of the part, done, in all).
 
     Returns:
@@ -149,7 +149,7 @@ def render_video(
     plain: bool = False,
     progress: Progress = False,
 ) -> VideoInfo:
-    """Write an mp4 of the reference robot, beside whatever else is given, at the same moment.
+    """Write an mp4 of the reference robot beside the other given motions, at the same moment.
 
     Args:
         out: The file.

@@ -42,7 +42,7 @@ Exporter = TypeVar("Exporter")
 
 @dataclass(frozen=True)
 class ForeignFile:
-    """What was read of a file of another project.
+    """Content of another project's file.
 
     Attributes:
         motion: On the floor.
@@ -60,7 +60,7 @@ def read_foreign(file: Path, fps: float | None, up: Up | None, config: MocapConf
 
     Raises:
         StoreError: the file cannot be read.
-        UnknownName, BadTable: no known format, a damaged file, or one that asks to run something.
+        UnknownName, BadTable: no known format, a damaged file, or one that would run code.
         BadConfiguration: a frame rate that no motion has, or axes that the file has not.
     """
     data = _bytes_of(file)
@@ -152,14 +152,14 @@ def _rate(
     rate = given or stored_fps or importer.fps
     if rate is None:
         raise BadConfiguration(
-            f"this {importer.name} file does not say its frame rate: give it with --fps"
+            f"this {importer.name} file does not give its frame rate: give it with --fps"
         )
     if not SLOWEST <= rate <= FASTEST:
         raise BadConfiguration(
-            f"{rate:g} frames a second: wanted {SLOWEST:g} to {FASTEST:g}; give it with --fps"
+            f"{rate:g} frames a second: allowed are {SLOWEST:g} to {FASTEST:g}; give it with --fps"
         )
     if given and stored_fps and abs(given - stored_fps) > 0.01:
-        return rate, [f"the file says {stored_fps:g} frames a second: {given:g} was given"]
+        return rate, [f"the file has {stored_fps:g} frames a second: {given:g} was given"]
     if not given and not stored_fps:
-        return rate, [f"the file does not say its frame rate: taken as {rate:g}; --fps changes it"]
+        return rate, [f"the file does not give its frame rate: taken as {rate:g}; --fps changes it"]
     return rate, []

@@ -1,4 +1,4 @@
-"""Other motions that a video allows: what limbs that nobody saw may have done."""
+"""Other motions that a video allows: what hidden limbs may have done."""
 
 from collections.abc import Iterator
 from dataclasses import replace

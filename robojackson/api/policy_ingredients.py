@@ -1,4 +1,4 @@
-"""What a policy was made from, as far as the files around it tell: for the licence passport."""
+"""Inputs of a policy, as far as the files beside it show, for the licence passport."""
 
 import hashlib
 from pathlib import Path
@@ -41,11 +41,11 @@ def _body_models(reference: Path) -> list[Ingredient]:
     folders = reference.parent, reference.parent.parent
     folder = next((folder for folder in folders if (folder / LANDMARKS).is_file()), None)
     if folder is None or not (folder / PERSON).is_file():
-        note = "no landmarks and motion of a person lie beside it: declare them"
+        note = "no landmarks and motion of a person are beside it: declare them"
         return [Ingredient("body models", "what recovered the motion", UNKNOWN, note)]
     notes = SmplSequence.load(folder / PERSON).notes
     networks = [note for note in notes if note.startswith(NETWORK_NOTE)]
-    note = f"{PERSON} beside the motion says so"
+    note = f"{PERSON} beside the motion records it"
     found = [Ingredient("body models", "MediaPipe's pose landmarker", "Apache-2.0", LANDMARKS)]
     if networks:
         return found + [Ingredient("body models", name, UNKNOWN, note) for name in networks]

@@ -83,7 +83,7 @@ def train_policy(
         move: Name of the dance in the tables.
         run_id: Name of the run in the tables; made of move, setup and seed when empty.
         force: Train on a motion that the gate refuses, too.
-        hooks: What else is told while it runs, and how it is stopped.
+        hooks: Callbacks of progress, and how it is stopped.
         progress: True shows a bar; a function gets a row every few seconds: steps, seconds_left,
             survived_s, site_error_m, episode_return.
 
@@ -126,7 +126,7 @@ def _trained(
     hooks: Hooks,
     report: Callable[[Row], None],
 ) -> TrainedPolicy:
-    """Train in a folder that nobody else may use meanwhile; its table is saved in any case."""
+    """Train in a folder that is locked meanwhile; its table is saved in any case."""
     with results_in(folder) as files, locked(folder):
         rows = EpisodeLog(files, labels, resumes=newest_checkpoint(folder) is not None)
         audit = audit_record(audit_both_readings(robot, motion, config.environment))

@@ -38,7 +38,7 @@ def bar(label: str) -> Iterator[Callable[[int, int], None]]:
 
 
 class _Rate(ProgressColumn):
-    """How many a second."""
+    """Column of the items per second."""
 
     def render(self, task: Task) -> Text:
         return Text(f"{task.speed:.1f}/s" if task.speed else "")

@@ -1,6 +1,6 @@
 """HybrIK's analytic solve: keypoints and twists to rotations (Li et al., CVPR 2021, section 3.3).
 
-Down the tree, each joint swings its rest bone onto the wanted one and turns it by its twist. NAIVE
+Down the tree, each joint swings its rest bone onto the target bone and turns it by its twist. NAIVE
 aims along the predicted bone; ADAPTIVE aims from where the parent really ended, so that errors do
 not add up along a limb. Metres; any common frame of keypoints.
 """
@@ -95,7 +95,7 @@ def solve_with(
 def _target_directions(
     child: np.ndarray, start: np.ndarray, end: np.ndarray, bone: np.ndarray, method: Method
 ) -> np.ndarray:
-    """Return the direction along which the bones of some joints shall lie.
+    """Return the direction along which the bones of some joints should point.
 
     Args:
         child: Where the bones should end.

@@ -23,7 +23,7 @@ from robojackson.motion.landmark_track import LANDMARKS, LandmarkTrack, uneven
 Size = Literal["lite", "full", "heavy"]
 Watcher = Callable[[int, np.ndarray, np.ndarray], None]
 """Called with the number of a frame, its RGB image and its row (33, 7): image xyz, world xyz,
-visibility; NaN when nobody was found."""
+visibility; NaN where no person was detected."""
 SIZES: tuple[str, ...] = ("lite", "full", "heavy")
 ASSETS = Path(__file__).parent.parent / "assets"
 GRAPHICS_LIBRARIES = ("libEGL.so.1", "libGLESv2.so.2")
@@ -42,7 +42,7 @@ def model_path(size: str) -> Path:
 
     Raises:
         UnknownName: no such size.
-        MissingDependency: the bundle is not here; the message is the command that brings it.
+        MissingDependency: the bundle is missing; the message is the command that installs it.
     """
     if size not in SIZES:
         raise UnknownName("pose model", size, "clips.pose_detector", SIZES)

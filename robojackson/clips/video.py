@@ -44,7 +44,7 @@ DAMAGE_ALLOWED = 0.2
 
 @config_dataclass
 class VideoLimits:
-    """What a clip may be.
+    """Limits of a clip.
 
     Attributes:
         max_duration_s: Longest clip, seconds; None is any length.
@@ -57,7 +57,7 @@ class VideoLimits:
 
 @dataclass(frozen=True)
 class VideoInfo:
-    """What a video file holds.
+    """Properties of a video file.
 
     Attributes:
         path: The file.
@@ -111,7 +111,7 @@ def list_videos(source: Path) -> tuple[Path, ...]:
 
 
 def probe(path: Path, limits: VideoLimits) -> VideoInfo:
-    """Return the size, rate and number of frames of a video, counted and not believed.
+    """Return the size, rate and number of frames of a video, counted, not taken from the header.
 
     Raises:
         UnreadableVideo: missing, empty, or not a video.
@@ -134,7 +134,7 @@ def probe(path: Path, limits: VideoLimits) -> VideoInfo:
         )
     fps = rate(stamps, declared)
     if not fps:
-        raise UnreadableVideo("the file tells no frame rate", path)
+        raise UnreadableVideo("the file declares no frame rate", path)
     rotation = -first.rotation % 360
     size = (first.height, first.width) if rotation % 180 else (first.width, first.height)
     frames = len(stamps)

@@ -1,4 +1,4 @@
-"""Video containers, opened with one clear error, and what their packets tell without decoding."""
+"""Video containers, opened with one clear error, and what their packets hold without decoding."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from robojackson.errors import TruncatedVideo, UnreadableVideo
 
 ISO_MEDIA_MARK = b"ftyp"
 RATE_TOLERANCE = 0.002
-"""A rate that is off the timestamps by more is not believed."""
+"""A declared rate that differs from the timestamps by more is ignored."""
 
 
 def opened(path: Path) -> av.container.InputContainer:

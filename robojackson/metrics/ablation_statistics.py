@@ -1,4 +1,4 @@
-"""What an ablation shows: three claims of the paper, and effects move by move.
+"""Statistics of an ablation: three claims of the paper, and effects move by move.
 
 Pairs are seeds, each the mean over the moves that both setups have; `seed_statistics` has the
 tests. Nothing here knows where tables are kept.
@@ -24,10 +24,10 @@ Verdict = Literal["holds", "not shown", "reversed", "not measured"]
 
 @dataclass(frozen=True)
 class Claim:
-    """One sentence of the paper, and what was found.
+    """One claim of the paper, and the result.
 
     Attributes:
-        text: What it says.
+        text: The claim in words.
         treated, control: Setups that are compared.
         expected: 1 when the treated should be better, -1 when worse.
         verdict: `holds` and `reversed` only where the interval of the effect leaves out zero.

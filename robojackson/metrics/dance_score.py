@@ -1,7 +1,7 @@
-"""Whether a motion dances: the headline figure, which no impostor of `impostors` passes.
+"""The headline score of a dance, which no impostor of `impostors` passes.
 
-Millimetres say little of a dance: on a hip-shake whose joints stray 30 mm from their mean, a robot
-that does it half as large is 15 mm wrong, and a good estimate 20 mm. Velocities tell them apart.
+Millimetres mean little: on a hip-shake whose joints stray 30 mm from their mean, a robot
+that does it half as large is 15 mm wrong, and a good estimate 20 mm. Velocities separate the two.
 """
 
 import numpy as np

@@ -47,7 +47,7 @@ def mirrored(truth: Motion, fps: float, sides: Sequence[tuple[int, int]]) -> Mot
     """Return left exchanged for right, at the same place and with the same mean heading.
 
     Args:
-        sides: Left and right joint of each pair; the first pair, the hips, tells the heading.
+        sides: Left and right joint of each pair; the first pair, the hips, gives the heading.
     """
     left, right = sides[0]
     across = (truth[:, left] - truth[:, right]).mean(0) * [1.0, 1.0, 0.0]

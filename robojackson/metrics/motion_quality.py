@@ -1,7 +1,7 @@
-"""How smooth a motion is and how it treats the floor, by itself and beside a truth.
+"""Smoothness of a motion and its contact with the floor, alone and beside a truth.
 
 Metres and seconds, world frame, z up, floor at z = 0. Definitions as in Shin et al., WHAM (CVPR
-2024) and Shen et al., GVHMR (SIGGRAPH Asia 2024) but for what is said below. None of them is a
+2024) and Shen et al., GVHMR (SIGGRAPH Asia 2024) except as noted below. None of them is a
 headline: a frozen pose is smooth, does not slide and stands well (`docs/metrics.md`).
 """
 

@@ -1,6 +1,6 @@
 """Figures of a robot motion against its targets; arrays in, floats out.
 
-Metres, radians and seconds in; each name says its own unit out (mm, deg, cm/s).
+Metres, radians and seconds in; each name has its unit (mm, deg, cm/s).
 """
 
 import numpy as np
@@ -68,7 +68,7 @@ def unsupported(
 ) -> Bool[np.ndarray, " S"]:
     """Return the steps in which no sole is near the floor and yet the body does not fall.
 
-    A levitating motion is caught whatever its contact labels say.
+    A levitating motion is detected with any contact labels.
 
     Args:
         sole_height: Lowest points of the soles over the floor.

@@ -1,8 +1,8 @@
-"""How well a rollout dances: site error, skill against the best frozen pose, liveliness of limbs.
+"""Scores of a rollout: site error, skill against the best frozen pose, liveliness of limbs.
 
 Positions are in the pelvis-heading frame: relative to the pelvis site, turned so that the root's
-heading is +x. Metres, seconds. Millimetres alone say nothing: a frozen mean pose scores 51-74 mm
-on a hip-shake, so errors are told relative to the best frozen pose, and limbs by their velocities.
+heading is +x. Metres, seconds. Millimetres alone mean nothing: a frozen mean pose scores 51-74 mm
+on a hip-shake, so errors are given relative to the best frozen pose, and limbs by their velocities.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ FROZEN_CANDIDATES = 24
 
 @dataclass(frozen=True)
 class LimbResponse:
-    """How one limb end follows its reference, at the best lag.
+    """Response of one limb end to its reference, at the best lag.
 
     Attributes:
         gain: sum(v . v_ref) / sum(v_ref^2) over moving frames; 1 is the reference's amplitude.

@@ -1,7 +1,7 @@
 """YAML to frozen dataclasses: unknown keys are refused with the file and the path of the key.
 
 A name such as `smoke` or `robots/humanoid` is a file of the user's `./configs` (or of the folder
-that ROBOJACKSON_CONFIGS names), else of the shipped ones; whatever has a YAML suffix is a path.
+that ROBOJACKSON_CONFIGS names), else of the shipped ones; a name with a YAML suffix is a path.
 A file with `extends: robots/g1` begins with the keys of that one; a key of its own replaces the
 whole of the other's. YAML is read as version 1.2 does it (`yaml_scalars`).
 """
@@ -32,7 +32,7 @@ def load(
     name_or_path: str | Path | None,
     overrides: Mapping[str, object] | None = None,
 ) -> Config:
-    """Return a configuration, with its defaults where the file says nothing.
+    """Return a configuration, with defaults for what the file does not set.
 
     Args:
         cls: A frozen pydantic dataclass.
@@ -216,7 +216,7 @@ def _is_branch(part: int | str) -> bool:
 
 
 def _keys_at(cls: Any, path: list[str]) -> list[str]:
-    """Return the keys that a dataclass allows at a path; none where it cannot be told."""
+    """Return the keys that a dataclass allows at a path; none where they are unknown."""
     for key in path:
         candidates = [c for c in (cls, *get_args(cls)) if is_dataclass(c)]
         if not candidates:

@@ -154,7 +154,7 @@ def _spans(hard: Bool[np.ndarray, " S"], reach: int) -> Iterator[slice]:
 def _slowed(robot: Robot, motion: Feasible, config: RetargetConfig) -> Feasible | None:
     """Return the motion solved again at the tempo that its steps need.
 
-    None where none asks, or where a hard bar would be broken.
+    None where none needs it, or where a hard bar would be broken.
     """
     aims = motion.aims
     slack = _slacks(robot, motion, config, tempo.GRID)
@@ -175,7 +175,7 @@ def _slowed(robot: Robot, motion: Feasible, config: RetargetConfig) -> Feasible 
     )
     solved = _solved(robot, slower, config.repair.weights[0], config)
     kept = _accepted(robot, slower, solved, config)
-    # Limbs that passed through each other between two steps are seen to do so when slowed down.
+    # Limbs that passed through each other between two steps show it when slowed down.
     return kept if _holds(robot, kept, config) else None
 
 

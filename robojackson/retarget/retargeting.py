@@ -67,7 +67,7 @@ def retarget_motion(
         found, floor_mm = optimise(aims, robot, config)
         hovering = hovers(robot, found.qpos, aims.dt)
         if hovering.mean() > BARS["unsupported_share"] / 2 and aims.airborne.any():
-            _log.info("a flight that does not fall is taken back: solving again")
+            _log.info("removed a flight that does not fall: solving again")
             upright = with_tails(
                 targets(clip, robot, hovering[tailed.clip]), robot, config.tails
             ).aims

@@ -27,7 +27,7 @@ def score(
 
     Args:
         aims: What the solver followed: contacts, and keypoints that may be leaned over the feet.
-        upright: The dancer's own keypoints, which fidelity is told against; `aims` when None.
+        upright: The dancer's own keypoints, which fidelity is measured against; `aims` when None.
     """
     card = {
         "steps": float(len(motion)),

@@ -1,4 +1,4 @@
-"""The gate: refuses a reference motion that training cannot follow, and says what would mend it."""
+"""The gate: refuse a reference motion that training cannot follow, and name the remedy."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -27,7 +27,7 @@ BARS: Mapping[str, float] = {
 }
 """Largest allowed value of each gated figure (issue 2, stage 4)."""
 
-_FINDINGS = 2  # that an error message tells
+_FINDINGS = 2  # that an error message lists
 _TRIM = "(`robojackson dance CLIP --start S --end S`)"
 _MENDING = {
     "infeasible_share": f"tempo: auto, a shorter range of the clip {_TRIM}, or a stronger robot",
@@ -59,11 +59,11 @@ def check(card: Mapping[str, Any]) -> None:
     """Apply the gate of training to a card with figures and findings (`scorecard_record`).
 
     Raises:
-        RejectedReference: A figure is over its bar; the message names it and what may mend it.
+        RejectedReference: A figure is over its bar; the message names it and the remedy.
     """
     if not set(BARS) & set(card):
         raise RejectedReference(
-            "reference refused: it has no score card, so nobody knows whether the robot can follow "
+            "reference refused: without a score card, nothing shows whether the robot can follow "
             "it",
             "make one with `robojackson retarget`",
             forcible=True,

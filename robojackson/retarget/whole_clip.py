@@ -57,7 +57,7 @@ class Optimised:
 
 
 def optimise(aims: Targets, robot: Robot, config: RetargetConfig) -> tuple[Optimised, float]:
-    """Solve a clip for its targets; a solution that cannot hold the bars gives way to the next.
+    """Solve a clip for its targets; a solution that misses the bars is replaced by the next.
 
     Returns the solution and the kinematic floor: the mean keypoint error of every frame by itself,
     without contacts, smoothness or speed limits, millimetres.
@@ -124,7 +124,7 @@ def _solutions(
     """Yield the coarse solutions, cheapest first; last, one that never lets limbs pass through each
     other.
 
-    Limbs that have tunnelled stay tangled whatever the weights; from the rest pose, where they are
+    Limbs that have tunnelled stay tangled with any weights; from the rest pose, where they are
     free, a strong repulsion keeps them so.
     """
     rest, how = rest_start(problem), config.solver
@@ -156,7 +156,7 @@ def _stand_upright(
 
 @dataclass(frozen=True)
 class Faults:
-    """Which bars a solution breaks, and by how much."""
+    """The bars that a solution breaks, and by how much."""
 
     deepest_m: float
     fastest: float

@@ -23,7 +23,7 @@ ACTION_SCALE_RAD = 0.5
 
 @dataclass(frozen=True)
 class Actuation:
-    """What drives the hinges, in the order of qpos.
+    """Drives of the hinges, in the order of qpos.
 
     Attributes:
         torque_limit: Nm; infinite without a motor.
@@ -105,7 +105,7 @@ def torque_limits(
     first.
 
     A motor gives gear times gain times control range, several of one joint together; one without a
-    range, or a position or velocity servo, whatever its force range allows; the joint's own force
+    range, or a position or velocity servo, what its force range allows; the joint's own force
     range bounds all.
     """
     limit = np.full(len(joints), np.inf)

@@ -1,4 +1,4 @@
-"""What a robot must be: a free root with limited hinges, mirrored sides, level soles at rest."""
+"""Requirements of a robot: a free root with limited hinges, mirrored sides, level soles at rest."""
 
 import mujoco
 import numpy as np

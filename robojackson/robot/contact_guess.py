@@ -1,4 +1,4 @@
-"""Balls under the feet of a model that nobody has described: the corners of what it stands on.
+"""Balls under the feet of a model without a description: the corners of what it stands on.
 
 A foot that is one ball gets one contact; any other those four of its lowest points that are
 furthest out. Metres; x forward, y left, z up in the zero pose.

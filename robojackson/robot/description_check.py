@@ -1,7 +1,7 @@
 """Everything that is wrong with a robot description, a line each, in one go.
 
 `load_robot` stops at the first error; here every name is looked up by itself, and what a robot can
-be loaded with although it is hardly meant is told, too.
+be loaded with although it is hardly meant is reported, too.
 """
 
 from collections.abc import Callable, Iterator
@@ -96,7 +96,7 @@ def _out_of_range(robot: Robot) -> Iterator[str]:
     for name, rest, low, high in zip(
         robot.joint_names, robot.rest, robot.lower, robot.upper, strict=True
     ):
-        if rest and not low <= rest <= high:  # zero is where nobody said anything
+        if rest and not low <= rest <= high:  # zero where nothing is given
             yield f"{place}.{name} is {rest:g}: beyond its range, {low:.3g} to {high:.3g} radians"
 
 

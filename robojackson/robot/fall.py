@@ -1,4 +1,4 @@
-"""When a robot has fallen: the rule of its description, bound to its size. Metres, radians."""
+"""Fall detection: the rule of the robot's description, bound to its size. Metres, radians."""
 
 from dataclasses import dataclass
 

@@ -1,6 +1,6 @@
 """A first description of a model, guessed from its names and its kinematic tree, as YAML to edit.
 
-Every line says what it was guessed from; what could not be told is a comment in its place.
+Every line names what it was guessed from; what could not be found is a comment in its place.
 """
 
 import json
@@ -27,7 +27,7 @@ BENT_RAD = 0.3
 SIDEWAYS = 0.9
 """Least share of y in the axis of a hinge that bends a leg forward."""
 SUBSTEPS, SHORTEST_S, LONGEST_S, USUAL_S = 5, 0.01, 0.03, 0.015
-"""Of a control step; training takes five steps of the model unless it is told otherwise."""
+"""Of a control step; training takes five steps of the model by default."""
 SIDE = re.compile("left|right", re.IGNORECASE)
 PLAIN = re.compile(r"(?!(?:true|false|null)$)[A-Za-z_][\w./-]*$", re.IGNORECASE)
 
@@ -39,7 +39,7 @@ class Draft:
     Attributes:
         name: Of the robot.
         text: The YAML.
-        guessed: Keys that want a look: no name said them.
+        guessed: Keys to check: no name gave them.
         left: Keys that nothing was found for.
     """
 
@@ -78,8 +78,8 @@ def first_description(path: Path, folder: Path, name: str) -> Draft:
     left += ["torque_limits"] if None in undriven.values() else []
     guessed = [f"sites.{key}" for key, guess in keypoints.items() if not guess.sure]
     lines = [
-        f"# {name}: a first description by `robojackson robots new`. A line with GUESS is not said",
-        "# by a name of the model; see it in the picture of `robojackson robots check`.",
+        f"# {name}: a first description by `robojackson robots new`. A line with GUESS is not",
+        "# given by a name; check it in the picture of `robojackson robots check`.",
         f"name: {_text(name)}",
         f"mjcf: {_text(_place(path, folder))}",
         f"root_body: {_text(model.body(skeleton.root).name)} # "

@@ -43,7 +43,7 @@ def remove(
     joints: Collection[str] = frozenset(),
     actuators: Collection[int] = frozenset(),
 ) -> None:
-    """Delete joints by name, actuators by index, and whatever refers to them.
+    """Delete joints by name, actuators by index, and everything that refers to them.
 
     That is tendons over the joints; actuators, equality constraints and sensors of joints and
     tendons; sensors of the actuators; and all keyframes, which hold a number a joint and actuator.

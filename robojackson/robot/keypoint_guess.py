@@ -1,4 +1,4 @@
-"""Where the human keypoints are on a model that nobody has described, and how sure that is.
+"""Find the human keypoints on a model without a description, and how sure that is.
 
 A joint of several hinges is where their axes come closest. Metres, in the frame of the body.
 """
@@ -26,7 +26,7 @@ class Guess:
         body: Name.
         offset: In the body, metres.
         why: What it was guessed from.
-        sure: Whether names say it.
+        sure: Whether names give it.
     """
 
     body: str

@@ -1,4 +1,4 @@
-"""Legs and arms of a model that nobody has described: from names where they say it, else the tree.
+"""Find legs and arms of a model without a description: from names, else from the tree.
 
 World frame of the zero pose: x forward, y left, z up, metres. Hinges are joint indices.
 """
@@ -36,7 +36,7 @@ class Limb:
     Attributes:
         bodies: From the first that the other side does not share to the tip.
         parts: Name of each joint (hip, knee, ankle; shoulder, elbow, wrist) -> its hinges.
-        named: Whether names say which is which; else the distances of the hinges do.
+        named: Whether names identify them; else the distances of the hinges do.
     """
 
     bodies: tuple[int, ...]

@@ -127,7 +127,7 @@ class Robot:
 
     @cached_property
     def standing(self) -> Float[np.ndarray, " nq"]:
-        """qpos of the rest pose, upright above the origin, root at its height in the MJCF."""
+        """The qpos of the rest pose, upright above the origin, root at its height in the MJCF."""
         qpos = self.model.qpos0.copy()
         qpos[7:] = np.clip(self.rest, self.lower, self.upper)
         result: np.ndarray = qpos

@@ -1,4 +1,4 @@
-"""What a robot description changes in its MJCF before it is compiled: joints, motors, stepping.
+"""Changes to an MJCF before it is compiled: joints, motors, stepping of the description.
 
 Metres, seconds, newton-metres. What the description does not name stays as the MJCF has it, so a
 description without these keys compiles to the stock model.
@@ -99,7 +99,7 @@ def integrator_of(name: str) -> mujoco.mjtIntegrator:
 
 
 def is_plane(geom: mujoco.MjsGeom) -> bool:
-    """Return whether a geom of a spec is an endless floor."""
+    """Return whether a geom of a spec is an infinite floor."""
     return bool(geom.type == mujoco.mjtGeom.mjGEOM_PLANE)
 
 

@@ -1,4 +1,4 @@
-"""From solved poses to a reference motion at the control step of the robot.
+"""Resample solved poses to a reference motion at the robot's control step.
 
 Hinges and root by cubic spline, the root quaternion by a cubic spline of its components, made unit;
 velocities are MuJoCo's tangent differences over two steps. Metres, radians, seconds, world frame.

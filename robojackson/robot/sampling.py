@@ -1,7 +1,7 @@
 """A robot's motion at the frame rate that another project's files have.
 
 qpos in MuJoCo's order: root xyz (metres, world), root quaternion wxyz, hinges (radians). A cyclic
-reference gives one cycle: no format of the field can say that a motion repeats.
+reference gives one cycle: no format of the field can express that a motion repeats.
 """
 
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ class SampledMotion:
         fps: Frames a second; frame t is at t / fps seconds.
         qpos: MuJoCo positions, root quaternion wxyz.
         qvel: MuJoCo velocities: root linear in the world, root angular in the body, hinges; None
-            where a file does not say.
+            where a file does not give it.
     """
 
     fps: float

@@ -89,5 +89,5 @@ def _cause(run_id: str, code: int, work: Path, last: deque[str]) -> TrainingFail
         if -code == signal.SIGKILL:
             how += " (by hand, or out of memory)"
         return TrainingCrashed(f"run {run_id} {how}; {log}; the same command resumes it")
-    said = last[-1] if last else "it said nothing"
+    said = last[-1] if last else "no message"
     return TrainingFailed(f"run {run_id} ended with exit code {code}: {said}; {log}")

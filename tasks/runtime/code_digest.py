@@ -1,4 +1,4 @@
-"""What a stage computes, as one digest: the syntax trees of the modules that it reaches.
+"""Digest of a stage's code: the syntax trees of the modules that it reaches.
 
 Imports are followed statically, also those inside functions. Comments, docstrings and layout are
 not in a syntax tree, so they change nothing; a changed formula does.
@@ -24,7 +24,7 @@ LAYOUT = (
     "robojackson.files.table_types",
     "robojackson.pipeline.table_schemas",
 )
-"""Modules that say how results stand in files."""
+"""Modules that define how results are laid out in files."""
 NOT_FOLLOWED = frozenset(("robojackson.files", "robojackson.pipeline"))
 """Packages that carry values and files and compute nothing; a change of the layout of tables is in
 every key by itself (`layout`)."""
@@ -223,7 +223,7 @@ def _folder_of(package: str) -> Path:
 
 @cache
 def layout() -> str:
-    """Return the digest of how results stand in files: a table of an older layout could not be
+    """Return the digest of the layout of result files: a table of an older layout could not be
     read."""
     files = [Path(str(import_module(name).__file__)) for name in LAYOUT]
     return hashlib.sha256("".join(bare_tree(f.read_text()) for f in files).encode()).hexdigest()

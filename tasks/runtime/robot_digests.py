@@ -19,7 +19,7 @@ def robot_models(parameters: Mapping[str, Any]) -> list[str]:
 def robot_file(robot: RobotDescription, work: Path) -> Path:
     """Write the description of a robot for a process; return its path.
 
-    The motion that the process reads does not say where the description is, since it may have been
+    The motion that the process reads does not name its description's place, as it may have been
     made on another machine.
     """
     path = work.absolute() / "robot.yaml"

@@ -72,7 +72,7 @@ def labelled(name: str) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class KeyRecipe:
-    """What the cache keys of a stage are made of.
+    """Ingredients of the cache keys of a stage.
 
     Attributes:
         name: Of the stage.
@@ -220,7 +220,7 @@ def identity(value: Any) -> Any:
     """Return what a value is, in JSON: artifacts by content, configurations by class and fields.
 
     Raises:
-        TypeError: a value whose content cannot be told, such as a path.
+        TypeError: a value without a content, such as a path.
     """
     if isinstance(value, Artifact):
         return {"sha256": value.sha256}

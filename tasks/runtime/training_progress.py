@@ -18,7 +18,7 @@ EVERY_S, LATER_S, SHARE = 5.0, 30.0, 0.05
 
 @asynccontextmanager
 async def show_progress(work: Path, name: str) -> AsyncIterator[None]:
-    """Show what a training in `work` says of itself for the time of a block, and where it ended."""
+    """Show the progress of a training in `work` for the time of a block, and where it ended."""
     bar = _Bar(work / FILE, name)
     watcher = asyncio.create_task(bar.watch())
     try:

@@ -1,7 +1,7 @@
 """Processes that take work off the flow: decoding strangers' videos uses all cores and may crash.
 
 They are kept for the whole flow, because loading the pose model takes seconds. A clip that kills
-its process harms no other: whatever was under way is done again, each in a process of its own.
+its process harms no other: work under way is done again, each in a process of its own.
 """
 
 import os

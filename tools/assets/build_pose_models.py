@@ -1,6 +1,6 @@
 """Build MediaPipe's pose bundles (.task) from the npm package that carries the same networks.
 
-PoseLandmarker reads a zip of two TensorFlow Lite models, each with metadata that says how the image
+PoseLandmarker reads a zip of two TensorFlow Lite models, each with metadata on how the image
 is normalised. The package `@mediapipe/pose` (Apache-2.0) has the three landmark networks and the
 detector, without that metadata. This tool adds it and zips them; the bytes are reproducible, so
 both the tarball and every bundle are checked by sha256.

@@ -1,4 +1,4 @@
-"""One clip of pairs: a motion, a person, a camera, things in the way; BlazePose looks at it all."""
+"""One clip of pairs: a motion, a person, a camera, occluders; BlazePose's detections of it."""
 
 from dataclasses import replace
 from pathlib import Path

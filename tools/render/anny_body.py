@@ -1,7 +1,7 @@
 """A parametric human body (Anny) put into the poses of a motion file.
 
 Anny's world: x left, y backward (the body faces -y), z up; metres. Its 104 bones are posed by world
-orientations: limbs point along the motion's limbs whatever the body's rest pose is, the spine and
+orientations: limbs point along the motion's limbs for any rest pose, the spine and
 neck share the bend between their ends.
 """
 

@@ -1,4 +1,4 @@
-"""Author the bundled hip-shake: a cyclic dance of one lap, written as a DeepMimic motion file.
+"""Author the bundled hip-shake: a cyclic dance of one cycle, written as a DeepMimic motion file.
 
     python -m tools.render.hip_shake -o hip_shake.txt
     python -m tools.render.render_dancer hip_shake.txt -o clips/hip_shake
@@ -6,7 +6,7 @@
 The pelvis sways from foot to foot and rolls, the chest leans and turns against it, the arms swing
 lightly with bent elbows, both feet stay planted: hips and feet are given and the legs follow by
 two-bone inverse kinematics on the body that will be filmed. Every curve is a smooth function of
-phases that grow by whole turns in a lap, so the last frame continues in the first with every
+phases that grow by whole turns in a cycle, so the last frame continues in the first with every
 derivative.
 
 The figures are chosen for a robot with ball feet, hips that close by 5 degrees, shoulders of two
@@ -40,21 +40,21 @@ LEFT, RIGHT = 1.0, -1.0
 
 @dataclass(frozen=True)
 class Dance:
-    """The choreography; degrees where it says so, else metres and seconds.
+    """The choreography; degrees where noted, else metres and seconds.
 
     Attributes:
-        lap_s: Length of a lap.
-        sways: Left-right sways in a lap.
+        lap_s: Length of a cycle.
+        sways: Left-right sways in a cycle.
         fps: Frames a second of the file.
-        rubato: Radians by which the sway runs ahead of and behind the beat within a lap.
-        swell: Share by which the sway's width grows and shrinks within a lap.
+        rubato: Radians by which the sway runs ahead of and behind the beat within a cycle.
+        swell: Share by which the sway's width grows and shrinks within a cycle.
         sway: Half the way of the pelvis between the feet.
         roll_deg: Pelvis roll at the end of a sway, the loaded hip up.
         pelvis_yaw_deg, chest_yaw_deg: Turn of the pelvis, and of the chest against it.
         chest_roll_deg: Lean of the chest against the sway.
         lean_deg: Forward lean of the trunk.
         bounce: Rise of the pelvis over a foot above the middle of the sway, half of it.
-        dip: Half the slow change of the knee bend within a lap.
+        dip: Half the slow change of the knee bend within a cycle.
         half_stance: From the middle to an ankle.
         toe_out_deg: Of each foot.
         knee_deg: Mean bend of the knees at the middle of the sway.
@@ -94,7 +94,7 @@ class Dance:
 
 @dataclass(frozen=True)
 class Measures:
-    """What the choreography must know of the body, metres.
+    """Measures of the body for the choreography, metres.
 
     Attributes:
         hips: From the root to the left and the right hip, upright.

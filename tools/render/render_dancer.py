@@ -28,11 +28,11 @@ logger = logging.getLogger("render_dancer")
 
 @dataclass(frozen=True)
 class Shot:
-    """How a motion is filmed.
+    """Camera and length of a rendered clip.
 
     Attributes:
         yaw: Degrees that the camera goes around the dancer; 0 is the front.
-        loops: Laps of the motion.
+        loops: Cycles of the motion.
         fps: Frames a second of the video.
         width, height: Pixels.
         quality: Constant rate factor of H.264; lower is better and larger.

@@ -40,7 +40,7 @@ QUICK = {
     "PREFECT_RUNNER_POLL_FREQUENCY": "2",
     "ROBOJACKSON_SILENCE_S": os.environ.get("ROBOJACKSON_SILENCE_S", "75"),
 }
-"""For a stack that is tested: workers that ask often, and runs that are soon given up (on a machine
+"""For a stack under test: workers that poll often, and runs that are soon given up (on a machine
 that is busy, set the variable: a run whose imports take 150 s would be given up)."""
 CLIENT = "flow-worker"
 """The service whose environment a command beside the stack gets."""
@@ -89,7 +89,7 @@ class Stack:
         return self
 
     def start(self, name: str, wait: bool = True) -> None:
-        """Start a service, as many of it as the scale asks for.
+        """Start a service, as many of it as the scale sets.
 
         Args:
             wait: Return when it is healthy, or has ended well.
@@ -217,6 +217,7 @@ def running(folder: Path, **options: Any) -> Iterator[Stack]:
 
 
 def main() -> None:
+    """Run the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )

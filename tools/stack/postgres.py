@@ -21,9 +21,9 @@ def service(settings: Mapping[str, str], check: str, port: int, folder: Path, lo
     """Return the database server of a stack.
 
     Args:
-        wanted: Environment of the image: POSTGRES_USER, POSTGRES_PASSWORD, POSTGRES_DB.
+        settings: Environment of the image: POSTGRES_USER, POSTGRES_PASSWORD, POSTGRES_DB.
         check: The file's health check, a line of shell.
-        port, folder, log: Where it listens, keeps its data's path, and says what it does.
+        port, folder, log: Where it listens, keeps its data's path, and writes its log.
     """
     home = _home(folder)
     user = USER if os.geteuid() == 0 else None

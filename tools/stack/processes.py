@@ -34,7 +34,7 @@ class Found:
 
 
 STOPPED, DEAD = ("T", "t"), ("", "Z", "X")
-"""States of the kernel: stopped by a signal; gone, or waiting to be asked for."""
+"""States of the kernel: stopped by a signal; gone, or waiting to be reaped."""
 SOON_S = 5.0
 
 
@@ -47,7 +47,7 @@ def _all() -> Iterator[Found]:
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit() and (home := _home(entry)):
             words = (entry / "cmdline").read_bytes() if entry.exists() else b""
-            if words:  # a dead process that nobody has asked for yet has none
+            if words:  # a dead process that was not reaped yet has none
                 command = words.replace(b"\0", b" ").decode(errors="replace").strip()
                 yield Found(int(entry.name), command, home)
 

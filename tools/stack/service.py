@@ -32,7 +32,7 @@ class Service:
         command: Words of the process.
         environment: Whole environment of the process.
         check: Command that succeeds when the service is healthy; None for one that ends by itself.
-        log: File that takes what it says.
+        log: File that takes its output.
         user: Name of the user that runs it, if another than ours.
         grace_s: Time to end by itself before it is killed.
     """
@@ -47,6 +47,7 @@ class Service:
     process: subprocess.Popen[bytes] | None = None
 
     def start(self) -> None:
+        """Start the process."""
         with self.log.open("ab") as out:
             self.process = subprocess.Popen(
                 self.command,
@@ -104,7 +105,7 @@ class Service:
         return self.process.wait(SECONDS_TO_END) == -signal.SIGKILL
 
     def stop(self) -> None:
-        """End it: ask, wait, kill."""
+        """End it: SIGTERM, wait, SIGKILL."""
         if self.process is not None:
             request = signal.SIGINT if self.user else signal.SIGTERM
             end_group(self.process, self.grace_s, request)
@@ -133,7 +134,7 @@ def _variable(found: re.Match[str], given: Mapping[str, str]) -> str:
 
 
 def free_port() -> int:
-    """Return a port that nobody listens on now."""
+    """Return a port on which nothing listens now."""
     with socket.socket() as found:
         found.bind(("127.0.0.1", 0))
         return int(found.getsockname()[1])

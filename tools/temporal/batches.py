@@ -33,7 +33,7 @@ class Batch:
 
     Attributes:
         flat, local, visibility: As in `features.ClipView`, of the landmarks that are read.
-        constant: What the network is told of the clip.
+        constant: What the network knows of the clip.
         distance: Of the hips as placed, metres.
         truth: Of the same landmarks, NaN-free, metres.
         good: 1 in the frames that count, else 0.
@@ -57,7 +57,7 @@ class Batch:
 
 @dataclass(frozen=True)
 class Change:
-    """How much windows are changed.
+    """Strength of the augmentation of windows.
 
     Attributes:
         frames: Length of a window.

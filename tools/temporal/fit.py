@@ -20,7 +20,7 @@ from tools.temporal.net import Lifter
 
 @dataclass(frozen=True)
 class FitConfig:
-    """How the lifter is fitted.
+    """Configuration of fitting the lifter.
 
     Attributes:
         steps: Of the optimiser.
@@ -46,7 +46,7 @@ class FitConfig:
 
 @dataclass
 class Progress:
-    """All that a run needs to go on."""
+    """State that a run needs to resume."""
 
     step: int
     net: Lifter
@@ -57,7 +57,7 @@ class Progress:
 
 @dataclass(frozen=True)
 class Source:
-    """Where batches come from."""
+    """Source of batches."""
 
     real: Batch
     invented: Batch | None

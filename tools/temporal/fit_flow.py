@@ -1,7 +1,7 @@
 """Fitting the flow on the lifter's errors, with NIKI's losses (Li et al., CVPR 2023).
 
 Inverse: the error's z is likely under an AR(1) process of standard normals. Forward: z = 0 is the
-lifter's own answer. Boundary: a clean clip has z = 0. Independence: z tells nothing of the pose
+lifter's own answer. Boundary: a clean clip has z = 0. Independence: z carries nothing of the pose
 (maximum mean discrepancy between (pose, z) and (pose, noise)).
 """
 

@@ -1,7 +1,7 @@
 """Does the camera stand still? Displacement of the background between two frames, a few a second.
 
 Corners outside the person's box are followed by Lucas-Kanade; the camera moved if most of them did
-(the median: somebody who walks by is a few corners). Displacements are shares of the image's
+(the median: a person who walks by is a few corners). Displacements are shares of the image's
 diagonal, a frame.
 """
 

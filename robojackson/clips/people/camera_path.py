@@ -1,4 +1,4 @@
-"""How the camera moved: the background of every frame laid onto that of the first.
+"""Motion of the camera: register the background of every frame with that of the first.
 
 Corners outside the person's box are followed by Lucas-Kanade from frame to frame; what most of them
 did together (RANSAC) is the camera's motion as a homography, exact for a camera that turns or zooms
@@ -29,7 +29,7 @@ CORNERS, FEWEST = 160, 12
 CELLS = 3, 4
 """Rows and columns of the image that share the corners evenly."""
 RENEW = 0.6
-"""Corners are found anew when fewer than this share of them is left."""
+"""Corners are found again when fewer than this share of them is left."""
 INLIER = 1.5
 """Pixels of the small picture; a corner further off did not move with the background."""
 AGREED = 0.5
@@ -68,7 +68,7 @@ class CameraPath:
 
     @property
     def moved(self) -> bool:
-        """Whether the camera moved, as far as it was seen."""
+        """Whether the camera moved, as far as the background shows it."""
         return bool(self.stray > STILL)
 
     @property
@@ -103,7 +103,7 @@ def camera_path(
 
     Args:
         images: RGB frames, upright, of any one size.
-        landmarks: Of the person, 0..1, NaN where nobody was found.
+        landmarks: Of the person, 0..1, NaN where no person was detected.
         width, height: Of the full upright image, pixels.
     """
     chain = _Chain()

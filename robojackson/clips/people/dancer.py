@@ -1,8 +1,8 @@
 """The dancer of a clip in which there may be others: one person, the same from first to last frame.
 
-A clip of one is looked at once. Where a few frames show somebody else, everybody is looked for in
-every frame (`person_detection`) and told apart (`identity`); then the dancer is followed as if he
-were alone, with all others painted over, because the detector sees best whom it follows. The
+A clip of one person is processed once. Where a few frames show another, all people are detected in
+every frame (`person_detection`) and identified (`identity`); then the dancer is followed as if
+alone, with all others painted over, because the detector is best on the person it follows. The
 largest steady person is number 1 and danced by default.
 """
 
@@ -36,15 +36,15 @@ Progress = Callable[[int, int], None]
 
 @config_dataclass
 class DancerConfig:
-    """How the dancer is found among others.
+    """Configuration of following one dancer among others.
 
     Attributes:
-        number: Whom to dance: 1 is the largest steady person, None too.
-        scouts: The few frames in which somebody else is looked for.
+        number: The person to follow: 1 is the largest steady person, and so is None.
+        scouts: The few frames in which other people are looked for.
         detection, identity: Of everybody in every frame.
-        astray: Body heights; a row further than this from where the person must be is another's.
+        astray: Body heights; a detection further than this from the expected place is another's.
         crowding: People nearer than this hide one another, body heights.
-        longest_gap_s: He is looked for in gaps up to this, seconds.
+        longest_gap_s: Longest gap in which the person is looked for, seconds.
     """
 
     number: int | None = Field(default=None, ge=1)
@@ -69,10 +69,10 @@ def track_dancer(
         path: Video file.
         info: What `probe` found in it.
         size: lite, full or heavy.
-        config: Whom to follow, and how.
+        config: Which person to follow, and how.
         progress: Called with (frames done, frames in all); others in view make it several passes.
     Raises:
-        NoPersonFound: there is no person of that number; the message tells who is there.
+        NoPersonFound: there is no person of that number; the message lists the people.
         MissingDependency: no model bundle, or no EGL and GLES libraries.
     """
     if config.number is None or config.number == 1:
@@ -97,7 +97,7 @@ def track_dancer(
 def _scouted(
     path: Path, info: VideoInfo, size: str, config: DancerConfig, progress: Progress | None
 ) -> tuple[LandmarkTrack, bool]:
-    """Return the track of a person who is alone, and whether somebody else was seen in a few
+    """Return the track of a person who is alone, and whether another person was detected in a few
     frames."""
     with still_landmarker(SCOUT) as landmarker:
         scouts = People(info.frames, info.fps, landmarker, config.scouts)

@@ -1,7 +1,7 @@
-"""Who is who: the detections of all frames put together to one track a person.
+"""Identity: join the detections of all frames to one track a person.
 
-The ends of the tracklets in which nobody can be mistaken are linked to the beginnings of later
-ones, all at once (a path cover of least cost, by the Hungarian method): two who cross are told
+The ends of unambiguous tracklets are linked to the beginnings of later
+ones, all at once (a path cover of least cost, by the Hungarian method): two who cross are kept
 apart by where both were going, by their sizes and by their colours. What was seen of the two as
 one is left out when it is short, and goes to whom it fits best when it is long.
 """
@@ -24,7 +24,7 @@ NEAR = 30
 
 @config_dataclass
 class IdentityConfig:
-    """How much may change from one detection of a person to the next.
+    """Allowed changes from one detection of a person to the next.
 
     Attributes:
         tracklets: What a tracklet is.
@@ -38,8 +38,8 @@ class IdentityConfig:
         growth: Change of size, ratio.
         colour: Change of the mean colours, units of CIELAB.
         parting: Cost of ending one person and beginning another, unitless.
-        shortest_s: Who is seen for less than this is nobody, seconds.
-        least_share: Who is seen in less than this share of the clip is nobody.
+        shortest_s: Shortest time for which a person is visible, seconds.
+        least_share: Least share of the clip in which a person is visible.
     """
 
     tracklets: TrackletConfig = Field(default_factory=TrackletConfig)

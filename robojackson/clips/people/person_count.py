@@ -1,8 +1,8 @@
-"""How many people are in a clip. The paper could not tell two dancers apart.
+"""Count the people in a clip. The paper could not separate two dancers.
 
-PoseLandmarker asked for several people at once finds one of two who stand side by side in every
-second frame (measured), so a few frames a second are asked again with whoever was found painted
-over, until nobody is left.
+PoseLandmarker with several poses finds one of two people who stand side by side in every
+second frame (measured), so a few frames a second are processed again with found people painted
+over, until none is left.
 """
 
 from typing import Any

@@ -1,9 +1,9 @@
 """Everybody in one picture. BlazePose finds one person well and a second one badly.
 
-Asked for several people at once, PoseLandmarker misses one of two who stand side by side in every
+With several poses, PoseLandmarker misses one of two people who stand side by side in every
 second frame, and in most after they crossed (measured): its detector throws away circles that
-overlap. So whoever is found is painted over, limb by limb, and the picture is looked at again until
-nobody is left: 94-99 % of two dancers who cross.
+overlap. So each found person is painted over, limb by limb, and the detector runs again until
+none is left: 94-99 % of two dancers who cross.
 """
 
 from dataclasses import dataclass
@@ -52,7 +52,7 @@ class PersonDetectionConfig:
 
 @dataclass(frozen=True)
 class PersonDetection:
-    """Somebody in one frame.
+    """One person in one frame.
 
     Attributes:
         row: Image xyz, world xyz, visibility of the landmarks.
@@ -84,7 +84,7 @@ def detect_people(
 
 
 def detect_person(landmarker: Any, image: np.ndarray) -> np.ndarray | None:
-    """Return one person in a single picture, (33, 7); None for nobody."""
+    """Return one person in a single picture, (33, 7); None without one."""
     import mediapipe
 
     rows = np.ascontiguousarray(image)

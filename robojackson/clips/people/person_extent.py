@@ -1,4 +1,4 @@
-"""What the landmarks of a clip say of the person: in full view or cut off, and how large."""
+"""Extent of the person in a clip, from landmarks: in full view or cut off, and how large."""
 
 from collections.abc import Sequence
 
@@ -25,7 +25,7 @@ POINTS = {
 }
 """Landmarks of BlazePose."""
 BODY = tuple(name for name in POINTS if not name.endswith(("elbow", "wrist")))
-"""Arms pass behind the body and out of the picture in any dance, so they are not asked for."""
+"""Arms pass behind the body and out of the picture in any dance, so they are not required."""
 MIRROR = (0, 4, 5, 6, 1, 2, 3, 8, 7, 10, 9) + tuple(i + (1 if i % 2 else -1) for i in range(11, 33))
 """Number of the landmark that each one becomes in a mirror."""
 
@@ -84,7 +84,7 @@ def stature(points: Float[np.ndarray, "*T 33 2"]) -> Float[np.ndarray, "*T"]:
 def box(
     xy: Float[np.ndarray, "33 2"], margin: float, width: int, height: int
 ) -> tuple[int, int, int, int] | None:
-    """Return the person's box (x0, y0, x1, y1) in pixels of an image, None when nobody is in it.
+    """Return the person's box (x0, y0, x1, y1) in pixels of an image, None without a person.
 
     Args:
         xy: Landmarks in image coordinates, 0..1.

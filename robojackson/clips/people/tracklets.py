@@ -1,8 +1,8 @@
-"""Stretches of frames in which one person was followed and nobody could be taken for another.
+"""Stretches of frames in which one person was followed without ambiguity.
 
 From one frame to the next, people are matched by the Hungarian method. Where they touch (two claim
 one detection, one vanishes or appears beside another) the tracklets of all of them end; what
-follows beside somebody who vanished may be either of the two, and says so. Pixels and seconds.
+follows beside a person who vanished may be either of the two, and is marked. Pixels and seconds.
 """
 
 from collections.abc import Sequence
@@ -45,7 +45,7 @@ class Tracklet:
         place: Middle of the trunk, pixels.
         tall: Stature, pixels.
         colours: Colours.
-        blended: Whether it may be either of two who were seen as one.
+        blended: Whether it may be either of two people detected as one.
     """
 
     frames: list[int] = field(default_factory=list)
@@ -62,6 +62,7 @@ class Tracklet:
             getattr(self, name).extend(getattr(other, name))
 
     def add(self, frame: int, time_s: float, seen: PersonDetection, size: tuple[int, int]) -> None:
+        """Add a detection of a frame."""
         points = seen.row[:, :2] * size
         self.frames.append(frame)
         self.time_s.append(time_s)
@@ -77,7 +78,7 @@ def find_tracklets(
     size: tuple[int, int],
     config: TrackletConfig,
 ) -> list[Tracklet]:
-    """Return the stretches without doubt, and those of two seen as one."""
+    """Return the unambiguous stretches, and those of two people detected as one."""
     done: list[Tracklet] = []
     alive: list[Tracklet] = []
     for index, detections in enumerate(frames):

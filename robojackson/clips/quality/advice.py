@@ -1,4 +1,4 @@
-"""What to do better when a clip is filmed again: kinds with figures; the words are made last.
+"""Advice for filming a clip again: kinds with figures; the words are made last.
 
 Derived from the clip alone, that is from the landmarks and what was measured beside them. The same
 advice is given by `mocap`, by `dance` and by the page of a run.
@@ -31,7 +31,7 @@ LIMITS: Mapping[Kind, float] = {
 }
 """Where advice begins: frames a second, seconds, pixels, share of the frames with a person, share
 of all frames, a count, share of the image's diagonal, grey level 0..1, share of fine detail. Under
-two seconds no evaluation can judge; the pixels are those of a search's filter; the last two are
+two seconds are too short to evaluate; the pixels are those of a search's filter; the last two are
 half of what the bundled clips have at the worst."""
 AT_MOST: tuple[Kind, ...] = ("body_outside", "people", "camera_moves")
 """Figures that are advised against above their limit; the others below it."""
@@ -39,7 +39,7 @@ AT_MOST: tuple[Kind, ...] = ("body_outside", "people", "camera_moves")
 
 @dataclass(frozen=True)
 class Advice:
-    """One thing to do better.
+    """One piece of advice.
 
     Attributes:
         kind: What it is about.
@@ -105,7 +105,7 @@ _WORDS: Mapping[Kind, Callable[[Advice], str]] = {
         "camera upright"
     ),
     "person_missing": lambda a: (
-        f"the person is seen in {a.value:.0%} of the frames: choose a range with --start and "
+        f"the person is detected in {a.value:.0%} of the frames: choose a range with --start and "
         "--end, or film without anything in between"
     ),
     "people": lambda a: (

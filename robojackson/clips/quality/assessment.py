@@ -42,7 +42,7 @@ class AssessmentConfig:
 
 @dataclass(frozen=True)
 class Quality:
-    """What Algorithm 1 does not see.
+    """Figures beyond Algorithm 1.
 
     Attributes:
         frames: Frames in the clip.
@@ -71,7 +71,7 @@ class Quality:
 
 @dataclass(frozen=True)
 class Assessment:
-    """All that is known of a clip.
+    """All figures of a clip.
 
     Attributes:
         info: The file.
@@ -104,7 +104,7 @@ def assess_video(
 
 
 class _Eyes:
-    """All that looks at the frames beside the pose detector."""
+    """All observers of the frames beside the pose detector."""
 
     def __init__(self, info: VideoInfo, config: AssessmentConfig, landmarker: Any) -> None:
         self._info, self._config = info, config

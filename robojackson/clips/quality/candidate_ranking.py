@@ -1,4 +1,4 @@
-"""Which candidate is danced: the lowest score of Algorithm 1 among those that no filter rejects."""
+"""Rank candidates: the lowest score of Algorithm 1 among those that no filter rejects wins."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ Share = Annotated[float, Field(ge=0, le=1)]
 
 @config_dataclass
 class FilterConfig:
-    """What a clip must be. None switches a filter off; its figure stays in the table.
+    """Filters of clips. None switches a filter off; its figure stays in the table.
 
     Attributes:
         rank_by: The score a second or a frame, which do not favour short clips, or the paper's sum.

@@ -1,6 +1,6 @@
 """Is the dancer drawn? The paper's own example of a bad clip is a cartoon that dances.
 
-A pose detector takes a good drawing for a person. What tells it from one is paint: inside a drawn
+A pose detector takes a good drawing for a person. The difference is paint: inside a drawn
 body neighbouring pixels are equal, on skin and cloth light, folds and the camera's noise differ.
 """
 
@@ -55,7 +55,7 @@ class Paint:
 
     @property
     def flat_share(self) -> float:
-        """Share of the body in flat colour, median of the frames; 0 where nobody was found."""
+        """Share of the body in flat colour, median of the frames; 0 without a person."""
         return float(np.median(self._shares)) if self._shares else 0.0
 
 

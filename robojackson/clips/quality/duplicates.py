@@ -1,4 +1,4 @@
-"""Copies of a clip among candidates, mirrored ones included, told by how the person moves.
+"""Copies of a clip among candidates, mirrored ones included, recognised by how the person moves.
 
 A copy may be smaller, cropped, recoloured, recompressed or start later, so pictures are not
 compared but poses: landmarks relative to the hips, divided by the body's height.

@@ -1,4 +1,4 @@
-"""How light and how sharp a person is in the pictures of a clip; a few of them are looked at."""
+"""Brightness and sharpness of a person in a clip, measured on a few frames."""
 
 from collections.abc import Iterable, Iterator
 
@@ -22,7 +22,7 @@ class PictureQuality:
     """Looks at some of the pictures of a clip as they pass by.
 
     Args:
-        landmarks: Of the person in every frame, 0..1, NaN where nobody was found.
+        landmarks: Of the person in every frame, 0..1, NaN where no person was detected.
     """
 
     def __init__(self, landmarks: Float[np.ndarray, "T 33 2"]) -> None:

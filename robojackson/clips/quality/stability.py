@@ -46,7 +46,7 @@ class Stability(TableFile):
     Attributes:
         frames: Frames in the clip.
         detected: Frames in which a person was found.
-        missing_joints: M, landmarks not seen, summed over the clip.
+        missing_joints: M, landmarks not visible, summed over the clip.
         jitter: J, normalised image units, summed over the clip.
         stability_score: M + J; lower is steadier.
         missing_joints_per_frame, jitter_per_frame: M and J divided by the number of frames.
@@ -65,11 +65,13 @@ class Stability(TableFile):
     score_per_second: float
 
     def to_columns(self) -> tuple[Columns, Facts]:
+        """Return the columns and the metadata of the table."""
         names = (column.name for column in STABILITY_SCORE.columns)
         return {name: np.array([getattr(self, name)]) for name in names}, {}
 
     @classmethod
     def from_columns(cls, columns: Columns, facts: Facts) -> "Stability":
+        """Build the object from columns and metadata."""
         return cls(**{name: values[0].item() for name, values in columns.items()})
 
 

@@ -1,7 +1,7 @@
-"""What a detector's word is worth. BlazePose reports a visibility of .99 for what it cannot see.
+"""Correct the detector's visibility: BlazePose reports .99 even for hidden landmarks.
 
 It draws a whole body wherever it finds a part of one, and a face on the back of a head. So its
-visibility is multiplied by what the picture itself tells: nothing outside the image was seen, no
+visibility is multiplied by what the picture allows: nothing outside the image is visible, no
 face of a person who is turned away, and little in frames beside a gap.
 """
 
@@ -23,7 +23,7 @@ FACE = slice(0, 11)
 FROM_BEHIND, NO_FACE = 0.8, 0.2
 """Times the visibility of a body that is seen from behind, and of its face."""
 BACK_WIDTH = 0.15
-"""Trunk lengths between both shoulders, and hips, in the image of somebody who is turned away."""
+"""Trunk lengths between both shoulders, and hips, in the image of a person who is turned away."""
 VISIBLE = 0.3
 """Weighed visibility of a landmark that was seen."""
 TRUNK_SHARE = 0.3
@@ -34,14 +34,14 @@ PARTS = {
     "feet": ("left_ankle", "right_ankle"),
     "arms": ("left_elbow", "right_elbow", "left_wrist", "right_wrist"),
 }
-"""What is told when it is not seen in a larger share of the frames than `NOTED_SHARE`."""
+"""Parts that a note names when they are hidden in more of the frames than `NOTED_SHARE`."""
 
 
 def weigh_visibility(track: LandmarkTrack) -> LandmarkTrack:
-    """Return the track with the visibility that the picture allows, and notes of what was not seen.
+    """Return the track with the visibility that the picture allows, and notes of what was hidden.
 
     Raises:
-        NoPersonFound: the hips are hardly ever seen, as in a clip of a face.
+        NoPersonFound: the hips are hardly ever visible, as in a clip of a face.
     """
     visibility = track.visibility * inside(track) * steady(track)[:, None]
     away = turned_away(track)

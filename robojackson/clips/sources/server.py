@@ -24,7 +24,7 @@ def page(query: str, address: str) -> str:
 def search(
     query: str, address: str, count: int, config: WebConfig, now: datetime
 ) -> list[VideoCandidate]:
-    """Return the video files that a page links to, on the same server; all of them, whatever the
+    """Return the video files that a page links to, on the same server; all of them, for any
     words."""
     page = web_address(address or query)
     if not page:

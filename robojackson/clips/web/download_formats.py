@@ -1,4 +1,4 @@
-"""Which format of a video is downloaded: a small one to score, a good one to dance.
+"""Choose the format to download: a small one to score, a good one to dance.
 
 Robots do not listen, so a format without sound is as good as one with it, and nothing is ever
 merged. The short side of the image counts: shorts stand upright.
@@ -47,7 +47,7 @@ def choose(formats: Sequence[Format], purpose: Purpose, config: FormatConfig) ->
 
 
 def short_side(format_: Format) -> int:
-    """Return pixels of the shorter side of the image; 0 when the format does not tell."""
+    """Return pixels of the shorter side of the image; 0 when the format does not give it."""
     width, height = format_.get("width"), format_.get("height")
     sides = [int(side) for side in (width, height) if side]
     return min(sides) if sides else 0

@@ -1,6 +1,6 @@
-"""Whether a site of the web can be reached at all: one attempt, before anything costly begins.
+"""Check that a site can be reached: one attempt, before anything costly begins.
 
-A search without a network would otherwise start Prefect's server, and ask again and again.
+A search without a network would otherwise start Prefect's server, and retry again and again.
 """
 
 import socket

@@ -1,4 +1,4 @@
-"""Why a request to the web failed, and whether it is worth another try."""
+"""Explain why a request to the web failed, and whether to retry it."""
 
 import math
 import re
@@ -18,7 +18,7 @@ class Failure(NamedTuple):
     """Attributes:
     reason: In one line.
     passing: Whether another attempt makes sense.
-    wait_s: Seconds that the server asks to wait.
+    wait_s: Seconds that the server requests to wait.
     most_retries: How often it makes sense at most; a name that cannot be resolved is soon sure.
     """
 

@@ -1,4 +1,4 @@
-"""What the web says in words: titles, ids and addresses. None of it is trusted.
+"""Text from the web: titles, ids and addresses. None of it is trusted.
 
 A title may hold control characters, a thousand letters or letters that run from right to left; an
 id may be `../../x`. What leaves this module fits into one cell of a table and one part of a path.

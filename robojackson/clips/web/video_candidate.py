@@ -1,4 +1,4 @@
-"""A video that may be danced, as its source tells of it before anything is downloaded."""
+"""A video that may be danced, as its source describes it before anything is downloaded."""
 
 import math
 from collections.abc import Mapping
@@ -24,12 +24,12 @@ class VideoCandidate:
         title: One line.
         query: What was searched for.
         source: Where it was found: `folder`, or the name of yt-dlp's extractor.
-        duration_s: Seconds; None when the source does not tell.
+        duration_s: Seconds; None when the source does not give it.
         view_count: How often it was watched.
         width, height: Pixels.
         thumbnail: Address of a picture, `` without one.
         live: Whether it is, was or will be a live stream.
-        retrieved_at: When the source told this; not part of what the video is.
+        retrieved_at: When the source was queried; not part of the video's identity.
     """
 
     video_id: str
@@ -47,7 +47,7 @@ class VideoCandidate:
 
     @property
     def key(self) -> tuple[str, str]:
-        """What tells two videos apart."""
+        """Identity of a video."""
         return self.source, self.video_id
 
 

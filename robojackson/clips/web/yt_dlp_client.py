@@ -1,7 +1,7 @@
 """The one place that talks to yt-dlp: what an address holds, and the file behind it.
 
 yt-dlp's Python API, quiet, with our retries around it: a server that is busy, silent or cuts the
-line is asked again after 1, 2, 4 ... times the back-off (or when it says; once where the name
+line is retried after 1, 2, 4 ... times the back-off (or when it says; once where the name
 cannot be resolved), and a file goes on where it stopped. Every failure becomes one line of reason.
 Sizes in bytes, times in seconds.
 """
@@ -36,7 +36,7 @@ class WebConfig:
     Attributes:
         retries: How often a request that failed for now is made again.
         backoff_s: Wait before the first of them, seconds; it doubles each time.
-        longest_wait_s: Longest wait that a server may ask for, seconds.
+        longest_wait_s: Longest wait that a server may request, seconds.
         timeout_s: Longest silence of a server, seconds.
         longest_download_s: Longest time that one file may take, seconds.
         rate_limit_bytes_s: Fastest download, bytes a second; None is no limit.
@@ -44,7 +44,7 @@ class WebConfig:
         largest_file_mb: A file beyond this is not downloaded, megabytes.
         cookies_file: Netscape cookie file that is passed through.
         proxy: Address of a proxy that is passed through.
-        language: Two letters in which titles are asked for; empty is the site's own choice.
+        language: Language of the titles, two letters; empty is the site's own choice.
     """
 
     retries: int = Field(default=4, ge=0)
@@ -178,7 +178,7 @@ def _download(info: Mapping[str, Any], options: dict[str, Any]) -> None:
 
 
 def _selector(purpose: Purpose, formats: FormatConfig) -> Callable[[Mapping[str, Any]], Any]:
-    """Return our choice in the form in which yt-dlp asks for it."""
+    """Return our choice in the form that yt-dlp expects."""
 
     def select(context: Mapping[str, Any]) -> Any:
         chosen = choose(context["formats"], purpose, formats)
@@ -216,7 +216,7 @@ def _patiently(attempt: Callable[[], Result], config: WebConfig) -> Result:
                 tried = f" ({number + 1} attempts)" if number else ""
                 raise DownloadFailed(f"{reason}{tried}") from cause
             wait_s = min(max(config.backoff_s * 2**number, retry_after_s), config.longest_wait_s)
-            log.info("%s; again in %.3g s", reason, wait_s)
+            log.info("%s; retrying in %.3g s", reason, wait_s)
             time.sleep(wait_s)
     raise AssertionError("unreachable")
 

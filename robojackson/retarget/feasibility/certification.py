@@ -1,7 +1,7 @@
 """Certify a motion: which steps the robot can do, which joint or contact fails in the others.
 
 A step fails for a torque when it would be feasible without torque limits; otherwise nothing that
-the soles can push makes up for the missing support. Joins what fails in a row to one finding.
+the soles can push replaces the missing support. Joins what fails in a row to one finding.
 """
 
 from collections.abc import Iterator, Sequence
@@ -34,7 +34,7 @@ class Certified:
 
 @dataclass(frozen=True)
 class _Failure:
-    """Why one step fails: cause, the joint or part, how much, and the tempo that mends it."""
+    """Failure of one step: cause, the joint or part, how much, and the tempo that repairs it."""
 
     cause: Cause
     part: str
@@ -88,7 +88,7 @@ def _demand(
     cycle_offset: np.ndarray | None,
     tolerance: Tolerance,
 ) -> tuple[contact_wrench.Demand, Bool[np.ndarray, "S C"], FreeSpace]:
-    """Return what a motion asks for at its own tempo, which soles are near the floor, and the parts
+    """Return what a motion needs at its own tempo, which soles are near the floor, and the parts
     of the force."""
     forces = inverse_dynamics.free_space(robot, qpos, dt, cycle_offset)
     posed = pose(inverse_dynamics.linkage(robot), qpos)

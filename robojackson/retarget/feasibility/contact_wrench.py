@@ -1,8 +1,8 @@
-"""Which contact pushes and joint torques together produce a motion, and what they leave over.
+"""Solve for the contact pushes and joint torques that produce a motion, and their residual.
 
 For every step: pushes p >= 0 along the edges of the friction pyramids and torques inside their
 limits that leave the least of  f - G p - torques,  f being the generalised force of the motion in
-free space (root 6, then the hinges). What is left is told in units of a tolerance, so a step is
+free space (root 6, then the hinges). The residual is given in units of a tolerance, so a step is
 feasible when its slack is at most 1. Newtons, newton-metres; all steps are solved at once.
 """
 
@@ -28,7 +28,7 @@ _SINGULAR = 1e-13  # share of what the feet can give that keeps its square root 
 
 @config_dataclass
 class Tolerance:
-    """What may be left over in a step that counts as feasible: a tracking robot makes up for it.
+    """Residual of a step that still counts as feasible: a tracking robot compensates for it.
 
     Attributes:
         force_bw: Force on the root, body weights.
@@ -43,7 +43,7 @@ class Tolerance:
 
 @dataclass(frozen=True)
 class Demand:
-    """What a motion asks for and what may give it, a row a step.
+    """The force that a motion needs and what may supply it, a row a step.
 
     Attributes:
         force: Generalised force of the motion in free space.

@@ -1,4 +1,4 @@
-"""What inverse dynamics reads of a robot, read once a robot.
+"""Constants of a robot for inverse dynamics, computed once a robot.
 
 Copying a model with meshes costs as much as the dynamics of a thousand steps, so what is derived of
 a robot is cached by its identity. Kilograms, metres, radians, newton-metres.

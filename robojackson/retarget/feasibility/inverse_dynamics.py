@@ -1,4 +1,4 @@
-"""Inverse dynamics of a motion: what it asks for in free space, and what soles and motors can give.
+"""Inverse dynamics of a motion: the force needed in free space, and what soles and motors supply.
 
 The force of a motion at another tempo k follows from two evaluations: gravity and springs do not
 change, damping goes with k, inertia and Coriolis with k^2. Soles push along the edges of friction
@@ -110,7 +110,7 @@ def sole_points(robot: Robot, posed: Posed) -> Float[np.ndarray, "S C 3"]:
 
 
 def touching(robot: Robot, posed: Posed) -> Bool[np.ndarray, "S C"]:
-    """Return soles near the floor, whatever their labels."""
+    """Return the soles near the floor, for any labels."""
     return np.asarray(sole_points(robot, posed)[..., 2] < NEAR_M)
 
 

@@ -1,4 +1,4 @@
-"""Lean: bring the body over feet that are balls at the ankles.
+"""Lean: put the body over feet that are balls at the ankles.
 
 A person stands with the centre of mass some centimetres in front of the ankles, and one camera
 tilts whole bodies by degrees. A ball foot can balance neither. The median distance from the zero
@@ -61,7 +61,7 @@ def leaned(aims: Targets, shift: Float[np.ndarray, "2"]) -> Targets:
 
 @dataclass(frozen=True)
 class Support:
-    """Where the soles in contact can carry.
+    """Support of the soles in contact.
 
     Attributes:
         nearest: The point of their convex hull next to a given point, which itself may be in it.

@@ -61,7 +61,7 @@ class Weights:
 
 @dataclass
 class Warm:
-    """What one evaluation of the cost leaves to the next: where the pushes' solver has arrived."""
+    """State that one evaluation of the cost leaves to the next: the solution of the pushes."""
 
     point: Point | None = None
 

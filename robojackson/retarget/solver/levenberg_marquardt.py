@@ -31,7 +31,7 @@ _HELD = 2  # steps of the window before it that an acceleration reaches back to
 
 @config_dataclass
 class SolverConfig:
-    """When the solver stops.
+    """Stopping rules of the solver.
 
     Attributes:
         iterations: Most Newton steps from each start, at the coarsest rate.

@@ -1,4 +1,4 @@
-"""Laps: find where a clip repeats itself, close it, and put it on the robot's clock.
+"""Cycles: find where a clip repeats itself, close it, and put it on the robot's clock.
 
 A clip is nearly cyclic when some later frame has the pose and the velocity of an early one, seen
 from the hips and the heading. The cycle between them is closed by spreading what is left of the
@@ -35,7 +35,7 @@ _SECONDS = 0.1  # velocity differences count over this time beside pose differen
 
 @config_dataclass
 class CycleConfig:
-    """When a clip counts as cyclic.
+    """Conditions under which a clip counts as cyclic.
 
     Attributes:
         tolerance_m: Largest seam: mean keypoint distance plus a tenth of a second of the mean
@@ -88,7 +88,7 @@ def human_clip(
             f"retarget: at least {_MIN_STEPS * dt:.2f} s are needed"
         )
     cycle = None if cyclic == "no" else find_cycle(sequence, config)
-    if cycle is None and cyclic == "yes":  # whoever turns on with every cycle is turned back
+    if cycle is None and cyclic == "yes":  # a body that turns with every cycle is turned back
         cycle = find_cycle(sequence, replace(config, heading_deg=180.0))
     if cycle is None or (cyclic == "auto" and not _nearly_cyclic(cycle, config)):
         return _open_clip(sequence, dt, tempo), None

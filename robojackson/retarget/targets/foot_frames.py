@@ -1,4 +1,4 @@
-"""How the human's feet are turned, for robots that have soles and not balls.
+"""Orientation of the human's feet, for robots with soles instead of balls.
 
 A foot points from the ankle to the big toe. How far that line slopes when the sole is flat depends
 on the skeleton, so it is measured where heel and toe are both planted. World frame, metres.

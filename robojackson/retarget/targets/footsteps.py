@@ -23,7 +23,7 @@ CLEARANCE_M = 0.05
 NARROWEST, WIDEST, STAGGERED = 0.5, 2.5, 1.5
 """Distance of the feet across (least, largest) and along the heading, in widths of the stand."""
 TURNED_RAD = 0.8
-"""Between the heading and a foot, from which that foot is to be placed anew."""
+"""Between the heading and a foot, from which that foot is to be placed again."""
 SAME_M, SAME_RAD = 0.03, 0.2
 """A foot so close to its place stays."""
 

@@ -68,7 +68,7 @@ def ball_contact(
     """Return the states of the robot's balls: those of the human points they follow, planted where
     slow.
 
-    A foot that stands still near the floor is planted whatever its label; a body that touches
+    A foot that stands still near the floor is planted with any label; a body that touches
     nothing and does not fall stands on its lowest foot.
     """
     mode = clip.edges

@@ -1,4 +1,4 @@
-"""Where the robot's keypoints should be: every human bone keeps its direction, takes robot length.
+"""Targets of the robot's keypoints: human bones keep their directions and take robot lengths.
 
 The root is scaled by the ratio of the leg lengths and lifted or lowered until the lowest sole is on
 the floor, unless the body is in free fall. Metres, seconds, world frame (z up, floor at z = 0).
@@ -35,7 +35,7 @@ BONES: tuple[tuple[str, str], ...] = tuple(
 
 @dataclass(frozen=True)
 class Targets:
-    """What the solver aims at.
+    """Targets of the solver.
 
     Attributes:
         keypoints_w: Targets of the robot's keypoints, metres.

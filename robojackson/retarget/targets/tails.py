@@ -45,7 +45,7 @@ class TailConfig:
     """Whether and how long a motion that does not repeat begins and ends standing.
 
     Attributes:
-        use: `auto`: on robots that are judged beside the reference (`fall.frame: reference`).
+        use: `auto`: on robots that are evaluated beside the reference (`fall.frame: reference`).
         lead_s: Stand before the clip, seconds.
         blend_s: From the stand into the clip, and back, seconds.
         stand_s: Stand after the clip, seconds.
