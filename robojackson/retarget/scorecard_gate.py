@@ -63,8 +63,7 @@ def check(card: Mapping[str, Any]) -> None:
     """
     if not set(BARS) & set(card):
         raise RejectedReference(
-            "reference refused: without a score card, nothing shows whether the robot can follow "
-            "it",
+            "reference refused: no score card shows whether the robot can follow it",
             "make one with `robojackson retarget`",
             forcible=True,
         )
