@@ -21,7 +21,7 @@ class Dance:
         top: How many videos are assessed; None is the default number.
         every_days: Days between two searches.
         source: A file of robojackson/clips/sources.
-        address: Of the folder, list, site or server; empty is the source's usual one.
+        address: Address of the folder, list, site or server; empty is the source's usual one.
     """
 
     name: Annotated[str, Field(min_length=1, max_length=60)]
@@ -51,7 +51,7 @@ class DanceBook:
     """All dances.
 
     Attributes:
-        dances: In the order in which they are searched.
+        dances: Dances in the order in which they are searched.
     """
 
     dances: tuple[Dance, ...]

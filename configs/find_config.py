@@ -13,7 +13,7 @@ from robojackson.config import config_dataclass
 @config_dataclass
 class FindConfig:
     """Attributes:
-    selection, web, formats, assessment, filters: Of the steps, in their order.
+    selection, web, formats, assessment, filters: Configurations of the steps, in their order.
     """
 
     selection: SelectionConfig = Field(default_factory=SelectionConfig)

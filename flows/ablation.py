@@ -104,7 +104,7 @@ def motion(
     """Make what a move is trained on and shown with; every stage cached.
 
     Args:
-        name: Of the move; its task runs are named after it.
+        name: Name of the move; its task runs are named after it.
     Returns:
         `reference` and `scorecard`; `still`, its picture; `reward_audits`, what the rewards of the
         setups pay to bodies that do not dance it.

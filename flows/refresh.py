@@ -67,9 +67,9 @@ async def refresh(
         dances: Names in the book, searched whether they are due or not; all that are due if absent.
         book: Name or path of the list of dances.
         config: Name or path of the configuration of the search.
-        overrides: Of that, values by key path.
+        overrides: Overrides of that configuration, values by key path.
         pipeline: Name or path of the configuration of the stages after it.
-        pipeline_overrides: Of that, values by key path, as robot: a name of configs/robots, or the
+        pipeline_overrides: Overrides of the pipeline; robot is a name of configs/robots, or the
             path, where the worker is, of the YAML of your own.
     Raises:
         BadConfiguration: two dances of the book have the same letters and digits.

@@ -119,7 +119,7 @@ class RejectedReference(RoboJacksonError):
     Attributes:
         remedy: What may repair it.
         figure: Name of the figure of the score card that failed; empty where none did.
-        value, limit: Of that figure.
+        value, limit: The figure and its limit.
         forcible: Whether `--force` goes on anyway.
     """
 

@@ -64,7 +64,7 @@ class Manifest:
         store: Address of the store.
         files: Content of each key of the store.
         database: Prefect's database; None: there was none.
-        version: Of this layout.
+        version: Version of this layout.
     """
 
     store: str

@@ -24,7 +24,7 @@ class Run:
         move: Name of the dance, as `run_name` leaves it.
         robot: Name of the robot description.
         setup: Name of the training setup.
-        seed: Of the training.
+        seed: Seed of the training.
         finished_at: When, with time zone.
         artifacts: What it made, by name.
         summary: Its figures.

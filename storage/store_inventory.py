@@ -42,7 +42,7 @@ class Item:
 
     Attributes:
         kind: What they are.
-        key: Of the file or folder, relative to the root.
+        key: Key of the file or folder, relative to the root.
         size: Bytes.
         age_s: Since the newest of them was written, seconds.
     """

@@ -43,7 +43,7 @@ class Place:
 
     Attributes:
         study, move, setup, seed: The partition.
-        run_id: Of the training.
+        run_id: Run id of the training.
     """
 
     study: str

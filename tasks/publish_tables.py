@@ -41,7 +41,7 @@ def publish(cell: Cell, run_id: str, made: Mapping[str, Artifact]) -> Result:
     """Write the cell's rows and where these come from; the same call again writes nothing.
 
     Args:
-        run_id: Of the training.
+        run_id: Run id of the training.
         made: What its stages left.
     Returns:
         What the stages left, with the tables under their keys among the metrics.

@@ -29,7 +29,7 @@ def render_video(
 
     Args:
         title: Over the panel of the rollout.
-        name: Of the file.
+        name: Name of the file.
     """
     store = Store.from_environment()
     with store.local(source) as path, store.scratch() as folder:

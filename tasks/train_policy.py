@@ -91,7 +91,7 @@ async def train_policy(
     JSON).
 
     Args:
-        time_left: Of the pass that it is part of.
+        time_left: Time that the pass leaves for it.
         whole_pass: Whether `config.minutes` is the budget of a whole pass, of which training gets
             what the other stages leave.
         limit_s: Time after which it has failed, seconds; a budget in minutes sets one by itself.

@@ -79,8 +79,8 @@ def report(
     """Write `studies/<name>/` again: `page`, `table` (CSV), `results` (JSON) and the figures.
 
     Args:
-        moves: Of the study, by name.
-        pictures: By move, its video frame, recovered body and robot side by side, as PNG.
+        moves: Moves of the study, by name.
+        pictures: By move, a picture of video frame, recovered body and robot side by side, as PNG.
         runs: Ids of the trainings that count; all that the tables have under its name if absent.
         reward_audits: By move, what the rewards of the setups pay to bodies that do not dance it.
     """

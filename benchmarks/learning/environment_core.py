@@ -42,7 +42,7 @@ class Script:
     """The commands of an environment to MuJoCo, control step by control step.
 
     Attributes:
-        controls: For every batch of robots its controls, (substeps, robots, nu).
+        controls: Controls of every batch of robots, (substeps, robots, nu).
         placed: (robot, qpos, qvel) that were put somewhere after the step; first, before it.
     """
 
@@ -154,7 +154,7 @@ class Bare:
     """A loop over `mj_step` that follows a script.
 
     Args:
-        batched: In the environment's order, a batch's control step at a time, which the cache of
+        batched: Speed in the environment's order, a batch at a time, which the cache of
             the processor likes; else substep by substep over all robots, as anybody would write it.
     """
 

@@ -32,7 +32,7 @@ class Move:
 
     Attributes:
         clip: A video of the repository, or the name of a file in a folder of others'.
-        cpu_minutes: Of one core.
+        cpu_minutes: Minutes of one core.
         success, worst: Least strict success, of the mean over seeds and of the worst seed.
         skill: Least skill.
         cyclic: Whether it is danced for a time; else to its end.

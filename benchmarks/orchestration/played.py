@@ -39,7 +39,7 @@ def played(seconds: float, burn: bool, began: Callable[[], None] = lambda: None)
     """Replace every training and evaluation of this process by a stand-in.
 
     Args:
-        seconds: That a training takes, of processor time if it burns; an evaluation takes none.
+        seconds: Length of a training, processor time if it burns; an evaluation takes none.
         began: Called whenever a training begins.
     """
     code = (BURN if burn else SLEEP).format(seconds=seconds)

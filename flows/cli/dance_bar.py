@@ -93,7 +93,7 @@ class _Watch:
     """Moves the bar with the clock.
 
     Attributes:
-        stage: That the pass is at.
+        stage: Current stage of the pass.
     """
 
     def __init__(

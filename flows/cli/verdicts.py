@@ -110,7 +110,7 @@ def ablation_verdict(made: Facts, steps: int, seeds: int, least_steps: int) -> d
 
     Args:
         made: `cells` and `page`.
-        steps, seeds: Of the study.
+        steps, seeds: Steps and seeds of the study.
         least_steps: Control steps of a training below which nothing is learnt.
     """
     if steps < least_steps:

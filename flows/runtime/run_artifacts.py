@@ -31,8 +31,8 @@ async def show_dance(
     """Leave one Markdown artifact under the key `dance-<name>`, which keeps its history.
 
     Args:
-        name: Of the dance.
-        evaluation: Of the trained policy, with its baselines.
+        name: Name of the dance.
+        evaluation: Evaluation of the trained policy, with its baselines.
         made: What the pass made, by name; the files are in an open folder.
     """
     key, text = f"dance-{slug_of(name)}", of_dance(store, name, evaluation, made)
@@ -44,7 +44,7 @@ async def show_study(store: Store, name: str, made: Artifacts) -> None:
     """Leave one Markdown artifact under the key `study-<name>`.
 
     Args:
-        name: Of the study.
+        name: Name of the study.
         made: The files of its page, by name; a picture is a `.png`.
     """
     text = of_study(store, name, made)

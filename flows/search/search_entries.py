@@ -48,7 +48,7 @@ class SearchResult:
         dance: What was looked for.
         run_id: Under which it is in the catalogue.
         entries: The chosen one first, then by rank, rejected and failed ones last.
-        selection: Of the search.
+        selection: Selection of the search.
     """
 
     dance: Dance

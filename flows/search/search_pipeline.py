@@ -52,7 +52,7 @@ def search_and_rank(
     Args:
         dance: What to look for.
         settings: How.
-        run_id: For the catalogue.
+        run_id: Run id for the catalogue.
         known: Videos that were assessed before and need not be again.
         reigning: Row of the catalogue of the video chosen last, which a new one has to beat.
         failed: Videos that failed before and are tried again where there is nothing else.

@@ -61,7 +61,7 @@ async def make_dance(
     """Dance the steadiest of some videos.
 
     Args:
-        paths: Of the videos.
+        paths: Paths of the videos.
         start_s, end_s: Range of each, seconds.
     Raises:
         NoPersonFound: no person is in any of them.

@@ -25,9 +25,9 @@ class Candidate:
     """A clip that may be danced.
 
     Attributes:
-        name: Of the file.
+        name: Name of the file.
         clip: Its video and what is known of it, as `probe_video` left them.
-        stability, score: Of Algorithm 1, as artifact and as value.
+        stability, score: Stability and score of Algorithm 1, as artifact and as value.
     """
 
     name: str

@@ -42,7 +42,7 @@ class TrackedDance:
     Attributes:
         tracker: Which.
         made: What its stages left, by the names that a trained policy's have.
-        folder: Of the page.
+        folder: Folder of the page.
     """
 
     tracker: TrackerDescription

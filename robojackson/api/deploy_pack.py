@@ -50,7 +50,7 @@ def write_deploy_pack(
 
     Args:
         policy: policy.safetensors of a training with `track.observation=onboard`.
-        folder: For the pack.
+        folder: Folder for the pack.
         reference: The motion that it was trained on; None looks beside the policy.
         robot: The one that the motion was made for; None finds it.
         evaluation: evaluation.json of `robojackson evaluate`, whose figures and passport go into

@@ -45,7 +45,7 @@ class ForeignFile:
     """Content of another project's file.
 
     Attributes:
-        motion: On the floor.
+        motion: Motion on the floor.
         format: Name of the format.
         figures: `kinematics_error_mm` of HybrIK's files: how far our joints are from theirs.
     """

@@ -156,7 +156,7 @@ def read_motion(
             or our csv, recognised by its content. Nothing in it is executed.
         fps: Frames a second, where the file does not give them.
         up: Axis that points up, where it is unusual.
-        config: Of the camera and the floor of HybrIK's files.
+        config: Configuration of the camera and the floor of HybrIK's files.
 
     Returns:
         A human motion put on the floor, or a robot's reference motion.
@@ -182,7 +182,7 @@ def write_motion(
 
     Args:
         motion: A human or a robot motion, or the file of one.
-        file: For the result.
+        file: File for the result.
         to: Name of the format (docs/formats.md); without it the file's suffix decides: `.parquet`
             is our table, `.bvh` and `.csv` are the formats of these names.
         robot: The one that a robot's motion was made for; None finds it.

@@ -76,7 +76,7 @@ def train_policy(
             it where `config` is given, too.
         steps: Budget in control steps of all simulations, over that of the configuration.
         minutes: Budget of wall time, over that of the configuration; 9 where nothing ends it.
-        seed: Of networks, environments and replay, over that of the configuration.
+        seed: Seed of networks, environments and replay, over that of the configuration.
         reward: Terms of your own beside the configured ones: a function of `RewardState` that
             returns one number a robot, (N,), or several by name. Not part of a checkpoint.
         out: Folder for checkpoints and tables; the same call resumes from it. None keeps nothing.

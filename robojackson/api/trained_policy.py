@@ -24,7 +24,7 @@ class TrainedPolicy:
     Attributes:
         policy: The network as numpy arrays; `policy.act(observations)` gives actions, -1..1.
         reference: The motion that it follows.
-        config: Of the training.
+        config: Configuration of the training.
         episodes: One row an episode: return, length, every reward term, tracking errors.
         steps, updates: Control steps and gradient updates in all.
         seconds: Wall time in all, resumptions included.

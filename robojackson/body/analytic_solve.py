@@ -101,7 +101,7 @@ def _target_directions(
         child: Where the bones should end.
         start: Where they should begin.
         end: Where their parents really end.
-        bone: In the rest pose.
+        bone: Bone in the rest pose.
         method: naive or adaptive.
     """
     predicted = child - start

@@ -48,7 +48,7 @@ class Comparison:
 
     Attributes:
         treated, control: Setups that are compared.
-        effects: By move; None where it was not measured.
+        effects: Effects by move; None where it was not measured.
     """
 
     treated: str
@@ -64,8 +64,8 @@ def claims(
     """Return the paper's three claims, and the same two effects where the others are absent.
 
     Args:
-        figures: By (move, setup), the figure of each seed; higher is better.
-        walking: Of each move, whether it is walking.
+        figures: The figure of each seed, by (move, setup); higher is better.
+        walking: Whether each move is walking.
     """
     dances = [move for move, walks in walking.items() if not walks]
     walks = [move for move, is_walking in walking.items() if is_walking]

@@ -22,8 +22,8 @@ class Estimate:
     """A mean over seeds.
 
     Attributes:
-        mean: Of the samples that are finite; infinite where there are others only.
-        low, high: Of the 95 % interval; NaN with fewer than two such samples.
+        mean: Mean of the samples that are finite; infinite where there are others only.
+        low, high: Ends of the 95 % interval; NaN with fewer than two such samples.
         count: Samples that are finite.
     """
 

@@ -32,7 +32,7 @@ class PipelineConfig:
             the first for the robot whose file is here, `none` is no tracker.
         gate: Refuse to train on a reference motion that breaks a hard bar of its score card.
         network: Published networks whose weights the user brings; none by default.
-        video, stability, mocap, retarget, train, evaluate, render: Of the stages.
+        video, stability, mocap, retarget, train, evaluate, render: Configurations of the stages.
     """
 
     robot: str = "humanoid"

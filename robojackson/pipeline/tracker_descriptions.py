@@ -41,7 +41,7 @@ def require_tracker(robot: str, name: str | None = None) -> TrackerDescription |
     """Return a tracker of a robot that can be run at once.
 
     Args:
-        name: Of the tracker; the first whose file is here when None, no tracker when `none`.
+        name: Name of the tracker; the first whose file is here when None, no tracker when `none`.
 
     Raises:
         UnknownName: there is no such tracker.

@@ -53,7 +53,7 @@ class RetargetConfig:
             the clip's own are not half as large; beyond it limbs have passed through each other,
             and another start is tried.
         tails: Stands before and after a motion that does not repeat.
-        cycle, weights, solver, repair: Of the stages.
+        cycle, weights, solver, repair: Configurations of the stages.
     """
 
     method: Literal["optimise", "paper", "framefix"] = "optimise"

@@ -18,11 +18,11 @@ class BodyStates:
     """One row a frame.
 
     Attributes:
-        position, quaternion: Of the body frames, metres, wxyz.
+        position, quaternion: Position and quaternion of the body frames, metres, wxyz.
         linear, angular: Velocities of the body frames' origins, m/s and rad/s, world axes.
         com_velocity: MuJoCo's `cvel`: angular, then linear, about the centre of mass of the tree.
         subtree_com: Centre of mass of each body with all that hang from it, metres.
-        site_position, site_rotation: Of the sites, metres and row-major matrices.
+        site_position, site_rotation: Places of the sites, metres, and row-major matrices.
     """
 
     position: Float[np.ndarray, "T B 3"]

@@ -51,7 +51,7 @@ class RobotSource:
 
     Attributes:
         package: Name in the package index.
-        version: Of the package.
+        version: Version of the package.
         wheel_sha256: Digest of its wheel.
         folder: Folder inside the wheel that holds the MJCF and its meshes.
         model_sha256: Digest of the MJCF.

@@ -37,7 +37,7 @@ class Draft:
     """A first description.
 
     Attributes:
-        name: Of the robot.
+        name: Name of the robot.
         text: The YAML.
         guessed: Keys to check: no name gave them.
         left: Keys that nothing was found for.
@@ -55,7 +55,7 @@ def first_description(path: Path, folder: Path, name: str) -> Draft:
     Args:
         path: The MJCF.
         folder: Where the description will be; a model below it is named from there.
-        name: Of the robot.
+        name: Name of the robot.
     Raises:
         BadConfiguration: no such file, or MuJoCo cannot load it.
     """

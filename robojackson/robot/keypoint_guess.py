@@ -24,7 +24,7 @@ class Guess:
 
     Attributes:
         body: Name.
-        offset: In the body, metres.
+        offset: Offset in the body, metres.
         why: What it was guessed from.
         sure: Whether names give it.
     """

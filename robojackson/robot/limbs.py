@@ -34,7 +34,7 @@ class Limb:
     """A leg or an arm.
 
     Attributes:
-        bodies: From the first that the other side does not share to the tip.
+        bodies: Bodies from the first that the other side does not share to the tip.
         parts: Name of each joint (hip, knee, ankle; shoulder, elbow, wrist) -> its hinges.
         named: Whether names identify them; else the distances of the hinges do.
     """

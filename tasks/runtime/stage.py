@@ -75,7 +75,7 @@ class KeyRecipe:
     """Ingredients of the cache keys of a stage.
 
     Attributes:
-        name: Of the stage.
+        name: Name of the stage.
         text: Bare syntax tree of its function.
         roots: Modules that it imports.
         models: Its parameters to the digests of the models that it loads.
@@ -108,7 +108,7 @@ class Stage(Generic[P, R]):
 
     Attributes:
         fn: The function itself.
-        recipe: Of its cache keys.
+        recipe: Recipe of its cache keys.
     """
 
     def __init__(self, fn: Callable[P, R], recipe: KeyRecipe) -> None:
@@ -160,7 +160,7 @@ class Stage(Generic[P, R]):
         """Return the recorded result of a call, or None where it would have to run.
 
         Args:
-            args, kwargs: Of the call; those without influence on the result may be left out.
+            args, kwargs: Arguments of the call; those without effect on the result may be omitted.
         """
         try:
             return self.required(*args, **kwargs)

@@ -302,7 +302,7 @@ def test_only_a_killed_process_is_started_again_and_not_for_ever(
     assert len(stage.limits) == attempts
 
 
-def test_training_and_judgement_share_the_time_of_a_cell(
+def test_training_and_evaluation_share_the_time_of_a_cell(
     store_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     limits: list[float] = []

@@ -47,7 +47,7 @@ class Chapter:
     """The keys of some commands.
 
     Attributes:
-        title, about: Of the part of the page.
+        title, about: Heading and introduction of the part of the page.
         kind: Dataclass of the configuration.
         usual: Name of the configuration that the commands use when none is named.
     """
@@ -94,7 +94,7 @@ class Setting:
 
     Attributes:
         key: Its path.
-        unit: Of a number; empty for all else.
+        unit: Unit of a number; empty for all else.
         default: As YAML.
         allowed: The range, or the values.
         meaning: What it is.

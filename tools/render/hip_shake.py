@@ -55,8 +55,8 @@ class Dance:
         lean_deg: Forward lean of the trunk.
         bounce: Rise of the pelvis over a foot above the middle of the sway, half of it.
         dip: Half the slow change of the knee bend within a cycle.
-        half_stance: From the middle to an ankle.
-        toe_out_deg: Of each foot.
+        half_stance: Distance from the middle to an ankle.
+        toe_out_deg: Outward turn of each foot.
         knee_deg: Mean bend of the knees at the middle of the sway.
         abduction_deg, abduction_swing_deg: Upper arm away from the trunk, mean and half the swing;
             an arm rises while the hips are on the other side. A single camera sees this swing
@@ -97,9 +97,9 @@ class Measures:
     """Measures of the body for the choreography, metres.
 
     Attributes:
-        hips: From the root to the left and the right hip, upright.
+        hips: Hips from the root to the left and the right hip, upright.
         thigh, shin: Lengths.
-        ankle_height: Of the ankle over the floor.
+        ankle_height: Height of the ankle over the floor.
         scale: Size of the body over that of the motion file's humanoid.
     """
 

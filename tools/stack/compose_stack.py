@@ -59,7 +59,7 @@ class Stack:
     """All services of the compose file.
 
     Attributes:
-        folder: For logs, data and homes.
+        folder: Folder for logs, data and homes.
         given: Values of the variables, as in .env.
         scale: How many of a service.
         more: Environment for all services besides the file's.

@@ -22,7 +22,7 @@ class End:
 
     Attributes:
         moment_s: When it was interrupted, seconds after its start.
-        acknowledged_s, ended_s: From the signal to the first line about it, and to the end.
+        acknowledged_s, ended_s: Seconds from the signal to the first line about it, and to the end.
         saving: Whether it announced that a checkpoint is being saved.
         code: Exit code.
         lines: What it wrote after the signal.

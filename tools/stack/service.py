@@ -28,7 +28,7 @@ class Service:
     """One process of the stack.
 
     Attributes:
-        name: In the compose file, with a number behind it for a second one.
+        name: Name in the compose file, with a number behind it for a second one.
         command: Words of the process.
         environment: Whole environment of the process.
         check: Command that succeeds when the service is healthy; None for one that ends by itself.

@@ -34,8 +34,8 @@ class Batch:
     Attributes:
         flat, local, visibility: As in `features.ClipView`, of the landmarks that are read.
         constant: What the network knows of the clip.
-        distance: Of the hips as placed, metres.
-        truth: Of the same landmarks, NaN-free, metres.
+        distance: Distance of the hips as placed, metres.
+        truth: Truth of the same landmarks, NaN-free, metres.
         good: 1 in the frames that count, else 0.
     """
 
@@ -61,16 +61,16 @@ class Change:
 
     Attributes:
         frames: Length of a window.
-        roll_deg: Of the camera, standard deviation.
-        size: Of the person, standard deviation of the logarithm.
-        metre: Of the detector's metre, likewise.
-        shift_m: Of each landmark for the whole window, across the image: joints are not defined
+        roll_deg: Roll of the camera, standard deviation.
+        size: Size of the person, standard deviation of the logarithm.
+        metre: Scale of the detector's metre, likewise.
+        shift_m: Shift of each landmark for a whole window, across the image: joints are not defined
             alike everywhere.
-        tilt_deg: Of the detector's body about the image's x and y axes, and
+        tilt_deg: Tilt of the detector's body about the image's x and y axes, and
         depth: the logarithm of its depth, and
         depth_shift_m: the depth of each landmark, for the whole window, standard deviations:
             the detector errs in other ways on pictures of real people than on rendered ones.
-        shake_m: Of each landmark in each frame.
+        shake_m: Shake of each landmark in each frame.
         hidden: Chance of hidden limbs.
         hidden_s: How long they are hidden.
     """

@@ -42,7 +42,7 @@ class Example:
         sight: What was seen.
         truth: All landmarks along the rays, NaN where there is none, metres.
         good: Frames that count.
-        distance: Of the hips from the camera, metres.
+        distance: Distance of the hips from the camera, metres.
         motion: Its name.
     """
 

@@ -23,14 +23,14 @@ class FitConfig:
     """Configuration of fitting the lifter.
 
     Attributes:
-        steps: Of the optimiser.
+        steps: Steps of the optimiser.
         batch: Windows a step.
         rate: Learning rate, warmed up over 100 steps, then a cosine.
         decay: Weight decay.
         invented: Share of windows of the invented detector, at the first and the last step.
         velocity, spread: Weights of these losses beside that of the place.
         average: Memory of the running mean of the weights, which is what is kept.
-        change: Of the windows.
+        change: Change of the windows.
     """
 
     steps: int = 3000

@@ -103,8 +103,8 @@ def camera_path(
 
     Args:
         images: RGB frames, upright, of any one size.
-        landmarks: Of the person, 0..1, NaN where no person was detected.
-        width, height: Of the full upright image, pixels.
+        landmarks: Landmarks of the person, 0..1, NaN where no person was detected.
+        width, height: Width and height of the full upright image, pixels.
     """
     chain = _Chain()
     for image, xy in zip(images, landmarks, strict=False):

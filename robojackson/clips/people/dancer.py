@@ -41,7 +41,7 @@ class DancerConfig:
     Attributes:
         number: The person to follow: 1 is the largest steady person, and so is None.
         scouts: The few frames in which other people are looked for.
-        detection, identity: Of everybody in every frame.
+        detection, identity: Configurations of detecting and identifying all people in every frame.
         astray: Body heights; a detection further than this from the expected place is another's.
         crowding: People nearer than this hide one another, body heights.
         longest_gap_s: Longest gap in which the person is looked for, seconds.

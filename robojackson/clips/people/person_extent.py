@@ -89,7 +89,7 @@ def box(
     Args:
         xy: Landmarks in image coordinates, 0..1.
         margin: Added on each side, in sizes of the box.
-        width, height: Of the image, pixels.
+        width, height: Width and height of the image, pixels.
     """
     if np.isnan(xy).any():
         return None

@@ -28,7 +28,7 @@ from robojackson.motion.landmark_track import LandmarkTrack
 class AssessmentConfig:
     """Attributes:
     detector: Size of the pose model.
-    video, stability, cuts, camera, people, drawing: Of the parts.
+    video, stability, cuts, camera, people, drawing: Configurations of the parts.
     """
 
     detector: Size = "lite"

@@ -51,7 +51,7 @@ class Ranked:
     """A candidate's place.
 
     Attributes:
-        name: Of the candidate.
+        name: Name of the candidate.
         place: 1 is danced; None when it is rejected.
         rejections: Why it is rejected; empty when it is not.
     """

@@ -41,7 +41,7 @@ def find_duplicates(
     """Return the clips that are copies, each with the rejection that names the clip that stays.
 
     Args:
-        tracks: By name, the best picture first: of two copies the later one is the copy.
+        tracks: Tracks by name, the best picture first: of two copies the later one is the copy.
         config: Limits.
     """
     found: dict[str, Rejection] = {}

@@ -22,7 +22,7 @@ class PictureQuality:
     """Looks at some of the pictures of a clip as they pass by.
 
     Args:
-        landmarks: Of the person in every frame, 0..1, NaN where no person was detected.
+        landmarks: Landmarks of the person in every frame, 0..1, NaN where no person was detected.
     """
 
     def __init__(self, landmarks: Float[np.ndarray, "T 33 2"]) -> None:

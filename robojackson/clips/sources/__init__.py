@@ -26,7 +26,7 @@ class Source(Protocol):
 
         Args:
             query: Words to look for; a source that cannot look for words offers all it has.
-            address: Of the folder, the list, the site or the server; empty for the usual one.
+            address: Address of the folder, list, site or server; empty for the usual one.
             count: How many at most.
             config: Manners on the web.
             now: Noted in the candidates.

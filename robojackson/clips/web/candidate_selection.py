@@ -53,7 +53,7 @@ def select(
     A video of unknown length is kept: the downloaded file will show its length.
 
     Args:
-        found: In the order of the search, which breaks ties of the view count.
+        found: Candidates in the order of the search, which breaks ties of the view count.
         known: Keys of videos that were assessed before.
         config: Limits.
         failed: Keys of videos that could not be had or assessed before.

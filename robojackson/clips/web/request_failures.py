@@ -16,7 +16,7 @@ CONNECTION = re.compile(r"^HTTPS?Connection\([^)]*\): ")
 
 class Failure(NamedTuple):
     """Attributes:
-    reason: In one line.
+    reason: Reason in one line.
     passing: Whether another attempt makes sense.
     wait_s: Seconds that the server requests to wait.
     most_retries: How often it makes sense at most; a name that cannot be resolved is soon sure.

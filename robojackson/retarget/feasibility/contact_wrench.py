@@ -51,8 +51,8 @@ class Demand:
         spread: Wrench of one body weight along each pyramid edge.
         usable: Edges of contacts that touch.
         lower, upper: Torque limits of the hinges; infinite where a stop carries.
-        scale: Of each row of the force: slack a newton or newton-metre.
-        ease: Of each hinge: one over its torque limit; 0 without a motor.
+        scale: Scale of each row of the force: slack a newton or newton-metre.
+        ease: Ease of each hinge: one over its torque limit; 0 without a motor.
     """
 
     force: Float[np.ndarray, "S nv"]
@@ -81,7 +81,7 @@ class Supply:
 
     Attributes:
         pushes: Along the edges, body weights.
-        torque: Of the hinges, inside limits or not, newton-metres.
+        torque: Torque of the hinges, inside limits or not, newton-metres.
         left: What is left over of each row, in tolerances; zero on a hinge inside its limits.
         slack: Its norm; feasible up to 1.
     """
@@ -154,7 +154,7 @@ def relaxed(demand: Demand, barrier: float, start: Point | None = None) -> Relax
     curvature of prices and barrier.
 
     Args:
-        start: Of a problem nearby.
+        start: Solution of a nearby problem.
     """
     box = _box(demand, barrier)
     point = solve_box(box, start)

@@ -29,12 +29,12 @@ class ForceModel:
         bodies: Bodies that move and have mass, and of each:
         last_dof: The lowest degree of freedom that moves it,
         mass, com, inertia: about the centre of mass, in the frame of the body.
-        parent: Of each dof: the lowest one above it; the root's six are two joints of three,
+        parent: Parent of each dof: the lowest one above it; the root's six are two joints of three,
             which no other precedes.
         above: 1 where dof i (row) moves dof j (column), or is of its joint.
         below: 1 where j is moved by i, and i is not of its joint; `upper` both or itself.
-        carried_mass: Of all bodies that a dof moves.
-        stiffness, spring, damping, armature: Of the dofs; `spring` of the hinges.
+        carried_mass: Mass of all bodies that a dof moves.
+        stiffness, spring, damping, armature: Parameters of the dofs; `spring` of the hinges.
         gravity: m/s2.
     """
 

@@ -30,7 +30,7 @@ class Box:
         stiff: A of the torques, a diagonal under the six rows of the root.
         target: b.
         lower, upper: Bounds of pushes, then torques; infinite where there is none.
-        price: Of the squares of pushes, then torques.
+        price: Weight of the squares of pushes, then torques.
         relax: Weight of the barrier, mu.
     """
 

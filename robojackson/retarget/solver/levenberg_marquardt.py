@@ -73,7 +73,7 @@ def solve(
     the end of what is kept of it.
 
     Args:
-        tolerance: That of the configuration when None.
+        tolerance: Stopping tolerance; that of the configuration when None.
         spans: The steps that may change, of a clip that does not repeat; all when None.
     """
     stop_at = config.tolerance if tolerance is None else tolerance

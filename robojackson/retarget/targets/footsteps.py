@@ -33,8 +33,8 @@ class Placement:
     """One foot on the floor.
 
     Attributes:
-        place: Of the ankle over the floor, m.
-        yaw: Of the toes, rad.
+        place: Place of the ankle over the floor, m.
+        yaw: Yaw of the toes, rad.
     """
 
     place: Float[np.ndarray, "2"]
@@ -133,7 +133,7 @@ def steps_into_stand(feet: Feet, heading: float, robot: Robot, dt: float) -> Wal
 
     Args:
         feet: Where the feet are, both on the floor, the body between them.
-        heading: Of the stand, rad.
+        heading: Heading of the stand, rad.
         dt: Seconds a step of the motion.
     """
     if not stands_badly(feet, heading, robot):

@@ -47,7 +47,7 @@ class TailConfig:
     Attributes:
         use: `auto`: on robots that are evaluated beside the reference (`fall.frame: reference`).
         lead_s: Stand before the clip, seconds.
-        blend_s: From the stand into the clip, and back, seconds.
+        blend_s: Blend from the stand into the clip, and back, seconds.
         stand_s: Stand after the clip, seconds.
         steps: Whether steps lead from feet on which no robot stands well into the robot's stand.
     """
