@@ -5,10 +5,10 @@
 #   make test-fast  more than four fifths of them, of every folder, within 90 s on two idle cores
 #   make test-stack  the whole stack and the documented server as processes, end to end (half an
 #                 hour; apt-get install postgresql chromium)
-#   make bench    accuracy of the mocap stage against ground truth, cost of judging a clip
+#   make bench    accuracy of the mocap stage against ground truth, cost of assessing a clip
 #   make bench-mocap  the first of the two alone, writes benchmarks/results/mocap.json and .md
 #   make bench-retarget  our solver beside the paper's mapping and mink (pip install -e '.[bench]')
-#   make bench-learning  speed beside sb3-contrib and bare MuJoCo, policies judged (hours; resumable)
+#   make bench-learning  speed beside sb3-contrib and bare MuJoCo, policies evaluated (hours; resumable)
 #   make bench-orchestration  what Prefect costs around the work (PostgreSQL and a server are started)
 #   make chaos    20 studies whose processes, services, disk and wires are cut at random moments
 #   make deploy   pools, deployments and automations on the server of PREFECT_API_URL

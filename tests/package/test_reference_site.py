@@ -73,6 +73,13 @@ def test_every_link_of_the_site_leads_somewhere(site: Path, pages: dict[Path, Pa
     assert list(dead_links(site, pages)) == []
 
 
+def test_dead_links_and_anchors_are_found(tmp_path: Path) -> None:
+    text = '<a id="b" href="#b"></a><a href="#c"></a><img src="d.png"><a href="https://e.org"></a>'
+    page = tmp_path / "index.html"
+    page.write_text(text)
+    assert list(dead_links(tmp_path, {page: Page(text)})) == ["index.html: #c", "index.html: d.png"]
+
+
 def test_every_public_name_stands_in_the_reference(pages: dict[Path, Page]) -> None:
     anchors = {anchor for page in pages.values() for anchor in page.anchors}
     public = set(rj.__all__) - {"__version__", "RoboJacksonError"}
