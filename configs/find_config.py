@@ -12,8 +12,10 @@ from robojackson.config import config_dataclass
 
 @config_dataclass
 class FindConfig:
-    """Attributes:
-    selection, web, formats, assessment, filters: Configurations of the steps, in their order.
+    """Configuration of a search.
+
+    Attributes:
+        selection, web, formats, assessment, filters: Configurations of the steps, in their order.
     """
 
     selection: SelectionConfig = Field(default_factory=SelectionConfig)

@@ -177,7 +177,7 @@ async def conclude(
     outcomes: Mapping[str, Any],
     motions: Mapping[str, dict[str, Artifact]],
 ) -> Facts:
-    """Write the page over what ended well, and raise what did not in one sentence.
+    """Write the page of the successful cells, and raise one sentence about the failed ones.
 
     Raises:
         StudyFailed: a cell failed.

@@ -210,7 +210,7 @@ def _is_due(dance: Dance) -> bool:
 
 
 def _note(dance: Dance, result: Facts) -> None:
-    """Keep what was found, and when."""
+    """Store the result and its time."""
     facts = {"finished_at": datetime.now(UTC).isoformat(), "dance": dance.name, **result}
     text = json.dumps(facts, indent=1, default=str)
     Store.from_environment().put(_key(dance), text.encode())

@@ -11,7 +11,7 @@ Value = TypeVar("Value", bound=tables.Tabular)
 
 
 def save(store: Store, stage: str, name: str, value: tables.Tabular) -> Artifact:
-    """Keep a dataclass in the store under a key made of its content."""
+    """Store a dataclass under a key made of its content."""
     return store.save(stage, name, tables.encode(value))
 
 

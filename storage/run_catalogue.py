@@ -41,7 +41,7 @@ class Run:
 
 
 def record(store: Store, run: Run) -> Artifact:
-    """Write a run down, replacing what was known of it."""
+    """Record a run, replacing its earlier record."""
     text = json.dumps(asdict(run), default=str, indent=1, sort_keys=True)
     return store.put(f"{FOLDER}/{run.run_id}.json", text.encode())
 

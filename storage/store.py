@@ -104,7 +104,7 @@ class Store(FileTree):
 
     @property
     def here(self) -> Path:
-        """What belongs to this machine alone: the root itself on a disk, else a folder in cache."""
+        """The folder of this machine: the root itself on a disk, else a folder in cache."""
         if isinstance(self.place, LocalFolder):
             return self.place.root
         cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")

@@ -59,7 +59,7 @@ class Place:
 
 
 def write(store: Store, place: Place, given: Mapping[str, Artifact]) -> dict[str, Artifact]:
-    """Put the tables of a cell where questions find them; another run of that cell makes room.
+    """Write the tables of a cell where queries find them; replace those of another run of it.
 
     A table that is there already is not written again.
 
@@ -97,7 +97,7 @@ def read_note(store: Store, place: Place) -> dict[str, Any]:
 
 
 def note(store: Store, place: Place, facts: Mapping[str, Any]) -> Artifact:
-    """Keep where the numbers of a cell come from."""
+    """Store the provenance of a cell."""
     text = json.dumps(facts, indent=1, sort_keys=True, default=str)
     return store.put(note_key(place), text.encode())
 

@@ -36,12 +36,14 @@ OPENGL_TO_CAMERA = np.array([1.0, -1.0, -1.0])
 
 @dataclass(frozen=True)
 class Truth:
-    """Attributes:
-    clip: Name of the video without its suffix.
-    joints: `JOINTS`, metres, world.
-    up_c: Direction against gravity in the camera frame.
-    feet: Soles under heels and toes, metres; None where the truth has no toes.
-    seams: First frame of every further cycle.
+    """Ground truth of a clip.
+
+    Attributes:
+        clip: Name of the video without its suffix.
+        joints: `JOINTS`, metres, world.
+        up_c: Direction against gravity in the camera frame.
+        feet: Soles under heels and toes, metres; None where the truth has no toes.
+        seams: First frame of every further cycle.
     """
 
     clip: str

@@ -36,7 +36,7 @@ def quiet_prefect() -> None:
 
 @contextmanager
 def dance_bar(minutes: float, store: Path) -> Iterator[None]:
-    """Show how far the pass is that runs inside, on a terminal.
+    """Show the progress of the pass that runs inside, on a terminal.
 
     Args:
         minutes: Budget of the whole pass.

@@ -17,7 +17,7 @@ PAGE_S, PICTURE_S = 4.0, 0.04
 def training_time(
     reference: Artifact, robot: RobotDescription, settings: PipelineConfig, began: float
 ) -> TrainingTime | None:
-    """Measure what is over of the pass, estimate what comes after the training.
+    """Measure the time spent by the pass, and estimate the time after the training.
 
     Args:
         began: When the budget of the pass began, Unix time, seconds.

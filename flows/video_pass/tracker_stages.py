@@ -51,7 +51,7 @@ class TrackedDance:
 
     @property
     def joined(self) -> Artifacts:
-        """What stays of it on the page of a trained policy."""
+        """The part of it that stays on the page of a trained policy."""
         return {there: self.made[alone] for alone, there in JOINED.items()}
 
 

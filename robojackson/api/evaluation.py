@@ -44,7 +44,7 @@ PartProgress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True, repr=False)
 class PolicyEvaluation:
-    """The verdict on a policy.
+    """The evaluation of a policy.
 
     Attributes:
         summary: Means over its rollouts; `baselines`: the same of bodies that do not dance.

@@ -66,7 +66,7 @@ def train_policy(
     hooks: Hooks | None = None,
     progress: bool | Callable[[Row], None] = False,
 ) -> TrainedPolicy:
-    """Teach a robot to follow a reference motion with TQC.
+    """Train a robot to follow a reference motion with TQC.
 
     Args:
         reference: What `retarget_motion` returned, or its reference.parquet.

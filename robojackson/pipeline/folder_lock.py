@@ -19,7 +19,7 @@ POLL_S = 0.05
 
 @contextmanager
 def locked(folder: Path, name: str = "lock", patience_s: float = 0.0) -> Iterator[None]:
-    """Hold a folder for this thread; the kernel lets go when the process dies.
+    """Hold a folder for this thread; the kernel releases it when the process dies.
 
     Args:
         patience_s: Time to wait for the holder, seconds; infinite waits forever.

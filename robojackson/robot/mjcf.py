@@ -116,7 +116,7 @@ def model_sha256(path: Path) -> str:
 
 
 def _silence_mujoco() -> None:
-    """Keep MuJoCo's warnings out of the terminal and of a MUJOCO_LOG.TXT where the user stands.
+    """Keep MuJoCo's warnings out of the terminal and of a MUJOCO_LOG.TXT in the working folder.
 
     A simulation that diverges, as a robot that just learns to stand does, is counted in
     `data.warning`, which ends the episode.

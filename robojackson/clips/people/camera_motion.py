@@ -22,12 +22,14 @@ LEAST_TEXTURE = 3e-3
 
 @config_dataclass
 class CameraConfig:
-    """Attributes:
-    samples_per_s: Pairs of frames that are compared, a second.
-    fewest: Pairs that are compared in a short clip.
-    short_side: Pixels of the short side of the pictures that are compared.
-    corners: Most corners that are followed.
-    still: Displacement of a camera that stands, image diagonals a frame.
+    """Configuration of measuring the camera's motion.
+
+    Attributes:
+        samples_per_s: Pairs of frames that are compared, a second.
+        fewest: Pairs that are compared in a short clip.
+        short_side: Pixels of the short side of the pictures that are compared.
+        corners: Most corners that are followed.
+        still: Displacement of a camera that stands, image diagonals a frame.
     """
 
     samples_per_s: float = Field(default=2.0, gt=0)

@@ -21,13 +21,15 @@ PERSON_MARGIN = 0.15
 
 @config_dataclass
 class PeopleConfig:
-    """Attributes:
-    samples_per_s: Frames that are looked at, a second.
-    fewest: Frames that are looked at in a short clip.
-    most: People that are counted at most.
-    short_side: Pixels of the short side of the pictures that are looked at.
-    smallest: A person below this size is in the background, heights of the first person.
-    visibility: Least mean visibility of the landmarks of a person, 0..1.
+    """Configuration of counting people.
+
+    Attributes:
+        samples_per_s: Frames that are looked at, a second.
+        fewest: Frames that are looked at in a short clip.
+        most: People that are counted at most.
+        short_side: Pixels of the short side of the pictures that are looked at.
+        smallest: A person below this size is in the background, heights of the first person.
+        visibility: Least mean visibility of the landmarks of a person, 0..1.
     """
 
     samples_per_s: float = Field(default=1.0, gt=0)

@@ -33,13 +33,15 @@ FEWEST_PIXELS = 12
 
 @config_dataclass
 class PersonDetectionConfig:
-    """Attributes:
-    most: People that are looked for in a picture.
-    limb_width: Width of the paint over a limb, body heights.
-    short_side: Pixels of the short side of the pictures that are looked at.
-    visibility: Least mean visibility of the landmarks of a person, 0..1.
-    smallest: A person below this size is in the background, heights of the largest.
-    apart: Two finds with their trunks nearer than this are one person, body heights.
+    """Configuration of detecting all people in a picture.
+
+    Attributes:
+        most: People that are looked for in a picture.
+        limb_width: Width of the paint over a limb, body heights.
+        short_side: Pixels of the short side of the pictures that are looked at.
+        visibility: Least mean visibility of the landmarks of a person, 0..1.
+        smallest: A person below this size is in the background, heights of the largest.
+        apart: Two finds with their trunks nearer than this are one person, body heights.
     """
 
     most: int = Field(default=5, ge=2)

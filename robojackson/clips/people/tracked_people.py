@@ -51,7 +51,7 @@ class Person:
 
 @dataclass(frozen=True)
 class TrackedPeople:
-    """Everybody in a clip.
+    """All people of a clip.
 
     Attributes:
         rows: One track a person, number 1 first; NaN where not detected.

@@ -19,12 +19,14 @@ from robojackson.config import config_dataclass
 
 @config_dataclass
 class TrackletConfig:
-    """Attributes:
-    step: Distance of the trunk from one frame to the next, body heights.
-    step_speed: The same as a speed, body heights a second: it counts at low frame rates.
-    growth: Change of size from one frame to the next, ratio, that counts half of such a step.
-    crowding: People whose trunks are nearer than this touch, body heights.
-    pause_s: A tracklet outlives so long a gap, seconds.
+    """Configuration of tracklets.
+
+    Attributes:
+        step: Distance of the trunk from one frame to the next, body heights.
+        step_speed: The same as a speed, body heights a second: it counts at low frame rates.
+        growth: Change of size from one frame to the next, ratio, that counts half of such a step.
+        crowding: People whose trunks are nearer than this touch, body heights.
+        pause_s: A tracklet outlives so long a gap, seconds.
     """
 
     step: float = Field(default=0.12, gt=0)

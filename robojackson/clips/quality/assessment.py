@@ -26,9 +26,11 @@ from robojackson.motion.landmark_track import LandmarkTrack
 
 @config_dataclass
 class AssessmentConfig:
-    """Attributes:
-    detector: Size of the pose model.
-    video, stability, cuts, camera, people, drawing: Configurations of the parts.
+    """Configuration of the assessment of a clip.
+
+    Attributes:
+        detector: Size of the pose model.
+        video, stability, cuts, camera, people, drawing: Configurations of the parts.
     """
 
     detector: Size = "lite"

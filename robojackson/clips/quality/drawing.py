@@ -25,11 +25,13 @@ LIMB_WIDTH = 0.03
 
 @config_dataclass
 class DrawingConfig:
-    """Attributes:
-    samples_per_s: Frames that are looked at, a second.
-    fewest: Frames that are looked at in a short clip.
-    short_side: Pixels of the short side of the pictures that are looked at.
-    level: Largest difference of neighbouring pixels of one paint, 0..255.
+    """Configuration of recognising drawings.
+
+    Attributes:
+        samples_per_s: Frames that are looked at, a second.
+        fewest: Frames that are looked at in a short clip.
+        short_side: Pixels of the short side of the pictures that are looked at.
+        level: Largest difference of neighbouring pixels of one paint, 0..255.
     """
 
     samples_per_s: float = Field(default=0.5, gt=0)

@@ -22,11 +22,13 @@ Poses = Float[np.ndarray, "N 33 2"]
 
 @config_dataclass
 class DuplicateConfig:
-    """Attributes:
-    distance: Mean distance of the landmarks below which two clips show the same, body heights.
-    rate: Poses a second that are compared.
-    lag_s: Longest delay between two copies, seconds.
-    overlap: Least share of the shorter clip that both must show.
+    """Configuration of finding copies.
+
+    Attributes:
+        distance: Mean distance of the landmarks below which two clips show the same, body heights.
+        rate: Poses a second that are compared.
+        lag_s: Longest delay between two copies, seconds.
+        overlap: Least share of the shorter clip that both must show.
     """
 
     distance: float = Field(default=0.03, gt=0)

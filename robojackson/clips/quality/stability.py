@@ -32,8 +32,10 @@ STABILITY_SCORE = TableSchema(
 
 @config_dataclass
 class StabilityConfig:
-    """Attributes:
-    visibility_threshold: A landmark below this visibility (0..1) counts as missing.
+    """Configuration of the stability score.
+
+    Attributes:
+        visibility_threshold: A landmark below this visibility (0..1) counts as missing.
     """
 
     visibility_threshold: float = Field(default=0.5, ge=0, le=1)

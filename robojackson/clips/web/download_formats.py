@@ -19,9 +19,11 @@ DIRECT_PROTOCOLS = ("http", "https")
 
 @config_dataclass
 class FormatConfig:
-    """Attributes:
-    score_short_side: Fewest pixels of the short side of the image that is scored.
-    dance_short_side: Most pixels of the short side of the image that is danced.
+    """Configuration of the formats of downloads.
+
+    Attributes:
+        score_short_side: Fewest pixels of the short side of the image that is scored.
+        dance_short_side: Most pixels of the short side of the image that is danced.
     """
 
     score_short_side: int = Field(default=360, ge=16)

@@ -15,11 +15,13 @@ CONNECTION = re.compile(r"^HTTPS?Connection\([^)]*\): ")
 
 
 class Failure(NamedTuple):
-    """Attributes:
-    reason: Reason in one line.
-    passing: Whether another attempt makes sense.
-    wait_s: Seconds that the server requests to wait.
-    most_retries: How often it makes sense at most; a name that cannot be resolved is soon sure.
+    """Why a request failed, and whether to retry it.
+
+    Attributes:
+        reason: Reason in one line.
+        passing: Whether another attempt makes sense.
+        wait_s: Seconds that the server requests to wait.
+        most_retries: How often it makes sense at most; a name that cannot be resolved is soon sure.
     """
 
     reason: str

@@ -31,7 +31,7 @@ log = logging.getLogger(__name__)
 
 @config_dataclass
 class WebConfig:
-    """Manners towards the servers of others.
+    """Limits towards the servers of others.
 
     Attributes:
         retries: How often a request that failed for now is made again.
