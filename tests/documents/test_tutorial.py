@@ -38,6 +38,7 @@ def shortened(words: Sequence[str], clip: Path) -> list[str]:
     return [*named, *MORE.get(named[0], ())]
 
 
+@pytest.mark.timeout(1500)
 def test_the_tutorial_ends_with_a_dancing_robot(
     tmp_path: Path, short_clip: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -73,6 +74,7 @@ def test_a_command_that_looks_at_what_is_there_ends_well(
     store = tmp_path / "store"
     if words == ("metrics",):
         shutil.copytree(ROOT / "benchmarks" / "results" / "ablation", store)
+    store.mkdir(exist_ok=True)
     if words == ("robots", "check", "humanoid"):
         words = (*words, "-o", str(tmp_path / "humanoid.png"))
     done = robojackson(*words, ROBOJACKSON_STORE=str(store))
