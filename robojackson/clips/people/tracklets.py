@@ -23,7 +23,7 @@ class TrackletConfig:
 
     Attributes:
         step: Distance of the trunk from one frame to the next, body heights.
-        step_speed: The same as a speed, body heights a second: it counts at low frame rates.
+        step_speed: That distance as a speed, body heights a second: it counts at low frame rates.
         growth: Change of size from one frame to the next, ratio, that counts half of such a step.
         crowding: People whose trunks are nearer than this touch, body heights.
         pause_s: A tracklet outlives so long a gap, seconds.
