@@ -1,4 +1,4 @@
-"""What a tracker dances at once: a first look on the page, then the full evaluation.
+"""Stages of a tracker's dance: a first look on the page, then the full evaluation.
 
 The page is written before anything else is evaluated or trained, and again when more is known, at
 the same address.
@@ -42,7 +42,7 @@ class TrackedDance:
     Attributes:
         tracker: Which.
         made: What its stages left, by the names that a trained policy's have.
-        folder: Of the page.
+        folder: Folder of the page.
     """
 
     tracker: TrackerDescription
@@ -51,7 +51,7 @@ class TrackedDance:
 
     @property
     def joined(self) -> Artifacts:
-        """What stays of it on the page of a trained policy."""
+        """The part of it that stays on the page of a trained policy."""
         return {there: self.made[alone] for alone, there in JOINED.items()}
 
 

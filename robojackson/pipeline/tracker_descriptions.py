@@ -41,8 +41,8 @@ def require_tracker(robot: str, name: str | None = None) -> TrackerDescription |
     """Return a tracker of a robot that can be run at once.
 
     Args:
-        name: Of the tracker; when None, the first that is here, a fallback last;
-            no tracker when `none`.
+        name: Name of the tracker; when None, the first that is here, a fallback last; no tracker
+            when `none`.
 
     Raises:
         UnknownName: there is no such tracker.

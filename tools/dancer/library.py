@@ -1,6 +1,6 @@
 """Motions that the dancer learns: captured ones of the split's training list, and invented dances.
 
-    python -m tools.dancer.motions CAPTURED OUT [--robot g1] [--invented 120] [--part 0/2]
+    python -m tools.dancer.library CAPTURED OUT [--robot g1] [--invented 120] [--part 0/2]
 
 CAPTURED holds BVH files of CMU's subject 5 (`05_01.bvh.gz`) and DeepMimic files
 (`humanoid3d_jog.txt.gz`); what `benchmarks/learning/split.yaml` does not list for training is

@@ -11,8 +11,8 @@ from benchmarks.learning.split import load_split
 from robojackson.body.skeleton import keypoint
 from robojackson.motion.reference_motion import ReferenceMotion
 from tests.fixtures.robots import robot_motion, stock
+from tools.dancer.library import sequences
 from tools.dancer.mirror import mirrored
-from tools.dancer.motions import sequences
 from tools.dancer.smpl_motion import smpl_sequence
 from tools.dancer.train import collection
 from tools.render import deepmimic
