@@ -9,7 +9,7 @@ from configs.study_config import Study
 from robojackson.metrics import learning_curve
 from robojackson.rl.config.evaluate_config import TRAINED, VARIANTS
 from robojackson.rl.evaluation import verdict
-from storage.study_tables import RunQuery
+from storage.sql_tables import RunQuery
 
 INTERVALS = 40
 """Of the budget, in the learning curves."""

@@ -23,6 +23,7 @@ from robojackson.rl.evaluation.verdict import NEEDS_FULL_LENGTH
 from robojackson.rl.pretrained import pretrained
 from storage import study_tables
 from storage.artifact import Artifact
+from storage.sql_tables import RunQuery
 from storage.store import Store
 from tasks.runtime.code_digest import digest, template_digests
 from tasks.runtime.stage import stage
@@ -125,7 +126,7 @@ def report(
     return made
 
 
-def _facts(ask: study_tables.RunQuery, study: Study) -> dict[str, Any]:
+def _facts(ask: RunQuery, study: Study) -> dict[str, Any]:
     sql = "SELECT DISTINCT git_commit FROM runs WHERE study = $study"
     commits = [row["git_commit"] or "?" for row in ask(sql, {"study": study.name})]
     return {
@@ -167,7 +168,7 @@ def _few(study: Study) -> list[str]:
     ]
 
 
-def _starts(ask: study_tables.RunQuery, study: Study) -> list[str]:
+def _starts(ask: RunQuery, study: Study) -> list[str]:
     """What was learnt before the first step of a cell: it belongs to the price of pretraining."""
     sql = "SELECT DISTINCT setup, config FROM runs WHERE config IS NOT NULL ORDER BY ALL"
     setups: dict[str, set[str]] = {}

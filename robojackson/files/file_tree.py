@@ -5,7 +5,7 @@ Commands write their results through it; the store of the flows is one of these,
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 from robojackson.errors import RoboJacksonError, StoreError
@@ -110,20 +110,13 @@ def in_one_line(what: str, error: type[RoboJacksonError] = StoreError) -> Iterat
 
 @contextmanager
 def results_in(out: Path) -> Iterator[FileTree]:
-    """A folder for results, told at once when it cannot be written.
+    """A folder for results, refused at once when it cannot be written.
 
-    After a failure the folders that were made for it and are empty go away again.
+    It is made with the first result, so that nothing is left of a command that has none.
     """
-    made = [path for path in (out, *out.parents) if not path.exists()]
-    try:
-        files = FileTree(out)
-        files.require_writable()
-        yield files
-    except BaseException:
-        with suppress(OSError):
-            for path in made:
-                path.rmdir()
-        raise
+    there = next(path for path in (out.absolute(), *out.absolute().parents) if path.exists())
+    FileTree(there).require_writable()
+    yield FileTree(out)
 
 
 def _is_text(key: str) -> bool:

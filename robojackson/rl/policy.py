@@ -18,6 +18,7 @@ from safetensors.numpy import save
 
 from robojackson.errors import BadPolicy
 from robojackson.files.file_tree import FileTree
+from robojackson.files.foreign_file import parse_json, require_file
 
 FORMAT = "robojackson-policy-1"
 
@@ -113,14 +114,13 @@ def load_policy(path: Path) -> Policy:
     Raises:
         BadPolicy: the file is missing, foreign or has layers that do not fit each other.
     """
-    if not path.is_file():
-        raise BadPolicy(f"{path}: {'a folder, not a file' if path.is_dir() else 'no such file'}")
+    require_file(path, BadPolicy)
     try:
         with safe_open(path, framework="np") as file:
             header = file.metadata() or {}
             names = set(file.keys())
             tensors = {name: file.get_tensor(name) for name in names}
-    except (OSError, SafetensorError) as error:
+    except (OSError, SafetensorError, TypeError, ValueError) as error:
         raise BadPolicy(f"{path} is not a policy file of ours ({error})") from error
     if FORMAT not in header:
         raise BadPolicy(f"{path} is not a {FORMAT} file; `robojackson train` writes them")
@@ -129,7 +129,7 @@ def load_policy(path: Path) -> Policy:
 
 def _facts(path: Path, text: str) -> dict[str, object]:
     try:
-        facts = json.loads(text)
+        facts = parse_json(text)
     except ValueError as error:
         raise BadPolicy(f"{path}: what it was trained for cannot be read ({error})") from error
     if not isinstance(facts, dict):
