@@ -6,9 +6,11 @@ import sys
 from collections.abc import Callable
 from typing import NoReturn
 
+from robojackson.cli.environment import check_environment, quieten
 from robojackson.cli.library_output import set_variables
-from robojackson.cli.lifetime.interruption import INTERRUPTED, conclude, same_command
+from robojackson.cli.lifetime.interruption import INTERRUPTED, complain, conclude, same_command
 from robojackson.cli.lifetime.supervisor import guarded
+from robojackson.errors import BadConfiguration
 
 
 def start(command: Callable[[], int]) -> NoReturn:
@@ -22,9 +24,15 @@ def start(command: Callable[[], int]) -> NoReturn:
     """
     end = _End()
     atexit.register(end.leave)  # the first to be registered is the last to run
+    try:
+        check_environment(os.environ)
+    except BadConfiguration as cause:
+        complain(f"{type(cause).__name__}: {cause}")
+        sys.exit(1)
+    quieten(os.environ)
     set_variables()
     if sys.platform == "linux":
-        os.environ.setdefault("MUJOCO_GL", "disable")
+        os.environ["MUJOCO_GL"] = os.environ.get("MUJOCO_GL") or "disable"
     end.code = guarded(lambda: _run(command))
     sys.exit(end.code)
 

@@ -103,7 +103,9 @@ def sha256_of(data: bytes) -> str:
 
 
 def sha256_of_file(path: Path) -> str:
-    """Digest of a local file, in hexadecimal."""
+    """Digest of a local file, in hexadecimal; a device has no end."""
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise OSError("a device or a pipe, no file")
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

@@ -8,6 +8,10 @@ from pathlib import Path
 MOST = 2**29
 """Bytes beyond what the process has when it begins to read."""
 
+VIDEO_MEMORY = 5 * 2**29
+"""The same while a stranger's video is read: room for the detector and the stacks of its threads,
+of which a tenth becomes resident."""
+
 
 @contextmanager
 def limited_memory(most: int = MOST) -> Iterator[None]:

@@ -66,13 +66,17 @@ def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo, most: int) -> np.nd
         version = npy.read_magic(source)
         read_header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
         shape, fortran, kind = read_header(source)
-        size = math.prod(shape)
+        size, there = math.prod(shape), info.file_size - source.tell()
         if kind.hasobject:
             raise ValueError(f"{info.filename}: holds Python objects")
-        if size > most or size * kind.itemsize > 8 * MOST_NUMBERS:
-            raise ValueError(f"{info.filename}: {shape} of {kind}; {most:,} numbers are read")
-        content = source.read(size * kind.itemsize + 1)
-    if len(content) != size * kind.itemsize:
-        raise ValueError(f"{info.filename}: {shape} of {kind} promised, {len(content)} bytes read")
+        if size * kind.itemsize != there:
+            raise ValueError(
+                f"{info.filename}: {shape} of {kind} promised, {there} bytes are there"
+            )
+        if size > most or there > 8 * MOST_NUMBERS:
+            raise ValueError(
+                f"{info.filename}: {size:,} numbers; at most {MOST_NUMBERS:,} are read"
+            )
+        content = source.read(there)
     flat = np.frombuffer(content, kind).copy()
     return flat.reshape(shape, order="F" if fortran else "C")
