@@ -6,8 +6,8 @@ import sys
 from collections.abc import Callable
 from typing import NoReturn
 
-from robojackson.cli.environment import check_environment, quieten
 from robojackson.cli.library_output import set_variables
+from robojackson.cli.lifetime.environment import check_environment, quieten
 from robojackson.cli.lifetime.interruption import INTERRUPTED, complain, conclude, same_command
 from robojackson.cli.lifetime.supervisor import guarded
 from robojackson.errors import BadConfiguration

@@ -5,7 +5,7 @@ Commands write their results through it; the store of the flows is one of these,
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from robojackson.errors import RoboJacksonError, StoreError
@@ -106,6 +106,19 @@ def in_one_line(what: str, error: type[RoboJacksonError] = StoreError) -> Iterat
         reason = cause.strerror if isinstance(cause, OSError) and cause.strerror else str(cause)
         line = " ".join(reason.split()) or type(cause).__name__
         raise error(f"{what}: {line}") from cause
+
+
+@contextmanager
+def without_empty_folders(out: Path) -> Iterator[None]:
+    """After a failure, the folders that were made for results and are empty go away again."""
+    missing = [path for path in (out, *out.parents) if not path.exists()]
+    try:
+        yield
+    except BaseException:
+        with suppress(OSError):
+            for path in missing:
+                path.rmdir()
+        raise
 
 
 @contextmanager

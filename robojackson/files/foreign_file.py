@@ -60,13 +60,20 @@ def read_text(
         raise error(f"no text in UTF-8 ({cause.reason} at byte {cause.start})", path) from cause
 
 
-def parse_json(text: str | bytes) -> Any:
+def parse_json(text: str | bytes, finite: bool = False) -> Any:
     """Return what a JSON text holds.
+
+    Args:
+        finite: Whether NaN and infinity, which Python's JSON knows, are refused.
 
     Raises:
         ValueError: it is damaged, or its lists and objects stand too deep in each other.
     """
     try:
-        return json.loads(text)
+        return json.loads(text, parse_constant=_no_constant if finite else None)
     except RecursionError:
         raise ValueError("lists and objects stand too deep in each other") from None
+
+
+def _no_constant(name: str) -> Any:
+    raise ValueError(f"{name} is no number")

@@ -20,7 +20,13 @@ from robojackson.robot.contact_guess import guess_contacts, toe_of
 from robojackson.robot.description import KEYPOINTS, TOES, ContactPoint
 from robojackson.robot.keypoint_guess import Guess, guess_keypoints
 from robojackson.robot.limbs import SIDES, Skeleton, skeleton_of
-from robojackson.robot.model_files import FAULTS, first_line, require_model_files, require_sound
+from robojackson.robot.model_files import (
+    FAULTS,
+    first_line,
+    require_model_files,
+    require_sound,
+    silence_mujoco,
+)
 
 WEIGHTS = {"foot": 1.5, "hand": 1.5, "head": 0.5, "toe": 0.7, "pelvis": 0.0}
 """Of the squared error, by the end of a keypoint's name; the others have 1. As Humanoid-v5's."""
@@ -128,6 +134,7 @@ def _model(path: Path) -> mujoco.MjModel:
     if not path.is_file():
         raise BadConfiguration(f"{path}: no such file; expected the MJCF of a robot")
     require_model_files(path, str(path))
+    silence_mujoco()
     try:
         with limited_memory():
             model = mujoco.MjModel.from_xml_path(str(path))

@@ -20,6 +20,7 @@ from robojackson.robot.model_files import (
     first_line,
     require_model_files,
     require_sound,
+    silence_mujoco,
 )
 from robojackson.robot.names import known, where
 from robojackson.robot.physics import apply_physics, is_plane
@@ -97,7 +98,7 @@ def _in_package(description: RobotDescription, package: str, inside: str) -> Pat
 
 def compiled(description: RobotDescription, path: Path) -> mujoco.MjModel:
     """The model with the keypoint sites, a floor, and scaled motors."""
-    _silence_mujoco()
+    silence_mujoco()
     spec = read_spec(path, description)
     bodies = [body.name for body in spec.bodies if body.name != "world"]
     _add_sites(spec, description, bodies)
@@ -121,17 +122,6 @@ def model_sha256(path: Path) -> str:
     if len(digests) == 1:
         return digests[0].hexdigest()
     return hashlib.sha256(b"".join(digest.digest() for digest in digests)).hexdigest()
-
-
-def _silence_mujoco() -> None:
-    """Keep MuJoCo's warnings out of the terminal and of a MUJOCO_LOG.TXT where the user stands.
-
-    A simulation that diverges, as a robot that just learns to stand does, is counted in
-    `data.warning`, which ends the episode.
-    """
-    config = mujoco.MjLogConfig.get()
-    config.logto_console = config.logto_file = False
-    mujoco.MjLogConfig.set(config)
 
 
 def read_spec(path: Path, description: RobotDescription) -> mujoco.MjSpec:

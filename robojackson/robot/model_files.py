@@ -87,3 +87,14 @@ def first_line(error: Exception) -> str:
     """Return MuJoCo's reason in one line."""
     lines = str(error).splitlines() or [type(error).__name__]
     return "not enough memory for this model" if isinstance(error, MemoryError) else lines[0]
+
+
+def silence_mujoco() -> None:
+    """Keep MuJoCo's warnings out of the terminal and of a MUJOCO_LOG.TXT where the user stands.
+
+    A simulation that diverges, as a robot that just learns to stand does, is counted in
+    `data.warning`, which ends the episode.
+    """
+    config = mujoco.MjLogConfig.get()
+    config.logto_console = config.logto_file = False
+    mujoco.MjLogConfig.set(config)

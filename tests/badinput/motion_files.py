@@ -33,8 +33,9 @@ def amass(**changes: object) -> Maker:
         with np.load(BASE / "amass.npz") as archive:
             arrays = dict(archive)
         for name, value in changes.items():
-            arrays.pop(name, None)
-            if value is not ...:
+            if value is ...:
+                arrays.pop(name, None)
+            else:
                 arrays[name] = value(arrays) if callable(value) else np.asarray(value)
         np.savez(here / "a.npz", **arrays)
 

@@ -59,6 +59,9 @@ def _become(request: dict[str, object]) -> None:
             os.dup2(file, number)
             os.close(file)
         sys.argv = ["robojackson", *request["words"]]  # type: ignore[misc]
+        if request["cold"]:
+            words = [sys.executable, "-m", "robojackson", *sys.argv[1:]]
+            os.execve(sys.executable, words, dict(os.environ))
         from robojackson.__main__ import main as command
 
         command()
