@@ -17,13 +17,16 @@ from tools.stack.service import Service, StackError
 USER = "postgres"
 
 
-def service(wanted: Mapping[str, str], check: str, port: int, folder: Path, log: Path) -> Service:
+def service(
+    wanted: Mapping[str, str], check: str, port: int, folder: Path, log: Path, roles: str = ""
+) -> Service:
     """The database server of a stack.
 
     Args:
         wanted: Environment of the image: POSTGRES_USER, POSTGRES_PASSWORD, POSTGRES_DB.
         check: The file's health check, a line of shell.
         port, folder, log: Where it listens, keeps its data's path, and says what it does.
+        roles: SQL that the image runs once, with an empty volume.
     """
     home = _home(folder)
     user = USER if os.geteuid() == 0 else None
@@ -35,7 +38,7 @@ def service(wanted: Mapping[str, str], check: str, port: int, folder: Path, log:
         "postgres",
         [*command, "-k", str(home)],
         {**os.environ, **access},
-        ["sh", "-c", f"{check} && {_database(wanted)}"],
+        ["sh", "-c", _ready(wanted, check, roles, home)],
         log,
         user,
     )
@@ -68,6 +71,16 @@ def _initialise(home: Path, wanted: Mapping[str, str], user: str | None) -> None
     making = [program("initdb"), "-D", str(home / "data"), "-A", "scram-sha-256", *words]
     subprocess.run(making, user=user, check=True, capture_output=True, cwd="/")
     secret.unlink()
+
+
+def _ready(wanted: Mapping[str, str], check: str, roles: str, home: Path) -> str:
+    """Shell that does what the image does at its first start, then asks whether it is healthy."""
+    if not roles:
+        return f"{check} && {_database(wanted)}"
+    script, done, user = home / "roles.sql", home / "roles.done", wanted["POSTGRES_USER"]
+    script.write_text(roles)
+    told = f"psql -q -v ON_ERROR_STOP=1 -U {user} -d {wanted['POSTGRES_DB']} -f {script}"
+    return f"pg_isready && {{ test -e {done} || {{ {told} && touch {done}; }}; }} && {check}"
 
 
 def _database(wanted: Mapping[str, str]) -> str:
