@@ -23,7 +23,7 @@ Row = dict[str, str]
 
 
 def packages() -> list[Row]:
-    """Return name, version and licence of every package below ours that is installed, extras too."""
+    """Return name, version and licence of every installed package below ours, of extras too."""
     found: dict[str, Row] = {}
     waiting = [OURS]
     while waiting:

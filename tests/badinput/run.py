@@ -108,6 +108,12 @@ class Warm:
         answer = json.loads(self._process.stdout.readline())
         return answer["code"], answer["peak_kb"] / 1024, out.read_bytes(), err.read_bytes()
 
+    def end(self) -> None:
+        """End the process."""
+        assert self._process.stdin
+        self._process.stdin.close()
+        self._process.wait()
+
 
 def _faults(
     case: Case, code: int, peak_mb: float, out: bytes, err: bytes, left: list[str]

@@ -1,4 +1,4 @@
-"""The roles of the stack's database, on a real PostgreSQL: each may do what it needs and no more."""
+"""The roles of the stack's database, on a real PostgreSQL: each may do what it needs, no more."""
 
 import os
 import subprocess

@@ -4,6 +4,7 @@ Only the standard library is imported, since this precedes everything else.
 """
 
 import os
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -15,6 +16,8 @@ PLATFORMS = ("", "cpu", "cuda", "gpu", "rocm", "tpu", "metal")
 STORES = ("file", "s3", "s3a", "gs", "gcs", "abfs", "az", "memory")
 LOG_LEVELS = ("DEBUG", "INFO", "WARNING", "ERROR", "CRITICAL")
 MOST_THREADS = 4096
+SECRET = re.compile(r"//[^/@]*@")
+"""User and password in an address."""
 
 
 def check_environment(given: Mapping[str, str]) -> None:
@@ -26,7 +29,8 @@ def check_environment(given: Mapping[str, str]) -> None:
     for name, fault in CHECKS.items():
         value = given.get(name)
         if value and (reason := fault(value)):
-            raise BadConfiguration(f"{name} is {value!r:.200}: {reason}")
+            shown = SECRET.sub("//***@", value)
+            raise BadConfiguration(f"{name} is {shown!r:.200}: {reason}")
 
 
 def _one_of(*allowed: str) -> Callable[[str], str]:
