@@ -1,6 +1,6 @@
 """`make badinput`: every case of the corpus through the real command, and a table of what came of it.
 
-    python -m tests.badinput.run [--group NAME] [--workers 2] [--table FILE]
+    python -m tests.badinput.run [--groups NAME,...] [--workers 2] [--table FILE]
 
 A bad case passes when the command ends with 1 or 2 and one line, without control bytes or a
 traceback, leaves nothing behind and takes at most `MARGIN_MB` more memory than the same command
@@ -17,7 +17,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 from queue import Queue
@@ -151,14 +151,15 @@ def _listed(folder: Path) -> set[str]:
 def main() -> int:
     """Run the corpus, print its table, and return how many cases failed."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--group", default="")
+    parser.add_argument("--groups", default="", help="names, a comma between them")
     parser.add_argument("--name", default="")
     parser.add_argument("--cold", action="store_true", help="a fresh process for every case")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--table", type=Path)
     given = parser.parse_args()
     began, made = time.monotonic(), base()
-    cases = [c for c in corpus() if given.group in c.group and given.name in c.name]
+    wanted = [name for name in given.groups.split(",") if name]
+    cases = [c for c in corpus() if c.group in (wanted or [c.group]) and given.name in c.name]
     free: Queue[Warm] = Queue()
     for _ in range(given.workers):
         free.put(Warm(given.cold))
@@ -172,7 +173,8 @@ def main() -> int:
 
     with ThreadPoolExecutor(given.workers) as pool:
         outcomes = []
-        for outcome in pool.map(in_turn, cases):
+        for done in as_completed([pool.submit(in_turn, case) for case in cases]):
+            outcome = done.result()
             outcomes.append(outcome)
             if outcome.faults:
                 print(_row(outcome), flush=True)

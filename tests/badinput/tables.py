@@ -164,7 +164,7 @@ REFERENCE: Mapping[str, Change] = {
     "torque nan": column("torque_ratio", entry(np.nan)),
     "no rows": rows(0),
     "one row": rows(1),
-    "2000000 rows": rows(2_000_000),
+    "300000 rows": rows(300_000),
 }
 
 
