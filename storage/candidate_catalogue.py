@@ -16,10 +16,10 @@ import pyarrow as pa
 from robojackson.clips.quality.stability import STABILITY_SCORE
 from robojackson.errors import StoreError
 from robojackson.files import tables
+from robojackson.files.sql_tables import answering
 from robojackson.files.table_types import F64, I32, TEXT, Column, TableSchema
 from robojackson.pipeline.table_schemas import VIDEO_CANDIDATE
 from storage.artifact import Artifact
-from storage.sql_tables import answering
 from storage.store import Store
 
 FOLDER = "candidates"

@@ -20,10 +20,10 @@ import pyarrow as pa
 from robojackson.errors import BadTable, StoreError
 from robojackson.files import tables
 from robojackson.files.local_folder import sha256_of
+from robojackson.files.sql_tables import RunQuery, answering
 from robojackson.files.table_types import TableSchema
 from robojackson.pipeline.table_schemas import EPISODE_RECORD, EVALUATION_RECORD
 from storage.artifact import Artifact
-from storage.sql_tables import RunQuery, answering
 from storage.store import Store
 
 FOLDER = "metrics"

@@ -14,6 +14,7 @@ import numpy as np
 from configs.study_config import Move, Study
 from robojackson.errors import RoboJacksonError
 from robojackson.files.json_types import to_json_types
+from robojackson.files.sql_tables import RunQuery
 from robojackson.metrics import ablation_statistics
 from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.report.pages import study_page, study_table
@@ -23,7 +24,6 @@ from robojackson.rl.evaluation.verdict import NEEDS_FULL_LENGTH
 from robojackson.rl.pretrained import pretrained
 from storage import study_tables
 from storage.artifact import Artifact
-from storage.sql_tables import RunQuery
 from storage.store import Store
 from tasks.runtime.code_digest import digest, template_digests
 from tasks.runtime.stage import stage

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from typing import NoReturn
 
 from robojackson.cli.library_output import set_variables
-from robojackson.cli.lifetime.environment import check_environment, quieten
 from robojackson.cli.lifetime.interruption import INTERRUPTED, complain, conclude, same_command
 from robojackson.cli.lifetime.supervisor import guarded
+from robojackson.cli.lifetime.variables import check_environment, quieten
 from robojackson.errors import BadConfiguration
 
 

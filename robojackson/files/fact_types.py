@@ -28,6 +28,6 @@ Matrix = Annotated[
 Figures = dict[Text, Number | None]
 
 
-def many(kind: Any, count: int) -> Any:
+def many(kind: Any, count: int) -> object:
     """Return the type of a list of exactly so many."""
     return Annotated[list[kind], Field(min_length=count, max_length=count)]

@@ -2,10 +2,12 @@
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from robojackson.errors import RoboJacksonError, StoreError
 
+Json = Any
+"""What a JSON text may hold."""
 LARGEST = 2**28
 """Bytes of a file that is read into memory; an hour of motion has fewer."""
 
@@ -60,7 +62,7 @@ def read_text(
         raise error(f"no text in UTF-8 ({cause.reason} at byte {cause.start})", path) from cause
 
 
-def parse_json(text: str | bytes, finite: bool = False) -> Any:
+def parse_json(text: str | bytes, finite: bool = False) -> Json:
     """Return what a JSON text holds.
 
     Args:
@@ -75,5 +77,5 @@ def parse_json(text: str | bytes, finite: bool = False) -> Any:
         raise ValueError("lists and objects stand too deep in each other") from None
 
 
-def _no_constant(name: str) -> Any:
+def _no_constant(name: str) -> NoReturn:
     raise ValueError(f"{name} is no number")

@@ -5,7 +5,6 @@ a list of distinct values, since a few bytes can promise the same long text for 
 """
 
 import io
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -15,7 +14,7 @@ from pydantic import ValidationError
 
 from robojackson.errors import BadTable
 from robojackson.files.foreign_file import parse_json
-from robojackson.files.table_types import Column, TableSchema
+from robojackson.files.table_types import Column, Facts, TableSchema
 
 MAKERS = {"SmplSequence": "mocap", "ReferenceMotion": "retarget"}
 """Which command writes a table that other commands read."""
@@ -93,7 +92,7 @@ def check(schema: TableSchema, table: pa.Table, where: str) -> pa.Table:
     return table
 
 
-def facts_of(schema: TableSchema, table: pa.Table, where: str) -> dict[str, Any]:
+def facts_of(schema: TableSchema, table: pa.Table, where: str) -> Facts:
     """Return the facts of a table that its schema knows.
 
     Raises:
@@ -111,9 +110,9 @@ def facts_of(schema: TableSchema, table: pa.Table, where: str) -> dict[str, Any]
     return found
 
 
-def metadata_of(table: pa.Table) -> dict[str, Any]:
+def metadata_of(table: pa.Table) -> Facts:
     """Return the facts about the whole table; what is not JSON is not ours and left out."""
-    facts: dict[str, Any] = {}
+    facts: Facts = {}
     for key, value in (table.schema.metadata or {}).items():
         try:
             facts[key.decode()] = parse_json(value)

@@ -3,7 +3,7 @@
 import json
 from os import PathLike
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -11,10 +11,10 @@ from robojackson.files import tables
 from robojackson.files.file_tree import results_in
 from robojackson.files.foreign_file import read_file
 from robojackson.files.json_types import to_json_types
+from robojackson.files.table_types import Facts as Facts
 from robojackson.files.table_types import TableSchema
 
 Columns = dict[str, np.ndarray]
-Facts = dict[str, Any]
 
 
 class TableFile:

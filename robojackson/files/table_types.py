@@ -9,6 +9,10 @@ import pyarrow as pa
 from pydantic import TypeAdapter
 
 VERSION = 1
+Facts = dict[str, Any]
+"""Metadata of a table."""
+FactTypes = Mapping[str, Any]
+"""Types of such facts by key, as pydantic takes them."""
 WORLD = "world"
 F32, F64, I32, I64 = pa.float32(), pa.float64(), pa.int32(), pa.int64()
 TEXT, FLAG, STATE = pa.string(), pa.bool_(), pa.int8()
@@ -68,12 +72,12 @@ class TableSchema:
     name: str
     row: str
     columns: tuple[Column, ...]
-    metadata: Mapping[str, Any] = field(default_factory=dict)
-    optional: Mapping[str, Any] = field(default_factory=dict)
+    metadata: FactTypes = field(default_factory=dict)
+    optional: FactTypes = field(default_factory=dict)
     dynamic: Mapping[str, str] | None = None
 
     @cached_property
-    def facts(self) -> Mapping[str, TypeAdapter[Any]]:
+    def facts(self) -> Mapping[str, TypeAdapter[object]]:
         """What checks the metadata, by key."""
         return {key: TypeAdapter(kind) for key, kind in {**self.metadata, **self.optional}.items()}
 

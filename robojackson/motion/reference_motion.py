@@ -169,7 +169,7 @@ class ReferenceMotion(TableFile):
         )
 
 
-def _require_widths(arrays: dict[str, Any], facts: Facts) -> None:
+def _require_widths(arrays: Mapping[str, np.ndarray], facts: Facts) -> None:
     """Raise `ValueError` where a table has not a column a name, or its root is not turned."""
     joints, contacts = len(facts["joint_names"]), len(facts["contact_names"])
     wanted = {"qpos": 7 + joints, "qvel": 6 + joints, "contact": contacts, "torque_ratio": joints}

@@ -3,10 +3,11 @@ is an error.
 """
 
 import re
-from typing import Any
+from typing import Any, TypeVar
 
 import yaml
 
+Value = TypeVar("Value")
 MOST_VALUES = 100_000
 """In one text, those of an alias counted wherever it stands."""
 
@@ -57,7 +58,7 @@ def _integer(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> int:
 Yaml12.add_constructor("tag:yaml.org,2002:int", _integer)
 
 
-def require_few(value: Any) -> Any:
+def require_few(value: Value) -> Value:
     """Return the value of a text, refused where its aliases make a few lines endless.
 
     Raises:
@@ -65,7 +66,7 @@ def require_few(value: Any) -> Any:
     """
     known: dict[int, int] = {}
 
-    def count(part: Any) -> int:
+    def count(part: object) -> int:
         if not isinstance(part, dict | list | set | tuple):
             return 1
         if id(part) not in known:

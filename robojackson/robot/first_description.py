@@ -15,18 +15,11 @@ import mujoco
 import numpy as np
 
 from robojackson.errors import BadConfiguration
-from robojackson.files.memory_limit import limited_memory
 from robojackson.robot.contact_guess import guess_contacts, toe_of
 from robojackson.robot.description import KEYPOINTS, TOES, ContactPoint
 from robojackson.robot.keypoint_guess import Guess, guess_keypoints
 from robojackson.robot.limbs import SIDES, Skeleton, skeleton_of
-from robojackson.robot.model_files import (
-    FAULTS,
-    first_line,
-    require_model_files,
-    require_sound,
-    silence_mujoco,
-)
+from robojackson.robot.model_files import read_model
 
 WEIGHTS = {"foot": 1.5, "hand": 1.5, "head": 0.5, "toe": 0.7, "pelvis": 0.0}
 """Of the squared error, by the end of a keypoint's name; the others have 1. As Humanoid-v5's."""
@@ -133,14 +126,7 @@ def guess_rest(skeleton: Skeleton) -> dict[str, float]:
 def _model(path: Path) -> mujoco.MjModel:
     if not path.is_file():
         raise BadConfiguration(f"{path}: no such file; expected the MJCF of a robot")
-    require_model_files(path, str(path))
-    silence_mujoco()
-    try:
-        with limited_memory():
-            model = mujoco.MjModel.from_xml_path(str(path))
-    except FAULTS as cause:
-        raise BadConfiguration(f"{path}: {first_line(cause)}") from cause
-    require_sound(model, str(path))
+    model = read_model(path)
     if model.nbody < 2 or not (model.jnt_type == int(mujoco.mjtJoint.mjJNT_HINGE)).any():
         raise BadConfiguration(f"{path}: no body with a hinge; expected the MJCF of a robot")
     return model

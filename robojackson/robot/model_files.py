@@ -12,6 +12,7 @@ import numpy as np
 
 from robojackson.errors import BadConfiguration
 from robojackson.files.foreign_file import require_file
+from robojackson.files.memory_limit import limited_memory
 
 FOLDERS = ("assetdir", "meshdir", "texturedir")
 PARTS = ("include", "model")
@@ -81,6 +82,23 @@ def require_sound(model: mujoco.MjModel, place: str) -> None:
             raise BadConfiguration(
                 f"{place}: {name} holds numbers that are not finite, or too large"
             )
+
+
+def read_model(path: Path) -> mujoco.MjModel:
+    """Return a model as it is, compiled.
+
+    Raises:
+        BadConfiguration: MuJoCo cannot read it, or it is none that we open.
+    """
+    require_model_files(path, str(path))
+    silence_mujoco()
+    try:
+        with limited_memory():
+            model = mujoco.MjModel.from_xml_path(str(path))
+    except FAULTS as cause:
+        raise BadConfiguration(f"{path}: {first_line(cause)}") from cause
+    require_sound(model, str(path))
+    return model
 
 
 def first_line(error: Exception) -> str:

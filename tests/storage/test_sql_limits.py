@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from robojackson.errors import BadTable
-from storage import sql_tables, study_tables
+from robojackson.files import sql_tables
+from storage import study_tables
 from storage.store import Store
 
 

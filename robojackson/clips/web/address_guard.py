@@ -19,6 +19,8 @@ from robojackson.errors import DownloadFailed
 ADVICE = "web.private_addresses=true in the configuration allows it"
 _trusted: ContextVar[frozenset[str] | None] = ContextVar("trusted hosts of the guard", default=None)
 _resolve = socket.getaddrinfo
+Given = Any
+"""What `getaddrinfo` takes and returns."""
 
 
 class PrivateAddress(OSError):
@@ -66,7 +68,7 @@ def refusal(cause: BaseException) -> DownloadFailed | None:
     return None
 
 
-def _guarded(host: Any, *more: Any, **options: Any) -> Any:
+def _guarded(host: Given, *more: Given, **options: Given) -> Given:
     found = _resolve(host, *more, **options)
     trusted = _trusted.get()
     if trusted is not None and str(host) not in trusted:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from robojackson.cli.lifetime.environment import check_environment
+from robojackson.cli.lifetime.variables import check_environment
 from robojackson.errors import BadConfiguration
 
 BAD = {

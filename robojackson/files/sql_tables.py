@@ -18,7 +18,9 @@ from robojackson.files.memory_limit import limited_memory
 if TYPE_CHECKING:
     from duckdb import DuckDBPyConnection
 
-RunQuery = Callable[..., list[dict[str, Any]]]
+Rows = list[dict[str, Any]]
+Given = Mapping[str, object]
+RunQuery = Callable[..., Rows]
 """A question in SQL and its parameters to rows."""
 LIMITS: dict[str, str | bool | int | float | list[str]] = {
     "threads": 1,
@@ -53,7 +55,7 @@ def answering(
         connection.execute("SET enable_external_access = false")
         connection.execute("SET lock_configuration = true")
 
-        def ask(sql: str, given: Mapping[str, Any] | None = None) -> list[dict[str, Any]]:
+        def ask(sql: str, given: Given | None = None) -> Rows:
             try:
                 if not limited:
                     return _rows(connection, sql, given or {}, most=None)
@@ -81,9 +83,7 @@ def _limits(connection: "DuckDBPyConnection") -> Iterator[None]:
         timer.cancel()
 
 
-def _rows(
-    connection: "DuckDBPyConnection", sql: str, given: Mapping[str, Any], most: int | None
-) -> list[dict[str, Any]]:
+def _rows(connection: "DuckDBPyConnection", sql: str, given: Given, most: int | None) -> Rows:
     if connection.execute(sql, dict(given)) is None:
         raise BadTable("there is no question in the text")
     names = [column[0] for column in connection.description or ()]
