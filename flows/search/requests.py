@@ -46,6 +46,8 @@ def require_online(dance: Dance, config: FindConfig) -> None:
         SearchFailed: one line with the reason and what to do.
     """
     page = page_of(dance.source, dance.full_query, dance.address)
+    if dance.source == "site" and not page:
+        raise SearchFailed("site: no address; give one such as https://host/search?q={query}")
     if page and not web_address(page):
         raise SearchFailed(f"{dance.source}: {clean_text(page)} is no http address")
     if page:
