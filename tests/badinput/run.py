@@ -30,6 +30,8 @@ from tests.fixtures.commands import environment
 MARGIN_MB = 1024
 USUAL_MB = {"mocap": 620, "score": 620, "dance": 700, "train": 900, "evaluate": 600}
 """Peak memory of commands on a bundled clip (docs/bad_input.md); other commands are below 500."""
+PROGRESS = 25
+"""Cases between two lines on stderr."""
 LONGEST_S = 60.0
 KEPT_VARIABLES = ("PATH", "LANG", "VIRTUAL_ENV", "PYTHONPATH", "OMP_NUM_THREADS")
 
@@ -176,6 +178,8 @@ def main() -> int:
         for done in as_completed([pool.submit(in_turn, case) for case in cases]):
             outcome = done.result()
             outcomes.append(outcome)
+            if not len(outcomes) % PROGRESS:
+                sys.stderr.write(f"{len(outcomes)} of {len(cases)}\n")
             if outcome.faults:
                 print(_row(outcome), flush=True)
     failed = [each for each in outcomes if each.faults]
