@@ -32,13 +32,14 @@ _OURS = "keypoint/"
 
 
 def site_of(model: mujoco.MjModel, key: str) -> int:
-    """Index of a keypoint's site."""
+    """Return the index of a keypoint's site."""
     ours = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, f"{_OURS}{key}")
     return int(model.site(key).id if ours < 0 else ours)
 
 
 def robots_folder() -> Path:
-    """Where added robots are kept: inside the store, or in the cache where that is no folder."""
+    """Return where added robots are kept: inside the store, or in the cache where that is no
+    folder."""
     root = os.environ.get(STORE) or "store"
     if "://" in root:
         cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
@@ -47,13 +48,13 @@ def robots_folder() -> Path:
 
 
 def added_folder(description: RobotDescription) -> Path:
-    """Where `robojackson robots add` puts the model of a robot."""
+    """Return where `robojackson robots add` puts the model of a robot."""
     shared = description.source.shared_folder if description.source else ""
     return robots_folder() / (shared or description.name)
 
 
 def mjcf_path(description: RobotDescription) -> Path:
-    """The file of a description.
+    """Return the file of a description.
 
     Raises:
         BadConfiguration: It is not there, or not the one that was pinned.
@@ -97,7 +98,7 @@ def _in_package(description: RobotDescription, package: str, inside: str) -> Pat
 
 
 def compiled(description: RobotDescription, path: Path) -> mujoco.MjModel:
-    """The model with the keypoint sites, a floor, and scaled motors."""
+    """Return the model with the keypoint sites, a floor, and scaled motors."""
     silence_mujoco()
     spec = read_spec(path, description)
     bodies = [body.name for body in spec.bodies if body.name != "world"]
@@ -117,7 +118,7 @@ def compiled(description: RobotDescription, path: Path) -> mujoco.MjModel:
 
 
 def model_sha256(path: Path) -> str:
-    """Digest of an MJCF; where it includes other files or has meshes, of all of them."""
+    """Return the digest of an MJCF; where it includes other files or has meshes, of all of them."""
     digests = [hashlib.sha256(file.read_bytes()) for file in files_of(path)]
     if len(digests) == 1:
         return digests[0].hexdigest()
@@ -125,7 +126,7 @@ def model_sha256(path: Path) -> str:
 
 
 def read_spec(path: Path, description: RobotDescription) -> mujoco.MjSpec:
-    """The MJCF as it is.
+    """Return the MJCF as it is.
 
     Raises:
         BadConfiguration: MuJoCo cannot read it.

@@ -1,4 +1,4 @@
-"""One clip of pairs: a motion, a person, a camera, things in the way; BlazePose looks at it all."""
+"""One clip of pairs: a motion, a person, a camera, occluders; BlazePose's detections of it."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -38,7 +38,7 @@ REACH = 1.5
 def choose_motion(
     files: list[Path], cache: dict[Path, deepmimic.Motion], rng: np.random.Generator
 ) -> tuple[str, deepmimic.Motion]:
-    """An invented dance, or a captured motion changed."""
+    """Return an invented dance, or a captured motion changed."""
     count = int(rng.integers(*FRAMES))
     if rng.uniform() < 0.6 or not files:
         motion, name = gestures.invent(rng, count, FPS), "invented"
@@ -59,7 +59,7 @@ def choose_motion(
 
 
 def facing(motion: deepmimic.Motion, rng: np.random.Generator) -> deepmimic.Motion:
-    """Turned so that the middle frame faces the camera, more or less."""
+    """Return turned so that the middle frame faces the camera, more or less."""
     middle = motion.rotations["root"][len(motion) // 2].apply([1.0, 0.0, 0.0])
     angle = -np.arctan2(-middle[2], middle[0]) + np.radians(rng.normal(0.0, 12.0))
     turn = Rotation.from_rotvec([0.0, angle, 0.0])
@@ -74,7 +74,7 @@ def make_clip(
     number: int, seed: int, body: Body, studio: scenery.Studio, files: list[Path],
     cache: dict[Path, deepmimic.Motion],
 ) -> dict[str, Any]:  # fmt: skip
-    """One clip: what BlazePose sees and what is true."""
+    """Return one clip: what BlazePose sees and what is true."""
     rng = np.random.default_rng([seed, number])
     name, motion = choose_motion(files, cache, rng)
     person = people.draw_person(body, rng)

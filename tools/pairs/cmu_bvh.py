@@ -43,7 +43,7 @@ class Node:
 
 
 def read(path: Path) -> deepmimic.Motion:
-    """The whole file."""
+    """Return the whole file."""
     header, _, body = path.read_text().partition("MOTION")
     nodes = _nodes(header.split())
     lines = body.strip().splitlines()
@@ -91,7 +91,7 @@ def _rotations(nodes: Mapping[str, Node], table: np.ndarray) -> dict[str, Rotati
 
 
 def _turned(world: Rotation, limb: np.ndarray | None) -> Rotation:
-    """From the file's axes to DeepMimic's; a limb's rest is to hang down."""
+    """Return the rotation from the file's axes to DeepMimic's; a limb at rest hangs down."""
     rest = Rotation.identity()
     if limb is not None:
         rest, _ = Rotation.align_vectors([limb / np.linalg.norm(limb)], [DOWN])

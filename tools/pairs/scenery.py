@@ -49,11 +49,11 @@ class View:
     height: int
 
     def see(self, points: np.ndarray) -> np.ndarray:
-        """World to camera."""
+        """Return the world to camera."""
         return points @ self.rotation.T + self.shift
 
     def matrix(self) -> np.ndarray:
-        """World to OpenGL's clip space."""
+        """Return the world to OpenGL's clip space."""
         flip = np.diag([1.0, -1.0, -1.0, 1.0])
         view = np.eye(4)
         view[:3, :3], view[:3, 3] = self.rotation, self.shift
@@ -65,7 +65,8 @@ class View:
 
 
 def film(posed: Posed, rng: np.random.Generator) -> View:
-    """A camera that sees the clip, mostly from the front, anything from the side and behind."""
+    """Return a camera that sees the clip, mostly from the front, anything from the side and
+    behind."""
     width, height = SIZES[rng.integers(len(SIZES))]
     points = posed.heads
     centre = (points.max((0, 1)) + points.min((0, 1))) / 2.0
@@ -92,7 +93,7 @@ def film(posed: Posed, rng: np.random.Generator) -> View:
 
 
 def background(view: View, rng: np.random.Generator) -> np.ndarray:
-    """A floor, a wall and blurred stuff, float RGB 0..1."""
+    """Return a floor, a wall and blurred stuff, float RGB 0..1."""
     shape = (view.height, view.width)
     rows, columns = np.mgrid[0 : view.height, 0 : view.width]
     rays = np.stack(
@@ -116,7 +117,8 @@ def background(view: View, rng: np.random.Generator) -> np.ndarray:
 def occluders(
     seen: np.ndarray, limbs: list[list[int]], view: View, fps: float, rng: np.random.Generator
 ) -> np.ndarray:
-    """Boxes (T, N, 4) of pixels x0 y0 x1 y1 over a limb for 0.2 to 1 s; NaN where there is none."""
+    """Return the boxes (T, N, 4) of pixels x0 y0 x1 y1 over a limb for 0.2 to 1 s; NaN where there
+    is none."""
     count = len(seen)
     boxes = np.full((count, 3, 4), np.nan)
     if rng.uniform() < 0.45:
@@ -151,7 +153,7 @@ class Studio:
     def frames(
         self, person: Person, posed: Posed, view: View, boxes: np.ndarray, rng: np.random.Generator
     ) -> Iterator[np.ndarray]:
-        """The pictures, RGB bytes."""
+        """Yield the pictures, RGB bytes."""
         target = self._target(view.width, view.height)
         self.paint.write(person.colour.astype("f4").tobytes())
         self.program["camera"] = tuple(view.matrix().T.ravel())

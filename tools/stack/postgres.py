@@ -18,12 +18,12 @@ USER = "postgres"
 
 
 def service(
-    wanted: Mapping[str, str], check: str, port: int, folder: Path, log: Path, roles: str = ""
+    settings: Mapping[str, str], check: str, port: int, folder: Path, log: Path, roles: str = ""
 ) -> Service:
-    """The database server of a stack.
+    """Return the database server of a stack.
 
     Args:
-        wanted: Environment of the image: POSTGRES_USER, POSTGRES_PASSWORD, POSTGRES_DB.
+        settings: Environment of the image: POSTGRES_USER, POSTGRES_PASSWORD, POSTGRES_DB.
         check: The file's health check, a line of shell.
         port, folder, log: Where it listens, keeps its data's path, and says what it does.
         roles: SQL that the image runs once, with an empty volume.
@@ -31,14 +31,18 @@ def service(
     home = _home(folder)
     user = USER if os.geteuid() == 0 else None
     if not (home / "data").exists():
-        _initialise(home, wanted, user)
-    access = {"PGPORT": str(port), "PGHOST": "127.0.0.1", "PGPASSWORD": wanted["POSTGRES_PASSWORD"]}
+        _initialise(home, settings, user)
+    access = {
+        "PGPORT": str(port),
+        "PGHOST": "127.0.0.1",
+        "PGPASSWORD": settings["POSTGRES_PASSWORD"],
+    }
     command = [program("postgres"), "-D", str(home / "data"), "-p", str(port), "-h", "127.0.0.1"]
     return Service(
         "postgres",
         [*command, "-k", str(home)],
         {**os.environ, **access},
-        ["sh", "-c", _ready(wanted, check, roles, home)],
+        ["sh", "-c", _ready(settings, check, roles, home)],
         log,
         user,
     )
@@ -51,7 +55,7 @@ def remove(folder: Path) -> None:
 
 
 def program(name: str) -> str:
-    """Path of one of PostgreSQL's programs.
+    """Return the path of one of PostgreSQL's programs.
 
     Raises:
         StackError: it is not installed.
@@ -62,30 +66,30 @@ def program(name: str) -> str:
     return str(found[-1])
 
 
-def _initialise(home: Path, wanted: Mapping[str, str], user: str | None) -> None:
+def _initialise(home: Path, settings: Mapping[str, str], user: str | None) -> None:
     secret = home / "password"
-    secret.write_text(wanted["POSTGRES_PASSWORD"])
+    secret.write_text(settings["POSTGRES_PASSWORD"])
     if user:
         shutil.chown(secret, user)
-    words = ["--username", wanted["POSTGRES_USER"], "--pwfile", str(secret)]
+    words = ["--username", settings["POSTGRES_USER"], "--pwfile", str(secret)]
     making = [program("initdb"), "-D", str(home / "data"), "-A", "scram-sha-256", *words]
     subprocess.run(making, user=user, check=True, capture_output=True, cwd="/")
     secret.unlink()
 
 
-def _ready(wanted: Mapping[str, str], check: str, roles: str, home: Path) -> str:
-    """Shell that does what the image does at its first start, then asks whether it is healthy."""
+def _ready(settings: Mapping[str, str], check: str, roles: str, home: Path) -> str:
+    """Return the shell that does what the image does first, then asks for health."""
     if not roles:
-        return f"{check} && {_database(wanted)}"
-    script, done, user = home / "roles.sql", home / "roles.done", wanted["POSTGRES_USER"]
+        return f"{check} && {_database(settings)}"
+    script, done, user = home / "roles.sql", home / "roles.done", settings["POSTGRES_USER"]
     script.write_text(roles)
-    told = f"psql -q -v ON_ERROR_STOP=1 -U {user} -d {wanted['POSTGRES_DB']} -f {script}"
+    told = f"psql -q -v ON_ERROR_STOP=1 -U {user} -d {settings['POSTGRES_DB']} -f {script}"
     return f"pg_isready && {{ test -e {done} || {{ {told} && touch {done}; }}; }} && {check}"
 
 
-def _database(wanted: Mapping[str, str]) -> str:
-    """Shell that makes the database, as the image does at its first start, and asks it."""
-    user, name = wanted["POSTGRES_USER"], wanted["POSTGRES_DB"]
+def _database(settings: Mapping[str, str]) -> str:
+    """Return the shell that makes the database, as the image does first, and asks it."""
+    user, name = settings["POSTGRES_USER"], settings["POSTGRES_DB"]
     asked = f"psql -U {user} -d {name} -c 'select 1'"
     return f"{{ {asked} 2>/dev/null || createdb -U {user} {name}; {asked}; }}"
 

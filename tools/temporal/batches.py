@@ -33,9 +33,9 @@ class Batch:
 
     Attributes:
         flat, local, visibility: As in `features.ClipView`, of the landmarks that are read.
-        constant: What the network is told of the clip.
-        distance: Of the hips as placed, metres.
-        truth: Of the same landmarks, NaN-free, metres.
+        constant: What the network knows of the clip.
+        distance: Distance of the hips as placed, metres.
+        truth: Truth of the same landmarks, NaN-free, metres.
         good: 1 in the frames that count, else 0.
     """
 
@@ -48,7 +48,7 @@ class Batch:
     good: np.ndarray
 
     def numbers(self) -> np.ndarray:
-        """The network's input (B, L, F), as `features.numbers` orders it."""
+        """Return the network's input (B, L, F), as `features.numbers` orders it."""
         shape = self.flat.shape[:2]
         constant = np.broadcast_to(self.constant[:, None], (*shape, self.constant.shape[1]))
         parts = (self.flat.reshape(*shape, -1), self.local.reshape(*shape, -1), self.visibility)
@@ -57,20 +57,20 @@ class Batch:
 
 @dataclass(frozen=True)
 class Change:
-    """How much windows are changed.
+    """Strength of the augmentation of windows.
 
     Attributes:
         frames: Length of a window.
-        roll_deg: Of the camera, standard deviation.
-        size: Of the person, standard deviation of the logarithm.
-        metre: Of the detector's metre, likewise.
-        shift_m: Of each landmark for the whole window, across the image: joints are not defined
+        roll_deg: Roll of the camera, standard deviation.
+        size: Size of the person, standard deviation of the logarithm.
+        metre: Scale of the detector's metre, likewise.
+        shift_m: Shift of each landmark for a whole window, across the image: joints are not defined
             alike everywhere.
-        tilt_deg: Of the detector's body about the image's x and y axes, and
+        tilt_deg: Tilt of the detector's body about the image's x and y axes, and
         depth: the logarithm of its depth, and
         depth_shift_m: the depth of each landmark, for the whole window, standard deviations:
             the detector errs in other ways on pictures of real people than on rendered ones.
-        shake_m: Of each landmark in each frame.
+        shake_m: Shake of each landmark in each frame.
         hidden: Chance of hidden limbs.
         hidden_s: How long they are hidden.
     """
@@ -89,7 +89,7 @@ class Change:
 
 
 def table(examples: Sequence[Example]) -> Batch:
-    """Whole examples, the last frame held to a common length with no weight."""
+    """Return whole examples, the last frame held to a common length with no weight."""
 
     def stack(values: Sequence[np.ndarray]) -> np.ndarray:
         index = [np.minimum(np.arange(LONGEST), len(v) - 1) for v in values]
@@ -109,12 +109,12 @@ def table(examples: Sequence[Example]) -> Batch:
 
 
 def lengths(good: np.ndarray) -> np.ndarray:
-    """Frames of each row up to the last that counts."""
+    """Return frames of each row up to the last that counts."""
     return LONGEST - np.argmax(good[:, ::-1] > 0, axis=1)
 
 
 def windows(whole: Batch, rows: np.ndarray, frames: int, rng: np.random.Generator) -> Batch:
-    """A window of each row, anywhere in it."""
+    """Return a window of each row, anywhere in it."""
     latest = np.maximum(lengths(whole.good[rows]) - frames, 0)
     starts = rng.integers(0, latest + 1)
     index = (rows[:, None], np.minimum(starts[:, None] + np.arange(frames), LONGEST - 1))
@@ -123,7 +123,7 @@ def windows(whole: Batch, rows: np.ndarray, frames: int, rng: np.random.Generato
 
 
 def joined(first: Batch, second: Batch) -> Batch:
-    """Both."""
+    """Return both batches as one."""
     return Batch(
         **{
             f.name: np.concatenate([getattr(first, f.name), getattr(second, f.name)])
@@ -133,7 +133,7 @@ def joined(first: Batch, second: Batch) -> Batch:
 
 
 def change(batch: Batch, how: Change, rng: np.random.Generator) -> Batch:
-    """The windows, changed."""
+    """Return the windows, changed."""
     count = len(batch.flat)
     batch = _mirrored(batch, rng.uniform(size=count) < 0.5)
     angle = np.radians(rng.normal(0.0, how.roll_deg, count))
@@ -196,7 +196,7 @@ def _mirrored(batch: Batch, which: np.ndarray) -> Batch:
 
 
 def _misjudged(local: np.ndarray, how: Change, rng: np.random.Generator) -> np.ndarray:
-    """The detector's body tilted, flattened or deepened, each landmark's depth shifted."""
+    """Return the detector's body tilted, flattened or deepened, each landmark's depth shifted."""
     count, landmarks = len(local), local.shape[2]
     angles = np.radians(rng.normal(0.0, 1.0, (count, 2)) * how.tilt_deg)
     turns = Rotation.from_euler("xy", angles).as_matrix().astype(np.float32)

@@ -35,7 +35,7 @@ class Detector:
         self.sizes = [body_size(e.truth) for e in examples]
 
     def sees(self, truth: Truth, rng: np.random.Generator) -> Example:
-        """What it would see of a truth, but for the residual."""
+        """Return what it would see of a truth, but for the residual."""
         points, distance, wrong_focal = truth
         tilt = Rotation.from_euler("x", rng.normal(*TILT_DEG), degrees=True).as_matrix()
         points = points @ tilt.T
@@ -78,7 +78,7 @@ def _row(truth: np.ndarray) -> np.ndarray:
 
 
 def _errors(real: Batch) -> np.ndarray:
-    """Errors of depth and image of what was seen, (B, T, 5 N)."""
+    """Return the errors of depth and image of what was detected, (B, T, 5 N)."""
     away = real.distance[..., None, None]
     ideal = real.truth[..., :2] * away / (away + real.truth[..., 2:])
     errors = np.concatenate([real.local - real.truth, real.flat - ideal], -1)

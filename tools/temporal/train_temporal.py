@@ -43,7 +43,7 @@ def check_motions(examples: list[Example]) -> None:
 
 
 def truths_of(folder: Path, motions: list[Path], count: int, seed: int) -> list[Truth]:
-    """The truths without pictures, made once."""
+    """Return the truths without pictures, made once."""
     path = folder / f"truths-{seed}-{count}.npz"
     if not path.exists():
         from tools.temporal import truths  # needs tools/requirements.txt, as the rendering does
@@ -80,8 +80,8 @@ def train(
         if now.step % 300 == 0 or now.step == config.steps:
             now.curve[-1] |= fit.validate(fit.averaged(now), validation)
         keep(now, state)
-        told = ", ".join(f"{k} {v:.4g}" for k, v in now.curve[-1].items())
-        log.info("%s; %.0f CPU s left", told, (config.steps - now.step) * step_s)
+        figures = ", ".join(f"{k} {v:.4g}" for k, v in now.curve[-1].items())
+        log.info("%s; %.0f CPU s left", figures, (config.steps - now.step) * step_s)
 
     synthetic = truths_of(pairs, motions, count, seed) if count else []
     where = fit.source(training, synthetic, seed)
@@ -104,7 +104,7 @@ def train(
 
 
 def save(lifter: Lifter, flow: Flow, path: Path) -> None:
-    """Both in one file, half precision but for the normalisation of the input."""
+    """Write both networks to one file, half precision but for the normalisation of the input."""
     arrays = dict(lifter.state_dict())
     arrays |= {f"flow.{name}": value for name, value in flow.state_dict().items()}
     keep_exact = ("mean", "scale")
@@ -147,7 +147,7 @@ def resume(progress: fit.Progress, path: Path) -> None:
 
 
 def draw_curve(report: dict[str, object], path: Path) -> None:
-    """The curve as a picture."""
+    """Draw the curve as a picture."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -157,11 +157,11 @@ def draw_curve(report: dict[str, object], path: Path) -> None:
     assert isinstance(curve, list)
     figure, axes = pyplot.subplots(figsize=(7, 4))
     axes.plot([c["step"] for c in curve], [1e3 * c["place"] for c in curve], label="training")
-    judged = [c for c in curve if "rr_network" in c]
+    evaluated = [c for c in curve if "rr_network" in c]
     for key, label in (("rr_network", "validation"), ("pa_network", "validation, PA")):
-        axes.plot([c["step"] for c in judged], [c[key] for c in judged], "o-", label=label)
+        axes.plot([c["step"] for c in evaluated], [c[key] for c in evaluated], "o-", label=label)
     for key in ("rr_detector", "pa_detector"):
-        axes.axhline(judged[-1][key], ls=":", c="grey")
+        axes.axhline(evaluated[-1][key], ls=":", c="grey")
     axes.set(xlabel="step", ylabel="MPJPE, mm (dotted: the detector)", ylim=(0, None))
     axes.legend()
     figure.tight_layout()
@@ -169,7 +169,7 @@ def draw_curve(report: dict[str, object], path: Path) -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Command line."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -18,7 +18,8 @@ NEAREST_M = 1.0
 
 
 def make(folders: list[Path], count: int, seed: int) -> list[Truth]:
-    """So many clips: landmarks along the rays, distance, and the guessed focal over the true."""
+    """Return so many clips: landmarks along the rays, distance, and the guessed focal over the
+    true."""
     rng = np.random.default_rng([seed, count])
     files = [
         path for path in sources.find(folders)

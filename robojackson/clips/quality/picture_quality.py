@@ -1,4 +1,4 @@
-"""How light and how sharp a person is in the pictures of a clip; a few of them are looked at."""
+"""Brightness and sharpness of a person in a clip, measured on a few frames."""
 
 from collections.abc import Iterable, Iterator
 
@@ -22,7 +22,7 @@ class PictureQuality:
     """Looks at some of the pictures of a clip as they pass by.
 
     Args:
-        landmarks: Of the person in every frame, 0..1, NaN where nobody was found.
+        landmarks: Landmarks of the person in every frame, 0..1, NaN where no person was detected.
     """
 
     def __init__(self, landmarks: Float[np.ndarray, "T 33 2"]) -> None:
@@ -35,7 +35,7 @@ class PictureQuality:
     def watch(
         self, images: Iterable[UInt8[np.ndarray, "H W 3"]]
     ) -> Iterator[UInt8[np.ndarray, "H W 3"]]:
-        """The same pictures, RGB, one a frame."""
+        """Yield the same pictures, RGB, one a frame."""
         for index, image in enumerate(images):
             if index in self._chosen:
                 self._look(image, self._landmarks[index])
@@ -61,7 +61,7 @@ class PictureQuality:
 
 
 def detail_share(grey: UInt8[np.ndarray, "H W"]) -> float:
-    """Standard deviation of the Laplacian over that of the grey levels, at one size."""
+    """Return the standard deviation of the Laplacian over that of the grey levels, at one size."""
     factor = TALL / grey.shape[0]
     way = cv2.INTER_AREA if factor < 1.0 else cv2.INTER_CUBIC
     width = max(round(grey.shape[1] * factor), 3)
