@@ -10,6 +10,7 @@
 #   make bench-retarget  our solver beside the paper's mapping and mink (pip install -e '.[bench]')
 #   make bench-learning  speed beside sb3-contrib and bare MuJoCo, policies evaluated (hours; resumable)
 #   make bench-orchestration  what Prefect costs around the work (PostgreSQL and a server are started)
+#   make badinput  every case of the corpus of bad inputs through the real command, and a table
 #   make chaos    20 studies whose processes, services, disk and wires are cut at random moments
 #   make deploy   pools, deployments and automations on the server of PREFECT_API_URL
 #   make lint     ruff, mypy and the order of imports (docs/architecture.md)
@@ -28,7 +29,7 @@ WORKERS ?= auto
 PYTEST := $(PY) -m pytest -q -n $(WORKERS) --dist loadgroup
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: dance test test-fast test-stack coverage bench bench-learning bench-mocap bench-retarget chaos bench-orchestration deploy lint doctor docs wheel clean setup
+.PHONY: badinput dance test test-fast test-stack coverage bench bench-learning bench-mocap bench-retarget chaos bench-orchestration deploy lint doctor docs wheel clean setup
 .DEFAULT_GOAL := dance
 
 setup:
@@ -68,6 +69,9 @@ bench-orchestration: setup
 chaos: setup
 	@$(PY) -m tests.chaos.run --trials 20 --seed 0 $(ARGS)
 
+badinput: setup
+	@$(PY) -m tests.badinput.run $(ARGS)
+
 deploy: setup
 	@.venv/bin/robojackson deploy $(ARGS)
 
@@ -83,7 +87,7 @@ docs: setup
 	@$(PY) -m zensical build --clean --strict
 
 wheel: setup
-	@$(PY) -m build --outdir dist .
+	@SOURCE_DATE_EPOCH=$$(git log -1 --format=%ct) $(PY) -m build --outdir dist .
 	@$(PY) -m twine check --strict dist/*
 
 doctor: setup

@@ -20,6 +20,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from robojackson.config import config_dataclass
 from robojackson.errors import BackupFailed, StoreError
+from robojackson.files.foreign_file import parse_json
 from robojackson.files.local_folder import TEMPORARY, LocalFolder, sha256_of, sha256_of_file
 from robojackson.pipeline.folder_lock import locked
 
@@ -227,7 +228,7 @@ def _parsed(text: str) -> Manifest:
     Raises:
         ValueError, KeyError, TypeError: it is truncated, altered, or of another layout.
     """
-    whole = json.loads(text)
+    whole = parse_json(text)
     if whole["sha256"] != _digest(whole["backup"]):
         raise ValueError("its content does not have the digest that it names")
     manifest: Manifest = MANIFEST.validate_python(whole["backup"])

@@ -14,8 +14,9 @@ from typing import Any
 import pyarrow as pa
 
 from robojackson.clips.quality.stability import STABILITY_SCORE
-from robojackson.errors import BadTable, StoreError
+from robojackson.errors import StoreError
 from robojackson.files import tables
+from robojackson.files.sql_tables import answering
 from robojackson.files.table_types import F64, I32, TEXT, Column, TableSchema
 from robojackson.pipeline.table_schemas import VIDEO_CANDIDATE
 from storage.artifact import Artifact
@@ -83,7 +84,7 @@ def records(store: Store, dance: str | None = None) -> list[dict[str, Any]]:
         f"ORDER BY decided_at, run_id, {places} NULLS LAST, decision, score_per_second, "
         "stability_score, record_id"
     )
-    return query(store, f"SELECT * FROM candidates {where} {ordered}", given)
+    return _ask(store, f"SELECT * FROM candidates {where} {ordered}", given, limited=False)
 
 
 def query(store: Store, sql: str, given: Mapping[str, Any] | None = None) -> list[dict[str, Any]]:
@@ -93,24 +94,15 @@ def query(store: Store, sql: str, given: Mapping[str, Any] | None = None) -> lis
     Raises:
         BadTable: the question is not SQL, or names what is not there.
     """
-    import duckdb
+    return _ask(store, sql, given)
 
-    whole = _without_zones(_read_all(store))
-    with duckdb.connect(":memory:") as connection:
-        connection.register("parts", whole)
-        unique = "SELECT DISTINCT ON (record_id) * FROM parts"
-        connection.execute(f"CREATE TABLE candidates AS {unique}")
-        connection.unregister("parts")
-        connection.execute("SET enable_external_access = false")
-        try:
-            connection.execute(sql, dict(given or {}))
-            names = [column[0] for column in connection.description or ()]
-            tables.require_distinct(names)
-            return [
-                dict(zip(names, map(_in_utc, row), strict=True)) for row in connection.fetchall()
-            ]
-        except duckdb.Error as cause:
-            raise BadTable(f"catalogue: {' '.join(str(cause).split())}") from cause
+
+def _ask(
+    store: Store, sql: str, given: Mapping[str, Any] | None, limited: bool = True
+) -> list[dict[str, Any]]:
+    known = {"candidates": _distinct(_without_zones(_read_all(store)))}
+    with answering("catalogue", known, limited) as ask:
+        return [{name: _in_utc(value) for name, value in row.items()} for row in ask(sql, given)]
 
 
 def compact(store: Store, least: int = COMPACT_FROM) -> Artifact | None:
@@ -199,6 +191,13 @@ def _read(store: Store, key: str) -> pa.Table | None:
             raise
         return None
     return tables.decode_table(CANDIDATE_RECORD, data, store.address(key), earlier=True)
+
+
+def _distinct(table: pa.Table) -> pa.Table:
+    """Return the rows, each `record_id` once."""
+    numbered = table.select(["record_id"]).append_column("row", pa.array(range(len(table))))
+    first = numbered.group_by("record_id", use_threads=False).aggregate([("row", "min")])
+    return table.take(first.column("row_min"))
 
 
 def _without_zones(table: pa.Table) -> pa.Table:

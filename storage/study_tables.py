@@ -10,26 +10,22 @@ when and where a cell ran is in the file beside it. DuckDB answers questions abo
 """
 
 import json
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pyarrow as pa
 
 from robojackson.errors import BadTable, StoreError
 from robojackson.files import tables
 from robojackson.files.local_folder import sha256_of
+from robojackson.files.sql_tables import RunQuery, answering
 from robojackson.files.table_types import TableSchema
 from robojackson.pipeline.table_schemas import EPISODE_RECORD, EVALUATION_RECORD
 from storage.artifact import Artifact
 from storage.store import Store
 
-if TYPE_CHECKING:
-    from duckdb import DuckDBPyConnection
-
-RunQuery = Callable[..., list[dict[str, Any]]]
-"""A question in SQL and its parameters to rows."""
 FOLDER = "metrics"
 TABLES: Mapping[str, TableSchema] = {"episodes": EPISODE_RECORD, "evaluations": EVALUATION_RECORD}
 RUNS = f"{FOLDER}/runs"
@@ -110,7 +106,7 @@ def query(store: Store, sql: str, given: Mapping[str, Any] | None = None) -> lis
     Raises:
         BadTable: the question is not SQL, or names what is not there.
     """
-    with opened(store) as ask:
+    with answering("metrics", _tables(store, None, None)) as ask:
         return ask(sql, given)
 
 
@@ -121,24 +117,13 @@ def opened(
     """Yield a query function over all tables, or those of a study or of some of its runs, read once
     for any number of questions.
     """
-    import duckdb
-
-    with duckdb.connect(":memory:") as connection:
-        for table in TABLES:
-            _create(connection, table, read(store, table, study, runs))
-        _create(connection, "runs", _runs(store, study, runs))
-        connection.execute("SET enable_external_access = false")
-
-        def ask(sql: str, given: Mapping[str, Any] | None = None) -> list[dict[str, Any]]:
-            try:
-                connection.execute(sql, dict(given or {}))
-                names = [column[0] for column in connection.description or ()]
-                tables.require_distinct(names)
-                return [dict(zip(names, row, strict=True)) for row in connection.fetchall()]
-            except duckdb.Error as cause:
-                raise BadTable(f"metrics: {' '.join(str(cause).split())}") from cause
-
+    with answering("metrics", _tables(store, study, runs), limited=False) as ask:
         yield ask
+
+
+def _tables(store: Store, study: str | None, runs: Collection[str] | None) -> dict[str, pa.Table]:
+    held = {table: read(store, table, study, runs) for table in TABLES}
+    return held | {"runs": _runs(store, study, runs)}
 
 
 def files_of(store: Store, study: str, runs: Collection[str] | None = None) -> list[Artifact]:
@@ -190,12 +175,6 @@ def _put(store: Store, key: str, content: bytes) -> Artifact:
     digest = sha256_of(content)
     there = store.exists(key) and store.sha256(key) == digest
     return Artifact(key=key, sha256=digest) if there else store.put(key, content)
-
-
-def _create(connection: "DuckDBPyConnection", name: str, rows: pa.Table) -> None:
-    connection.register("given", rows)
-    connection.execute(f"CREATE TABLE {name} AS SELECT * FROM given")
-    connection.unregister("given")
 
 
 def _run(key: str) -> str:

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from configs.study_config import Study
+from robojackson.files.sql_tables import RunQuery
 from robojackson.metrics import learning_curve
 from robojackson.rl.config.evaluate_config import TRAINED, VARIANTS
 from robojackson.rl.evaluation import verdict
-from storage.study_tables import RunQuery
 
 INTERVALS = 40
 """Of the budget, in the learning curves."""

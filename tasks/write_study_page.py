@@ -14,6 +14,7 @@ import numpy as np
 from configs.study_config import Move, Study
 from robojackson.errors import RoboJacksonError
 from robojackson.files.json_types import to_json_types
+from robojackson.files.sql_tables import RunQuery
 from robojackson.metrics import ablation_statistics
 from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.report.pages import study_page, study_table
@@ -125,7 +126,7 @@ def report(
     return made
 
 
-def _facts(ask: study_tables.RunQuery, study: Study) -> dict[str, Any]:
+def _facts(ask: RunQuery, study: Study) -> dict[str, Any]:
     sql = "SELECT DISTINCT git_commit FROM runs WHERE study = $study"
     commits = [row["git_commit"] or "?" for row in ask(sql, {"study": study.name})]
     return {
@@ -167,7 +168,7 @@ def _few(study: Study) -> list[str]:
     ]
 
 
-def _starts(ask: study_tables.RunQuery, study: Study) -> list[str]:
+def _starts(ask: RunQuery, study: Study) -> list[str]:
     """Return what was learnt before the first step of a cell: it belongs to the price of
     pretraining."""
     sql = "SELECT DISTINCT setup, config FROM runs WHERE config IS NOT NULL ORDER BY ALL"

@@ -66,6 +66,15 @@ def require_robot(reference: ReferenceMotion, robot: Robot) -> Robot:
             f"(sha256 {reference.model_sha256[:12]}..., here {robot.sha256[:12]}...)",
             "retarget the motion again",
         )
+    for kind in ("joint_names", "body_names", "keypoint_names", "contact_names"):
+        said, known = getattr(reference, kind), getattr(robot, kind)
+        if said != known:
+            odd = next((a for a, b in zip(said, known, strict=False) if a != b), "their number")
+            raise RejectedReference(
+                f"the reference motion's {kind} are not those of {reference.robot!r}, in its order "
+                f"(first difference: {odd})",
+                "retarget the motion again",
+            )
     return robot
 
 

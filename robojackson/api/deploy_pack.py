@@ -13,7 +13,7 @@ from robojackson.api.policy_ingredients import policy_ingredients
 from robojackson.api.robots import load_robot
 from robojackson.errors import BadConfiguration, BadPolicy, StoreError
 from robojackson.files.file_tree import results_in
-from robojackson.files.table_file import require_file
+from robojackson.files.foreign_file import require_file
 from robojackson.formats.deploy.deployed_policy import (
     DeployedPolicy,
     chain_between,

@@ -11,9 +11,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from robojackson.api.arguments import FilePath
-from robojackson.errors import BadConfiguration, BadTable, StoreError, UnknownName
+from robojackson.errors import BadConfiguration, BadTable, UnknownName
 from robojackson.files.file_tree import FileTree
-from robojackson.files.table_file import require_file
+from robojackson.files.foreign_file import read_file
 from robojackson.formats.foreign_motion import (
     Y_UP_TO_WORLD,
     Z_UP_TO_WORLD,
@@ -31,8 +31,6 @@ from robojackson.mocap.recover import MocapConfig
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.rl.policy import Policy, load_policy
 
-LARGEST = 2**30
-"""Bytes of a file that is read."""
 SLOWEST, FASTEST = 1.0, 1000.0
 """Frames a second."""
 AXES = {"y": Y_UP_TO_WORLD, "z": Z_UP_TO_WORLD}
@@ -63,7 +61,7 @@ def read_foreign(file: Path, fps: float | None, up: Up | None, config: MocapConf
         UnknownName, BadTable: no known format, a damaged file, or one that would run code.
         BadConfiguration: a frame rate that no motion has, or axes that the file has not.
     """
-    data = _bytes_of(file)
+    data = read_file(file)
     importer = recognise(data, str(file))
     with _naming_the_file(file):
         motion = importer.read(data)
@@ -90,11 +88,11 @@ def holds_a_person(source: Path) -> bool:
         StoreError: no such file.
         BadTable: it is no Parquet file.
     """
-    require_file(source)
     try:
-        return "global_orient" in pq.read_schema(io.BytesIO(source.read_bytes())).names
-    except pa.ArrowInvalid as cause:
-        raise BadTable(f"{source}: not a Parquet file ({cause})") from cause
+        return "global_orient" in pq.read_schema(io.BytesIO(read_file(source))).names
+    except (pa.ArrowException, OSError) as cause:
+        reason = " ".join(str(cause).split())[:120]
+        raise BadTable(f"not a Parquet file ({reason})", source) from cause
 
 
 def format_of(name: str, known: Mapping[str, Exporter], what: str) -> Exporter:
@@ -135,13 +133,6 @@ def _naming_the_file(file: Path) -> Iterator[None]:
         yield
     except BadTable as cause:
         raise BadTable(f"{file}: {cause}") from cause
-
-
-def _bytes_of(file: Path) -> bytes:
-    require_file(file)
-    if (size := file.stat().st_size) > LARGEST:
-        raise StoreError(f"{file}: {size} bytes; at most {LARGEST} are read")
-    return file.read_bytes()
 
 
 def _rate(

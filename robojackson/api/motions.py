@@ -17,9 +17,10 @@ from robojackson.api.foreign_files import Up, format_of, holds_a_person, read_fo
 from robojackson.api.robots import load_robot
 from robojackson.api.videos import detect_landmarks
 from robojackson.clips.video import read_frames
-from robojackson.errors import BadConfiguration, StoreError
+from robojackson.errors import BadConfiguration, BadTable, StoreError
 from robojackson.files.file_tree import FileTree
 from robojackson.formats import registry
+from robojackson.formats.foreign_motion import require_person
 from robojackson.mocap import recover
 from robojackson.mocap.landmarks.landmark_pipeline import Quality
 from robojackson.mocap.networks.network_config import NetworkConfig
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
     from robojackson.mocap.networks.inference import Networks
 
 TABLE = ".parquet"
+MOST_FRAMES = 20_000
+"""Of a motion that is fitted to a robot: eleven minutes at 30 frames a second."""
 
 
 @dataclass(frozen=True)
@@ -137,6 +140,11 @@ def retarget_motion(
     sequence = motion if isinstance(motion, SmplSequence) else read_motion(motion)
     if not isinstance(sequence, SmplSequence):
         raise BadConfiguration(f"{motion}: a motion of robot {sequence.robot!r} already")
+    if len(sequence) > MOST_FRAMES:
+        raise BadTable(
+            f"{len(sequence):,} frames; at most {MOST_FRAMES:,} are fitted together: cut the motion"
+        )
+    require_person(sequence.keypoints_w, "the motion")
     machine = load_robot(robot)
     reference = retargeting.retarget_motion(sequence, machine, config or RetargetConfig())
     return replace(reference, robot_file=machine.description.file)

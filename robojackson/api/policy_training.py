@@ -18,7 +18,7 @@ from robojackson.api.arguments import (
 )
 from robojackson.api.robots import load_robot
 from robojackson.api.trained_policy import TrainedPolicy
-from robojackson.files.file_tree import results_in
+from robojackson.files.file_tree import results_in, without_empty_folders
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.pipeline.episode_log import EpisodeLog
 from robojackson.pipeline.folder_lock import locked
@@ -127,7 +127,7 @@ def _trained(
     report: Callable[[Row], None],
 ) -> TrainedPolicy:
     """Train in a folder that is locked meanwhile; its table is saved in any case."""
-    with results_in(folder) as files, locked(folder):
+    with without_empty_folders(folder), results_in(folder) as files, locked(folder):
         rows = EpisodeLog(files, labels, resumes=newest_checkpoint(folder) is not None)
         audit = audit_record(audit_both_readings(robot, motion, config.environment))
         hooks.audited(audit)

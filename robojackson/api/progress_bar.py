@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -26,11 +27,12 @@ log = logging.getLogger("robojackson")
 @contextmanager
 def bar(label: str) -> Iterator[Callable[[int, int], None]]:
     """Yield a progress bar on stderr; a few lines where stderr is no terminal."""
+    label = "".join(c if c.isprintable() else "?" for c in label)
     console = Console(stderr=True)
     if not console.is_terminal:
         yield _plain_bar(label)
         return
-    counted = (TextColumn(label), BarColumn(), MofNCompleteColumn())
+    counted = (TextColumn(escape(label)), BarColumn(), MofNCompleteColumn())
     columns = (*counted, _Rate(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True) as progress:
         task = progress.add_task(label)

@@ -100,7 +100,7 @@ def _as_file(video: FilePath | Frames, fps: float | None) -> Iterator[Path]:
 
 
 def _write_lossless(frames: Frames, fps: float, path: Path) -> None:
-    with av.open(str(path), "w") as container:
+    with av.open(f"file:{path.absolute()}", "w") as container:
         stream = container.add_stream("ffv1", rate=Fraction(fps).limit_denominator(1001))
         stream.height, stream.width, stream.pix_fmt = frames.shape[1], frames.shape[2], "bgr0"
         for frame in frames:

@@ -154,6 +154,25 @@ def doctor(
     return CommandResult(found, code=0 if found["ok"] else 1, text=doctor_lines(found))
 
 
+@command
+def licences(
+    sbom: Annotated[
+        Path | None, typer.Option("--sbom", help="Also write a bill of materials (CycloneDX JSON).")
+    ] = None,
+    as_json: Json = False,
+) -> CommandResult:
+    """The licences of all packages that run below us, and of the data that ships."""
+    from robojackson.pipeline import licences as listing
+
+    rows, data = listing.packages(), listing.data()
+    if sbom is not None:
+        listing.write_sbom(sbom, rows)
+    wide = max(len(row["package"]) + len(row["version"]) for row in rows) + 3
+    text = [f"{row['package'] + ' ' + row['version']:<{wide}}{row['licence']}" for row in rows]
+    text += ["", *(f"{row['data']}: {row['licence']} ({row['what']})" for row in data)]
+    return CommandResult({"packages": rows, "data": data}, text=text)
+
+
 STAGES: dict[str, Callable[..., None]] = {
     "score": score,
     "mocap": mocap,
@@ -164,6 +183,7 @@ STAGES: dict[str, Callable[..., None]] = {
     "pretrain": pretrain,
     "evaluate": evaluate,
     "doctor": doctor,
+    "licences": licences,
 }
 """Commands by name, in the order of `--help`."""
 

@@ -2,10 +2,10 @@
 
 import functools
 import json
-import logging
 import os
 import sys
 import time
+import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -16,14 +16,17 @@ import typer
 from pydantic import ValidationError
 
 from robojackson.api.progress_bar import bar as bar
+from robojackson.cli.library_output import log_to_stderr as log_to_stderr
 from robojackson.cli.library_output import silence_libraries
-from robojackson.cli.lifetime.interruption import INTERRUPTED, conclude
+from robojackson.cli.lifetime.interruption import INTERRUPTED, conclude, printable
 from robojackson.cli.lifetime.interruption import complain as complain
 from robojackson.cli.lifetime.interruption import same_command as same_command
 from robojackson.errors import RoboJacksonError, StoreError
 from robojackson.files.json_types import to_json_types as to_json_types
 
 P = ParamSpec("P")
+TRACEBACK, LONGEST_CAUSE = "ROBOJACKSON_TRACEBACK", 300
+"""The variable that lets an unforeseen error show its traceback; characters of its line."""
 SECONDS_BETWEEN_LINES = 15.0
 """Of progress, where every line stays."""
 USAGE_ERROR: Any = typer.BadParameter.__bases__[0]
@@ -31,11 +34,7 @@ USAGE_ERROR: Any = typer.BadParameter.__bases__[0]
 
 APP_PACKAGES = ("prefect", "fastapi", "sqlalchemy", "yt_dlp")
 """What the extra `app` brings: without it the commands of one stage work and the others do not."""
-OWN_PACKAGES = ("robojackson", "flows", "tasks", "storage", "configs")
-"""Whose log is for the user; of all other packages only errors are."""
 INSTALL_APP = "pip install 'robojackson[app]'"
-
-log = logging.getLogger("robojackson")
 
 
 @dataclass(frozen=True)
@@ -82,6 +81,12 @@ def command(body: Callable[P, CommandResult]) -> Callable[P, None]:
             _leave_interrupted(f"interrupted: {cause}")
         except KeyboardInterrupt:
             _leave_interrupted(f"interrupted: resume: {same_command()}")
+        except MemoryError:
+            _leave(1, "StoreError: out of memory: the input is too large for this machine")
+        except typer.Exit:
+            raise
+        except Exception as cause:
+            _leave(1, _unexpected(cause))
         try:
             print_result(answer, as_json=bool(kwargs.get("as_json")))
         except BrokenPipeError:  # whoever reads has enough
@@ -101,7 +106,8 @@ def print_result(answer: CommandResult, as_json: bool) -> None:
     if as_json:
         sys.stdout.write(json.dumps(data) + "\n")
     else:
-        sys.stdout.write("\n".join(answer.text or lines(data)) + "\n")
+        text = "\n".join(answer.text or lines(data)).split("\n")
+        sys.stdout.write("\n".join(map(printable, text)) + "\n")
     sys.stdout.flush()
 
 
@@ -134,19 +140,13 @@ def table(rows: Mapping[str, Mapping[str, object]], columns: Sequence[str]) -> l
     ]
 
 
-def log_to_stderr() -> None:
-    """Send our log to stderr, one short line a record, and errors of other libraries."""
-    logging.basicConfig(level=logging.ERROR, stream=sys.stderr, format="%(message)s")
-    for own in OWN_PACKAGES:
-        logging.getLogger(own).setLevel(logging.INFO)
-
-
 @contextmanager
 def ticker() -> Iterator[Callable[[str], None]]:
     """A line on stderr that replaces itself; line after line where there is no terminal."""
     live = sys.stderr.isatty()
 
     def write_line(line: str) -> None:
+        line = printable(line)
         sys.stderr.write(f"\r\x1b[2K{line}" if live else f"{line}\n")
         sys.stderr.flush()
 
@@ -196,6 +196,21 @@ def usage_error(cause: Any) -> str:
         given = repr(cause.__cause__.errors()[0]["input"])
         message += "" if given in message else f", given {given}"
     return f"{message} (see --help)"
+
+
+def _unexpected(cause: Exception) -> str:
+    """The line about an error that none of our own classes foresees."""
+    if isinstance(cause, USAGE_ERROR):
+        raise cause
+    if TRACEBACK in os.environ:
+        raise cause
+    place = traceback.extract_tb(cause.__traceback__)[-1]
+    told = " ".join(str(cause).split())[:LONGEST_CAUSE]
+    return (
+        f"InternalError: {type(cause).__name__}: {told} ({Path(place.filename).name}:"
+        f"{place.lineno}); the input is not what it should be, or this is our fault: "
+        f"{TRACEBACK}=1 shows where, `robojackson doctor --report` is for an issue"
+    )
 
 
 def _leave(code: int, line: str) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 
 from robojackson.cli import cards
 from robojackson.errors import BadConfiguration
-from robojackson.files.table_file import require_file
+from robojackson.files.foreign_file import require_file
 from robojackson.formats import registry
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence

@@ -18,6 +18,10 @@ VARIABLES = {
 }
 
 
+OWN_PACKAGES = ("robojackson", "flows", "tasks", "storage", "configs")
+"""Whose log is for the user; of all other packages only errors are."""
+
+
 def set_variables() -> None:
     """Set what native code and child processes read, where the user has not."""
     for name, value in VARIABLES.items():
@@ -34,3 +38,20 @@ def silence_libraries() -> None:
     log = logging.getLogger("py.warnings")
     log.setLevel(logging.ERROR)
     log.propagate = False
+
+
+def log_to_stderr() -> None:
+    """Send our log to stderr, one short printable line a record, and errors of other libraries."""
+    import logging
+
+    from robojackson.cli.lifetime.interruption import printable
+
+    class Plain(logging.Formatter):
+        def format(self, record: logging.LogRecord) -> str:
+            return printable(" ".join(super().format(record).split()))
+
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(Plain("%(message)s"))
+    logging.basicConfig(level=logging.ERROR, handlers=[handler])
+    for own in OWN_PACKAGES:
+        logging.getLogger(own).setLevel(logging.INFO)

@@ -12,6 +12,7 @@ from robojackson.cli import console
 from robojackson.cli.cards import command_line
 from robojackson.cli.stages import Figures, Overrides
 from robojackson.errors import RoboJacksonError, TrackTooShort, UnreadableVideo
+from robojackson.files.memory_limit import VIDEO_MEMORY, limited_memory
 from robojackson.pipeline.yaml_loader import load
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ def score(videos: list[Path], config: str, overrides: Overrides) -> Figures:
     for info in infos:
         video = info.path
         try:
-            with console.bar(video.name) as progress:
+            with console.bar(video.name) as progress, limited_memory(VIDEO_MEMORY):
                 if settings.dancer.number:
                     which = settings.dancer
                     track = track_dancer(video, info, settings.scoring_detector, which, progress)

@@ -16,6 +16,7 @@ from robojackson.cli import cards, console
 from robojackson.errors import NoPersonFound, RejectedReference, TrackTooShort
 from robojackson.files.file_tree import results_in
 from robojackson.files.json_types import to_json_types
+from robojackson.files.memory_limit import VIDEO_MEMORY, limited_memory
 from robojackson.pipeline.yaml_loader import load
 from robojackson.rl.evaluation.verdict import NEEDS_FULL_LENGTH
 
@@ -44,7 +45,7 @@ def mocap(
     names = hypothesis_files(settings, hypotheses)
     probe_video(video, limits=settings.video)
     networks = load_weights(settings.network)
-    with results_in(out) as files:
+    with results_in(out) as files, limited_memory(VIDEO_MEMORY):
         track = detect_landmarks(
             video, quality=settings.detector, limits=settings.video, config=settings.dancer,
             progress=True,

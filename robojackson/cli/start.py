@@ -7,8 +7,10 @@ from collections.abc import Callable
 from typing import NoReturn
 
 from robojackson.cli.library_output import set_variables
-from robojackson.cli.lifetime.interruption import INTERRUPTED, conclude, same_command
+from robojackson.cli.lifetime.interruption import INTERRUPTED, complain, conclude, same_command
 from robojackson.cli.lifetime.supervisor import guarded
+from robojackson.cli.lifetime.variables import check_environment, quieten
+from robojackson.errors import BadConfiguration
 
 
 def start(command: Callable[[], int]) -> NoReturn:
@@ -22,18 +24,31 @@ def start(command: Callable[[], int]) -> NoReturn:
     """
     end = _End()
     atexit.register(end.leave)  # the first to be registered is the last to run
+    try:
+        check_environment(os.environ)
+    except BadConfiguration as cause:
+        complain(f"{type(cause).__name__}: {cause}")
+        sys.exit(1)
+    quieten(os.environ)
     set_variables()
     if sys.platform == "linux":
-        os.environ.setdefault("MUJOCO_GL", "disable")
+        os.environ["MUJOCO_GL"] = os.environ.get("MUJOCO_GL") or "disable"
     end.code = guarded(lambda: _run(command))
+    if NEEDS_ITS_END not in sys.modules:
+        end.leave()
     sys.exit(end.code)
 
 
-class _End:
-    """Ends the process after all of Python's own end, without the destructors of C++ libraries.
+NEEDS_ITS_END = "prefect"
+"""The one library whose functions at exit do what has to be done: they end its server."""
 
-    On a busy machine those of pyarrow abort now and then ("terminate called without an active
-    exception"), which makes exit code 134 of a command that has done all its work.
+
+class _End:
+    """Ends the process without the ends of C++ libraries: neither what they register with Python,
+    as JAX does for its backends, nor their destructors.
+
+    On a busy machine these abort now and then ("terminate called without an active exception": a
+    thread of theirs still runs), which makes exit code 134 of a command that has done all its work.
 
     Attributes:
         code: Exit code of a command that came to its end.

@@ -1,7 +1,6 @@
 """A range of a video as a file of its own."""
 
-import os
-import tempfile
+import secrets
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -12,6 +11,7 @@ from av.video.frame import VideoFrame
 
 from robojackson.clips.video import VideoLimits, probe, timed_frames
 from robojackson.errors import TrackTooShort
+from robojackson.files.local_folder import TEMPORARY
 from robojackson.motion.landmark_track import uneven
 
 ANY = VideoLimits(max_duration_s=None, min_frames=1)
@@ -29,9 +29,7 @@ def trim(path: Path, start_s: float, end_s: float, out: Path) -> Path:
         TrackTooShort: the range holds no frame.
     """
     info = probe(path, ANY)
-    handle, name = tempfile.mkstemp(suffix=".mp4", dir=out.parent)
-    os.close(handle)
-    written = Path(name)
+    written = out.with_name(f"{TEMPORARY}{secrets.token_hex(8)}.mp4")
     try:
         frames = timed_frames(path, start_s, end_s)
         rate = Fraction(info.fps).limit_denominator(1001)
@@ -53,7 +51,7 @@ def _encode(
     of them, seconds."""
     times: list[float] = []
     start_s = 0.0
-    with av.open(str(out), "w", format="mp4") as container:
+    with av.open(f"file:{out.absolute()}", "w", format="mp4") as container:
         stream = container.add_stream("libx264", rate=rate, options={"crf": "17"})
         stream.pix_fmt = "yuv420p"
         if timed:

@@ -16,6 +16,7 @@ from av.video.frame import VideoFrame
 from pydantic import Field
 
 from robojackson.clips.video_container import (
+    FASTEST,
     declared_rate,
     first_frame,
     opened,
@@ -135,6 +136,8 @@ def probe(path: Path, limits: VideoLimits) -> VideoInfo:
     fps = rate(stamps, declared)
     if not fps:
         raise UnreadableVideo("the file declares no frame rate", path)
+    if fps > FASTEST:
+        raise UnreadableVideo(f"{fps:.0f} frames a second; at most {FASTEST:g} are read", path)
     rotation = -first.rotation % 360
     size = (first.height, first.width) if rotation % 180 else (first.width, first.height)
     frames = len(stamps)

@@ -1,5 +1,12 @@
-"""Video containers, opened with one clear error, and what their packets hold without decoding."""
+"""The door for videos: containers opened with one clear error, and what their packets say.
 
+FFmpeg gets an absolute path with the protocol `file` and may open nothing else, so that neither a
+colon in a name nor a playlist leads it to the network or to another file. Only the containers of
+`CONTAINERS` are read; a picture may have `MOST_PIXELS`, a stream `MOST_FRAMES` frames at no more
+than `FASTEST` a second.
+"""
+
+from itertools import islice
 from pathlib import Path
 
 import av
@@ -11,6 +18,24 @@ from jaxtyping import Float
 from robojackson.errors import TruncatedVideo, UnreadableVideo
 
 ISO_MEDIA_MARK = b"ftyp"
+CONTAINERS = (
+    *("mov", "matroska", "webm", "avi", "gif", "mpegts", "mpeg", "flv", "asf", "ogg", "nut"),
+    *("h264", "hevc", "m4v", "mpegvideo", "mjpeg", "ivf", "obu", "apng", "yuv4mpegpipe"),
+)
+"""FFmpeg's names; none of them opens another file."""
+LISTS = {
+    b"#EXTM3U": "an HLS playlist",
+    b"ffconcat": "a script of FFmpeg's concat",
+    b"<MPD": "a DASH manifest",
+    b"[playlist]": "a playlist",
+    b"v=0": "a session description (SDP)",
+}
+"""Beginnings of what is no video and names other files."""
+MOST_PIXELS = 8192 * 8192
+MOST_FRAMES = 500_000
+"""More than an hour at 120 frames a second."""
+FASTEST = 1000.0
+"""Frames a second."""
 RATE_TOLERANCE = 0.002
 """A declared rate that differs from the timestamps by more is ignored."""
 
@@ -28,28 +53,45 @@ def opened(path: Path) -> av.container.InputContainer:
         raise UnreadableVideo("no such file", path)
     if path.stat().st_size == 0:
         raise UnreadableVideo("the file is empty (0 bytes)", path)
+    whitelists = {"protocol_whitelist": "file", "format_whitelist": ",".join(CONTAINERS)}
     try:
-        return av.open(str(path))
-    except av.FFmpegError as cause:
+        return av.open(f"file:{path.absolute()}", container_options=whitelists)
+    except (av.FFmpegError, UnicodeError) as cause:
         with path.open("rb") as file:
-            is_media = ISO_MEDIA_MARK in file.read(32)
-        if is_media:
+            head = file.read(256)
+        if ISO_MEDIA_MARK in head[:32]:
             message = "cut off before its index; copy or download the file again"
             raise TruncatedVideo(message, path) from cause
-        raise UnreadableVideo("not a video that FFmpeg can read", path) from cause
+        raise UnreadableVideo(_not_a_video(head), path) from cause
+
+
+def _not_a_video(head: bytes) -> str:
+    text = head.removeprefix(b"\xef\xbb\xbf").lstrip()
+    for start, kind in LISTS.items():
+        if text.startswith(start) or (start in text and text.startswith(b"<?xml")):
+            return f"{kind}, which names other files; give the video itself"
+    return "not a video that FFmpeg can read"
 
 
 def video_stream(container: av.container.InputContainer, path: Path) -> VideoStream:
-    """Return the first video stream of a container."""
+    """Return the first video stream of a container; no picture beyond `MOST_PIXELS`."""
     if not container.streams.video:
         raise UnreadableVideo("the file holds no video stream", path)
-    return container.streams.video[0]
+    stream = container.streams.video[0]
+    if stream.width * stream.height > MOST_PIXELS:
+        raise UnreadableVideo(
+            f"{stream.width} x {stream.height} pixels; at most {MOST_PIXELS:,} are read: make it "
+            "smaller (ffmpeg -i IN -vf scale=-2:1080 OUT.mp4)",
+            path,
+        )
+    stream.codec_context.options = {"max_pixels": str(MOST_PIXELS)}
+    return stream
 
 
 def first_frame(container: av.container.InputContainer, path: Path) -> VideoFrame:
     """Return the first frame that can be decoded."""
     try:
-        return next(iter(container.decode(video=0)))
+        return next(iter(container.decode(video_stream(container, path))))
     except (StopIteration, av.FFmpegError) as cause:
         raise UnreadableVideo("the file holds no frame that can be decoded", path) from cause
 
@@ -62,14 +104,17 @@ def packet_times(path: Path) -> Float[np.ndarray, " T"]:
     """
     with opened(path) as container:
         stream = video_stream(container, path)
+        shown = (
+            np.nan if packet.pts is None else float(packet.pts * packet.time_base)
+            for packet in container.demux(stream)
+            if packet.size > 0 and not packet.is_discard and not packet.is_corrupt
+        )
         try:
-            found = [
-                np.nan if packet.pts is None else float(packet.pts * packet.time_base)
-                for packet in container.demux(stream)
-                if packet.size > 0 and not packet.is_discard and not packet.is_corrupt
-            ]
+            found = list(islice(shown, MOST_FRAMES + 1))
         except av.FFmpegError as cause:
             raise TruncatedVideo(f"damaged ({cause})", path) from cause
+    if len(found) > MOST_FRAMES:
+        raise UnreadableVideo(f"more than {MOST_FRAMES:,} frames; trim it", path)
     stamps = np.sort(np.array(found))
     return stamps - stamps[:1] if len(stamps) else stamps
 

@@ -109,21 +109,27 @@ def in_one_line(what: str, error: type[RoboJacksonError] = StoreError) -> Iterat
 
 
 @contextmanager
-def results_in(out: Path) -> Iterator[FileTree]:
-    """A folder for results, told at once when it cannot be written.
-
-    After a failure the folders that were made for it and are empty go away again.
-    """
-    made = [path for path in (out, *out.parents) if not path.exists()]
+def without_empty_folders(out: Path) -> Iterator[None]:
+    """After a failure, the folders that were made for results and are empty go away again."""
+    missing = [path for path in (out, *out.parents) if not path.exists()]
     try:
-        files = FileTree(out)
-        files.require_writable()
-        yield files
+        yield
     except BaseException:
         with suppress(OSError):
-            for path in made:
+            for path in missing:
                 path.rmdir()
         raise
+
+
+@contextmanager
+def results_in(out: Path) -> Iterator[FileTree]:
+    """A folder for results, refused at once when it cannot be written.
+
+    It is made with the first result, so that nothing is left of a command that has none.
+    """
+    there = next(path for path in (out.absolute(), *out.absolute().parents) if path.exists())
+    FileTree(there).require_writable()
+    yield FileTree(out)
 
 
 def _is_text(key: str) -> bool:

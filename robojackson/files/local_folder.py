@@ -7,8 +7,8 @@ operating system; `file_tree.FileTree` words them.
 import fcntl
 import hashlib
 import os
+import secrets
 import shutil
-import tempfile
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -62,19 +62,20 @@ class LocalFolder:
             raise IsADirectoryError("a folder; name a file in it")
         if target.exists() and not target.is_file():
             raise OSError("a device or a pipe; name a file")
-        mode = target.stat().st_mode & 0o777 if target.exists() else 0o644
+        mode = target.stat().st_mode & 0o777 if target.exists() else None
         target.parent.mkdir(parents=True, exist_ok=True)
-        file = _begun(target.parent)
+        name, file = _begun(target.parent)
         try:
             with file:
                 _fill(file, source)
                 file.flush()
                 os.fsync(file.fileno())
-                os.chmod(file.name, mode)
-                os.replace(file.name, target)
+                if mode is not None:
+                    os.chmod(name, mode)
+                os.replace(name, target)
             _sync_folder(target.parent)
         finally:
-            Path(file.name).unlink(missing_ok=True)
+            name.unlink(missing_ok=True)
 
     def read(self, key: str) -> bytes:
         return (self.root / key).read_bytes()
@@ -102,18 +103,22 @@ def sha256_of(data: bytes) -> str:
 
 
 def sha256_of_file(path: Path) -> str:
-    """Digest of a local file, in hexadecimal."""
+    """Digest of a local file, in hexadecimal; a device has no end."""
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise OSError("a device or a pipe, no file")
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _begun(folder: Path) -> Any:
+def _begun(folder: Path) -> tuple[Path, Any]:
     """A temporary file that is held: what nobody holds is a dead process's, and swept away."""
     while True:
-        file = tempfile.NamedTemporaryFile(prefix=TEMPORARY, dir=folder, delete=False)  # noqa: SIM115
+        name = folder / f"{TEMPORARY}{secrets.token_hex(8)}"
+        handle = os.open(name, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)  # umask
+        file = os.fdopen(handle, "w+b")
         fcntl.flock(file, fcntl.LOCK_EX)
-        if Path(file.name).exists():
-            return file
+        if name.exists():
+            return name, file
         file.close()  # it was swept away before it was held
 
 

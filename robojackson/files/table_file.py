@@ -3,18 +3,18 @@
 import json
 from os import PathLike
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 
-from robojackson.errors import StoreError
 from robojackson.files import tables
-from robojackson.files.file_tree import FileTree, results_in
+from robojackson.files.file_tree import results_in
+from robojackson.files.foreign_file import read_file
 from robojackson.files.json_types import to_json_types
+from robojackson.files.table_types import Facts as Facts
 from robojackson.files.table_types import TableSchema
 
 Columns = dict[str, np.ndarray]
-Facts = dict[str, Any]
 
 
 class TableFile:
@@ -71,20 +71,7 @@ class TableFile:
             BadTable: not Parquet, another table, or a column or metadata key that is wrong.
         """
         file = Path(path)
-        require_file(file)
-        return cls.from_bytes(FileTree(file.parent).read(file.name), str(file))
-
-
-def require_file(path: Path) -> None:
-    """Refuse a path that cannot be read as one file.
-
-    Raises:
-        StoreError: it is a folder, or not there.
-    """
-    if path.is_dir():
-        raise StoreError(f"{path}: a folder, not a file")
-    if not path.is_file():
-        raise StoreError(f"{path}: no such file")
+        return cls.from_bytes(read_file(file), str(file))
 
 
 def numbered(index: str, rows: int, period_s: float) -> Columns:

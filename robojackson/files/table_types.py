@@ -1,11 +1,18 @@
 """Types of tables: a column with type, unit and frame; a table with columns and metadata."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
 
 import pyarrow as pa
+from pydantic import TypeAdapter
 
 VERSION = 1
+Facts = dict[str, Any]
+"""Metadata of a table."""
+FactTypes = Mapping[str, Any]
+"""Types of such facts by key, as pydantic takes them."""
 WORLD = "world"
 F32, F64, I32, I64 = pa.float32(), pa.float64(), pa.int32(), pa.int64()
 TEXT, FLAG, STATE = pa.string(), pa.bool_(), pa.int8()
@@ -22,6 +29,7 @@ class Column:
         frame: Axes of a vector, `` for a scalar.
         width: Numbers a row; 1 is a scalar, None a vector whose width the file itself tells.
         nullable: Whether a row may have none.
+        least, most: Bounds of the numbers of a table that is a dataclass.
     """
 
     name: str
@@ -30,6 +38,8 @@ class Column:
     frame: str = ""
     width: int | None = 1
     nullable: bool = False
+    least: float = -1e6
+    most: float = 1e6
 
     @property
     def is_vector(self) -> bool:
@@ -52,7 +62,9 @@ class TableSchema:
         name: Of the column or table.
         row: What one row is.
         columns: All fixed columns.
-        metadata: Keys that the file's metadata must have (JSON values).
+        metadata: Keys that the file's metadata must have and the types of their JSON values
+            (`fact_types`).
+        optional: Those that it may have.
         dynamic: Beginnings of further columns, float64, nullable, with their unit; which of them a
             file has depends on the reward and the robot.
     """
@@ -60,8 +72,14 @@ class TableSchema:
     name: str
     row: str
     columns: tuple[Column, ...]
-    metadata: tuple[str, ...] = ()
+    metadata: FactTypes = field(default_factory=dict)
+    optional: FactTypes = field(default_factory=dict)
     dynamic: Mapping[str, str] | None = None
+
+    @cached_property
+    def facts(self) -> Mapping[str, TypeAdapter[object]]:
+        """What checks the metadata, by key."""
+        return {key: TypeAdapter(kind) for key, kind in {**self.metadata, **self.optional}.items()}
 
     def column(self, name: str) -> Column | None:
         """The column of that name, also a dynamic one; None where the table has no such column."""

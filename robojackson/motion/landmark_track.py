@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
+from robojackson.files.fact_types import Count, Matrix, Number, Pixels, Rate, Texts
 from robojackson.files.table_file import Columns, Facts, TableFile, numbered
 from robojackson.files.table_types import F32, F64, I32, Column, TableSchema
 
@@ -24,7 +25,11 @@ LANDMARK_TRACK = TableSchema(
         Column("world_landmarks", F32, "m", "hips: x right, y down, z away", 99, nullable=True),
         Column("visibility", F32, "1", width=33, nullable=True),
     ),
-    ("fps", "width", "height"),
+    {"fps": Rate, "width": Pixels, "height": Pixels},
+    {
+        **{"person": Count, "notes": Texts, "people": Count, "brightness": Number | None},
+        **{"sharpness": Number | None, "to_first": list[Matrix]},
+    },
 )
 
 

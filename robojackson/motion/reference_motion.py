@@ -10,13 +10,46 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
+from typing_extensions import TypedDict
 
+from robojackson.files.fact_types import (
+    Count,
+    Figures,
+    Flag,
+    Numbers,
+    Point,
+    Step,
+    Text,
+    Texts,
+)
 from robojackson.files.table_file import Columns, Facts, TableFile, json_facts, numbered
 from robojackson.files.table_types import F32, F64, I32, STATE, WORLD, Column, TableSchema
 from robojackson.motion.certificate import Certificate, Finding
 
 ARRAYS = ("qpos", "qvel", "body_pos_w", "keypoints_w", "contact", "torque_ratio")
 NAMES = ("joint_names", "body_names", "keypoint_names", "contact_names")
+UNIT = 1e-3
+"""How far the length of a quaternion may be from one."""
+
+
+class FoundFinding(TypedDict):
+    """A finding of a certificate, as a file has it."""
+
+    start: Count
+    end: Count
+    cause: Text
+    what: Text
+    repair: Text
+
+
+class FoundCertificate(TypedDict):
+    """A certificate, as a file has it."""
+
+    slack: Numbers
+    tempo: Numbers
+    findings: list[FoundFinding]
+
+
 REFERENCE_MOTION = TableSchema(
     "ReferenceMotion",
     "step",
@@ -24,26 +57,24 @@ REFERENCE_MOTION = TableSchema(
         Column("step", I32),
         Column("time_s", F64, "s"),
         # Not rounded to f32: a joint at its limit would end up beyond it.
-        Column("qpos", F64, "m, wxyz, rad", WORLD, None),
+        Column("qpos", F64, "m, wxyz, rad", WORLD, None, least=-1e4, most=1e4),
         Column("qvel", F64, "m/s, rad/s", "root linear: world; root angular: body", None),
-        Column("body_pos_w", F32, "m", WORLD, None),
-        Column("keypoints_w", F32, "m", WORLD, None),
-        Column("contact", STATE, "0 air, 1 planted, 2 sliding", width=None),
+        Column("body_pos_w", F32, "m", WORLD, None, least=-1e4, most=1e4),
+        Column("keypoints_w", F32, "m", WORLD, None, least=-1e4, most=1e4),
+        Column("contact", STATE, "0 air, 1 planted, 2 sliding", width=None, least=0, most=2),
         Column("torque_ratio", F32, "1", width=None),
         Column("source_time_s", F64, "s"),
     ),
-    (
-        "robot",
-        "model_sha256",
-        "dt",
-        "cyclic",
-        "cycle_offset",
-        "joint_names",
-        "body_names",
-        "keypoint_names",
-        "contact_names",
-        "scorecard",
-    ),
+    {
+        "robot": Text,
+        "model_sha256": Text,
+        "dt": Step,
+        "cyclic": Flag,
+        "cycle_offset": Point,
+        **dict.fromkeys(NAMES, Texts),
+        "scorecard": Figures,
+    },
+    {"certificate": FoundCertificate, "robot_file": Text},
 )
 
 
@@ -125,6 +156,7 @@ class ReferenceMotion(TableFile):
         bodies, points = len(facts["body_names"]), len(facts["keypoint_names"])
         arrays["body_pos_w"] = arrays["body_pos_w"].reshape(-1, bodies, 3)
         arrays["keypoints_w"] = arrays["keypoints_w"].reshape(-1, points, 3)
+        _require_widths(arrays, facts)
         return cls(
             robot=str(facts["robot"]),
             model_sha256=str(facts["model_sha256"]),
@@ -137,6 +169,20 @@ class ReferenceMotion(TableFile):
             robot_file=str(facts.get("robot_file", "")),
             **(arrays | {name: tuple(facts[name]) for name in NAMES}),
         )
+
+
+def _require_widths(arrays: Mapping[str, np.ndarray], facts: Facts) -> None:
+    """Raise `ValueError` where a table has not a column a name, or its root is not turned."""
+    joints, contacts = len(facts["joint_names"]), len(facts["contact_names"])
+    wanted = {"qpos": 7 + joints, "qvel": 6 + joints, "contact": contacts, "torque_ratio": joints}
+    for name, width in wanted.items():
+        if arrays[name].shape[1] != width:
+            raise ValueError(f"{name} has {arrays[name].shape[1]} numbers a row, not {width}")
+    for name in NAMES:
+        if len(set(facts[name])) < len(facts[name]):
+            raise ValueError(f"{name} has a name twice")
+    if (abs(np.linalg.norm(arrays["qpos"][:, 3:7], axis=1) - 1.0) > UNIT).any():
+        raise ValueError("qpos: the root's quaternion has not length one")
 
 
 def _certificate(facts: Facts) -> Certificate | None:

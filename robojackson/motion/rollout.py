@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from robojackson.files.fact_types import Step
 from robojackson.files.table_file import Columns, Facts, TableFile, numbered
 from robojackson.files.table_types import F64, I32, WORLD, Column, TableSchema
 
@@ -16,7 +17,7 @@ ROLLOUT = TableSchema(
         Column("time_s", F64, "s"),
         Column("qpos", F64, "m, wxyz, rad", WORLD, None),
     ),
-    ("dt",),
+    {"dt": Step},
 )
 
 

@@ -8,12 +8,40 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Float, Int
+from typing_extensions import TypedDict
 
+from robojackson.files.fact_types import (
+    Count,
+    Matrix,
+    Number,
+    Pixels,
+    Point,
+    Rate,
+    Text,
+    Texts,
+    many,
+)
 from robojackson.files.table_file import Columns, Facts, TableFile, json_facts, numbered
 from robojackson.files.table_types import F32, F64, FLAG, I32, STATE, WORLD, Column, TableSchema
 
 CONTACT_POINTS: tuple[str, ...] = ("left_heel", "left_toe", "right_heel", "right_toe")
 AIR, PLANTED, SLIDING = 0, 1, 2
+REACH_M = 1e4
+"""How far from the origin a body may be, metres."""
+
+
+class Camera(TypedDict, total=False):
+    """The camera, where it is known; other keys may stand beside these."""
+
+    focal_px: Number
+    width: Pixels
+    height: Pixels
+    gravity: Text
+    tilt_deg: Number
+    position_w: Point | list[Point]
+    rotation_w: Matrix | list[Matrix]
+
+
 ARRAYS = (
     "global_orient",
     "body_pose",
@@ -32,14 +60,21 @@ SMPL_SEQUENCE = TableSchema(
         Column("time_s", F64, "s"),
         Column("global_orient", F32, "rad", WORLD, 3),
         Column("body_pose", F32, "rad", "parent joint", 69),
-        Column("transl", F32, "m", WORLD, 3),
-        Column("joints", F32, "m", WORLD, 72),
-        Column("keypoints_w", F32, "m", WORLD, 87),
+        Column("transl", F32, "m", WORLD, 3, least=-REACH_M, most=REACH_M),
+        Column("joints", F32, "m", WORLD, 72, least=-REACH_M, most=REACH_M),
+        Column("keypoints_w", F32, "m", WORLD, 87, least=-REACH_M, most=REACH_M),
         Column("confidence", F32, "1", width=29),
-        Column("contact", STATE, "0 air, 1 planted, 2 sliding", width=4),
+        Column("contact", STATE, "0 air, 1 planted, 2 sliding", width=4, least=AIR, most=SLIDING),
         Column("valid", FLAG),
     ),
-    ("fps", "betas", "rest_joints", "person", "camera", "notes"),
+    {
+        "fps": Rate,
+        "betas": many(Number, 10),
+        "rest_joints": many(Point, 29),
+        "person": Count,
+        "camera": Camera,
+        "notes": Texts,
+    },
 )
 
 

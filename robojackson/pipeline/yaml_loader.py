@@ -18,13 +18,16 @@ import yaml
 from pydantic import TypeAdapter, ValidationError
 
 from robojackson.errors import BadConfiguration, ConflictingValues, UnknownName
+from robojackson.files.foreign_file import read_text
 from robojackson.pipeline.app_folder import CONFIGS, app_folder
-from robojackson.pipeline.yaml_scalars import Yaml12
+from robojackson.pipeline.yaml_scalars import Yaml12, require_few
 
 Config = TypeVar("Config")
 SHIPPED = app_folder() / "configs"
 SUFFIXES = (".yaml", ".yml")
 EXTENDS = "extends"
+LARGEST = 2**20
+"""Bytes of a file."""
 
 
 def load(
@@ -137,9 +140,10 @@ def _read_extended(
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        values = _parsed(path.read_text(encoding="utf-8"), _display_name(path))
-    except (OSError, UnicodeDecodeError) as cause:
-        raise BadConfiguration(f"{_display_name(path)}: cannot be read ({cause})") from cause
+        text = read_text(path, BadConfiguration, LARGEST)
+    except BadConfiguration as cause:
+        raise BadConfiguration(cause.reason, _display_name(path)) from cause
+    values = _parsed(text, _display_name(path))
     if values is None:
         return {}
     if not isinstance(values, dict):
@@ -153,7 +157,7 @@ def _parsed(value: object, where: str) -> Any:
     if not isinstance(value, str):
         return value
     try:
-        return yaml.load(value, Loader=Yaml12)
+        return require_few(yaml.load(value, Loader=Yaml12))
     except (yaml.YAMLError, ValueError, TypeError, RecursionError) as cause:
         raise BadConfiguration(f"{where}: {' '.join(str(cause).split())}") from cause
 
@@ -190,7 +194,7 @@ def _explain(cls: type, cause: ValidationError) -> str:
         return f"key {where!r} is missing"
     if error["type"] == "value_error" and isinstance(error["input"], Mapping):
         return str(error["ctx"]["error"])  # values that do not go together, each right by itself
-    return f"{where!r} is {error['input']!r}: {_expected(cause)}"
+    return f"{where!r} is {error['input']!r:.200}: {_expected(cause)}"
 
 
 def _expected(cause: ValidationError) -> str:

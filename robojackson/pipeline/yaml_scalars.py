@@ -3,9 +3,13 @@ is an error.
 """
 
 import re
-from typing import Any
+from typing import Any, TypeVar
 
 import yaml
+
+Value = TypeVar("Value")
+MOST_VALUES = 100_000
+"""In one text, those of an alias counted wherever it stands."""
 
 
 class Yaml12(yaml.SafeLoader):
@@ -53,3 +57,25 @@ def _integer(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> int:
 
 
 Yaml12.add_constructor("tag:yaml.org,2002:int", _integer)
+
+
+def require_few(value: Value) -> Value:
+    """Return the value of a text, refused where its aliases make a few lines endless.
+
+    Raises:
+        ValueError: there are more than `MOST_VALUES`, or a value holds itself.
+    """
+    known: dict[int, int] = {}
+
+    def count(part: object) -> int:
+        if not isinstance(part, dict | list | set | tuple):
+            return 1
+        if id(part) not in known:
+            known[id(part)] = MOST_VALUES + 1  # while it is counted: a value that holds itself
+            inner = [*part, *part.values()] if isinstance(part, dict) else part
+            known[id(part)] = 1 + sum(map(count, inner))
+        return known[id(part)]
+
+    if count(value) > MOST_VALUES:
+        raise ValueError(f"more than {MOST_VALUES:,} values, or one that holds itself")
+    return value

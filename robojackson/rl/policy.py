@@ -18,8 +18,11 @@ from safetensors.numpy import save
 
 from robojackson.errors import BadPolicy
 from robojackson.files.file_tree import FileTree
+from robojackson.files.foreign_file import parse_json, require_file
 
 FORMAT = "robojackson-policy-1"
+LARGEST = 1e6
+"""Of a weight."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -113,14 +116,13 @@ def load_policy(path: Path) -> Policy:
     Raises:
         BadPolicy: the file is missing, foreign or has layers that do not fit each other.
     """
-    if not path.is_file():
-        raise BadPolicy(f"{path}: {'a folder, not a file' if path.is_dir() else 'no such file'}")
+    require_file(path, BadPolicy)
     try:
         with safe_open(path, framework="np") as file:
             header = file.metadata() or {}
             names = set(file.keys())
             tensors = {name: file.get_tensor(name) for name in names}
-    except (OSError, SafetensorError) as error:
+    except (OSError, SafetensorError, TypeError, ValueError) as error:
         raise BadPolicy(f"{path} is not a policy file of ours ({error})") from error
     if FORMAT not in header:
         raise BadPolicy(f"{path} is not a {FORMAT} file; `robojackson train` writes them")
@@ -129,7 +131,7 @@ def load_policy(path: Path) -> Policy:
 
 def _facts(path: Path, text: str) -> dict[str, object]:
     try:
-        facts = json.loads(text)
+        facts = parse_json(text, finite=True)
     except ValueError as error:
         raise BadPolicy(f"{path}: what it was trained for cannot be read ({error})") from error
     if not isinstance(facts, dict):
@@ -149,8 +151,10 @@ def _layers(
         raise BadPolicy(f"{path} lacks tensor {error}") from error
     if any(weight.ndim != 2 for weight, _ in layers):
         raise BadPolicy(f"{path} has a layer whose weight is no matrix")
-    if not all(np.isfinite(array).all() for layer in layers for array in layer):
-        raise BadPolicy(f"{path} has weights that are no numbers")
+    if any(array.dtype.kind != "f" for layer in layers for array in layer):
+        raise BadPolicy(f"{path} has weights that are no floating-point numbers")
+    if not all((np.abs(array) < LARGEST).all() for layer in layers for array in layer):
+        raise BadPolicy(f"{path} has weights that are no numbers, or over {LARGEST:g}")
     widths = [weight.shape[1] for weight, _ in layers[:-1]]
     fits = all(w == nxt.shape[0] for w, (nxt, _) in zip(widths, layers[1:], strict=True))
     if not layers or not fits or any(w.shape[1:] != b.shape for w, b in layers):

@@ -110,6 +110,7 @@ def from_sb3_zip(path: Path) -> Networks:
         ) from error
     except Exception as error:  # a damaged file fails in any way
         cause = str(error).partition("\n")[0]
+        cause = "damaged" if "weights_only" in str(error) else cause  # the same advice
         raise BadPolicy(f"{path} is no SB3 zip that can be read ({cause})") from error
     _require_relu(path, header)
     try:

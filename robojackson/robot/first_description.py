@@ -19,6 +19,7 @@ from robojackson.robot.contact_guess import guess_contacts, toe_of
 from robojackson.robot.description import KEYPOINTS, TOES, ContactPoint
 from robojackson.robot.keypoint_guess import Guess, guess_keypoints
 from robojackson.robot.limbs import SIDES, Skeleton, skeleton_of
+from robojackson.robot.model_files import read_model
 
 WEIGHTS = {"foot": 1.5, "hand": 1.5, "head": 0.5, "toe": 0.7, "pelvis": 0.0}
 """Of the squared error, by the end of a keypoint's name; the others have 1. As Humanoid-v5's."""
@@ -126,10 +127,7 @@ def guess_rest(skeleton: Skeleton) -> dict[str, float]:
 def _model(path: Path) -> mujoco.MjModel:
     if not path.is_file():
         raise BadConfiguration(f"{path}: no such file; expected the MJCF of a robot")
-    try:
-        model = mujoco.MjModel.from_xml_path(str(path))
-    except ValueError as cause:
-        raise BadConfiguration(f"{path}: {str(cause).splitlines()[0]}") from cause
+    model = read_model(path)
     if model.nbody < 2 or not (model.jnt_type == int(mujoco.mjtJoint.mjJNT_HINGE)).any():
         raise BadConfiguration(f"{path}: no body with a hinge; expected the MJCF of a robot")
     return model

@@ -8,12 +8,20 @@ import hashlib
 import importlib.util
 import os
 from pathlib import Path
-from xml.etree import ElementTree
 
 import mujoco
 
 from robojackson.errors import BadConfiguration
+from robojackson.files.memory_limit import limited_memory
 from robojackson.robot.description import KEYPOINTS, TOES, RobotDescription
+from robojackson.robot.model_files import (
+    FAULTS,
+    files_of,
+    first_line,
+    require_model_files,
+    require_sound,
+    silence_mujoco,
+)
 from robojackson.robot.names import known, where
 from robojackson.robot.physics import apply_physics, is_plane
 
@@ -21,9 +29,6 @@ STORE = "ROBOJACKSON_STORE"
 ADDED = "store"
 """Prefix of an `mjcf` that `robojackson robots add` unpacks."""
 _OURS = "keypoint/"
-FOLDERS = ("assetdir", "meshdir", "texturedir")
-PARTS = ("include", "model")
-"""Elements whose file is MJCF again."""
 
 
 def site_of(model: mujoco.MjModel, key: str) -> int:
@@ -55,7 +60,7 @@ def mjcf_path(description: RobotDescription) -> Path:
         BadConfiguration: It is not there, or not the one that was pinned.
     """
     package, colon, inside = description.mjcf.partition(":")
-    if not colon or len(package) == 1 or not package.isidentifier():
+    if not colon or len(package) == 1 or not package.replace(".", "").isidentifier():
         path = Path(description.mjcf)
     elif package == ADDED:
         return _added(description, inside)
@@ -81,17 +86,20 @@ def _added(description: RobotDescription, inside: str) -> Path:
 
 
 def _in_package(description: RobotDescription, package: str, inside: str) -> Path:
-    found = importlib.util.find_spec(package)
+    found = importlib.util.find_spec(package) if package.isidentifier() else None
     if found is None or found.origin is None:
         raise BadConfiguration(
             f"{where(description, 'mjcf')}: package {package!r} is not installed"
         )
-    return Path(found.origin).parent / inside
+    folder = Path(found.origin).parent
+    if not (folder / inside).resolve().is_relative_to(folder.resolve()):
+        raise BadConfiguration(f"{where(description, 'mjcf')}: {inside} is not in {package!r}")
+    return folder / inside
 
 
 def compiled(description: RobotDescription, path: Path) -> mujoco.MjModel:
     """Return the model with the keypoint sites, a floor, and scaled motors."""
-    _silence_mujoco()
+    silence_mujoco()
     spec = read_spec(path, description)
     bodies = [body.name for body in spec.bodies if body.name != "world"]
     _add_sites(spec, description, bodies)
@@ -100,49 +108,21 @@ def compiled(description: RobotDescription, path: Path) -> mujoco.MjModel:
         spec.worldbody.add_geom(name="floor", type=plane, size=[40, 40, 1], rgba=[0.5] * 3 + [1])
     try:
         apply_physics(spec, description)
-        model = spec.compile()
-    except ValueError as error:
+        with limited_memory():
+            model = spec.compile()
+    except FAULTS as error:
         raise _unreadable(description, error) from error
+    require_sound(model, where(description, "mjcf"))
     model.actuator_gear[:] *= description.gear_scale
     return model
 
 
 def model_sha256(path: Path) -> str:
     """Return the digest of an MJCF; where it includes other files or has meshes, of all of them."""
-    digests = [hashlib.sha256(file.read_bytes()) for file in _files(path)]
+    digests = [hashlib.sha256(file.read_bytes()) for file in files_of(path)]
     if len(digests) == 1:
         return digests[0].hexdigest()
     return hashlib.sha256(b"".join(digest.digest() for digest in digests)).hexdigest()
-
-
-def _silence_mujoco() -> None:
-    """Keep MuJoCo's warnings out of the terminal and of a MUJOCO_LOG.TXT in the working folder.
-
-    A simulation that diverges, as a robot that just learns to stand does, is counted in
-    `data.warning`, which ends the episode.
-    """
-    config = mujoco.MjLogConfig.get()
-    config.logto_console = config.logto_file = False
-    mujoco.MjLogConfig.set(config)
-
-
-def _files(path: Path) -> list[Path]:
-    """Return the MJCF and every file that it names, as MuJoCo finds them."""
-    found, folders, texts = [path], [path.parent], [path]
-    for text in texts:  # grows while it is read
-        try:
-            tree = ElementTree.parse(text)
-        except ElementTree.ParseError:  # MuJoCo reads what is no strict XML, too
-            continue
-        for compiler in tree.iter("compiler"):
-            folders += [path.parent / compiler.get(name, "") for name in FOLDERS]
-        for element in tree.iter():
-            places = [folder / element.get("file", "") for folder in folders]
-            file = next((place for place in places if place.is_file()), None)
-            if file is not None and file not in found:
-                found.append(file)
-                texts += [file] if element.tag in PARTS else []
-    return found
 
 
 def read_spec(path: Path, description: RobotDescription) -> mujoco.MjSpec:
@@ -151,14 +131,16 @@ def read_spec(path: Path, description: RobotDescription) -> mujoco.MjSpec:
     Raises:
         BadConfiguration: MuJoCo cannot read it.
     """
+    require_model_files(path, where(description, "mjcf"))
     try:
-        return mujoco.MjSpec.from_file(str(path))
-    except ValueError as error:
+        with limited_memory():
+            return mujoco.MjSpec.from_file(str(path))
+    except FAULTS as error:
         raise _unreadable(description, error) from error
 
 
-def _unreadable(description: RobotDescription, error: ValueError) -> BadConfiguration:
-    return BadConfiguration(f"{where(description, 'mjcf')}: {str(error).splitlines()[0]}")
+def _unreadable(description: RobotDescription, error: Exception) -> BadConfiguration:
+    return BadConfiguration(f"{where(description, 'mjcf')}: {first_line(error)}")
 
 
 def _add_sites(spec: mujoco.MjSpec, description: RobotDescription, bodies: list[str]) -> None:

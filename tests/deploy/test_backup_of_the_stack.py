@@ -130,7 +130,7 @@ def test_a_wrong_password_of_the_database_is_one_line(stack: Stack, tmp_path: Pa
     facts = stack.file["backup"]["environment"]
     name = "PREFECT_SERVER_DATABASE_CONNECTION_URL"
     right = facts[name]
-    facts[name] = right.replace(stack.given["POSTGRES_PASSWORD"], "wrong")
+    facts[name] = right.replace(stack.given["POSTGRES_BACKUP_PASSWORD"], "wrong")
     try:
         made = stack.once("backup", tmp_path)
     finally:

@@ -152,9 +152,16 @@ def test_a_service_has_the_keys_of_its_role_alone(name: str) -> None:
     assert held == {f"S3_{role.upper()}_PASSWORD"}
 
 
-def test_workers_cannot_reach_the_database() -> None:
-    with_it = {n for n in SERVICES if "POSTGRES_PASSWORD" in str(SERVICES[n])}
-    assert with_it == {"postgres", "prefect-server", "backup", "restore"}
+def test_workers_cannot_reach_the_database_and_nobody_is_its_administrator() -> None:
+    holders = {
+        name: {n for n in SERVICES if f"${{{name}:" in str(SERVICES[n])}
+        for name in ("POSTGRES_ADMIN_PASSWORD", "POSTGRES_PASSWORD", "POSTGRES_BACKUP_PASSWORD")
+    }
+    assert holders == {
+        "POSTGRES_ADMIN_PASSWORD": {"postgres"},
+        "POSTGRES_PASSWORD": {"prefect-server", "restore"},
+        "POSTGRES_BACKUP_PASSWORD": {"backup"},
+    }
 
 
 def test_the_copying_services_start_only_by_name() -> None:

@@ -11,7 +11,7 @@ import pytest
 
 from robojackson.clips.quality.stability import Stability
 from robojackson.errors import BadTable
-from robojackson.files import tables
+from robojackson.files import table_door, tables
 from robojackson.motion.landmark_track import LANDMARK_TRACK, LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.rollout import Rollout
@@ -56,13 +56,15 @@ def a_sequence(rng: np.random.Generator) -> SmplSequence:
 
 
 def a_reference(rng: np.random.Generator) -> ReferenceMotion:
+    qpos = rng.normal(size=(6, 24))
+    qpos[:, 3:7] /= np.linalg.norm(qpos[:, 3:7], axis=1, keepdims=True)
     return ReferenceMotion(
         robot="humanoid",
         model_sha256="0" * 64,
         dt=0.015,
         cyclic=True,
         cycle_offset=rng.normal(size=3),
-        qpos=rng.normal(size=(6, 24)),
+        qpos=qpos,
         qvel=rng.normal(size=(6, 23)),
         body_pos_w=f32(rng, 6, 13, 3),
         keypoints_w=f32(rng, 6, 14, 3),
@@ -129,7 +131,7 @@ def test_units_and_frames_stand_in_the_file() -> None:
 
 def test_fps_stands_in_the_file() -> None:
     table = pq.read_table(io.BytesIO(tables.encode(a_sequence(np.random.default_rng(1)))))
-    assert tables.metadata_of(table)["fps"] == 30.0
+    assert table_door.metadata_of(table)["fps"] == 30.0
 
 
 def rewritten(change) -> bytes:

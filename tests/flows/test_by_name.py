@@ -19,7 +19,10 @@ from storage.store import Store
 from tests.fixtures.web_server import serving
 
 NOW = datetime(2026, 11, 21, tzinfo=UTC)
-IMPATIENT = {"retries": 0, "timeout_s": 1, "request_pause_s": 0}
+IMPATIENT = {
+    **{"retries": 0, "timeout_s": 1, "request_pause_s": 0},
+    "private_addresses": True,
+}
 
 
 @pytest.fixture

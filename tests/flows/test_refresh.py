@@ -33,7 +33,10 @@ from tests.fixtures.web_server import Web, serving
 
 pytestmark = pytest.mark.xdist_group("refresh")
 
-OVERRIDES = {"web.retries": 1, "web.backoff_s": 0.01, "web.timeout_s": 1, "web.request_pause_s": 0}
+OVERRIDES = {
+    **{"web.retries": 1, "web.backoff_s": 0.01, "web.timeout_s": 1, "web.request_pause_s": 0},
+    "web.private_addresses": True,
+}
 FAILURES = {
     "missing": "HTTP 404 not found",
     "busy": "HTTP 429 too many requests (2 attempts)",

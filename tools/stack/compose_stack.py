@@ -31,7 +31,8 @@ COMPOSE = ROOT / "docker-compose.yml"
 ROLES = ("setup", "worker", "server", "backup")
 """S3 identities of the file."""
 PASSWORDS = (
-    *("POSTGRES_PASSWORD", "S3_INTERNAL_PASSWORD"),
+    *("POSTGRES_ADMIN_PASSWORD", "POSTGRES_PASSWORD", "POSTGRES_BACKUP_PASSWORD"),
+    "S3_INTERNAL_PASSWORD",
     *(f"S3_{role.upper()}_PASSWORD" for role in ROLES),
 )
 PORTS = {"postgres": 5432, "prefect-server": 4200, "s3": 9000, "flow-worker": 8080, "trainer": 8080}
@@ -150,8 +151,10 @@ class Stack:
         log = self.folder / f"{full}.log"
         if name == "postgres":
             test = self.file[name]["healthcheck"]["test"][1]
-            arguments = self.file[name]["environment"]
-            return postgres.service(arguments, test, self.ports[name], self.folder, log)
+            wanted = self.file[name]["environment"]
+            return postgres.service(
+                wanted, test, self.ports[name], self.folder, log, self.configs["roles"]["content"]
+            )
         if name == "s3":
             return self._s3(log)
         environment = self._environment(name, full)

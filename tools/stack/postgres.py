@@ -17,13 +17,16 @@ from tools.stack.service import Service, StackError
 USER = "postgres"
 
 
-def service(settings: Mapping[str, str], check: str, port: int, folder: Path, log: Path) -> Service:
+def service(
+    settings: Mapping[str, str], check: str, port: int, folder: Path, log: Path, roles: str = ""
+) -> Service:
     """Return the database server of a stack.
 
     Args:
         settings: Environment of the image: POSTGRES_USER, POSTGRES_PASSWORD, POSTGRES_DB.
         check: The file's health check, a line of shell.
-        port, folder, log: Where it listens, keeps its data's path, and writes its log.
+        port, folder, log: Where it listens, keeps its data's path, and says what it does.
+        roles: SQL that the image runs once, with an empty volume.
     """
     home = _home(folder)
     user = USER if os.geteuid() == 0 else None
@@ -39,7 +42,7 @@ def service(settings: Mapping[str, str], check: str, port: int, folder: Path, lo
         "postgres",
         [*command, "-k", str(home)],
         {**os.environ, **access},
-        ["sh", "-c", f"{check} && {_database(settings)}"],
+        ["sh", "-c", _ready(settings, check, roles, home)],
         log,
         user,
     )
@@ -74,12 +77,21 @@ def _initialise(home: Path, settings: Mapping[str, str], user: str | None) -> No
     secret.unlink()
 
 
+def _ready(settings: Mapping[str, str], check: str, roles: str, home: Path) -> str:
+    """Return the shell that does what the image does first, then asks for health."""
+    if not roles:
+        return f"{check} && {_database(settings)}"
+    script, done, user = home / "roles.sql", home / "roles.done", settings["POSTGRES_USER"]
+    script.write_text(roles)
+    told = f"psql -q -v ON_ERROR_STOP=1 -U {user} -d {settings['POSTGRES_DB']} -f {script}"
+    return f"pg_isready && {{ test -e {done} || {{ {told} && touch {done}; }}; }} && {check}"
+
+
 def _database(settings: Mapping[str, str]) -> str:
-    """Return the shell that makes the database, as the image does at its first start, and asks
-    it."""
+    """Return the shell that makes the database, as the image does first, and asks it."""
     user, name = settings["POSTGRES_USER"], settings["POSTGRES_DB"]
-    probe = f"psql -U {user} -d {name} -c 'select 1'"
-    return f"{{ {probe} 2>/dev/null || createdb -U {user} {name}; {probe}; }}"
+    asked = f"psql -U {user} -d {name} -c 'select 1'"
+    return f"{{ {asked} 2>/dev/null || createdb -U {user} {name}; {asked}; }}"
 
 
 def _home(folder: Path) -> Path:

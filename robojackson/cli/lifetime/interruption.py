@@ -17,6 +17,8 @@ INTERRUPTED = 130
 """Exit code of a command that was interrupted."""
 STOPS = (signal.SIGINT, signal.SIGTERM)
 """The signals that interrupt a command."""
+SHOWN = "\u2068\u2069"
+"""Isolates around words that run from right to left: they are ours."""
 UNSAVED = "robojackson-unsaved"
 """Name of the memory file that a training holds open while it has learning to save."""
 
@@ -67,8 +69,12 @@ def complain(line: str) -> None:
 
 def as_line(text: str) -> str:
     """Return a text as one printable line that names the command."""
-    plain = "".join(c if c.isprintable() else "?" for c in " ".join(text.split()))
-    return f"robojackson: {plain}"
+    return f"robojackson: {printable(' '.join(text.split()))}"
+
+
+def printable(text: str) -> str:
+    """Return a text without what steers a terminal: names of files may hold escape sequences."""
+    return "".join(c if c.isprintable() or c in SHOWN else "?" for c in text)
 
 
 def program() -> str:

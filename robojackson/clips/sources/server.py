@@ -7,6 +7,7 @@ from html.parser import HTMLParser
 from urllib.parse import unquote, urljoin, urlsplit
 
 from robojackson.clips.video import SUFFIXES
+from robojackson.clips.web.address_guard import public_only
 from robojackson.clips.web.untrusted_text import clean_text, safe_name, web_address
 from robojackson.clips.web.video_candidate import GENERIC, VideoCandidate
 from robojackson.clips.web.yt_dlp_client import WebConfig
@@ -44,7 +45,10 @@ def _page(address: str, config: WebConfig) -> str:
         handlers.append(urllib.request.ProxyHandler({"http": config.proxy, "https": config.proxy}))
     opener = urllib.request.build_opener(*handlers)
     try:
-        with opener.open(address, timeout=config.timeout_s) as answer:
+        with (
+            public_only(config.private_addresses, config.proxy),
+            opener.open(address, timeout=config.timeout_s) as answer,
+        ):
             return bytes(answer.read(LARGEST_PAGE)).decode("utf-8", "replace")
     except (OSError, ValueError) as cause:
         reason = f"HTTP {cause.code}" if isinstance(cause, urllib.error.HTTPError) else cause

@@ -8,9 +8,12 @@ from robojackson.clips.web.untrusted_text import clean_text, safe_name, web_addr
 from robojackson.clips.web.video_candidate import GENERIC, VideoCandidate
 from robojackson.clips.web.yt_dlp_client import WebConfig
 from robojackson.errors import SearchFailed
+from robojackson.files.foreign_file import read_text
 
 COMMENT = "#"
 IS_LOCAL = True
+LARGEST = 2**24
+"""Bytes of a list."""
 log = logging.getLogger(__name__)
 
 
@@ -42,8 +45,9 @@ def _lines(text: str) -> list[str]:
     if "://" not in text:
         path = Path(text)
         try:
-            listed = path.read_text(encoding="utf-8").splitlines()
-        except (OSError, ValueError) as cause:
-            raise SearchFailed(f"urls: {clean_text(text)}: cannot be read") from cause
+            listed = read_text(path, SearchFailed, LARGEST).splitlines()
+        except (SearchFailed, OSError, ValueError) as cause:
+            told = cause.reason if isinstance(cause, SearchFailed) else "cannot be read"
+            raise SearchFailed(f"urls: {clean_text(text)}: {told}") from cause
         return [line.strip() for line in listed if line.strip() and line[0] != COMMENT]
     return text.split()

@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 
 from pydantic import Field
 
+from robojackson.clips.web.address_guard import public_only, refusal
 from robojackson.clips.web.download_formats import FormatConfig, Purpose, choose
 from robojackson.clips.web.javascript_runtimes import runtimes
 from robojackson.clips.web.request_failures import REASON_LENGTH, explain
@@ -44,6 +45,7 @@ class WebConfig:
         largest_file_mb: A file beyond this is not downloaded, megabytes.
         cookies_file: Netscape cookie file that is passed through.
         proxy: Address of a proxy that is passed through.
+        private_addresses: Whether addresses that are not of the public web may be connected to.
         language: Language of the titles, two letters; empty is the site's own choice.
     """
 
@@ -57,6 +59,7 @@ class WebConfig:
     largest_file_mb: float = Field(default=300.0, gt=0)
     cookies_file: Path | None = None
     proxy: str | None = None
+    private_addresses: bool = False
     language: str = ""
 
 
@@ -134,7 +137,7 @@ def entries(info: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 def _options(config: WebConfig) -> dict[str, Any]:
     import imageio_ffmpeg
 
-    options = {
+    options: dict[str, Any] = {
         "quiet": True,
         "noprogress": True,
         "no_warnings": False,
@@ -142,6 +145,8 @@ def _options(config: WebConfig) -> dict[str, Any]:
         "cachedir": False,
         "color": {"stdout": "never", "stderr": "never"},
         "noplaylist": True,
+        "http_headers": {"Accept-Encoding": "identity"},
+        "hls_prefer_native": True,
         "socket_timeout": config.timeout_s,
         "sleep_interval_requests": config.request_pause_s,
         "retries": 0,
@@ -155,7 +160,7 @@ def _options(config: WebConfig) -> dict[str, Any]:
         options["proxy"] = config.proxy
     if config.language:
         options["extractor_args"] = {"youtube": {"lang": [config.language]}}
-        options["http_headers"] = {"Accept-Language": config.language}
+        options["http_headers"] |= {"Accept-Language": config.language}
     if config.cookies_file:
         options["cookiefile"] = str(config.cookies_file)
     return options
@@ -192,9 +197,12 @@ def _watch(progress: Progress | None, config: WebConfig) -> Callable[[Mapping[st
     began = time.monotonic()
 
     def hook(state: Mapping[str, Any]) -> None:
+        done = int(state.get("downloaded_bytes") or 0)  # decoded: a packed answer grows
         if progress and state.get("status") in ("downloading", "finished"):
             total = state.get("total_bytes") or state.get("total_bytes_estimate")
-            progress(int(state.get("downloaded_bytes") or 0), int(total) if total else None)
+            progress(done, int(total) if total and done <= total else None)
+        if done > config.largest_file_mb * BYTES_A_MEGABYTE:
+            raise DownloadFailed(f"larger than {config.largest_file_mb:g} MB")
         if state.get("status") == "downloading":
             spent = time.monotonic() - began
             if spent > config.longest_download_s:
@@ -209,8 +217,11 @@ def _patiently(attempt: Callable[[], Result], config: WebConfig) -> Result:
 
     for number in range(config.retries + 1):
         try:
-            return attempt()
+            with public_only(config.private_addresses, config.proxy):
+                return attempt()
         except (YoutubeDLError, OSError, ValueError, RecursionError) as cause:
+            if refused := refusal(cause):
+                raise refused from cause
             reason, transient, retry_after_s, most = explain(cause)
             if not transient or number >= min(config.retries, most):
                 tried = f" ({number + 1} attempts)" if number else ""

@@ -18,8 +18,8 @@ ZIP_FAILURES = (
 """What `zipfile` raises on a damaged file."""
 MAX_LISTED = 12
 """Names of arrays in a message."""
-MOST_BYTES = 2**29
-"""Of one array: ten minutes of AMASS at 120 frames a second have 90 MB."""
+MOST_NUMBERS = 2**25
+"""In all arrays that are read: ten minutes of AMASS at 120 frames a second have 13 million."""
 
 
 def pack(arrays: Mapping[str, np.ndarray]) -> bytes:
@@ -47,7 +47,10 @@ def unpack(
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             found = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
             chosen = [name for name in found if requested is None or name in requested]
-            arrays = {name: _member(archive, found[name]) for name in chosen}
+            arrays: dict[str, np.ndarray] = {}
+            for name in chosen:
+                left = MOST_NUMBERS - sum(array.size for array in arrays.values())
+                arrays[name] = _member(archive, found[name], left)
     except ZIP_FAILURES as cause:
         raise BadTable(f"{where}: not an .npz of plain arrays ({cause})") from cause
     known = ", ".join(list(found)[:MAX_LISTED])
@@ -57,18 +60,23 @@ def unpack(
     return arrays
 
 
-def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> np.ndarray:
-    """One array; its header must promise exactly the bytes that are there."""
-    if info.file_size > MOST_BYTES:
-        raise ValueError(f"{info.filename}: {info.file_size} bytes, at most {MOST_BYTES} are read")
-    source = io.BytesIO(archive.read(info))
-    version = npy.read_magic(source)
-    read_header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-    shape, fortran, kind = read_header(source)
-    if kind.hasobject:
-        raise ValueError(f"{info.filename}: holds Python objects")
-    rest = source.getbuffer().nbytes - source.tell()
-    if math.prod(shape) * kind.itemsize != rest:
-        raise ValueError(f"{info.filename}: {shape} of {kind} promised, {rest} bytes are there")
-    flat = np.frombuffer(source.read(), kind).copy()
+def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo, most: int) -> np.ndarray:
+    """One array of at most so many numbers; its header must promise exactly the bytes there are."""
+    with archive.open(info) as source:
+        version = npy.read_magic(source)
+        read_header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+        shape, fortran, kind = read_header(source)
+        size, there = math.prod(shape), info.file_size - source.tell()
+        if kind.hasobject:
+            raise ValueError(f"{info.filename}: holds Python objects")
+        if size * kind.itemsize != there:
+            raise ValueError(
+                f"{info.filename}: {shape} of {kind} promised, {there} bytes are there"
+            )
+        if size > most or there > 8 * MOST_NUMBERS:
+            raise ValueError(
+                f"{info.filename}: {size:,} numbers; at most {MOST_NUMBERS:,} are read"
+            )
+        content = source.read(there)
+    flat = np.frombuffer(content, kind).copy()
     return flat.reshape(shape, order="F" if fortran else "C")

@@ -16,6 +16,7 @@ import torch
 from torch import Tensor, nn
 
 from robojackson.errors import BadWeights
+from robojackson.files.foreign_file import require_file
 
 Kind = Literal["hybrik_hrnet48", "hybrik_resnet34", "niki_one_stage", "niki_twist_swing"]
 SIGNS: Mapping[Kind, tuple[str, ...]] = {
@@ -30,7 +31,8 @@ BODY_PREFIXES = ("smpl.", "regressor.smpl_layer.")
 WRAPPERS = ("model", "state_dict", "model_state_dict", "net")
 MAX_LISTED = 4
 """Keys that an error names before it only counts."""
-UNREADABLE = (pickle.UnpicklingError, RuntimeError, EOFError, ValueError, KeyError, OSError)
+LARGEST = 2**32
+"""Bytes; HybrIK's largest has 0.4 GB."""
 
 
 @dataclass(frozen=True)
@@ -123,8 +125,7 @@ def sha256_of(path: Path) -> str:
 
 
 def _content(path: Path) -> Any:
-    if not path.is_file():
-        raise BadWeights(f"{path}: no such file of weights")
+    require_file(path, BadWeights, LARGEST)
     try:
         if path.suffix == ".safetensors":
             from safetensors.torch import load_file
@@ -138,14 +139,12 @@ def _content(path: Path) -> Any:
             f"{path}: holds more than tensors, or is no PyTorch file, and loading it could run "
             "code; save only its state dict (torch.save(model.state_dict(), PATH)) or safetensors"
         ) from cause
-    except UNREADABLE as cause:
+    except Exception as cause:  # a damaged file fails in any way
+        if type(cause).__module__.startswith("safetensors"):
+            raise BadWeights(f"{path}: damaged safetensors ({cause}); download it again") from cause
         raise BadWeights(
             f"{path}: cut off or damaged, or no file of weights; download it again"
         ) from cause
-    except Exception as cause:
-        if type(cause).__module__.startswith("safetensors"):
-            raise BadWeights(f"{path}: damaged safetensors ({cause}); download it again") from cause
-        raise
 
 
 def _state_dict(content: Any, path: Path) -> dict[str, Tensor]:

@@ -1,7 +1,6 @@
 """Writing pictures as a video that browsers play: H.264, or MPEG-4 where FFmpeg has no x264."""
 
-import os
-import tempfile
+import secrets
 from collections.abc import Iterable
 from fractions import Fraction
 from pathlib import Path
@@ -11,6 +10,7 @@ import av
 from av.video.frame import VideoFrame
 from av.video.stream import VideoStream
 
+from robojackson.files.local_folder import TEMPORARY
 from robojackson.report.video.canvas import Picture
 
 CODECS = ("libx264", "mpeg4")
@@ -22,12 +22,9 @@ def write_video(pictures: Iterable[Picture], fps: int, out: Path, quality: int =
     Args:
         quality: Constant rate factor; lower is better and larger.
     """
-    handle, name = tempfile.mkstemp(suffix=".mp4", dir=out.parent)
-    os.close(handle)
-    partial = Path(name)
+    partial = out.with_name(f"{TEMPORARY}{secrets.token_hex(8)}.mp4")
     try:
         _encode(pictures, fps, partial, quality)
-        partial.chmod(0o644)
         partial.replace(out)
     finally:
         partial.unlink(missing_ok=True)
@@ -36,7 +33,9 @@ def write_video(pictures: Iterable[Picture], fps: int, out: Path, quality: int =
 
 def _encode(pictures: Iterable[Picture], fps: int, out: Path, quality: int) -> None:
     codec = next(name for name in CODECS if name in av.codecs_available)
-    with av.open(str(out), "w", format="mp4", options={"movflags": "+faststart"}) as container:
+    with av.open(
+        f"file:{out.absolute()}", "w", format="mp4", options={"movflags": "+faststart"}
+    ) as container:
         options = {"crf": str(quality), "preset": "veryfast"} if codec == "libx264" else {}
         stream = cast(VideoStream, container.add_stream(codec, rate=Fraction(fps), options=options))
         stream.pix_fmt = "yuv420p"

@@ -17,6 +17,7 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
 from robojackson.errors import BadPolicy
+from robojackson.files.foreign_file import parse_json, require_file
 from robojackson.rl.config.tqc_config import TqcConfig
 
 FORMAT = "robojackson-networks-1"
@@ -75,11 +76,12 @@ def load_networks(path: Path) -> Networks:
     Raises:
         BadPolicy: the file is missing, foreign or not whole.
     """
+    require_file(path, BadPolicy)
     try:
         with safe_open(path, framework="np") as file:
             header = file.metadata() or {}
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-        facts = json.loads(header.get(FORMAT, "{}"))
+        facts = parse_json(header.get(FORMAT, "{}"))
     except (OSError, SafetensorError, TypeError, ValueError) as error:
         raise BadPolicy(f"{path} is not a networks file of ours ({error})") from error
     if FORMAT not in header:

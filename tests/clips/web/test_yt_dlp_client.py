@@ -64,7 +64,7 @@ def test_a_download_that_was_cut_goes_on_where_it_stopped(web: Web, tmp_path: Pa
 
 
 def test_a_download_that_was_given_up_goes_on_the_next_day(web: Web, tmp_path: Path) -> None:
-    once = WebConfig(retries=0, timeout_s=1.0, request_pause_s=0.0)
+    once = WebConfig(private_addresses=True, retries=0, timeout_s=1.0, request_pause_s=0.0)
     with pytest.raises(DownloadFailed):
         get(web, "half_once/clip.mp4", tmp_path, once)
     sizes = [path.stat().st_size for path in tmp_path.iterdir()]
@@ -91,7 +91,9 @@ def test_the_rate_limit_is_kept(web: Web, tmp_path: Path) -> None:
     import time
 
     rate = len(web.video) / 0.8
-    slow = WebConfig(retries=0, request_pause_s=0.0, rate_limit_bytes_s=rate)
+    slow = WebConfig(
+        private_addresses=True, retries=0, request_pause_s=0.0, rate_limit_bytes_s=rate
+    )
     chosen = offer(f"{web.url}/good/clip.mp4", "score", FormatConfig(), slow)
     began = time.monotonic()
     fetch(chosen, tmp_path, slow)
@@ -107,7 +109,9 @@ def test_progress_ends_with_the_whole_file(web: Web, tmp_path: Path) -> None:
 
 def test_cookies_are_passed_through(web: Web, tmp_path: Path) -> None:
     """A cookie file that cannot be read is noticed, so it was opened."""
-    config = WebConfig(retries=0, cookies_file=tmp_path / "folder" / "cookies.txt")
+    config = WebConfig(
+        private_addresses=True, retries=0, cookies_file=tmp_path / "folder" / "cookies.txt"
+    )
     (tmp_path / "folder" / "cookies.txt").mkdir(parents=True)
     with pytest.raises(DownloadFailed):
         offer(f"{web.url}/good/clip.mp4", "score", FormatConfig(), config)

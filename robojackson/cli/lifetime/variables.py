@@ -1,0 +1,128 @@
+"""The door for the environment: variables that would break a library are refused before it loads.
+
+Only the standard library is imported, since this precedes everything else.
+"""
+
+import os
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from robojackson.errors import BadConfiguration
+
+GRAPHICS = ("", "disable", "disabled", "off", "false", "0", "egl", "osmesa", "glfw", "on", "true")
+PLATFORMS = ("", "cpu", "cuda", "gpu", "rocm", "tpu", "metal")
+STORES = ("file", "s3", "s3a", "gs", "gcs", "abfs", "az", "memory")
+LOG_LEVELS = ("DEBUG", "INFO", "WARNING", "ERROR", "CRITICAL")
+MOST_THREADS = 4096
+SECRET = re.compile(r"//[^/@]*@")
+"""User and password in an address."""
+
+
+def check_environment(given: Mapping[str, str]) -> None:
+    """Refuse variables whose values no library of ours can use.
+
+    Raises:
+        BadConfiguration: the line names the variable, its value and what is allowed.
+    """
+    for name, fault in CHECKS.items():
+        value = given.get(name)
+        if value and (reason := fault(value)):
+            shown = SECRET.sub("//***@", value)
+            raise BadConfiguration(f"{name} is {shown!r:.200}: {reason}")
+
+
+def _one_of(*allowed: str) -> Callable[[str], str]:
+    def fault(value: str) -> str:
+        wrong = set(value.lower().split(",")) - set(allowed)
+        return f"one of {', '.join(filter(None, allowed))} is wanted" if wrong else ""
+
+    return fault
+
+
+def _backend(value: str) -> str:
+    """MuJoCo takes one word, not a list."""
+    return _one_of(*GRAPHICS)(value.replace(",", " "))
+
+
+def _level(value: str) -> str:
+    levels = f"one of {', '.join(LOG_LEVELS)} is wanted"
+    return "" if value.upper() in LOG_LEVELS or value.isdigit() else levels
+
+
+def _flags(value: str) -> str:
+    """XLA ends the process for a flag that it does not know."""
+    wrong = [word for word in value.split() if not word.startswith("--xla")]
+    return "flags of XLA begin with --xla" if wrong else ""
+
+
+def _threads(value: str) -> str:
+    first = value.split(",")[0].strip()
+    is_right = first.isdecimal() and 0 < int(first) <= MOST_THREADS
+    return "" if is_right else "a number of threads is wanted"
+
+
+def _flag(value: str) -> str:
+    return _one_of("0", "1", "true", "false", "yes", "no", "on", "off")(value)
+
+
+def _address(value: str) -> str:
+    wanted = "an address such as http://127.0.0.1:4200/api is wanted"
+    try:
+        parts = urlsplit(value)
+        parts.port  # noqa: B018 (raises for what is no port)
+    except ValueError:
+        return wanted
+    return "" if parts.scheme in ("http", "https") and parts.hostname else wanted
+
+
+def _store(value: str) -> str:
+    scheme, colon, rest = value.partition("://")
+    if not colon:
+        return _folder(value)
+    if scheme not in STORES:
+        return f"a folder, or an address of {', '.join(STORES)} is wanted"
+    if scheme == "file":
+        return _folder(rest)
+    return "" if rest.strip("/") else "the address names no bucket"
+
+
+def _folder(value: str) -> str:
+    try:
+        path = Path(value).expanduser()
+        found = next((each for each in (path, *path.absolute().parents) if each.exists()), None)
+    except (OSError, ValueError, RuntimeError) as cause:
+        return getattr(cause, "strerror", None) or "no folder can have this name"
+    if found is not None and not found.is_dir():
+        return f"{found} is no folder"
+    return "" if value.isprintable() else "it holds characters that cannot be printed"
+
+
+def _existing(value: str) -> str:
+    return _folder(value) or ("" if Path(value).is_dir() else "there is no such folder")
+
+
+CHECKS: Mapping[str, Callable[[str], str]] = {
+    "ROBOJACKSON_STORE": _store,
+    "ROBOJACKSON_CONFIGS": _existing,
+    "MUJOCO_GL": _backend,
+    "PYOPENGL_PLATFORM": _one_of("", "egl", "osmesa", "glx", "x11", "linux"),
+    "JAX_PLATFORMS": _one_of(*PLATFORMS),
+    "JAX_PLATFORM_NAME": _one_of(*PLATFORMS),
+    "JAX_ENABLE_X64": _flag,
+    "JAX_DEBUG_NANS": _flag,
+    "XLA_FLAGS": _flags,
+    "OMP_NUM_THREADS": _threads,
+    "PREFECT_HOME": _folder,
+    "PREFECT_API_URL": _address,
+    "PREFECT_LOGGING_LEVEL": _level,
+    "PREFECT_LOGGING_ROOT_LEVEL": _level,
+    "XDG_CACHE_HOME": _folder,
+}
+"""What is wrong with the value of a variable; empty where nothing is."""
+
+
+def quieten(environment: "os._Environ[str]") -> None:
+    """Set what has one right value here: matplotlib draws to files, whatever the shell says."""
+    environment["MPLBACKEND"] = "agg"

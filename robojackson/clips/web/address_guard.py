@@ -1,0 +1,78 @@
+"""The door for addresses of the web: no connection to an address that is not public.
+
+A page may redirect to, or a name may mean, a machine of the user's own network. While the guard is
+on, every name that this thread resolves is refused where any of its addresses is private; so is a
+redirect, a second answer of a name server, and an address written as a number. What a proxy
+connects to is the proxy's matter.
+"""
+
+import ipaddress
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import Any
+from urllib.parse import urlsplit
+
+from robojackson.errors import DownloadFailed
+
+ADVICE = "web.private_addresses=true in the configuration allows it"
+_trusted: ContextVar[frozenset[str] | None] = ContextVar("trusted hosts of the guard", default=None)
+_resolve = socket.getaddrinfo
+Given = Any
+"""What `getaddrinfo` takes and returns."""
+
+
+class PrivateAddress(OSError):
+    """A host of the web that is none of the public web."""
+
+
+@contextmanager
+def public_only(allowed: bool, proxy: str | None = None) -> Iterator[None]:
+    """Inside, this thread connects to public addresses alone.
+
+    Args:
+        allowed: Whether private addresses may be reached all the same.
+        proxy: Address of the user's own proxy, which may be anywhere.
+
+    Raises:
+        DownloadFailed: an address was refused.
+    """
+    if allowed:
+        yield
+        return
+    if socket.getaddrinfo is not _guarded:
+        socket.getaddrinfo = _guarded
+    host = urlsplit(proxy or "").hostname
+    token = _trusted.set(frozenset([host] if host else []))
+    try:
+        yield
+    finally:
+        _trusted.reset(token)
+
+
+def is_public(address: str) -> bool:
+    """Whether an IP address is one of the public web; one that hides an IPv4 address as that is."""
+    found = ipaddress.ip_address(address.partition("%")[0])
+    hidden = getattr(found, "ipv4_mapped", None) or getattr(found, "sixtofour", None)
+    return (hidden or found).is_global and not found.is_multicast
+
+
+def refusal(cause: BaseException) -> DownloadFailed | None:
+    """Return the error of ours where the guard is behind an error of a library."""
+    seen: BaseException | None = cause
+    while seen is not None:
+        if isinstance(seen, PrivateAddress):
+            return DownloadFailed(str(seen))
+        seen = seen.__cause__ or seen.__context__
+    return None
+
+
+def _guarded(host: Given, *more: Given, **options: Given) -> Given:
+    found = _resolve(host, *more, **options)
+    trusted = _trusted.get()
+    if trusted is not None and str(host) not in trusted:
+        for place in found:
+            if not is_public(str(place[4][0])):
+                raise PrivateAddress(f"{str(host)[:80]} is no address of the public web; {ADVICE}")
+    return found

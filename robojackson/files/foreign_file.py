@@ -1,0 +1,81 @@
+"""The door for files from outside: one plain file, of a size that is read; JSON that has an end."""
+
+import json
+from pathlib import Path
+from typing import Any, NoReturn
+
+from robojackson.errors import RoboJacksonError, StoreError
+
+Json = Any
+"""What a JSON text may hold."""
+LARGEST = 2**28
+"""Bytes of a file that is read into memory; an hour of motion has fewer."""
+
+
+def require_file(
+    path: Path, error: type[RoboJacksonError] = StoreError, largest: int = LARGEST
+) -> None:
+    """Refuse a path that cannot be read as one file.
+
+    Args:
+        path: Of the file.
+        error: Class of the error.
+        largest: Bytes.
+
+    Raises:
+        RoboJacksonError: it is a folder, a device or a pipe, not there, or too large.
+    """
+    if path.is_dir():
+        raise error("a folder, not a file", path)
+    if not path.is_file():
+        raise error("no such file" if not path.exists() else "a device or a pipe, no file", path)
+    if (size := path.stat().st_size) > largest:
+        raise error(f"{size:,} bytes; at most {largest:,} are read", path)
+
+
+def read_file(
+    path: Path, error: type[RoboJacksonError] = StoreError, largest: int = LARGEST
+) -> bytes:
+    """Return the content of a file, refused as `require_file` does.
+
+    Raises:
+        RoboJacksonError: it cannot be read.
+    """
+    require_file(path, error, largest)
+    try:
+        return path.read_bytes()
+    except OSError as cause:
+        raise error(f"cannot be read: {cause.strerror}", path) from cause
+
+
+def read_text(
+    path: Path, error: type[RoboJacksonError] = StoreError, largest: int = LARGEST
+) -> str:
+    """Return the content of a file of text, a byte order mark left out.
+
+    Raises:
+        RoboJacksonError: it cannot be read, or is no text.
+    """
+    try:
+        return read_file(path, error, largest).decode("utf-8-sig")
+    except UnicodeDecodeError as cause:
+        raise error(f"no text in UTF-8 ({cause.reason} at byte {cause.start})", path) from cause
+
+
+def parse_json(text: str | bytes, finite: bool = False) -> Json:
+    """Return what a JSON text holds.
+
+    Args:
+        finite: Whether NaN and infinity, which Python's JSON knows, are refused.
+
+    Raises:
+        ValueError: it is damaged, or its lists and objects stand too deep in each other.
+    """
+    try:
+        return json.loads(text, parse_constant=_no_constant if finite else None)
+    except RecursionError:
+        raise ValueError("lists and objects stand too deep in each other") from None
+
+
+def _no_constant(name: str) -> NoReturn:
+    raise ValueError(f"{name} is no number")

@@ -1,0 +1,41 @@
+"""The files that cases are made of: the motions of the bundled clip and a policy, made once."""
+
+import pickle
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from tests.fixtures.commands import environment
+
+ROOT = Path(__file__).parents[2]
+CLIP = ROOT / "clips" / "hip_shake.mp4"
+BASE = ROOT / "build" / "badinput" / "base"
+MADE = (
+    ("smpl.parquet", ("mocap", str(CLIP), "-o", ".")),
+    ("reference.parquet", ("retarget", "smpl.parquet", "-o", ".")),
+    ("policy.safetensors", ("train", "reference.parquet", "-o", "t", "--steps", "300")),
+    ("amass.npz", ("export", "smpl.parquet", "--to", "amass", "-o", "amass.npz")),
+    ("motion.bvh", ("export", "smpl.parquet", "--to", "bvh", "-o", "motion.bvh")),
+    ("motion.csv", ("export", "smpl.parquet", "--to", "csv", "-o", "motion.csv")),
+    ("gvhmr.pt", ("export", "smpl.parquet", "--to", "gvhmr", "-o", "gvhmr.pt")),
+)
+
+
+def base() -> Path:
+    """The folder with all of them; what is there is left alone."""
+    BASE.mkdir(parents=True, exist_ok=True)
+    for name, words in MADE:
+        if not (BASE / name).is_file():
+            command = [sys.executable, "-m", "robojackson", *words]
+            subprocess.run(command, cwd=BASE, env=environment(), check=True, capture_output=True)
+            if words[0] == "train":
+                shutil.copy(BASE / "t" / name, BASE / name)
+                shutil.copy(BASE / "t" / "networks.safetensors", BASE / "networks.safetensors")
+    if not (BASE / "aist.pkl").is_file():
+        with np.load(BASE / "amass.npz") as motion:
+            found = {"smpl_poses": motion["poses"][:, :72], "smpl_trans": motion["trans"]}
+        (BASE / "aist.pkl").write_bytes(pickle.dumps({**found, "smpl_scaling": np.ones(1)}))
+    return BASE

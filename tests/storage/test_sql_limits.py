@@ -1,0 +1,33 @@
+"""A question in SQL ends, and takes no more memory than it may."""
+
+from pathlib import Path
+
+import pytest
+
+from robojackson.errors import BadTable
+from robojackson.files import sql_tables
+from storage import study_tables
+from storage.store import Store
+
+
+@pytest.mark.parametrize(
+    ("sql", "told"),
+    [
+        ("SELECT repeat('x', 2000000000)", "memory"),
+        ("SELECT list(range) FROM range(400000000)", "memory"),
+        ("SELECT * FROM range(200000)", "100,000 rows"),
+        ("SET memory_limit = '9GB'", "locked"),
+        ("--", "no question"),
+    ],
+)
+def test_a_question_has_limits(sql: str, told: str, tmp_path: Path) -> None:
+    with pytest.raises(BadTable, match=told):
+        study_tables.query(Store(tmp_path), sql)
+
+
+def test_a_question_without_end_is_interrupted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sql_tables, "MOST_SECONDS", 0.3)
+    with pytest.raises(BadTable, match=r"no answer in 0\.3 s"):
+        study_tables.query(Store(tmp_path), "SELECT count(*) FROM range(10000000) a, range(9999) b")
