@@ -8,25 +8,39 @@ from pathlib import Path
 from typing import cast
 
 import av
+import numpy as np
+from av.audio.frame import AudioFrame
+from av.audio.stream import AudioStream
+from av.container import OutputContainer
 from av.video.frame import VideoFrame
 from av.video.stream import VideoStream
 
+from robojackson.clips.sound import RATE, Sound
 from robojackson.report.video.canvas import Picture
 
 CODECS = ("libx264", "mpeg4")
 
 
-def write_video(pictures: Iterable[Picture], fps: int, out: Path, quality: int = 20) -> Path:
+def write_video(
+    pictures: Iterable[Picture],
+    fps: int,
+    out: Path,
+    quality: int = 20,
+    sound: Sound | None = None,
+    seekable: bool = False,
+) -> Path:
     """Encode RGB pictures of one even size; `out` is whole or absent.
 
     Args:
         quality: Constant rate factor; lower is better and larger.
+        sound: Heard from the first picture on.
+        seekable: Whether any picture is found fast, in a file that is larger for it.
     """
     handle, name = tempfile.mkstemp(suffix=".mp4", dir=out.parent)
     os.close(handle)
     partial = Path(name)
     try:
-        _encode(pictures, fps, partial, quality)
+        _encode(pictures, fps, partial, quality, sound, seekable)
         partial.chmod(0o644)
         partial.replace(out)
     finally:
@@ -34,14 +48,35 @@ def write_video(pictures: Iterable[Picture], fps: int, out: Path, quality: int =
     return out
 
 
-def _encode(pictures: Iterable[Picture], fps: int, out: Path, quality: int) -> None:
+def _encode(
+    pictures: Iterable[Picture],
+    fps: int,
+    out: Path,
+    quality: int,
+    sound: Sound | None,
+    seekable: bool,
+) -> None:
     codec = next(name for name in CODECS if name in av.codecs_available)
     with av.open(str(out), "w", format="mp4", options={"movflags": "+faststart"}) as container:
         options = {"crf": str(quality), "preset": "veryfast"} if codec == "libx264" else {}
+        if seekable:
+            options |= {"g": str(max(1, fps // 2)), "bf": "0"}
         stream = cast(VideoStream, container.add_stream(codec, rate=Fraction(fps), options=options))
         stream.pix_fmt = "yuv420p"
+        heard = None if sound is None else cast(AudioStream, container.add_stream("aac", rate=RATE))
         for index, picture in enumerate(pictures):
             if index == 0:
                 stream.height, stream.width = picture.shape[:2]
             container.mux(stream.encode(VideoFrame.from_ndarray(picture, format="rgb24")))
         container.mux(stream.encode(None))
+        if sound is not None and heard is not None:
+            _encode_sound(container, heard, sound)
+
+
+def _encode_sound(container: OutputContainer, stream: AudioStream, sound: Sound) -> None:
+    stream.layout = "stereo"
+    samples = np.ascontiguousarray(sound.samples.T, np.float32)
+    frame = AudioFrame.from_ndarray(samples, format="fltp", layout="stereo")
+    frame.sample_rate, frame.pts, frame.time_base = RATE, 0, Fraction(1, RATE)
+    container.mux(stream.encode(frame))
+    container.mux(stream.encode(None))

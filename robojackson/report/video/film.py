@@ -43,6 +43,7 @@ class VideoConfig:
         max_seconds: Longest video, seconds.
         azimuth_deg: How far the cameras go around the subject; 0 is the front.
         quality: Constant rate factor of H.264; lower is better and larger.
+        music: Path of the music that is heard instead of the clip's own sound.
     """
 
     fps: int = Field(default=30, ge=1)
@@ -51,6 +52,7 @@ class VideoConfig:
     max_seconds: float = Field(default=20.0, gt=0.0)
     azimuth_deg: float = 0.0
     quality: int = Field(default=20, ge=0, le=51)
+    music: str = ""
 
 
 class Film:

@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from robojackson.clips.sound import Sound
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
@@ -20,6 +21,7 @@ from robojackson.report.video.encoder import write_video
 from robojackson.report.video.film import SIDE_DEG, Film
 from robojackson.report.video.film import VideoConfig as VideoConfig
 from robojackson.report.video.robot_panel import REFERENCE_TINT, TRAINED_TINT
+from robojackson.report.video.soundtrack import soundtrack
 from robojackson.report.video.timeline import clip_timeline, reference_qpos, timeline
 
 Progress = Callable[[int, int], None]
@@ -70,7 +72,8 @@ def side_by_side(
         if rollout_qpos is not None and steps:
             qpos = rollout_qpos[when.rollout]
             film.add_robot(title, qpos, model, TRAINED_TINT, is_rollout=True)
-        return _written(film, len(when), config, out, progress)
+        heard = soundtrack(source, config.music, reference, len(when) / config.fps)
+        return _written(film, len(when), config, out, progress, heard)
 
 
 def body_video(
@@ -95,11 +98,17 @@ def body_video(
         film.add_source(source, track, sequence, plain=True)
         film.add_body(sequence, "body, front")
         film.add_body(sequence, "body, left side", SIDE_DEG)
-        return _written(film, len(when), config, out, progress)
+        heard = soundtrack(source, config.music, None, len(when) / config.fps)
+        return _written(film, len(when), config, out, progress, heard)
 
 
 def _written(
-    film: Film, total: int, config: VideoConfig, out: Path, progress: Progress | None
+    film: Film,
+    total: int,
+    config: VideoConfig,
+    out: Path,
+    progress: Progress | None,
+    sound: Sound | None,
 ) -> Path:
     def counted() -> Iterator[canvas.Picture]:
         for done, picture in enumerate(film.pictures(), start=1):
@@ -107,4 +116,4 @@ def _written(
             if progress:
                 progress(done, total)
 
-    return write_video(counted(), config.fps, out, config.quality)
+    return write_video(counted(), config.fps, out, config.quality, sound)
