@@ -5,12 +5,15 @@ Like `robojackson.cli.app`, each imports what it needs inside itself.
 
 import shlex
 import sys
+from enum import StrEnum
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from flows.cli.backup_commands import backup, restore
 from flows.cli.clean_command import clean
+from flows.cli.gallery_command import gallery
 from flows.cli.search_commands import catalogue, find, refresh
 from flows.cli.study_commands import ablation, deploy, metrics, server
 from robojackson.cli.app import add_stages, make_app
@@ -29,6 +32,16 @@ from robojackson.cli.options import (
     overrides_from,
     yaml_text,
 )
+
+
+class Shape(StrEnum):
+    """How a video is laid out."""
+
+    ROW = "row"
+    SQUARE = "square"
+    VERTICAL = "vertical"
+    WIDE = "wide"
+
 
 LONGER_MINUTES = 15
 """Least that a pass is advised to take whose robot does not dance."""
@@ -58,6 +71,12 @@ def dance(
     instant: Annotated[
         bool, typer.Option(INSTANT, help="A general tracker dances at once; no training.")
     ] = False,
+    music: Annotated[
+        Path | None, typer.Option(help="A sound file that is heard instead of the clip's sound.")
+    ] = None,
+    shape: Annotated[
+        Shape | None, typer.Option("--format", help="Of the video: row, square, vertical or wide.")
+    ] = None,
     set_: Set = None,
     as_json: Json = False,
 ) -> CommandResult:
@@ -74,6 +93,8 @@ def dance(
         "train.trainer": trainer,
         "train.seed": seed,
         "instant": instant or None,
+        "render.music": yaml_text(music.resolve()) if music else None,
+        "render.shape": shape and shape.value,
     }
     overrides = overrides_from(set_, given | {"dancer.number": person, "detector": quality})
     if force:
@@ -143,7 +164,7 @@ def _next(kind: str, page: str, minutes: float, seconds: float) -> str:
 app = make_app()
 for each in (
     *(dance, find, refresh, catalogue, ablation, metrics),
-    *(deploy, backup, restore, clean, server),
+    *(deploy, backup, restore, clean, server, gallery),
 ):
     app.command()(each)
 add_stages(app)

@@ -55,7 +55,7 @@ def motion_beats(points: Float[np.ndarray, "T K 3"], fps: float) -> Float[np.nda
 
 
 def alignment(music: Float[np.ndarray, " M"], motion: Float[np.ndarray, " B"]) -> BeatAlignment:
-    """Compare the beats of a motion with those of music; every beat counts for one other at most."""
+    """Compare the beats of a motion with those of music; each beat counts once."""
     if not len(music) or not len(motion):
         return BeatAlignment(len(motion), 0.0, 0.0, 0.0, 0.0)
     hits = _hits(np.sort(music), np.sort(motion))

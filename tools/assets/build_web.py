@@ -28,9 +28,9 @@ PACKAGES = {
 THREE = """
 export { Bone, BoxGeometry, BufferAttribute, BufferGeometry, CapsuleGeometry, Color,
   CylinderGeometry, DirectionalLight, Fog, GridHelper, Group, HemisphereLight, InstancedMesh, Line,
-  LineBasicMaterial, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, PerspectiveCamera, Plane,
-  PlaneGeometry, Quaternion, Raycaster, Scene, Skeleton, SkinnedMesh, SphereGeometry, Vector2, Vector3,
-  WebGLRenderer } from 'three';
+  LineBasicMaterial, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, PerspectiveCamera,
+  Plane, PlaneGeometry, Quaternion, Raycaster, Scene, Skeleton, SkinnedMesh, SphereGeometry,
+  Vector2, Vector3, WebGLRenderer } from 'three';
 export { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 """
 """What of three.js is in the script."""

@@ -18,7 +18,7 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.report.video import canvas
 from robojackson.report.video.encoder import write_video
-from robojackson.report.video.film import SIDE_DEG, Film
+from robojackson.report.video.film import SIDE_DEG, Film, panels_of
 from robojackson.report.video.film import VideoConfig as VideoConfig
 from robojackson.report.video.robot_panel import REFERENCE_TINT, TRAINED_TINT
 from robojackson.report.video.soundtrack import soundtrack
@@ -58,18 +58,25 @@ def side_by_side(
         MissingDependency: no way to draw without a screen.
     """
     config = config or VideoConfig()
+    whole = config.shape == "row"
+    danced = rollout_qpos is not None and len(rollout_qpos) > 0
+    with_source = source is not None and track is not None and (whole or not config.alone)
+    config = panels_of(config, 1 + with_source)
     steps = 0 if rollout_qpos is None else len(rollout_qpos)
     filmed = [each for each in (track, sequence) if each is not None]
     fps, frames = (filmed[0].fps, len(filmed[-1])) if filmed else (1.0, 1)
     when = timeline(reference, fps, frames, steps, float(config.fps), config.max_seconds)
     with ExitStack() as stack:
         film = Film(stack, config, when)
-        if source is not None and track is not None:
+        if with_source and source is not None and track is not None:
             film.add_source(source, track, sequence if plain else None, plain)
-        if sequence is not None:
+        if sequence is not None and whole:
             film.add_body(sequence)
-        film.add_robot("reference robot", reference_qpos(reference, when), model, REFERENCE_TINT)
-        if rollout_qpos is not None and steps:
+        if whole or not danced:
+            film.add_robot(
+                "reference robot", reference_qpos(reference, when), model, REFERENCE_TINT
+            )
+        if rollout_qpos is not None and danced:
             qpos = rollout_qpos[when.rollout]
             film.add_robot(title, qpos, model, TRAINED_TINT, is_rollout=True)
         heard = soundtrack(source, config.music, reference, len(when) / config.fps)

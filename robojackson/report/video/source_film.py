@@ -6,9 +6,9 @@ from pathlib import Path
 from robojackson.clips.sound import Sound
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.report.video.encoder import write_video
+from robojackson.report.video.film import VideoConfig
 from robojackson.report.video.source_panel import SourceClip
 from robojackson.report.video.timeline import Timeline
-from robojackson.report.video.film import VideoConfig
 
 QUALITY = 24
 """Constant rate factor: it lies inside the page."""
@@ -21,7 +21,7 @@ def source_film(
     config: VideoConfig,
     sound: Sound | None = None,
 ) -> bytes:
-    """Return an mp4 whose picture k is moment k, with short groups of pictures so that it seeks fast."""
+    """Return an mp4 whose picture k is moment k, and in which any picture is found fast."""
     size = config.panel_width, config.panel_height
     clip = SourceClip(source, track, None, when.frame, *size)
     pictures = (clip.with_landmarks(int(frame)) for frame in when.frame)

@@ -63,12 +63,14 @@ class Player:
         when: The moments of the pictures.
         error_m: Mean site error of the rollout at every picture, by name of the site; empty without
             a rollout.
+        points: Keypoints of dancer, reference and robot at every picture, metres.
     """
 
     data: dict[str, Any]
     bands: list[Band]
     when: Timeline
     error_m: dict[str, Float[np.ndarray, " N"]]
+    points: dict[str, Float[np.ndarray, "N K 3"]]
 
 
 def player(
@@ -100,11 +102,13 @@ def player(
         "liveliest": int(np.argmax(target[:, 7:].std(0))),
     }
     errors: dict[str, np.ndarray] = {}
+    moved = {"person": points, "reference": sites}
     if rollout_qpos is not None and steps:
         danced = np.asarray(rollout_qpos, float)[when.rollout]
         own_poses, own_sites = body_poses(robot.model, danced)
         own_sites = own_sites[:, robot.keypoint_sites]
         apart = np.linalg.norm(own_sites - sites, axis=-1)
+        moved["robot"] = own_sites
         errors = dict(zip(robot.keypoint_names, apart.T, strict=True))
         data["trained"] = {"poses": packed(own_poses), **_followed(own_sites, danced[:, :3], fps)}
         data["trained_angles"] = packed(np.degrees(danced[:, 7:]))
@@ -112,7 +116,7 @@ def player(
         data["ended"] = int(np.argmax(when.ended)) if when.ended.any() else len(when)
     bands = _contact_bands(sequence, reference, when)
     bands.append(Band("look here", attention(sequence, reference, when, errors)))
-    return Player(data, [band for band in bands if band.spans], when, errors)
+    return Player(data, [band for band in bands if band.spans], when, errors, moved)
 
 
 def _followed(points: np.ndarray, root: np.ndarray, fps: float) -> dict[str, Any]:
