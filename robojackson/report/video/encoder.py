@@ -63,7 +63,11 @@ def _encode(
             options |= {"g": str(max(1, fps // 2)), "bf": "0"}
         stream = cast(VideoStream, container.add_stream(codec, rate=Fraction(fps), options=options))
         stream.pix_fmt = "yuv420p"
-        heard = None if sound is None else cast(AudioStream, container.add_stream("aac", rate=RATE))
+        heard = (
+            None
+            if sound is None
+            else cast(AudioStream, container.add_stream("aac", rate=RATE, layout="stereo"))
+        )
         for index, picture in enumerate(pictures):
             if index == 0:
                 stream.height, stream.width = picture.shape[:2]
@@ -74,7 +78,6 @@ def _encode(
 
 
 def _encode_sound(container: OutputContainer, stream: AudioStream, sound: Sound) -> None:
-    stream.layout = "stereo"
     samples = np.ascontiguousarray(sound.samples.T, np.float32)
     frame = AudioFrame.from_ndarray(samples, format="fltp", layout="stereo")
     frame.sample_rate, frame.pts, frame.time_base = RATE, 0, Fraction(1, RATE)
