@@ -32,6 +32,8 @@ from robojackson.robot.model import Robot
 
 FRAMES, FPS, STEPS = 60, 30.0, 128
 SIZE = 96, 64
+LEVEL, CYCLE = 30, 7
+"""Grey of the clip's first picture and by how much the next is brighter, until it starts again."""
 TITLE = "<script>alert(1)</script> \u202emosnart"
 ARGUMENTS = [
     "--no-sandbox",
@@ -109,9 +111,11 @@ def run() -> RecordedRun:
 
 @pytest.fixture(scope="session")
 def page_file(run: RecordedRun, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A page whose clip gets brighter by one step a frame, so that a picture tells its number."""
+    """A page whose clip gets brighter a frame, again and again: a picture tells its number."""
     folder = tmp_path_factory.mktemp("page")
-    pictures = [np.full((SIZE[1], SIZE[0], 3), 20 + 3 * k, np.uint8) for k in range(FRAMES)]
+    pictures = [
+        np.full((SIZE[1], SIZE[0], 3), LEVEL + LEVEL * (k % CYCLE), np.uint8) for k in range(FRAMES)
+    ]
     hum = np.repeat(0.2 * np.sin(np.arange(2 * RATE) * 0.05)[:, None], 2, 1)
     clip = write_video(pictures, int(FPS), folder / "clip.mp4", sound=Sound(hum))
     shown = shown_run(run, clip, VideoConfig())
