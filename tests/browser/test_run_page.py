@@ -13,7 +13,7 @@ SHOWN = """() => {
   const { video, state } = robojackson, canvas = document.createElement('canvas');
   canvas.width = canvas.height = 8;
   const pen = canvas.getContext('2d');
-  pen.drawImage(video, 0, 0, video.videoWidth, 20, 0, 0, 8, 8);
+  pen.drawImage(video, video.videoWidth / 2 - 5, video.videoHeight / 2 - 5, 10, 10, 0, 0, 8, 8);
   return { drawn: state.drawn, picture: state.picture, grey: pen.getImageData(4, 4, 1, 1).data[0] };
 }"""
 GO = "k => new Promise(done => { robojackson.video.pause(); const wait = () => robojackson.state.drawn === k ? done() : setTimeout(wait, 20); robojackson.go(k); wait(); })"  # noqa: E501

@@ -120,7 +120,7 @@
     const colour = (name) => Stage.css(name), axis = { stroke: colour('--soft'), grid: { stroke: colour('--line'), width: 1 }, ticks: { stroke: colour('--line') }, font: '12px system-ui' };
     const made = new uPlot({
       width: Math.max(200, host.clientWidth), height: 190, legend: { show: false }, scales: { x: { time: false } },
-      axes: [{ ...axis, values: (u, ticks) => ticks.map((tick) => `${tick} s`) }, { ...axis, size: 54, values: (u, ticks) => ticks.map((tick) => `${tick} ${unit}`) }],
+      axes: [{ ...axis, values: (u, ticks) => ticks.map((tick) => `${tick} s`) }, { ...axis, size: 66, values: (u, ticks) => ticks.map((tick) => `${tick} ${unit}`) }],
       cursor: { y: false, points: { size: 7 }, drag: { x: false, y: false } },
       series: [{}, ...series.map(({ name, stroke, dash }) => ({ label: name, stroke: colour(stroke), width: 2, dash }))],
     }, [seconds, ...series.map(({ values }) => values)], host);
