@@ -14,10 +14,10 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.rollout import Rollout
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.pipeline.table_schemas import EPISODE_RECORD, EVALUATION_RECORD
+from robojackson.report.pages.evaluation_text import beat_rows
 from robojackson.report.pages.live_page import live_page
 from robojackson.report.pages.run_page import PageCandidate
 from robojackson.report.video.film import VideoConfig
-from robojackson.report.web.beats import beat_rows
 from robojackson.report.web.shown_run import RecordedRun, ShownRun, shown_run, thumbnail
 from robojackson.rl.policy import load_policy
 from robojackson.robot.model import Robot, RobotDescription, load_robot

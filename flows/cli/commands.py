@@ -7,7 +7,7 @@ import shlex
 import sys
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -32,6 +32,9 @@ from robojackson.cli.options import (
     overrides_from,
     yaml_text,
 )
+
+if TYPE_CHECKING:
+    from robojackson.pipeline.pipeline_config import PipelineConfig
 
 
 class Shape(StrEnum):
@@ -105,21 +108,35 @@ def dance(
     else:
         require_findable(str(source), Store.from_environment())
     prepare(Store.from_environment())
+    made = _danced(found or str(source), config, overrides, start, end, settings)
+    return _concluded(made, settings.minutes, settings.evaluate.seconds)
+
+
+def _danced(
+    source: Path | str,
+    config: str,
+    overrides: dict[str, Any],
+    start: float | None,
+    end: float | None,
+    settings: "PipelineConfig",
+) -> dict[str, Any]:
+    """Answer a pass from its records, or run it with a bar."""
     made = None
-    if found is not None:
+    if isinstance(source, Path):
         from flows.video_pass.recorded_dance import replay
 
-        made = replay(found, config, overrides, start, end)
+        made = replay(source, config, overrides, start, end)
     if made is None:
         from flows.cli.dance_bar import dance_bar, quiet_prefect
+        from storage.store import Store
 
         quiet_prefect()
         from flows.dance import run
 
         minutes = INSTANT_MINUTES if settings.instant else settings.minutes
         with dance_bar(minutes, Store.from_environment().here):
-            made = run(str(found or source), config, overrides, start, end)
-    return _concluded(made, settings.minutes, settings.evaluate.seconds)
+            made = run(str(source), config, overrides, start, end)
+    return made
 
 
 def _concluded(made: dict[str, Any], minutes: float, seconds: float) -> CommandResult:

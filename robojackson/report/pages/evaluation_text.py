@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from robojackson.report.quantities import POLICY_TITLES, Quantity, format_value, quantities
+from robojackson.report.web.beats import TITLES
 from robojackson.rl.config.evaluate_config import TRAINED
 from robojackson.rl.evaluation.verdict import NEEDS_FULL_LENGTH
 
@@ -106,4 +107,23 @@ def passport_rows(evaluation: Mapping[str, Any]) -> list[Verdict]:
             row["case"], "", [format_value(key, row[key]) for key in PASSPORT_COLUMNS], index == 0
         )
         for index, row in enumerate(evaluation.get("passport", []))
+    ]
+
+
+def beat_rows(report: Mapping[str, Any]) -> list[Verdict]:
+    """Return how motions meet the music (`beat_report`), ready to read."""
+    return [
+        Verdict(
+            TITLES[name],
+            "",
+            [
+                str(one["beats"]),
+                f"{100 * one['precision']:.0f}%",
+                f"{100 * one['recall']:.0f}%",
+                f"{one['f1']:.2f}",
+                f"{one['bas']:.2f}",
+            ],
+            name == "robot",
+        )
+        for name, one in report["figures"].items()
     ]

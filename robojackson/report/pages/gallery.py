@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
 
 from robojackson.report.pages import inline
 from robojackson.report.quantities import Quantity, quantities
@@ -37,7 +36,7 @@ class GalleryRun:
     setup: str
     seed: int
     finished_at: datetime
-    summary: Mapping[str, Any]
+    summary: Mapping[str, object]
     page: str = ""
     live: str = ""
     thumbnail: str = ""
@@ -51,7 +50,7 @@ class GalleryRun:
     @property
     def order(self) -> dict[str, float]:
         """What entries are sorted by."""
-        found = {key: float(self.summary.get(key) or 0.0) for key in ORDERED}
+        found = {key: _number(self.summary.get(key)) for key in ORDERED}
         return {"finished": self.finished_at.timestamp(), **found}
 
 
@@ -70,3 +69,7 @@ def render_gallery(runs: Sequence[GalleryRun]) -> str:
         filters=filters,
         sorts=SORTS,
     )
+
+
+def _number(value: object) -> float:
+    return float(value) if isinstance(value, int | float) else 0.0

@@ -8,7 +8,6 @@ import unicodedata
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib import resources
-from typing import Any
 
 import jinja2
 from markupsafe import Markup
@@ -57,7 +56,7 @@ def policy(scripts: Sequence[str], styles: Sequence[str], wasm: bool = False) ->
     )
 
 
-def json_text(data: Mapping[str, Any]) -> Markup:
+def json_text(data: Mapping[str, object]) -> Markup:
     """JSON that stands inside a script element."""
     text = json.dumps(data, separators=(",", ":"), allow_nan=False)
     return Markup(text.replace("<", "\\u003c"))
@@ -68,14 +67,14 @@ def zipped(content: bytes) -> str:
     return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()
 
 
-def visible(value: Any) -> Any:
+def visible(value: object) -> object:
     """A text whose invisible and turning characters are written out."""
     if isinstance(value, Markup) or not isinstance(value, str):
         return value
     return "".join(f"\\u{ord(c):04x}" if _is_hidden(c) else c for c in value)
 
 
-def render(template: str, styles: Sequence[str], scripts: Sequence[str], **values: Any) -> str:
+def render(template: str, styles: Sequence[str], scripts: Sequence[str], **values: object) -> str:
     """A page from a template of this package; every value is escaped.
 
     Args:

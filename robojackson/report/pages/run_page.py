@@ -175,7 +175,7 @@ def render(content: PageContent) -> str:
     )
 
 
-def _player_values(content: PageContent) -> dict[str, Any]:
+def _player_values(content: PageContent) -> dict[str, object]:
     """What the template shows of the player."""
     player = content.player
     data = {} if player is None else player.data

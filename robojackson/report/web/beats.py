@@ -13,7 +13,6 @@ from jaxtyping import Float
 from robojackson.clips.sound import music_beats, read_sound, require_sound
 from robojackson.metrics.beat_alignment import alignment, half_a_beat, motion_beats
 from robojackson.motion.reference_motion import ReferenceMotion
-from robojackson.report.pages.evaluation_text import Verdict
 from robojackson.report.video.soundtrack import clip_times
 from robojackson.report.web.player_data import Band, Span
 
@@ -79,23 +78,4 @@ def beat_bands(report: dict[str, Any], fps: float) -> list[Band]:
         )
         for name, times in rows.items()
         if times
-    ]
-
-
-def beat_rows(report: dict[str, Any]) -> list[Verdict]:
-    """Return the rows of the page's table."""
-    return [
-        Verdict(
-            TITLES[name],
-            "",
-            [
-                str(one["beats"]),
-                f"{100 * one['precision']:.0f}%",
-                f"{100 * one['recall']:.0f}%",
-                f"{one['f1']:.2f}",
-                f"{one['bas']:.2f}",
-            ],
-            name == "robot",
-        )
-        for name, one in report["figures"].items()
     ]

@@ -4,8 +4,6 @@ The model goes without the geoms that touch nothing: their masses are written in
 Metres, radians, seconds, newton-metres.
 """
 
-from typing import Any
-
 import mujoco
 import numpy as np
 
@@ -43,7 +41,7 @@ SUBSTEPS = 300
 """Of each comparison."""
 
 
-def live_data(policy: Policy, reference: ReferenceMotion, robot: Robot) -> dict[str, Any] | None:
+def live_data(policy: Policy, reference: ReferenceMotion, robot: Robot) -> dict[str, object] | None:
     """Return everything of a live dance; None where a browser cannot run it.
 
     That is a policy of the paper's mode, or a robot whose meshes collide.
@@ -118,7 +116,7 @@ def model_xml(robot: Robot) -> str:
     return str(spec.to_xml())
 
 
-def records(policy: Policy, reference: ReferenceMotion, robot: Robot) -> list[dict[str, Any]]:
+def records(policy: Policy, reference: ReferenceMotion, robot: Robot) -> list[dict[str, object]]:
     """Return noisy starts all over the motion and where the bodies are `SUBSTEPS` later."""
     control = control_of(policy, robot)
     clip = Clip(reference, lead_of(robot, reference, control))

@@ -7,7 +7,6 @@ World frame, metres, radians, seconds.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -66,7 +65,7 @@ class Player:
         points: Keypoints of dancer, reference and robot at every picture, metres.
     """
 
-    data: dict[str, Any]
+    data: dict[str, object]
     bands: list[Band]
     when: Timeline
     error_m: dict[str, Float[np.ndarray, " N"]]
@@ -89,7 +88,7 @@ def player(
     poses, sites = body_poses(robot.model, target)
     sites = sites[:, robot.keypoint_sites]
     points = np.asarray(sequence.keypoints_w, float)[np.minimum(when.frame, len(sequence) - 1)]
-    data: dict[str, Any] = {
+    data: dict[str, object] = {
         "fps": fps,
         "count": len(when),
         "robot": robot_shape(robot.model),
@@ -119,7 +118,7 @@ def player(
     return Player(data, [band for band in bands if band.spans], when, errors, moved)
 
 
-def _followed(points: np.ndarray, root: np.ndarray, fps: float) -> dict[str, Any]:
+def _followed(points: np.ndarray, root: np.ndarray, fps: float) -> dict[str, object]:
     """Where a camera looks, and how much room what it follows takes, metres."""
     path = smooth_camera_path(root, fps)
     around = np.linalg.norm(points[..., :2] - path[:, None], axis=-1).max()

@@ -5,7 +5,6 @@ Metres, quaternions wxyz, world frame; arrays travel as base64 of little-endian 
 
 import base64
 import copy
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -34,7 +33,7 @@ def packed(values: np.ndarray, kind: type[np.generic] = np.float32) -> str:
     return base64.b64encode(np.ascontiguousarray(values, kind).tobytes()).decode()
 
 
-def robot_shape(model: mujoco.MjModel, detail_m: float = DETAIL_M) -> dict[str, Any]:
+def robot_shape(model: mujoco.MjModel, detail_m: float = DETAIL_M) -> dict[str, object]:
     """The visible geoms of a robot by body; meshes with details of a given size."""
     small, coarse = copy.copy(model), copy.copy(model)
     simplify(small, detail_m)
@@ -58,7 +57,7 @@ def robot_shape(model: mujoco.MjModel, detail_m: float = DETAIL_M) -> dict[str, 
     return {"bodies": model.nbody, "geoms": geoms, "meshes": meshes}
 
 
-def _mesh(model: mujoco.MjModel, mesh: int) -> dict[str, Any]:
+def _mesh(model: mujoco.MjModel, mesh: int) -> dict[str, object]:
     """The corners that triangles use, as steps of the largest coordinate."""
     first = model.mesh_vertadr[mesh]
     faces = slice(model.mesh_faceadr[mesh], model.mesh_faceadr[mesh] + model.mesh_facenum[mesh])
@@ -87,7 +86,7 @@ def body_poses(
     return poses, sites
 
 
-def person_shape() -> dict[str, Any]:
+def person_shape() -> dict[str, object]:
     """The parts of a person between its keypoints: ends, radius and side."""
     bones = [
         {"from": parent, "to": child, "radius": RADII[bare(name)], "side": side_of(name)}

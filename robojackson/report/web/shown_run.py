@@ -4,7 +4,6 @@ import base64
 import logging
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
@@ -60,7 +59,7 @@ class ShownRun:
     player: Player
     film: bytes
     has_sound: bool
-    beats: dict[str, Any] | None
+    beats: dict[str, object] | None
 
 
 def shown_run(run: RecordedRun, clip: Path, config: VideoConfig) -> ShownRun:
@@ -86,7 +85,7 @@ def shown_run(run: RecordedRun, clip: Path, config: VideoConfig) -> ShownRun:
 
 def _beats(
     run: RecordedRun, clip: Path, config: VideoConfig, shown: Player, seconds: float
-) -> dict[str, Any] | None:
+) -> dict[str, object] | None:
     try:
         music = music_beats_shown(clip, config.music, run.reference, seconds)
     except MissingDependency as missing:
