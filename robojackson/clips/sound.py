@@ -96,4 +96,6 @@ def music_beats(sound: Sound) -> Float[np.ndarray, " B"]:
 
 
 def _start_s(stream: av.stream.Stream) -> float:
-    return float(stream.start_time * stream.time_base) if stream.start_time is not None else 0.0
+    if stream.start_time is None or stream.time_base is None:
+        return 0.0
+    return float(stream.start_time * stream.time_base)
