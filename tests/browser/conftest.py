@@ -6,11 +6,11 @@ import tarfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, Page, Playwright, sync_playwright
 
 from robojackson.api.robots import load_robot
 from robojackson.body.skeleton import REST_JOINTS
@@ -30,6 +30,9 @@ from robojackson.rl.policy import Policy
 from robojackson.rl.sim.simulation import resolved
 from robojackson.robot.model import Robot
 
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
 FRAMES, FPS, STEPS = 60, 30.0, 128
 SIZE = 96, 64
 LEVEL, CYCLE = 30, 7
@@ -46,7 +49,7 @@ ARGUMENTS = [
 class Opened:
     """A page with what it asked for and complained about."""
 
-    page: Page
+    page: "Page"
     requests: list[str] = field(default_factory=list)
     complaints: list[str] = field(default_factory=list)
 
@@ -140,19 +143,17 @@ def live_file(run: RecordedRun, tmp_path_factory: pytest.TempPathFactory) -> Pat
 
 
 @pytest.fixture(scope="session")
-def browser() -> Iterator[Browser]:
+def browser() -> Iterator["Browser"]:
     path = shutil.which("chromium")
     assert path, "apt-get install chromium"
+    from playwright.sync_api import sync_playwright
+
     with sync_playwright() as playwright:
-        yield _launched(playwright, path)
-
-
-def _launched(playwright: Playwright, path: str) -> Browser:
-    return playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
+        yield playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
 
 
 @pytest.fixture
-def opened(browser: Browser) -> Iterator[Callable[..., Opened]]:
+def opened(browser: "Browser") -> Iterator[Callable[..., Opened]]:
     """Open a file and wait until it can be used; the context is closed after the test."""
     contexts = []
 

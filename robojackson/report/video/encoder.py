@@ -63,17 +63,13 @@ def _encode(
             options |= {"g": str(max(1, fps // 2)), "bf": "0"}
         stream = cast(VideoStream, container.add_stream(codec, rate=Fraction(fps), options=options))
         stream.pix_fmt = "yuv420p"
-        heard = (
-            None
-            if sound is None
-            else cast(AudioStream, container.add_stream("aac", rate=RATE, layout="stereo"))
-        )
+        heard = sound and container.add_stream("aac", rate=RATE, layout="stereo")
         for index, picture in enumerate(pictures):
             if index == 0:
                 stream.height, stream.width = picture.shape[:2]
             container.mux(stream.encode(VideoFrame.from_ndarray(picture, format="rgb24")))
         container.mux(stream.encode(None))
-        if sound is not None and heard is not None:
+        if sound and heard:
             _encode_sound(container, heard, sound)
 
 
