@@ -141,7 +141,7 @@ def _written(
 
 
 def recorded_run(store: Store, made: Mapping[str, Artifact], robot: Robot) -> RecordedRun:
-    """What a pass has left, read."""
+    """Read what a pass has left."""
     policy = None
     if "policy" in made:
         with store.local(made["policy"]) as path:

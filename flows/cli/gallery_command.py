@@ -54,7 +54,7 @@ def _entry(store: "Store", run: "Run") -> "GalleryRun":
 
 
 def _thumbnail(store: "Store", run: "Run") -> str:
-    """A small picture of the dance, made once."""
+    """Return a small picture of the dance, made once."""
     import io
 
     from PIL import Image

@@ -74,7 +74,7 @@ def require_sound(path: Path) -> Sound:
 
 
 def music_beats(sound: Sound) -> Float[np.ndarray, " B"]:
-    """Times of the beats of a piece of music, seconds.
+    """Return the times of the beats of a piece of music, seconds.
 
     Raises:
         MissingDependency: librosa is not installed.

@@ -72,7 +72,7 @@ def half_a_beat(music: Float[np.ndarray, " M"]) -> float:
 
 
 def _hits(music: np.ndarray, motion: np.ndarray) -> int:
-    """Number of pairs that lie near each other, each beat in one: earliest first."""
+    """Count the pairs that lie near each other, each beat in one: earliest first."""
     hits = i = j = 0
     while i < len(music) and j < len(motion):
         apart = motion[j] - music[i]

@@ -10,12 +10,7 @@ import numpy as np
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.report.web.shapes import packed, robot_shape
 from robojackson.rl.config.train_config import EvaluateConfig
-from robojackson.rl.evaluation.controllers import (
-    control_of,
-    mode_of,
-    observation_of,
-    trained_driver,
-)
+from robojackson.rl.evaluation.controllers import control_of, trained_driver
 from robojackson.rl.evaluation.rollouts import Starts
 from robojackson.rl.evaluation.starts import starts_of
 from robojackson.rl.modes.observation import (
@@ -27,8 +22,9 @@ from robojackson.rl.modes.observation import (
     USUAL_HEIGHT_M,
 )
 from robojackson.rl.policy import Policy
+from robojackson.rl.policy_facts import mode_of, observation_of
 from robojackson.rl.sim.feedforward import lead_of
-from robojackson.rl.sim.motors import Motors, gains, residual_scale
+from robojackson.rl.sim.motors import Motors, feedback_share, gains, residual_scale
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.robot.fall import Fall
@@ -39,17 +35,22 @@ RECORDS = 20
 """States from which the browser's physics is compared with ours."""
 SUBSTEPS = 300
 """Of each comparison."""
+OBSERVED = ("full", "onboard")
+"""Observations that the browser computes."""
 
 
 def live_data(policy: Policy, reference: ReferenceMotion, robot: Robot) -> dict[str, object] | None:
     """Return everything of a live dance; None where a browser cannot run it.
 
-    That is a policy of the paper's mode, or a robot whose meshes collide.
+    That is a policy of the paper's mode, of another observation or with feedback along the
+    reference, or a robot whose meshes collide.
     """
     if mode_of(policy) != "track":
         return None
     control = control_of(policy, robot)
     if control.law != "pd" or _has_colliding_meshes(robot.model):
+        return None
+    if feedback_share(robot, control) or observation_of(policy) not in OBSERVED:
         return None
     motors, (kp, kd) = Motors.of(robot.model), gains(robot, control)
     lead, fall = lead_of(robot, reference, control), Fall.of(robot)
