@@ -5,6 +5,7 @@
 #   make test-fast  more than four fifths of them, of every folder, within 90 s on two idle cores
 #   make test-stack  the whole stack and the documented server as processes, end to end (half an
 #                 hour; apt-get install postgresql chromium)
+#   make test-browser  pages and live dances in a browser (apt-get install chromium)
 #   make bench    accuracy of the mocap stage against ground truth, cost of assessing a clip
 #   make bench-mocap  the first of the two alone, writes benchmarks/results/mocap.json and .md
 #   make bench-retarget  our solver beside the paper's mapping and mink (pip install -e '.[bench]')
@@ -29,7 +30,7 @@ WORKERS ?= auto
 PYTEST := $(PY) -m pytest -q -n $(WORKERS) --dist loadgroup
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: badinput dance test test-fast test-stack coverage bench bench-learning bench-mocap bench-retarget chaos bench-orchestration deploy lint doctor docs wheel clean setup
+.PHONY: badinput dance test test-fast test-stack test-browser coverage bench bench-learning bench-mocap bench-retarget chaos bench-orchestration deploy lint doctor docs wheel clean setup
 .DEFAULT_GOAL := dance
 
 setup:
@@ -49,6 +50,9 @@ coverage: setup
 
 test-stack: setup
 	@$(PY) -m pytest -q -m cluster tests/deploy $(ARGS)
+
+test-browser: setup
+	@$(PY) -m pytest -q -m browser tests/browser $(ARGS)
 
 bench-mocap: setup
 	@$(PY) -m benchmarks.mocap.accuracy $(ARGS)

@@ -1,5 +1,11 @@
 """The video that proves it: source, skeleton, reference robot and trained robot side by side."""
 
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from robojackson.errors import UnreadableVideo
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.rollout import Rollout
@@ -13,7 +19,25 @@ from tasks.runtime.robot_digests import robot_models
 from tasks.runtime.stage import stage
 
 
-@stage(models=robot_models)
+def music_digest(config: VideoConfig) -> list[str]:
+    """Digest of the music that a configuration names, as a list; empty without one.
+
+    Raises:
+        UnreadableVideo: it cannot be read.
+    """
+    if not config.music:
+        return []
+    try:
+        return [hashlib.sha256(Path(config.music).read_bytes()).hexdigest()]
+    except OSError as cause:
+        raise UnreadableVideo(f"no music there ({cause.strerror})", Path(config.music)) from cause
+
+
+def _models(parameters: Mapping[str, Any]) -> list[str]:
+    return [*robot_models(parameters), *music_digest(parameters["config"])]
+
+
+@stage(models=_models)
 def render_video(
     source: Artifact,
     landmarks: Artifact,

@@ -3,6 +3,7 @@
 import hashlib
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,41 +14,94 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.rollout import Rollout
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.pipeline.table_schemas import EPISODE_RECORD, EVALUATION_RECORD
+from robojackson.report.pages.evaluation_text import beat_rows
+from robojackson.report.pages.live_page import live_page
+from robojackson.report.pages.run_page import PageCandidate
+from robojackson.report.video.film import VideoConfig
+from robojackson.report.web.shown_run import RecordedRun, ShownRun, shown_run, thumbnail
+from robojackson.rl.policy import load_policy
+from robojackson.robot.model import Robot, RobotDescription, load_robot
 from storage import artifact_tables
 from storage.artifact import Artifact
 from storage.store import Store
 from tasks.probe_video import info_of
+from tasks.render_video import music_digest
 from tasks.runtime.code_digest import template_digests
 from tasks.runtime.stage import stage
 
 if TYPE_CHECKING:
     from robojackson.report.pages.page_content import Results
 
-PAGE = "index.html"
-TEMPLATES = ("page.html", "page.css")
+PAGE, LIVE, BEATS = "index.html", "live.html", "beats.json"
+TEMPLATES = (
+    "page.html", "page.css", "figures.html", "scene.js", "page.js", "live.html", "live.js",
+    "dance.js",
+)  # fmt: skip
 LEFT_OUT = ("video", "info")
 """Artifacts that stay where they are: the user has the video already."""
 
 
-@stage(models=lambda parameters: template_digests(__name__, TEMPLATES))
+@dataclass(frozen=True)
+class ScoredClip:
+    """A candidate.
+
+    Attributes:
+        name: Of the file.
+        video: The clip.
+        reason: Why it is danced, or not.
+        chosen: Whether it is danced.
+    """
+
+    name: str
+    video: Artifact
+    reason: str
+    chosen: bool
+
+
+@dataclass(frozen=True)
+class PageSettings:
+    """What a page needs besides what the stages made.
+
+    Attributes:
+        robot: Who dances.
+        render: How the video looks; the page shows the same moments.
+        configuration: Of the pass, as YAML.
+        candidates: Clips that were scored, the one that is danced among them.
+    """
+
+    robot: RobotDescription
+    render: VideoConfig
+    configuration: str = ""
+    candidates: tuple[ScoredClip, ...] = ()
+
+
+def _models(parameters: Mapping[str, Any]) -> list[str]:
+    music = music_digest(parameters["settings"].render)
+    return [*template_digests(__name__, TEMPLATES), *music]
+
+
+@stage(models=_models)
 def write_page(
-    made: dict[str, Artifact], move: str, file: str, folder: str = ""
+    made: dict[str, Artifact], move: str, file: str, settings: PageSettings, folder: str = ""
 ) -> dict[str, Artifact]:
-    """Write everything under `dances/<move>-<digest>/`; return its artifacts and `page`.
+    """Write everything under `dances/<move>-<digest>/`; return it, `page`, `beats` and `live`.
 
     Args:
         made: What the other stages made, by name.
         move: Name of the dance, for the folder.
         file: Name of the file that is danced; the same video may be stored under another.
+        settings: What it needs besides.
         folder: Where to, instead of there.
     """
     if not folder:
         digest = hashlib.sha256("".join(a.sha256 for a in made.values()).encode()).hexdigest()
         folder = f"dances/{move}-{digest[:8]}"
-    return _written(made, file, folder)
+    return _written(made, file, settings, folder)
 
 
-def write_first_page(made: dict[str, Artifact], move: str, file: str, folder: str) -> str | None:
+def write_first_page(
+    made: dict[str, Artifact], move: str, file: str, settings: PageSettings, folder: str
+) -> str | None:
     """Write the page that a later `write_page` into the same folder replaces; not a stage.
 
     Returns:
@@ -56,41 +110,90 @@ def write_first_page(made: dict[str, Artifact], move: str, file: str, folder: st
     store = Store.from_environment()
     if store.exists(f"{folder}/{PAGE}"):
         return None
-    return store.address(_written(made, file, folder)["page"].key)
+    return store.address(_written(made, file, settings, folder)["page"].key)
 
 
-def _written(made: dict[str, Artifact], file: str, folder: str) -> dict[str, Artifact]:
+def _written(
+    made: dict[str, Artifact], file: str, settings: PageSettings, folder: str
+) -> dict[str, Artifact]:
     """Return the page and all files that belong to it, in a folder."""
     from robojackson.report.pages.page_content import page_content
     from robojackson.report.pages.run_page import render  # matplotlib
 
     store = Store.from_environment()
-    text = render(page_content(_results(store, made, Path(file)), made["dance"].name))
+    run = recorded_run(store, made, load_robot(settings.robot))
+    with store.local(made["video"]) as clip:
+        shown = shown_run(run, clip, settings.render)
+    results, files = _results(store, made, Path(file), run, shown, settings), {}
+    live = live_page(run, results.title)
+    if shown.beats is not None:
+        files["beats"] = store.put(f"{folder}/{BEATS}", json.dumps(shown.beats).encode())
+    if live is not None:
+        files["live"] = store.put(f"{folder}/{LIVE}", live.encode())
+        results = replace(results, live=LIVE)
+    text = render(page_content(results, made["dance"].name))
     kept = {
         name: store.put(f"{folder}/{artifact.name}", store.read(artifact.key))
         for name, artifact in made.items()
         if name not in LEFT_OUT
     }
-    return {**kept, "page": store.put(f"{folder}/{PAGE}", text.encode())}
+    return {**kept, **files, "page": store.put(f"{folder}/{PAGE}", text.encode())}
 
 
-def _results(store: Store, made: Mapping[str, Artifact], file: Path) -> "Results":
+def recorded_run(store: Store, made: Mapping[str, Artifact], robot: Robot) -> RecordedRun:
+    """Read what a pass has left."""
+    policy = None
+    if "policy" in made:
+        with store.local(made["policy"]) as path:
+            policy = load_policy(path)
+    return RecordedRun(
+        robot=robot,
+        track=artifact_tables.read(LandmarkTrack, store, made["landmarks"]),
+        sequence=artifact_tables.read(SmplSequence, store, made["smpl"]),
+        reference=artifact_tables.read(ReferenceMotion, store, made["reference"]),
+        rollout_qpos=artifact_tables.read(Rollout, store, made["rollout"]).qpos,
+        policy=policy,
+    )
+
+
+def _results(
+    store: Store,
+    made: Mapping[str, Artifact],
+    file: Path,
+    run: RecordedRun,
+    shown: ShownRun,
+    settings: PageSettings,
+) -> "Results":
     from robojackson.report.pages.page_content import Results
 
     return Results(
         title=file.stem.replace("_", " "),
         info=info_of(store, made["info"], file),
         stability=artifact_tables.read(Stability, store, made["stability"]),
-        sequence=artifact_tables.read(SmplSequence, store, made["smpl"]),
-        reference=artifact_tables.read(ReferenceMotion, store, made["reference"]),
+        sequence=run.sequence,
+        reference=run.reference,
         training=_json(store, made["training"]) if "training" in made else {},
         episodes=_episodes(store, made),
         evaluation=joined_evaluation(store, made),
         evaluations=artifact_tables.read_rows(EVALUATION_RECORD, store, made["evaluations"]),
-        rollout_qpos=artifact_tables.read(Rollout, store, made["rollout"]).qpos,
-        advice=advise(artifact_tables.read(LandmarkTrack, store, made["landmarks"])),
+        advice=advise(run.track),
         tracker_video=made["tracker_dance"].name if "tracker_dance" in made else None,
+        player=shown.player,
+        film=shown.film,
+        has_sound=shown.has_sound,
+        beats=beat_rows(shown.beats) if shown.beats else (),
+        candidates=[
+            PageCandidate(each.name, each.reason, each.chosen, _thumbnail(store, each.video))
+            for each in settings.candidates
+        ],
+        provenance={name: artifact.sha256[:16] for name, artifact in sorted(made.items())},
+        settings=settings.configuration,
     )
+
+
+def _thumbnail(store: Store, video: Artifact) -> str:
+    with store.local(video) as path:
+        return thumbnail(path)
 
 
 def joined_evaluation(store: Store, made: Mapping[str, Artifact]) -> dict[str, Any]:

@@ -28,7 +28,7 @@ def pytest_xdist_auto_num_workers() -> int:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out what needs more than a machine has by itself, unless `-m` asks for it by name."""
     asked = str(config.getoption("-m"))
-    unasked = [marker for marker in ("network", "cluster") if marker not in asked]
+    unasked = [marker for marker in ("network", "cluster", "browser") if marker not in asked]
     outside = [item for item in items if any(item.get_closest_marker(m) for m in unasked)]
     if outside:
         config.hook.pytest_deselected(items=outside)

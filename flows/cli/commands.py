@@ -5,12 +5,15 @@ Like `robojackson.cli.app`, each imports what it needs inside itself.
 
 import shlex
 import sys
-from typing import Annotated, Any
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from flows.cli.backup_commands import backup, restore
 from flows.cli.clean_command import clean
+from flows.cli.gallery_command import gallery
 from flows.cli.search_commands import catalogue, find, refresh
 from flows.cli.study_commands import ablation, deploy, metrics, server
 from robojackson.cli.app import add_stages, make_app
@@ -29,6 +32,19 @@ from robojackson.cli.options import (
     overrides_from,
     yaml_text,
 )
+
+if TYPE_CHECKING:
+    from robojackson.pipeline.pipeline_config import PipelineConfig
+
+
+class Shape(StrEnum):
+    """How a video is laid out."""
+
+    ROW = "row"
+    SQUARE = "square"
+    VERTICAL = "vertical"
+    WIDE = "wide"
+
 
 LONGER_MINUTES = 15
 """Least that a pass is advised to take whose robot does not dance."""
@@ -58,6 +74,12 @@ def dance(
     instant: Annotated[
         bool, typer.Option(INSTANT, help="A general tracker dances at once; no training.")
     ] = False,
+    music: Annotated[
+        Path | None, typer.Option(help="A sound file that is heard instead of the clip's sound.")
+    ] = None,
+    shape: Annotated[
+        Shape | None, typer.Option("--format", help="Of the video: row, square, vertical or wide.")
+    ] = None,
     set_: Set = None,
     as_json: Json = False,
 ) -> CommandResult:
@@ -74,6 +96,8 @@ def dance(
         "train.trainer": trainer,
         "train.seed": seed,
         "instant": instant or None,
+        "render.music": yaml_text(music.resolve()) if music else None,
+        "render.shape": shape and shape.value,
     }
     overrides = overrides_from(set_, given | {"dancer.number": person, "detector": quality})
     if force:
@@ -84,21 +108,35 @@ def dance(
     else:
         require_findable(str(source), Store.from_environment())
     prepare(Store.from_environment())
+    made = _danced(found or str(source), config, overrides, start, end, settings)
+    return _concluded(made, settings.minutes, settings.evaluate.seconds)
+
+
+def _danced(
+    source: Path | str,
+    config: str,
+    overrides: dict[str, Any],
+    start: float | None,
+    end: float | None,
+    settings: "PipelineConfig",
+) -> dict[str, Any]:
+    """Answer a pass from its records, or run it with a bar."""
     made = None
-    if found is not None:
+    if isinstance(source, Path):
         from flows.video_pass.recorded_dance import replay
 
-        made = replay(found, config, overrides, start, end)
+        made = replay(source, config, overrides, start, end)
     if made is None:
         from flows.cli.dance_bar import dance_bar, quiet_prefect
+        from storage.store import Store
 
         quiet_prefect()
         from flows.dance import run
 
         minutes = INSTANT_MINUTES if settings.instant else settings.minutes
         with dance_bar(minutes, Store.from_environment().here):
-            made = run(str(found or source), config, overrides, start, end)
-    return _concluded(made, settings.minutes, settings.evaluate.seconds)
+            made = run(str(source), config, overrides, start, end)
+    return made
 
 
 def _concluded(made: dict[str, Any], minutes: float, seconds: float) -> CommandResult:
@@ -143,7 +181,7 @@ def _next(kind: str, page: str, minutes: float, seconds: float) -> str:
 app = make_app()
 for each in (
     *(dance, find, refresh, catalogue, ablation, metrics),
-    *(deploy, backup, restore, clean, server),
+    *(deploy, backup, restore, clean, server, gallery),
 ):
     app.command()(each)
 add_stages(app)

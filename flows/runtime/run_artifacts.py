@@ -9,7 +9,7 @@ from prefect.artifacts import acreate_markdown_artifact
 
 from robojackson.clips.web.untrusted_text import in_markdown
 from robojackson.pipeline.run_names import slug_of
-from robojackson.report.pages.run_page import VERDICT_COLUMNS, headline, verdicts
+from robojackson.report.pages.evaluation_text import VERDICT_COLUMNS, headline, verdicts
 from robojackson.report.quantities import quantities
 from storage.artifact import Artifact
 from storage.store import Store

@@ -6,6 +6,7 @@ the same pass is answered from the records of an earlier one.
 
 import json
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -13,7 +14,7 @@ from typing import Any
 
 from flows.video_pass.motion_stages import to_reference
 from flows.video_pass.pass_progress import announce
-from flows.video_pass.scored_candidates import Candidate, choose, score_all
+from flows.video_pass.scored_candidates import Candidate, choose, page_settings, score_all
 from flows.video_pass.time_budget import training_time
 from flows.video_pass.tracker_stages import TrackedDance, chosen_tracker, track
 from robojackson.clips.quality.advice import advise
@@ -74,12 +75,13 @@ async def make_dance(
     candidates = score_all(paths, settings, start_s, end_s)
     best = choose(candidates)
     labels = RunLabels(*map(run_name, (Path(best.name).stem, settings.setup)))
-    made = await perform(best, robot, settings, labels, began)
+    made = await perform(best, candidates, robot, settings, labels, began)
     return DanceResult(conclude(store, made, candidates, settings, labels), made)
 
 
 async def perform(
     best: Candidate,
+    candidates: Sequence[Candidate],
     robot: RobotDescription,
     settings: PipelineConfig,
     labels: RunLabels,
@@ -88,6 +90,7 @@ async def perform(
     """Run every stage after the choice, in order; where there is a tracker, it dances first.
 
     Args:
+        candidates: All that were scored.
         labels: Names of the dance and the setup.
         began: When the budget of the pass began, Unix time, seconds.
     """
@@ -97,13 +100,26 @@ async def perform(
         moved = to_reference(best.clip, robot, settings)
         if settings.gate:
             check(json.loads(Store.from_environment().read(moved["scorecard"].key)))
-        tracked = None if tracker is None else track(tracker, best, moved, robot, settings, labels)
+        tracked = (
+            None
+            if tracker is None
+            else track(
+                tracker,
+                best,
+                moved,
+                robot,
+                settings,
+                labels,
+                page_settings(best, candidates, robot, settings),
+            )
+        )
         if tracked is not None and settings.instant:
             made = tracked.made
         else:
             made = await _trained(best, moved, robot, settings, labels, began, tracked)
         folder = "" if tracked is None else tracked.folder
-        return {**made, **write_page(made, labels.move, best.name, folder)}
+        shown = page_settings(best, candidates, robot, settings)
+        return {**made, **write_page(made, labels.move, best.name, shown, folder)}
 
 
 async def _trained(
@@ -157,10 +173,12 @@ def conclude(
     return {
         "page": store.address(made["page"].key),
         "video": store.address(made["dance"].key),
+        "live": store.address(made["live"].key) if "live" in made else None,
         **names,
         "candidates": {c.name: c.score.score_per_second for c in candidates},
         "scorecard": json.loads(store.read(made["scorecard"].key)),
         "evaluation": summary,
+        "beats": json.loads(store.read(made["beats"].key))["figures"] if "beats" in made else None,
         "advice": [each.record for each in advise(track)],
         "artifacts": {name: store.address(artifact.key) for name, artifact in made.items()},
     }

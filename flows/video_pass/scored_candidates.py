@@ -5,9 +5,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
+import yaml
+
 from robojackson.clips.quality.stability import Stability
 from robojackson.errors import NoPersonFound, RoboJacksonError, UnreadableVideo
+from robojackson.files.json_types import to_json_types
 from robojackson.pipeline.pipeline_config import PipelineConfig
+from robojackson.robot.model import RobotDescription
 from storage import artifact_tables
 from storage.artifact import Artifact
 from storage.store import Store
@@ -16,6 +20,7 @@ from tasks.probe_video import SourceFile, probe_video
 from tasks.runtime.run_logger import run_logger
 from tasks.runtime.stage import Stage
 from tasks.score_stability import score_stability
+from tasks.write_page import PageSettings, ScoredClip
 
 Input = TypeVar("Input")
 
@@ -74,6 +79,33 @@ def choose(candidates: list[Candidate]) -> Candidate:
         reasons = (f"{name}: no person found in {n} of {n} frames" for name, n in frames.items())
         raise NoPersonFound("; ".join(reasons))
     return min(danced, key=lambda candidate: candidate.score.score_per_second)
+
+
+def page_settings(
+    best: Candidate,
+    candidates: Sequence[Candidate],
+    robot: RobotDescription,
+    settings: PipelineConfig,
+) -> PageSettings:
+    """Return what a page needs besides what the stages make, with a reason for every candidate."""
+    return PageSettings(
+        robot,
+        settings.render,
+        yaml.safe_dump(to_json_types(settings), sort_keys=False),
+        tuple(
+            ScoredClip(each.name, each.clip["video"], _reason(each, best), each is best)
+            for each in candidates
+        ),
+    )
+
+
+def _reason(candidate: Candidate, best: Candidate) -> str:
+    score, least = candidate.score.score_per_second, best.score.score_per_second
+    if not candidate.score.detected:
+        return "nobody is seen in it"
+    if candidate is best:
+        return f"danced: steadiest, {score:.2f} a second"
+    return f"not danced: {score:.2f} a second, {least:.2f} is steadier"
 
 
 def _readable(paths: Sequence[Path]) -> list[tuple[Path, SourceFile]]:

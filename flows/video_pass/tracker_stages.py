@@ -23,7 +23,7 @@ from tasks.render_video import render_video
 from tasks.runtime.run_logger import run_logger
 from tasks.runtime.stage import identity, is_records_only
 from tasks.train_policy import RunLabels
-from tasks.write_page import write_first_page
+from tasks.write_page import PageSettings, write_first_page
 
 Artifacts = dict[str, Artifact]
 FILM = "tracker.mp4"
@@ -81,11 +81,13 @@ def track(
     robot: RobotDescription,
     settings: PipelineConfig,
     labels: RunLabels,
+    shown_with: PageSettings,
 ) -> TrackedDance:
     """Dance, film it, show it, then evaluate it from all starts.
 
     Args:
         moved: `landmarks`, `smpl`, `reference` and `scorecard` of the clip.
+        shown_with: What the page needs besides.
     """
     reference = moved["reference"]
     announce("tracking")
@@ -98,7 +100,7 @@ def track(
     made |= {"dance": film, "still": draw_snapshot(film)}
     folder = _folder(made, tracker, robot, settings, labels)
     if not is_records_only():
-        page = write_first_page(made, labels.move, best.name, folder)
+        page = write_first_page(made, labels.move, best.name, shown_with, folder)
         if page is not None:
             run_logger().info(FIRST_PAGE, page)
     announce("evaluation")

@@ -38,6 +38,7 @@ from robojackson.cli.options import (
 )
 from robojackson.cli.robot_commands import robots
 from robojackson.cli.trackers.tracker_commands import trackers
+from robojackson.cli.view_command import view
 
 
 @command
@@ -182,6 +183,7 @@ STAGES: dict[str, Callable[..., None]] = {
     "train": train,
     "pretrain": pretrain,
     "evaluate": evaluate,
+    "view": view,
     "doctor": doctor,
     "licences": licences,
 }

@@ -99,15 +99,8 @@ def _in_package(description: RobotDescription, package: str, inside: str) -> Pat
 
 def compiled(description: RobotDescription, path: Path) -> mujoco.MjModel:
     """Return the model with the keypoint sites, a floor, and scaled motors."""
-    silence_mujoco()
-    spec = read_spec(path, description)
-    bodies = [body.name for body in spec.bodies if body.name != "world"]
-    _add_sites(spec, description, bodies)
-    if not any(is_plane(geom) for geom in spec.worldbody.geoms):
-        plane = mujoco.mjtGeom.mjGEOM_PLANE
-        spec.worldbody.add_geom(name="floor", type=plane, size=[40, 40, 1], rgba=[0.5] * 3 + [1])
     try:
-        apply_physics(spec, description)
+        spec = described_spec(description, path)
         with limited_memory():
             model = spec.compile()
     except FAULTS as error:
@@ -115,6 +108,19 @@ def compiled(description: RobotDescription, path: Path) -> mujoco.MjModel:
     require_sound(model, where(description, "mjcf"))
     model.actuator_gear[:] *= description.gear_scale
     return model
+
+
+def described_spec(description: RobotDescription, path: Path) -> mujoco.MjSpec:
+    """Return the MJCF with keypoint sites, a floor and the physics of the description."""
+    silence_mujoco()
+    spec = read_spec(path, description)
+    bodies = [body.name for body in spec.bodies if body.name != "world"]
+    _add_sites(spec, description, bodies)
+    if not any(is_plane(geom) for geom in spec.worldbody.geoms):
+        plane = mujoco.mjtGeom.mjGEOM_PLANE
+        spec.worldbody.add_geom(name="floor", type=plane, size=[40, 40, 1], rgba=[0.5] * 3 + [1])
+    apply_physics(spec, description)
+    return spec
 
 
 def model_sha256(path: Path) -> str:

@@ -1,26 +1,37 @@
 """From the results of the stages to the content of the page: figures, plots and versions."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from importlib import metadata
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
+from robojackson.body.skeleton import keypoint
 from robojackson.clips.quality.advice import Advice
 from robojackson.clips.quality.stability import Stability
 from robojackson.clips.video import VideoInfo
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import AIR, PLANTED, SmplSequence
-from robojackson.report.pages.run_page import PageContent, Plot, dancer_of
+from robojackson.report.pages.evaluation_text import Verdict, dancer_of
+from robojackson.report.pages.run_page import PageCandidate, PageContent, Plot
 from robojackson.report.plots import run_plots
 from robojackson.report.plots.feasibility_plot import feasibility_strip
+from robojackson.report.quantities import format_value
+from robojackson.report.web.player_data import Player
 
 PROGRAMS = ("robojackson", "mujoco", "gymnasium", "mediapipe", "torch", "jax", "sbx-rl",
             "sb3-contrib", "prefect", "numpy")  # fmt: skip
 
 SHOWN_FINDINGS = 3
+LIMBS = {
+    "head": ("pelvis", "head"),
+    "left_hand": ("left_shoulder", "left_hand"),
+    "right_hand": ("right_shoulder", "right_hand"),
+    "left_foot": ("left_hip", "left_foot"),
+    "right_foot": ("right_hip", "right_foot"),
+}
+"""The ends of each limb by its name, as keypoints of the dancer and of robots."""
 
 
 @dataclass(frozen=True)
@@ -37,9 +48,15 @@ class Results:
         episodes: Rows of EpisodeRecord.
         evaluation: Summary of the evaluation, its baselines inside.
         evaluations: Rows of EvaluationRecord.
-        rollout_qpos: The trained robot from the first step, or None.
         advice: What to do better when the clip is filmed again.
         tracker_video: Name of the film of a tracker beside a trained robot, or None.
+        player: Of the page, or None.
+        film, has_sound: Its source pane (mp4), and whether that is not silent.
+        live: Name of the live dance, or None.
+        candidates: Clips that were scored.
+        beats: How the motions meet the music.
+        provenance: Digests of what was made, by name.
+        settings: The configuration, as YAML.
     """
 
     title: str
@@ -51,9 +68,16 @@ class Results:
     episodes: Sequence[Mapping[str, Any]]
     evaluation: Mapping[str, Any]
     evaluations: Sequence[Mapping[str, Any]]
-    rollout_qpos: Float[np.ndarray, "S nq"] | None
     advice: Sequence[Advice] = ()
     tracker_video: str | None = None
+    player: Player | None = None
+    film: bytes = b""
+    has_sound: bool = False
+    live: str | None = None
+    candidates: Sequence[PageCandidate] = ()
+    beats: Sequence[Verdict] = ()
+    provenance: Mapping[str, str] = field(default_factory=dict)
+    settings: str = ""
 
 
 def page_content(results: Results, video: str | None) -> PageContent:
@@ -72,7 +96,53 @@ def page_content(results: Results, video: str | None) -> PageContent:
         versions=versions(),
         notes=results.sequence.notes,
         advice=[str(each) for each in results.advice],
+        player=results.player,
+        film=results.film,
+        has_sound=results.has_sound,
+        live=results.live,
+        candidates=results.candidates,
+        limbs=limb_rows(results),
+        beats=results.beats,
+        provenance=results.provenance,
+        settings=results.settings,
     )
+
+
+def limb_rows(results: Results) -> list[Verdict]:
+    """Figures of head, hands and feet: capture, retargeting, the rollout shown, the evaluation."""
+    errors = results.player.error_m if results.player else {}
+    directions = limb_directions(results.sequence, results.reference)
+    rows = []
+    for limb, (_, end) in LIMBS.items():
+        confidence = float(results.sequence.confidence[:, keypoint(end)].mean())
+        error = errors.get(limb)
+        row = [
+            f"{confidence:.2f}",
+            f"{directions[limb]:.0f}°",
+            "–" if error is None else f"{1000 * float(error.mean()):.0f} mm",
+            format_value("limb_gain", results.evaluation.get(f"limb_gain_{limb}")),
+        ]
+        rows.append(Verdict(limb.replace("_", " "), "", row, False))
+    return rows
+
+
+def limb_directions(sequence: SmplSequence, reference: ReferenceMotion) -> dict[str, float]:
+    """Mean angle between the limbs of the reference robot and of the dancer, degrees."""
+    times = np.asarray(reference.source_time_s)
+    frames = np.clip(np.round(times * sequence.fps).astype(int), 0, len(sequence) - 1)
+    names, found = list(reference.keypoint_names), {}
+    for limb, (start, end) in LIMBS.items():
+        person = np.asarray(sequence.keypoints_w, float)[frames]
+        theirs = person[:, keypoint(end)] - person[:, keypoint(start)]
+        if not {limb, start if start in names else "pelvis"} <= set(names):
+            found[limb] = float("nan")
+            continue
+        root = names.index(start if start in names else "pelvis")
+        ours = reference.keypoints_w[:, names.index(limb)] - reference.keypoints_w[:, root]
+        lengths = np.linalg.norm(theirs, axis=1) * np.linalg.norm(ours, axis=1)
+        cosine = np.sum(theirs * ours, 1) / np.maximum(lengths, 1e-9)
+        found[limb] = float(np.degrees(np.arccos(np.clip(cosine, -1, 1))).mean())
+    return found
 
 
 def versions(programs: Sequence[str] = PROGRAMS) -> dict[str, str]:
@@ -126,12 +196,6 @@ def _plots(results: Results) -> list[Plot]:
             "left blue, right orange, head green."
         )
         made.append(_plot("How lively the limbs are", caption, figure))
-    if results.rollout_qpos is not None and len(results.rollout_qpos):
-        figure = run_plots.joint_tracking(reference, results.rollout_qpos)
-        caption = "The six hinges that move most: grey the reference, blue the robot in simulation."
-        made.append(_plot("Joint tracking", caption, figure))
-    figure = run_plots.contact_strip(results.sequence, reference)
-    made.append(_plot("Contacts", "Feet on the floor, of the person and of the robot.", figure))
     return made + _dynamics(reference)
 
 

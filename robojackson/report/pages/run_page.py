@@ -1,30 +1,32 @@
-"""One HTML page about one run: plain, offline, light or dark as the reader's system is.
+"""One HTML page about one run: offline, light or dark as the reader's system is.
 
-The page needs nothing but itself and the video beside it; plots are inside. Everything that comes
-from a file's name or a user is escaped by the template engine.
+The page needs nothing but itself: player, motions, source clip and plots are inside; its content
+security policy lets nothing else in. Everything that comes from a file's name or a user is escaped
+by the template engine.
 """
 
 import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import jinja2
+from robojackson.report.pages import inline
+from robojackson.report.pages.evaluation_text import (
+    PASSPORT_COLUMNS,
+    VERDICT_COLUMNS,
+    Verdict,
+    dancer_of,
+    headline,
+    passport_rows,
+    tiles,
+    verdicts,
+)
+from robojackson.report.quantities import Quantity, format_value, quantities
+from robojackson.report.web.player_data import Player
+from robojackson.retarget.scorecard_gate import BARS
 
-from robojackson.report.quantities import POLICY_TITLES, Quantity, format_value, quantities
-from robojackson.rl.config.evaluate_config import TRAINED
-from robojackson.rl.evaluation.verdict import NEEDS_FULL_LENGTH
-
-VERDICT_COLUMNS = (
-    "survived_s", "success", "strict_success", "skill", "site_error_m", "limb_gain", "drift_m",
-    "heading_error_deg",
-)  # fmt: skip
-NOT_TRAINED = "follows any motion, not trained on this one"
-"""What a tracker does."""
-TOO_SHORT = "too short"
-"""In place of a figure that rollouts are too short to judge."""
+FOLDED = ("Versions", "Files")
 SCORECARD_LINES = (
     "seconds", "cyclic", "keypoint_mm", "keypoint_p95_mm", "keypoint_leaned_mm", "lean_deg",
     "bone_deg", "limit_violations",
@@ -67,6 +69,14 @@ class PageContent:
         versions: Of programs and models.
         notes: Warnings for the reader.
         advice: What to do better when the clip is filmed again.
+        player: The four panes, their curves and the rows of their timeline.
+        film: mp4 of the source pane, at the moments of the player.
+        has_sound: Whether that has sound.
+        live: Address of the live dance relative to the page, or None.
+        candidates: Clips that were scored.
+        limbs, beats: Rows of figures by limb, and of how motions meet the music.
+        provenance: Digests of what the run made.
+        settings: The configuration, as YAML.
     """
 
     title: str
@@ -82,6 +92,43 @@ class PageContent:
     versions: Mapping[str, str] = field(default_factory=dict)
     notes: Sequence[str] = ()
     advice: Sequence[str] = ()
+    player: Player | None = None
+    film: bytes = b""
+    has_sound: bool = False
+    live: str | None = None
+    candidates: Sequence["PageCandidate"] = ()
+    limbs: Sequence[Verdict] = ()
+    beats: Sequence[Verdict] = ()
+    provenance: Mapping[str, str] = field(default_factory=dict)
+    settings: str = ""
+
+
+@dataclass(frozen=True)
+class PageCandidate:
+    """A clip that was scored.
+
+    Attributes:
+        name: Of the file.
+        reason: Why it was chosen, or not.
+        chosen: Whether it is danced.
+        thumbnail: JPEG as base64, or empty.
+    """
+
+    name: str
+    reason: str
+    chosen: bool
+    thumbnail: str = ""
+
+
+@dataclass(frozen=True)
+class _Bar:
+    """A gated figure beside its bar; `share` is how much of the bar it takes, per cent."""
+
+    label: str
+    value: str
+    bar: str
+    share: float
+    holds: bool
 
 
 @dataclass(frozen=True)
@@ -90,35 +137,75 @@ class _Section:
     lines: Sequence[Quantity]
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """One row of the evaluation table."""
-
-    title: str
-    meaning: str
-    values: Sequence[str]
-    trained: bool
+LIMB_COLUMNS = ("limb", "confidence", "direction", "error", "gain")
+BEAT_COLUMNS = ("", "beats", "precision", "recall", "F1", "BAS")
+SCRIPTS = ("scene.js", "page.js")
 
 
 def render(content: PageContent) -> str:
     """The page as HTML."""
-    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
-    here = resources.files("robojackson.report.pages")
-    template = environment.from_string(here.joinpath("page.html").read_text("utf-8"))
-    return template.render(
+    player, styles, scripts = content.player, [inline.own("page.css")], []
+    if player is not None:
+        styles.append(inline.asset("uplot.min.css"))
+        scripts = [inline.asset("three.min.js"), inline.asset("uplot.min.js")]
+        scripts += [inline.own(name) for name in SCRIPTS]
+    evaluation, sections = content.evaluation, _sections(content)
+    folded = [section for section in sections if section.title in FOLDED]
+    return inline.render(
+        "page.html",
+        styles,
+        scripts,
+        security=inline.policy(scripts, styles),
         content=content,
-        style=here.joinpath("page.css").read_text("utf-8"),
-        headline=headline(content.evaluation),
-        dancer=dancer_of(content.evaluation),
-        trackers=list(content.evaluation.get("trackers", {})),
-        tiles=_tiles(content.evaluation),
+        **_player_values(content),
+        headline=headline(evaluation),
+        dancer=dancer_of(evaluation),
+        trackers=list(evaluation.get("trackers", {})),
+        tiles=tiles(evaluation),
         columns=[Quantity("", "")] + quantities(dict.fromkeys(VERDICT_COLUMNS)),
-        verdicts=verdicts(content.evaluation),
+        verdicts=verdicts(evaluation),
         passport_columns=[Quantity("", "")] + quantities(dict.fromkeys(PASSPORT_COLUMNS)),
-        passport=passport_rows(content.evaluation),
-        sections=_sections(content),
+        passport=passport_rows(evaluation),
+        limb_columns=[Quantity(name, "") for name in LIMB_COLUMNS],
+        beat_columns=[Quantity(name, "") for name in BEAT_COLUMNS],
+        bars=_bars(content.scorecard),
+        sections=[section for section in sections if section not in folded],
+        folded=folded,
         plots=[(plot, base64.b64encode(plot.png).decode()) for plot in content.plots],
     )
+
+
+def _player_values(content: PageContent) -> dict[str, object]:
+    """What the template shows of the player."""
+    player = content.player
+    data = {} if player is None else player.data
+    film = base64.b64encode(content.film).decode()
+    bands = [] if player is None else player.bands
+    return {
+        "data": inline.json_text({**data, "video": film}),
+        "bands": bands,
+        "count": data.get("count", 0),
+        "has_rollout": "trained" in data,
+        "has_torque": bool(data.get("torque")),
+        "has_sound": content.has_sound,
+        "has_beats": any(span.kind in ("beat", "music") for b in bands for span in b.spans),
+        "sites": 0 if player is None else len(player.error_m),
+    }
+
+
+def _bars(scorecard: Mapping[str, Any]) -> list[_Bar]:
+    """The gated figures of the score card with their bars; a broken bar of 0 is full."""
+    bars = []
+    for key, bar in BARS.items():
+        value = scorecard.get(key)
+        if value is None:
+            continue
+        holds = bool(value <= bar)
+        share = 100 * min(1.0, value / bar) if bar and value == value else 100.0 * (not holds)
+        label = quantities({key: value})[0].label
+        shown, limit = format_value(key, value), format_value(key, bar)
+        bars.append(_Bar(label, shown, limit, round(share, 1), holds))
+    return bars
 
 
 def write_page(content: PageContent, out: Path) -> Path:
@@ -129,87 +216,6 @@ def write_page(content: PageContent, out: Path) -> Path:
     return out
 
 
-def dancer_of(evaluation: Mapping[str, Any]) -> str:
-    """Return who dances: the trained robot, or a tracker by its name."""
-    name = evaluation.get("tracker")
-    return POLICY_TITLES[TRAINED][0] if name is None else f"tracker {name}"
-
-
-def headline(evaluation: Mapping[str, Any]) -> str:
-    """Return one sentence that says how well it went, beside the best of the baselines."""
-    if not evaluation:
-        return ""
-    said = str(evaluation.get("verdict", {}).get("sentence", ""))
-    if evaluation.get("success") is None:
-        return said
-    said += " " if said else ""
-    said += (
-        f"The {dancer_of(evaluation)} finished {format_value('success', evaluation['success'])} of "
-        f"{format_value('rollouts', evaluation['rollouts'])} rollouts without a fall"
-    )
-    baselines = evaluation.get("baselines", {})
-    if not baselines:
-        return f"{said}."
-    name = max(baselines, key=lambda key: baselines[key]["success"])
-    best = POLICY_TITLES.get(name, (name, ""))[0]
-    theirs, ours = baselines[name]["success"], evaluation["success"]
-    if theirs < ours:
-        return f"{said}; the best baseline ({best}) {format_value('success', theirs)}."
-    how = "as well" if theirs == ours else "better"
-    figure = format_value("success", theirs)
-    return f"{said}; a baseline that learnt nothing ({best}) does {how}: {figure}."
-
-
-def _tiles(evaluation: Mapping[str, Any]) -> list[Quantity]:
-    meanings = {
-        "success": "no fall in a whole rollout",
-        "survived_s": "mean time before a fall",
-        "skill": "1 is perfect, 0 is the best frozen pose",
-        "site_error_m": "mean distance of 14 points",
-        "limb_gain": "1 is the whole amplitude",
-    }
-    found = {key: evaluation[key] for key in meanings if evaluation.get(key) is not None}
-    return [
-        Quantity(f.label, f.value, meanings[key])
-        for key, f in zip(found, quantities(found), strict=True)
-    ]
-
-
-def verdicts(evaluation: Mapping[str, Any]) -> list[Verdict]:
-    """Return the figures of the trained policy and of its baselines, ready to read."""
-    if not evaluation:
-        return []
-    trackers = evaluation.get("trackers", {})
-    policies = {TRAINED: evaluation, **trackers, **evaluation.get("baselines", {})}
-    rows = []
-    for name, figures in policies.items():
-        title, meaning = POLICY_TITLES.get(name, (name, ""))
-        if "tracker" in figures:
-            title, meaning = dancer_of(figures), NOT_TRAINED
-        short = evaluation.get("verdict", {}).get("kind") == "too_short"
-        values = [
-            TOO_SHORT
-            if short and column in NEEDS_FULL_LENGTH
-            else format_value(column, figures.get(column))
-            for column in VERDICT_COLUMNS
-        ]
-        rows.append(Verdict(title, meaning, values, name == TRAINED))
-    return rows
-
-
-PASSPORT_COLUMNS = ("strict_success", "skill", "survived_s", "kept")
-
-
-def passport_rows(evaluation: Mapping[str, Any]) -> list[Verdict]:
-    """Return the figures of the policy under other physics, ready to read."""
-    return [
-        Verdict(
-            row["case"], "", [format_value(key, row[key]) for key in PASSPORT_COLUMNS], index == 0
-        )
-        for index, row in enumerate(evaluation.get("passport", []))
-    ]
-
-
 def _sections(content: PageContent) -> list[_Section]:
     found = [
         _Section("Source clip", quantities(content.source)),
@@ -217,8 +223,9 @@ def _sections(content: PageContent) -> list[_Section]:
         _Section("Motion capture", quantities(content.mocap)),
         _Section("Retargeting", quantities(content.scorecard, SCORECARD_LINES)),
         _Section("Training", quantities(content.training)),
-        _Section(
-            "Versions", [Quantity(name, version) for name, version in content.versions.items()]
+        *(
+            _Section(title, [Quantity(name, value) for name, value in known.items()])
+            for title, known in (("Versions", content.versions), ("Files", content.provenance))
         ),
     ]
     return [section for section in found if section.lines]

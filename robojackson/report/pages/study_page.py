@@ -9,14 +9,13 @@ import base64
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib import resources
 from itertools import groupby
 from typing import Any
 
-import jinja2
-
 from robojackson.metrics.ablation_statistics import Claim, Comparison
 from robojackson.metrics.seed_statistics import Effect, Estimate
+from robojackson.report.pages.inline import own, policy
+from robojackson.report.pages.inline import render as from_template
 from robojackson.report.pages.run_page import Plot
 
 FIGURES: Mapping[str, tuple[str, int, float]] = {
@@ -92,12 +91,13 @@ class StudyContent:
 
 def render(content: StudyContent) -> str:
     """The page as HTML, one file with everything in it."""
-    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
-    here, compared = resources.files("robojackson.report.pages"), content.comparisons
-    template = environment.from_string(here.joinpath("study.html").read_text("utf-8"))
-    return template.render(
+    compared, styles = content.comparisons, [own("page.css")]
+    return from_template(
+        "study.html",
+        styles,
+        [],
+        security=policy([], styles),
         content=content,
-        style=here.joinpath("page.css").read_text("utf-8"),
         columns=[title for title, _, _ in FIGURES.values()],
         moves=[
             (

@@ -28,7 +28,6 @@ BASELINE_COLOURS = {
     "statue": "#a78bfa", "mean_pose": "#e879b9", "zero_residual": GOOD, "random": "#9aa3b2",
 }  # fmt: skip
 BINS = 60
-TRACKED_JOINTS = 6
 TORQUE_SHOWN = 2.0
 """Torques beyond this many limits have the colour of this many."""
 TORQUE_COLOURS = ((0.0, "#8080801a"), (0.5, ACCENT), (0.5, SECOND), (1.0, "#b3123a"))
@@ -139,26 +138,6 @@ def torque_heat_map(reference: ReferenceMotion, motors: Sequence[str]) -> Figure
     axes.set_xlabel("s      names: share of the time over the limit")
     axes.grid(visible=False)
     _torque_bar(figure, picture, bool((ratio > TORQUE_SHOWN).any()))
-    return figure
-
-
-def joint_tracking(
-    reference: ReferenceMotion, rollout_qpos: Float[np.ndarray, "S nq"], cycles: int = 1
-) -> Figure:
-    """The hinges that move most: the reference and what the robot did, degrees."""
-    shown = min(len(rollout_qpos), cycles * len(reference))
-    wanted = np.degrees(reference.qpos[np.arange(shown) % len(reference), 7:])
-    done = np.degrees(rollout_qpos[:shown, 7:])
-    busiest = np.argsort(-np.ptp(wanted, axis=0))[:TRACKED_JOINTS]
-    figure, axes = figure_of(7.0, 3.6, rows=3, columns=2, sharex=True)
-    time_s = np.arange(shown) * reference.dt
-    for joint, panel in zip(busiest, axes, strict=False):
-        panel.plot(time_s, wanted[:, joint], color=INK, lw=2.4, alpha=0.6)
-        panel.plot(time_s, done[:, joint], color=ACCENT, lw=1.2)
-        name = reference.joint_names[joint].replace("_", " ")
-        panel.set_title(f"{name}, deg", loc="left", fontsize=8, color=INK)
-    for panel in axes[-2:]:
-        panel.set_xlabel("s")
     return figure
 
 

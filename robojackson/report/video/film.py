@@ -7,7 +7,9 @@ that sizes compare.
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import mujoco
 import numpy as np
@@ -43,6 +45,10 @@ class VideoConfig:
         max_seconds: Longest video, seconds.
         azimuth_deg: How far the cameras go around the subject; 0 is the front.
         quality: Constant rate factor of H.264; lower is better and larger.
+        music: Path of the music that is heard instead of the clip's own sound.
+        shape: All panels in a row; or dancer and robot, square, vertical (9:16) or wide (16:9),
+            1080 pixels at the shorter side.
+        alone: Whether such a video shows the robot without the dancer.
     """
 
     fps: int = Field(default=30, ge=1)
@@ -51,6 +57,22 @@ class VideoConfig:
     max_seconds: float = Field(default=20.0, gt=0.0)
     azimuth_deg: float = 0.0
     quality: int = Field(default=20, ge=0, le=51)
+    music: str = ""
+    shape: Literal["row", "square", "vertical", "wide"] = "row"
+    alone: bool = False
+
+
+SIZES = {"square": (1080, 1080), "vertical": (1080, 1920), "wide": (1920, 1080)}
+"""Pixels of a whole picture."""
+
+
+def panels_of(config: VideoConfig, count: int) -> VideoConfig:
+    """The configuration with the panels' size that fills its shape."""
+    if config.shape == "row":
+        return config
+    width, height = SIZES[config.shape]
+    across, down = (1, count) if config.shape == "vertical" else (count, 1)
+    return replace(config, panel_width=width // across, panel_height=height // down)
 
 
 class Film:
@@ -139,8 +161,11 @@ class Film:
             yield [draw(index, framing) for draw in self._panels]
 
     def pictures(self) -> Iterator[canvas.Picture]:
-        """The panels of each moment in a row."""
-        return map(canvas.side_by_side, self.moments())
+        """The panels of each moment in a row; one above the other in a vertical film."""
+        if self._config.shape == "vertical":
+            return map(np.concatenate, self.moments())
+        gap = 2 if self._config.shape == "row" else 0
+        return (canvas.side_by_side(panels, gap) for panels in self.moments())
 
     def sheet(self) -> canvas.Picture:
         """One picture: a column a moment, a row a panel."""

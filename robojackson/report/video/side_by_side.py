@@ -12,14 +12,16 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from robojackson.clips.sound import Sound
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.report.video import canvas
 from robojackson.report.video.encoder import write_video
-from robojackson.report.video.film import SIDE_DEG, Film
+from robojackson.report.video.film import SIDE_DEG, Film, panels_of
 from robojackson.report.video.film import VideoConfig as VideoConfig
 from robojackson.report.video.robot_panel import REFERENCE_TINT, TRAINED_TINT
+from robojackson.report.video.soundtrack import soundtrack
 from robojackson.report.video.timeline import clip_timeline, reference_qpos, timeline
 
 Progress = Callable[[int, int], None]
@@ -56,21 +58,29 @@ def side_by_side(
         MissingDependency: no way to draw without a screen.
     """
     config = config or VideoConfig()
+    whole = config.shape == "row"
+    danced = rollout_qpos is not None and len(rollout_qpos) > 0
+    with_source = source is not None and track is not None and (whole or not config.alone)
+    config = panels_of(config, 1 + with_source)
     steps = 0 if rollout_qpos is None else len(rollout_qpos)
     filmed = [each for each in (track, sequence) if each is not None]
     fps, frames = (filmed[0].fps, len(filmed[-1])) if filmed else (1.0, 1)
     when = timeline(reference, fps, frames, steps, float(config.fps), config.max_seconds)
     with ExitStack() as stack:
         film = Film(stack, config, when)
-        if source is not None and track is not None:
+        if with_source and source is not None and track is not None:
             film.add_source(source, track, sequence if plain else None, plain)
-        if sequence is not None:
+        if sequence is not None and whole:
             film.add_body(sequence)
-        film.add_robot("reference robot", reference_qpos(reference, when), model, REFERENCE_TINT)
-        if rollout_qpos is not None and steps:
+        if whole or not danced:
+            film.add_robot(
+                "reference robot", reference_qpos(reference, when), model, REFERENCE_TINT
+            )
+        if rollout_qpos is not None and danced:
             qpos = rollout_qpos[when.rollout]
             film.add_robot(title, qpos, model, TRAINED_TINT, is_rollout=True)
-        return _written(film, len(when), config, out, progress)
+        heard = soundtrack(source, config.music, reference, len(when) / config.fps)
+        return _written(film, len(when), config, out, progress, heard)
 
 
 def body_video(
@@ -95,11 +105,17 @@ def body_video(
         film.add_source(source, track, sequence, plain=True)
         film.add_body(sequence, "body, front")
         film.add_body(sequence, "body, left side", SIDE_DEG)
-        return _written(film, len(when), config, out, progress)
+        heard = soundtrack(source, config.music, None, len(when) / config.fps)
+        return _written(film, len(when), config, out, progress, heard)
 
 
 def _written(
-    film: Film, total: int, config: VideoConfig, out: Path, progress: Progress | None
+    film: Film,
+    total: int,
+    config: VideoConfig,
+    out: Path,
+    progress: Progress | None,
+    sound: Sound | None,
 ) -> Path:
     def counted() -> Iterator[canvas.Picture]:
         for done, picture in enumerate(film.pictures(), start=1):
@@ -107,4 +123,4 @@ def _written(
             if progress:
                 progress(done, total)
 
-    return write_video(counted(), config.fps, out, config.quality)
+    return write_video(counted(), config.fps, out, config.quality, sound)

@@ -4,7 +4,7 @@ import numpy as np
 
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.pipeline.yaml_loader import load
-from robojackson.report.pages.run_page import passport_rows
+from robojackson.report.pages.evaluation_text import passport_rows
 from robojackson.rl.config.train_config import EvaluateConfig, TrainConfig
 from robojackson.rl.evaluation.passport import NOMINAL, ROBUST, cases, passport, robust_settings
 from robojackson.rl.evaluation.policy_evaluation import evaluate_policy

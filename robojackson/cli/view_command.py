@@ -1,0 +1,51 @@
+"""The command that opens what a run made, or writes it for other viewers."""
+
+import webbrowser
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from robojackson.cli.console import CommandResult, command
+from robojackson.cli.options import Json
+from robojackson.errors import BadConfiguration, StoreError
+
+PAGE = "index.html"
+
+
+class View(StrEnum):
+    """What else a run can be written as."""
+
+    GIF = "gif"
+    WEBP = "webp"
+    RERUN = "rerun"
+
+
+@command
+def view(
+    file: Annotated[Path, typer.Argument(help="A page, a live dance, or the folder of a run.")],
+    to: Annotated[View | None, typer.Option(help="Write it for another viewer instead.")] = None,
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="File to write.")] = None,
+    as_json: Json = False,
+) -> CommandResult:
+    """Open the page of a run; --to writes its video as GIF or WebP, or the run for Rerun (.rrd)."""
+    if to is None:
+        page = file / PAGE if file.is_dir() else file
+        if not page.is_file():
+            raise StoreError(f"{page}: no such file; the folder of a run has its {PAGE}")
+        opened = webbrowser.open(page.resolve().as_uri())
+        word = "opened" if opened else "no browser here; open"
+        return CommandResult({"page": str(page), "opened": opened}, text=[f"{word} {page}"])
+    if out is None:
+        raise BadConfiguration(f"--to {to} writes a file: name it with -o FILE")
+    if to is View.RERUN:
+        from robojackson.api.rerun_export import write_rerun
+
+        write_rerun(file if file.is_dir() else file.parent, out)
+    else:
+        from robojackson.report.video.animation import write_animation
+
+        write_animation(file / "dance.mp4" if file.is_dir() else file, out, to.value)
+    size = out.stat().st_size
+    return CommandResult({"file": str(out), "bytes": size}, text=[f"{out}  {size:,} bytes"])

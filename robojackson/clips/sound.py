@@ -1,0 +1,101 @@
+"""The sound of a clip, and its beats. Seconds since the first picture of the clip."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import av
+import numpy as np
+from jaxtyping import Float
+
+from robojackson.clips.video_container import opened
+from robojackson.errors import MissingDependency, UnreadableVideo
+
+RATE = 44_100
+"""Samples a second of everything that is heard."""
+LONGEST_S = 600.0
+"""More of a file is not read, seconds."""
+SILENT = 1e-4
+"""Largest amplitude of a sound that nobody hears."""
+
+
+@dataclass(frozen=True, repr=False)
+class Sound:
+    """Samples at `RATE`, -1..1; the first is heard with the first picture."""
+
+    samples: Float[np.ndarray, "S 2"]
+
+    def __repr__(self) -> str:
+        return f"Sound({len(self.samples) / RATE:.1f} s)"
+
+
+def read_sound(path: Path) -> Sound | None:
+    """Read the first sound track of a video or of a sound file; None where there is none to hear.
+
+    What follows damage is left out.
+
+    Raises:
+        UnreadableVideo: the file cannot be read.
+        TruncatedVideo: it ends before its index.
+    """
+    parts: list[np.ndarray] = []
+    with opened(path) as container:
+        if not container.streams.audio:
+            return None
+        pictures = container.streams.video
+        shift = _start_s(container.streams.audio[0])
+        if pictures:
+            shift -= _start_s(pictures[0])
+        resampler = av.AudioResampler(format="fltp", layout="stereo", rate=RATE)
+        try:
+            for frame in container.decode(audio=0):
+                parts += [part.to_ndarray().T for part in resampler.resample(frame)]
+                if sum(map(len, parts)) > LONGEST_S * RATE:
+                    break
+            parts += [part.to_ndarray().T for part in resampler.resample(None)]
+        except av.FFmpegError:
+            pass  # heard as far as it goes
+    samples = np.concatenate(parts) if parts else np.zeros((0, 2), np.float32)
+    late = round(shift * RATE)
+    samples = np.pad(samples, ((late, 0), (0, 0))) if late > 0 else samples[-late:]
+    samples = np.clip(np.nan_to_num(samples), -1, 1)
+    return Sound(samples) if np.abs(samples).max(initial=0.0) > SILENT else None
+
+
+def require_sound(path: Path) -> Sound:
+    """Read a sound file.
+
+    Raises:
+        UnreadableVideo: it has no sound.
+    """
+    sound = read_sound(path)
+    if sound is None:
+        raise UnreadableVideo("the file holds no sound that can be heard", path)
+    return sound
+
+
+def music_beats(sound: Sound) -> Float[np.ndarray, " B"]:
+    """Return the times of the beats of a piece of music, seconds.
+
+    Raises:
+        MissingDependency: librosa is not installed.
+    """
+    try:
+        import librosa
+    except ImportError as cause:
+        raise MissingDependency(
+            "beats of music need librosa: pip install 'robojackson[music]'"
+        ) from cause
+    mono = sound.samples.mean(1)
+    hop = 256
+    strength = librosa.onset.onset_strength(y=mono, sr=RATE, hop_length=hop)
+    _, frames = librosa.beat.beat_track(
+        onset_envelope=strength, sr=RATE, hop_length=hop, trim=False
+    )
+    times: np.ndarray = librosa.frames_to_time(frames, sr=RATE, hop_length=hop)
+    return times
+
+
+def _start_s(stream: av.stream.Stream) -> float:
+    if stream.start_time is None or stream.time_base is None:
+        return 0.0
+    return float(stream.start_time * stream.time_base)

@@ -1,0 +1,182 @@
+/* A trained robot in MuJoCo's wasm: the observation, network, PD law, reset and fall rule of RoboJackson. */
+'use strict';
+const Dance = (() => {
+  const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
+  const doubles = (text) => new Float64Array(bytes(text));
+
+  async function load(zipped) {
+    const stream = new Blob([bytes(zipped)]).stream().pipeThrough(new DecompressionStream('gzip'));
+    return MUJOCO.default({ wasmBinary: await new Response(stream).arrayBuffer() });
+  }
+
+  /* Rows of the matrix of a quaternion wxyz. */
+  function matrixOf(q, at) {
+    const w = q[at], x = q[at + 1], y = q[at + 2], z = q[at + 3];
+    return [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
+      2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+      2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)];
+  }
+  /* The transpose of a matrix times a vector: a world vector in the frame of the body. */
+  const local = (r, x, y, z) => [r[0] * x + r[3] * y + r[6] * z, r[1] * x + r[4] * y + r[7] * z, r[2] * x + r[5] * y + r[8] * z];
+
+  class Dancer {
+    constructor(mujoco, dance) {
+      Object.assign(this, { mujoco, dance, mode: 'policy' });
+      this.model = mujoco.MjModel.from_xml_string(dance.xml);
+      this.data = new mujoco.MjData(this.model);
+      this.ghost = new mujoco.MjData(this.model);
+      this.model.actuator_gear.set(dance.gears);
+      const { nq, nv, nu } = this.model;
+      Object.assign(this, { nq, nv, nu });
+      for (const name of ['qpos', 'qvel', 'points', 'lead']) this[name] = dance[name] && doubles(dance[name]);
+      this.steps = this.qpos.length / nq;
+      this.layers = dance.layers.map(({ weight, bias, inputs }) => ({ inputs, weight: new Float32Array(bytes(weight)), bias: new Float32Array(bytes(bias)) }));
+      this.sites = dance.sites.map((name) => mujoco.mj_name2id(this.model, mujoco.mjtObj.mjOBJ_SITE.value, name));
+      this.friction = Float64Array.from(this.model.geom_friction);
+      this.gravity = this.model.opt.gravity[2];
+      this.last = new Float64Array(nu); this.targets = new Float64Array(nu);
+      this.start(0);
+    }
+
+    /* The reference at a step: its row and how far the cycles before have moved it. */
+    at(step) {
+      const { cyclic, offset } = this.dance, cycle = cyclic ? Math.floor(step / this.steps) : 0;
+      return { row: cyclic ? step - cycle * this.steps : Math.min(step, this.steps - 1), moved: offset.map((by) => by * cycle) };
+    }
+
+    state(step) {
+      const { row, moved } = this.at(step), qpos = this.qpos.slice(row * this.nq, (row + 1) * this.nq);
+      for (let k = 0; k < 3; k++) qpos[k] += moved[k];
+      return { qpos, qvel: this.qvel.slice(row * this.nv, (row + 1) * this.nv) };
+    }
+
+    start(step, state = this.state(step)) {
+      this.mujoco.mj_resetData(this.model, this.data);
+      this.data.qpos.set(state.qpos); this.data.qvel.set(state.qvel);
+      this.mujoco.mj_forward(this.model, this.data);
+      this.step = this.first = step; this.last.fill(0); this.fallen = false; this.error = 0; this.danced = 0;
+    }
+
+    observe() {
+      const { dance, nq, nv, nu } = this, { qpos, qvel, site_xpos: sites } = this.data;
+      const { row, moved } = this.at(this.step + 1), aim = row * nq, aimSpeed = row * nv;
+      const own = matrixOf(qpos, 3), wanted = matrixOf(this.qpos, aim + 3), seen = [], put = (...values) => seen.push(...values);
+      const turned = [0, 1].flatMap((k) => local(own, wanted[k], wanted[3 + k], wanted[6 + k]));
+      const gyro = () => { for (let k = 3; k < 6; k++) put(qvel[k] * dance.scales.gyro); };
+      const speeds = (values, from) => { for (let k = 6; k < nv; k++) put(values[from + k] * dance.scales.hinge); };
+      const done = () => { for (let k = 0; k < nu; k++) put(this.last[k] * 0.5); };
+      if (dance.observation === 'onboard') {
+        gyro(); put(...turned);
+        for (let k = 7; k < nq; k++) put(qpos[k] - dance.rest[k - 7]);
+        speeds(qvel, 0);
+        for (let k = 7; k < nq; k++) put(this.qpos[aim + k] - dance.rest[k - 7]);
+        speeds(this.qvel, aimSpeed); done();
+      } else {
+        const angle = (2 * Math.PI * row) / this.steps;
+        put(qpos[2] - dance.scales.height, own[6], own[7], own[8], ...local(own, qvel[0], qvel[1], qvel[2]));
+        gyro();
+        for (let k = 7; k < nq; k++) put(qpos[k]);
+        speeds(qvel, 0);
+        put(Math.sin(angle), Math.cos(angle));
+        const away = [0, 1, 2].map((k) => this.qpos[aim + k] + moved[k] - qpos[k]);
+        put(...local(own, ...away).map((value) => value * dance.scales.root), ...turned);
+        for (let k = 7; k < nq; k++) put(this.qpos[aim + k] - qpos[k]);
+        speeds(this.qvel, aimSpeed);
+        put(...local(own, this.qvel[aimSpeed], this.qvel[aimSpeed + 1], this.qvel[aimSpeed + 2]));
+        this.sites.forEach((site, i) => {
+          const from = 3 * (row * this.sites.length + i);
+          const apart = [0, 1, 2].map((k) => this.points[from + k] + moved[k] - sites[3 * site + k]);
+          put(...local(own, ...apart).map((value) => value * dance.scales.point));
+        });
+        done();
+      }
+      return Float32Array.from(seen, (value) => Math.min(dance.scales.clip, Math.max(-dance.scales.clip, value)));
+    }
+
+    act(observation) {
+      let values = observation;
+      this.layers.forEach(({ inputs, weight, bias }, index) => {
+        const out = Float32Array.from(bias), width = out.length, isLast = index === this.layers.length - 1;
+        for (let i = 0; i < inputs; i++) {
+          const value = values[i];
+          if (value !== 0) for (let j = 0, at = i * width; j < width; j++, at++) out[j] += value * weight[at];
+        }
+        for (let j = 0; j < width; j++) out[j] = isLast ? Math.tanh(out[j]) : Math.max(0, out[j]);
+        values = out;
+      });
+      return values;
+    }
+
+    /* One control step, as `Simulation.step`; false where the robot has fallen. */
+    advance() {
+      const { mujoco, model, data, dance, nu } = this, { row } = this.at(this.mode === 'statue' ? this.first : this.step + 1);
+      const action = this.mode === 'policy' ? this.act(this.observe()) : new Float32Array(nu);
+      for (let k = 0; k < nu; k++) {
+        const lead = this.lead && this.mode !== 'statue' ? this.lead[row * nu + k] : 0;
+        this.targets[k] = this.qpos[row * this.nq + 7 + dance.hinge[k]] + lead + dance.action[k] * action[k];
+        this.last[k] = action[k];
+      }
+      for (let substep = 0; substep < dance.substeps; substep++) {
+        const { qpos, qvel, ctrl } = data;
+        for (let k = 0; k < nu; k++) {
+          const torque = dance.kp[k] * (this.targets[k] - qpos[7 + dance.hinge[k]]) - dance.kd[k] * qvel[6 + dance.hinge[k]];
+          ctrl[k] = Math.min(dance.limit[k], Math.max(-dance.limit[k], torque)) / dance.gear[k];
+        }
+        mujoco.mj_step(model, data);
+      }
+      mujoco.mj_kinematics(model, data);
+      this.step += 1;
+      this.#measure();
+      return !this.fallen;
+    }
+
+    #measure() {
+      const { fall } = this.dance, { qpos, site_xpos: sites } = this.data, aim = this.state(this.step).qpos;
+      const up = matrixOf(qpos, 3), wanted = matrixOf(aim, 3), along = up[2] * wanted[2] + up[5] * wanted[5] + up[8] * wanted[8];
+      const low = fall.relative ? Math.abs(qpos[2] - aim[2]) > fall.height : qpos[2] < fall.height;
+      this.fallen ||= low || (fall.relative ? along : up[8]) < fall.cosTilt || !Number.isFinite(qpos[2]);
+      const { row, moved } = this.at(this.step);
+      let sum = 0;
+      this.sites.forEach((site, i) => {
+        const from = 3 * (row * this.sites.length + i);
+        sum += Math.hypot(...[0, 1, 2].map((k) => this.points[from + k] + moved[k] - sites[3 * site + k]));
+      });
+      this.error = sum / this.sites.length;
+      if (!this.fallen) this.danced += 1;
+    }
+
+    push(x, y) { this.data.qvel[0] += x; this.data.qvel[1] += y; }
+    setFriction(factor) { this.model.geom_friction.set(this.friction.map((value) => value * factor)); }
+    setGravity(factor) { this.model.opt.gravity[2] = this.gravity * factor; }
+
+    /* Rows of x y z qw qx qy qz a body. */
+    poses(data = this.data) {
+      const { xpos, xquat } = data, rows = new Float32Array(7 * this.model.nbody);
+      for (let i = 0; i < this.model.nbody; i++) {
+        for (let k = 0; k < 3; k++) rows[7 * i + k] = xpos[3 * i + k];
+        for (let k = 0; k < 4; k++) rows[7 * i + 3 + k] = xquat[4 * i + k];
+      }
+      return rows;
+    }
+
+    ghostPoses() {
+      this.ghost.qpos.set(this.state(this.step).qpos);
+      this.mujoco.mj_kinematics(this.model, this.ghost);
+      return this.poses(this.ghost);
+    }
+
+    /* Largest distance, millimetres, of a body from where Python's MuJoCo has it after a recorded start. */
+    deviation(record) {
+      const keep = this.mode; this.mode = 'policy';
+      this.start(record.step, { qpos: Float64Array.from(record.qpos), qvel: Float64Array.from(record.qvel) });
+      for (let k = 0; k < record.steps; k++) this.advance();
+      const { xpos } = this.data;
+      let most = 0;
+      for (let i = 0; i < record.places.length; i += 3) most = Math.max(most, Math.hypot(...[0, 1, 2].map((k) => xpos[3 + i + k] - record.places[i + k])));
+      this.mode = keep;
+      return 1000 * most;
+    }
+  }
+  return { load, Dancer };
+})();
+if (typeof module !== 'undefined') module.exports = Dance;

@@ -1,0 +1,129 @@
+"""What an evaluation says, ready to read: one sentence, tiles and rows of tables."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from robojackson.report.quantities import POLICY_TITLES, Quantity, format_value, quantities
+from robojackson.report.web.beats import TITLES
+from robojackson.rl.config.evaluate_config import TRAINED
+from robojackson.rl.evaluation.verdict import NEEDS_FULL_LENGTH
+
+VERDICT_COLUMNS = (
+    "survived_s", "success", "strict_success", "skill", "site_error_m", "limb_gain", "drift_m",
+    "heading_error_deg",
+)  # fmt: skip
+NOT_TRAINED = "follows any motion, not trained on this one"
+"""What a tracker does."""
+TOO_SHORT = "too short"
+"""In place of a figure that rollouts are too short to judge."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One row of the evaluation table."""
+
+    title: str
+    meaning: str
+    values: Sequence[str]
+    trained: bool
+
+
+def dancer_of(evaluation: Mapping[str, Any]) -> str:
+    """Return who dances: the trained robot, or a tracker by its name."""
+    name = evaluation.get("tracker")
+    return POLICY_TITLES[TRAINED][0] if name is None else f"tracker {name}"
+
+
+def headline(evaluation: Mapping[str, Any]) -> str:
+    """Return one sentence that says how well it went, beside the best of the baselines."""
+    if not evaluation:
+        return ""
+    said = str(evaluation.get("verdict", {}).get("sentence", ""))
+    if evaluation.get("success") is None:
+        return said
+    said += " " if said else ""
+    said += (
+        f"The {dancer_of(evaluation)} finished {format_value('success', evaluation['success'])} of "
+        f"{format_value('rollouts', evaluation['rollouts'])} rollouts without a fall"
+    )
+    baselines = evaluation.get("baselines", {})
+    if not baselines:
+        return f"{said}."
+    name = max(baselines, key=lambda key: baselines[key]["success"])
+    best = POLICY_TITLES.get(name, (name, ""))[0]
+    theirs, ours = baselines[name]["success"], evaluation["success"]
+    if theirs < ours:
+        return f"{said}; the best baseline ({best}) {format_value('success', theirs)}."
+    how = "as well" if theirs == ours else "better"
+    figure = format_value("success", theirs)
+    return f"{said}; a baseline that learnt nothing ({best}) does {how}: {figure}."
+
+
+def tiles(evaluation: Mapping[str, Any]) -> list[Quantity]:
+    meanings = {
+        "success": "no fall in a whole rollout",
+        "survived_s": "mean time before a fall",
+        "skill": "1 is perfect, 0 is the best frozen pose",
+        "site_error_m": "mean distance of 14 points",
+        "limb_gain": "1 is the whole amplitude",
+    }
+    found = {key: evaluation[key] for key in meanings if evaluation.get(key) is not None}
+    return [
+        Quantity(f.label, f.value, meanings[key])
+        for key, f in zip(found, quantities(found), strict=True)
+    ]
+
+
+def verdicts(evaluation: Mapping[str, Any]) -> list[Verdict]:
+    """Return the figures of the trained policy and of its baselines, ready to read."""
+    if not evaluation:
+        return []
+    trackers = evaluation.get("trackers", {})
+    policies = {TRAINED: evaluation, **trackers, **evaluation.get("baselines", {})}
+    rows = []
+    for name, figures in policies.items():
+        title, meaning = POLICY_TITLES.get(name, (name, ""))
+        if "tracker" in figures:
+            title, meaning = dancer_of(figures), NOT_TRAINED
+        short = evaluation.get("verdict", {}).get("kind") == "too_short"
+        values = [
+            TOO_SHORT
+            if short and column in NEEDS_FULL_LENGTH
+            else format_value(column, figures.get(column))
+            for column in VERDICT_COLUMNS
+        ]
+        rows.append(Verdict(title, meaning, values, name == TRAINED))
+    return rows
+
+
+PASSPORT_COLUMNS = ("strict_success", "skill", "survived_s", "kept")
+
+
+def passport_rows(evaluation: Mapping[str, Any]) -> list[Verdict]:
+    """Return the figures of the policy under other physics, ready to read."""
+    return [
+        Verdict(
+            row["case"], "", [format_value(key, row[key]) for key in PASSPORT_COLUMNS], index == 0
+        )
+        for index, row in enumerate(evaluation.get("passport", []))
+    ]
+
+
+def beat_rows(report: Mapping[str, Any]) -> list[Verdict]:
+    """Return how motions meet the music (`beat_report`), ready to read."""
+    return [
+        Verdict(
+            TITLES[name],
+            "",
+            [
+                str(one["beats"]),
+                f"{100 * one['precision']:.0f}%",
+                f"{100 * one['recall']:.0f}%",
+                f"{one['f1']:.2f}",
+                f"{one['bas']:.2f}",
+            ],
+            name == "robot",
+        )
+        for name, one in report["figures"].items()
+    ]

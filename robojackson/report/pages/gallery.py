@@ -1,0 +1,75 @@
+"""The gallery: all dances of a store on one page, to filter and to sort."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+
+from robojackson.report.pages import inline
+from robojackson.report.quantities import Quantity, quantities
+
+SHOWN = ("strict_success", "survived_s", "skill", "site_error_m", "limb_gain")
+SORTS = {
+    "finished": "latest",
+    "strictSuccess": "strict success",
+    "survivedS": "survival",
+    "skill": "skill",
+    "limbGain": "limb gain",
+}
+"""Orders by their names in the page, largest first."""
+ORDERED = ("strict_success", "survived_s", "skill", "limb_gain")
+
+
+@dataclass(frozen=True)
+class GalleryRun:
+    """A dance.
+
+    Attributes:
+        dance, robot, setup, seed: What danced what.
+        finished_at: When.
+        summary: Figures of the evaluation.
+        page, live: Addresses relative to the gallery, or empty.
+        thumbnail: JPEG as base64, or empty.
+    """
+
+    dance: str
+    robot: str
+    setup: str
+    seed: int
+    finished_at: datetime
+    summary: Mapping[str, object]
+    page: str = ""
+    live: str = ""
+    thumbnail: str = ""
+
+    @property
+    def figures(self) -> list[Quantity]:
+        """The figures that are shown."""
+        found = {key: self.summary[key] for key in SHOWN if self.summary.get(key) is not None}
+        return quantities(found)
+
+    @property
+    def order(self) -> dict[str, float]:
+        """What entries are sorted by."""
+        found = {key: _number(self.summary.get(key)) for key in ORDERED}
+        return {"finished": self.finished_at.timestamp(), **found}
+
+
+def render_gallery(runs: Sequence[GalleryRun]) -> str:
+    """Return the gallery as HTML, one file with everything but the pages that it leads to."""
+    styles, scripts = [inline.own("page.css")], [inline.own("gallery.js")]
+    filters = {
+        key: sorted({str(getattr(r, key)) for r in runs}) for key in ("dance", "robot", "setup")
+    }
+    return inline.render(
+        "gallery.html",
+        styles,
+        scripts,
+        security=inline.policy(scripts, styles),
+        entries=sorted(runs, key=lambda run: run.finished_at, reverse=True),
+        filters=filters,
+        sorts=SORTS,
+    )
+
+
+def _number(value: object) -> float:
+    return float(value) if isinstance(value, int | float) else 0.0

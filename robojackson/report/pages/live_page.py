@@ -1,0 +1,49 @@
+"""A live dance as one HTML file: MuJoCo's wasm, the robot, its policy and its motion inside it."""
+
+import numpy as np
+
+from robojackson.report.pages import inline
+from robojackson.report.web.live_data import live_data
+from robojackson.report.web.shown_run import RecordedRun
+
+SCRIPTS = ("scene.js", "dance.js", "live.js")
+STYLES = ("page.css",)
+TOLERANCE_MM = 5.0
+"""By how much a body may be elsewhere than in Python after a recorded start."""
+CHECKED = 4
+"""Recorded starts that a browser checks by itself as it opens the page."""
+PULL = 6.0
+"""Stiffness of the pointer's pull, 1/s^2: newtons a metre and kilogram."""
+STRONGEST = 5.0
+"""Its largest acceleration of the whole robot, m/s^2."""
+ROOM = 1.35
+"""Height and width of the pane beside what the dance takes."""
+
+
+def live_page(run: RecordedRun, title: str) -> str | None:
+    """Return the page; None where a browser cannot run the policy or the robot (`live_data`)."""
+    data = None if run.policy is None else live_data(run.policy, run.reference, run.robot)
+    if data is None:
+        return None
+    points, mass = np.asarray(run.reference.keypoints_w), float(run.robot.model.body_mass.sum())
+    data |= {
+        "height": ROOM * float(points[..., 2].max()),
+        "width": ROOM * float(np.ptp(points[..., :2], axis=(0, 1)).max()),
+        "tolerance": TOLERANCE_MM,
+        "checked": CHECKED,
+        "stiffness": PULL * mass,
+        "strongest": STRONGEST * mass,
+        "wasm": inline.compressed_asset("mujoco.wasm.gz"),
+    }
+    styles = [inline.own(name) for name in STYLES]
+    scripts = [inline.asset("three.min.js"), inline.asset("mujoco.min.js")]
+    scripts += [inline.own(name) for name in SCRIPTS]
+    return inline.render(
+        "live.html",
+        styles,
+        scripts,
+        security=inline.policy(scripts, styles, wasm=True),
+        title=title,
+        data=inline.json_text(data),
+        steps=len(run.reference),
+    )

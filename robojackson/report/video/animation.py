@@ -1,0 +1,34 @@
+"""A film as a picture that moves by itself, where no video can be shown: GIF or WebP."""
+
+from pathlib import Path
+
+import cv2
+from PIL import Image
+
+from robojackson.clips.video import VideoLimits, probe, read_frames
+
+FPS, WIDTH_PX = 12, 640
+
+
+def write_animation(film: Path, out: Path, kind: str) -> Path:
+    """Write the pictures of a film, at most 12 a second and 640 pixels wide, endlessly repeated.
+
+    Args:
+        kind: gif or webp.
+    Raises:
+        UnreadableVideo: the film cannot be read.
+    """
+    info = probe(film, VideoLimits(min_frames=1))
+    every = max(1, round(info.fps / FPS))
+    scale = min(1.0, WIDTH_PX / info.width)
+    pictures = [
+        Image.fromarray(cv2.resize(frame, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA))
+        for index, frame in enumerate(read_frames(film))
+        if index % every == 0
+    ]
+    partial = out.with_name(out.name + ".partial")
+    duration = round(1000 * every / info.fps)
+    first, rest = pictures[0], pictures[1:]
+    first.save(partial, kind, save_all=True, append_images=rest, duration=duration, loop=0)
+    partial.replace(out)
+    return out

@@ -1,0 +1,152 @@
+"""What a browser needs to run a trained policy on a robot: model, motion, network, law, fall rule.
+
+The model goes without the geoms that touch nothing: their masses are written into the bodies.
+Metres, radians, seconds, newton-metres.
+"""
+
+import mujoco
+import numpy as np
+
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.report.web.shapes import packed, robot_shape
+from robojackson.rl.config.train_config import EvaluateConfig
+from robojackson.rl.evaluation.controllers import control_of, trained_driver
+from robojackson.rl.evaluation.rollouts import Starts
+from robojackson.rl.evaluation.starts import starts_of
+from robojackson.rl.modes.observation import (
+    CLIP,
+    HINGE_SPEED_SCALE,
+    POINT_SCALE,
+    ROOT_SCALE,
+    SPEED_SCALE,
+    USUAL_HEIGHT_M,
+)
+from robojackson.rl.policy import Policy
+from robojackson.rl.policy_facts import mode_of, observation_of
+from robojackson.rl.sim.feedforward import lead_of
+from robojackson.rl.sim.motors import Motors, feedback_share, gains, residual_scale
+from robojackson.rl.sim.reference_clip import Clip
+from robojackson.rl.sim.simulation import Simulation
+from robojackson.robot.fall import Fall
+from robojackson.robot.mjcf import described_spec, mjcf_path
+from robojackson.robot.model import Robot
+
+RECORDS = 20
+"""States from which the browser's physics is compared with ours."""
+SUBSTEPS = 300
+"""Of each comparison."""
+OBSERVED = ("full", "onboard")
+"""Observations that the browser computes."""
+
+
+def live_data(policy: Policy, reference: ReferenceMotion, robot: Robot) -> dict[str, object] | None:
+    """Return everything of a live dance; None where a browser cannot run it.
+
+    That is a policy of the paper's mode, of another observation or with feedback along the
+    reference, or a robot whose meshes collide.
+    """
+    if mode_of(policy) != "track":
+        return None
+    control = control_of(policy, robot)
+    if control.law != "pd" or _has_colliding_meshes(robot.model):
+        return None
+    if feedback_share(robot, control) or observation_of(policy) not in OBSERVED:
+        return None
+    motors, (kp, kd) = Motors.of(robot.model), gains(robot, control)
+    lead, fall = lead_of(robot, reference, control), Fall.of(robot)
+    names = [robot.model.site(int(site)).name for site in robot.keypoint_sites]
+    return {
+        "xml": model_xml(robot),
+        "dt": reference.dt,
+        "substeps": control.substeps or robot.substeps,
+        "qpos": packed(reference.qpos, np.float64),
+        "qvel": packed(reference.qvel, np.float64),
+        "points": packed(reference.keypoints_w, np.float64),
+        "lead": None if lead is None else packed(lead, np.float64),
+        "cyclic": bool(reference.cyclic),
+        "offset": np.asarray(reference.cycle_offset, float).tolist(),
+        "sites": names,
+        "observation": observation_of(policy),
+        "rest": robot.standing[7:].tolist(),
+        "layers": [
+            {"weight": packed(weight), "bias": packed(bias), "inputs": len(weight)}
+            for weight, bias in policy.layers
+        ],
+        "scales": {
+            "gyro": SPEED_SCALE, "hinge": HINGE_SPEED_SCALE, "point": POINT_SCALE,
+            "root": ROOT_SCALE, "clip": CLIP, "height": USUAL_HEIGHT_M,
+        },
+        "hinge": motors.hinge.tolist(),
+        "gear": motors.gear.tolist(),
+        "gears": robot.model.actuator_gear.ravel().tolist(),
+        "limit": motors.limit.tolist(),
+        "kp": kp.tolist(),
+        "kd": kd.tolist(),
+        "action": residual_scale(robot, control).tolist(),
+        "fall": {
+            "relative": fall.relative,
+            "height": fall.height,
+            "cosTilt": float(np.cos(fall.tilt)),
+        },
+        "shape": robot_shape(robot.model),
+        "records": records(policy, reference, robot),
+    }  # fmt: skip
+
+
+def model_xml(robot: Robot) -> str:
+    """Return the robot's MJCF in one text, without what is only looked at."""
+    spec = described_spec(robot.description, mjcf_path(robot.description))
+    for body in spec.bodies[1:]:
+        shown = [geom for geom in body.geoms if not (geom.contype or geom.conaffinity)]
+        if not shown:
+            continue
+        index = robot.model.body(body.name).id
+        body.mass, body.explicitinertial = float(robot.model.body_mass[index]), True
+        body.inertia = robot.model.body_inertia[index]
+        body.ipos, body.iquat = robot.model.body_ipos[index], robot.model.body_iquat[index]
+        for geom in shown:
+            spec.delete(geom)
+    parts = [*spec.meshes, *spec.sensors, *spec.keys]
+    if any(texture.file for texture in spec.textures):
+        parts += [*spec.textures, *spec.materials]
+        for geom in spec.geoms:
+            geom.material = ""
+    for part in parts:
+        spec.delete(part)
+    spec.compile()
+    return str(spec.to_xml())
+
+
+def records(policy: Policy, reference: ReferenceMotion, robot: Robot) -> list[dict[str, object]]:
+    """Return noisy starts all over the motion and where the bodies are `SUBSTEPS` later."""
+    control = control_of(policy, robot)
+    clip = Clip(reference, lead_of(robot, reference, control))
+    starts, _ = starts_of(robot, clip, EvaluateConfig(phases=RECORDS, resets=1))
+    starts = Starts(starts.step[:RECORDS], starts.qpos[:RECORDS], starts.qvel[:RECORDS])
+    driver, count = trained_driver(policy, robot, reference), len(starts.step)
+    sim = Simulation(robot, driver.control, count)
+    sim.place(np.arange(count), starts.qpos, starts.qvel)
+    steps = SUBSTEPS // (sim.control.substeps or 1)
+    last = np.zeros((count, robot.model.nu))
+    for step in range(steps):
+        following = clip.at(starts.step + step + 1)
+        command = driver.command(sim, following, starts.step, last)
+        last = np.clip((command - sim.reference_angles(following)) / sim.residual, -1, 1)
+        sim.step(command)
+    sim.close()
+    return [
+        {
+            "step": int(starts.step[i]),
+            "qpos": starts.qpos[i].tolist(),
+            "qvel": starts.qvel[i].tolist(),
+            "steps": steps,
+            "places": sim.datas[i].xpos[1:].ravel().tolist(),
+        }
+        for i in range(count)
+    ]
+
+
+def _has_colliding_meshes(model: mujoco.MjModel) -> bool:
+    solid = (model.geom_contype > 0) | (model.geom_conaffinity > 0)
+    kinds = (int(mujoco.mjtGeom.mjGEOM_MESH), int(mujoco.mjtGeom.mjGEOM_HFIELD))
+    return bool((solid & np.isin(model.geom_type, kinds)).any())

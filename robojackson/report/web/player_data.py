@@ -1,0 +1,200 @@
+"""What the player of a page shows: one clock, four panes, bands of time and curves.
+
+Every row is a picture of the timeline of the rendered video, so that all panes go by one number.
+World frame, metres, radians, seconds.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from robojackson.motion.landmark_track import LandmarkTrack
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.smpl_sequence import AIR, SmplSequence
+from robojackson.report.video.panel_camera import smooth_camera_path
+from robojackson.report.video.timeline import Timeline, reference_qpos, timeline
+from robojackson.report.web.shapes import body_poses, packed, person_shape, robot_shape
+from robojackson.robot.model import Robot
+
+FAINT = 0.5
+"""Mean confidence of the keypoints below which a stretch is marked."""
+FAR_M = 0.15
+"""Mean site error above which a stretch is marked, metres: half of what strict success allows."""
+CONTACT_CLASSES = {1: "on", 2: "slide"}
+MARGIN_M = 0.12
+LEAST_SPAN = 2
+"""Pictures that a marked stretch lasts at least, so that it can be seen."""
+
+
+@dataclass(frozen=True)
+class Span:
+    """Pictures [start, end) of a band.
+
+    Attributes:
+        kind: Class of its colour.
+        title: What it is, in words.
+    """
+
+    start: float
+    end: float
+    kind: str
+    title: str
+
+
+@dataclass(frozen=True)
+class Band:
+    """A row of the timeline."""
+
+    title: str
+    spans: Sequence[Span]
+
+
+@dataclass(frozen=True)
+class Player:
+    """Everything of the player.
+
+    Attributes:
+        data: As JSON: shapes, motions and curves.
+        bands: Rows of the timeline.
+        when: The moments of the pictures.
+        error_m: Mean site error of the rollout at every picture, by name of the site; empty without
+            a rollout.
+        points: Keypoints of dancer, reference and robot at every picture, metres.
+    """
+
+    data: dict[str, object]
+    bands: list[Band]
+    when: Timeline
+    error_m: dict[str, Float[np.ndarray, " N"]]
+    points: dict[str, Float[np.ndarray, "N K 3"]]
+
+
+def player(
+    track: LandmarkTrack,
+    sequence: SmplSequence,
+    reference: ReferenceMotion,
+    rollout_qpos: Float[np.ndarray, "S nq"] | None,
+    robot: Robot,
+    fps: float,
+    max_seconds: float,
+) -> Player:
+    """Return the panes, bands and curves of a run."""
+    steps = 0 if rollout_qpos is None else len(rollout_qpos)
+    when = timeline(reference, track.fps, len(sequence), steps, fps, max_seconds)
+    target = reference_qpos(reference, when)
+    poses, sites = body_poses(robot.model, target)
+    sites = sites[:, robot.keypoint_sites]
+    points = np.asarray(sequence.keypoints_w, float)[np.minimum(when.frame, len(sequence) - 1)]
+    data: dict[str, object] = {
+        "fps": fps,
+        "count": len(when),
+        "robot": robot_shape(robot.model),
+        "person": person_shape(),
+        "body": {"points": packed(points), **_followed(points, points[:, 0], fps)},
+        "reference": {"poses": packed(poses), **_followed(sites, target[:, :3], fps)},
+        "joints": [name.replace("_", " ") for name in reference.joint_names],
+        "angles": packed(np.degrees(target[:, 7:])),
+        "torque": _torques(reference, when),
+        "liveliest": int(np.argmax(target[:, 7:].std(0))),
+    }
+    errors: dict[str, np.ndarray] = {}
+    moved = {"person": points, "reference": sites}
+    if rollout_qpos is not None and steps:
+        danced = np.asarray(rollout_qpos, float)[when.rollout]
+        own_poses, own_sites = body_poses(robot.model, danced)
+        own_sites = own_sites[:, robot.keypoint_sites]
+        apart = np.linalg.norm(own_sites - sites, axis=-1)
+        moved["robot"] = own_sites
+        errors = dict(zip(robot.keypoint_names, apart.T, strict=True))
+        data["trained"] = {"poses": packed(own_poses), **_followed(own_sites, danced[:, :3], fps)}
+        data["trained_angles"] = packed(np.degrees(danced[:, 7:]))
+        data["error"] = packed(1000 * apart.mean(1))
+        data["ended"] = int(np.argmax(when.ended)) if when.ended.any() else len(when)
+    bands = _contact_bands(sequence, reference, when)
+    bands.append(Band("look here", attention(sequence, reference, when, errors)))
+    return Player(data, [band for band in bands if band.spans], when, errors, moved)
+
+
+def _followed(points: np.ndarray, root: np.ndarray, fps: float) -> dict[str, object]:
+    """Where a camera looks, and how much room what it follows takes, metres."""
+    path = smooth_camera_path(root, fps)
+    around = np.linalg.norm(points[..., :2] - path[:, None], axis=-1).max()
+    return {
+        "target": packed(path),
+        "height": float(points[..., 2].max()) + 2 * MARGIN_M,
+        "width": 2 * float(around + MARGIN_M),
+    }
+
+
+def _torques(reference: ReferenceMotion, when: Timeline) -> str | None:
+    ratio = np.asarray(reference.torque_ratio)
+    if ratio.shape[1] != len(reference.joint_names):
+        return None
+    return packed(100 * ratio[when.step])
+
+
+def _contact_bands(
+    sequence: SmplSequence, reference: ReferenceMotion, when: Timeline
+) -> list[Band]:
+    frames = np.minimum(when.frame, len(sequence) - 1)
+    bands = []
+    for column, side in ((0, "left"), (2, "right")):
+        contact = np.asarray(sequence.contact)[frames, column : column + 2]
+        state = np.where((contact == AIR).all(1), 0, np.where((contact == 1).any(1), 1, 2))
+        bands.append(Band(f"person, {side} foot", _spans(state)))
+    for side in ("left", "right"):
+        own = [i for i, name in enumerate(reference.contact_names) if name.startswith(side)]
+        contact = np.asarray(reference.contact)[when.step][:, own]
+        if own:
+            state = np.where((contact == AIR).all(1), 0, np.where((contact == 1).any(1), 1, 2))
+            bands.append(Band(f"robot, {side} foot", _spans(state)))
+    return bands
+
+
+def _spans(state: Int[np.ndarray, " N"]) -> list[Span]:
+    words = {1: "planted", 2: "sliding"}
+    return [
+        Span(start, end, CONTACT_CLASSES[kind], words[kind])
+        for start, end, kind in _runs(state)
+        if kind in words
+    ]
+
+
+def attention(
+    sequence: SmplSequence,
+    reference: ReferenceMotion,
+    when: Timeline,
+    errors: dict[str, Float[np.ndarray, " N"]],
+) -> list[Span]:
+    """Return the bad stretches, by cause."""
+    frames = np.minimum(when.frame, len(sequence) - 1)
+    marks: dict[str, Bool[np.ndarray, " N"]] = {
+        "body filled in": ~np.asarray(sequence.valid)[frames],
+        "body uncertain": np.asarray(sequence.confidence)[frames].mean(1) < FAINT,
+    }
+    if reference.certificate is not None:
+        marks["beyond the robot"] = np.asarray(reference.certificate.slack)[when.step] > 1
+    if errors:
+        apart = np.mean(list(errors.values()), 0)
+        marks["robot off the dance"] = (apart > FAR_M) & ~when.ended
+        marks["robot has fallen or ended"] = when.ended
+    found = []
+    for title, bad in marks.items():
+        kind = "bad" if title.startswith("robot") else "weak"
+        for start, end, is_bad in _runs(bad.astype(int)):
+            if is_bad:
+                found.append(Span(start, max(end, start + LEAST_SPAN), kind, title))
+    return found
+
+
+def _runs(values: Int[np.ndarray, " N"]) -> list[tuple[int, int, int]]:
+    """Return (start, end, value) of every stretch of one value."""
+    found, start = [], 0
+    for value, group in groupby(values.tolist()):
+        end = start + len(list(group))
+        found.append((start, end, int(value)))
+        start = end
+    return found

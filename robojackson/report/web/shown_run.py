@@ -1,0 +1,104 @@
+"""A recorded run as a page shows it: player, source pane, sound and beats."""
+
+import base64
+import logging
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+from jaxtyping import Float
+
+from robojackson.clips.video import read_frames
+from robojackson.errors import MissingDependency
+from robojackson.motion.landmark_track import LandmarkTrack
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.smpl_sequence import SmplSequence
+from robojackson.report.video.film import VideoConfig
+from robojackson.report.video.soundtrack import soundtrack
+from robojackson.report.video.source_film import source_film
+from robojackson.report.web.beats import beat_bands, beat_report, music_beats_shown
+from robojackson.report.web.player_data import Player, player
+from robojackson.rl.policy import Policy
+from robojackson.robot.model import Robot
+
+THUMBNAIL_PX, THUMBNAIL_QUALITY = 168, 70
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class RecordedRun:
+    """What a pass has left.
+
+    Attributes:
+        robot: Who danced.
+        track, sequence, reference: Landmarks, person and target.
+        rollout_qpos: What was danced, from the first step.
+        policy: What was trained; None where a tracker danced.
+    """
+
+    robot: Robot
+    track: LandmarkTrack
+    sequence: SmplSequence
+    reference: ReferenceMotion
+    rollout_qpos: Float[np.ndarray, "S nq"] | None
+    policy: Policy | None
+
+
+@dataclass(frozen=True)
+class ShownRun:
+    """What the page has of it.
+
+    Attributes:
+        player: The panes.
+        film, has_sound: mp4 of the source pane, and whether that is not silent.
+        beats: Beats and their figures; None where there is no music.
+    """
+
+    player: Player
+    film: bytes
+    has_sound: bool
+    beats: dict[str, object] | None
+
+
+def shown_run(run: RecordedRun, clip: Path, config: VideoConfig) -> ShownRun:
+    """Return panes, film and beats of a run.
+
+    Raises:
+        UnreadableVideo: the music of the configuration cannot be read.
+    """
+    fps = float(config.fps)
+    shown = player(
+        run.track, run.sequence, run.reference, run.rollout_qpos, run.robot, fps, config.max_seconds
+    )
+    seconds = len(shown.when) / fps
+    sound = soundtrack(clip, config.music, run.reference, seconds)
+    beats = None
+    if sound is not None:
+        beats = _beats(run, clip, config, shown, seconds)
+    if beats is not None:
+        shown = replace(shown, bands=[*beat_bands(beats, fps), *shown.bands])
+    film = source_film(clip, run.track, shown.when, config, sound)
+    return ShownRun(shown, film, sound is not None, beats)
+
+
+def _beats(
+    run: RecordedRun, clip: Path, config: VideoConfig, shown: Player, seconds: float
+) -> dict[str, object] | None:
+    try:
+        music = music_beats_shown(clip, config.music, run.reference, seconds)
+    except MissingDependency as missing:
+        log.warning("%s", missing)
+        return None
+    return beat_report(music, shown.points, float(config.fps)) if len(music) else None
+
+
+def thumbnail(clip: Path) -> str:
+    """Return a small picture of the first frame of a clip, JPEG as base64."""
+    picture = next(iter(read_frames(clip)))
+    scale = THUMBNAIL_PX / min(picture.shape[:2])
+    small = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    options = [cv2.IMWRITE_JPEG_QUALITY, THUMBNAIL_QUALITY]
+    _, encoded = cv2.imencode(".jpg", cv2.cvtColor(small, cv2.COLOR_RGB2BGR), options)
+    return base64.b64encode(encoded.tobytes()).decode()

@@ -1,0 +1,103 @@
+"""The live dance in Debian's chromium: the same physics as Python's, and it can be disturbed."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robojackson.report.web.live_data import RECORDS
+from robojackson.report.web.shown_run import RecordedRun
+from robojackson.rl.evaluation.controllers import control_of, trained_driver
+from robojackson.rl.evaluation.rollouts import Starts, roll_out
+from robojackson.rl.sim.feedforward import lead_of
+from robojackson.rl.sim.reference_clip import Clip
+from robojackson.robot.fall import Fall
+from tests.browser.conftest import Opened
+from tests.browser.test_run_page import serious
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(900)]
+Open = Callable[..., Opened]
+STEPS = 120
+PAUSE = "() => { robojackson.state.playing = false }"
+ROLLOUTS = """steps => { const { dancer, dance } = robojackson; robojackson.state.playing = false;
+  return dance.records.map((record) => {
+    dancer.start(record.step, { qpos: Float64Array.from(record.qpos), qvel: Float64Array.from(record.qvel) });
+    let error = 0, count = 0;
+    for (let k = 0; k < steps; k++) { if (!dancer.advance()) break; error += dancer.error; count += 1; }
+    return [dancer.danced, error / Math.max(1, count)];
+  }); }"""  # noqa: E501
+
+
+def test_live_page_asks_for_nothing_and_fits(opened: Open, live_file: Path) -> None:
+    found = opened(live_file, 375, "dark")
+    found.page.wait_for_selector("[data-checked=yes]")
+    assert [url for url in found.requests if not url.startswith("blob:")] == [live_file.as_uri()]
+    assert found.complaints == []
+    assert found.page.evaluate("document.documentElement.scrollWidth") <= 375
+    assert "physics as in Python" in found.page.inner_text("#badge")
+    assert live_file.stat().st_size <= 6_000_000
+
+
+def test_every_recorded_state_ends_within_5_mm_of_python(opened: Open, live_file: Path) -> None:
+    page = opened(live_file).page
+    page.evaluate(PAUSE)
+    apart = page.evaluate("robojackson.dance.records.map((r) => robojackson.dancer.deviation(r))")
+    assert len(apart) == RECORDS
+    assert max(apart) <= 5.0
+
+
+def test_rollouts_survive_and_err_as_in_python(
+    opened: Open, live_file: Path, run: RecordedRun
+) -> None:
+    page = opened(live_file).page
+    theirs = np.array(page.evaluate(ROLLOUTS, STEPS))
+    records = page.evaluate("robojackson.dance.records")
+    assert run.policy is not None
+    clip = Clip(run.reference, lead_of(run.robot, run.reference, control_of(run.policy, run.robot)))
+    starts = Starts(*(np.array([one[k] for one in records]) for k in ("step", "qpos", "qvel")))
+    driver = trained_driver(run.policy, run.robot, run.reference)
+    horizon = np.full(len(records), STEPS)
+    done = roll_out(run.robot, clip, driver, starts, horizon, 1, Fall.of(run.robot))
+    ours = done.length.astype(float)
+    assert abs(theirs[:, 0].mean() - ours.mean()) <= max(1.0, ours.std())
+    apart = np.linalg.norm(done.points - done.target, axis=-1).mean(-1)
+    errors = np.array([apart[: max(1, n), i].mean() for i, n in enumerate(done.length)])
+    assert abs(theirs[:, 1].mean() - errors.mean()) <= max(0.001, errors.std())
+
+
+def test_a_push_gravity_and_floor_change_what_happens(opened: Open, live_file: Path) -> None:
+    page = opened(live_file).page
+    page.evaluate(PAUSE)
+    after = {
+        name: page.evaluate(
+            f"() => {{ const {{ dancer }} = robojackson; dancer.start(0); {act}; "
+            "for (let k = 0; k < 20; k++) dancer.advance(); "
+            "const at = Array.from(dancer.data.qpos).slice(0, 3);"
+            " dancer.setGravity(1); dancer.setFriction(1); return at; }"
+        )
+        for name, act in {
+            "plain": "",
+            "pushed": "dancer.push(0.3, 0)",
+            "light": "dancer.setGravity(0.1)",
+            "slippery": "dancer.setFriction(0.05)",
+        }.items()
+    }
+    assert after["pushed"][0] - after["plain"][0] > 0.02
+    assert after["light"] != after["plain"] != after["slippery"]
+
+
+def test_policy_off_and_statue_are_other_dancers(opened: Open, live_file: Path) -> None:
+    page = opened(live_file).page
+    page.evaluate(PAUSE)
+    script = """mode => { const { dancer } = robojackson; dancer.mode = mode; dancer.start(0);
+      for (let k = 0; k < 20; k++) dancer.advance(); return Array.from(dancer.data.qpos); }"""
+    ends = [page.evaluate(script, mode) for mode in ("policy", "reference", "statue", "policy")]
+    assert ends[0] == ends[3]
+    assert ends[0] != ends[1] != ends[2]
+
+
+def test_axe_finds_nothing_serious_in_a_live_dance(opened: Open, live_file: Path, axe: str) -> None:
+    page = opened(live_file).page
+    page.evaluate(PAUSE)
+    assert serious(page, axe) == []

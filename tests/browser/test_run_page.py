@@ -1,0 +1,105 @@
+"""The page of a run in Debian's chromium, from disk."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.browser.conftest import CYCLE, LEVEL, Opened
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(900)]
+Open = Callable[..., Opened]
+SHOWN = """() => {
+  const { video, state } = robojackson, canvas = document.createElement('canvas');
+  canvas.width = canvas.height = 8;
+  const pen = canvas.getContext('2d');
+  pen.drawImage(video, video.videoWidth / 2 - 5, video.videoHeight / 2 - 5, 10, 10, 0, 0, 8, 8);
+  return { drawn: state.drawn, picture: state.picture, grey: pen.getImageData(4, 4, 1, 1).data[0] };
+}"""
+GO = "k => new Promise(done => { robojackson.video.pause(); const wait = () => robojackson.state.drawn === k ? done() : setTimeout(wait, 20); robojackson.go(k); wait(); })"  # noqa: E501
+
+
+@pytest.mark.parametrize("width", [375, 1600])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_page_asks_for_nothing_complains_of_nothing_and_fits(
+    opened: Open, page_file: Path, width: int, scheme: str
+) -> None:
+    found = opened(page_file, width, scheme)
+    found.page.wait_for_timeout(1500)
+    assert [url for url in found.requests if not url.startswith(("blob:", "data:"))] == [
+        page_file.as_uri()
+    ]
+    assert found.complaints == []
+    assert found.page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+def test_markup_and_turned_text_of_a_title_are_text(opened: Open, page_file: Path) -> None:
+    page = opened(page_file).page
+    assert page.inner_text("h1") == "<script>alert(1)</script> \\u202emosnart"
+    assert page.title().startswith("<script>alert(1)</script> \\u202emosnart")
+
+
+@pytest.mark.parametrize("picture", [3, 20, 41])
+def test_panes_and_picture_are_of_one_moment_after_a_seek(
+    opened: Open, page_file: Path, picture: int
+) -> None:
+    page = opened(page_file).page
+    page.evaluate(GO, picture)
+    assert_one_moment(page.evaluate(SHOWN), picture)
+
+
+def test_panes_and_picture_are_of_one_moment_after_steps(opened: Open, page_file: Path) -> None:
+    page = opened(page_file).page
+    page.evaluate(GO, 10)
+    page.focus("#player")
+    for key, picture in (("ArrowRight", 11), ("ArrowRight", 12), ("ArrowLeft", 11)):
+        page.keyboard.press(key)
+        page.wait_for_function(f"robojackson.state.drawn === {picture}")
+        assert_one_moment(page.evaluate(SHOWN), picture)
+
+
+def test_panes_follow_the_picture_while_it_plays_and_when_it_pauses(
+    opened: Open, page_file: Path
+) -> None:
+    page = opened(page_file).page
+    page.evaluate("robojackson.video.play()")
+    for _ in range(5):
+        page.wait_for_timeout(300)
+        shown = page.evaluate(SHOWN)
+        assert abs(shown["drawn"] - shown["picture"]) <= 1
+    page.evaluate("robojackson.video.pause()")
+    page.wait_for_timeout(800)
+    shown = page.evaluate(SHOWN)
+    assert_one_moment(shown, shown["picture"])
+
+
+def assert_one_moment(shown: dict[str, int], picture: int) -> None:
+    """The panes drew the picture, and the clip's grey says that its picture is within one of it."""
+    assert shown["drawn"] == shown["picture"] == picture
+    seen = round(shown["grey"] / LEVEL) - 1
+    assert (seen - picture + 1) % CYCLE <= 2
+
+
+def test_keyboard_slows_and_shows_the_ghost(opened: Open, page_file: Path) -> None:
+    page = opened(page_file).page
+    page.focus("#player")
+    page.keyboard.press("s")
+    page.keyboard.press("g")
+    assert page.evaluate("robojackson.video.playbackRate") == 0.25
+    assert page.get_attribute("#ghost", "aria-pressed") == "true"
+
+
+def test_axe_finds_nothing_serious(opened: Open, page_file: Path, axe: str) -> None:
+    page = opened(page_file).page
+    page.evaluate("robojackson.video.pause()")
+    assert serious(page, axe) == []
+
+
+def serious(page: object, axe: str) -> list[str]:
+    """Rules of axe-core that are broken seriously."""
+    found = page.evaluate(f"async () => {{ {axe}; return (await axe.run()).violations }}")  # type: ignore[attr-defined]
+    return [
+        f"{one['id']}: {one['nodes'][0]['html'][:80]}"
+        for one in found
+        if one["impact"] in ("serious", "critical")
+    ]
