@@ -36,9 +36,9 @@ from robojackson.cli.options import (
     overrides_from,
     yaml_text,
 )
+from robojackson.cli.pictures.view_command import view
 from robojackson.cli.robot_commands import robots
 from robojackson.cli.trackers.tracker_commands import trackers
-from robojackson.cli.view_command import view
 
 
 @command

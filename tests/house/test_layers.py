@@ -22,7 +22,8 @@ COMMANDS = (
     *("flows/cli/backup_commands.py", "robojackson/cli/app.py", "robojackson/cli/options.py"),
     *("robojackson/cli/format_commands.py", "robojackson/cli/learning_commands.py"),
     *("robojackson/cli/robot_commands.py", "flows/cli/clean_command.py"),
-    "robojackson/cli/trackers/tracker_commands.py",
+    *("robojackson/cli/trackers/tracker_commands.py", "flows/cli/gallery_command.py"),
+    "robojackson/cli/pictures/view_command.py",
 )
 """Modules that define commands."""
 LIGHT = {

@@ -9,6 +9,9 @@ from robojackson.report.web.beats import TITLES
 from robojackson.rl.config.evaluate_config import TRAINED
 from robojackson.rl.evaluation.verdict import NEEDS_FULL_LENGTH
 
+Evaluation = Mapping[str, Any]
+"""An evaluation as its JSON has it."""
+
 VERDICT_COLUMNS = (
     "survived_s", "success", "strict_success", "skill", "site_error_m", "limb_gain", "drift_m",
     "heading_error_deg",
@@ -29,13 +32,13 @@ class Verdict:
     trained: bool
 
 
-def dancer_of(evaluation: Mapping[str, Any]) -> str:
+def dancer_of(evaluation: Evaluation) -> str:
     """Return who dances: the trained robot, or a tracker by its name."""
     name = evaluation.get("tracker")
     return POLICY_TITLES[TRAINED][0] if name is None else f"tracker {name}"
 
 
-def headline(evaluation: Mapping[str, Any]) -> str:
+def headline(evaluation: Evaluation) -> str:
     """Return one sentence that says how well it went, beside the best of the baselines."""
     if not evaluation:
         return ""
@@ -60,7 +63,7 @@ def headline(evaluation: Mapping[str, Any]) -> str:
     return f"{said}; a baseline that learnt nothing ({best}) does {how}: {figure}."
 
 
-def tiles(evaluation: Mapping[str, Any]) -> list[Quantity]:
+def tiles(evaluation: Evaluation) -> list[Quantity]:
     meanings = {
         "success": "no fall in a whole rollout",
         "survived_s": "mean time before a fall",
@@ -75,7 +78,7 @@ def tiles(evaluation: Mapping[str, Any]) -> list[Quantity]:
     ]
 
 
-def verdicts(evaluation: Mapping[str, Any]) -> list[Verdict]:
+def verdicts(evaluation: Evaluation) -> list[Verdict]:
     """Return the figures of the trained policy and of its baselines, ready to read."""
     if not evaluation:
         return []
@@ -100,7 +103,7 @@ def verdicts(evaluation: Mapping[str, Any]) -> list[Verdict]:
 PASSPORT_COLUMNS = ("strict_success", "skill", "survived_s", "kept")
 
 
-def passport_rows(evaluation: Mapping[str, Any]) -> list[Verdict]:
+def passport_rows(evaluation: Evaluation) -> list[Verdict]:
     """Return the figures of the policy under other physics, ready to read."""
     return [
         Verdict(
@@ -110,7 +113,7 @@ def passport_rows(evaluation: Mapping[str, Any]) -> list[Verdict]:
     ]
 
 
-def beat_rows(report: Mapping[str, Any]) -> list[Verdict]:
+def beat_rows(report: Evaluation) -> list[Verdict]:
     """Return how motions meet the music (`beat_report`), ready to read."""
     return [
         Verdict(

@@ -16,6 +16,9 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.report.video.soundtrack import clip_times
 from robojackson.report.web.player_data import Band, Span
 
+Report = dict[str, Any]
+"""Beats as `beats.json` has them."""
+
 GRID_S = 0.005
 CONTROL = "control"
 TITLES = {
@@ -47,7 +50,7 @@ def music_beats_shown(
 
 def beat_report(
     music: Float[np.ndarray, " B"], motions: dict[str, Float[np.ndarray, "T K 3"]], fps: float
-) -> dict[str, Any]:
+) -> Report:
     """Return beats and figures of the motions, and of the last of them half a beat later."""
     beats = {name: motion_beats(points, fps) for name, points in motions.items()}
     last = list(beats)[-1]
@@ -60,7 +63,7 @@ def beat_report(
     }
 
 
-def beat_bands(report: dict[str, Any], fps: float) -> list[Band]:
+def beat_bands(report: Report, fps: float) -> list[Band]:
     """Return the rows of the timeline that show the beats."""
     rows = {"music": report["music"], **report["motions"]}
     return [
