@@ -33,6 +33,8 @@ BONES = tuple(
 ORDER = [LANDMARK_NAMES[index] for index in BODY]
 HIPS = [ORDER.index("left_hip"), ORDER.index("right_hip")]
 LEAST_VISIBILITY = 0.1
+SUDDEN = 1.5
+"""Spreads of acceleration from which on it counts less than squared."""
 
 
 @config_dataclass
@@ -152,20 +154,28 @@ def _step(
     normal = np.einsum("tri,trj->tij", jacobian, jacobian)
     moment = np.einsum("tri,tr->ti", jacobian, residual)
     bands = _to_bands(normal)
-    stiff = stiffness(evidence.fps, config)
+    stiff = stiffness(body, evidence.fps, config)
     second = np.diff(body.reshape(count, SIZE), 2, axis=0) * stiff
     for offset, factor in enumerate((1.0, -2.0, 1.0)):
         moment[offset : count - 2 + offset] += factor * second
     if count > 2:
-        _add_acceleration(bands, count, stiff)
+        _add_acceleration(bands, stiff)
     step = solveh_banded(bands, -moment.reshape(-1))
     result: np.ndarray = step.reshape(count, *SHAPE)
     return result
 
 
-def stiffness(fps: float, config: RefineConfig) -> float:
-    """Weight of the squared second difference of a coordinate, 1/m^2; the same at any rate."""
-    return (fps**2 / config.acceleration_mps2) ** 2 * 30.0 / fps
+def stiffness(
+    body: Float[np.ndarray, "T 12 3"], fps: float, config: RefineConfig
+) -> Float[np.ndarray, "T-2 36"]:
+    """Weight of the squared second difference of each coordinate, 1/m^2, pseudo-Huber.
+
+    A frame says as much at any rate, so that a clip of few frames is not smoothed more: detectors
+    err alike in neighbouring frames. What truly accelerates, as a kick does, is let go.
+    """
+    acceleration = np.diff(body, 2, axis=0) * fps**2 / config.acceleration_mps2
+    robust = (1.0 + (acceleration**2).sum(-1) / SUDDEN**2) ** -0.5
+    return np.repeat(robust * (fps**2 / config.acceleration_mps2) ** 2, 3, axis=1)
 
 
 def residuals(
@@ -236,10 +246,13 @@ def _to_bands(blocks: Float[np.ndarray, "T 36 36"]) -> np.ndarray:
     return bands
 
 
-def _add_acceleration(bands: np.ndarray, count: int, stiff: float) -> None:
-    """Add D2' D2 of every coordinate: it couples frames one and two apart."""
+def _add_acceleration(bands: np.ndarray, stiff: Float[np.ndarray, "T-2 36"]) -> None:
+    """Add D2' W D2: it couples frames one and two apart."""
+    count = len(stiff) + 2
     second = np.diff(np.eye(3), 2, axis=0)[0]
     for first, left in enumerate(second):
         for last in range(first, 3):
             columns = slice(last * SIZE, (count - 2 + last) * SIZE)
-            bands[2 * SIZE - (last - first) * SIZE, columns] += stiff * left * second[last]
+            bands[2 * SIZE - (last - first) * SIZE, columns] += (
+                left * second[last] * stiff.reshape(-1)
+            )
