@@ -79,9 +79,10 @@ def test_one_step_is_that_of_a_dense_solver() -> None:
         part = slice(36 * frame, 36 * (frame + 1))
         dense[part, part] = jacobian[frame].T @ jacobian[frame]
         moment[part] = jacobian[frame].T @ residual[frame]
-    second = np.kron(np.diff(np.eye(8), 2, axis=0), np.eye(36)) * FPS**2 / CONFIG.acceleration_mps2
-    dense += second.T @ second
-    moment += second.T @ second @ body.reshape(-1)
+    second = np.kron(np.diff(np.eye(8), 2, axis=0), np.eye(36))
+    smooth = second.T @ np.diag(refinement.stiffness(body, FPS, CONFIG).ravel()) @ second
+    dense += smooth
+    moment += smooth @ body.reshape(-1)
     expected = np.linalg.solve(dense, -moment).reshape(body.shape)
     assert np.allclose(refinement._step(body, evidence, CONFIG), expected, atol=1e-9)
 
