@@ -24,6 +24,9 @@ FALL_SHARE = 0.35
 """Least mean acceleration of a whole flight, of gravity."""
 FLIGHT_EDGE_S = 0.15
 """Smoothing hides so much of the beginning and of the end of a free fall, seconds."""
+FLIGHT_MARGIN_S, RISE_SHARE = 0.07, 0.4
+"""Of a jump: what the change of sign misses at either end, and the least rise of the feet, share of
+that of a body in the air for so long."""
 CAMERA_UP = np.array([0.0, -1.0, 0.0])
 AXIS_WEIGHTS = np.array([1.0, 1.0, 0.4])
 """Of a speed in the camera frame; in depth a single camera sees mostly noise."""
@@ -195,6 +198,37 @@ def free_fall(height: Float[np.ndarray, " T"], fps: float) -> np.ndarray:
             falling[start:end] = False
     result: np.ndarray = falling
     return result
+
+
+def ballistic(
+    height: Float[np.ndarray, " T"], lowest: Float[np.ndarray, " T"], fps: float
+) -> np.ndarray:
+    """Frames of jumps: the body falls freely, and the feet rise as far as its fall asks for.
+
+    Push and landing accelerate upward, so that a flight lasts from one change of sign of the
+    acceleration to the next, whatever the smoothing.
+
+    Args:
+        height: Of the centre of mass, metres; any level.
+        lowest: Of the lowest foot point, metres; any level.
+        fps: Frames a second.
+    """
+    falling = free_fall(height, fps)
+    flying = np.zeros(len(height), bool)
+    if not falling.any():
+        return flying
+    smooth = lowpass(height, fps, FALL_CUTOFF_HZ)
+    downward = np.gradient(np.gradient(smooth)) < 0.0
+    margin = max(round(FLIGHT_MARGIN_S * fps), 1)
+    for start, end in stretches(downward):
+        if not falling[start:end].any():
+            continue
+        first, last = max(start - margin, 0), min(end + margin, len(height))
+        ground = max(lowest[first], lowest[last - 1])
+        rise = GRAVITY / 8.0 * ((last - first) / fps) ** 2
+        if lowest[first:last].max() - ground > RISE_SHARE * rise:
+            flying[first:last] = True
+    return flying
 
 
 def flight(
