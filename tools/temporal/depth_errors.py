@@ -1,5 +1,5 @@
-"""How a detector may misjudge depth on people other than the rendered ones, and how much windows are
-changed at all.
+"""How a detector may misjudge depth on people other than the rendered ones, and how much windows
+are changed at all.
 
 Drawn wide on purpose: a network that has only met the errors of one detector on renderings takes
 those of real people for motion.

@@ -90,9 +90,7 @@ def axes_along(root: np.ndarray) -> np.ndarray:
     return np.stack([right, np.cross(forward, right), forward], -1)
 
 
-def _played(
-    bank: Bank, rows: np.ndarray, frames: int, rng: np.random.Generator
-) -> np.ndarray:
+def _played(bank: Bank, rows: np.ndarray, frames: int, rng: np.random.Generator) -> np.ndarray:
     """Windows at any tempo, linear between frames."""
     tempo = rng.uniform(*TEMPO, len(rows))
     spare = np.maximum(bank.lengths[rows] - 1 - tempo * frames, 0.0)
@@ -127,5 +125,3 @@ def _before_cameras(points: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     aside = rng.normal(0.0, ASIDE, (count, 2)) * distance[:, None]
     shift = np.concatenate([aside, distance[:, None]], -1)
     return np.asarray(seen + shift[:, None, None])
-
-

@@ -51,10 +51,10 @@ class RefineConfig:
     """
 
     enabled: bool = True
-    image_m: float = 0.03
+    image_m: float = 0.02
     depth_m: float = 0.07
-    bone_m: float = 0.02
-    acceleration_mps2: float = 30.0
+    bone_m: float = 0.03
+    acceleration_mps2: float = 20.0
     rounds: int = 12
 
 

@@ -51,8 +51,8 @@ def test_lifting_twice_gives_the_same(seen: Landmarks, placed: np.ndarray) -> No
     assert np.array_equal(lifted(seen, placed).points, lifted(seen, placed).points)
 
 
-def test_no_trust_changes_nothing_of_the_body(seen: Landmarks, placed: np.ndarray) -> None:
-    image = lifted(seen, placed, trust=0.0).points[:, BODY]
+def test_a_sure_detector_is_left_as_it_is(seen: Landmarks, placed: np.ndarray) -> None:
+    image = lifted(seen, placed, detector_m=0.0).points[:, BODY]
     assert np.allclose(image[..., :2] / image[..., 2:], _rays(placed), atol=2e-3)
 
 
