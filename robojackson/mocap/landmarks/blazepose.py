@@ -31,8 +31,8 @@ which one is real, under eight cameras."""
 SWAP_PRIOR_M = 0.003
 """What a frame with exchanged sides costs, metres of mean displacement; tuned on person_cam2."""
 SWAP_FPS = 15.0
-"""At fewer frames a second a turn looks like an exchange (10 of 26 frames of a dancer at 8 were), so
-that only where shoulders and hips face the other way from one frame to the next it is one."""
+"""At fewer frames a second a turn looks like an exchange (10 of 26 frames of a dancer at 8 were):
+there it is one only where shoulders and hips face the other way from one frame to the next."""
 FEWEST_FPS = 6.0
 """At fewer yet nothing tells an exchange from a turn."""
 FACING_PRIOR = 0.03
@@ -184,7 +184,9 @@ def _steps(landmarks: Landmarks) -> tuple[np.ndarray, np.ndarray]:
 
 def _turns(landmarks: Landmarks) -> tuple[np.ndarray, np.ndarray]:
     """Turn of the line from right to left, half turns, and what it would be with one exchanged."""
-    pairs = [landmarks.local[:, one] - landmarks.local[:, other] for one, other in (HIPS, SHOULDERS)]
+    pairs = [
+        landmarks.local[:, one] - landmarks.local[:, other] for one, other in (HIPS, SHOULDERS)
+    ]
     line = unit(np.sum(pairs, axis=0))
     cosine = np.clip(np.sum(line[1:] * line[:-1], -1), -1.0, 1.0)
     turn = np.arccos(cosine) / np.pi
