@@ -84,19 +84,29 @@ def make_clip(
     number: int, seed: int, body: Body, studio: scenery.Studio, files: list[Path],
     cache: dict[Path, deepmimic.Motion],
 ) -> dict[str, Any]:  # fmt: skip
-    """One clip: what BlazePose sees and what is true."""
+    """One clip for training."""
     rng = np.random.default_rng([seed, number])
     name, motion = choose_motion(files, cache, rng)
+    stride = int(rng.choice(STRIDES, p=STRIDE_SHARES))
+    return shoot(name, motion, stride, body, studio, rng)
+
+
+def shoot(
+    name: str, motion: deepmimic.Motion, stride: int, body: Body, studio: scenery.Studio,
+    rng: np.random.Generator, angles: scenery.Angles | None = None, hidden: bool = True,
+) -> dict[str, Any]:  # fmt: skip
+    """What BlazePose sees of a motion and what is true, with things in the way if `hidden`."""
     person = people.draw_person(body, rng)
     posed = person.posed(motion)
     low = posed.heads[..., 2].min(1)
     drop = low if name == "invented" else np.full(len(low), np.percentile(low, 5))
     posed = replace(posed, heads=posed.heads - np.outer(drop - 0.03, [0, 0, 1])[:, None])
     posed = replace(posed, heads=posed.heads.astype(np.float32))
-    view = scenery.film(posed, rng)
+    view = scenery.film(posed, rng, angles or scenery.draw_angles(rng))
     truth = view.see(person.landmarks(posed, LANDMARK_NAMES))
     boxes = scenery.occluders(truth, LIMBS, view, FPS, rng)
-    stride = int(rng.choice(STRIDES, p=STRIDE_SHARES))
+    if not hidden:
+        boxes[:] = np.nan
     seen = np.full((len(truth), len(LANDMARK_NAMES), 7), np.nan, np.float32)
     with video_landmarker("full") as detect_frame:
         pictures = studio.frames(person, posed, view, boxes, rng, stride)

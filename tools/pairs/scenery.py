@@ -64,14 +64,29 @@ class View:
         return clip @ flip @ view
 
 
-def film(posed: Posed, rng: np.random.Generator) -> View:
-    """A camera on any side, looking up by 20 to down by 60 degrees, near or far."""
+@dataclass(frozen=True)
+class Angles:
+    """From where a camera looks: radians, and how much of the picture the motion fills."""
+
+    yaw: float
+    pitch: float
+    fills: float
+
+
+def draw_angles(rng: np.random.Generator) -> Angles:
+    """On any side, looking up by 20 to down by 60 degrees, near or far."""
+    level = rng.uniform() < 0.5
+    yaw = rng.uniform(-np.pi, np.pi)
+    pitch = np.radians(rng.normal(6.0, 9.0) if level else rng.uniform(-20.0, 60.0))
+    return Angles(yaw, float(pitch), float(np.exp(rng.uniform(np.log(0.35), np.log(1.15)))))
+
+
+def film(posed: Posed, rng: np.random.Generator, angles: Angles) -> View:
+    """A camera that sees the clip."""
     width, height = SIZES[rng.integers(len(SIZES))]
     points = posed.heads
     centre = (points.max((0, 1)) + points.min((0, 1))) / 2.0
-    level = rng.uniform() < 0.5
-    yaw = np.radians(rng.uniform(-180.0, 180.0))
-    pitch = np.radians(rng.normal(6.0, 9.0) if level else rng.uniform(-20.0, 60.0))
+    yaw, pitch, fills = angles.yaw, angles.pitch, angles.fills
     forward = np.array([-np.sin(yaw) * np.cos(pitch), np.cos(yaw) * np.cos(pitch), -np.sin(pitch)])
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
@@ -80,7 +95,6 @@ def film(posed: Posed, rng: np.random.Generator) -> View:
     turn = np.array([[np.cos(roll), -np.sin(roll), 0], [np.sin(roll), np.cos(roll), 0], [0, 0, 1]])
     rotation = turn @ rotation
     focal = float(np.hypot(width, height) * np.exp(rng.uniform(np.log(0.55), np.log(1.7))))
-    fills = float(np.exp(rng.uniform(np.log(0.35), np.log(1.15))))
     distance = 4.0
     for _ in range(6):
         shift = np.array([0.0, 0.0, distance]) - rotation @ centre

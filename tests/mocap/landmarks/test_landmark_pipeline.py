@@ -70,7 +70,8 @@ def test_pictures_that_pass_by_tell_what_a_second_look_tells(hip_shake: Landmark
         background.add_frame(index, image, row)
     once = background.told(hip_shake)
     twice = landmark_pipeline.with_camera(CLIP, hip_shake)
-    assert once.to_first is None and twice.to_first is None
+    assert once.to_first is None
+    assert twice.to_first is None
     assert once.brightness == pytest.approx(twice.brightness, rel=0.02)
     assert once.sharpness == pytest.approx(twice.sharpness, rel=0.1)
 
