@@ -85,6 +85,24 @@ def test_floor_does_not_rise_with_a_jump() -> None:
     assert np.abs(ground.floor_height(lowest, falling, 30.0, 3.0)).max() < 1e-9
 
 
+@pytest.mark.parametrize("height_m", [0.1, 0.25, 0.45])
+def test_a_jump_is_ballistic_as_long_as_it_lasts(height_m: float) -> None:
+    speed = np.sqrt(2.0 * 9.81 * height_m)
+    time = np.arange(60) / 30.0 - 0.7
+    rise = np.maximum(speed * time - 4.905 * time**2, 0.0) * (time > 0.0)
+    seen = lowpass(rise, 30.0, 4.0)
+    found = np.flatnonzero(ground.ballistic(1.0 + seen, 0.02 + seen, 30.0))
+    true = np.flatnonzero(rise > 0.0)
+    assert abs(found[0] - true[0]) <= 2
+    assert abs(found[-1] - true[-1]) <= 2
+
+
+def test_somebody_who_drops_into_a_squat_does_not_jump() -> None:
+    time = np.arange(60) / 30.0
+    height = 1.0 - 0.4 * np.clip((time - 0.7) / 0.25, 0.0, 1.0) ** 2
+    assert not ground.ballistic(height, np.zeros(60), 30.0).any()
+
+
 def test_flight_reaches_from_the_last_to_the_first_touch() -> None:
     lowest = np.array([0.0, 0.0, 0.1, 0.3, 0.4, 0.3, 0.1, 0.0, 0.0])
     falling = np.zeros(9, bool)
