@@ -13,7 +13,7 @@ from tools.temporal import batches, train_temporal
 from tools.temporal.batches import Batch
 from tools.temporal.depth_errors import Change, misjudged
 from tools.temporal.examples import Example, flattened
-from tools.temporal.film import HIPS, film, with_constants
+from tools.temporal.filming import HIPS, film, with_constants
 from tools.temporal.fit_flow import discrepancy
 from tools.temporal.net import Flow, Lifter
 from tools.temporal.truths import FRAMES, Bank

@@ -15,7 +15,7 @@ from robojackson.mocap.temporal.temporal_lift import corrected
 from tools.temporal.batches import TWELVE, Batch, change, joined, table, windows
 from tools.temporal.depth_errors import Change
 from tools.temporal.examples import Example
-from tools.temporal.film import film, with_constants
+from tools.temporal.filming import film, with_constants
 from tools.temporal.invented import Detector
 from tools.temporal.net import Lifter
 from tools.temporal.truths import Bank

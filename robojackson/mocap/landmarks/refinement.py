@@ -15,6 +15,7 @@ from scipy.linalg import solveh_banded
 from robojackson.body.forward_kinematics import unit
 from robojackson.body.skeleton import keypoint
 from robojackson.config import config_dataclass
+from robojackson.mocap.landmarks.banded_matrix import add_acceleration, to_bands
 from robojackson.mocap.landmarks.blazepose import BODY, LANDMARK_NAMES, landmark
 
 SHAPE = (len(BODY), 3)
@@ -153,13 +154,13 @@ def _step(
     jacobian, residual = residuals(body, evidence, config)
     normal = np.einsum("tri,trj->tij", jacobian, jacobian)
     moment = np.einsum("tri,tr->ti", jacobian, residual)
-    bands = _to_bands(normal)
+    bands = to_bands(normal)
     stiff = stiffness(body, evidence.fps, config)
     second = np.diff(body.reshape(count, SIZE), 2, axis=0) * stiff
     for offset, factor in enumerate((1.0, -2.0, 1.0)):
         moment[offset : count - 2 + offset] += factor * second
     if count > 2:
-        _add_acceleration(bands, stiff)
+        add_acceleration(bands, stiff)
     step = solveh_banded(bands, -moment.reshape(-1))
     result: np.ndarray = step.reshape(count, *SHAPE)
     return result
@@ -233,26 +234,3 @@ def _bones(body: np.ndarray, evidence: Evidence, spread: float) -> tuple[np.ndar
     jacobian[:, each, ends] = along
     jacobian[:, each, starts] = -along
     return jacobian, (np.linalg.norm(bone, axis=-1) - evidence.lengths) / spread
-
-
-def _to_bands(blocks: Float[np.ndarray, "T 36 36"]) -> np.ndarray:
-    """Upper banded storage (scipy) of a block-diagonal symmetric matrix, with two frames above."""
-    above = 2 * SIZE
-    bands = np.zeros((above + 1, len(blocks) * SIZE))
-    for offset in range(SIZE):
-        values = np.zeros((len(blocks), SIZE))
-        values[:, offset:] = np.diagonal(blocks, offset, axis1=1, axis2=2)
-        bands[above - offset] = values.reshape(-1)
-    return bands
-
-
-def _add_acceleration(bands: np.ndarray, stiff: Float[np.ndarray, "T-2 36"]) -> None:
-    """Add D2' W D2: it couples frames one and two apart."""
-    count = len(stiff) + 2
-    second = np.diff(np.eye(3), 2, axis=0)[0]
-    for first, left in enumerate(second):
-        for last in range(first, 3):
-            columns = slice(last * SIZE, (count - 2 + last) * SIZE)
-            bands[2 * SIZE - (last - first) * SIZE, columns] += (
-                left * second[last] * stiff.reshape(-1)
-            )
