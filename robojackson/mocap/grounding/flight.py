@@ -13,7 +13,7 @@ FALL_SHARE = 0.35
 """Least mean acceleration of a whole flight, of gravity."""
 FLIGHT_EDGE_S = 0.15
 """Smoothing hides so much of the beginning and of the end of a free fall, seconds."""
-FLIGHT_MARGIN_S, RISE_SHARE = 0.07, 0.4
+FLIGHT_MARGIN_S, RISE_SHARE = 0.07, 0.45
 """Of a jump: what the change of sign misses at either end, and the least rise of the feet, share of
 that of a body in the air for so long."""
 
