@@ -1,5 +1,5 @@
 # The worker's image: flows, trainings and the `robojackson` command, as a user without rights.
-#   docker build -t robojackson:0.1.0 [--build-arg TORCH_INDEX=...] [--build-arg GIT_COMMIT=...] .
+#   docker build -t robojackson:0.2.0 [--build-arg TORCH_INDEX=...] [--build-arg GIT_COMMIT=...] .
 FROM python:3.11-slim-bookworm
 
 ENV DEBIAN_FRONTEND=noninteractive PIP_NO_CACHE_DIR=1 PYTHONUNBUFFERED=1

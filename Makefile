@@ -5,16 +5,16 @@
 #   make test-fast  more than four fifths of them, of every folder, within 90 s on two idle cores
 #   make test-stack  the whole stack and the documented server as processes, end to end (half an
 #                 hour; apt-get install postgresql chromium)
-#   make bench    accuracy of the mocap stage against ground truth, cost of judging a clip
+#   make bench    accuracy of the mocap stage against ground truth, cost of assessing a clip
 #   make bench-mocap  the first of the two alone, writes benchmarks/results/mocap.json and .md
 #   make bench-retarget  our solver beside the paper's mapping and mink (pip install -e '.[bench]')
-#   make bench-learning  speed beside sb3-contrib and bare MuJoCo, policies judged (hours; resumable)
+#   make bench-learning  speed beside sb3-contrib and bare MuJoCo, policies evaluated (hours; resumable)
 #   make bench-orchestration  what Prefect costs around the work (PostgreSQL and a server are started)
 #   make chaos    20 studies whose processes, services, disk and wires are cut at random moments
 #   make deploy   pools, deployments and automations on the server of PREFECT_API_URL
 #   make lint     ruff, mypy and the order of imports (docs/architecture.md)
-#   make docs     from the docstrings: docs/settings.md, and the reference of the Python functions
-#                 in build/site
+#   make docs     the documentation as a site in build/site; every link is checked
+#   make coverage all tests with the share of lines and branches that they run
 #   make wheel    the package, checked as the index would, in dist/
 #   make doctor   what is installed and what is missing
 #   make clean    remove the environment and all caches; the store stays
@@ -28,7 +28,7 @@ WORKERS ?= auto
 PYTEST := $(PY) -m pytest -q -n $(WORKERS) --dist loadgroup
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: dance test test-fast test-stack bench bench-learning bench-mocap bench-retarget chaos bench-orchestration deploy lint doctor docs wheel clean setup
+.PHONY: dance test test-fast test-stack coverage bench bench-learning bench-mocap bench-retarget chaos bench-orchestration deploy lint doctor docs wheel clean setup
 .DEFAULT_GOAL := dance
 
 setup:
@@ -42,6 +42,9 @@ test: setup
 
 test-fast: setup
 	@$(PYTEST) -m "not slow and not medium" $(ARGS)
+
+coverage: setup
+	@$(PYTEST) --cov --cov-report=term $(ARGS)
 
 test-stack: setup
 	@$(PY) -m pytest -q -m cluster tests/deploy $(ARGS)
@@ -76,7 +79,8 @@ lint: setup
 
 docs: setup
 	@$(PY) -m tools.assets.settings_page
-	@$(PY) -m mkdocs build --strict --quiet
+	@$(PY) -m tools.assets.data_contracts_page
+	@$(PY) -m zensical build --clean --strict
 
 wheel: setup
 	@$(PY) -m build --outdir dist .

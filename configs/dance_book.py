@@ -17,11 +17,11 @@ class Dance:
         name: What it is called here and in the catalogue.
         query: What is searched for; may be empty where a source needs no more than an address.
         added_words: Added to the query.
-        language: Two letters in which titles are asked for; empty is the site's own choice.
-        top: How many videos are judged; None is the usual number.
+        language: Language of the titles, two letters; empty is the site's own choice.
+        top: How many videos are assessed; None is the default number.
         every_days: Days between two searches.
         source: A file of robojackson/clips/sources.
-        address: Of the folder, list, site or server; empty is the source's usual one.
+        address: Address of the folder, list, site or server; empty is the source's usual one.
     """
 
     name: Annotated[str, Field(min_length=1, max_length=60)]
@@ -51,7 +51,7 @@ class DanceBook:
     """All dances.
 
     Attributes:
-        dances: In the order in which they are searched.
+        dances: Dances in the order in which they are searched.
     """
 
     dances: tuple[Dance, ...]
@@ -60,10 +60,10 @@ class DanceBook:
         names = [dance.name.casefold() for dance in self.dances]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
-            raise BadConfiguration(f"dances: {', '.join(twice)} stands twice")
+            raise BadConfiguration(f"dances: {', '.join(twice)} is listed twice")
 
     def pick(self, names: Sequence[str] | None) -> tuple[Dance, ...]:
-        """The dances of these names in their order; all of them when no names are given.
+        """Return the dances of these names in their order; all of them when no names are given.
 
         Raises:
             UnknownName: one is not in the book; the message lists those that are.
@@ -73,7 +73,7 @@ class DanceBook:
         return tuple(self._of(name) for name in names)
 
     def find(self, words: str) -> Dance:
-        """The dance that a person means by its name or query, or one that is made of the words."""
+        """Return the dance with this name or query, or one that is made of the words."""
         for dance in self.dances:
             if words.casefold() in (dance.name.casefold(), dance.query.casefold()):
                 return dance

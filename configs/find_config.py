@@ -1,4 +1,4 @@
-"""How a dance is found: what is kept of a search, what is downloaded, how it is judged."""
+"""Configuration of searches: selection, downloads and assessment."""
 
 from pydantic import Field
 
@@ -12,8 +12,10 @@ from robojackson.config import config_dataclass
 
 @config_dataclass
 class FindConfig:
-    """Attributes:
-    selection, web, formats, assessment, filters: Of the steps, in their order.
+    """Configuration of a search.
+
+    Attributes:
+        selection, web, formats, assessment, filters: Configurations of the steps, in their order.
     """
 
     selection: SelectionConfig = Field(default_factory=SelectionConfig)

@@ -1,4 +1,4 @@
-"""What an ablation trains: moves x setups x seeds, as data that a person edits or fills in.
+"""Configuration of an ablation: moves x setups x seeds.
 
 One experiment is one `Study`; `configs/studies/*.yaml` are those that ship, and the parameters of
 the deployments `ablation/paper` and `ablation/smoke` are the same text.
@@ -32,11 +32,11 @@ Steps = Annotated[int, Field(ge=1)]
 
 
 def _each_once(values: tuple[Any, ...]) -> tuple[Any, ...]:
-    """Twins would be one cell, which two runs want to train at once."""
+    """Refuse duplicates: twins would be one cell, which two runs train at once."""
     twice = sorted({value for value in values if values.count(value) > 1})
     if twice:
-        told = ", ".join(map(str, twice))
-        raise PydanticCustomError("twice", "{told} stands twice", {"told": told})
+        listed = ", ".join(map(str, twice))
+        raise PydanticCustomError("twice", "{values} is listed twice", {"values": listed})
     return values
 
 
@@ -61,10 +61,10 @@ class Move:
 
     @model_validator(mode="after")
     def _of_the_motion(self) -> "Move":
-        """Refuse what the study says for all of its moves, or nobody would read."""
+        """Refuse keys that the study sets for all of its moves, or that nothing reads."""
         for key in self.overrides:
             if key.partition(".")[0] in OF_THE_STUDY:
-                raise ValueError(f"overrides.{key}: is no part of a motion; the study says it")
+                raise ValueError(f"overrides.{key}: is no part of a motion; set it in the study")
         return self
 
     @property
@@ -76,7 +76,7 @@ class Move:
 
 @config_dataclass
 class Study:
-    """One ablation. How its cells are run (the last four fields) is no part of what it is.
+    """One ablation. The last four fields, how its cells are run, are no part of its identity.
 
     Attributes:
         name: Name of the study, in the tables and on the page.
@@ -88,13 +88,13 @@ class Study:
         move_steps: Move -> control steps of its trainings, where they are not `steps`.
         trainer: `sbx` (JAX, fast) or `sb3` (the reference).
         robot: Name of `configs/robots/*.yaml`, or path, where the worker is, of your own YAML.
-        pipeline: Name of the configuration that makes the reference motions and judges.
+        pipeline: Name of the configuration that makes the reference motions and evaluates.
         gate: Refuse the study when a motion breaks a hard bar of its score card, as `dance` does;
-            off: train on it all the same, and say so.
+            off: train on it anyway, and log it.
         train: Values of the training's configuration by key path, for all cells.
         executor: `local`: processes of this machine; `work-pool`: runs that workers take.
         slots: Trainings at once on this machine; the number of its cores if absent.
-        timeout_minutes: Wall time after which a cell has failed, minutes: training, judgement and
+        timeout_minutes: Wall time after which a cell has failed, minutes: training, evaluation and
             what is tried again of them, all together; waiting for a worker is no part of it.
         retries: How often a cell whose process was killed is started again.
     """

@@ -22,8 +22,8 @@ hands = [robot.keypoint_names.index(name) for name in ("left_hand", "right_hand"
 def quiet_hands(state: rj.RewardState) -> np.ndarray:
     """Return minus 0.1 for each m/s by which the hands are faster than the reference's."""
     speed = np.linalg.norm(state.moved[:, hands], axis=-1)
-    wanted = np.linalg.norm(state.target.moved[:, hands], axis=-1)
-    return -0.1 * np.maximum(speed - wanted, 0.0).mean(1)
+    target = np.linalg.norm(state.target.moved[:, hands], axis=-1)
+    return -0.1 * np.maximum(speed - target, 0.0).mean(1)
 
 
 reference = rj.retarget_motion(rj.recover_motion(video, progress=True), robot)

@@ -1,1 +1,1 @@
-"""What Prefect runs, one flow a file, and the command line."""
+"""Prefect flows, one a file, and the command line."""

@@ -48,7 +48,7 @@ REASON = 200
 
 
 def run(study: Study) -> Facts:
-    """The flow from the command line.
+    """Return the flow from the command line.
 
     Raises:
         DeploymentFailed: the server that is named does not answer, or refuses us.
@@ -59,7 +59,7 @@ def run(study: Study) -> Facts:
 
 @flow(name="ablation", flow_run_name="{study.name}")
 async def ablation(study: Study) -> Facts:
-    """Train and judge every cell, then write the page of the study.
+    """Train and evaluate every cell, then write the page of the study.
 
     Args:
         study: What is compared with what.
@@ -81,14 +81,14 @@ async def ablation(study: Study) -> Facts:
     slots = asyncio.Semaphore(study.slots or _slots(study))
     execute = EXECUTORS[study.executor]
 
-    async def one(wanted: Cell) -> Any:
+    async def one(each: Cell) -> Any:
         async with slots:
-            board.running(wanted)
+            board.running(each)
             try:
-                made = await execute(wanted)
-                board.done(wanted, made)
+                made = await execute(each)
+                board.done(each, made)
             except Exception as cause:
-                board.failed(wanted, _line(cause))
+                board.failed(each, _line(cause))
                 raise
             return made
 
@@ -104,7 +104,7 @@ def motion(
     """Make what a move is trained on and shown with; every stage cached.
 
     Args:
-        name: Of the move; its task runs are named after it.
+        name: Name of the move; its task runs are named after it.
     Returns:
         `reference` and `scorecard`; `still`, its picture; `reward_audits`, what the rewards of the
         setups pay to bodies that do not dance it.
@@ -123,7 +123,7 @@ def motion(
 
 
 def gate(study: Study, scorecards: Mapping[str, Artifact]) -> None:
-    """Refuse motions that no robot can follow, or say that they are trained on all the same.
+    """Refuse motions that no robot can follow, or log that they are trained on anyway.
 
     Raises:
         RejectedReference: the message names each and the figure that failed.
@@ -137,19 +137,20 @@ def gate(study: Study, scorecards: Mapping[str, Artifact]) -> None:
             refused.append(f"{name}: {cause.without_force}")
     if not refused:
         return
-    told = f"study {study.name}: {len(refused)} of {len(scorecards)} motions are refused"
+    summary = f"study {study.name}: {len(refused)} of {len(scorecards)} motions are refused"
     if study.gate:
         raise RejectedReference(
-            f"{told} ({'; '.join(refused)}). No cell was started; `gate: false` (--set gate=false) "
-            "trains on them all the same"
+            f"{summary} ({'; '.join(refused)}). No cell was started; `gate: false` "
+            "(--set gate=false) trains on them anyway"
         )
-    get_run_logger().warning("%s and trained on: %s", told, "; ".join(refused))
+    get_run_logger().warning("%s and trained on: %s", summary, "; ".join(refused))
 
 
 def cells_of(
     study: Study, references: Mapping[str, Artifact], trainings: Mapping[str, TrainConfig]
 ) -> list[Cell]:
-    """Every move x setup x seed, seed by seed, so that an early look compares like with like."""
+    """Return every move x setup x seed, seed by seed, so that an early look compares like with
+    like."""
     evaluate = load(PipelineConfig, study.pipeline).evaluate
     return [
         Cell(
@@ -176,7 +177,7 @@ async def conclude(
     outcomes: Mapping[str, Any],
     motions: Mapping[str, dict[str, Artifact]],
 ) -> Facts:
-    """Write the page over what ended well, and raise what did not in one sentence.
+    """Write the page of the successful cells, and raise one sentence about the failed ones.
 
     Raises:
         StudyFailed: a cell failed.
@@ -208,7 +209,7 @@ async def conclude(
 
 
 def _slots(study: Study) -> int:
-    """Cores of this machine; a pool's workers set their own limits."""
+    """Return the cores of this machine; a pool's workers set their own limits."""
     if study.executor == "work-pool":
         return 10_000
     return cores()

@@ -1,4 +1,4 @@
-"""One cell of an ablation: a training, its judgement, its rows. Here or on any other machine.
+"""One cell of an ablation: a training, its evaluation, its rows. Here or on another machine.
 
 Entry point of the deployment `cell/pool`: `flows.cells.cell`.
 """
@@ -37,7 +37,7 @@ WATCHER = RunWatcher()
 
 @flow(name="cell", flow_run_name="{cell.name}")
 async def cell(cell: Cell) -> Result:
-    """Train, judge, publish; what was done before is cached.
+    """Train, evaluate, publish; what was done before is cached.
 
     Args:
         cell: What to train, on which motion.
@@ -70,7 +70,8 @@ async def cell(cell: Cell) -> Result:
 async def with_retries(
     stage: Callable[[float], Awaitable[Result]], cell: Cell, deadline: float
 ) -> Result:
-    """A stage of a cell, again when its process was killed; an attempt gets the time that is left.
+    """Return a stage of a cell, again when its process was killed; an attempt gets the time that is
+    left.
 
     Prefect's own retries would give every attempt the time of the first.
 
@@ -85,8 +86,8 @@ async def with_retries(
             return await stage(max(deadline - time.monotonic(), SHORTEST_S))
         except TrainingFailed as cause:
             if time.monotonic() >= deadline:
-                told = f"{cell.name} did not end within {cell.timeout_minutes:g} minutes"
-                raise TrainingFailed(f"{told}: {cause}") from cause
+                reason = f"{cell.name} did not end within {cell.timeout_minutes:g} minutes"
+                raise TrainingFailed(f"{reason}: {cause}") from cause
             if not tries_left or not isinstance(cause, TrainingCrashed):
                 raise
         await asyncio.sleep(SECONDS_BEFORE_RETRY)
@@ -100,16 +101,17 @@ def _robot(name: str) -> RobotDescription:
 
 
 async def run_locally(requested: Cell) -> Result:
-    """The cell as a subflow of the flow that calls.
+    """Return the cell as a subflow of the flow that calls.
 
     Raises:
-        Exception: whatever the cell failed of.
+        Exception: the failure of the cell.
     """
     return await cell(requested)
 
 
 async def run_on_worker(requested: Cell) -> Result:
-    """The cell as a run that a worker of the pool takes; another one, if the worker dies with it.
+    """Return the cell as a run that a worker of the pool takes; another one, if the worker dies
+    with it.
 
     One that was done before is read here: a worker would take seconds to start for nothing.
 

@@ -55,7 +55,7 @@ async def dance(
     robot: str | None = None,
     instant: bool = False,
 ) -> dict[str, Any]:
-    """From the name of a dance, or a video of it, to a robot that dances it.
+    """Turn the name of a dance, or a video of it, into a robot that dances it.
 
     Args:
         source: Name of a dance, as APT; or address of a video on the web; or path, where the worker

@@ -1,4 +1,4 @@
-"""Find the best video of a dance: search, download, judge and rank, nothing after that.
+"""Find the best video of a dance: search, download, assess and rank, nothing after that.
 
 Entry point of the deployment: `flows.find.find`.
 """
@@ -28,7 +28,7 @@ from storage.store import Store
 from tasks.runtime.worker_processes import cores
 
 HUNTERS: ThreadPoolTaskRunner[Any] = ThreadPoolTaskRunner(max_workers=2 * cores())
-"""Downloads wait for servers and judges for their processes: more threads than cores."""
+"""Downloads wait for servers, assessments for their processes: more threads than cores."""
 
 
 @flow(name="find", flow_run_name="find-{name}", task_runner=HUNTERS)  # type: ignore[arg-type]
@@ -38,7 +38,7 @@ async def find(
     config: str = "finding",
     overrides: dict[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """The ranked videos of one dance.
+    """Return the ranked videos of one dance.
 
     Args:
         name: Shown as the name of the run.
@@ -49,13 +49,13 @@ async def find(
     sweep(Store.from_environment(), work=False)
     settings = load(FindConfig, config, overrides)
     found = search_and_rank(build(Dance, dance, "dance"), settings, run_id("find"))
-    told = rows(found)
-    await publish_search(found.dance.name, told, told[0] if found.chosen else None)
+    table = rows(found)
+    await publish_search(found.dance.name, table, table[0] if found.chosen else None)
     return summarise(found)
 
 
 def run(requested: Dance, config: str, overrides: Mapping[str, Any]) -> dict[str, Any]:
-    """The flow from the command line.
+    """Return the flow from the command line.
 
     Raises:
         SearchFailed: the source does not answer.
@@ -71,7 +71,7 @@ async def best(
     config: str = "finding",
     overrides: dict[str, Any] | None = None,
 ) -> dict[str, str]:
-    """Search, and bring the chosen video in good quality: its artifact."""
+    """Search, and download the chosen video in good quality; return its artifact."""
     settings = load(FindConfig, config, overrides)
     requested = build(Dance, dance, "dance")
     store = Store.from_environment()
@@ -82,22 +82,22 @@ async def best(
         if reigning is None:
             raise
         return {"key": reigning["video_key"], "sha256": reigning["video_sha256"]}
-    told = rows(found)
-    await publish_search(requested.name, told, told[0] if found.chosen else None)
+    table = rows(found)
+    await publish_search(requested.name, table, table[0] if found.chosen else None)
     if found.chosen is None:
         raise NoPersonFound(nothing(found))
     return asdict(in_good_quality(found.chosen, settings))
 
 
 def in_good_quality(chosen: Entry, settings: FindConfig) -> Artifact:
-    """The file that is danced: the best format, or the scored one when that cannot be had."""
+    """Return the file to dance: the best format, or the scored one when that is not available."""
     return of_candidate(chosen.candidate, chosen.video, settings)
 
 
 def of_candidate(
     candidate: VideoCandidate, scored: Artifact | None, settings: FindConfig
 ) -> Artifact:
-    """The best format of a video, or its scored file when that cannot be had.
+    """Return the best format of a video, or its scored file when that cannot be had.
 
     Raises:
         SearchFailed: neither is there.
@@ -111,26 +111,26 @@ def of_candidate(
 
 
 def nothing(found: SearchResult) -> str:
-    """Why no video of a search may be danced, in one line."""
+    """Return in one line why no video of a search may be danced."""
     if not found.entries:
         return f"{found.dance.name}: no video is left of the search"
-    told = (f"{e.candidate.title or e.candidate.video_id}: {e.reason}" for e in found.entries)
+    table = (f"{e.candidate.title or e.candidate.video_id}: {e.reason}" for e in found.entries)
     return (
-        f"{found.dance.name}: none of {len(found.entries)} videos may be danced: {'; '.join(told)}"
+        f"{found.dance.name}: none of {len(found.entries)} videos may be danced: {'; '.join(table)}"
     )
 
 
 def summarise(found: SearchResult) -> dict[str, Any]:
-    """What the command says."""
-    told = rows(found)
+    """Return the answer of the command."""
+    table = rows(found)
     every = [*found.selection.selected, *(c for c, _ in found.selection.dropped)]
     return {
         "dance": found.dance.name,
         "query": found.dance.full_query,
         "source": found.dance.source,
         "run_id": found.run_id,
-        "chosen": told[0] if found.chosen else None,
-        "candidates": told,
+        "chosen": table[0] if found.chosen else None,
+        "candidates": table,
         "dropped": [
             {"title": c.title, "url": c.url, "reason": str(r)} for c, r in found.selection.dropped
         ],
@@ -139,5 +139,5 @@ def summarise(found: SearchResult) -> dict[str, Any]:
 
 
 def run_id(kind: str) -> str:
-    """A name that no other run has."""
+    """Return a name that no other run has."""
     return f"{kind}-{datetime.now(UTC):%Y%m%d-%H%M%S}-{uuid.uuid4().hex[:6]}"

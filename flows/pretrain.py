@@ -38,7 +38,7 @@ async def pretrain(
     Args:
         kind: The mode whose trainings start from it.
         steps: Control steps in all.
-        seed: Of the training.
+        seed: Seed of the training.
         robot: Name of `configs/robots/*.yaml`, or path, where the worker is, of your own YAML; for
             `paper` only Humanoid-v5. A walker of a robot for which none ships is what trainings of
             that robot start from with `start: walker`.

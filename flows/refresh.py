@@ -1,7 +1,7 @@
 """The nightly flow: for every dance the best new video, as a motion that is ready to train.
 
 Entry point of the deployments: `flows.refresh.refresh`. A dance whose search fails does not stop
-the others; the result says which failed and why.
+the others; the result names which failed and why.
 """
 
 import json
@@ -67,9 +67,9 @@ async def refresh(
         dances: Names in the book, searched whether they are due or not; all that are due if absent.
         book: Name or path of the list of dances.
         config: Name or path of the configuration of the search.
-        overrides: Of that, values by key path.
+        overrides: Overrides of that configuration, values by key path.
         pipeline: Name or path of the configuration of the stages after it.
-        pipeline_overrides: Of that, values by key path, as robot: a name of configs/robots, or the
+        pipeline_overrides: Overrides of the pipeline; robot is a name of configs/robots, or the
             path, where the worker is, of the YAML of your own.
     Raises:
         BadConfiguration: two dances of the book have the same letters and digits.
@@ -99,7 +99,7 @@ async def refresh(
 
 
 def run(dances: list[str] | None, config: str, overrides: Mapping[str, Any]) -> Facts:
-    """The flow from the command line.
+    """Return the flow from the command line.
 
     Raises:
         DeploymentFailed: the Prefect server that is named does not answer, or refuses us.
@@ -111,23 +111,23 @@ def run(dances: list[str] | None, config: str, overrides: Mapping[str, Any]) -> 
 async def refresh_dance(
     name: str, dance: Facts, config: Facts, pipeline: str, pipeline_overrides: Facts
 ) -> Facts:
-    """One dance, from its name to a reference motion.
+    """Refresh one dance, from its name to a reference motion.
 
     Raises:
         SearchFailed: the source does not answer, or has no new video and none was chosen before.
         NoPersonFound: no video may be danced; the message has the reasons.
     """
-    wanted = build(Dance, dance, "dance")
+    entry = build(Dance, dance, "dance")
     settings = build(FindConfig, config, "config")
     store = Store.from_environment()
     stages = load(PipelineConfig, pipeline, pipeline_overrides)
-    mine = (store, wanted.name, KIND)  # what `find` judges is nothing to this
+    mine = (store, entry.name, KIND)  # assessments of `find` do not count here
     reigning = candidate_catalogue.champion(*mine)
     seen, failing = candidate_catalogue.known(*mine), candidate_catalogue.failed(*mine)
-    found = search_and_rank(wanted, settings, run_id(KIND), seen, reigning, failing)
-    told = rows(found)
-    chosen = told[0] if found.chosen else reigning
-    await publish_search(wanted.name, told, chosen)
+    found = search_and_rank(entry, settings, run_id(KIND), seen, reigning, failing)
+    listing = rows(found)
+    chosen = listing[0] if found.chosen else reigning
+    await publish_search(entry.name, listing, chosen)
     if chosen is None:
         raise NoPersonFound(nothing(found))
     try:
@@ -135,15 +135,15 @@ async def refresh_dance(
     except RoboJacksonError as cause:
         if not found.chosen:
             raise
-        candidate_catalogue.append(store, [{**told[0], **_failed(cause)}])
+        candidate_catalogue.append(store, [{**listing[0], **_failed(cause)}])
         if reigning is None:
             raise
-        get_run_logger().warning("%s: %s; the one before is danced", wanted.name, cause)
+        get_run_logger().warning("%s: %s; the one before is danced", entry.name, cause)
         chosen = reigning
         made = motion(store, _video(None, reigning, settings), stages)
     return {
         "run_id": found.run_id,
-        "assessed": len(told),
+        "assessed": len(listing),
         "is_new": chosen is not reigning,
         "chosen": {
             key: chosen[key]
@@ -154,7 +154,7 @@ async def refresh_dance(
 
 
 def motion(store: Store, video: Artifact, settings: PipelineConfig) -> Facts:
-    """Mocap and retargeting of a video: what a training starts from."""
+    """Return the mocap and retargeting of a video: what a training starts from."""
     with store.local(video) as path:
         clip = probe_video(SourceFile(path, video.sha256), settings.video, None, None)
     moved = to_reference(clip, describe_robot(settings.robot), settings)
@@ -167,13 +167,13 @@ def motion(store: Store, video: Artifact, settings: PipelineConfig) -> Facts:
 
 
 def _failed(cause: RoboJacksonError) -> Facts:
-    """What the catalogue says of a choice of which no motion could be made."""
+    """Return the catalogue's entry for a choice of which no motion could be made."""
     reason = clean_text(f"no motion could be made of it: {reason_of(cause)}", REASON_LENGTH)
     return {"decision": "failed", "reason": reason, "decided_at": datetime.now(UTC)}
 
 
 def _video(chosen: Entry | None, reigning: Facts | None, settings: FindConfig) -> Artifact:
-    """The file to dance: of the new choice, or of the video that still reigns."""
+    """Return the file to dance: of the new choice, or of the video chosen before."""
     if chosen:
         return in_good_quality(chosen, settings)
     assert reigning
@@ -189,7 +189,7 @@ def _video(chosen: Entry | None, reigning: Facts | None, settings: FindConfig) -
 
 
 def _require_distinct(book: DanceBook) -> DanceBook:
-    """The book, if no two dances would share what is noted of them."""
+    """Return the book, or raise if two dances would share a catalogue key."""
     by_slug: dict[str, str] = {}
     for dance in book.dances:
         other = by_slug.setdefault(slug_of(dance.name), dance.name)
@@ -201,7 +201,7 @@ def _require_distinct(book: DanceBook) -> DanceBook:
 
 
 def _is_due(dance: Dance) -> bool:
-    """Whether it was last searched long enough ago."""
+    """Return whether it was last searched long enough ago."""
     store, key = Store.from_environment(), _key(dance)
     if not store.exists(key):
         return True
@@ -210,7 +210,7 @@ def _is_due(dance: Dance) -> bool:
 
 
 def _note(dance: Dance, result: Facts) -> None:
-    """Keep what was found, and when."""
+    """Store the result and its time."""
     facts = {"finished_at": datetime.now(UTC).isoformat(), "dance": dance.name, **result}
     text = json.dumps(facts, indent=1, default=str)
     Store.from_environment().put(_key(dance), text.encode())
@@ -221,7 +221,7 @@ def _key(dance: Dance) -> str:
 
 
 async def _log_summary(done: dict[str, Facts], failed: dict[str, str]) -> None:
-    """One table of all dances."""
+    """Log one table of all dances."""
     table = [
         {"dance": name, "result": "new" if facts["is_new"] else "as before",
          "video": clean_text(facts["chosen"]["title"]), "reason": ""}

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from robojackson.rl.policy import Policy as Policy
     from robojackson.robot.model import Robot as Robot
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _MODULES = {
     "api.evaluation": ("PolicyEvaluation", "evaluate_policy", "render_video"),

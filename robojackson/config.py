@@ -1,7 +1,7 @@
 """The decorator of every configuration: frozen, strict, no unknown keys, no NaN or infinity.
 
 Strict means that no number, text or boolean is converted into another: `"3"` is no number, `3.0` no
-integer and `1` no boolean. What YAML and JSON cannot say is taken for what the field asks for: a
+integer and `1` no boolean. What YAML and JSON cannot express is converted to the field's type: a
 list for a tuple, a mapping for a section, text for a path.
 """
 
@@ -32,7 +32,7 @@ SCALARS = (bool, int, float)
 
 @dataclass_transform(frozen_default=True, field_specifiers=(pydantic.Field, field))
 def config_dataclass(cls: type[Config]) -> type[Config]:
-    """A frozen dataclass whose values are checked when it is made.
+    """Return a frozen dataclass whose values are checked when it is made.
 
     Args:
         cls: Fields with types, defaults and, by `pydantic.Field`, limits.
@@ -47,7 +47,7 @@ def config_dataclass(cls: type[Config]) -> type[Config]:
 
 
 def _strict(kind: Any) -> Any:
-    """A type whose numbers and booleans are not converted."""
+    """Return a type whose numbers and booleans are not converted."""
     if kind in SCALARS:
         return Annotated[kind, Strict()]
     origin, inner = get_origin(kind), get_args(kind)

@@ -22,7 +22,7 @@ class RoboJacksonError(Exception):
         self.reason, self.source = reason, source
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Let an error go to another process with its fields, whatever its arguments are."""
+        """Let an error go to another process with its fields, for any arguments."""
         return _rebuilt, (type(self), self.args, self.__dict__)
 
 
@@ -52,7 +52,7 @@ class TrackTooShort(RoboJacksonError):
 
 
 class NoPersonFound(RoboJacksonError):
-    """The pose detector found nobody in the clip."""
+    """The pose detector found no person in the clip."""
 
 
 class UnknownName(RoboJacksonError):
@@ -117,10 +117,10 @@ class RejectedReference(RoboJacksonError):
     """A reference motion that the robot cannot follow.
 
     Attributes:
-        remedy: What may mend it.
+        remedy: What may repair it.
         figure: Name of the figure of the score card that failed; empty where none did.
-        value, limit: Of that figure.
-        forcible: Whether `--force` goes on all the same.
+        value, limit: The figure and its limit.
+        forcible: Whether `--force` goes on anyway.
     """
 
     def __init__(
@@ -152,7 +152,7 @@ class RejectedReference(RoboJacksonError):
 
 
 class TrainingFailed(RoboJacksonError):
-    """The training process died; the message says which run, how and where its log is."""
+    """The training process died; the message names the run, the cause and its log."""
 
 
 class TrainingCrashed(TrainingFailed):
@@ -160,7 +160,7 @@ class TrainingCrashed(TrainingFailed):
 
 
 class MissingDependency(RoboJacksonError):
-    """Something that has to be installed first; the message is the line that brings it."""
+    """Something that has to be installed first; the message is the line that installs it."""
 
 
 class SearchFailed(RoboJacksonError):

@@ -1,4 +1,4 @@
-"""What a stage hands to the next: the key of a file in the store and its digest."""
+"""Artifact that a stage hands to the next: the key of a file in the store and its digest."""
 
 from typing import Annotated
 

@@ -11,15 +11,15 @@ Value = TypeVar("Value", bound=tables.Tabular)
 
 
 def save(store: Store, stage: str, name: str, value: tables.Tabular) -> Artifact:
-    """Keep a dataclass in the store under a key made of its content."""
+    """Store a dataclass under a key made of its content."""
     return store.save(stage, name, tables.encode(value))
 
 
 def read(cls: type[Value], store: Store, artifact: Artifact) -> Value:
-    """The dataclass that an artifact holds."""
+    """Return the dataclass that an artifact holds."""
     return tables.decode(cls, store.read(artifact.key), store.address(artifact.key))
 
 
 def read_rows(schema: TableSchema, store: Store, artifact: Artifact) -> list[dict[str, Any]]:
-    """The records that an artifact holds."""
+    """Return the records that an artifact holds."""
     return tables.decode_rows(schema, store.read(artifact.key), store.address(artifact.key))

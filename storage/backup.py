@@ -64,7 +64,7 @@ class Manifest:
         store: Address of the store.
         files: Content of each key of the store.
         database: Prefect's database; None: there was none.
-        version: Of this layout.
+        version: Version of this layout.
     """
 
     store: str
@@ -124,7 +124,7 @@ class Backups:
         return name
 
     def path(self, content: Content) -> Path:
-        """Return where a content lies."""
+        """Return the place of a content."""
         return self.root / CONTENTS / content.sha256[:2] / content.sha256
 
     def has(self, content: Content) -> bool:

@@ -14,7 +14,7 @@ T = TypeVar("T")
 
 @dataclass
 class Progress:
-    """How far a copy is.
+    """Progress of a copy.
 
     Attributes:
         what: What is done to each file.

@@ -1,4 +1,4 @@
-"""The catalogue of every video that was ever judged: a row a judgement, never changed, only added.
+"""The catalogue of all assessed videos: a row an assessment, never changed, only added.
 
 Each refresh writes its rows as one new Parquet file under a name that no other can have, so two
 refreshes at once never touch the same file, on a disk or in an object store. Compaction writes what
@@ -40,7 +40,7 @@ QUALITY = (
 )
 CANDIDATE_RECORD = TableSchema(
     "CandidateRecord",
-    "judgement of a video",
+    "assessment of a video",
     (
         Column("record_id", TEXT),
         Column("run_id", TEXT),
@@ -50,7 +50,7 @@ CANDIDATE_RECORD = TableSchema(
         Column("thumbnail", TEXT, nullable=True),
         *(Column(c.name, c.type, c.unit, nullable=True) for c in STABILITY_SCORE.columns),
         *QUALITY,
-        # chosen, accepted, rejected (a filter says why) or failed (could not be downloaded or read)
+        # chosen, accepted, rejected (by a filter) or failed (could not be downloaded or read)
         Column("decision", TEXT),
         Column("reason", TEXT, nullable=True),
         Column("decided_at", TIME),
@@ -62,7 +62,7 @@ Row = Mapping[str, Any]
 
 
 def append(store: Store, rows: Iterable[Row]) -> Artifact | None:
-    """Add judgements; a `record_id` is made for each. None when there are no rows.
+    """Add assessments; a `record_id` is made for each. None when there are no rows.
 
     Raises:
         BadTable: a row lacks a column or has one too many.
@@ -73,8 +73,8 @@ def append(store: Store, rows: Iterable[Row]) -> Artifact | None:
 
 
 def records(store: Store, dance: str | None = None) -> list[dict[str, Any]]:
-    """All judgements, or those of one dance: the oldest search first, in it the chosen video, those
-    that may be danced by their score, and the others.
+    """Return all assessments, or those of one dance: the oldest search first, in it the chosen
+    video, those that may be danced by their score, and the others.
     """
     where = "" if dance is None else "WHERE lower(dance) = lower($dance)"
     given = {} if dance is None else {"dance": dance}
@@ -87,7 +87,8 @@ def records(store: Store, dance: str | None = None) -> list[dict[str, Any]]:
 
 
 def query(store: Store, sql: str, given: Mapping[str, Any] | None = None) -> list[dict[str, Any]]:
-    """Rows of a question in DuckDB's SQL about the table `candidates`; it reaches no other file.
+    """Return rows of a question in DuckDB's SQL about the table `candidates`; it reaches no other
+    file.
 
     Raises:
         BadTable: the question is not SQL, or names what is not there.
@@ -129,8 +130,8 @@ def compact(store: Store, least: int = COMPACT_FROM) -> Artifact | None:
 
 
 def champion(store: Store, dance: str, kind: str = "") -> dict[str, Any] | None:
-    """The judgement of the video that was chosen last for a dance, if its file is still there and
-    it has not failed since.
+    """Return the assessment of the video that was chosen last for a dance, if its file still exists
+    and it has not failed since.
 
     Args:
         kind: Beginning of the ids of the runs that count, such as `refresh`.
@@ -146,12 +147,13 @@ def champion(store: Store, dance: str, kind: str = "") -> dict[str, Any] | None:
 
 
 def known(store: Store, dance: str, kind: str = "") -> set[tuple[str, str]]:
-    """Source and id of every video that was judged for a dance; a failed one may be tried again."""
+    """Return source and id of every video that was assessed for a dance; a failed one may be tried
+    again."""
     return _assessed(_of(store, dance, kind))
 
 
 def failed(store: Store, dance: str, kind: str = "") -> set[tuple[str, str]]:
-    """Source and id of every video that could never be judged for a dance."""
+    """Return source and id of every video that could never be assessed for a dance."""
     found = _of(store, dance, kind)
     return {_key_of(row) for row in found} - _assessed(found)
 
@@ -179,7 +181,7 @@ def _keys(store: Store) -> list[str]:
 
 
 def _read_all(store: Store) -> pa.Table:
-    """All files in one table; read anew when a compaction took one away meanwhile."""
+    """Return all files in one table; read again when a compaction removed one meanwhile."""
     for _ in range(ATTEMPTS):
         parts = [_read(store, key) for key in _keys(store)]
         whole = [part for part in parts if part is not None]
@@ -189,7 +191,7 @@ def _read_all(store: Store) -> pa.Table:
 
 
 def _read(store: Store, key: str) -> pa.Table | None:
-    """One file, None when it is gone."""
+    """Return one file, None when it is gone."""
     try:
         data = store.read(key)
     except StoreError:
@@ -200,7 +202,8 @@ def _read(store: Store, key: str) -> pa.Table | None:
 
 
 def _without_zones(table: pa.Table) -> pa.Table:
-    """Times as DuckDB takes them without its extension for time zones; they all are UTC."""
+    """Return the times as DuckDB takes them without its extension for time zones; they all are
+    UTC."""
     columns = [
         column.cast(pa.timestamp("us")) if column.type == TIME else column
         for column in table.itercolumns()

@@ -1,8 +1,8 @@
-"""What processes that were killed left on this machine, and taking it away.
+"""Find and remove what killed processes left on this machine.
 
 Half-written files (`.part-`), scratch folders, and folders of work. A process holds a lock on what
-it is writing and the kernel lets go when it dies, so whatever nobody holds is nobody's; it is taken
-away by who holds its lock, so that nobody can begin to use it meanwhile. A training that was killed
+it is writing, and the kernel releases it when it dies; what is not locked is a leftover and is
+removed under its lock, so that no process can begin to use it meanwhile. A training that was killed
 is the exception: its checkpoint is worth going on from, until the same training has been finished
 elsewhere.
 """
@@ -31,11 +31,11 @@ YOUNG_S = 60.0
 
 
 def sweep(store: Store, parts: bool = True, work: bool = True) -> list[Path]:
-    """Take away what is nobody's; what a living process works on stays.
+    """Remove leftovers of dead processes; what a living process works on stays.
 
     Args:
         parts: Look for half-written files, too: in all folders of the store, if it is on a disk.
-        work: Look for what cells of ablations left, too: their tables tell what is still needed.
+        work: Also remove leftovers of ablation cells: their tables show what is still needed.
     """
     gone = [
         *(_parts(store) if parts else ()),
@@ -43,12 +43,12 @@ def sweep(store: Store, parts: bool = True, work: bool = True) -> list[Path]:
         *(_work(store) if work else ()),
     ]
     for path in gone:
-        log.info("left by a process that is dead, taken away: %s", path)
+        log.info("removed leftover of a dead process: %s", path)
     return gone
 
 
 def _parts(store: Store) -> Iterator[Path]:
-    """Files whose writing was not finished."""
+    """Yield the files whose writing was not finished."""
     if not isinstance(store.place, LocalFolder):
         return
     for folder, _, names in os.walk(store.place.root):  # a folder may go away while it is read
@@ -68,7 +68,8 @@ def _scratch(store: Store) -> Iterator[Path]:
 
 
 def _work(store: Store) -> Iterator[Path]:
-    """Folders of judgements, which begin anew, and of trainings that were finished elsewhere."""
+    """Yield folders of evaluations, which start again, and of trainings that were finished
+    elsewhere."""
     left = [f for f in _folders(store, f"{TRAINING}*") if not is_held(f / TASK)]
     finished = _finished(store) if left else set()
     unneeded = [folder for folder in left if folder.name.removeprefix(TRAINING) in finished]
@@ -82,7 +83,7 @@ def _work(store: Store) -> Iterator[Path]:
 
 
 def _finished(store: Store) -> set[str]:
-    """Digests of the trainings whose cells are in the tables."""
+    """Return the digests of the trainings whose cells are in the tables."""
     tables = [
         {_digest(key) for key in store.list(f"{study_tables.FOLDER}/{t}")}
         for t in study_tables.TABLES
@@ -106,7 +107,7 @@ def _age_s(path: Path) -> float:
 
 
 def is_held(path: Path) -> bool:
-    """Whether a living process has locked the file."""
+    """Return whether a living process has locked the file."""
     try:
         with path.open("rb") as file:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

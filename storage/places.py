@@ -1,4 +1,4 @@
-"""Where a store keeps its files: a folder of this machine, or whatever fsspec reaches.
+"""Places of a store: a folder of this machine, or any address that fsspec reaches.
 
 Every write is whole or absent: on a disk a temporary name, fsync, then rename; in an object store
 one PUT; elsewhere a temporary name, then a move. Errors are those of the place; `Store` words them.
@@ -16,7 +16,7 @@ PUT_IS_ATOMIC = frozenset(("s3", "s3a", "gs", "gcs", "abfs", "az", "memory"))
 
 
 def place_at(root: str) -> "LocalFolder | Remote":
-    """The place of an address: a URL is fsspec's, all else is a folder."""
+    """Return the place of an address: a URL is fsspec's, all else is a folder."""
     if "://" in root and not root.startswith("file://"):
         return Remote(root)
     return LocalFolder(Path(root.removeprefix("file://")))
@@ -33,9 +33,11 @@ class Remote:
         self._put_is_atomic = bool(protocols & PUT_IS_ATOMIC)
 
     def create(self) -> None:
+        """Make the bucket or folder."""
         self._system.makedirs(self._base, exist_ok=True)
 
     def put(self, key: str, source: Path | bytes) -> None:
+        """Write a file, whole or not at all."""
         data = source if isinstance(source, bytes) else source.read_bytes()
         target = self._path(key)
         if self._put_is_atomic:
@@ -52,25 +54,31 @@ class Remote:
             raise
 
     def read(self, key: str) -> bytes:
+        """Return the content of a file."""
         self._system.invalidate_cache()
         return bytes(self._system.cat_file(self._path(key)))
 
     def sha256(self, key: str) -> str:
+        """Return the digest of a file."""
         return sha256_of(self.read(key))
 
     def exists(self, key: str) -> bool:
+        """Return whether there is such a file."""
         self._system.invalidate_cache()
         return bool(self._system.isfile(self._path(key)))
 
     def remove(self, key: str) -> None:
+        """Remove a file."""
         self._system.rm_file(self._path(key))
 
     def list(self, prefix: str) -> list[str]:
+        """Return the keys of all finished files under a prefix."""
         self._system.invalidate_cache()
         found = self._system.find(self._path(prefix))
         return [p.removeprefix(self._base).lstrip("/") for p in found if TEMPORARY not in p]
 
     def address(self, key: str) -> str:
+        """Return the address of a key."""
         return f"{self.url}/{key}"
 
     def _path(self, key: str) -> str:

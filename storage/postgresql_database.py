@@ -126,7 +126,7 @@ class PostgreSQL:
 
 
 def _advice(message: str) -> str:
-    """Return the next step for the failures that a user can mend."""
+    """Return the next step for the failures that a user can repair."""
     if "version mismatch" in message or "unsupported version" in message:
         return "; install the postgresql-client of the server's version"
     if "authentication failed" in message or "no password supplied" in message:

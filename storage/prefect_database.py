@@ -18,7 +18,7 @@ SQLITE_FILE = "prefect.db"
 
 
 class Database(Protocol):
-    """What a backup needs of a database."""
+    """Interface of a database for backups."""
 
     @property
     def kind(self) -> Literal["postgresql", "sqlite"]:

@@ -24,7 +24,7 @@ class Run:
         move: Name of the dance, as `run_name` leaves it.
         robot: Name of the robot description.
         setup: Name of the training setup.
-        seed: Of the training.
+        seed: Seed of the training.
         finished_at: When, with time zone.
         artifacts: What it made, by name.
         summary: Its figures.
@@ -41,13 +41,13 @@ class Run:
 
 
 def record(store: Store, run: Run) -> Artifact:
-    """Write a run down, replacing what was known of it."""
+    """Record a run, replacing its earlier record."""
     text = json.dumps(asdict(run), default=str, indent=1, sort_keys=True)
     return store.put(f"{FOLDER}/{run.run_id}.json", text.encode())
 
 
 def list_runs(store: Store) -> list[Run]:
-    """All runs, the latest last.
+    """Return all runs, the latest last.
 
     Raises:
         BadTable: a file of the catalogue is not a run.

@@ -2,7 +2,7 @@
 
     records/<stage>/<sha256 of the call>.json
 
-Where they lie depends on the store alone, so that the command line, workers and every machine that
+Their place depends on the store alone, so that the command line, workers and every machine that
 reaches the store share them. Prefect writes and reads them (`tasks/runtime/engine.py`); the result
 inside is JSON of ours, so that a cached pass is read without Prefect.
 """

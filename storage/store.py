@@ -1,6 +1,6 @@
-"""Where artifacts live: a local folder by default, any fsspec address by configuration.
+"""The store of artifacts: a local folder by default, any fsspec address by configuration.
 
-Keys are relative to the root. Whatever goes wrong in a place is one `StoreError` with one line.
+Keys are relative to the root. Every failure of a place is one `StoreError` with one line.
 """
 
 import hashlib
@@ -29,7 +29,7 @@ class Store(FileTree):
 
     Attributes:
         root: Path or URL, as given.
-        place: The folder or whatever else keeps the files.
+        place: The folder or other place that keeps the files.
     """
 
     def __init__(self, root: str | Path, place: Place | None = None) -> None:
@@ -39,11 +39,11 @@ class Store(FileTree):
 
     @classmethod
     def from_environment(cls) -> "Store":
-        """The store that `ROBOJACKSON_STORE` names, `./store` without it."""
+        """Return the store that `ROBOJACKSON_STORE` names, `./store` without it."""
         return cls(os.environ.get(VARIABLE) or DEFAULT_ROOT)
 
     def create(self) -> "Store":
-        """The store itself, its folder or bucket made if it is not there."""
+        """Return the store itself, its folder or bucket made if it is not there."""
         with in_one_line(f"cannot make the store {self.root}"):
             self.place.create()
         return self
@@ -74,7 +74,7 @@ class Store(FileTree):
 
     @contextmanager
     def local(self, artifact: Artifact) -> Iterator[Path]:
-        """A local file with the content: the file itself on a disk, else a copy that goes away."""
+        """Yield a local file with the content: the file itself on a disk, else a temporary copy."""
         if isinstance(self.place, LocalFolder):
             yield self.place.root / artifact.key
             return
@@ -85,7 +85,7 @@ class Store(FileTree):
 
     @contextmanager
     def scratch(self) -> Iterator[Path]:
-        """A folder that goes away, for results on their way into the store."""
+        """Yield a temporary folder for results on their way into the store."""
         base = self.work(SCRATCH)
         with in_one_line(f"cannot write {base}"):
             folder = Path(tempfile.mkdtemp(dir=base))
@@ -96,7 +96,7 @@ class Store(FileTree):
             shutil.rmtree(folder, ignore_errors=True)
 
     def work(self, name: str) -> Path:
-        """A local folder that stays: the state of a run that may be resumed."""
+        """Return a local folder that stays: the state of a run that may be resumed."""
         path = self.here / "work" / name
         with in_one_line(f"cannot write {path}"):
             path.mkdir(parents=True, exist_ok=True)
@@ -104,7 +104,7 @@ class Store(FileTree):
 
     @property
     def here(self) -> Path:
-        """What belongs to this machine alone: the root itself on a disk, else a folder in cache."""
+        """The folder of this machine: the root itself on a disk, else a folder in cache."""
         if isinstance(self.place, LocalFolder):
             return self.place.root
         cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")

@@ -24,14 +24,14 @@ NO_FILES: dict[str, Content] = {}
 
 @dataclass(frozen=True)
 class BackupResult:
-    """What a backup did.
+    """Result of a backup.
 
     Attributes:
-        name: Of the backup.
-        files, size_mb: In it.
+        name: Name of the backup.
+        files, size_mb: Files and size in it.
         copied, copied_mb: Files and millions of bytes that earlier backups did not have.
         database: Address of the database that was dumped; None: there is none.
-        freed_mb: Of contents that only removed backups had.
+        freed_mb: Size of contents that only removed backups had.
     """
 
     name: str

@@ -1,6 +1,6 @@
 """Removing from a store what is old: unfinished work and unused results; by request more kinds.
 
-A folder of work is removed by whoever holds its locks, as in `leftovers`. The other kinds stay
+A folder of work is removed under its locks, as in `leftovers`. The other kinds stay
 while a process works with the store: it may know of results that no record names yet.
 """
 
@@ -26,7 +26,7 @@ FLOW = "prefect.flow_engine"
 
 @dataclass(frozen=True)
 class Cleaning:
-    """What would go and what stays.
+    """Plan of what to remove and what to keep.
 
     Attributes:
         items: Everything in the store.
@@ -59,7 +59,7 @@ def plan(store: Store, kinds: Collection[Kind], older_than_s: float) -> Cleaning
 
 
 def remove(store: Store, cleaning: Cleaning) -> list[Item]:
-    """Remove what a plan says; return what is gone. What is held meanwhile stays."""
+    """Remove what a plan lists; return what was removed. What is locked meanwhile stays."""
     root = root_of(store)
     return [item for item in cleaning.going if _removed(root / item.key, item.kind == WORK)]
 
@@ -99,7 +99,7 @@ def _content(path: Path) -> bytes:
 
 
 def _command(words: list[str]) -> str:
-    """What a process of ours does; empty for any other process."""
+    """Return the command of a process of ours; empty for any other process."""
     for place, word in enumerate(words):
         if word == FLOW:
             return "a run of a worker"
@@ -110,7 +110,7 @@ def _command(words: list[str]) -> str:
 
 
 def _store_of(process: Path) -> Path:
-    """The folder that a process takes for its store."""
+    """Return the folder that a process uses as its store."""
     variables = (process / "environ").read_bytes().decode(errors="replace").split("\0")
     named = dict(each.partition("=")[::2] for each in variables)
     return (Path(os.readlink(process / "cwd")) / (named.get(VARIABLE) or DEFAULT_ROOT)).resolve()

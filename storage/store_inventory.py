@@ -1,4 +1,4 @@
-"""What is in a store on a disk: how old, how big, and what still refers to it.
+"""Inventory of a store on a disk: age, size, and references.
 
 Reference means: a file of JSON in the store, or the catalogue of videos, names the folder of an
 artifact. The folder is named by the digest of its content, so no other text looks like it.
@@ -21,7 +21,7 @@ Kind = Literal["work", "unused", "videos", "cache", "runs", "kept"]
 KINDS: dict[Kind, str] = {
     "work": "unfinished trainings, downloads and scratch files that no process holds",
     "unused": "results that no record, run or table refers to",
-    "videos": "downloaded videos that only their catalogue refers to; loaded again if wanted",
+    "videos": "downloaded videos that only their catalogue refers to; downloaded again if needed",
     "cache": "records of finished stages and what only they refer to; made again if needed",
     "runs": "pages and videos of finished dances, and what only they refer to",
     "kept": "tables, studies, walkers, robots, Prefect's database, what is in use: never removed",
@@ -42,7 +42,7 @@ class Item:
 
     Attributes:
         kind: What they are.
-        key: Of the file or folder, relative to the root.
+        key: Key of the file or folder, relative to the root.
         size: Bytes.
         age_s: Since the newest of them was written, seconds.
     """
@@ -82,7 +82,7 @@ def root_of(store: Store) -> Path:
 
 
 def _entries(root: Path) -> Iterator[Path]:
-    """Folders of work, artifacts, pages and downloads, and all single files."""
+    """Yield the folders of work, artifacts, pages and downloads, and all single files."""
     for path in sorted(root.iterdir()):
         if not path.is_dir():
             yield path
@@ -97,7 +97,7 @@ def _entries(root: Path) -> Iterator[Path]:
 
 
 def _folders_with_files(folder: Path) -> Iterator[Path]:
-    """The topmost folders that hold a file."""
+    """Yield the topmost folders that hold a file."""
     for path in sorted(folder.iterdir()):
         if path.is_file() or any(inner.is_file() for inner in path.iterdir()):
             yield path
@@ -140,7 +140,7 @@ def _references(store: Store, root: Path) -> Callable[[str], Kind | None]:
 
 
 def _kind_of_text(path: Path) -> Kind:
-    """Of a file that may name artifacts: one inside an artifact counts as kept."""
+    """Return the kind of a file that may name artifacts: one inside an artifact counts as kept."""
     kinds: dict[str, Kind] = {stage_records.FOLDER: "cache", run_catalogue.FOLDER: "runs"}
     kinds |= {PAGES: "runs", WORK: "work", DOWNLOADS: "videos"}
     return kinds.get(path.parts[0], "kept")
@@ -154,7 +154,7 @@ def _named_in(path: Path) -> set[str]:
 
 
 def _item(root: Path, path: Path, kind: Kind) -> Item | None:
-    """Size and age of a file or folder; None where it has gone meanwhile."""
+    """Return the size and age of a file or folder; None where it has gone meanwhile."""
     files = [path] if path.is_file() else [each for each in path.rglob("*") if each.is_file()]
     try:
         facts = [each.stat() for each in files if TEMPORARY not in each.name]

@@ -16,10 +16,10 @@ from storage.store_listing import entries
 
 @dataclass(frozen=True)
 class Restored:
-    """What a restore did.
+    """Result of a restore.
 
     Attributes:
-        files, size_mb: That were written.
+        files, size_mb: Files and size that were written.
         database: Address of the database that was loaded; None: the backup has none.
         others: Files of the store that the backup does not have; they stay.
     """
@@ -42,7 +42,7 @@ def restore(
 
     Args:
         report: Called after every file.
-        name: Of the backup; the newest without one.
+        name: Name of the backup; the newest without one.
         force: Replace what is in a store and a database that are not empty.
     Raises:
         BackupFailed: the backup is damaged or the target is not empty; nothing is written.

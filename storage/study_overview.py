@@ -1,4 +1,4 @@
-"""The question that `robojackson metrics` asks by itself."""
+"""The default query of `robojackson metrics`."""
 
 from robojackson.rl.evaluation.verdict import EASY, SHORTEST_S
 
@@ -18,4 +18,4 @@ SELECT study, move, setup, seed, rollouts, round(survived_s, 2) AS survived_s,
        CASE WHEN NOT too_short THEN round(skill, 3) END AS skill
 FROM bodies JOIN cells USING (study, move, setup, seed) WHERE policy = 'trained' ORDER BY ALL
 """
-"""A line a cell; success and skill are empty where its rollouts are too short to judge."""
+"""A line a cell; success and skill are empty where its rollouts are too short to evaluate."""

@@ -34,16 +34,16 @@ FOLDER = "metrics"
 TABLES: Mapping[str, TableSchema] = {"episodes": EPISODE_RECORD, "evaluations": EVALUATION_RECORD}
 RUNS = f"{FOLDER}/runs"
 ALWAYS = ("run_id", "study", "move", "setup", "config")
-"""Columns of `runs`, whatever is known."""
+"""Columns of `runs` that always exist."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where the rows of a cell stand.
+    """Place of the rows of a cell.
 
     Attributes:
         study, move, setup, seed: The partition.
-        run_id: Of the training.
+        run_id: Run id of the training.
     """
 
     study: str
@@ -53,20 +53,20 @@ class Place:
     run_id: str
 
     def key(self, table: str) -> str:
-        """The key of one of its tables."""
+        """Return the key of one of its tables."""
         partition = f"study={self.study}/move={self.move}/setup={self.setup}/seed={self.seed}"
         return f"{FOLDER}/{table}/{partition}/{self.run_id}.parquet"
 
 
 def write(store: Store, place: Place, given: Mapping[str, Artifact]) -> dict[str, Artifact]:
-    """Put the tables of a cell where questions find them; another run of that cell makes room.
+    """Write the tables of a cell where queries find them; replace those of another run of it.
 
     A table that is there already is not written again.
 
     Args:
         given: `episodes` and `evaluations`, as the stages left them.
     Raises:
-        BadTable: one is not what its schema says.
+        BadTable: one does not match its schema.
         StoreError: the store refuses it; nothing half-written is left.
     """
     made = {}
@@ -84,12 +84,12 @@ def write(store: Store, place: Place, given: Mapping[str, Artifact]) -> dict[str
 
 
 def note_key(place: Place) -> str:
-    """The key of what is known of a cell's origin."""
+    """Return the key of a cell's provenance."""
     return f"{RUNS}/{place.run_id}-{place.study}.json"
 
 
 def read_note(store: Store, place: Place) -> dict[str, Any]:
-    """What is known of a cell's origin; nothing where it is not there or cannot be read."""
+    """Return a cell's provenance; empty where it is missing or cannot be read."""
     try:
         return dict(json.loads(store.read(note_key(place))))
     except (StoreError, ValueError):
@@ -97,13 +97,13 @@ def read_note(store: Store, place: Place) -> dict[str, Any]:
 
 
 def note(store: Store, place: Place, facts: Mapping[str, Any]) -> Artifact:
-    """Keep where the numbers of a cell come from."""
+    """Store the provenance of a cell."""
     text = json.dumps(facts, indent=1, sort_keys=True, default=str)
     return store.put(note_key(place), text.encode())
 
 
 def query(store: Store, sql: str, given: Mapping[str, Any] | None = None) -> list[dict[str, Any]]:
-    """Rows of a question in DuckDB's SQL about `episodes`, `evaluations` and `runs`.
+    """Return rows of a question in DuckDB's SQL about `episodes`, `evaluations` and `runs`.
 
     It reaches no other file.
 
@@ -118,8 +118,8 @@ def query(store: Store, sql: str, given: Mapping[str, Any] | None = None) -> lis
 def opened(
     store: Store, study: str | None = None, runs: Collection[str] | None = None
 ) -> Iterator[RunQuery]:
-    """The tables, all or those of a study or of some runs of it, read once for any number of
-    questions.
+    """Yield a query function over all tables, or those of a study or of some of its runs, read once
+    for any number of questions.
     """
     import duckdb
 
@@ -142,21 +142,22 @@ def opened(
 
 
 def files_of(store: Store, study: str, runs: Collection[str] | None = None) -> list[Artifact]:
-    """All files of a study, or of some runs of it: its tables and where they come from."""
+    """Return all files of a study, or of some runs of it: its tables and where they come from."""
     keys = [key for table in TABLES for key in store.list(f"{FOLDER}/{table}/study={study}")]
     keys = [key for key in keys if runs is None or _run(key) in runs]
     return [Artifact(key=k, sha256=store.sha256(k)) for k in [*keys, *_notes(store, study, runs)]]
 
 
 def runs_of(files: Iterable[Artifact]) -> set[str]:
-    """Ids of the runs whose tables are among the files."""
+    """Return the ids of the runs whose tables are among the files."""
     return {_run(file.key) for file in files if file.key.endswith(".parquet")}
 
 
 def read(
     store: Store, table: str, study: str | None = None, runs: Collection[str] | None = None
 ) -> pa.Table:
-    """All rows of a table, with the column `study`, or those of one study or of some runs."""
+    """Return all rows of a table, with the column `study`, or those of one study or of some
+    runs."""
     schema = TABLES[table]
     prefix = f"{FOLDER}/{table}" + (f"/study={study}" if study else "")
     parts = [
@@ -168,7 +169,7 @@ def read(
 
 
 def _relabelled(place: Place, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Rows under the names of this cell: a cached table may have been made under others."""
+    """Return rows under the names of this cell: a cached table may have been made under others."""
     names = {"run_id": place.run_id, "move": place.move, "setup": place.setup, "seed": place.seed}
     return [{**row, **names} for row in rows]
 
@@ -202,16 +203,16 @@ def _run(key: str) -> str:
 
 
 def _notes(store: Store, study: str | None, runs: Collection[str] | None) -> list[str]:
-    """Keys of what is known of the cells' origin; one of another study may be among them."""
+    """Return the keys of the cells' provenance; one of another study may be among them."""
     found = [key for key in store.list(RUNS) if study is None or key.endswith(f"-{study}.json")]
     if runs is None:
         return found
-    wanted = {f"{run}-{study}.json" for run in runs}
-    return [key for key in found if key.rpartition("/")[2] in wanted]
+    note_names = {f"{run}-{study}.json" for run in runs}
+    return [key for key in found if key.rpartition("/")[2] in note_names]
 
 
 def _runs(store: Store, study: str | None, runs: Collection[str] | None) -> pa.Table:
-    """Provenance, a row a cell: what is not a plain value stands as JSON."""
+    """Return the provenance, a row a cell: what is not a plain value stands as JSON."""
     rows = []
     for key in _notes(store, study, runs):
         try:
@@ -231,7 +232,7 @@ def _as_text(value: Any) -> str | None:
 
 
 def _outdated(store: Store, place: Place) -> list[str]:
-    """Files of the same cell under another run id: an earlier configuration or code."""
+    """Return the files of the same cell under another run id: an earlier configuration or code."""
     found = []
     for table in TABLES:
         folder = place.key(table).rsplit("/", 1)[0]

@@ -22,7 +22,8 @@ def _models(parameters: Mapping[str, Any]) -> list[str]:
 
 @stage(models=_models)
 def assess_video(video: Artifact, config: AssessmentConfig) -> dict[str, Artifact]:
-    """`landmarks`: LandmarkTrack; `stability`: StabilityScore; `quality`, `info`: JSON."""
+    """Return `landmarks` (LandmarkTrack), `stability` (StabilityScore), `quality` and `info`
+    (JSON)."""
     store = Store.from_environment()
     with store.local(video) as path:
         found: Assessment = in_worker(measure, path, config)

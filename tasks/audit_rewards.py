@@ -1,4 +1,4 @@
-"""What the rewards of a study pay to bodies that do not dance."""
+"""Audit what the rewards of a study pay to bodies that do not dance."""
 
 import json
 
@@ -16,7 +16,7 @@ from tasks.runtime.stage import stage
 def audit_rewards(
     reference: Artifact, robot: RobotDescription, rewards: dict[str, TrackConfig | PaperConfig]
 ) -> Artifact:
-    """JSON: by name of the reward, the share of a perfect dance that each body earns."""
+    """Return, by name of the reward, the share of a perfect dance that each body earns (JSON)."""
     from robojackson.rl.evaluation.reward_audit import audit_reward
 
     store = Store.from_environment()

@@ -20,7 +20,7 @@ ONE_AT_A_TIME = threading.Lock()
 
 
 def one_at_a_time() -> threading.Lock:
-    """The lock, by a name that can be sent to another process, where it is another lock."""
+    """Return the lock, by a name that can be sent to another process, where it is another lock."""
     return ONE_AT_A_TIME
 
 
@@ -36,7 +36,8 @@ def _models(parameters: Mapping[str, Any]) -> list[str]:
 def detect_landmarks(
     video: Artifact, info: Artifact, size: str, dancer: DancerConfig | None = None
 ) -> Artifact:
-    """LandmarkTrack of one person, or, as Algorithm 1 has it, of whom the detector prefers."""
+    """Return the LandmarkTrack of one person, or (Algorithm 1) of the one that the detector
+    prefers."""
     store = Store.from_environment()
     with store.local(video) as path, one_at_a_time():
         known = info_of(store, info, path)

@@ -1,4 +1,4 @@
-"""Bring a video into the store: from the web in one format, or from a folder as it is.
+"""Put a video into the store: from the web in one format, or from a folder as it is.
 
 A download is cached by the video's id and format: by the task's record, and where that is lost by a
 note in the store, so that a file comes over the net once, also when two runs want it at once: one
@@ -49,7 +49,7 @@ class WebVideo:
 
     @property
     def folder(self) -> str:
-        """Where it is kept; both parts are made safe once more, whoever made the object."""
+        """Where it is kept; both parts are made safe again, however the object was made."""
         return f"{FOLDER}/{safe_name(self.source)}/{safe_name(self.video_id)}"
 
 
@@ -57,7 +57,7 @@ class WebVideo:
 def download_video(
     video: WebVideo, purpose: Purpose, formats: FormatConfig, web: WebConfig, limits: VideoLimits
 ) -> Artifact:
-    """A video file, in the format that serves the purpose."""
+    """Return a video file, in the format that serves the purpose."""
     store = Store.from_environment()
     chosen = offer(video.url, purpose, formats, web)
     had = _earlier_download(store, video, chosen)
@@ -66,13 +66,13 @@ def download_video(
 
 @stage()
 def take_file(file: SourceFile) -> Artifact:
-    """A video of a folder."""
+    """Return a video of a folder."""
     suffix = safe_name(file.path.suffix.lstrip(".").lower() or "mp4")
     return Store.from_environment().save("video", f"clip.{suffix}", file.path)
 
 
 def _earlier_download(store: Store, video: WebVideo, chosen: Offer) -> Artifact | None:
-    """The file of an earlier download, if it is there unaltered."""
+    """Return the file of an earlier download, if it is there unaltered."""
     note = f"{video.folder}/{chosen.name}.json"
     if not store.exists(note):
         return None
@@ -85,7 +85,7 @@ def _earlier_download(store: Store, video: WebVideo, chosen: Offer) -> Artifact 
 def _download_or_reuse(
     store: Store, video: WebVideo, chosen: Offer, web: WebConfig, limits: VideoLimits
 ) -> Artifact:
-    """The file that another run has brought meanwhile, or else from the web."""
+    """Return the file that another run has downloaded meanwhile, or download it."""
     folder = store.work(f"{video.folder}.{chosen.name}")
     with locked(folder, patience_s=FOR_EVER):
         had = _earlier_download(store, video, chosen)
@@ -115,24 +115,24 @@ class _Progress:
         self._what = f"{clean_text(video.title, 60) or video.video_id} ({name})"
         self._key = "download-" + hashlib.sha256(video.folder.encode()).hexdigest()[:12]
         self._artifact: Any = None
-        self._told = 0.0
+        self._logged = 0.0
         self._in_run = TaskRunContext.get() is not None
 
     def __call__(self, done: int, total: int | None) -> None:
         share = min(done / total, 1.0) if total else 0.0
-        if share < self._told + STEP and share < 1.0:
+        if share < self._logged + STEP and share < 1.0:
             return
-        if share >= 1.0 and self._told >= 1.0:
+        if share >= 1.0 and self._logged >= 1.0:
             return
-        self._told = share
+        self._logged = share
         self._log().info("%s: %.0f %% of %.1f MB", self._what, 100 * share, (total or 0) / 1e6)
         if self._in_run:
             self._show(100 * share)
 
     def _show(self, percent: float) -> None:
         if self._artifact is None:
-            told = in_markdown(self._what)
-            self._artifact = create_progress_artifact(percent, key=self._key, description=told)
+            label = in_markdown(self._what)
+            self._artifact = create_progress_artifact(percent, key=self._key, description=label)
         else:
             update_progress_artifact(self._artifact, percent)
 

@@ -20,7 +20,7 @@ def draw_still(
     reference: Artifact,
     robot: RobotDescription,
 ) -> Artifact:
-    """A PNG."""
+    """Return a PNG."""
     store = Store.from_environment()
     with store.local(source) as path:
         picture = still(

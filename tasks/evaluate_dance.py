@@ -35,7 +35,8 @@ def evaluate_dance(
     config: EvaluateConfig,
     labels: RunLabels,
 ) -> dict[str, Artifact]:
-    """`evaluations`: EvaluationRecord; `evaluation`: means, as JSON; `rollout`: Rollout."""
+    """Return `evaluations` (EvaluationRecord), `evaluation` (means, JSON) and `rollout`
+    (Rollout)."""
     from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
     from robojackson.rl.policy import load_policy
 
@@ -57,7 +58,7 @@ def evaluate_tracker(
     config: EvaluateConfig,
     labels: RunLabels,
 ) -> dict[str, Artifact]:
-    """`evaluations`: EvaluationRecord; `evaluation`: means, as JSON; `rollout`: Rollout.
+    """Return `evaluations` (EvaluationRecord), `evaluation` (means, JSON) and `rollout` (Rollout).
 
     Raises:
         BadPolicy: the tracker's file is not here, or it is for another robot.
@@ -76,7 +77,7 @@ def evaluate_tracker(
 def _saved(
     store: Store, stage_name: str, prefix: str, verdict: "Evaluation", dt: float, common: Row
 ) -> dict[str, Artifact]:
-    """The artifacts of an evaluation; `common` are the columns that all its rows share."""
+    """Return the artifacts of an evaluation; `common` are the columns that all its rows share."""
     rows = tables.encode_rows(EVALUATION_RECORD, [{**common, **row} for row in verdict.rows])
     summary = json.dumps(verdict.summary, indent=1).encode()
     rollout, name = Rollout(dt, verdict.rollout_qpos), f"{prefix}rollout.parquet"

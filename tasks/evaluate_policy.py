@@ -33,7 +33,7 @@ async def evaluate_policy(
     config: EvaluateConfig,
     limit_s: float | None = None,
 ) -> dict[str, Artifact]:
-    """`evaluations`: EvaluationRecord; `evaluation`: means, as JSON; `rollout`: Rollout.
+    """Return `evaluations` (EvaluationRecord), `evaluation` (means, JSON) and `rollout` (Rollout).
 
     Args:
         limit_s: Time after which it has failed, seconds.

@@ -27,7 +27,7 @@ class SourceFile:
 
     @classmethod
     def at(cls, path: Path) -> "SourceFile":
-        """The file at a path."""
+        """Return the file at a path."""
         return cls(path, sha256_of_file(path))
 
 
@@ -35,7 +35,7 @@ class SourceFile:
 def probe_video(
     source: SourceFile, limits: VideoLimits, start_s: float | None, end_s: float | None
 ) -> dict[str, Artifact]:
-    """`video`: the file, or its range; `info`: size, rate and frames, as JSON."""
+    """Return `video` (the file, or its range) and `info` (size, rate and frames, JSON)."""
     store = Store.from_environment()
     if start_s is None and end_s is None:
         return _save(store, source.path, probe(source.path, limits))
@@ -47,7 +47,7 @@ def probe_video(
 
 
 def info_of(store: Store, info: Artifact, path: Path) -> VideoInfo:
-    """What `probe` found, with the path at which the video is now."""
+    """Return what `probe` found, with the path at which the video is now."""
     return VideoInfo(path=path, **json.loads(store.read(info.key)))
 
 

@@ -41,7 +41,7 @@ def publish(cell: Cell, run_id: str, made: Mapping[str, Artifact]) -> Result:
     """Write the cell's rows and where these come from; the same call again writes nothing.
 
     Args:
-        run_id: Of the training.
+        run_id: Run id of the training.
         made: What its stages left.
     Returns:
         What the stages left, with the tables under their keys among the metrics.
@@ -57,7 +57,7 @@ def publish(cell: Cell, run_id: str, made: Mapping[str, Artifact]) -> Result:
 
 
 def published(cell: Cell, run_id: str) -> Result:
-    """Return what `publish` returned, on whatever machine that was.
+    """Return what `publish` returned, on any machine.
 
     Raises:
         StoreError: this store has nothing of that run.
@@ -77,7 +77,7 @@ def published(cell: Cell, run_id: str) -> Result:
 def provenance(
     cell: Cell, place: study_tables.Place, made: Mapping[str, Artifact]
 ) -> dict[str, Any]:
-    """Where the numbers of a cell come from: code, configuration, inputs, machine, time."""
+    """Return where the numbers of a cell come from: code, configuration, inputs, machine, time."""
     return {
         **asdict(place),
         "mode": cell.train.mode,
@@ -104,10 +104,12 @@ def _digests(made: Mapping[str, Artifact]) -> dict[str, str]:
 
 @cache
 def _commit() -> str:
-    """Of the checkout, `-dirty` where files differ from it; without git, as in a container, what
-    ROBOJACKSON_COMMIT says.
+    """Return the commit of the checkout, `-dirty` where files differ from it; without git, as in a
+    container, the value of ROBOJACKSON_COMMIT.
     """
-    if not is_checkout():  # the commit of whoever keeps an environment in a repository is not ours
+    if (
+        not is_checkout()
+    ):  # an environment inside another repository has that one's commit, which is not ours
         return os.environ.get(COMMIT, "")
     command = ["git", "-C", str(app_folder()), "describe", "--always", "--dirty", "--abbrev=40"]
     try:

@@ -1,4 +1,4 @@
-"""From landmarks to the motion of the person."""
+"""Recover the motion of the person from landmarks."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -14,14 +14,15 @@ from tasks.runtime.stage import stage
 
 
 def _models(parameters: Mapping[str, Any]) -> list[str]:
-    """Digest of the temporal network's weights, if it is used; the stage misses a missing file."""
+    """Return the digest of the temporal network's weights, if it is used; the stage misses a
+    missing file."""
     config = parameters["config"].temporal
     return [sha256_of_file(config.file)] if config.enabled and config.file.is_file() else []
 
 
 @stage(models=_models)
 def recover_motion(landmarks: Artifact, config: MocapConfig) -> Artifact:
-    """SmplSequence."""
+    """Return the SmplSequence of the dancer."""
     store = Store.from_environment()
     track = artifact_tables.read(LandmarkTrack, store, landmarks)
     return artifact_tables.save(

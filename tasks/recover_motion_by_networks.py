@@ -1,4 +1,4 @@
-"""From a video to the motion of the person, by published networks whose weights a user brings."""
+"""Recover the motion of the person by published networks with weights of the user."""
 
 import logging
 from collections.abc import Callable, Mapping
@@ -30,7 +30,7 @@ def _models(parameters: Mapping[str, Any]) -> list[str]:
 def recover_motion_by_networks(
     video: Artifact, landmarks: Artifact, network: NetworkConfig, config: MocapConfig
 ) -> Artifact:
-    """SmplSequence."""
+    """Return the SmplSequence of the dancer, by HybrIK's and NIKI's networks."""
     store = Store.from_environment()
     track = artifact_tables.read(LandmarkTrack, store, landmarks)
     networks = load_networks(network)
@@ -41,12 +41,12 @@ def recover_motion_by_networks(
 
 
 def _teller() -> Callable[[int, int], None]:
-    told = 0
+    reported = 0
 
     def report(done: int, total: int) -> None:
-        nonlocal told
-        if done * REPORTS // total > told:
-            told = done * REPORTS // total
+        nonlocal reported
+        if done * REPORTS // total > reported:
+            reported = done * REPORTS // total
             log.info("networks: %d of %d frames", done, total)
 
     return report

@@ -25,11 +25,11 @@ def render_video(
     title: str = TRAINED_TITLE,
     name: str = "dance.mp4",
 ) -> Artifact:
-    """An mp4.
+    """Return the video as mp4.
 
     Args:
         title: Over the panel of the rollout.
-        name: Of the file.
+        name: Name of the file.
     """
     store = Store.from_environment()
     with store.local(source) as path, store.scratch() as folder:

@@ -1,4 +1,4 @@
-"""From the motion of a person to the reference motion of a robot."""
+"""Retarget the motion of a person to the reference motion of a robot."""
 
 import json
 
@@ -18,7 +18,7 @@ from tasks.runtime.stage import stage
 def retarget_motion(
     sequence: Artifact, robot: RobotDescription, config: RetargetConfig
 ) -> dict[str, Artifact]:
-    """`reference`: ReferenceMotion; `scorecard`: its figures, as JSON."""
+    """Return `reference` (ReferenceMotion) and `scorecard` (its figures, JSON)."""
     store = Store.from_environment()
     motion = artifact_tables.read(SmplSequence, store, sequence)
     reference = to_robot(motion, load_robot(robot), config)

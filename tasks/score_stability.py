@@ -1,4 +1,4 @@
-"""How steady the dancer of a clip is seen."""
+"""Score how steadily the dancer of a clip is tracked."""
 
 from robojackson.clips.quality.stability import StabilityConfig, stability
 from robojackson.motion.landmark_track import LandmarkTrack
@@ -10,7 +10,7 @@ from tasks.runtime.stage import stage
 
 @stage()
 def score_stability(landmarks: Artifact, config: StabilityConfig) -> Artifact:
-    """StabilityScore."""
+    """Return the StabilityScore of a track."""
     store = Store.from_environment()
     track = artifact_tables.read(LandmarkTrack, store, landmarks)
     return artifact_tables.save(store, "stability", "stability.parquet", stability(track, config))

@@ -1,4 +1,4 @@
-"""Ask a source for videos of a dance. Never cached: tomorrow's answer is another one."""
+"""Search a source for videos of a dance. Never cached: results change from day to day."""
 
 from datetime import UTC, datetime
 
@@ -13,5 +13,5 @@ from robojackson.clips.web.yt_dlp_client import WebConfig
 def search_videos(
     name: str, query: str, address: str, count: int, web: WebConfig
 ) -> tuple[VideoCandidate, ...]:
-    """Candidates in the source's own order."""
+    """Return candidates in the source's own order."""
     return tuple(source(name).search(query, address, count, web, datetime.now(UTC)))

@@ -1,4 +1,4 @@
-"""One training of a study and its judgement, as data that can go to a worker."""
+"""One training of a study and its evaluation, as data that can go to a worker."""
 
 from configs.study_config import Name, Seed, Setup
 from robojackson.config import config_dataclass

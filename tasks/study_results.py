@@ -25,12 +25,13 @@ Baselines = dict[str, dict[str, dict[str, float]]]
 
 
 def grids_of(study: Study) -> dict[str, np.ndarray]:
-    """By move: ends of the intervals of its learning curves, control steps."""
+    """Return, by move, the ends of the intervals of its learning curves, control steps."""
     return {move: np.linspace(0, study.steps_of(move), INTERVALS + 1) for move in study.moves}
 
 
 def learning(ask: RunQuery, study: Study) -> dict[Key, dict[int, dict[str, np.ndarray]]]:
-    """By (move, setup) and seed: mean return and length of the episodes of each interval."""
+    """Return, by (move, setup) and seed, mean return and length of the episodes of each
+    interval."""
     sql = (
         "SELECT move, setup, seed, step, episode_return, episode_length FROM episodes "
         "WHERE study = $study ORDER BY step"
@@ -51,7 +52,7 @@ def learning(ask: RunQuery, study: Study) -> dict[Key, dict[int, dict[str, np.nd
 
 
 def of_learning(curves: Mapping[Key, Seeds], study: Study) -> Figures:
-    """Final return, area under the curve, and steps to the threshold, of every seed."""
+    """Return final return, area under the curve and steps to the threshold of every seed."""
     grids = grids_of(study)
     last = max(1, round(LAST * INTERVALS))
     goal = {move: _goal(curves, move) for move in study.moves}
@@ -68,7 +69,7 @@ def of_learning(curves: Mapping[Key, Seeds], study: Study) -> Figures:
 
 
 def of_evaluations(ask: RunQuery, study: Study) -> Figures:
-    """Means over the rollouts of every trained policy."""
+    """Return the means over the rollouts of every trained policy."""
     sql = f"SELECT move, setup, seed, {_means(ask)} FROM evaluations WHERE study = $study "
     rows = ask(f"{sql} AND policy = 'trained' GROUP BY ALL", {"study": study.name})
     found: Figures = {name: {} for name in EVALUATED}
@@ -81,7 +82,7 @@ def of_evaluations(ask: RunQuery, study: Study) -> Figures:
 
 
 def of_baselines(ask: RunQuery, study: Study) -> Baselines:
-    """By move and policy that learnt nothing: the same figures."""
+    """Return the same figures by move and baseline policy."""
     sql = f"SELECT move, policy, {_means(ask)} FROM evaluations WHERE study = $study "
     given = {"study": study.name, "taught": [TRAINED, *VARIANTS]}
     rows = ask(f"{sql} AND policy NOT IN $taught GROUP BY ALL ORDER BY ALL", given)
@@ -93,7 +94,7 @@ def of_baselines(ask: RunQuery, study: Study) -> Baselines:
 
 
 def too_short_moves(ask: RunQuery, study: Study, baselines: Baselines) -> list[str]:
-    """Moves whose rollouts say nothing: bodies that do not dance succeed as well."""
+    """Return the moves whose rollouts are too short: bodies that do not dance succeed as well."""
     sql = (
         "SELECT move, max(survived_s) AS longest FROM evaluations WHERE study = $study GROUP BY ALL"
     )
@@ -109,7 +110,7 @@ def too_short_moves(ask: RunQuery, study: Study, baselines: Baselines) -> list[s
 
 
 def without_unassessed(figures: Figures, unassessed: Collection[str]) -> Figures:
-    """The figures without the success and skill of moves that are too short to judge."""
+    """Return the figures without success and skill of moves that are too short to evaluate."""
     return {
         name: {
             k: v
@@ -121,7 +122,7 @@ def without_unassessed(figures: Figures, unassessed: Collection[str]) -> Figures
 
 
 def _means(ask: RunQuery) -> str:
-    """SQL of the means of the evaluated figures; one that no table has is null."""
+    """Return SQL of the means of the evaluated figures; one that no table has is null."""
     known = [row["column_name"] for row in ask("DESCRIBE evaluations")]
     gains = [name for name in known if name.startswith("limb_gain_")]
     terms = {name: f"avg({name})" for name in EVALUATED if name in known}
@@ -147,7 +148,8 @@ def _each(curves: Any, figure: Any) -> dict[Key, dict[int, float]]:
 
 
 def _goal(curves: Any, move: str) -> float:
-    """The threshold of a move: a share of the longest mean episode that any setup reaches."""
+    """Return the threshold of a move: a share of the longest mean episode that any setup
+    reaches."""
     means = [
         np.mean([seed["episode_length"] for seed in seeds.values()], axis=0)
         for (name, _), seeds in curves.items()

@@ -46,7 +46,7 @@ OVERTIME_S = 300.0
 
 @dataclass(frozen=True)
 class RunLabels:
-    """What the rows of a run are known by.
+    """Labels of the rows of a run.
 
     Attributes:
         move: Name of the dance.
@@ -59,7 +59,7 @@ class RunLabels:
 
 @dataclass(frozen=True)
 class TrainingTime:
-    """What the clock of a pass leaves for its training.
+    """Time that a pass leaves for its training.
 
     Attributes:
         deadline: Unix time at which the training ends in any case, seconds.
@@ -71,8 +71,8 @@ class TrainingTime:
 
 
 def _models(parameters: Mapping[str, Any]) -> list[str]:
-    """Of the networks to start from. The minutes in the key are those that were asked for, not
-    those that the clock left: the same call again does not train again.
+    """Return the digest of the networks to start from. The key holds the requested minutes, not
+    those that the clock left: the same call does not train again.
     """
     return _start(parameters["config"], parameters["robot"])
 
@@ -87,10 +87,11 @@ async def train_policy(
     limit_s: float | None = None,
     whole_pass: bool = False,
 ) -> dict[str, Artifact]:
-    """`policy`: safetensors; `episodes`: EpisodeRecord; `training`: steps, seconds, as JSON.
+    """Return `policy` (safetensors), `episodes` (EpisodeRecord) and `training` (steps, seconds,
+    JSON).
 
     Args:
-        time_left: Of the pass that it is part of.
+        time_left: Time that the pass leaves for it.
         whole_pass: Whether `config.minutes` is the budget of a whole pass, of which training gets
             what the other stages leave.
         limit_s: Time after which it has failed, seconds; a budget in minutes sets one by itself.
@@ -119,8 +120,8 @@ async def train_policy(
 def run_id_of(
     reference: Artifact, robot: RobotDescription, config: TrainConfig, labels: RunLabels
 ) -> str:
-    """Names and a digest of all that makes the training what it is, its code too; no clock, no
-    machine.
+    """Return the names and a digest of everything that determines the training, its code included;
+    no clock, no machine.
     """
     parts = [identity([reference, robot, config]), _start(config, robot), digest(CODE)]
     facts = json.dumps(parts, sort_keys=True)
@@ -129,13 +130,13 @@ def run_id_of(
 
 
 def _start(config: TrainConfig, robot: RobotDescription) -> list[str]:
-    """The digest of the networks that it starts from, if it does."""
+    """Return the digest of the networks that it starts from, if it does."""
     path = local_start_file(Store.from_environment(), config, robot)
     return [] if path is None else [sha256_of_file(path)]
 
 
 def _minutes(config: TrainConfig, time_left: TrainingTime | None, whole_pass: bool) -> float | None:
-    """What the clock leaves of the minutes that were asked for; says so."""
+    """Return what remains of the requested minutes; log it."""
     if config.minutes is None or time_left is None:
         return config.minutes
     left = max(SHORTEST_MINUTES, (time_left.deadline - time.time()) / 60)
@@ -179,8 +180,8 @@ def _command(
 
 
 def _facts(answer: bytes, labels: RunLabels) -> bytes:
-    """What is told of a training, without the paths of this machine."""
+    """Return the facts of a training, without the paths of this machine."""
     said = json.loads(answer)
-    told = ("trainer", "seed", "steps", "updates", "stopped", "episodes")
-    facts = {key: said[key] for key in told} | {"training_s": said["seconds"]}
+    public_keys = ("trainer", "seed", "steps", "updates", "stopped", "episodes")
+    facts = {key: said[key] for key in public_keys} | {"training_s": said["seconds"]}
     return json.dumps({"setup": labels.setup, **facts}, indent=1).encode()

@@ -33,7 +33,7 @@ LEFT_OUT = ("video", "info")
 def write_page(
     made: dict[str, Artifact], move: str, file: str, folder: str = ""
 ) -> dict[str, Artifact]:
-    """Everything under `dances/<move>-<digest>/`, and `page`, which shows it.
+    """Write everything under `dances/<move>-<digest>/`; return its artifacts and `page`.
 
     Args:
         made: What the other stages made, by name.
@@ -60,7 +60,7 @@ def write_first_page(made: dict[str, Artifact], move: str, file: str, folder: st
 
 
 def _written(made: dict[str, Artifact], file: str, folder: str) -> dict[str, Artifact]:
-    """The page and all files that belong to it, in a folder."""
+    """Return the page and all files that belong to it, in a folder."""
     from robojackson.report.pages.page_content import page_content
     from robojackson.report.pages.run_page import render  # matplotlib
 
@@ -94,7 +94,8 @@ def _results(store: Store, made: Mapping[str, Artifact], file: Path) -> "Results
 
 
 def joined_evaluation(store: Store, made: Mapping[str, Artifact]) -> dict[str, Any]:
-    """The summary of an evaluation, with that of a tracker under `trackers` where both danced."""
+    """Return the summary of an evaluation, with that of a tracker under `trackers` where both
+    danced."""
     summary = _json(store, made["evaluation"])
     if "tracker_evaluation" in made:
         other = _json(store, made["tracker_evaluation"])

@@ -1,4 +1,4 @@
-"""The results of a study out of its tables: numbers, figures, and a page that says what they show.
+"""The results of a study out of its tables: numbers, figures, and a page that explains them.
 
 Drawing takes seconds, so it is done again only when the rows, or the code that reads them, are
 others.
@@ -57,7 +57,7 @@ def write_study_page(
     pictures: dict[str, Artifact],
     reward_audits: dict[str, Artifact],
 ) -> dict[str, Artifact]:
-    """The files of `report`.
+    """Write the files of `report`.
 
     Args:
         rows: Files of the tables of the cells that count (`storage.study_tables.files_of`).
@@ -65,7 +65,7 @@ def write_study_page(
     """
     store = Store.from_environment()
     shown = {name: store.read(png.key) for name, png in pictures.items()}
-    paid = {name: json.loads(store.read(told.key)) for name, told in reward_audits.items()}
+    paid = {name: json.loads(store.read(text.key)) for name, text in reward_audits.items()}
     return report(study, moves, shown, study_tables.runs_of(rows), paid)
 
 
@@ -76,11 +76,11 @@ def report(
     runs: Collection[str] | None = None,
     reward_audits: Mapping[str, study_page.RewardAudits] | None = None,
 ) -> dict[str, Artifact]:
-    """Write `studies/<name>/` anew: `page`, `table` (CSV), `results` (JSON) and the figures.
+    """Write `studies/<name>/` again: `page`, `table` (CSV), `results` (JSON) and the figures.
 
     Args:
-        moves: Of the study, by name.
-        pictures: By move, its video frame, recovered body and robot side by side, as PNG.
+        moves: Moves of the study, by name.
+        pictures: By move, a picture of video frame, recovered body and robot side by side, as PNG.
         runs: Ids of the trainings that count; all that the tables have under its name if absent.
         reward_audits: By move, what the rewards of the setups pay to bodies that do not dance it.
     """
@@ -151,7 +151,7 @@ def _too_short(moves: Sequence[str]) -> list[str]:
     if not moves:
         return []
     return [
-        f"{', '.join(moves)}: too short to judge. Bodies that do not dance succeed as well, so "
+        f"{', '.join(moves)}: too short to evaluate. Bodies that do not dance succeed as well, so "
         "success and skill are left out."
     ]
 
@@ -168,7 +168,8 @@ def _few(study: Study) -> list[str]:
 
 
 def _starts(ask: study_tables.RunQuery, study: Study) -> list[str]:
-    """What was learnt before the first step of a cell: it belongs to the price of pretraining."""
+    """Return what was learnt before the first step of a cell: it belongs to the price of
+    pretraining."""
     sql = "SELECT DISTINCT setup, config FROM runs WHERE config IS NOT NULL ORDER BY ALL"
     setups: dict[str, set[str]] = {}
     for row in ask(sql):
@@ -192,8 +193,8 @@ def _steps_of(start: str, study: Study) -> str:
 
 def _picture(name: str, move: Move, png: bytes) -> Plot:
     stands = f" (for the paper's {move.paper})" if move.paper else ""
-    told = "The video, the body recovered from it, and the same moment on the robot."
-    return Plot(f"{name}{stands}", told, png)
+    text = "The video, the body recovered from it, and the same moment on the robot."
+    return Plot(f"{name}{stands}", text, png)
 
 
 def _json(
@@ -201,13 +202,13 @@ def _json(
     compared: Sequence[ablation_statistics.Comparison],
     lines: Sequence[study_page.Line],
 ) -> bytes:
-    told = {
+    text = {
         "primary": PRIMARY,
         "claims": [{**asdict(claim), "sentence": study_page.sentence(claim)} for claim in claims],
         "comparisons": [asdict(comparison) for comparison in compared],
         "lines": [asdict(line) for line in lines],
     }
-    return json.dumps(to_json_types(told), indent=1, allow_nan=False).encode()
+    return json.dumps(to_json_types(text), indent=1, allow_nan=False).encode()
 
 
 def _file(title: str) -> str:

@@ -1,1 +1,1 @@
-"""How the assets were made: pose bundles, rendered dancers, the authored hip-shake."""
+"""Scripts that made the assets: pose bundles, rendered dancers, the authored hip-shake."""

@@ -2,7 +2,7 @@
 # What `make` runs first. POSIX sh, nothing of ours installed.
 #   bootstrap.sh missing   print the apt packages that this machine lacks, on one line
 #   bootstrap.sh check     one sentence and exit 1 when something is lacking, before any work
-#   bootstrap.sh install   create .venv or bring it up to date; does nothing when it is
+#   bootstrap.sh install   create .venv or update it; does nothing when it is
 # Environment: PYTHON (an interpreter 3.11, 3.12 or 3.13; by default the first of these that is here
 # and can make an environment), TORCH_INDEX (where torch comes from), EXTRAS (which of pyproject.toml's
 # optional dependencies; the image leaves `dev` out).
@@ -81,7 +81,7 @@ check() {
     exit 1
 }
 
-wanted() { { cat pyproject.toml constraints.txt tools/bootstrap.sh; echo "${TORCH_INDEX:-} $EXTRAS"; } | cksum; }
+expected() { { cat pyproject.toml constraints.txt tools/bootstrap.sh; echo "${TORCH_INDEX:-} $EXTRAS"; } | cksum; }
 
 pinned() { sed -n "s/^$1==//p" constraints.txt; }
 
@@ -95,7 +95,7 @@ has_environment() {
 
 install() {
     check
-    if [ -f "$STAMP" ] && [ "$(cat "$STAMP")" = "$(wanted)" ] && has_environment; then
+    if [ -f "$STAMP" ] && [ "$(cat "$STAMP")" = "$(expected)" ] && has_environment; then
         return 0
     fi
     if ! has_environment; then
@@ -106,17 +106,17 @@ install() {
     fi
     pip="$VENV/bin/python -m pip --disable-pip-version-check --quiet"
     say "torch $(pinned torch) (some minutes, some gigabytes)"
-    # First and alone: what comes later would bring a CUDA build of several gigabytes.
+    # First and alone: later packages would install a CUDA build of several gigabytes.
     $pip install ${TORCH_INDEX:+--index-url "$TORCH_INDEX"} "torch==$(pinned torch)"
     say "the rest"
     $pip install --constraint constraints.txt --editable ".[$EXTRAS]"
-    # MediaPipe and scenedetect bring two more OpenCV builds; all three share one folder, and the
+    # MediaPipe and scenedetect install two more OpenCV builds; all three share one folder, and the
     # one with windows needs libraries that a server has not.
     say "headless OpenCV alone"
     $pip uninstall --yes opencv-python opencv-contrib-python
     $pip install --no-deps --force-reinstall \
         "opencv-python-headless==$(pinned opencv-python-headless)"
-    wanted >"$STAMP"
+    expected >"$STAMP"
     say "done"
 }
 

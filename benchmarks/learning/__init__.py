@@ -1,1 +1,1 @@
-"""What learning costs and what comes out of it."""
+"""Cost and results of learning."""

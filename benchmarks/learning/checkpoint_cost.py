@@ -1,4 +1,4 @@
-"""What the checkpoints of a training cost it: the default method on the hip-shake, one core."""
+"""Cost of a training's checkpoints: the default method on the hip-shake, one core."""
 
 import os
 import tempfile
@@ -11,7 +11,7 @@ import numpy as np
 
 from benchmarks.learning.environment_core import humanoid
 from benchmarks.learning.policies import Folders, reference_of
-from benchmarks.learning.speed import told
+from benchmarks.learning.speed import comparison
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.training import train_policy
@@ -21,7 +21,8 @@ BAR = "<= 0.02"
 
 
 def checkpoints(folders: Folders, minutes: float = 5.0) -> dict[str, Any]:
-    """Wall seconds of a checkpoint (median) over those between two of them, as they are by default.
+    """Return wall seconds of a checkpoint (median) over those between two of them, as they are by
+    default.
 
     `slowest_s` is the longest, `megabytes` what one adds to the replay on the disk, `steps` those
     between two.
@@ -46,7 +47,9 @@ def checkpoints(folders: Folders, minutes: float = 5.0) -> dict[str, Any]:
     # The last one ends the training, whenever that is.
     middle, between = float(np.median(spent[:-1])), config.checkpoint_seconds
     return {
-        **told("a checkpoint, s, over those between two", middle, between, middle / between, BAR),
+        **comparison(
+            "a checkpoint, s, over those between two", middle, between, middle / between, BAR
+        ),
         "slowest_s": max(spent[:-1]),
         "megabytes": float(np.median(sizes[:-1])) / 1e6,
         "steps": int(np.median(np.diff(steps[:-1]))),

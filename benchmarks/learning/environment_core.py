@@ -39,10 +39,10 @@ def humanoid() -> Robot:
 
 @dataclass(frozen=True)
 class Script:
-    """What an environment told MuJoCo, control step by control step.
+    """The commands of an environment to MuJoCo, control step by control step.
 
     Attributes:
-        controls: For every batch of robots its controls, (substeps, robots, nu).
+        controls: Controls of every batch of robots, (substeps, robots, nu).
         placed: (robot, qpos, qvel) that were put somewhere after the step; first, before it.
     """
 
@@ -81,7 +81,8 @@ def core(repeats: int, steps: int = 60, robot: Robot | None = None) -> Speeds:
 
 
 def _turns(robot: Robot, script: Script, n: int, steps: int) -> tuple[float, float, float]:
-    """Substeps a CPU second of the environment, of the plain loop and of the batched one."""
+    """Return the substeps a CPU second of the environment, of the plain loop and of the batched
+    one."""
     environment = _core(robot, n)
     loops = [Bare(robot.model, n, script, batched) for batched in (False, True)]
     environment.reset()
@@ -113,7 +114,7 @@ def _timed(core: TrackingCore, steps: int) -> float:
 
 
 def recorded(core: TrackingCore, steps: int) -> Script:
-    """Run an environment and write down what it tells MuJoCo."""
+    """Run an environment and record its commands to MuJoCo."""
     script, place = Script([], [[]]), core.sim.place
     batches = [_Spy(batch.controls) for _, _, batch in core.sim.chunks[0]]
     for (_, _, batch), spy in zip(core.sim.chunks[0], batches, strict=True):
@@ -139,12 +140,12 @@ class _Spy:
         self._controls, self._wrote = controls, list[np.ndarray]()
 
     def __call__(self, targets: np.ndarray) -> np.ndarray:
-        told = self._controls(targets)
-        self._wrote.append(told.copy())
-        return told
+        commands = self._controls(targets)
+        self._wrote.append(commands.copy())
+        return commands
 
     def taken(self) -> np.ndarray:
-        """What was written since the last call."""
+        """Return what was written since the last call."""
         wrote, self._wrote = np.array(self._wrote), []
         return wrote
 
@@ -153,7 +154,7 @@ class Bare:
     """A loop over `mj_step` that follows a script.
 
     Args:
-        batched: In the environment's order, a batch's control step at a time, which the cache of
+        batched: Speed in the environment's order, a batch at a time, which the cache of
             the processor likes; else substep by substep over all robots, as anybody would write it.
     """
 
@@ -164,19 +165,19 @@ class Bare:
         ends = np.cumsum([batch.shape[1] for batch in script.controls[0]])
         split = np.split(np.arange(n), ends[:-1]) if batched else [np.arange(n)]
         self._robots = [[robots[i] for i in which] for which in split]
-        merged = lambda told: [np.concatenate(told, 1)]  # noqa: E731
+        merged = lambda commands: [np.concatenate(commands, 1)]  # noqa: E731
         self._controls = (
             script.controls if batched else [merged(t) for t in script.controls]  # type: ignore[no-untyped-call]
         )
         self._place(0)
 
     def run(self, first: int, steps: int) -> float:
-        """CPU seconds of some control steps; putting robots elsewhere is not counted."""
+        """Return CPU seconds of some control steps; putting robots elsewhere is not counted."""
         spent, model, step = 0.0, self._model, mujoco.mj_step
         for t in range(first, first + steps):
             began = time.thread_time()
-            for robots, told in zip(self._robots, self._controls[t], strict=True):
-                for controls in told:
+            for robots, commands in zip(self._robots, self._controls[t], strict=True):
+                for controls in commands:
                     for (data, ctrl), control in zip(robots, controls, strict=True):
                         ctrl[:] = control
                         step(model, data)

@@ -1,9 +1,9 @@
-"""What learning costs and what comes out of it (`make bench-learning`).
+"""Measure cost and results of learning (`make bench-learning`).
 
     python -m benchmarks.learning.learning_suite PART ... [--folder FOLDER]
 
 `speed`, `threads`: our parts beside their peers (`speed`). `policies`: one row a move
-and a seed, trained for the row's CPU minutes and judged on stock physics (`policies`).
+and a seed, trained for the row's CPU minutes and evaluated on stock physics (`policies`).
 `survival`, `pretraining`: races (`races`). `checkpoints`: what they cost a training
 (`checkpoint_cost`). `table` only prints what there is. What exists is not computed again, so
 that all of it may take several sittings. The authors' clips are measured where ROBOJACKSON_PAPER
@@ -31,7 +31,7 @@ from benchmarks.learning import (
     speed as learning_speed,
 )
 from benchmarks.learning.policies import MOVES, Folders
-from benchmarks.learning.summary import AUTHORS_ROBOT, EXCESS, GAIN, LIMBS, R2, TOLD, summary
+from benchmarks.learning.summary import AUTHORS_ROBOT, COLUMNS, EXCESS, GAIN, LIMBS, R2, summary
 
 PARTS = ("speed", "threads", "policies", "survival", "pretraining", "checkpoints", "table")
 SPEED = ("what", "ours", "peer", "ratio", "bar", "holds", "load_average")
@@ -42,28 +42,28 @@ POLICY = (
 
 
 def main() -> None:
-    """Measure the parts that are asked for and print all that there is."""
+    """Measure the requested parts and print all rows."""
     given = _arguments()
     folders = Folders.at(given.folder)
-    wanted = given.what or list(PARTS)
+    parts = given.what or list(PARTS)
     command = f"python -m benchmarks.learning.learning_suite {' '.join(sys.argv[1:])}".strip()
     speed = folders.results / "learning_speed.json"
-    if "threads" in wanted:
+    if "threads" in parts:
         _write(speed, [learning_speed.threads()], command)
-    if "speed" in wanted:
+    if "speed" in parts:
         _write(speed, learning_speed.speed(given.repeats, given.seconds), command)
-    if "survival" in wanted:
+    if "survival" in parts:
         _write(speed, [races.survival(folders, given.cpu_minutes or 10)], command)
-    if "pretraining" in wanted:
+    if "pretraining" in parts:
         minutes = given.cpu_minutes or 5
         row = races.pretraining(folders, given.seeds, minutes, given.walker_cpu_seconds)
         _write(speed, [row], command)
-    if "checkpoints" in wanted:
+    if "checkpoints" in parts:
         _write(speed, [checkpoint_cost.checkpoints(folders)], command)
-    if "policies" in wanted:
+    if "policies" in parts:
         minutes, jobs = given.cpu_minutes, given.jobs
         learning_policies.policies(given.moves, given.seeds, minutes, jobs, folders)
-    if {"policies", "table"} & set(wanted) and (rows := summary(folders)):
+    if {"policies", "table"} & set(parts) and (rows := summary(folders)):
         held = {"command": command, "authors_robot": AUTHORS_ROBOT, "rows": rows}
         (folders.results / "learning.json").write_text(json.dumps(held, indent=1) + "\n")
     _show(folders, Console())
@@ -90,7 +90,7 @@ def _arguments() -> argparse.Namespace:
 
 
 def _write(path: Path, rows: list[dict[str, Any]], command: str) -> None:
-    """Put rows in the place of those that told the same."""
+    """Replace the rows of the same comparisons."""
     old = json.loads(path.read_text()) if path.exists() else []
     named = {row["what"]: row for row in old} | {
         row["what"]: {**row, "command": command} for row in rows
@@ -123,7 +123,7 @@ def _table(title: str, columns: tuple[str, ...], rows: list[dict[str, Any]]) -> 
 
 
 def _limbs(rows: list[dict[str, Any]]) -> Table:
-    """Gain, R2 and excess speed of every limb, with a mark where the bar is missed."""
+    """Return the gain, R2 and excess speed of every limb, with a mark where the bar is missed."""
     table = Table(
         "move", *LIMBS, title=f"gain {GAIN[0]}-{GAIN[1]} / R2 >= {R2} / excess <= {EXCESS}"
     )
@@ -138,11 +138,11 @@ def _limbs(rows: list[dict[str, Any]]) -> Table:
 
 
 def _beside(rows: list[dict[str, Any]]) -> Table:
-    """Those that do not dance, and the authors' robot."""
-    table = Table("move", "who", *TOLD, title="Beside the policy")
+    """Return the baselines that do not dance, and the authors' robot."""
+    table = Table("move", "who", *COLUMNS, title="Beside the policy")
     for row in rows:
         for who, figures in row["beside"].items():
-            table.add_row(_name(row), who, *(_cell(figures[key]) for key in TOLD))
+            table.add_row(_name(row), who, *(_cell(figures[key]) for key in COLUMNS))
     table.add_row(
         "authors' logs", "authors' robot", _cell(AUTHORS_ROBOT["survived_s"]), "-", "-", "-"
     )

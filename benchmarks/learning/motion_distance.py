@@ -1,4 +1,4 @@
-"""How near two human motions are: the share of one that the other contains, mirrored or not.
+"""Nearness of two human motions: the share of one that the other contains, mirrored or not.
 
 A window of a motion is one second of SMPL joints at 10 Hz, relative to the pelvis and turned by the
 heading of its first frame. Its distance to another is the mean distance of the joints, metres.
@@ -20,7 +20,7 @@ NEAR_M = 0.08
 
 
 def windows(sequence: SmplSequence, mirrored: bool = False) -> Float[np.ndarray, "W F 24 3"]:
-    """All windows of a motion; none where it is shorter than a second."""
+    """Return all windows of a motion; none where it is shorter than a second."""
     joints = np.asarray(sequence.joints, float)
     if mirrored:
         joints = joints[:, MIRROR] * [1.0, -1.0, 1.0]
@@ -34,7 +34,7 @@ def windows(sequence: SmplSequence, mirrored: bool = False) -> Float[np.ndarray,
 def contained_share(
     motion: Float[np.ndarray, "W F 24 3"], pool: Float[np.ndarray, "V F 24 3"]
 ) -> float:
-    """Share of a motion's windows to which some window of the pool is near."""
+    """Return the share of a motion's windows to which some window of the pool is near."""
     if not len(motion) or not len(pool):
         return 0.0
     return float(np.mean([distances(window, pool).min() < NEAR_M for window in motion]))
@@ -43,15 +43,15 @@ def contained_share(
 def distances(
     window: Float[np.ndarray, "F 24 3"], pool: Float[np.ndarray, "V F 24 3"]
 ) -> Float[np.ndarray, " V"]:
-    """Distance of a window to each of the pool, metres."""
+    """Return the distance of a window to each of the pool, metres."""
     result: np.ndarray = np.linalg.norm(pool - window, axis=-1).mean((1, 2))
     return result
 
 
 def _turned(joints: Float[np.ndarray, "F 24 3"]) -> Float[np.ndarray, "F 24 3"]:
-    """Relative to each frame's pelvis, the first frame facing +x."""
+    """Return relative to each frame's pelvis, the first frame facing +x."""
     across = joints[0, LEFT_HIP] - joints[0, RIGHT_HIP]
-    yaw = np.arctan2(-across[0], across[1])  # the left hip is at +y of who faces +x
+    yaw = np.arctan2(-across[0], across[1])  # the left hip is at +y of a body that faces +x
     c, s = np.cos(yaw), np.sin(yaw)
     offset = joints - joints[:, :1]
     x, y, z = np.moveaxis(offset, -1, 0)

@@ -1,8 +1,8 @@
-"""Policies of the bundled dances and of the authors' clips, trained and judged: one cached row a
+"""Policies of the bundled dances and of the authors' clips, trained and evaluated: one cached row a
 move and a seed, so that it may take several sittings.
 
 A row's training is pinned to a core of its own and ended by the CPU minutes of its bar. A motion
-that the gate refuses is trained on all the same, and the row says so.
+that the gate refuses is trained on anyway, and the row is marked.
 """
 
 import json
@@ -32,12 +32,12 @@ class Move:
 
     Attributes:
         clip: A video of the repository, or the name of a file in a folder of others'.
-        cpu_minutes: Of one core.
+        cpu_minutes: Minutes of one core.
         success, worst: Least strict success, of the mean over seeds and of the worst seed.
         skill: Least skill.
         cyclic: Whether it is danced for a time; else to its end.
-        authors: Whether it is a file of the authors': limbs are told and not asked for.
-        robot: Who dances it.
+        authors: Whether it is a file of the authors': limbs are reported without a bar.
+        robot: Name of the robot.
         mpjpe_mm: Largest mpjpe_l, fallen robots counted to the horizon; none for Humanoid-v5.
         cmu: Whether it is a BVH file of CMU.
     """
@@ -55,7 +55,7 @@ class Move:
 
     @property
     def horizons_s(self) -> tuple[float, ...]:
-        """Seconds that it is judged over, a row each."""
+        """Seconds that it is evaluated over, a row each."""
         return HORIZONS_S if self.cyclic else HORIZONS_S[:1]
 
     @property
@@ -85,7 +85,7 @@ MOVES = {
 
 @dataclass(frozen=True)
 class Folders:
-    """Where a benchmark keeps its things.
+    """Folders of a benchmark.
 
     Attributes:
         work: Motions, checkpoints, policies: not for the repository.
@@ -97,7 +97,7 @@ class Folders:
 
     @staticmethod
     def at(folder: Path | None) -> "Folders":
-        """The usual ones, or both within one folder."""
+        """Return the usual ones, or both within one folder."""
         if folder is None:
             return Folders(ROOT / "store" / "bench-learning", Path(__file__).parents[1] / "results")
         return Folders(folder.absolute() / "work", folder.absolute() / "results")
@@ -108,18 +108,19 @@ class Folders:
         return self.results / "learning"
 
     def row(self, name: str, seed: int | str, seconds: float, minutes: float | None = None) -> Path:
-        """The file of a row; one of another budget than the move's own is in no table."""
+        """Return the file of a row; one of another budget than the move's own is in no table."""
         suffix = "" if seconds == HORIZONS_S[0] else f"-{seconds:g}s"
         return self.rows / f"{name}{budget(minutes)}-s{seed}{suffix}.parquet"
 
 
 def budget(minutes: float | None) -> str:
-    """What the name of a row says of CPU minutes that are not the move's own."""
+    """Return the CPU minutes that the name of a row gives, where they are not the move's own."""
     return "" if minutes is None else f"-{minutes:g}min"
 
 
 def command(*words: object, core: int | None = None) -> int:
-    """One of our commands on one thread, pinned to a core where one is named; its exit status."""
+    """Run one of our commands on one thread, pinned to a core where one is named; return its exit
+    status."""
     line = [sys.executable, "-m", "robojackson", *map(str, words)]
     if core is not None:
         line = ["taskset", "-c", str(core), *line]
@@ -128,13 +129,13 @@ def command(*words: object, core: int | None = None) -> int:
 
 
 def must(*words: object, core: int | None = None) -> None:
-    """The same for a command without which nothing goes on."""
+    """Run a command without which the rest cannot go on."""
     if status := command(*words, core=core):
         raise SystemExit(f"`robojackson {' '.join(map(str, words))}` ended with {status}")
 
 
 def source_of(move: Move) -> Path | None:
-    """The file that a move comes from; None where the authors' are not at hand."""
+    """Return the file that a move comes from; None where the authors' are not at hand."""
     if not move.is_foreign:
         return ROOT / move.clip
     variable, suffix = (CMU, ".bvh") if move.cmu else (PAPER, ".pt")
@@ -143,7 +144,8 @@ def source_of(move: Move) -> Path | None:
 
 
 def reference_of(name: str, folders: Folders) -> Path:
-    """The motion of a move for the robot, made once; `gate.json` beside it tells the verdict."""
+    """Return the motion of a move for the robot, made once; `gate.json` beside it tells the
+    verdict."""
     move, work = MOVES[name], folders.work / name
     reference = work / "reference.parquet"
     if (work / "gate.json").is_file():
@@ -165,17 +167,18 @@ def reference_of(name: str, folders: Folders) -> Path:
 
 def require_frozen(name: str, reference: Path) -> None:
     """Refuse a reference that is not the one that the row was frozen with (`split.yaml`)."""
-    asked = load_split().references.get(name)
+    frozen_reference = load_split().references.get(name)
     found = poses_sha256(load(reference))
-    if asked is not None and asked != found:
+    if frozen_reference is not None and frozen_reference != found:
         raise SystemExit(
-            f"{name}: {reference} has the poses {found[:12]}, the row is measured on {asked[:12]}: "
-            "another mocap or retargeting made it; freeze it anew or use the old one"
+            f"{name}: {reference} has the poses {found[:12]}, the row is measured on "
+            f"{frozen_reference[:12]}: another mocap or retargeting made it; freeze it again or "
+            "use the old one"
         )
 
 
 def load(reference: Path) -> ReferenceMotion:
-    """A reference motion."""
+    """Return a reference motion."""
     return ReferenceMotion.load(reference)
 
 
@@ -189,9 +192,9 @@ def _made(move: Move, work: Path) -> int:
 
 
 def forced(name: str, folders: Folders) -> bool:
-    """Whether the gate refused the move's motion, so that it was forced."""
-    told = folders.work / name / "gate.json"
-    return told.is_file() and bool(json.loads(told.read_text())["forced"])
+    """Return whether the gate refused the move's motion, so that it was forced."""
+    gate = folders.work / name / "gate.json"
+    return gate.is_file() and bool(json.loads(gate.read_text())["forced"])
 
 
 def train_and_judge(
@@ -208,18 +211,19 @@ def train_and_judge(
     must("train", reference, "-o", out, *options, core=core)
     folders.rows.mkdir(parents=True, exist_ok=True)
     for seconds, path in kept.items():
-        judged = out / f"judged-{seconds:g}s"
+        evaluated = out / f"judged-{seconds:g}s"
         policy = out / "policy.safetensors"
-        must("evaluate", policy, reference, "-o", judged, "--seconds", seconds, core=core)
+        must("evaluate", policy, reference, "-o", evaluated, "--seconds", seconds, core=core)
         part = path.with_suffix(".part")
-        part.write_bytes((judged / "evaluations.parquet").read_bytes())
+        part.write_bytes((evaluated / "evaluations.parquet").read_bytes())
         part.replace(path)
 
 
 def policies(
     names: Iterable[str], seeds: Iterable[int], minutes: float | None, jobs: int, folders: Folders
 ) -> None:
-    """All rows, `jobs` at a time, each on a core of its own; Ctrl-C keeps checkpoints."""
+    """Train and evaluate all rows, `jobs` at a time, each on a core of its own; Ctrl-C keeps
+    checkpoints."""
     present = [name for name in names if source_of(MOVES[name]) is not None]
     for name in present:
         reference_of(name, folders)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.learning.policies import Folders, reference_of
-from benchmarks.learning.speed import told
+from benchmarks.learning.speed import comparison
 from benchmarks.learning.summary import cluster_interval
 from benchmarks.learning.training_curve import STOCK, area, curve_of, first_at
 
@@ -24,7 +24,7 @@ Points = list[tuple[float, int, float]]
 
 
 def survival(folders: Folders, minutes: float, seed: int = 0) -> dict[str, Any]:
-    """CPU seconds to a mean survival of 5 s, ours over the peer's."""
+    """Return CPU seconds to a mean survival of 5 s, ours over the peer's."""
     reference, work = reference_of("hip_shake", folders), folders.work / "survival"
     ours = curve_of(reference, work / f"ours-s{seed}.json", [f"seed={seed}"], GOAL_S, minutes)
     spent = ours["points"][-1][0]
@@ -33,7 +33,7 @@ def survival(folders: Folders, minutes: float, seed: int = 0) -> dict[str, Any]:
     peer = curve_of(reference, work / name, [f"seed={seed}", *STOCK], GOAL_S, limit)
     theirs = peer["points"][-1][0] if peer["reached"] else 60 * limit
     what = "CPU s to a mean survival of 5 s on hip_shake, ours over sb3-contrib's default"
-    row = told(what, spent, theirs, spent / theirs, "<= 0.1")
+    row = comparison(what, spent, theirs, spent / theirs, "<= 0.1")
     best = [max(survived for _, _, survived in curve["points"]) for curve in (ours, peer)]
     return {
         **row,
@@ -48,7 +48,7 @@ def survival(folders: Folders, minutes: float, seed: int = 0) -> dict[str, Any]:
 def pretraining(
     folders: Folders, seeds: Sequence[int], minutes: float, cost_s: float | None
 ) -> dict[str, Any]:
-    """Scratch against pretrain, paired by seed, at equal CPU minutes.
+    """Return scratch against pretrain, paired by seed, at equal CPU minutes.
 
     Args:
         cost_s: CPU seconds that the walker took; from a `walker.json` beside it or by hand.
@@ -68,7 +68,7 @@ def pretraining(
 
 
 def compared(scratch: Points, pretrain: Points, seconds: float) -> dict[str, Any]:
-    """One seed: mean survival under both curves, s, and CPU seconds that the walker saves.
+    """Return one seed: mean survival under both curves, s, and CPU seconds that the walker saves.
 
     Saved is what lies between the end and the moment at which the pretrained run survives as long
     as the other one does in the end; it is nothing when that never comes.
@@ -86,7 +86,8 @@ def compared(scratch: Points, pretrain: Points, seconds: float) -> dict[str, Any
 
 
 def concluded(pairs: list[dict[str, Any]], minutes: float, cost_s: float | None) -> dict[str, Any]:
-    """Means over seeds with 95 % intervals, and after how many dances the walker has paid."""
+    """Return the means over seeds with 95 % intervals, and after how many dances the walker has
+    paid."""
     gain = np.array([pair["pretrain_s"] - pair["scratch_s"] for pair in pairs])
     saved = np.array([pair["saved_cpu_s"] for pair in pairs])
     per_dance = float(saved.mean())

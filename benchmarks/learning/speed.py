@@ -1,5 +1,5 @@
 """Speed of learning beside its peers, interleaved in one process on one core, in CPU time, so that
-a busy machine changes both alike; `threads` alone is wall time and wants two idle cores.
+a busy machine changes both alike; `threads` alone is wall time and needs two idle cores.
 """
 
 import os
@@ -25,7 +25,7 @@ Row = dict[str, Any]
 
 
 def speed(repeats: int, seconds: float) -> list[Row]:
-    """One row a comparison: ours, the peer's, their ratio and the bar."""
+    """Return one row a comparison: ours, the peer's, their ratio and the bar."""
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     rows = [updates(repeats, seconds, layer_norm) for layer_norm in (False, True)]
     rows += [paper_steps(repeats, seconds), *cores(repeats)]
@@ -33,28 +33,29 @@ def speed(repeats: int, seconds: float) -> list[Row]:
 
 
 def updates(repeats: int, seconds: float, layer_norm: bool) -> Row:
-    """Gradient updates a CPU second at equal hyper-parameters, on the tracking observation: as
-    sb3-contrib's critics are, and as ours are by default."""
+    """Return the gradient updates a CPU second at equal hyper-parameters, on the tracking
+    observation: as sb3-contrib's critics are, and as ours are by default."""
     tqc = TqcConfig(policy_delay=1, warmup=1, layer_norm=layer_norm)
     work = {name: _rounds(name, TrackConfig(threads=1), tqc) for name in ("sbx", "sb3")}
     ours, theirs = interleaved(work, repeats, seconds)
     what = "updates/s, sbx over sb3-contrib" + ", layer normalisation" * layer_norm
-    return told(what, ours, theirs, ours / theirs, ">= 4")
+    return comparison(what, ours, theirs, ours / theirs, ">= 4")
 
 
 def paper_steps(repeats: int, seconds: float) -> Row:
-    """CPU seconds a step of paper mode: 348 observations, one update a step, same networks."""
+    """Return CPU seconds a step of paper mode: 348 observations, one update a step, same
+    networks."""
     tqc = TqcConfig(preset="paper", warmup=1)
     work = {name: _rounds(name, PaperConfig(), tqc, step=True) for name in ("sbx", "sb3")}
     ours, theirs = (1 / rate for rate in interleaved(work, repeats, seconds))
     what = "paper mode, CPU s a step, sbx over sb3-contrib"
-    return told(what, ours, theirs, ours / theirs, "<= 0.45")
+    return comparison(what, ours, theirs, ours / theirs, "<= 0.45")
 
 
 def _rounds(
     trainer_name: str, environment: TrackConfig | PaperConfig, tqc: TqcConfig, step: bool = False
 ) -> Callable[[], int]:
-    """A function that does one round (its steps, too, where asked) and tells its updates."""
+    """Return a function that does one round (with steps, if requested) and returns its updates."""
     robot = humanoid()
     env = TrackingVecEnv(
         TrackingCore(robot, make_standing_motion(robot), environment, tqc.n_envs, 0)
@@ -92,7 +93,7 @@ def _rounds(
 def interleaved(
     work: Mapping[str, Callable[[], int]], repeats: int, seconds: float
 ) -> tuple[float, ...]:
-    """Units a CPU second of each, turn by turn; the median over turns."""
+    """Return the units a CPU second of each, turn by turn; the median over turns."""
     rates: dict[str, list[float]] = {name: [] for name in work}
     for _ in range(repeats):
         for name, one_round in work.items():
@@ -109,7 +110,7 @@ CORES = {"humanoid": ">= 0.88", "g1": ">= 0.85"}
 
 def cores(repeats: int) -> list[Row]:
     """Return the row of every robot whose model is here."""
-    return [told_core(repeats, name) for name in CORES if _is_here(name)]
+    return [core_row(repeats, name) for name in CORES if _is_here(name)]
 
 
 def _is_here(robot: str) -> bool:
@@ -119,21 +120,23 @@ def _is_here(robot: str) -> bool:
         return False
 
 
-def told_core(repeats: int, robot: str = "humanoid") -> Row:
-    """Substeps a CPU second of the whole environment over a bare mj_step loop, same physics.
+def core_row(repeats: int, robot: str = "humanoid") -> Row:
+    """Return the substeps a CPU second of the whole environment over a bare mj_step loop, same
+    physics.
 
-    `ratio_batched` is told beside it: over a bare loop in the order of our batches.
+    `ratio_batched` stands beside it: over a bare loop in the order of our batches.
     """
     speeds = core(repeats, robot=named(robot))
     what = "environment, substeps/s, over a bare mj_step loop"
     if robot != "humanoid":
         what = f"{what}, {robot}"
-    row = told(what, speeds.ours, speeds.bare, speeds.ratio, CORES[robot])
+    row = comparison(what, speeds.ours, speeds.bare, speeds.ratio, CORES[robot])
     return {**row, "peer_batched": speeds.batched, "ratio_batched": speeds.ratio_batched}
 
 
 def threads(repeats: int = 5, n: int = 32, steps: int = 100) -> Row:
-    """Environment steps a second of two threads over one, wall time: two cores must be idle."""
+    """Return the environment steps a second of two threads over one, wall time: two cores must be
+    idle."""
     robot = humanoid()
     motion = make_standing_motion(robot)
     rates: dict[int, list[float]] = {1: [], 2: []}
@@ -148,12 +151,14 @@ def threads(repeats: int = 5, n: int = 32, steps: int = 100) -> Row:
             found.append(n * steps / (time.perf_counter() - began))
             sim.close()
     one, two = (float(np.median(found)) for found in rates.values())
-    row = told("environment steps/s, two threads over one (wall)", two, one, two / one, ">= 1.6")
+    row = comparison(
+        "environment steps/s, two threads over one (wall)", two, one, two / one, ">= 1.6"
+    )
     return {**row, "load_average": os.getloadavg()[0]}
 
 
-def told(name: str, ours: float, theirs: float, ratio: float, bar: str) -> Row:
-    """A comparison as a row, and whether its bar holds."""
+def comparison(name: str, ours: float, theirs: float, ratio: float, bar: str) -> Row:
+    """Return a comparison as a row, and whether its bar holds."""
     word, limit = bar.split()
     holds = ratio >= float(limit) if word == ">=" else ratio <= float(limit)
     return {"what": name, "ours": ours, "peer": theirs, "ratio": ratio, "bar": bar, "holds": holds}

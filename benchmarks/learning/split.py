@@ -1,8 +1,8 @@
-"""The split of motions: what may be trained on, what is judged, and how near they are.
+"""The split of motions: what may be trained on, what is evaluated, and how near they are.
 
     python -m benchmarks.learning.split FOLDER
 
-prints, for every judged motion of a folder of SMPL motions (`NAME.parquet`), which others contain
+prints, for every evaluated motion of a folder of SMPL motions (`NAME.parquet`), which ones contain
 it. `split.yaml` holds the lists.
 """
 
@@ -19,7 +19,7 @@ from robojackson.motion.smpl_sequence import SmplSequence
 
 FILE = Path(__file__).with_suffix(".yaml")
 DUPLICATE_SHARE = 0.5
-"""Of a judged motion's windows, from which on a motion that contains them is left out."""
+"""Share of an evaluated motion's windows from which on a motion that contains them is left out."""
 WORTH_TELLING = 0.1
 
 
@@ -30,7 +30,7 @@ class Split:
     Attributes:
         judged: Motions that no training, pretraining or tuning may see.
         train: Motions that trainings may see.
-        excluded: Near-duplicates of judged ones, with the motion and the share of it.
+        excluded: Near-duplicates of evaluated ones, with the motion and the share of it.
         references: sha256 of the poses of frozen references, by row.
     """
 
@@ -65,7 +65,7 @@ def load_split(path: Path = FILE) -> Split:
 
 
 def shares(motions: Mapping[str, SmplSequence], judged: Iterable[str]) -> list[dict[str, Any]]:
-    """For every judged motion, the others that contain some of it, plain or mirrored."""
+    """Return, for every evaluated motion, the others that contain some of it, plain or mirrored."""
     plain = {name: windows(motion) for name, motion in motions.items()}
     mirrored = {name: windows(motion, mirrored=True) for name, motion in motions.items()}
     rows = []
@@ -82,7 +82,7 @@ def shares(motions: Mapping[str, SmplSequence], judged: Iterable[str]) -> list[d
 
 
 def main() -> None:
-    """Print what contains the judged motions."""
+    """Print what contains the evaluated motions."""
     folder = Path(sys.argv[1])
     motions = {path.stem: SmplSequence.load(path) for path in sorted(folder.glob("*.parquet"))}
     for row in shares(motions, load_split().judged):

@@ -19,14 +19,14 @@ AUTHORS_ROBOT = {
     "note": "at best: 27 steps of 0.06 s in the authors' own logs; nothing else can be told of it",
 }
 BESIDE = ("statue", "mean_pose", "zero_residual", "random", "hold")
-TOLD = (
+COLUMNS = (
     "survived_s", "strict_success", "skill", "velocity_score", "mpjpe_l_m", "mpjpe_g_m",
     "acceleration_ratio",
 )  # fmt: skip
 
 
 def summary(folders: Folders) -> Rows:
-    """One line a move and a horizon over the seeds that there are."""
+    """Return one line a move and a horizon, over the seeds that exist."""
     lines = []
     for name, move in MOVES.items():
         for seconds in move.horizons_s:
@@ -39,9 +39,9 @@ def summary(folders: Folders) -> Rows:
 
 
 def line(name: str, move: Move, seconds: float, seeds: Sequence[Rows]) -> dict[str, Any]:
-    """Figures of a move and whether each of its bars holds."""
+    """Return the figures of a move and whether each of its bars holds."""
     trained = [of_policy(rows, "trained") for rows in seeds]
-    by_seed = {key: [mean(r.get(key) for r in rows) for rows in trained] for key in TOLD}
+    by_seed = {key: [mean(r.get(key) for r in rows) for rows in trained] for key in COLUMNS}
     success = [value or 0.0 for value in by_seed["strict_success"]]
     taken = [row.get("step") for rows in trained for row in rows]
     found: dict[str, Any] = {
@@ -63,7 +63,8 @@ def line(name: str, move: Move, seconds: float, seeds: Sequence[Rows]) -> dict[s
     found["holds"] = all(found["bars"].values())
     found["beside"] = {
         policy: {
-            key: mean(r.get(key) for rows in seeds for r in of_policy(rows, policy)) for key in TOLD
+            key: mean(r.get(key) for rows in seeds for r in of_policy(rows, policy))
+            for key in COLUMNS
         }
         for policy in BESIDE
     }
@@ -71,7 +72,7 @@ def line(name: str, move: Move, seconds: float, seeds: Sequence[Rows]) -> dict[s
 
 
 def bars(found: Mapping[str, Any], move: Move) -> dict[str, bool]:
-    """Each bar by name; of a limb that the dance does not move nothing is asked."""
+    """Return each bar by name; a limb that the dance does not move has none."""
     held = {
         f"strict success >= {move.success:g}": found["strict_success"] >= move.success,
         f"worst seed >= {move.worst:g}": found["worst_seed"] >= move.worst,
@@ -96,18 +97,19 @@ def bars(found: Mapping[str, Any], move: Move) -> dict[str, bool]:
 
 
 def cluster_interval(by_seed: Sequence[float] | np.ndarray) -> tuple[float, float]:
-    """95 % interval of the mean by resampling seeds; rollouts of one seed are no evidence."""
+    """Return 95 % interval of the mean by resampling seeds; rollouts of one seed are no
+    evidence."""
     found = estimate(list(by_seed), np.random.default_rng(0))
     return (found.low, found.high) if found.count > 1 else (found.mean, found.mean)
 
 
 def of_policy(rows: Rows, policy: str) -> Rows:
-    """The rollouts of one driver."""
+    """Return the rollouts of one driver."""
     return [row for row in rows if row["policy"] == policy]
 
 
 def mean(values: Any) -> float | None:
-    """Of those that are numbers; None where there is none."""
+    """Return the mean of the values that are numbers; None where there is none."""
     finite = [float(value) for value in values if value is not None and np.isfinite(value)]
     return float(np.mean(finite)) if finite else None
 

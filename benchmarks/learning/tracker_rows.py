@@ -1,4 +1,4 @@
-"""Downloaded trackers on the frozen references, with our judge: no training at all.
+"""Downloaded trackers on the frozen references, with our evaluation: no training at all.
 
     python -m benchmarks.learning.tracker_rows [--moves g1_walk ...] [--folder FOLDER]
 
@@ -34,7 +34,7 @@ FILES = "ROBOJACKSON_TRACKERS"
 """Variable that names a folder with the files of trackers."""
 FRICTIONS = (1.0, 0.6)
 """Of the soles on the floor; the second is what mjlab trains with."""
-JUDGE = EvaluateConfig(resets=1)
+EVALUATION = EvaluateConfig(resets=1)
 """24 phases and the stand."""
 FIGURES = (
     *("survived_s", "success", "strict_success", "skill", "site_error_m", "mpjpe_l_m"),
@@ -63,7 +63,7 @@ def main() -> None:
 
 
 def measured(moves: list[str], held: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
-    """Rows that are not held yet, of the trackers that are here."""
+    """Yield rows that are not held yet, of the trackers that are here."""
     known = {(row["tracker"], row["move"], row["friction"], row["poses"]) for row in held}
     for name in tracker_names():
         tracker = present(name)
@@ -77,30 +77,31 @@ def measured(moves: list[str], held: list[dict[str, Any]]) -> Iterator[dict[str,
                 key = (name, move, friction, poses_sha256(motion))
                 if key not in known:
                     labels = dict(zip(("tracker", "move", "friction", "poses"), key, strict=True))
-                    yield labels | judged(tracker, motion, friction)
+                    yield labels | evaluated(tracker, motion, friction)
 
 
-def judged(tracker: Tracker, motion: ReferenceMotion, friction: float) -> dict[str, Any]:
-    """The figures of a tracker on one motion."""
+def evaluated(tracker: Tracker, motion: ReferenceMotion, friction: float) -> dict[str, Any]:
+    """Return the figures of a tracker on one motion."""
     robot = load_robot(tracker.description.robot)
     usual = robot.description.simulation.friction
     if usual is None:
-        raise BadConfiguration(f"robot {motion.robot!r} does not say its friction")
+        raise BadConfiguration(f"robot {motion.robot!r} does not give its friction")
     began = time.process_time()
     found = evaluate_policy(
-        tracker, motion, varied(robot, Variation(friction=friction / usual)), JUDGE
+        tracker, motion, varied(robot, Variation(friction=friction / usual)), EVALUATION
     )
     figures = {name: found.summary[name] for name in FIGURES}
-    facts = {"sha256": tracker.description.file.sha256, "steps": len(motion), "dt": motion.dt}
+    pinned = tracker.description.file
+    facts = {"sha256": pinned.sha256 if pinned else "", "steps": len(motion), "dt": motion.dt}
     starts = sum(row["policy"] == "trained" for row in found.rows)
     return {**facts, "starts": starts, **figures, "cpu_s": time.process_time() - began}
 
 
 def present(name: str) -> Tracker | None:
-    """A tracker whose file is here; None, with a line why, where it is not."""
+    """Return a tracker whose file is here; None, with a line why, where it is not."""
     description = describe_tracker(name)
     folder = os.environ.get(FILES)
-    file = Path(folder) / description.file.name if folder else None
+    file = Path(folder) / description.file.name if folder and description.file else None
     try:
         return open_tracker(description, file)
     except BadPolicy as cause:

@@ -1,4 +1,4 @@
-"""How a training gets on: seconds survived by training episodes against CPU seconds and steps.
+"""Curve of a training: seconds survived by training episodes against CPU seconds and steps.
 
 A process of its own, so that its CPU time is its own:
 
@@ -51,7 +51,7 @@ class Curve:
             self.points.append((spent, int(rows[-1]["step"]), float(np.mean(self._recent))))
 
     def reached(self) -> bool:
-        """Whether the mean survival that is waited for is there."""
+        """Return whether the target mean survival is reached."""
         return len(self._recent) == RECENT and float(np.mean(self._recent)) >= self.until
 
 
@@ -74,17 +74,18 @@ def measure(reference: Path, out: Path, options: list[str], until: float, minute
         except KeyboardInterrupt:
             if not curve.reached():
                 raise
-    told = {"options": options, "reached": curve.reached(), "points": curve.points}
+    record = {"options": options, "reached": curve.reached(), "points": curve.points}
     out.parent.mkdir(parents=True, exist_ok=True)
     part = out.with_suffix(".part")
-    part.write_text(json.dumps(told))
+    part.write_text(json.dumps(record))
     part.replace(out)
 
 
 def curve_of(
     reference: Path, out: Path, options: list[str], until: float, minutes: float
 ) -> dict[str, Any]:
-    """The curve of a training, measured in a process on one core unless it is there already."""
+    """Return the curve of a training, measured in a process on one core unless it is there
+    already."""
     if not out.exists():
         line = [
             sys.executable,
@@ -103,7 +104,8 @@ def curve_of(
 
 
 def area(points: list[tuple[float, int, float]], seconds: float) -> float:
-    """Mean of the survival over the first CPU seconds, s: the area under the curve over its width.
+    """Return the mean of the survival over the first CPU seconds, s: the area under the curve over
+    its width.
 
     Before its first point nothing survives; after its last it stays.
     """
@@ -113,7 +115,7 @@ def area(points: list[tuple[float, int, float]], seconds: float) -> float:
 
 
 def first_at(points: list[tuple[float, int, float]], level: float) -> float | None:
-    """CPU seconds at which a survival is first reached."""
+    """Return CPU seconds at which a survival is first reached."""
     return next((spent for spent, _, survived in points if survived >= level), None)
 
 

@@ -1,1 +1,1 @@
-"""How close motion capture comes to the truth."""
+"""Accuracy of motion capture against ground truth."""

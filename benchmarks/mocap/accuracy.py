@@ -68,7 +68,7 @@ class Seen:
 
 
 def look(clip: str) -> Seen:
-    """Both pose models over a clip."""
+    """Return both pose models over a clip."""
     path = video_path(clip)
     info = probe(path, VideoLimits())
     began = time.process_time()
@@ -81,12 +81,12 @@ def look(clip: str) -> Seen:
 
 
 def heavy_installed() -> bool:
-    """Whether the larger pose model is there; `tools.assets.build_pose_models` brings it."""
+    """Return whether the larger pose model is there; `tools.assets.build_pose_models` builds it."""
     return (ASSETS / "pose_landmarker_heavy.task").is_file()
 
 
 def configurations() -> dict[str, tuple[str, MocapConfig]]:
-    """Row -> the track and the configuration that it measures."""
+    """Return the row -> the track and the configuration that it measures."""
     whole = MocapConfig()
     plain, learned = (with_temporal(whole, enabled) for enabled in (False, True))
     first = replace(plain, refine=RefineConfig(enabled=False))
@@ -97,17 +97,17 @@ def configurations() -> dict[str, tuple[str, MocapConfig]]:
 
 
 def default_row() -> str:
-    """The row that is measured with the default configuration."""
+    """Return the row that is measured with the default configuration."""
     return "step 3" if MocapConfig().temporal.enabled else "step 2"
 
 
 def with_temporal(config: MocapConfig, enabled: bool) -> MocapConfig:
-    """The configuration with step 3 switched on or off."""
+    """Return the configuration with step 3 switched on or off."""
     return replace(config, temporal=replace(config.temporal, enabled=enabled))
 
 
 def measure(clip: str) -> Row:
-    """All rows of one clip."""
+    """Return all rows of one clip."""
     seen = look(clip)
     track = seen.tracks["full"]
     raw = fill_gaps(track.world_landmarks, track.detected)[:, [landmark(n) for n in JOINTS]]
@@ -127,7 +127,7 @@ def measure(clip: str) -> Row:
 
 
 def motion_figures(track: LandmarkTrack, config: MocapConfig, truth: Truth) -> figures.Figures:
-    """All figures of the motion that one configuration makes of a track."""
+    """Return all figures of the motion that one configuration makes of a track."""
     began = time.process_time()
     sequence = recover_motion(track, config)
     spent = time.process_time() - began
@@ -143,7 +143,7 @@ def motion_figures(track: LandmarkTrack, config: MocapConfig, truth: Truth) -> f
 
 
 def solve_fps() -> float:
-    """Frames a CPU second of `analytic_solve.solve` in batches of 300."""
+    """Return frames a CPU second of `analytic_solve.solve` in batches of 300."""
     rng = np.random.default_rng(0)
     points: Float[np.ndarray, "T 29 3"] = REST_JOINTS + rng.normal(
         scale=0.05, size=(SOLVE_FRAMES, 29, 3)
@@ -157,7 +157,7 @@ def solve_fps() -> float:
 
 
 def means(rows: list[Row]) -> dict[str, dict[str, figures.Figures]]:
-    """Group -> row -> mean of each figure over the group's clips that have it."""
+    """Return the group -> row -> mean of each figure over the group's clips that have it."""
     found: dict[str, dict[str, figures.Figures]] = {}
     for group, clips in GROUPS.items():
         chosen = [row["rows"] for row in rows if row["clip"] in clips]

@@ -28,7 +28,7 @@ Result = Mapping[str, Any]
 
 
 def markdown(result: Result) -> str:
-    """Joint errors, ground and feet, speeds; what was tuned on what."""
+    """Return the joint errors, ground and feet, speeds; what was tuned on what."""
     names = [name for name in NAMES if name in result["clips"][0]["rows"]]
     parts = [_joints(result, names), _ground(result), _speeds(result)]
     if "official" in result:
@@ -39,7 +39,7 @@ def markdown(result: Result) -> str:
 
 
 def _joints(result: Result, names: list[str]) -> str:
-    """One line a clip, a group's mean in bold; each cell lists the rows."""
+    """Return one line a clip, a group's mean in bold; each cell lists the rows."""
     head = ["clip", *(title for title, _ in JOINTS.values())]
     lines = [_cells([clip["clip"] + _mark(clip), *_values(clip["rows"], names)])
              for clip in result["clips"]]  # fmt: skip
@@ -49,7 +49,7 @@ def _joints(result: Result, names: list[str]) -> str:
 
 
 def _ground(result: Result) -> str:
-    """Ground and feet of the default."""
+    """Return the ground and feet of the default."""
     name = result["default"]
     head = ["clip", *(title for title, _, _ in GROUND.values())]
     lines = []

@@ -1,11 +1,11 @@
-"""How near our motion is to the official HybrIK's on a video that both have seen.
+"""Distance of our motion from the official HybrIK's on the same video.
 
     python -m benchmarks.mocap.agreement VIDEO RES_PK [--hybrik WEIGHTS] [--niki WEIGHTS]
 
 RES_PK is what the official demo writes with `--save-pk` (or NIKI's `vis_tmp.pt`); it is read by a
 reader that executes nothing. Rows: the raw landmarks as keypoints, our motion, and with weights our
 reading of the network itself. Figure: distance of the 24 joints relative to the pelvis, after ONE
-rotation for the clip and no scale, millimetres, over the frames in which HybrIK found somebody.
+rotation for the clip and no scale, millimetres, over the frames in which HybrIK found a person.
 """
 
 import argparse
@@ -34,7 +34,7 @@ ROOT = (keypoint("pelvis"),)
 
 
 def agreement(ours: Float[np.ndarray, "T 24 3"], theirs: HybrikMotion) -> dict[str, float]:
-    """Distances over the frames that both have, millimetres.
+    """Return the distances over the frames that both have, millimetres.
 
     Args:
         ours: Joints of every frame of the video, metres, any fixed axes.
@@ -58,7 +58,7 @@ def agreement(ours: Float[np.ndarray, "T 24 3"], theirs: HybrikMotion) -> dict[s
 def rows(
     video: Path, track: LandmarkTrack, theirs: HybrikMotion, network: NetworkConfig
 ) -> Mapping[str, Mapping[str, float]]:
-    """Every row of the table."""
+    """Return every row of the table."""
     marks = repair(track)
     raw = build(marks.local, marks.visibility).points[:, : len(JOINT_NAMES)]
     joints = {"raw landmarks": raw, "ours": recover_motion(track, MocapConfig()).joints}

@@ -30,7 +30,7 @@ FLOATS_M = 0.03
 
 
 def counted(truth: Truth, count: int) -> np.ndarray:
-    """Frames that count, shape (count,): all but those around the seams of a loop."""
+    """Return frames that count, shape (count,): all but those around the seams of a loop."""
     frames = np.arange(count)
     keep = np.ones(count, bool)
     for seam in truth.seams:
@@ -39,7 +39,8 @@ def counted(truth: Truth, count: int) -> np.ndarray:
 
 
 def joint_errors(joints: Float[np.ndarray, "T 12 3"], truth: Truth, fps: float) -> Figures:
-    """PA-MPJPE and RR-MPJPE in mm, MPJVE in mm/s, ratios of mean joint speed and acceleration."""
+    """Return PA-MPJPE and RR-MPJPE in mm, MPJVE in mm/s, ratios of mean joint speed and
+    acceleration."""
     count = min(len(joints), len(truth.joints))
     keep = counted(truth, count)
     mine, right = joints[:count], truth.joints[:count]
@@ -55,7 +56,8 @@ def joint_errors(joints: Float[np.ndarray, "T 12 3"], truth: Truth, fps: float) 
 
 
 def path_error_share(sequence: SmplSequence, truth: Truth) -> Figures:
-    """Mean error of the root's path over its length, after one turn about z, shift and scale."""
+    """Return the mean error of the root's path over its length, after one turn about z, shift and
+    scale."""
     count = min(len(sequence), len(truth.joints))
     keep = counted(truth, count)
     hips = [keypoint(JOINTS[index]) for index in HIPS]
@@ -73,7 +75,7 @@ def path_error_share(sequence: SmplSequence, truth: Truth) -> Figures:
 
 
 def floor_figures(sequence: SmplSequence) -> Figures:
-    """How the motion treats the floor by its own contacts."""
+    """Return how the motion treats the floor by its own contacts."""
     feet = foot_points(pose_sequence(sequence), sequence.rest_joints)
     planted = sequence.contact == PLANTED
     return {
@@ -87,19 +89,20 @@ def floor_figures(sequence: SmplSequence) -> Figures:
 
 
 def unsupported_share(sequence: SmplSequence) -> float:
-    """Share of all frames in which nothing touches and the body does not fall (a_z > -g/2)."""
+    """Return the share of all frames in which nothing touches and the body does not fall (a_z >
+    -g/2)."""
     return float(((sequence.contact == AIR).all(1) & ~falls(sequence)).mean())
 
 
 def falls(sequence: SmplSequence) -> np.ndarray:
-    """Frames in which the centre of mass accelerates downward by more than g / 2."""
+    """Return frames in which the centre of mass accelerates downward by more than g / 2."""
     centre = ground.centre_of_mass(sequence.keypoints_w)[:, 2]
     acceleration = np.gradient(np.gradient(centre)) * sequence.fps**2
     return np.asarray(acceleration < -ground.GRAVITY / 2.0)
 
 
 def contact_figures(sequence: SmplSequence, truth: Truth) -> Figures:
-    """F1 of the states of the foot points, and their slide where the truth says planted."""
+    """Return F1 of the states of the foot points, and their slide where the truth is planted."""
     if truth.feet is None:
         return {}
     count = min(len(sequence), len(truth.feet))
@@ -118,7 +121,7 @@ def contact_figures(sequence: SmplSequence, truth: Truth) -> Figures:
 
 
 def true_contacts(feet: Float[np.ndarray, "T 4 3"], fps: float) -> Int[np.ndarray, "T 4"]:
-    """States of the true foot points: low over their refitted floor, still along it."""
+    """Return the states of the true foot points: low over their refitted floor, still along it."""
     flying = np.zeros(len(feet), bool)
     floor = ground.floor_height(feet[..., 2].min(1), flying, fps, FLOOR_HZ)
     height = feet[..., 2] - floor[:, None]
@@ -131,7 +134,8 @@ def true_contacts(feet: Float[np.ndarray, "T 4 3"], fps: float) -> Int[np.ndarra
 
 
 def hysteresis(values: np.ndarray, on: float, off: float) -> np.ndarray:
-    """True from a value below `on` until one above `off`; undecided beginnings count as below."""
+    """Return True from a value below `on` until one above `off`; undecided beginnings count as
+    below."""
     decided = np.where(values < on, 1, np.where(values > off, 0, -1))
     decided[0] = np.where(decided[0] < 0, 1, decided[0])
     frames = np.arange(len(values)).reshape(-1, *([1] * (values.ndim - 1)))
@@ -140,7 +144,7 @@ def hysteresis(values: np.ndarray, on: float, off: float) -> np.ndarray:
 
 
 def join_short(states: np.ndarray, shortest: int) -> np.ndarray:
-    """Runs of fewer than `shortest` frames along axis 0 take the state before them."""
+    """Give runs of fewer than `shortest` frames along axis 0 the state before them."""
     joined = states.copy()
     for column in joined.reshape(len(joined), -1).T:
         edges = np.flatnonzero(np.diff(column)) + 1
@@ -151,19 +155,21 @@ def join_short(states: np.ndarray, shortest: int) -> np.ndarray:
 
 
 def f1(found: np.ndarray, true: np.ndarray) -> float:
-    """Harmonic mean of precision and recall; 1 where there is nothing to find and nothing found."""
+    """Return the harmonic mean of precision and recall; 1 where there is nothing to find and
+    nothing found."""
     total = found.sum() + true.sum()
     return float(2.0 * (found & true).sum() / total) if total else 1.0
 
 
 def tilt_error_deg(sequence: SmplSequence, truth: Truth) -> float:
-    """Angle between the estimated and the true vertical, degrees."""
+    """Return the angle between the estimated and the true vertical, degrees."""
     up = np.array(sequence.camera["rotation_w"])[2]
     return float(np.degrees(np.arccos(np.clip(up @ truth.up_c, -1.0, 1.0))))
 
 
 def _one_rotation(mine: np.ndarray, right: np.ndarray, keep: np.ndarray) -> np.ndarray:
-    """Root-relative joints after the rotation that fits them best over the frames that count."""
+    """Return the root-relative joints after the rotation that fits them best over the frames that
+    count."""
     x, y = pose_error.root_relative(mine, HIPS), pose_error.root_relative(right, HIPS)
     return np.asarray(x @ kabsch(x[keep].reshape(-1, 3), y[keep].reshape(-1, 3)).T)
 
@@ -171,7 +177,7 @@ def _one_rotation(mine: np.ndarray, right: np.ndarray, keep: np.ndarray) -> np.n
 def _differences(
     mine: np.ndarray, goal: np.ndarray, keep: np.ndarray, fps: float, order: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Differences in time of both whose frames all count, times fps^order."""
+    """Return the differences in time of both whose frames all count, times fps^order."""
     whole = np.lib.stride_tricks.sliding_window_view(keep, order + 1).all(1)
     ours, right = (np.diff(points, order, axis=0)[whole] for points in (mine, goal))
     return ours * fps**order, right * fps**order

@@ -2,7 +2,7 @@
 benchmarks.mocap.hidden_limb`).
 
 Forty cases of clip, limb, onset and length (0.2 to 1 s), drawn with a seed. In each, the landmarks
-of a whole limb are taken away: their visibility is 0 and their places are interpolated in time.
+of a whole limb are hidden: their visibility is 0 and their places are interpolated in time.
 Rows: interpolation (the motion of step 2 with the limb's joints interpolated in time, seen from
 the pelvis), step 2 and step 3 on the clip with the hidden limb. Figures: mean distance of the
 limb's joints from the truth in the hidden frames, mm, after the similarity that brings the ten
@@ -70,7 +70,8 @@ class Case:
 def draw_cases(
     lengths: Mapping[str, tuple[int, float]], count: int, rng: np.random.Generator
 ) -> list[Case]:
-    """Cases from clips with so many frames at such a rate; a frame is seen at both ends."""
+    """Return the cases from clips with so many frames at such a rate; a frame is seen at both
+    ends."""
     names = sorted(lengths)
     cases = []
     for _ in range(count):
@@ -85,7 +86,7 @@ def draw_cases(
 
 
 def hide(track: LandmarkTrack, case: Case) -> LandmarkTrack:
-    """The track as if nothing of the limb had been seen."""
+    """Return the track as if nothing of the limb had been seen."""
     columns = [landmark(f"{case.side}_{name}") for name in MARKS[case.limb]]
     visibility = np.array(track.visibility)
     visibility[case.start : case.end, columns] = 0.0
@@ -98,7 +99,7 @@ def hide(track: LandmarkTrack, case: Case) -> LandmarkTrack:
 
 
 def bridged(values: np.ndarray, columns: list[int], start: int, end: int) -> np.ndarray:
-    """Columns of (T, N, D), linear in time from the frame before `start` to `end`."""
+    """Return the columns of (T, N, D), linear in time from the frame before `start` to `end`."""
     result = np.array(values)
     share = ((np.arange(start, end) - start + 1) / (end - start + 1))[:, None, None]
     before, after = values[start - 1, columns], values[end, columns]
@@ -107,7 +108,7 @@ def bridged(values: np.ndarray, columns: list[int], start: int, end: int) -> np.
 
 
 def figures(case: Case, track: LandmarkTrack, truth: Truth, whole: MocapConfig) -> dict[str, float]:
-    """Errors of all rows in mm, and confidences."""
+    """Return the errors of all rows in mm, and confidences."""
     plain = replace(whole, temporal=replace(whole.temporal, enabled=False))
     hidden = hide(track, case)
     seen, step_2, step_3 = (
@@ -132,13 +133,14 @@ def figures(case: Case, track: LandmarkTrack, truth: Truth, whole: MocapConfig) 
 
 
 def placed(sequence: SmplSequence) -> np.ndarray:
-    """The twelve joints seen from the hips' middle."""
+    """Return the twelve joints seen from the hips' middle."""
     joints = sequence.joints[:, [keypoint(name) for name in JOINTS]]
     return pose_error.root_relative(joints, HIPS)
 
 
 def limb_error(joints: np.ndarray, truth: Truth, case: Case) -> float:
-    """Of the limb's joints in the hidden frames, the other ten joints brought to the truth, mm."""
+    """Return the error of the limb's joints in the hidden frames, the other ten joints aligned to
+    the truth, mm."""
     columns = [JOINTS.index(name) for name in case.joints]
     others = np.setdiff1d(np.arange(len(JOINTS)), columns)
     mine, right = (x[case.start : min(case.end, len(truth.joints))] for x in (joints, truth.joints))
@@ -147,7 +149,7 @@ def limb_error(joints: np.ndarray, truth: Truth, case: Case) -> float:
 
 
 def error(joints: np.ndarray, truth: Truth, case: Case) -> float:
-    """Of the limb's joints in the hidden frames, mm."""
+    """Return the error of the limb's joints in the hidden frames, mm."""
     count = min(len(joints), len(truth.joints))
     aligned = pose_error.align_clip(joints[:count], truth.joints[:count], HIPS)
     goal = pose_error.root_relative(truth.joints[:count], HIPS)
@@ -184,7 +186,7 @@ def main() -> None:
 
 
 def means(rows: list[dict[str, float]]) -> dict[str, float]:
-    """Mean of each figure, and how far step 3 is under interpolation."""
+    """Return the mean of each figure, and how far step 3 is under interpolation."""
     names = [name for name in rows[0] if name.endswith("_mm") or name.startswith("confidence")]
     found = {name: float(np.mean([row[name] for row in rows])) for name in names}
     found["step_3_over_interpolation"] = found["step_3_mm"] / found["interpolation_mm"] - 1.0

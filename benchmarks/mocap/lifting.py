@@ -26,7 +26,7 @@ DEPTH_CUTOFF_HZ = 1.5
 
 
 def measure(path: Path) -> dict[str, float]:
-    """All figures of one file."""
+    """Return all figures of one file."""
     content = safe_pickle.load_joblib(path.read_bytes(), path.name)
     rows = {name: np.asarray(content[name], float) for name in ("pred_uvd", "pred_xyz_29")}
     uvd, local = (table.reshape(-1, 29, 3) for table in rows.values())

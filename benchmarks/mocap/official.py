@@ -1,4 +1,4 @@
-"""Our solve against real outputs of the official code, which the user brings (`ROBOJACKSON_PAPER`).
+"""Our solve against real outputs of the official code, from the user (`ROBOJACKSON_PAPER`).
 
 Figures of each file: how far our analytic solve ends from HybrIK's own 29 joints when it is given
 its joints and twists on a skeleton of their median lengths; how much a constant twist in place of
@@ -25,7 +25,7 @@ FILES, VIDEOS = (".pt", ".pk"), (".mp4", ".mov", ".avi", ".webm")
 
 
 def compare(folder: Path) -> dict[str, dict[str, object]]:
-    """Figures of every file of a folder."""
+    """Return the figures of every file of a folder."""
     files = sorted(file for file in folder.iterdir() if file.suffix in FILES)
     return {file.name: _compared(file) for file in files}
 

@@ -36,12 +36,14 @@ OPENGL_TO_CAMERA = np.array([1.0, -1.0, -1.0])
 
 @dataclass(frozen=True)
 class Truth:
-    """Attributes:
-    clip: Name of the video without its suffix.
-    joints: `JOINTS`, metres, world.
-    up_c: Direction against gravity in the camera frame.
-    feet: Soles under heels and toes, metres; None where the truth has no toes.
-    seams: First frame of every further cycle.
+    """Ground truth of a clip.
+
+    Attributes:
+        clip: Name of the video without its suffix.
+        joints: `JOINTS`, metres, world.
+        up_c: Direction against gravity in the camera frame.
+        feet: Soles under heels and toes, metres; None where the truth has no toes.
+        seams: First frame of every further cycle.
     """
 
     clip: str
@@ -52,12 +54,12 @@ class Truth:
 
 
 def video_path(clip: str) -> Path:
-    """The video of a clip."""
+    """Return the video of a clip."""
     return _folder(clip) / f"{clip}.mp4"
 
 
 def load_truth(clip: str) -> Truth:
-    """The truth of a bundled clip."""
+    """Return the truth of a bundled clip."""
     return _real(clip) if clip in REAL else _rendered(clip)
 
 
@@ -92,7 +94,7 @@ def _real(clip: str) -> Truth:
 
 
 def _own_name(name: str) -> str:
-    """L_Hip of the renderer and LHip of the TRC are our left_hip."""
+    """Return our name of a joint: L_Hip of the renderer and LHip of the TRC are left_hip."""
     match = re.fullmatch(r"([LR])_?([A-Z].*)", name)
     if not match:
         return name.lower()

@@ -1,1 +1,1 @@
-"""What Prefect, the cache and the command line cost around the work."""
+"""Cost of Prefect, the cache and the command line around the work."""

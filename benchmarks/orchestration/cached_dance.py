@@ -1,4 +1,4 @@
-"""What a dance that was made before takes: from its records, and through the flow.
+"""Time of a cached dance: from its records, and through the flow.
 
     python -m benchmarks.orchestration.cached_dance [--runs 5]
 
@@ -75,6 +75,7 @@ def _row(found: list[tuple[float, float]]) -> dict[str, float]:
 
 
 def main() -> None:
+    """Run the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )

@@ -1,4 +1,4 @@
-"""What a stack and a flow use: wall time, processor time, calls of the server's API, disk."""
+"""Costs of a stack and a flow: wall time, processor time, calls of the server's API, disk."""
 
 import os
 import re
@@ -16,12 +16,13 @@ WORK = ("work_cpu_s", "workers_cpu_s", "store_cpu_s")
 
 
 class Costs:
-    """What is used from now on."""
+    """Costs from now on."""
 
     def __init__(self, stack: Stack) -> None:
         self._stack, self._first = stack, self._read(stack)
 
     def so_far(self) -> dict[str, float]:
+        """Return what was used since the beginning."""
         now = self._read(self._stack)
         used = {name: round(now[name] - self._first[name], 2) for name in now}
         known = sum(used[name] for name in (*ORCHESTRATION, *WORK))
@@ -47,7 +48,7 @@ class Costs:
 
 
 class Begun:
-    """What had been used when cells began, of every so many of them; it costs 30 ms a time."""
+    """Costs at the start of every so many cells; a reading takes 30 ms."""
 
     def __init__(self, stack: Stack, every: int = 1) -> None:
         self._every = every
@@ -60,6 +61,7 @@ class Begun:
         self.orchestration_s: list[float] = []
 
     def __call__(self) -> None:
+        """Count one cell, and read the costs at every so many."""
         if self.count % self._every == 0:
             own = _own_cpu_s()
             self.wall_s.append(time.monotonic())
@@ -70,12 +72,12 @@ class Begun:
         self.count += 1
 
     def busy(self, cores: int) -> float:
-        """Share of the cores that work used while cells waited for a slot."""
+        """Return the share of the cores that work used while cells waited for a slot."""
         work, wall = self.work_s[-1] - self.work_s[0], self.wall_s[-1] - self.wall_s[0]
         return round(work / (cores * wall), 4)
 
     def by_parts(self, parts: int) -> dict[str, list[float]]:
-        """Cells begun a second, and what one cost, in equal parts of all of them."""
+        """Return the cells begun a second, and what one cost, in equal parts of all of them."""
         last = len(self.wall_s) - 1
         ends = [round(n * last / parts) for n in range(parts + 1)]
         found: dict[str, list[float]] = {"cells_a_second": [], "cpu_ms_a_cell": []}
@@ -89,7 +91,7 @@ class Begun:
 
 
 def each(used: dict[str, float], count: int) -> dict[str, float]:
-    """The same for one of `count` cells."""
+    """Return the same for one of `count` cells."""
     figures = {"wall_ms": 1e3 * used["wall_s"], "cpu_ms": 1e3 * used["orchestration_cpu_s"]}
     figures |= {"calls": used["api_calls"], "database_kb": used["database_kb"]}
     return {f"{name}_each": round(value / count, 1) for name, value in figures.items()}
@@ -101,19 +103,19 @@ def _own_cpu_s() -> float:
 
 
 def _below_cpu_s() -> float:
-    """Of all processes below this one: the cells', and the services of the stack."""
+    """Return the CPU time of all processes below this one: cells and services of the stack."""
     return cpu_seconds(os.getpid()) - _own_cpu_s()
 
 
 def _machine_cpu_s() -> float:
-    """Of all processes, ours or not: what was not ours spoils wall times."""
+    """Return the CPU time of all processes; other people's work spoils wall times."""
     ticks = list(map(int, Path("/proc/stat").read_text().split("\n", 1)[0].split()[1:9]))
     user, nice, system, _idle, _iowait, irq, softirq, _steal = ticks
     return (user + nice + system + irq + softirq) / os.sysconf("SC_CLK_TCK")
 
 
 def _database_kb(stack: Stack) -> float:
-    """What the database takes on its disk."""
+    """Return what the database takes on its disk."""
     ask = ["psql", "-U", "prefect", "-d", "prefect", "-Atc", "select pg_database_size('prefect')"]
     access = stack.services["postgres"].environment
     run = subprocess.run(ask, env=access, capture_output=True, text=True, check=True)

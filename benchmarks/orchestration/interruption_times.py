@@ -1,11 +1,11 @@
-"""How fast Ctrl-C is acknowledged and obeyed.
+"""Measure how fast Ctrl-C is acknowledged and obeyed.
 
     python -m benchmarks.orchestration.interruption_times
 
 Every command is started with an empty store and interrupted at moments spread over the time that it
 takes, by turns with SIGINT and SIGTERM, to the process group and to the process alone. Bars:
 acknowledged within 1 s, ended within 3 s; where a training saves its checkpoint, which the
-acknowledgement must say, within 30 s. Each end must have exit code 130, no traceback, no process
+acknowledgement must announce, within 30 s. Each end has exit code 130, no traceback, no process
 left and no half-written file. Writes results/interruption.json.
 """
 

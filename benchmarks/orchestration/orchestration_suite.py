@@ -1,4 +1,4 @@
-"""What Prefect costs around the work (`make bench-orchestration`; results/orchestration.json).
+"""Measure the cost of Prefect around the work (`make bench-orchestration`).
 
 On the PostgreSQL and the server of tools/stack/compose_stack.py, with played cells
 (benchmarks/orchestration/played.py):
@@ -10,7 +10,7 @@ On the PostgreSQL and the server of tools/stack/compose_stack.py, with played ce
     pool     200 sleeping cells through a work pool with 8 workers of one run each
 
 Processor time of this process, of the server and of PostgreSQL is what orchestration costs; it is
-told beside wall time, which other work on the machine would make longer.
+reported beside wall time, which other work on the machine would make longer.
 """
 
 import argparse
@@ -43,17 +43,17 @@ QUARTERS = 4
 
 
 def sleepers(count: int) -> dict[str, Any]:
-    """A grid of about so many cells of one move."""
+    """Return a grid of about so many cells of one move."""
     return {"moves": ("walk",), "setups": SETUPS, "seeds": tuple(range(count // len(SETUPS)))}
 
 
 def study(name: str, grid: dict[str, Any], **more: Any) -> dict[str, Any]:
-    """A study whose motions are as short as can be, if they are made."""
+    """Return a study whose motions are as short as can be, if they are made."""
     return {"name": name, **grid, "pipeline": "smoke", "gate": False, **more}
 
 
 def ablate(
-    wanted: dict[str, Any],
+    options: dict[str, Any],
     seconds: float,
     burn: bool,
     began: Callable[[], None] = lambda: None,
@@ -69,11 +69,11 @@ def ablate(
     from flows.ablation import ablation
 
     with played(seconds, burn, began), nullcontext() if motions else motionless():
-        asyncio.run(ablation(Study(**wanted)))
+        asyncio.run(ablation(Study(**options)))
 
 
-def cached(stack: Stack, wanted: argparse.Namespace) -> dict[str, Any]:
-    """Nine cells again, three times in this process, then three times by the command."""
+def cached(stack: Stack, options: argparse.Namespace) -> dict[str, Any]:
+    """Run nine cached cells, three times in this process, then three times by the command."""
     nine = study("cached", NINE, slots=2)
     ablate(nine, 0.0, False, motions=True)
     rounds, commands = [], []
@@ -92,55 +92,55 @@ def cached(stack: Stack, wanted: argparse.Namespace) -> dict[str, Any]:
     }
 
 
-def busy(stack: Stack, wanted: argparse.Namespace) -> dict[str, Any]:
-    """Nine cells of work on two slots."""
+def busy(stack: Stack, options: argparse.Namespace) -> dict[str, Any]:
+    """Run nine cells of work on two slots."""
     ablate(study("first", {**sleepers(3), "seeds": (10_000,)}, slots=2), 0.0, False)
     costs, began = Costs(stack), Begun(stack)
-    ablate(study(f"busy-{wanted.seconds:g}", NINE, slots=2), wanted.seconds, True, began)
+    ablate(study(f"busy-{options.seconds:g}", NINE, slots=2), options.seconds, True, began)
     used = costs.so_far()
     rounds = 5  # nine cells on two slots: the last one is alone
     return {
         "cells": 9,
-        "seconds_each": wanted.seconds,
+        "seconds_each": options.seconds,
         **used,
         "orchestration_cpu_share": round(used["orchestration_cpu_s"] / used["work_cpu_s"], 4),
-        "wall_over_ideal": round(used["wall_s"] / (rounds * wanted.seconds), 4),
+        "wall_over_ideal": round(used["wall_s"] / (rounds * options.seconds), 4),
         "cores_busy_while_cells_wait": began.busy(cores=2),
     }
 
 
-def local(stack: Stack, wanted: argparse.Namespace) -> dict[str, Any]:
-    """More and more sleeping cells, many at once."""
+def local(stack: Stack, options: argparse.Namespace) -> dict[str, Any]:
+    """Run more and more sleeping cells, many at once."""
     ablate(study("first", {**sleepers(3), "seeds": (10_000,)}, slots=2), 0.0, False)
     rows: list[dict[str, Any]] = []
-    for count in wanted.counts:
+    for count in options.counts:
         costs, began = Costs(stack), Begun(stack, every=5)
         grid = sleepers(count)
-        ablate(study(f"sleep-{count}", grid, slots=wanted.slots), 1.0, False, began)
+        ablate(study(f"sleep-{count}", grid, slots=options.slots), 1.0, False, began)
         used = costs.so_far()
         rows.append({"cells": began.count, **used, **each(used, began.count)})
         rows[-1]["by_quarters"] = began.by_parts(QUARTERS)
-    return {"slots": wanted.slots, "sleep_s": 1.0, "rows": rows}
+    return {"slots": options.slots, "sleep_s": 1.0, "rows": rows}
 
 
-def pool(stack: Stack, wanted: argparse.Namespace) -> dict[str, Any]:
-    """Sleeping cells on workers, each a process of its own."""
+def pool(stack: Stack, options: argparse.Namespace) -> dict[str, Any]:
+    """Run sleeping cells on workers, each a process of its own."""
     from flows import cells
 
     ablate(study("first", {**sleepers(3), "seeds": (10_000,)}, slots=2), 0.0, False)
     _deploy()
     costs = Costs(stack)
     with patch.object(cells, "DEPLOYMENT", f"cell/{DEPLOYMENT}"):
-        ablate(study("pool", sleepers(wanted.runs), executor="work-pool"), 0.0, False)
-    used, count = costs.so_far(), len(sleepers(wanted.runs)["seeds"]) * len(SETUPS)
+        ablate(study("pool", sleepers(options.runs), executor="work-pool"), 0.0, False)
+    used, count = costs.so_far(), len(sleepers(options.runs)["seeds"]) * len(SETUPS)
     workers = {"workers_cpu_ms_each": round(1e3 * used["workers_cpu_s"] / count, 1)}
-    return {"workers": wanted.workers, "cells": count, **used, **each(used, count), **workers}
+    return {"workers": options.workers, "cells": count, **used, **each(used, count), **workers}
 
 
-def _command(stack: Stack, wanted: dict[str, Any]) -> float:
-    """Wall time of `robojackson ablation`, from the shell to its last word."""
+def _command(stack: Stack, options: dict[str, Any]) -> float:
+    """Return wall time of `robojackson ablation`, from the shell to its last word."""
     file = stack.folder / "study.yaml"
-    file.write_text(yaml.safe_dump(json.loads(json.dumps(wanted))))
+    file.write_text(yaml.safe_dump(json.loads(json.dumps(options))))
     began = time.monotonic()
     words = [sys.executable, "-m", "robojackson", "ablation", str(file), "--json"]
     subprocess.run(words, check=True, capture_output=True)
@@ -169,7 +169,7 @@ def _deploy() -> None:
 
 @contextmanager
 def _server(folder: Path, workers: int) -> Iterator[Stack]:
-    """A stack whose server counts its calls, and this process as its client.
+    """Yield a stack whose server counts its calls, and this process as its client.
 
     With workers the store is the stack's; else it is a folder, as for one machine.
     """
@@ -184,6 +184,7 @@ def _server(folder: Path, workers: int) -> Iterator[Stack]:
 
 
 def main() -> None:
+    """Run the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
@@ -193,8 +194,8 @@ def main() -> None:
     parser.add_argument("--slots", type=int, default=32, help="cells at once in `local`")
     parser.add_argument("--runs", type=int, default=200, help="in `pool`")
     parser.add_argument("--workers", type=int, default=8, help="in `pool`")
-    wanted = parser.parse_args()
-    if wanted.part is None:  # Prefect knows one server a process
+    options = parser.parse_args()
+    if options.part is None:  # Prefect knows one server a process
         for part in PARTS:
             words = [
                 sys.executable,
@@ -205,23 +206,23 @@ def main() -> None:
             ]
             subprocess.run([*words, *sys.argv[1:]], check=True)
         return
-    made = measured(wanted.part, wanted)
+    made = measured(options.part, options)
     print(json.dumps(made, indent=1), flush=True)
     known = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
-    RESULTS.write_text(json.dumps({**known, wanted.part: made}, indent=1) + "\n")
+    RESULTS.write_text(json.dumps({**known, options.part: made}, indent=1) + "\n")
 
 
-def measured(part: str, wanted: argparse.Namespace) -> dict[str, Any]:
-    """A part on a stack of its own, with how and when it was measured."""
+def measured(part: str, options: argparse.Namespace) -> dict[str, Any]:
+    """Return a part on a stack of its own, with how and when it was measured."""
     folder = Path(tempfile.mkdtemp(prefix="robojackson-bench-"))
-    with _server(folder, wanted.workers if part == "pool" else 0) as stack:
+    with _server(folder, options.workers if part == "pool" else 0) as stack:
         return {
             "command": " ".join(
                 ["python -m benchmarks.orchestration.orchestration_suite", *sys.argv[1:]]
             ),
             "date": datetime.now(UTC).isoformat(timespec="seconds"),
             "load_before": [round(one, 2) for one in os.getloadavg()],
-            **globals()[part](stack, wanted),
+            **globals()[part](stack, options),
             "load_after": [round(one, 2) for one in os.getloadavg()],
         }
 

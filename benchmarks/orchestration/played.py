@@ -36,10 +36,10 @@ NAP_S = 1.0
 
 @contextmanager
 def played(seconds: float, burn: bool, began: Callable[[], None] = lambda: None) -> Iterator[None]:
-    """Let every training and judgement of this process be played.
+    """Replace every training and evaluation of this process by a stand-in.
 
     Args:
-        seconds: That a training takes, of processor time if it burns; a judgement takes none.
+        seconds: Length of a training, processor time if it burns; an evaluation takes none.
         began: Called whenever a training begins.
     """
     code = (BURN if burn else SLEEP).format(seconds=seconds)
@@ -85,6 +85,6 @@ def motionless() -> Iterator[None]:
 
 @flow(name="cell", flow_run_name="{cell.name}")
 async def pooled(cell: Cell) -> dict[str, Artifact]:
-    """A cell on a worker that sleeps in place of learning."""
+    """Run a cell on a worker that sleeps in place of learning."""
     with played(NAP_S, burn=False):
         return await cells.cell.fn(cell)

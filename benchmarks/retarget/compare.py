@@ -76,7 +76,7 @@ class Case:
 
 
 def cases(folder: Path, clips: list[str]) -> Iterator[Case]:
-    """Motions of our own mocap, kept in a folder; truths; the authors' files."""
+    """Yield motions of our own mocap, kept in a folder; truths; the authors' files."""
     for clip in (*RENDERED, *REAL):
         if clip in clips:
             table = folder / clip / "smpl.parquet"
@@ -93,7 +93,7 @@ def cases(folder: Path, clips: list[str]) -> Iterator[Case]:
 
 
 def rows_of(case: Case, robot: Robot, methods: list[str]) -> Iterator[dict[str, Any]]:
-    """One row a method; mink on the truths, the paper's mapping on our own mocap."""
+    """Yield one row a method; mink on the truths, the paper's mapping on our own mocap."""
     peer, stock = case.source == "truth", robot.description.name == "humanoid"
     if "optimise" in methods:
         plain = RetargetConfig(**(PLAIN | {"cyclic": "no" if peer else "auto"}))
@@ -141,7 +141,8 @@ def _told(case: Case, robot: Robot, method: str, card: Any, seconds: float) -> d
 
 
 def speeds(robot: Robot, clip: str = "dance_a") -> dict[str, float]:
-    """CPU seconds of a 30 fps clip of 10 s and of 60 s, and their ratio; the best of three."""
+    """Return CPU seconds of a 30 fps clip of 10 s and of 60 s, and their ratio; the best of
+    three."""
     human, config = truth_motion(clip), RetargetConfig(cyclic="no", **PLAIN)
     best = dict.fromkeys(LENGTHS_S, np.inf)
     for _ in range(3):
@@ -156,7 +157,7 @@ def speeds(robot: Robot, clip: str = "dance_a") -> dict[str, float]:
 
 
 def table(rows: list[dict[str, Any]]) -> Table:
-    """The rows as text."""
+    """Return the rows as text."""
     out = Table("robot", "source", "clip", "method", *COLUMNS.values(), title="Retargeting")
     for row in rows:
         figures = [f"{row[key]:.3g}" if key in row else "-" for key in COLUMNS]
@@ -165,7 +166,7 @@ def table(rows: list[dict[str, Any]]) -> Table:
 
 
 def markdown(rows: list[dict[str, Any]]) -> str:
-    """The rows for docs/benchmarks.md."""
+    """Return the rows for docs/benchmarks.md."""
     names = ["robot", "source", "clip", "method"]
     lines = ["| " + " | ".join([*names, *COLUMNS.values()]) + " |"]
     lines.append("|---" * (len(names) + len(COLUMNS)) + "|")

@@ -27,7 +27,7 @@ _CUTOFF_HZ = 6.0
 
 
 def per_frame(robot: Robot, aims: Targets, lock: bool) -> Float[np.ndarray, "S nq"]:
-    """qpos of every frame, each solved from the one before.
+    """Return qpos of every frame, each solved from the one before.
 
     Args:
         lock: Whether feet in contact are held; for robots with one ball a foot.
@@ -71,7 +71,7 @@ def per_frame(robot: Robot, aims: Targets, lock: bool) -> Float[np.ndarray, "S n
 
 
 def filtered(robot: Robot, qpos: Float[np.ndarray, "S nq"], dt: float) -> np.ndarray:
-    """The motion through a zero-phase Butterworth low-pass of order 4 at 6 Hz."""
+    """Return the motion through a zero-phase Butterworth low-pass of order 4 at 6 Hz."""
     sections = butter(4, _CUTOFF_HZ, fs=1.0 / dt, output="sos")
     smooth = sosfiltfilt(sections, qpos, axis=0, padlen=min(len(qpos) - 1, 60))
     smooth[:, 3:7] /= np.linalg.norm(smooth[:, 3:7], axis=1, keepdims=True)
@@ -92,7 +92,7 @@ def _aim(mink, task, robot: Robot, at: np.ndarray, column: int) -> None:  # type
 def _held_at(
     robot: Robot, aims: Targets, step: int, column: int, held: dict[int, np.ndarray | None]
 ) -> np.ndarray | None:
-    """Where a foot in contact must be, else None; `held` remembers where it was planted."""
+    """Return where a foot in contact must be, else None; `held` remembers where it was planted."""
     if column not in held:
         return None
     ball = robot.contact_keypoints.tolist().index(column)
@@ -111,7 +111,7 @@ def _held_at(
 
 
 def _bound(limit, robot: Robot, before: np.ndarray, dt: float) -> None:  # type: ignore[no-untyped-def]
-    """Hinges stay within their limits and within the reach of their speed limit."""
+    """Keep hinges within their limits and within the reach of their speed limit."""
     reach = robot.description.max_joint_speed * dt
     limit.lower[7:] = np.maximum(robot.lower, before[7:] - reach)
     limit.upper[7:] = np.minimum(robot.upper, before[7:] + reach)

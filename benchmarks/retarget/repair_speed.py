@@ -1,8 +1,8 @@
-"""What retargeting with repair, tempo and certificate costs: CPU seconds a second of clip.
+"""Cost of retargeting with repair, tempo and certificate: CPU seconds a second of clip.
 
     python -m benchmarks.retarget.repair_speed --robots humanoid g1 --lengths 2 10 30 60
 
-A clip goes back and forth until it is as long as a row says. Each row has a ruler beside it that
+A clip goes back and forth until it has the length of its row. Each row has a ruler beside it that
 the code under test has no part in: `mj_inverse` calls a CPU second on the robot's model, measured
 just before and after the row on the same core, since a busy machine slows both down.
 """
@@ -32,7 +32,7 @@ _CALLS = 4000
 
 
 def ruler(robot: Robot) -> float:
-    """`mj_inverse` calls a CPU second in a pose that moves."""
+    """Return `mj_inverse` calls a CPU second in a pose that moves."""
     model, data = robot.model, mujoco.MjData(robot.model)
     rng = np.random.default_rng(0)
     data.qpos[:] = robot.standing
@@ -44,7 +44,7 @@ def ruler(robot: Robot) -> float:
 
 
 def rows_of(robot: Robot, clip: str, lengths: list[float]) -> Iterator[dict[str, Any]]:
-    """One row a length."""
+    """Yield one row a length."""
     for seconds in lengths:
         sequence = lengthened(truth_motion(clip), seconds)
         before, started = ruler(robot), time.process_time()

@@ -34,7 +34,8 @@ _SOLES = np.array([[-0.0435, -0.05, 0.0], [0.1335, -0.05, 0.0]])
 
 
 def truth_motion(clip: str) -> SmplSequence:
-    """The motion of the body that a bundled clip shows, from its bones; the first cycle alone."""
+    """Return the motion of the body that a bundled clip shows, from its bones; the first cycle
+    alone."""
     path = video_path(clip)
     with np.load(path.with_name(f"{clip}_gt.npz")) as data:
         bones = data["bone_names"].tolist()
@@ -55,7 +56,7 @@ def truth_motion(clip: str) -> SmplSequence:
 
 
 def mocap_motion(path: Path, fps: float = 60.0) -> SmplSequence:
-    """A motion-capture file of DeepMimic on its own skeleton."""
+    """Return a motion-capture file of DeepMimic on its own skeleton."""
     motion = deepmimic.read(path, fps)
     turn, points = motion.rotations, {"root": motion.root_position}
     points["chest"] = points["root"] + turn["root"].apply([0, _CHEST, 0])
@@ -83,7 +84,8 @@ def mocap_motion(path: Path, fps: float = 60.0) -> SmplSequence:
 def _sequence(
     points: Mapping[str, np.ndarray], soles: Float[np.ndarray, "T 4 3"], fps: float
 ) -> SmplSequence:
-    """A sequence whose lowest soles are at the floor; points that are not known are the hips."""
+    """Return a sequence whose lowest soles are at the floor; points that are not known are the
+    hips."""
     middle = (points["left_hip"] + points["right_hip"]) / 2
     keypoints = np.stack([points.get(name, middle) for name in KEYPOINT_NAMES], axis=1)
     low = np.quantile(soles[..., 2].min(axis=1), 0.02)
@@ -109,7 +111,8 @@ def _sequence(
 def _contacts(
     soles: Float[np.ndarray, "T 4 3"], falling: Bool[np.ndarray, " T"], fps: float
 ) -> Int[np.ndarray, "T 4"]:
-    """Low points touch, slow ones stand; a body that does not fall touches with its lowest."""
+    """Return contacts: low points touch, slow ones stand; a body that does not fall touches with
+    its lowest."""
     height = soles[..., 2]
     speed = np.linalg.norm(np.gradient(soles, axis=0)[..., :2], axis=-1) * fps
     low = (height < _LOW_M) | (height < height.min(axis=1, keepdims=True) + 1e-3)
@@ -128,7 +131,7 @@ def _falling(
 
 
 def lengthened(sequence: SmplSequence, seconds: float, fps: float = 30.0) -> SmplSequence:
-    """The motion back and forth at `fps` until it lasts that long."""
+    """Return the motion back and forth at `fps` until it lasts that long."""
     step = round(sequence.fps / fps)
     once = np.arange(0, len(sequence), step)
     there_and_back = np.concatenate([once, once[-2:0:-1]])

@@ -1,1 +1,1 @@
-"""What assessing a video costs."""
+"""Cost of assessing a video."""

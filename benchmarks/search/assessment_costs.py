@@ -1,4 +1,4 @@
-"""What judging a clip costs, as ratios within one run (`make bench`; results/search.json).
+"""The cost of assessing a clip, as ratios within one run (`make bench`; results/search.json).
 
 1. Algorithm 1 through our code over a bare loop of decode + PoseLandmarker lite: at most 1.1.
 2. The same with every filter: at most 1.35.
@@ -48,7 +48,7 @@ def bare(path: Path) -> int:
 
 
 def scored(path: Path) -> float:
-    """Algorithm 1."""
+    """Return Algorithm 1."""
     from robojackson.clips.pose_detector import detect
     from robojackson.clips.quality.stability import StabilityConfig, stability
     from robojackson.clips.video import VideoLimits, probe
@@ -58,7 +58,7 @@ def scored(path: Path) -> float:
 
 
 def assessed(path: Path) -> float:
-    """Algorithm 1 and every filter."""
+    """Return Algorithm 1 and every filter."""
     from robojackson.clips.quality.assessment import AssessmentConfig, assess_video
 
     return assess_video(path, AssessmentConfig()).stability.stability_score
@@ -68,14 +68,14 @@ WAYS: dict[str, Callable[[Path], float]] = {"bare": bare, "scored": scored, "ass
 
 
 def seconds(way: Callable[[Path], float], path: Path) -> float:
-    """CPU seconds of this process, which a neighbour's work does not lengthen much."""
+    """Return CPU seconds of this process, which a neighbour's work does not lengthen much."""
     began = time.process_time()
     way(path)
     return time.process_time() - began
 
 
 def costs(rounds: int) -> dict[str, dict[str, float]]:
-    """Best seconds of each way on each clip."""
+    """Return the best seconds of each way on each clip."""
     paths = [CLIPS / f"{name}.mp4" for name in NAMES]
     best = {path.stem: dict.fromkeys(WAYS, np.inf) for path in paths}
     for way in WAYS.values():
@@ -88,7 +88,8 @@ def costs(rounds: int) -> dict[str, dict[str, float]]:
 
 
 def batch(cores: Sequence[int]) -> float:
-    """Wall seconds of eight clips in one process a core, the loading of the model not counted."""
+    """Return wall seconds of eight clips in one process a core, the loading of the model not
+    counted."""
     paths = [CLIPS / f"{name}.mp4" for name in BATCH]
     context = get_context("spawn")
     before = os.sched_getaffinity(0)

@@ -44,7 +44,7 @@ def clean(
     ] = False,
     as_json: Json = False,
 ) -> CommandResult:
-    """What is in the store, how old and how big; removes what is old, with --delete alone.
+    """Show what is in the store, how old and how big; with --delete remove what is old.
 
     What a record, a run or a table refers to stays unless its kind is named; so does what a
     process works on.
@@ -54,8 +54,8 @@ def clean(
     from storage.store_inventory import KINDS
 
     store = Store.from_environment()
-    wanted = [kind for kind in KINDS if kind in (kinds or ())]
-    found = plan(store, wanted or USUAL, older_than * DAY_S)
+    chosen = [kind for kind in KINDS if kind in (kinds or ())]
+    found = plan(store, chosen or USUAL, older_than * DAY_S)
     gone = remove(store, found) if delete else found.going
     data = {
         "store": store.root,

@@ -36,7 +36,7 @@ INSTANT_MINUTES = 1.0
 """About what an instant dance takes, for its bar."""
 INSTANT = "--instant"
 LONG_ENOUGH_S = 10.0
-"""Rollouts that are advised where the settings' are too short to judge, seconds."""
+"""Advised rollout length where the settings' is too short to evaluate, seconds."""
 
 
 @command
@@ -61,7 +61,7 @@ def dance(
     set_: Set = None,
     as_json: Json = False,
 ) -> CommandResult:
-    """A video in, a robot that dances it out: every stage, cached, and a page at the end."""
+    """Turn a video, a folder of candidates or the name of a dance into a robot that dances it."""
     from flows.runtime.environment import prepare
     from flows.search.dance_source import is_name, load_settings, require_usable, resolve
     from flows.search.requests import require_findable
@@ -102,7 +102,7 @@ def dance(
 
 
 def _concluded(made: dict[str, Any], minutes: float, seconds: float) -> CommandResult:
-    """The answer of a dance with its verdict and the command to type next."""
+    """Return the answer of a dance with its verdict and the command to type next."""
     from robojackson.cli.cards import advice_lines, closing
     from robojackson.cli.stages import verdict_lines
 

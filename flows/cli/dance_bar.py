@@ -36,7 +36,7 @@ def quiet_prefect() -> None:
 
 @contextmanager
 def dance_bar(minutes: float, store: Path) -> Iterator[None]:
-    """Show how far the pass is that runs inside, on a terminal.
+    """Show the progress of the pass that runs inside, on a terminal.
 
     Args:
         minutes: Budget of the whole pass.
@@ -46,9 +46,9 @@ def dance_bar(minutes: float, store: Path) -> Iterator[None]:
     if not console.is_terminal:
         yield
         return
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[told]}"))
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[note]}"))
     with Progress(*columns, console=console, transient=True) as progress:
-        task = progress.add_task("starting", total=60 * minutes, told="")
+        task = progress.add_task("starting", total=60 * minutes, note="")
         over = threading.Event()
         watch = _Watch(progress, task, minutes, store, over)
         threading.Thread(target=watch.run, daemon=True).start()
@@ -93,7 +93,7 @@ class _Watch:
     """Moves the bar with the clock.
 
     Attributes:
-        stage: That the pass is at.
+        stage: Current stage of the pass.
     """
 
     def __init__(
@@ -115,13 +115,13 @@ class _Watch:
         while not self._over.wait(REFRESH_S):
             spent = time.monotonic() - self._began
             left = max(0, round(self._seconds - spent))
-            told = f"{self._training()}{left // 60}:{left % 60:02d} left"
+            note = f"{self._training()}{left // 60}:{left % 60:02d} left"
             self._progress.update(
-                self._task, completed=min(spent, self._seconds), description=self.stage, told=told
+                self._task, completed=min(spent, self._seconds), description=self.stage, note=note
             )
 
     def _training(self) -> str:
-        """Rate and survival of the training that runs."""
+        """Return the rate and survival of the training that runs."""
         if self.stage != "training":
             return ""
         rows = [p for p in self._store.glob(TRAININGS) if p.stat().st_mtime > self._began_unix]

@@ -15,7 +15,7 @@ from robojackson.cli.options import Json, SetFind, overrides_from
 @command
 def find(
     query: Annotated[str, typer.Argument(help="A dance; or the folder, or list, of the source.")],
-    top: Annotated[int | None, typer.Option(min=1, help="How many videos to judge.")] = None,
+    top: Annotated[int | None, typer.Option(min=1, help="How many videos to assess.")] = None,
     source: Annotated[
         str, typer.Option(help="youtube, folder, urls, site, server, or a file of your own.")
     ] = "youtube",
@@ -26,7 +26,7 @@ def find(
     set_: SetFind = None,
     as_json: Json = False,
 ) -> CommandResult:
-    """The videos of a dance, ranked: Algorithm 1, and why others are rejected."""
+    """Search, assess and rank the videos of a dance; show why others are rejected."""
     from configs.find_config import FindConfig
     from flows.cli.verdicts import find_verdict
     from flows.runtime.environment import prepare
@@ -58,7 +58,7 @@ def refresh(
     set_: SetFind = None,
     as_json: Json = False,
 ) -> CommandResult:
-    """The nightly run, now: for every dance the best new video, up to the robot's motion."""
+    """Run the nightly search now: for every dance the best new video, up to the robot's motion."""
     from flows.cli.verdicts import refresh_lines, refresh_verdict
     from flows.runtime.environment import prepare
     from flows.search.requests import check_refresh
@@ -84,7 +84,7 @@ def catalogue(
     ] = None,
     as_json: Json = False,
 ) -> CommandResult:
-    """Every video that was ever assessed, and why it was danced or not."""
+    """Show every video assessed so far, and why it was danced or not."""
     from flows.cli.verdicts import catalogue_verdict
     from flows.search import ranking_table
     from robojackson.cli import console
@@ -109,7 +109,7 @@ def catalogue(
 
 
 def empty_catalogue_text(dance: str | None) -> str:
-    """What fills a catalogue that has no rows, or none of a dance."""
+    """Return how to fill a catalogue that has no rows, or none of a dance."""
     from robojackson.clips.web.untrusted_text import clean_text
 
     if dance is None:

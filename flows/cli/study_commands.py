@@ -26,7 +26,7 @@ def ablation(
     set_: SetStudy = None,
     as_json: Json = False,
 ) -> CommandResult:
-    """Moves x setups x seeds, each trained and judged, and a page that compares them."""
+    """Train and evaluate moves x setups x seeds, and write a page that compares them."""
     from flows.cli.verdicts import ablation_verdict
     from flows.runtime.environment import prepare
     from flows.study.study_plan import study_of
@@ -35,14 +35,14 @@ def ablation(
 
     given: dict[str, Any] = {"moves": moves, "setups": setups, "seeds": seeds}
     given |= {"steps": steps, "executor": executor, "slots": slots, "robot": yaml_text(robot)}
-    wanted = study_of(study, overrides_from(set_, given))
+    requested = study_of(study, overrides_from(set_, given))
     prepare(Store.from_environment())
     from flows.ablation import run
     from tasks.write_study_page import LEAST_STEPS
 
-    made = run(wanted)
-    shortest = min(map(wanted.steps_of, wanted.moves))
-    made |= ablation_verdict(made, shortest, len(wanted.seeds), LEAST_STEPS)
+    made = run(requested)
+    shortest = min(map(requested.steps_of, requested.moves))
+    made |= ablation_verdict(made, shortest, len(requested.seeds), LEAST_STEPS)
     where = [f"page    {made['page']}", f"tables  {made['tables']}"]
     return CommandResult(made, text=[*where, *closing(made)])
 
@@ -55,7 +55,7 @@ def metrics(
     ] = None,
     as_json: Json = False,
 ) -> CommandResult:
-    """The tables of all studies; without a question, a line a cell."""
+    """Query the tables of all studies; without --sql, show one line a cell."""
     from flows.cli.verdicts import metrics_verdict
     from robojackson.cli.cards import closing
     from storage import study_tables
@@ -69,7 +69,7 @@ def metrics(
     if sql is not None:
         return CommandResult({"rows": rows}, text=text)
     if any(row["strict_success"] is None for row in rows):
-        text.append("-: too short to judge, or bodies that do not dance succeed as well")
+        text.append("-: too short to evaluate, or bodies that do not dance succeed as well")
     verdict = metrics_verdict(rows)
     return CommandResult({"rows": rows, **verdict}, text=[*text, *closing(verdict)])
 
@@ -104,7 +104,7 @@ def server(
     port: Annotated[int, typer.Option(envvar="PREFECT_SERVER_API_PORT", min=1, max=65535)] = 4200,
     as_json: Json = False,
 ) -> CommandResult:
-    """Prefect's server and pages, with the results of the store; Ctrl-C ends it."""
+    """Start Prefect's server and pages, with the results of the store; Ctrl-C ends it."""
     from flows.runtime.environment import prepare_server
     from storage.store import Store
 

@@ -1,4 +1,4 @@
-"""What searches and studies say at their end: a sentence that judges, the command to type next.
+"""Closing lines of searches and studies: a sentence that rates the result, and the next command.
 
 Everything is made from what a command answers; as `robojackson.cli.cards` does for single stages.
 """
@@ -25,21 +25,23 @@ def find_verdict(found: Facts) -> dict[str, Any]:
     Args:
         found: `chosen`, `candidates` and `summary` of the flow `find`.
     """
-    told, chosen = found["candidates"], found["chosen"]
+    candidates, chosen = found["candidates"], found["chosen"]
     if chosen is not None:
-        fit = sum(row["decision"] in ("chosen", "accepted") for row in told)
+        fit = sum(row["decision"] in ("chosen", "accepted") for row in candidates)
         sentence = (
-            f"{_title(chosen)} is the steadiest of {len(told)}, "
+            f"{_title(chosen)} is the steadiest of {len(candidates)}, "
             f"{chosen['score_per_second']:.2f} a second (lower is steadier); {fit} may be danced."
         )
         return _closing("found", sentence, command_line("dance", chosen["url"]))
-    if not told:
+    if not candidates:
         sentence = "The search found no video: other words may."
         return _closing("none", sentence, command_line("find", f"{found['dance']} tutorial"))
-    reasons = Counter(clean_text(row["reason"], REASON) for row in told)
+    reasons = Counter(clean_text(row["reason"], REASON) for row in candidates)
     reason, count = reasons.most_common(1)[0]
-    sentence = f"None of {len(told)} videos may be danced; of {count} the reason is: {reason}."
-    return _closing("none", sentence, with_option("--top", str(2 * len(told))))
+    sentence = (
+        f"None of {len(candidates)} videos may be danced; of {count} the reason is: {reason}."
+    )
+    return _closing("none", sentence, with_option("--top", str(2 * len(candidates))))
 
 
 def catalogue_verdict(rows: Sequence[Facts]) -> dict[str, Any]:
@@ -108,7 +110,7 @@ def ablation_verdict(made: Facts, steps: int, seeds: int, least_steps: int) -> d
 
     Args:
         made: `cells` and `page`.
-        steps, seeds: Of the study.
+        steps, seeds: Steps and seeds of the study.
         least_steps: Control steps of a training below which nothing is learnt.
     """
     if steps < least_steps:
@@ -124,7 +126,7 @@ def ablation_verdict(made: Facts, steps: int, seeds: int, least_steps: int) -> d
             f"show no difference between setups; {MANY_SEEDS} can. The page has the figures."
         )
         return _closing("few_seeds", sentence, show)
-    sentence = f"{made['cells']} cells are evaluated; the page says which claims hold."
+    sentence = f"{made['cells']} cells are evaluated; the page lists which claims hold."
     return _closing("evaluated", sentence, show)
 
 

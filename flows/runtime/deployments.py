@@ -1,4 +1,4 @@
-"""What a Prefect server must know of us: pools, deployments, automations.
+"""Register pools, deployments and automations with a Prefect server.
 
 Everything is registered by name and may be registered again: only what has changed is changed.
 """
@@ -59,8 +59,8 @@ def deploy(wait_s: float = 0.0) -> dict[str, Any]:
 
 async def _prepare() -> dict[str, Any]:
     async with get_client() as client:
-        for name, told in POOLS.items():
-            await _pool(client, name, told)
+        for name, described in POOLS.items():
+            await _pool(client, name, described)
     return {
         "pools": list(POOLS),
         "automations": [await _automation(facts) for facts in automations()],
@@ -68,41 +68,41 @@ async def _prepare() -> dict[str, Any]:
 
 
 def automations() -> list[dict[str, Any]]:
-    """The automations that are shipped, with the silence that the environment allows a run.
+    """Return the automations that are shipped, with the silence that the environment allows a run.
 
     Raises:
         DeploymentFailed: less than two signs of life would have to be missing.
     """
-    wanted = os.environ.get(SILENCE, str(SILENT_S))
-    if not wanted.isdecimal() or int(wanted) < SHORTEST_S:
+    target = os.environ.get(SILENCE, str(SILENT_S))
+    if not target.isdecimal() or int(target) < SHORTEST_S:
         raise DeploymentFailed(
-            f"{SILENCE}={wanted!r}: whole seconds, {SHORTEST_S} at least; runs say every "
+            f"{SILENCE}={target!r}: whole seconds, {SHORTEST_S} at least; runs report every "
             f"{HEARTBEAT_S} s that they live"
         )
     shipped = yaml.safe_load(find("automations").read_text())
-    return [_with_silence(facts, int(wanted)) for facts in shipped]
+    return [_with_silence(facts, int(target)) for facts in shipped]
 
 
 def _with_silence(facts: dict[str, Any], silence_s: int) -> dict[str, Any]:
-    """An automation as it would be written for another silence."""
+    """Return an automation as it would be written for another silence."""
     shipped = facts["trigger"]["within"]
-    wanted = shipped * silence_s // SILENT_S
-    facts["trigger"]["within"] = wanted
-    for told, name in ((facts, "description"), (facts["actions"][0], "message")):
-        told[name] = told[name].replace(f" {shipped} s", f" {wanted} s")
+    target = shipped * silence_s // SILENT_S
+    facts["trigger"]["within"] = target
+    for described, name in ((facts, "description"), (facts["actions"][0], "message")):
+        described[name] = described[name].replace(f" {shipped} s", f" {target} s")
     return facts
 
 
 async def _pool(client: PrefectClient, name: str, description: str) -> None:
-    """A pool that is new, or the one that is there with the heartbeat of our runs."""
+    """Create a pool, or add the heartbeat of our runs to the existing one."""
     try:
         known = await client.read_work_pool(name)
     except ObjectNotFound:
         template = with_heartbeat(ProcessWorker.get_default_base_job_template())
-        wanted = WorkPoolCreate(
+        target = WorkPoolCreate(
             name=name, type="process", description=description, base_job_template=template
         )
-        await client.create_work_pool(wanted)
+        await client.create_work_pool(target)
         return
     template = with_heartbeat(known.base_job_template)
     if template != known.base_job_template:
@@ -110,7 +110,7 @@ async def _pool(client: PrefectClient, name: str, description: str) -> None:
 
 
 def with_heartbeat(template: Mapping[str, Any]) -> dict[str, Any]:
-    """A job template whose runs get our heartbeat, whatever environment their worker has."""
+    """Return a job template whose runs get our heartbeat, in any environment of their worker."""
     made = deepcopy(dict(template))
     env = made["variables"]["properties"]["env"]
     env["default"] = {**env.get("default", {}), **HEARTBEAT}
@@ -118,23 +118,25 @@ def with_heartbeat(template: Mapping[str, Any]) -> dict[str, Any]:
 
 
 async def _automation(facts: Mapping[str, Any]) -> str:
-    wanted = Automation(**facts)
+    target = Automation(**facts)
     try:
-        known = await Automation.aread(name=wanted.name)
+        known = await Automation.aread(name=target.name)
     except ValueError:
-        await wanted.acreate()
+        await target.acreate()
     else:
-        wanted.id = known.id
-        await wanted.aupdate()
-    return wanted.name
+        target.id = known.id
+        await target.aupdate()
+    return target.name
 
 
 def _register() -> list[str]:
-    """prefect.yaml by Prefect's own command, from the folder it stands in."""
+    """Register prefect.yaml by Prefect's own command, in the folder of the file."""
     command = [sys.executable, "-m", "prefect", "--no-prompt", "deploy", "--all"]
     run = subprocess.run(command, cwd=app_folder(), capture_output=True, text=True, check=False)
     if run.returncode:
         said = (run.stdout + run.stderr).strip().splitlines()
-        raise DeploymentFailed(f"prefect deploy failed: {said[-1] if said else 'without a word'}")
+        raise DeploymentFailed(
+            f"prefect deploy failed: {said[-1] if said else 'without a message'}"
+        )
     entries = yaml.safe_load((app_folder() / "prefect.yaml").read_text())["deployments"]
     return [f"{entry['entrypoint'].rsplit('.', 1)[1]}/{entry['name']}" for entry in entries]

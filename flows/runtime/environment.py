@@ -1,4 +1,4 @@
-"""What Prefect must find in the environment before it is imported.
+"""Set the environment that Prefect reads when it is imported.
 
 Its home is inside the store, so that a run leaves nothing elsewhere; the temporary server gets the
 time that it needs on two busy cores and sends no usage data. A run reports often enough that it
@@ -27,7 +27,7 @@ FIXED = {
 SERVER = {
     # Relative to the page: right for every host name, port and proxy.
     ("PREFECT_UI_API_URL", "PREFECT_SERVER_UI_API_URL"): "/api",
-    # The newer pages of Prefect 3.8 contact an analytics service whatever the settings say.
+    # The newer pages of Prefect 3.8 contact an analytics service with any settings.
     ("PREFECT_SERVER_UI_V2_ENABLED",): "false",
     ("PREFECT_SERVER_UI_SHOW_PROMOTIONAL_CONTENT",): "false",
 }
@@ -60,8 +60,8 @@ def prepare(store: Store) -> None:
 
 
 def _set_home(store: Store) -> None:
-    wanted = {"PREFECT_HOME": str(store.here / HOME), **FIXED}
-    for name, value in wanted.items():
+    settings = {"PREFECT_HOME": str(store.here / HOME), **FIXED}
+    for name, value in settings.items():
         os.environ.setdefault(name, value)
     # Without it the server's database cannot be opened.
     Path(os.environ["PREFECT_HOME"]).expanduser().mkdir(parents=True, exist_ok=True)

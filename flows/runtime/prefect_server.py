@@ -12,11 +12,11 @@ from robojackson.errors import DeploymentFailed
 
 EVERY_S = 0.5
 REFUSED = (401, 403)
-"""Codes of HTTP with which a server refuses who asks."""
+"""HTTP codes with which a server refuses access."""
 
 
 def require_server() -> None:
-    """Ask the server that PREFECT_API_URL names, if it names one, whether a run may begin there.
+    """Check that a run may begin on the server that PREFECT_API_URL names, if it names one.
 
     Raises:
         DeploymentFailed: it does not answer, or refuses us.
@@ -46,18 +46,18 @@ def await_server(seconds: float) -> None:
 
 @contextmanager
 def answering() -> Iterator[None]:
-    """Whatever a server says or does not say, as one line with what to do.
+    """Turn failures of a server into one line with the next step.
 
     Raises:
-        DeploymentFailed: it does not answer, refuses us or something that we ask for.
+        DeploymentFailed: it does not answer, or refuses access or a request.
     """
     named = f"the Prefect server of PREFECT_API_URL={PREFECT_API_URL.value()}"
     try:
         yield
     except TransportError as cause:
-        told = str(cause) or type(cause).__name__
+        reason = str(cause) or type(cause).__name__
         raise DeploymentFailed(
-            f"{named} does not answer ({told}); start it (`robojackson server`) or correct "
+            f"{named} does not answer ({reason}); start it (`robojackson server`) or correct "
             "the address; where it is not set, flows start a server of their own"
         ) from cause
     except HTTPStatusError as cause:

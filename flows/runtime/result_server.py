@@ -1,7 +1,7 @@
 """`robojackson server`: Prefect's server with the settings that our runs need, and the results.
 
 What the server shows links to files of the store (`RESULTS`), so that a page or a video opens
-wherever the server does, whatever its host name. The browser calls the API relative to the page for
+wherever the server does, with any host name. The browser calls the API relative to the page for
 the same reason. Everything else is Prefect's: `PREFECT_` variables count as for its own command.
 """
 
@@ -75,7 +75,7 @@ def _require_free(host: str, port: int) -> None:
 def results(store: Store) -> ASGIApp:
     """Return the web application that hands out the pages, videos and tables of a store.
 
-    It asks for the password of the server, if that has one.
+    It requires the password of the server, if that has one.
     """
 
     async def answer(request: Request) -> Response:
@@ -96,8 +96,8 @@ def _is_allowed(request: Request) -> bool:
     password = get_current_settings().server.api.auth_string
     if password is None:
         return True
-    wanted = b"Basic " + b64encode(password.get_secret_value().encode())
-    return secrets.compare_digest(request.headers.get("Authorization", "").encode(), wanted)
+    expected = b"Basic " + b64encode(password.get_secret_value().encode())
+    return secrets.compare_digest(request.headers.get("Authorization", "").encode(), expected)
 
 
 def _key(path: str) -> str | None:
@@ -109,7 +109,7 @@ def _key(path: str) -> str | None:
 
 
 def _file(store: Store, key: str) -> Response:
-    """Return a file, whole or the part that the browser wants of it.
+    """Return a file, whole or the part that the browser requests.
 
     Raises:
         StoreError: the store has no such file.

@@ -1,4 +1,4 @@
-"""What Prefect's pages show of a dance or a study: verdict, figures, pictures, and links."""
+"""Prefect artifacts of a dance or a study: verdict, figures, pictures and links."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -31,9 +31,9 @@ async def show_dance(
     """Leave one Markdown artifact under the key `dance-<name>`, which keeps its history.
 
     Args:
-        name: Of the dance.
-        evaluation: Of the trained policy, with its baselines.
-        made: What the pass made, by name; the files lie in an open folder.
+        name: Name of the dance.
+        evaluation: Evaluation of the trained policy, with its baselines.
+        made: What the pass made, by name; the files are in an open folder.
     """
     key, text = f"dance-{slug_of(name)}", of_dance(store, name, evaluation, made)
     figures = ", ".join(f"{f.label} {f.value}" for f in quantities(evaluation, FIGURES))
@@ -44,7 +44,7 @@ async def show_study(store: Store, name: str, made: Artifacts) -> None:
     """Leave one Markdown artifact under the key `study-<name>`.
 
     Args:
-        name: Of the study.
+        name: Name of the study.
         made: The files of its page, by name; a picture is a `.png`.
     """
     text = of_study(store, name, made)
@@ -91,7 +91,7 @@ def table(evaluation: Mapping[str, Any]) -> str:
 
 def _text(store: Store, parts: Sequence[str], made: Artifacts) -> str:
     folder = store.address(made["page"].key).rpartition("/")[0]
-    where = f"Links and pictures need `robojackson server`. The files lie in `{folder}`."
+    where = f"Links and pictures need `robojackson server`. The files are in `{folder}`."
     return "\n\n".join([*parts, where]) + "\n"
 
 

@@ -22,14 +22,14 @@ class QueuedSqlite(AioSqliteConfiguration):
     async def begin_transaction(
         self, session: AsyncSession, with_for_update: bool = True
     ) -> AsyncIterator[AsyncSessionTransaction]:
-        """Begin a transaction of a session as a writer, whatever it is asked for."""
+        """Begin a transaction of a session as a writer, for any query."""
         async with super().begin_transaction(session, with_for_update=True) as transaction:
             yield transaction
 
 
 @contextmanager
 def queued_writers() -> Iterator[None]:
-    """Inside, a server of this process whose database is SQLite lets its writers wait."""
+    """Let the writers of a server of this process with an SQLite database wait for each other."""
     address = str(PREFECT_API_DATABASE_CONNECTION_URL.value())
     if get_dialect(address).name != "sqlite":
         yield

@@ -1,4 +1,4 @@
-"""What Prefect writes of a fault of the input: no traceback in its log, nothing said twice.
+"""Prefect's log of a wrong input: no traceback, and no message twice.
 
 Prefect logs an error of a stage as an exception and as a state, of the task and of the flow; the
 command ends with the same line again. On the terminal that last line is enough. Prefect's pages
@@ -29,7 +29,7 @@ def without_tracebacks() -> None:
 
 
 class Once:
-    """A filter of a handler for people: without what the command itself says at its end."""
+    """A filter of a handler for people: without what the command itself prints at its end."""
 
     def __init__(self) -> None:
         self._errors: deque[str] = deque(maxlen=REMEMBERED)
@@ -57,7 +57,7 @@ def _without_traceback(record: logging.LogRecord) -> bool:
 
 
 def _error_of(record: logging.LogRecord) -> RoboJacksonError | None:
-    """The fault of the input that a record is about."""
+    """Return the fault of the input that a record is about."""
     error = record.exc_info[1] if record.exc_info else getattr(record, "input_error", None)
     return error if isinstance(error, RoboJacksonError) else None
 

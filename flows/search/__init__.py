@@ -1,1 +1,1 @@
-"""From a query to a ranked table of videos."""
+"""The search pipeline: from a query to a ranked table of videos."""

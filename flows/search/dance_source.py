@@ -1,4 +1,4 @@
-"""What the SOURCE of a dance means: a file, a folder, or the name of a dance."""
+"""Resolve the SOURCE of a dance: a file, a folder, or the name of a dance."""
 
 import os
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ LONGEST = 1000
 
 
 def resolve(source: str | None) -> Path:
-    """The file or folder that a user means; without one, the bundled hip shake.
+    """Return the file or folder that a user means; without one, the bundled hip shake.
 
     Raises:
         UnreadableVideo: it looks like a path and is not there, or it is the name of a dance.
@@ -41,7 +41,7 @@ def resolve(source: str | None) -> Path:
 
 
 def is_name(source: str | None) -> bool:
-    """Whether a SOURCE is the name of a dance: no path, and nothing that looks like one."""
+    """Return whether a SOURCE is the name of a dance: no path, and nothing that looks like one."""
     if source is None:
         return False
     _require_name(source)
@@ -58,7 +58,7 @@ def _require_name(source: str) -> None:
 
 
 def load_settings(config: str, overrides: Mapping[str, Any]) -> "PipelineConfig":
-    """The configuration, checked with its robot before anything costly starts.
+    """Return the configuration, checked with its robot before anything costly starts.
 
     Raises:
         BadConfiguration, UnknownName: it cannot be used.

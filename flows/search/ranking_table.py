@@ -34,7 +34,8 @@ FIGURES = {
 
 
 def lines(rows: Sequence[Row], width: int | None = None) -> list[str]:
-    """The table as lines of text, no wider than the terminal; styles only where there is one."""
+    """Return the table as lines of text, no wider than the terminal; styles only where there is
+    one."""
     columns = shutil.get_terminal_size((USUAL, 0)).columns
     wide = width or min(max(columns, NARROWEST), WIDEST)
     sink = io.StringIO()
@@ -43,7 +44,8 @@ def lines(rows: Sequence[Row], width: int | None = None) -> list[str]:
 
 
 def table(rows: Sequence[Row], width: int = USUAL) -> Table:
-    """The table; what the web wrote stands in `Text`, so that no markup in it is obeyed."""
+    """Return the table; text from the web stands in `Text`, so that its markup is not
+    interpreted."""
     made = Table(box=SIMPLE_HEAD, header_style="bold", pad_edge=False, padding=(0, 1, 0, 0))
     made.add_column("")
     made.add_column("title", overflow="ellipsis", no_wrap=True, max_width=int(TITLE_SHARE * width))
@@ -62,7 +64,7 @@ def table(rows: Sequence[Row], width: int = USUAL) -> Table:
 
 
 def plain_rows(rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """The table for Prefect's pages: the same columns, numbers rounded."""
+    """Return the table for Prefect's pages: the same columns, numbers rounded."""
     shown = []
     for row in rows:
         figures = {head: _form(row, *figure) for head, figure in FIGURES.items()}
@@ -72,7 +74,7 @@ def plain_rows(rows: Sequence[Row]) -> list[dict[str, Any]]:
 
 
 def markdown(name: str, rows: Sequence[Row]) -> str:
-    """The candidates with their pictures, for Prefect's pages."""
+    """Return the candidates with their pictures, for Prefect's pages."""
     head = f"# {in_markdown(clean_text(name))}\n\n| | title | score | decision | reason |\n"
     body = [_markdown_row(row) for row in rows]
     return head + "|---|---|---|---|---|\n" + "\n".join(body) + "\n"

@@ -1,4 +1,4 @@
-"""What `find` and `refresh` are asked for, checked before Prefect is imported."""
+"""Requests to `find` and `refresh`, checked before Prefect is imported."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -17,11 +17,11 @@ from storage import candidate_catalogue
 from storage.store import Store
 
 ALL = 10_000
-"""Files of a folder are all assessed: nobody counted who watched them."""
+"""Files of a folder are all assessed: they have no view counts."""
 
 
 def find_dance(query: str, source: str, address: str, top: int | None, config: FindConfig) -> Dance:
-    """The dance to look for; a query that `configs/dances.yaml` knows means that dance.
+    """Return the dance to look for; a query that `configs/dances.yaml` knows means that dance.
 
     Raises:
         UnknownName: there is no such source.

@@ -1,4 +1,4 @@
-"""Who scores candidates side by side: threads of this process, or a Dask cluster.
+"""Pools that score candidates in parallel: threads of this process, or a Dask cluster.
 
 `ROBOJACKSON_DASK=local` starts a cluster of this machine's cores for the time of a flow;
 `ROBOJACKSON_DASK=tcp://host:8786` uses one that is there, whose workers have this package, the same
@@ -18,10 +18,10 @@ THREADS = 2
 
 
 def scorers(environment: Mapping[str, str] = os.environ) -> TaskRunner[Any]:
-    """The task runner that the environment asks for.
+    """Return the task runner that the environment names.
 
     Raises:
-        MissingDependency: it asks for Dask, which is not installed.
+        MissingDependency: it names Dask, which is not installed.
     """
     address = environment.get(VARIABLE)
     if not address:

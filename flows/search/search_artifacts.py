@@ -1,4 +1,4 @@
-"""What Prefect's pages show of a search: the table, the pictures, the link to the chosen video."""
+"""Prefect artifacts of a search: the table, the pictures, the link to the chosen video."""
 
 from typing import Any
 
@@ -16,13 +16,14 @@ from robojackson.pipeline.run_names import slug_of
 async def publish_search(
     name: str, rows: list[dict[str, Any]], chosen: dict[str, Any] | None
 ) -> None:
-    """Three artifacts under keys that stay the same for a dance, so that there is a history."""
+    """Publish three artifacts under keys that stay the same for a dance, so that they have a
+    history."""
     slug = slug_of(name)
-    told = f"Videos assessed for {in_markdown(clean_text(name))}"
+    caption = f"Videos assessed for {in_markdown(clean_text(name))}"
     table = ranking_table.plain_rows(rows)
-    await acreate_table_artifact(key=f"candidates-{slug}", table=table, description=told)
+    await acreate_table_artifact(key=f"candidates-{slug}", table=table, description=caption)
     text = ranking_table.markdown(name, rows)
-    await acreate_markdown_artifact(key=f"pictures-{slug}", markdown=text, description=told)
+    await acreate_markdown_artifact(key=f"pictures-{slug}", markdown=text, description=caption)
     link = web_address(chosen["url"]) if chosen else ""
     if chosen and link:
         title = clean_text(chosen["title"])

@@ -1,4 +1,4 @@
-"""What became of every video of a search, and the same as rows of the catalogue."""
+"""Outcome of every video of a search, and the same as rows of the catalogue."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ class Entry:
         decision: chosen, accepted, rejected or failed.
         reason: Why not; empty for those that may be danced.
         video: Its file, scored; None when it could not be had.
-        artifacts: What the judge made of it.
+        artifacts: Results of the assessment.
         score, quality: The figures; None when it could not be assessed.
     """
 
@@ -42,13 +42,13 @@ class Entry:
 
 @dataclass(frozen=True)
 class SearchResult:
-    """What came out of a search.
+    """Result of a search.
 
     Attributes:
         dance: What was looked for.
         run_id: Under which it is in the catalogue.
         entries: The chosen one first, then by rank, rejected and failed ones last.
-        selection: Of the search.
+        selection: Selection of the search.
     """
 
     dance: Dance
@@ -63,14 +63,14 @@ class SearchResult:
 
 
 def rows(found: SearchResult) -> list[dict[str, Any]]:
-    """The entries as rows of the catalogue."""
+    """Return the entries as rows of the catalogue."""
     now = datetime.now(UTC)
     labels = {"run_id": found.run_id, "dance": found.dance.name, "decided_at": now}
     return [{**labels, **_row(entry)} for entry in found.entries]
 
 
 def summary(found: Sequence[VideoCandidate], selection: Selection) -> str:
-    """What the selection did, in one line."""
+    """Return what the selection did, in one line."""
     kinds = Counter(rejection.kind for _, rejection in selection.dropped)
     words = {rejection.kind: str(rejection) for _, rejection in selection.dropped}
     words["too_long"] = "too long"
@@ -80,7 +80,7 @@ def summary(found: Sequence[VideoCandidate], selection: Selection) -> str:
 
 
 def reason_of(error: BaseException) -> str:
-    """An error as the reason in a table: one line, without the path of our own copy."""
+    """Return an error as the reason in a table: one line, without the path of our own copy."""
     if not isinstance(error, RoboJacksonError):
         return clean_text(f"unexpected {type(error).__name__}: {error}", REASON_LENGTH)
     return clean_text(error.reason, REASON_LENGTH)
@@ -88,12 +88,12 @@ def reason_of(error: BaseException) -> str:
 
 def _row(entry: Entry) -> dict[str, Any]:
     candidate = entry.candidate
-    told = {f.name: getattr(candidate, f.name) for f in fields(candidate) if f.name != "live"}
+    columns = {f.name: getattr(candidate, f.name) for f in fields(candidate) if f.name != "live"}
     measured = asdict(entry.quality) if entry.quality else {}
     scored = asdict(entry.score) if entry.score else {}
     video = entry.video
     return {
-        **told,
+        **columns,
         **measured,
         **scored,
         "decision": entry.decision,

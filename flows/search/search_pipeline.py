@@ -1,6 +1,6 @@
-"""From a query to a ranked table of videos and the one to dance: what `find` and `refresh` share.
+"""The search that `find` and `refresh` share: from a query to ranked videos and the one to dance.
 
-Search, select, download, judge, rank, write down. A video that fails on the way gets its reason and
+Search, select, download, assess, rank, record. A video that fails on the way gets its reason and
 harms no other; only a search that fails is an error.
 """
 
@@ -47,12 +47,12 @@ def search_and_rank(
     reigning: Mapping[str, Any] | None = None,
     failed: Collection[tuple[str, str]] = (),
 ) -> SearchResult:
-    """Find, judge and rank the videos of a dance; every one of them goes into the catalogue.
+    """Find, assess and rank the videos of a dance; every one of them goes into the catalogue.
 
     Args:
         dance: What to look for.
         settings: How.
-        run_id: For the catalogue.
+        run_id: Run id for the catalogue.
         known: Videos that were assessed before and need not be again.
         reigning: Row of the catalogue of the video chosen last, which a new one has to beat.
         failed: Videos that failed before and are tried again where there is nothing else.
@@ -75,7 +75,7 @@ def search_and_rank(
 def download_candidates(
     candidates: Sequence[VideoCandidate], purpose: Purpose, settings: FindConfig
 ) -> list[tuple[VideoCandidate, Artifact | str]]:
-    """The files of candidates in one format; the reason instead of one that fails."""
+    """Return the files of candidates in one format; the reason instead of one that fails."""
     waiting: list[PrefectFuture[Any] | str] = []
     for candidate in candidates:
         waiting.append(_submitted(candidate, purpose, settings))
@@ -85,7 +85,7 @@ def download_candidates(
 def assess_candidates(
     downloaded: Sequence[tuple[VideoCandidate, Artifact | str]], settings: FindConfig
 ) -> list[Entry]:
-    """All candidates with their figures, or with the reason why there are none."""
+    """Return all candidates with their figures, or with the reason why there are none."""
     there = [video for _, video in downloaded if isinstance(video, Artifact)]
     outcomes = iter(assess_video.outcomes([(video, settings.assessment) for video in there]))
     entries = []
@@ -104,7 +104,7 @@ def assess_candidates(
 
 
 def ranked(entries: Sequence[Entry], settings: FindConfig) -> list[Entry]:
-    """The entries in the order of their places, each with its decision and reason."""
+    """Return the entries in the order of their places, each with its decision and reason."""
     config = settings.filters
     by_name = {f"{i}": entry for i, entry in enumerate(entries) if entry.score}
     scores = {name: entry.score for name, entry in by_name.items() if entry.score}
@@ -123,7 +123,7 @@ def ranked(entries: Sequence[Entry], settings: FindConfig) -> list[Entry]:
 def challenged(
     entries: Sequence[Entry], reigning: Mapping[str, Any] | None, settings: FindConfig
 ) -> list[Entry]:
-    """The entries, the best one not chosen if the video that was chosen last is steadier."""
+    """Return the entries, the best one not chosen if the video that was chosen last is steadier."""
     if reigning is None or not entries or entries[0].decision != "chosen":
         return list(entries)
     first = entries[0]
@@ -141,7 +141,7 @@ def challenged(
 def _submitted(
     candidate: VideoCandidate, purpose: Purpose, settings: FindConfig
 ) -> PrefectFuture[Any] | str:
-    """The task that brings a video; the reason when a local file cannot even be looked at."""
+    """Return the task that downloads a video; the reason when a local file cannot be read."""
     if candidate.source == folder.NAME:
         try:
             return take_file.submit(SourceFile.at(Path(candidate.url)))
@@ -153,7 +153,7 @@ def _submitted(
 
 
 def _outcome(future: PrefectFuture[Any] | str) -> Any:
-    """The result of a task, or the reason in one line."""
+    """Return the result of a task, or the reason in one line."""
     if isinstance(future, str):
         return future
     return _or_reason(future.result(raise_on_failure=False))

@@ -1,4 +1,4 @@
-"""What a person sees of an ablation while it runs: one table that grows as its cells end."""
+"""Progress table of an ablation, which grows as its cells end."""
 
 import asyncio
 import json
@@ -16,7 +16,7 @@ from tasks.study_cell import Cell
 
 COLUMNS = ("survived_s", "strict_success", "skill", "limb_gain")
 SECONDS_A_ROW, SECONDS_BETWEEN = 0.05, (1.0, 60.0)
-"""What lies between two versions of the table: longer for a longer one, within bounds."""
+"""Time between two versions of the table: longer for a longer one, within bounds."""
 WAITING, RUNNING, DONE, FAILED = "waiting", "running", "done", "failed"
 ON_WORKERS = "with the workers"
 
@@ -26,7 +26,7 @@ class ProgressTable:
 
     def __init__(self, study: Study, cells: list[Cell]) -> None:
         self.key = f"ablation-{study.name.lower().replace('_', '-').replace('.', '-')}"
-        self._told = f"Study {study.name}: {len(cells)} cells of {study.steps_label} steps"
+        self._caption = f"Study {study.name}: {len(cells)} cells of {study.steps_label} steps"
         self._changed = asyncio.Event()
         self._begun = RUNNING if study.executor == "local" else ON_WORKERS
         self._rows: dict[str, dict[str, Any]] = {
@@ -43,17 +43,17 @@ class ProgressTable:
         }
 
     def running(self, cell: Cell) -> None:
-        """The cell has begun, or waits for a worker that takes it."""
+        """Record that the cell has begun, or waits for a worker."""
         self._change(cell, state=self._begun)
 
     def done(self, cell: Cell, made: Mapping[str, Artifact]) -> None:
-        """The cell has ended well; its figures go into the table."""
+        """Record that the cell has succeeded, with its figures."""
         summary = json.loads(Store.from_environment().read(made["evaluation"].key))
         figures = {name: _short(summary.get(name)) for name in COLUMNS}
         self._change(cell, state=DONE, **figures)
 
     def failed(self, cell: Cell, reason: str) -> None:
-        """The cell has failed."""
+        """Record that the cell has failed."""
         self._change(cell, state=FAILED, reason=reason)
 
     @asynccontextmanager
@@ -81,10 +81,10 @@ class ProgressTable:
     async def _show(self) -> None:
         self._changed.clear()
         ended = sum(row["state"] in (DONE, FAILED) for row in self._rows.values())
-        told = f"{self._told}; {ended} of {len(self._rows)} have ended"
+        caption = f"{self._caption}; {ended} of {len(self._rows)} have ended"
         rows = list(self._rows.values())
         try:
-            await acreate_table_artifact(key=self.key, table=rows, description=told)
+            await acreate_table_artifact(key=self.key, table=rows, description=caption)
         except Exception as cause:  # a server that is away is no reason to fail a cell
             get_run_logger().warning("the table on Prefect's page is not up to date: %s", cause)
 

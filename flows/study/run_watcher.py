@@ -1,6 +1,6 @@
 """Waiting for many runs at once: one question to the server, however many runs there are.
 
-Prefect's own `run_deployment` asks for each of its runs every 5 s: a thousand that wait would be
+Prefect's own `run_deployment` polls each of its runs every 5 s: a thousand that wait would be
 200 calls a second, more than one server answers.
 """
 
@@ -26,14 +26,14 @@ log = logging.getLogger(__name__)
 
 
 class RunWatcher:
-    """The runs that somebody waits for."""
+    """The runs that are waited for."""
 
     def __init__(self) -> None:
         self._waiting: dict[UUID, asyncio.Future[FlowRun]] = {}
         self._asking: asyncio.Task[None] | None = None
 
     async def of(self, run: FlowRun) -> FlowRun:
-        """The run as it ended.
+        """Return the run as it ended.
 
         Raises:
             Exception: the server does not answer any more.
@@ -50,7 +50,7 @@ class RunWatcher:
             del self._waiting[run.id]
 
     async def _poll(self) -> None:
-        """Ask until nobody waits; a server that is away for a while is asked again."""
+        """Poll until no run is waited for; a server that is away for a while is polled again."""
         answered = time.monotonic()
         while self._waiting:
             await asyncio.sleep(EVERY_S)
@@ -61,7 +61,7 @@ class RunWatcher:
                 if time.monotonic() - answered > PATIENCE_S:
                     self._give_up(cause)
                     return
-                log.warning("the runs on workers cannot be asked for, will try again: %s", cause)
+                log.warning("the runs on workers cannot be polled, will try again: %s", cause)
                 continue
             for run in found:
                 waits = self._waiting.get(run.id)
@@ -75,8 +75,8 @@ class RunWatcher:
 
 
 async def _ended(waiting: list[UUID]) -> list[FlowRun]:
-    """Those of the runs that have ended; the server tells of at most 200 at a time."""
+    """Return the runs that have ended; the server returns at most 200 at a time."""
     over = FlowRunFilterStateType(any_=sorted(TERMINAL_STATES))
-    wanted = FlowRunFilter(id=FlowRunFilterId(any_=waiting), state=FlowRunFilterState(type=over))
+    criteria = FlowRunFilter(id=FlowRunFilterId(any_=waiting), state=FlowRunFilterState(type=over))
     async with get_client() as client:
-        return await client.read_flow_runs(flow_run_filter=wanted)
+        return await client.read_flow_runs(flow_run_filter=criteria)

@@ -1,4 +1,4 @@
-"""What a study trains, read and checked before Prefect is imported."""
+"""Plan of a study, read and checked before Prefect is imported."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -20,7 +20,7 @@ WALKER = "walker"
 
 
 def study_of(name: str, overrides: Mapping[str, Any]) -> Study:
-    """A study of `configs/studies` or of a path, with everything that it names.
+    """Return a study of `configs/studies` or of a path, with everything that it names.
 
     Raises:
         UnknownName, BadConfiguration: something that it names does not exist or cannot be used.
@@ -53,7 +53,7 @@ def trainings_of(study: Study, robot: RobotDescription) -> dict[str, TrainConfig
 
 
 def training(study: Study, setup: str) -> TrainConfig:
-    """How the cells of a setup are trained; seeds come later."""
+    """Return how the cells of a setup are trained; seeds come later."""
     given = {"mode": study.mode, "steps": study.steps, "trainer": study.trainer, **study.train}
     return load(TrainConfig, f"setups/{setup}", given)
 

@@ -1,4 +1,4 @@
-"""One pass from clips to a page: which stages run, and in which order. No Prefect at import.
+"""One pass from clips to a page: its stages in order. No Prefect at import.
 
 Inside the flow `dance` the stages run as cached tasks. Inside `tasks.runtime.stage.records_only`
 the same pass is answered from the records of an earlier one.
@@ -43,7 +43,7 @@ class DanceResult:
     """A pass that has ended.
 
     Attributes:
-        answer: What the command says.
+        answer: The answer of the command.
         artifacts: What the stages left, by name.
     """
 
@@ -61,10 +61,10 @@ async def make_dance(
     """Dance the steadiest of some videos.
 
     Args:
-        paths: Of the videos.
+        paths: Paths of the videos.
         start_s, end_s: Range of each, seconds.
     Raises:
-        NoPersonFound: nobody is in any of them.
+        NoPersonFound: no person is in any of them.
         RejectedReference: the gate refuses the motion.
         RoboJacksonError: a stage cannot do its work; the message names the cause.
     """

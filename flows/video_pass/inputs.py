@@ -1,7 +1,7 @@
-"""From what somebody asked to be danced to video files of this machine.
+"""Turn the SOURCE of a dance into video files of this machine.
 
 That may be the name of a dance, the address of a video on the web, or the path of a file or folder.
-Names are searched and their steadiest video is brought; an address is brought as it is.
+Names are searched and their steadiest video is downloaded; an address is downloaded as it is.
 """
 
 from collections.abc import AsyncIterator, Iterator
@@ -35,7 +35,7 @@ Minutes = Annotated[float, Field(gt=0)]
 
 @config_dataclass
 class Search:
-    """How a dance is looked for that is given by its name.
+    """Search settings for a dance that is given by its name.
 
     Attributes:
         config: Name or path of the configuration of the search.
@@ -48,7 +48,7 @@ class Search:
 
 @asynccontextmanager
 async def videos_of(source: str, search: Search) -> AsyncIterator[tuple[Path, ...]]:
-    """The files that are meant, here for the time of the block.
+    """Yield the local files of the inputs.
 
     Raises:
         UnreadableVideo: it looks like a path and is not there, or holds no video.
@@ -67,7 +67,7 @@ async def videos_of(source: str, search: Search) -> AsyncIterator[tuple[Path, ..
 
 
 async def of_name(words: str, search: Search) -> tuple[str, Artifact]:
-    """The best video of a dance in good quality, and what it is called.
+    """Return the best video of a dance in good quality, and its name.
 
     When the search fails, the video that an earlier one chose is taken.
     """
@@ -77,15 +77,15 @@ async def of_name(words: str, search: Search) -> tuple[str, Artifact]:
 
 
 def of_address(address: str, search: Search) -> tuple[str, Artifact]:
-    """A video of the web in good quality, and what it is called.
+    """Return a video of the web in good quality, and its name.
 
     Raises:
         SearchFailed: it cannot be had; the message has the reason.
     """
     settings = load(FindConfig, search.config)
-    (wanted,) = urls.search("", address, 1, settings.web, datetime.now(UTC))
-    get_run_logger().info("bringing %s", wanted.url)
-    return slug_of(Path(wanted.title).stem), of_candidate(wanted, None, settings)
+    (candidate,) = urls.search("", address, 1, settings.web, datetime.now(UTC))
+    get_run_logger().info("bringing %s", candidate.url)
+    return slug_of(Path(candidate.title).stem), of_candidate(candidate, None, settings)
 
 
 def name_of(source: str) -> str:
@@ -103,7 +103,7 @@ def name_of(source: str) -> str:
 
 @contextmanager
 def _file(name: str, video: Artifact) -> Iterator[Path]:
-    """An artifact as a file that has a name."""
+    """Yield an artifact as a file that has a name."""
     store = Store.from_environment()
     with store.scratch() as folder:
         path = folder / f"{name or 'dance'}{Path(video.name).suffix}"

@@ -11,7 +11,7 @@ from tasks.retarget_motion import retarget_motion
 def to_reference(
     clip: dict[str, Artifact], robot: RobotDescription, settings: PipelineConfig
 ) -> dict[str, Artifact]:
-    """`landmarks`, `smpl`, `reference` and `scorecard` of a clip; every stage cached.
+    """Return `landmarks`, `smpl`, `reference` and `scorecard` of a clip; every stage cached.
 
     Args:
         clip: `video` and `info`, as `probe_video` left them.

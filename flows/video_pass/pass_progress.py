@@ -1,4 +1,4 @@
-"""Which stage a pass is at, for whoever listens."""
+"""The current stage of a pass, for listeners."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

@@ -33,7 +33,7 @@ def replay(
 
     Args:
         source: A video or a folder of them.
-        config, overrides: Of the pipeline.
+        config, overrides: Configuration of the pipeline and its overrides.
         start_s, end_s: Range of the video, seconds.
     Raises:
         RoboJacksonError: what the flow would raise from the same records.

@@ -25,9 +25,9 @@ class Candidate:
     """A clip that may be danced.
 
     Attributes:
-        name: Of the file.
+        name: Name of the file.
         clip: Its video and what is known of it, as `probe_video` left them.
-        stability, score: Of Algorithm 1, as artifact and as value.
+        stability, score: Stability and score of Algorithm 1, as artifact and as value.
     """
 
     name: str
@@ -71,8 +71,8 @@ def choose(candidates: list[Candidate]) -> Candidate:
     danced = [candidate for candidate in candidates if candidate.score.detected]
     if not danced:
         frames = {candidate.name: candidate.score.frames for candidate in candidates}
-        told = (f"{name}: no person found in {n} of {n} frames" for name, n in frames.items())
-        raise NoPersonFound("; ".join(told))
+        reasons = (f"{name}: no person found in {n} of {n} frames" for name, n in frames.items())
+        raise NoPersonFound("; ".join(reasons))
     return min(danced, key=lambda candidate: candidate.score.score_per_second)
 
 

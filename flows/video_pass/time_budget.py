@@ -1,4 +1,4 @@
-"""What of the minutes of a pass is left for its training; no part of a cache key."""
+"""Minutes of a pass that remain for its training; no part of a cache key."""
 
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.pipeline.pipeline_config import PipelineConfig
@@ -17,7 +17,7 @@ PAGE_S, PICTURE_S = 4.0, 0.04
 def training_time(
     reference: Artifact, robot: RobotDescription, settings: PipelineConfig, began: float
 ) -> TrainingTime | None:
-    """Measure what is over of the pass, estimate what comes after the training.
+    """Measure the time spent by the pass, and estimate the time after the training.
 
     Args:
         began: When the budget of the pass began, Unix time, seconds.

@@ -1,4 +1,4 @@
-"""What a tracker dances at once: a first look on the page, then the full evaluation.
+"""Stages of a tracker's dance: a first look on the page, then the full evaluation.
 
 The page is written before anything else is evaluated or trained, and again when more is known, at
 the same address.
@@ -42,7 +42,7 @@ class TrackedDance:
     Attributes:
         tracker: Which.
         made: What its stages left, by the names that a trained policy's have.
-        folder: Of the page.
+        folder: Folder of the page.
     """
 
     tracker: TrackerDescription
@@ -51,12 +51,13 @@ class TrackedDance:
 
     @property
     def joined(self) -> Artifacts:
-        """What stays of it on the page of a trained policy."""
+        """The part of it that stays on the page of a trained policy."""
         return {there: self.made[alone] for alone, there in JOINED.items()}
 
 
 def chosen_tracker(robot: RobotDescription, settings: PipelineConfig) -> TrackerDescription | None:
-    """Return the tracker that dances at once; None where there is none and none is needed.
+    """Return the tracker that dances at once; None where there is none and none is needed: before a
+    training, a fallback is taken by name alone.
 
     Raises:
         BadPolicy: `instant` needs one that is not here, or there is none for the robot.
@@ -64,11 +65,13 @@ def chosen_tracker(robot: RobotDescription, settings: PipelineConfig) -> Tracker
         UnknownName: no tracker of that name.
     """
     try:
-        return require_tracker(robot.name, settings.tracker)
+        found = require_tracker(robot.name, settings.tracker)
     except (BadPolicy, MissingDependency):
         if settings.instant:
             raise
         return None
+    unasked = found is not None and found.fallback and settings.tracker is None
+    return None if unasked and not settings.instant else found
 
 
 def track(

@@ -1,4 +1,4 @@
-"""What the public functions take: a path, or what an earlier function returned."""
+"""Arguments of the public functions: a path, or the result of an earlier function."""
 
 import platform
 from collections.abc import Callable, Iterator
@@ -27,7 +27,7 @@ Table = TypeVar("Table", LandmarkTrack, SmplSequence, ReferenceMotion)
 
 
 def read_if_path(kind: type[Table], given: FilePath | Table) -> Table:
-    """The value itself, or what its Parquet file holds.
+    """Return the value itself, or what its Parquet file holds.
 
     Raises:
         StoreError: no such file.
@@ -37,25 +37,25 @@ def read_if_path(kind: type[Table], given: FilePath | Table) -> Table:
 
 
 def robot_of(reference: ReferenceMotion) -> Robot:
-    """The robot that a reference motion was made for.
+    """Return the robot that a reference motion was made for.
 
     Raises:
-        UnknownName: its description is not here; the message says what to give.
+        UnknownName: its description is missing; the message names the option.
         RejectedReference: its model has changed since.
     """
     name, file = reference.robot, reference.robot_file
     if file and not Path(file).is_file():
         where = f"the motion was made for {file}, which is not on {platform.node()}"
     elif not file and name not in robot_names():
-        where = "the motion does not say where its description is"
+        where = "the motion does not name its description"
     else:
         return require_robot(reference, bind_robot(describe_robot(file or name)))
-    told = f"{where}; give --robot FILE, in Python robot="
-    raise UnknownName("robot", name, told, robot_names())
+    advice = f"{where}; give --robot FILE, in Python robot="
+    raise UnknownName("robot", name, advice, robot_names())
 
 
 def require_robot(reference: ReferenceMotion, robot: Robot) -> Robot:
-    """The robot itself, if the reference motion was made for its model.
+    """Return the robot itself, if the reference motion was made for its model.
 
     Raises:
         RejectedReference: it was made for another.
@@ -71,7 +71,7 @@ def require_robot(reference: ReferenceMotion, robot: Robot) -> Robot:
 
 @contextmanager
 def counter(progress: Progress, label: str) -> Iterator[Counter | None]:
-    """What a stage calls with (done, in all); None where nobody wants to know."""
+    """Yield what a stage calls with (done, in all); None where no progress is requested."""
     if progress is True:
         with bar(label) as advance:
             yield advance

@@ -1,4 +1,4 @@
-"""From a trained policy to a deploy pack: a folder that runs it without RoboJackson."""
+"""Write a deploy pack: a folder that runs a trained policy without RoboJackson."""
 
 import json
 from collections.abc import Mapping
@@ -23,9 +23,10 @@ from robojackson.formats.deploy.licence_passport import together, with_declared
 from robojackson.formats.deploy.pack_files import pack_files
 from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
 from robojackson.rl.config.train_config import ControlConfig
-from robojackson.rl.evaluation.controllers import control_of, mode_of, observation_of
+from robojackson.rl.evaluation.controllers import control_of
 from robojackson.rl.modes.observation import CLIP, HINGE_SPEED_SCALE, SPEED_SCALE
 from robojackson.rl.policy import Policy, load_policy
+from robojackson.rl.policy_facts import mode_of, observation_of
 from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.motors import Motors, gains, residual_scale
 from robojackson.robot.fall import Fall
@@ -49,7 +50,7 @@ def write_deploy_pack(
 
     Args:
         policy: policy.safetensors of a training with `track.observation=onboard`.
-        folder: For the pack.
+        folder: Folder for the pack.
         reference: The motion that it was trained on; None looks beside the policy.
         robot: The one that the motion was made for; None finds it.
         evaluation: evaluation.json of `robojackson evaluate`, whose figures and passport go into
@@ -75,12 +76,12 @@ def write_deploy_pack(
     machine = robot_of(motion) if robot is None else require_robot(motion, load_robot(robot))
     parts = deployed_policy(found, motion, machine)
     ingredients = with_declared(policy_ingredients(found, path, source, machine), licences or {})
-    judged = _evaluation(path, evaluation)
-    files = pack_files(parts, machine, ingredients, judged)
+    evaluated = _evaluation(path, evaluation)
+    files = pack_files(parts, machine, ingredients, evaluated)
     with results_in(Path(folder)) as tree:
         for name, content in files.items():
             tree.write(name, content)
-    rows = (judged or {}).get("passport") or []
+    rows = (evaluated or {}).get("passport") or []
     return {
         "files": sorted(files),
         "robot": motion.robot,
@@ -105,7 +106,7 @@ def deployed_policy(policy: Policy, reference: ReferenceMotion, robot: Robot) ->
     if sorted(hinge.tolist()) != list(range(count)):
         raise BadPolicy(
             f"robot {robot.description.name!r} has {len(hinge)} motors for {count} hinges: a "
-            "deploy pack wants one motor a hinge"
+            "deploy pack needs one motor a hinge"
         )
     motor = np.argsort(hinge)
     lead = lead_of(robot, reference, control)
@@ -141,7 +142,8 @@ def deployed_policy(policy: Policy, reference: ReferenceMotion, robot: Robot) ->
 def _network(
     policy: Policy, motor: np.ndarray
 ) -> tuple[tuple[tuple[np.ndarray, np.ndarray], ...], np.ndarray]:
-    """The layers with inputs in the order of the pack's terms and hinges, and the inputs' scales.
+    """Return the layers with inputs in the order of the pack's terms and hinges, and the inputs'
+    scales.
 
     The policy sees gyroscope, attitude, angles, speeds, target angles, target speeds, last action
     (`Observer`); the pack has targets, attitude, gyroscope, angles, speeds, last action.
@@ -177,7 +179,7 @@ def _require_onboard(policy: Policy) -> None:
         )
     if mode_of(policy) != "track" or kind != "pd":
         raise BadPolicy(
-            f"a policy of mode {mode_of(policy)} and law {kind}: a deploy pack wants mode track, "
+            f"a policy of mode {mode_of(policy)} and law {kind}: a deploy pack needs mode track, "
             "law pd and --set track.observation=onboard"
         )
 
@@ -192,7 +194,7 @@ def _require_same_motion(policy: Policy, motion: ReferenceMotion, source: Path) 
 
 
 def _beside(policy: Path, given: FilePath | None, name: str, option: str) -> Path:
-    """The file given, or the one of that name beside the policy or one folder up."""
+    """Return the file given, or the one of that name beside the policy or one folder up."""
     places = [Path(given)] if given else [f / name for f in (policy.parent, policy.parent.parent)]
     path = next((place for place in places if place.is_file()), None)
     if path is None:
@@ -203,7 +205,7 @@ def _beside(policy: Path, given: FilePath | None, name: str, option: str) -> Pat
 
 
 def _evaluation(policy: Path, given: FilePath | None) -> dict[str, Any] | None:
-    """The figures of an evaluation; None where there is none beside the policy."""
+    """Return the figures of an evaluation; None where there is none beside the policy."""
     path = Path(given) if given else policy.parent / EVALUATION
     path = path / EVALUATION if path.is_dir() else path
     if given is None and not path.is_file():
@@ -221,5 +223,5 @@ def _evaluation(policy: Path, given: FilePath | None) -> dict[str, Any] | None:
 
 
 def _strict_of(row: Mapping[str, Any]) -> float:
-    """Strict success of a row of the passport."""
+    """Return strict success of a row of the passport."""
     return float(row["strict_success"])

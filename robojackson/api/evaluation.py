@@ -1,4 +1,4 @@
-"""Judgement and video: how well a policy dances, and what that looks like."""
+"""Evaluate policies, and render videos of them."""
 
 import json
 from collections.abc import Callable
@@ -44,7 +44,7 @@ PartProgress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True, repr=False)
 class PolicyEvaluation:
-    """The verdict on a policy.
+    """The evaluation of a policy.
 
     Attributes:
         summary: Means over its rollouts; `baselines`: the same of bodies that do not dance.
@@ -57,14 +57,14 @@ class PolicyEvaluation:
     rollout: Rollout
 
     def __repr__(self) -> str:
-        told = self.summary
-        if told["verdict"]["kind"] == "too_short":
-            said = "too short to judge"
+        figures = self.summary
+        if figures["verdict"]["kind"] == "too_short":
+            said = "too short to evaluate"
         else:
-            said = f"strict_success={told['strict_success']:.0%}, skill={told['skill']:.2f}"
+            said = f"strict_success={figures['strict_success']:.0%}, skill={figures['skill']:.2f}"
         return (
-            f"PolicyEvaluation({said}, site_error_m={told['site_error_m']:.3f}, "
-            f"survived_s={told['survived_s']:.2f}, {told['rollouts']:.0f} rollouts)"
+            f"PolicyEvaluation({said}, site_error_m={figures['site_error_m']:.3f}, "
+            f"survived_s={figures['survived_s']:.2f}, {figures['rollouts']:.0f} rollouts)"
         )
 
     def save(self, folder: FilePath) -> Path:
@@ -95,7 +95,7 @@ def evaluate_policy(
     setup: str = "",
     progress: bool | PartProgress = False,
 ) -> PolicyEvaluation:
-    """Judge a policy on stock physics from many starts, beside baselines that do not dance.
+    """Evaluate a policy on stock physics from many starts, beside baselines that do not dance.
 
     Args:
         policy: A policy, or the policy.safetensors of a training; or a tracker (`load_tracker`).
@@ -103,7 +103,7 @@ def evaluate_policy(
         robot: The one that the motion was made for; None finds it by name.
         config: Starts, horizon and noise.
         move: Name of the dance in the tables.
-        setup: Name of the training in the tables, where the policy's file does not say.
+        setup: Name of the training in the tables, where the policy's file does not give it.
         progress: True shows a bar; a function is called with (name of the part, done, in all).
 
     Returns:
@@ -118,11 +118,11 @@ def evaluate_policy(
     machine = robot_of(motion) if robot is None else require_robot(motion, load_robot(robot))
     trained = load_policy(Path(policy)) if isinstance(policy, str | PathLike) else policy
     with counter(progress is True, "evaluation") as count:
-        tell: PartProgress = (lambda name, done, total: None) if progress is False else progress  # type: ignore[assignment]
+        notify: PartProgress = (lambda name, done, total: None) if progress is False else progress  # type: ignore[assignment]
         if count is not None:
-            tell = lambda name, done, total: count(done, total)  # noqa: E731
-        judged = policy_evaluation.evaluate_policy(
-            trained, motion, machine, config or EvaluateConfig(), tell
+            notify = lambda name, done, total: count(done, total)  # noqa: E731
+        evaluated = policy_evaluation.evaluate_policy(
+            trained, motion, machine, config or EvaluateConfig(), notify
         )
     name = move or ("motion" if isinstance(reference, ReferenceMotion) else motion_name(reference))
     if isinstance(trained, Policy):
@@ -130,8 +130,10 @@ def evaluate_policy(
     else:
         learnt, said = {"seed": 0, "step": None}, trained.description.name
     labels = run_labels(name, said, learnt["seed"])
-    rows = [{**labels, **learnt, **row} for row in judged.rows]
-    return PolicyEvaluation(dict(judged.summary), rows, Rollout(motion.dt, judged.rollout_qpos))
+    rows = [{**labels, **learnt, **row} for row in evaluated.rows]
+    return PolicyEvaluation(
+        dict(evaluated.summary), rows, Rollout(motion.dt, evaluated.rollout_qpos)
+    )
 
 
 def render_video(
@@ -147,7 +149,7 @@ def render_video(
     plain: bool = False,
     progress: Progress = False,
 ) -> VideoInfo:
-    """Write an mp4 of the reference robot, beside whatever else is given, at the same moment.
+    """Write an mp4 of the reference robot beside the other given motions, at the same moment.
 
     Args:
         out: The file.

@@ -42,10 +42,10 @@ Exporter = TypeVar("Exporter")
 
 @dataclass(frozen=True)
 class ForeignFile:
-    """What was read of a file of another project.
+    """Content of another project's file.
 
     Attributes:
-        motion: On the floor.
+        motion: Motion on the floor.
         format: Name of the format.
         figures: `kinematics_error_mm` of HybrIK's files: how far our joints are from theirs.
     """
@@ -60,7 +60,7 @@ def read_foreign(file: Path, fps: float | None, up: Up | None, config: MocapConf
 
     Raises:
         StoreError: the file cannot be read.
-        UnknownName, BadTable: no known format, a damaged file, or one that asks to run something.
+        UnknownName, BadTable: no known format, a damaged file, or one that would run code.
         BadConfiguration: a frame rate that no motion has, or axes that the file has not.
     """
     data = _bytes_of(file)
@@ -84,7 +84,7 @@ def read_foreign(file: Path, fps: float | None, up: Up | None, config: MocapConf
 
 
 def holds_a_person(source: Path) -> bool:
-    """Whether a Parquet file has SMPL's columns.
+    """Return whether a Parquet file has SMPL's columns.
 
     Raises:
         StoreError: no such file.
@@ -130,7 +130,7 @@ def write_policy(policy: FilePath | Policy, file: Path, to: str) -> Path:
 
 @contextmanager
 def _naming_the_file(file: Path) -> Iterator[None]:
-    """What is wrong is told with the file's name."""
+    """Add the file's name to errors."""
     try:
         yield
     except BadTable as cause:
@@ -147,19 +147,19 @@ def _bytes_of(file: Path) -> bytes:
 def _rate(
     motion: ForeignMotion | HybrikMotion, importer: Importer, given: float | None
 ) -> tuple[float, list[str]]:
-    """Frames a second, and what the user should know of them."""
-    told = motion.fps if isinstance(motion, ForeignMotion) else None
-    rate = given or told or importer.fps
+    """Return frames a second, and a note about them for the user."""
+    stored_fps = motion.fps if isinstance(motion, ForeignMotion) else None
+    rate = given or stored_fps or importer.fps
     if rate is None:
         raise BadConfiguration(
-            f"this {importer.name} file does not say its frame rate: give it with --fps"
+            f"this {importer.name} file does not give its frame rate: give it with --fps"
         )
     if not SLOWEST <= rate <= FASTEST:
         raise BadConfiguration(
-            f"{rate:g} frames a second: wanted {SLOWEST:g} to {FASTEST:g}; give it with --fps"
+            f"{rate:g} frames a second: allowed are {SLOWEST:g} to {FASTEST:g}; give it with --fps"
         )
-    if given and told and abs(given - told) > 0.01:
-        return rate, [f"the file says {told:g} frames a second: {given:g} was given"]
-    if not given and not told:
-        return rate, [f"the file does not say its frame rate: taken as {rate:g}; --fps changes it"]
+    if given and stored_fps and abs(given - stored_fps) > 0.01:
+        return rate, [f"the file has {stored_fps:g} frames a second: {given:g} was given"]
+    if not given and not stored_fps:
+        return rate, [f"the file does not give its frame rate: taken as {rate:g}; --fps changes it"]
     return rate, []

@@ -1,4 +1,4 @@
-"""Other motions that a video allows: what limbs that nobody saw may have done."""
+"""Other motions that a video allows: what hidden limbs may have done."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -11,7 +11,7 @@ from robojackson.pipeline.pipeline_config import PipelineConfig
 
 
 def hypothesis_files(settings: PipelineConfig, count: int) -> list[str]:
-    """`smpl_1.parquet` and so on.
+    """Return `smpl_1.parquet` and so on.
 
     Raises:
         BadConfiguration: there is no temporal network in this run to sample from.
@@ -27,7 +27,7 @@ def hypothesis_files(settings: PipelineConfig, count: int) -> list[str]:
 def sample_hypotheses(
     track: LandmarkTrack, settings: PipelineConfig, count: int
 ) -> Iterator[tuple[str, SmplSequence]]:
-    """Samples of the temporal network, seeded, each with the name of its file."""
+    """Yield the samples of the temporal network, seeded, each with the name of its file."""
     for number, name in enumerate(hypothesis_files(settings, count), 1):
         temporal = replace(settings.mocap.temporal, hypothesis=number)
         yield name, recover_motion(track, replace(settings.mocap, temporal=temporal))

@@ -39,7 +39,7 @@ TABLE = ".parquet"
 
 @dataclass(frozen=True)
 class LoadedNetworks:
-    """The published networks with the weights that a user brought.
+    """The published networks with weights of the user.
 
     Attributes:
         config: How they run.
@@ -78,7 +78,7 @@ def recover_motion(
 
     Raises:
         UnreadableVideo, TruncatedVideo, VideoTooLong: see `probe_video`.
-        NoPersonFound, TrackTooShort: nobody to be followed for long enough.
+        NoPersonFound, TrackTooShort: no person is detected for long enough.
         BadWeights: a file of weights cannot be used.
         BadConfiguration: HybrIK without a video.
     """
@@ -128,7 +128,7 @@ def retarget_motion(
 
     Returns:
         MuJoCo positions (S, nq) and velocities (S, nv) at the robot's control step, metres and
-        radians. `scorecard` tells how good it is: training refuses what is over a bar.
+        radians. `scorecard` holds its quality: training refuses figures over a bar.
 
     Raises:
         TrackTooShort: too few frames.
@@ -153,10 +153,10 @@ def read_motion(
 
     Args:
         file: smpl.parquet, reference.parquet, or a file of HybrIK, NIKI, AMASS, AIST++, GVHMR, BVH
-            or our csv; its content says which. Nothing in it is executed.
-        fps: Frames a second, where the file does not say.
+            or our csv, recognised by its content. Nothing in it is executed.
+        fps: Frames a second, where the file does not give them.
         up: Axis that points up, where it is unusual.
-        config: Of the camera and the floor of HybrIK's files.
+        config: Configuration of the camera and the floor of HybrIK's files.
 
     Returns:
         A human motion put on the floor, or a robot's reference motion.
@@ -182,8 +182,8 @@ def write_motion(
 
     Args:
         motion: A human or a robot motion, or the file of one.
-        file: For the result.
-        to: Name of the format (docs/formats.md); without it the suffix of the file says: `.parquet`
+        file: File for the result.
+        to: Name of the format (docs/formats.md); without it the file's suffix decides: `.parquet`
             is our table, `.bvh` and `.csv` are the formats of these names.
         robot: The one that a robot's motion was made for; None finds it.
 

@@ -1,4 +1,4 @@
-"""What a policy was made from, as far as the files around it tell: for the licence passport."""
+"""Inputs of a policy, as far as the files beside it show, for the licence passport."""
 
 import hashlib
 from pathlib import Path
@@ -37,15 +37,15 @@ def policy_ingredients(
 
 
 def _body_models(reference: Path) -> list[Ingredient]:
-    """The networks that recovered the motion, if it is of a video."""
+    """Return the networks that recovered the motion, if it is of a video."""
     folders = reference.parent, reference.parent.parent
     folder = next((folder for folder in folders if (folder / LANDMARKS).is_file()), None)
     if folder is None or not (folder / PERSON).is_file():
-        note = "no landmarks and motion of a person lie beside it: declare them"
+        note = "no landmarks and motion of a person are beside it: declare them"
         return [Ingredient("body models", "what recovered the motion", UNKNOWN, note)]
     notes = SmplSequence.load(folder / PERSON).notes
     networks = [note for note in notes if note.startswith(NETWORK_NOTE)]
-    note = f"{PERSON} beside the motion says so"
+    note = f"{PERSON} beside the motion records it"
     found = [Ingredient("body models", "MediaPipe's pose landmarker", "Apache-2.0", LANDMARKS)]
     if networks:
         return found + [Ingredient("body models", name, UNKNOWN, note) for name in networks]
@@ -54,7 +54,7 @@ def _body_models(reference: Path) -> list[Ingredient]:
 
 
 def _start(start: str) -> list[Ingredient]:
-    """The weights that the training began with."""
+    """Return the weights that the training began with."""
     if start == "scratch":
         return []
     if start == "walker":
@@ -64,7 +64,7 @@ def _start(start: str) -> list[Ingredient]:
 
 
 def _tracker(policy: Policy) -> list[Ingredient]:
-    """The general tracker that a training polished."""
+    """Return the general tracker that a training polished."""
     tracker = policy.facts.get("tracker")
     if not tracker:
         return []

@@ -66,7 +66,7 @@ def train_policy(
     hooks: Hooks | None = None,
     progress: bool | Callable[[Row], None] = False,
 ) -> TrainedPolicy:
-    """Teach a robot to follow a reference motion with TQC.
+    """Train a robot to follow a reference motion with TQC.
 
     Args:
         reference: What `retarget_motion` returned, or its reference.parquet.
@@ -76,14 +76,14 @@ def train_policy(
             it where `config` is given, too.
         steps: Budget in control steps of all simulations, over that of the configuration.
         minutes: Budget of wall time, over that of the configuration; 9 where nothing ends it.
-        seed: Of networks, environments and replay, over that of the configuration.
+        seed: Seed of networks, environments and replay, over that of the configuration.
         reward: Terms of your own beside the configured ones: a function of `RewardState` that
             returns one number a robot, (N,), or several by name. Not part of a checkpoint.
         out: Folder for checkpoints and tables; the same call resumes from it. None keeps nothing.
         move: Name of the dance in the tables.
         run_id: Name of the run in the tables; made of move, setup and seed when empty.
         force: Train on a motion that the gate refuses, too.
-        hooks: What else is told while it runs, and how it is stopped.
+        hooks: Callbacks of progress, and how it is stopped.
         progress: True shows a bar; a function gets a row every few seconds: steps, seconds_left,
             survived_s, site_error_m, episode_return.
 
@@ -97,21 +97,21 @@ def train_policy(
         StoreError: another training holds the folder.
         KeyboardInterrupt: Ctrl-C, after a checkpoint was written to `out`.
     """
-    wanted = _configured(config, setup, steps, minutes, seed)
+    settings = _configured(config, setup, steps, minutes, seed)
     motion = read_if_path(ReferenceMotion, reference)
     machine = robot_of(motion) if robot is None else require_robot(motion, load_robot(robot))
     require_trainable(machine)
     if not force:
         check(scorecard_record(motion))
     name = move or ("motion" if isinstance(reference, ReferenceMotion) else motion_name(reference))
-    labels = _labels(wanted, name, setup, run_id)
+    labels = _labels(settings, name, setup, run_id)
     heard = replace(hooks or Hooks(), setup=labels["setup"], rewards=_named(reward))
     with _folder(out) as folder, _telling(progress, f"training {name}") as report:
-        return _trained(motion, machine, wanted, folder, labels, heard, report)
+        return _trained(motion, machine, settings, folder, labels, heard, report)
 
 
 def _labels(config: TrainConfig, move: str, setup: str | None, run_id: str) -> dict[str, Any]:
-    """What the rows of the run are known by."""
+    """Return the labels of the run's rows."""
     usual = SETUPS[config.start != "scratch", config.curiosity != "off"]
     labels = run_labels(move, Path(setup).stem if setup else usual, config.seed)
     return labels | ({"run_id": run_id} if run_id else {})
@@ -126,14 +126,14 @@ def _trained(
     hooks: Hooks,
     report: Callable[[Row], None],
 ) -> TrainedPolicy:
-    """Train in a folder that nobody else may use meanwhile; its table is saved in any case."""
+    """Train in a folder that is locked meanwhile; its table is saved in any case."""
     with results_in(folder) as files, locked(folder):
         rows = EpisodeLog(files, labels, resumes=newest_checkpoint(folder) is not None)
         audit = audit_record(audit_both_readings(robot, motion, config.environment))
         hooks.audited(audit)
         try:
-            told = _joined(hooks, rows, report)
-            result = training.train_policy(motion, robot, config, folder, told)
+            joined = _joined(hooks, rows, report)
+            result = training.train_policy(motion, robot, config, folder, joined)
         finally:
             if len(rows):
                 rows.save()
@@ -152,7 +152,8 @@ def _configured(
     minutes: float | None,
     seed: int | None,
 ) -> TrainConfig:
-    """The configuration with what was given over it, and the usual budget where it has none."""
+    """Return the configuration with what was given over it, and the usual budget where it has
+    none."""
     found = config or load(TrainConfig, setup_file(setup))
     found = replace(
         found,
@@ -164,7 +165,7 @@ def _configured(
 
 
 def setup_file(name: str | None) -> str | None:
-    """What the loader finds: a bare name is one of configs/setups."""
+    """Return the name for the loader: a bare name is one of configs/setups."""
     bare = name is not None and not {"/", "."} & set(name)
     return f"setups/{name}" if bare else name
 
@@ -178,7 +179,7 @@ def _named(
 
 
 def _joined(hooks: Hooks, rows: EpisodeLog, report: Callable[[Row], None]) -> Hooks:
-    """The caller's hooks, with the table of episodes and the bar of ours."""
+    """Return the caller's hooks, with the table of episodes and the bar of ours."""
 
     def progress(row: Row) -> None:
         hooks.progress(row)
@@ -213,7 +214,7 @@ def _telling(progress: bool | Callable[[Row], None], label: str) -> Iterator[Cal
 
 @contextmanager
 def _folder(out: FilePath | None) -> Iterator[Path]:
-    """The folder of a training: the caller's, or one that goes away."""
+    """Yield the folder of a training: the caller's, or a temporary one."""
     if out is not None:
         yield Path(out)
         return

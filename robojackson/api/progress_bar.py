@@ -25,7 +25,7 @@ log = logging.getLogger("robojackson")
 
 @contextmanager
 def bar(label: str) -> Iterator[Callable[[int, int], None]]:
-    """A progress bar on stderr; a few lines where stderr is no terminal."""
+    """Yield a progress bar on stderr; a few lines where stderr is no terminal."""
     console = Console(stderr=True)
     if not console.is_terminal:
         yield _plain_bar(label)
@@ -38,20 +38,20 @@ def bar(label: str) -> Iterator[Callable[[int, int], None]]:
 
 
 class _Rate(ProgressColumn):
-    """How many a second."""
+    """Column of the items per second."""
 
     def render(self, task: Task) -> Text:
         return Text(f"{task.speed:.1f}/s" if task.speed else "")
 
 
 def _plain_bar(label: str) -> Callable[[int, int], None]:
-    told, began = 0, time.monotonic()
+    reported, began = 0, time.monotonic()
 
     def advance(done: int, total: int) -> None:
-        nonlocal told
+        nonlocal reported
         share = done * STEPS_WITHOUT_TERMINAL // max(total, 1)
-        if share > told:
-            told = share
+        if share > reported:
+            reported = share
             rate = done / max(time.monotonic() - began, 1e-9)
             left = (total - done) / rate
             log.info("%s %d/%d, %.1f/s, %.0f s left", label, done, total, rate, left)

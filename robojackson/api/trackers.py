@@ -9,7 +9,7 @@ def load_tracker(name: str) -> Tracker:
     """Load a tracker, for `evaluate_policy`.
 
     Args:
-        name: Of one of `configs/trackers`, such as `twist2`.
+        name: Name of a file of `configs/trackers`, such as `twist2`.
 
     Raises:
         UnknownName: no such tracker; the message lists the known ones.

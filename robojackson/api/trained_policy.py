@@ -1,4 +1,4 @@
-"""What a training made, with the table of its episodes."""
+"""Result of a training, with the table of its episodes."""
 
 import json
 from collections.abc import Mapping
@@ -19,12 +19,12 @@ Audit = Mapping[str, Mapping[str, float]]
 
 @dataclass(frozen=True, repr=False)
 class TrainedPolicy:
-    """What a training made.
+    """Result of a training.
 
     Attributes:
         policy: The network as numpy arrays; `policy.act(observations)` gives actions, -1..1.
         reference: The motion that it follows.
-        config: Of the training.
+        config: Configuration of the training.
         episodes: One row an episode: return, length, every reward term, tracking errors.
         steps, updates: Control steps and gradient updates in all.
         seconds: Wall time in all, resumptions included.

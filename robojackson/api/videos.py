@@ -24,7 +24,7 @@ Frames = UInt8[np.ndarray, "T H W 3"]
 
 
 def probe_video(video: FilePath, *, limits: VideoLimits | None = None) -> VideoInfo:
-    """Read the size, rate and number of frames of a video; frames are counted, not believed.
+    """Read the size, rate and number of frames of a video; the frames are counted.
 
     Args:
         video: File of any format that FFmpeg reads.
@@ -55,7 +55,7 @@ def detect_landmarks(
 
     Args:
         video: File, or frames (T, H, W, 3) as uint8 RGB.
-        fps: Frames a second of an array; a file says its own.
+        fps: Frames a second of an array; a file has its own.
         quality: Pose model: lite, full, heavy, or best, which lets two vote.
         person: Whom to follow among several people; 1 is the largest steady one, None too.
         limits: Longest and shortest clip.
@@ -83,13 +83,13 @@ def detect_landmarks(
 
 @contextmanager
 def _as_file(video: FilePath | Frames, fps: float | None) -> Iterator[Path]:
-    """The path of a video; an array is a lossless file meanwhile."""
+    """Yield the path of a video; an array becomes a temporary lossless file."""
     if not isinstance(video, np.ndarray):
         yield Path(video)
         return
     if video.ndim != 4 or video.shape[-1] != 3 or video.dtype != np.uint8:
         raise BadConfiguration(
-            f"frames have shape {video.shape} and type {video.dtype}; (T, H, W, 3) of uint8 wanted"
+            f"frames have shape {video.shape} and type {video.dtype}; needed: (T, H, W, 3), uint8"
         )
     if not fps or not np.isfinite(fps) or fps <= 0:
         raise BadConfiguration(f"fps is {fps!r}: an array of frames needs frames a second")

@@ -1,6 +1,6 @@
 """HybrIK's analytic solve: keypoints and twists to rotations (Li et al., CVPR 2021, section 3.3).
 
-Down the tree, each joint swings its rest bone onto the wanted one and turns it by its twist. NAIVE
+Down the tree, each joint swings its rest bone onto the target bone and turns it by its twist. NAIVE
 aims along the predicted bone; ADAPTIVE aims from where the parent really ended, so that errors do
 not add up along a limb. Metres; any common frame of keypoints.
 """
@@ -28,7 +28,7 @@ TwistRule = Callable[[int, np.ndarray], np.ndarray]
 
 
 def _levels() -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Joints 1..23 in groups that do not hang on one another."""
+    """Return the joints 1..23 in groups that do not hang on one another."""
     depth = [0]
     for parent in PARENTS[1 : len(JOINT_NAMES)]:
         depth.append(depth[parent] + 1)
@@ -49,7 +49,8 @@ def solve(
     twist: Float[np.ndarray, "T 23 2"],
     method: Method = "adaptive",
 ) -> Float[np.ndarray, "T 24 3 3"]:
-    """Local rotation matrices that pose `rest_joints` (T or 1 of them) onto the keypoints.
+    """Return the local rotation matrices that pose `rest_joints` (T or 1 of them) onto the
+    keypoints.
 
     Args:
         keypoints: Targets, metres, order of `KEYPOINT_NAMES`.
@@ -67,7 +68,7 @@ def solve_with(
     twist_rule: TwistRule,
     method: Method = "adaptive",
 ) -> Float[np.ndarray, "T 24 3 3"]:
-    """As `solve`, with each twist decided when the joint's swing is known."""
+    """Return the same as `solve`, with each twist decided when the joint's swing is known."""
     goal = np.asarray(keypoints, float)
     count = len(goal)
     rest = np.broadcast_to(np.asarray(rest_joints, float), (count, 29, 3))
@@ -80,8 +81,8 @@ def solve_with(
         above = world[:, parents]
         ends = position[:, parents] + apply(above, rest[:, joints] - rest[:, parents])
         bone = rest[:, children] - rest[:, joints]
-        wanted = _target_directions(goal[:, children], goal[:, joints], ends, bone, method)
-        swung = swing(bone, apply(np.swapaxes(above, -1, -2), wanted))
+        target = _target_directions(goal[:, children], goal[:, joints], ends, bone, method)
+        swung = swing(bone, apply(np.swapaxes(above, -1, -2), target))
         ahead = above @ swung
         turns = [twist_rule(int(joint), ahead[:, k]) for k, joint in enumerate(joints)]
         turn = twist(bone, np.stack(turns, 1))
@@ -94,13 +95,13 @@ def solve_with(
 def _target_directions(
     child: np.ndarray, start: np.ndarray, end: np.ndarray, bone: np.ndarray, method: Method
 ) -> np.ndarray:
-    """The direction along which the bones of some joints shall lie.
+    """Return the direction along which the bones of some joints should point.
 
     Args:
         child: Where the bones should end.
         start: Where they should begin.
         end: Where their parents really end.
-        bone: In the rest pose.
+        bone: Bone in the rest pose.
         method: naive or adaptive.
     """
     predicted = child - start
@@ -118,13 +119,13 @@ def _target_directions(
 def _root(goal: np.ndarray, rest: np.ndarray, method: Method) -> np.ndarray:
     children = list(ROOT_CHILDREN)
     bones = rest[:, children] - rest[:, :1]
-    wanted = goal[:, children] - goal[:, :1]
+    target = goal[:, children] - goal[:, :1]
     if method == "adaptive":
-        return kabsch(bones, wanted)
-    swung = swing(bones[:, 0], wanted[:, 0])
-    axis = unit(wanted[:, 0])
+        return kabsch(bones, target)
+    swung = swing(bones[:, 0], target[:, 0])
+    axis = unit(target[:, 0])
     before = _across(apply(swung, bones[:, 1:].mean(1)), axis)
-    after = _across(wanted[:, 1:].mean(1), axis)
+    after = _across(target[:, 1:].mean(1), axis)
     cosine = np.sum(before * after, -1)
     sine = np.sum(np.cross(before, after) * axis, -1)
     size = np.hypot(cosine, sine)
@@ -134,6 +135,6 @@ def _root(goal: np.ndarray, rest: np.ndarray, method: Method) -> np.ndarray:
 
 
 def _across(vector: np.ndarray, axis: np.ndarray) -> np.ndarray:
-    """The part of a vector at right angles to a unit axis."""
+    """Return the part of a vector at right angles to a unit axis."""
     result: np.ndarray = vector - np.sum(vector * axis, -1, keepdims=True) * axis
     return result

@@ -22,7 +22,7 @@ ABOVE = np.array([0.0, 0.0, 1.0])
 
 
 def foot_points(pose: Pose, rest_joints: Float[np.ndarray, "29 3"]) -> Float[np.ndarray, "T 4 3"]:
-    """Soles under heels and toes, in the frame of the pose."""
+    """Return soles under heels and toes, in the frame of the pose."""
     foot = rest_joints[keypoint("left_big_toe")] - rest_joints[keypoint("left_ankle")]
     scale = np.linalg.norm(foot) / REST_FOOT
     count = len(pose.points)
@@ -36,14 +36,16 @@ def foot_points(pose: Pose, rest_joints: Float[np.ndarray, "29 3"]) -> Float[np.
 
 
 def pitch(feet: Float[np.ndarray, "T 4 3"]) -> Float[np.ndarray, "T 2"]:
-    """Angle of each sole above the horizontal: positive when the toe is higher than the heel."""
+    """Return the angle of each sole above the horizontal: positive when the toe is higher than the
+    heel."""
     sole = feet[:, 1::2] - feet[:, 0::2]
     result: np.ndarray = np.arctan2(sole[..., 2], np.linalg.norm(sole[..., :2], axis=-1))
     return result
 
 
 def pitch_bias(feet: Float[np.ndarray, "T 4 3"], fps: float) -> float:
-    """The detector's pitch of a foot that stands, median over both feet's still, carrying frames.
+    """Return the detector's pitch of a foot that stands, median over both feet's still, carrying
+    frames.
 
     Zero where there are fewer than three such frames.
     """
@@ -57,7 +59,7 @@ def pitch_bias(feet: Float[np.ndarray, "T 4 3"], fps: float) -> float:
 
 
 def stands_flat(feet: Float[np.ndarray, "T 4 3"], planted: np.ndarray) -> np.ndarray:
-    """Frames in which each foot stands on its whole sole, shape (T, 2).
+    """Return frames in which each foot stands on its whole sole, shape (T, 2).
 
     Heel and toe both stand, or one of them does and the foot is about level.
     """
@@ -73,7 +75,8 @@ def level_feet(
     flat: np.ndarray,
     ramp: float,
 ) -> tuple[Float[np.ndarray, "T 29 3"], Float[np.ndarray, "T 2"]]:
-    """Keypoints whose standing feet are level and keep their heading, and the share of it.
+    """Return the keypoints whose standing feet are level and keep their heading, and the share of
+    it.
 
     A standing foot takes the mean heading of its stretch; over `ramp` frames before and after, the
     foot goes over to what was measured.
@@ -89,17 +92,17 @@ def level_feet(
         level = np.stack([left, np.broadcast_to(ABOVE, left.shape), forward], -1)
         for end in ends:
             measured = body_points[:, end] - body_points[:, ankle]
-            wanted = apply(
+            target = apply(
                 level, np.broadcast_to(rest_joints[end] - rest_joints[ankle], left.shape)
             )
-            mixed = measured + share[:, side, None] * (wanted - measured)
-            length = np.linalg.norm(wanted, axis=-1, keepdims=True)
+            mixed = measured + share[:, side, None] * (target - measured)
+            length = np.linalg.norm(target, axis=-1, keepdims=True)
             held[:, end] = held[:, ankle] + unit(mixed) * length
     return held, share
 
 
 def near(flags: np.ndarray, ramp: float) -> Float[np.ndarray, " T"]:
-    """1 where True, falling smoothly to 0 over `ramp` frames on both sides."""
+    """Return 1 where True, falling smoothly to 0 over `ramp` frames on both sides."""
     if not flags.any():
         return np.zeros(len(flags))
     distance = distance_transform_edt(~flags)
@@ -109,7 +112,8 @@ def near(flags: np.ndarray, ramp: float) -> Float[np.ndarray, " T"]:
 
 
 def _steady_heading(sole: np.ndarray, flat: np.ndarray) -> Float[np.ndarray, "T 3"]:
-    """Horizontal direction of a foot: the mean of each standing stretch, else interpolated."""
+    """Return the horizontal direction of a foot: the mean of each standing stretch, else
+    interpolated."""
     level = sole * [1.0, 1.0, 0.0]
     known = np.array(level)
     for start, end in stretches(flat):
@@ -120,7 +124,7 @@ def _steady_heading(sole: np.ndarray, flat: np.ndarray) -> Float[np.ndarray, "T 
 
 
 def stretches(flags: np.ndarray) -> list[tuple[int, int]]:
-    """Runs of True as (first, one past the last)."""
+    """Return the runs of True as (first, one past the last)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
@@ -128,7 +132,8 @@ def stretches(flags: np.ndarray) -> list[tuple[int, int]]:
 def turn_feet(
     points: Float[np.ndarray, "T 29 3"], angles: Float[np.ndarray, "T 2"]
 ) -> Float[np.ndarray, "T 29 3"]:
-    """Keypoints with the balls and toes of the feet lowered about the ankle by an angle."""
+    """Return the keypoints with the balls and toes of the feet lowered about the ankle by an
+    angle."""
     turned = np.array(points)
     feet = zip(pair("ankle"), pair("foot"), pair("big_toe"), strict=True)
     for side, (ankle, ball, toe) in enumerate(feet):

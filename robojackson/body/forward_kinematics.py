@@ -43,13 +43,13 @@ def forward(
 def apply(
     rotation: Float[np.ndarray, "*T 3 3"], vector: Float[np.ndarray, "*T 3"]
 ) -> Float[np.ndarray, "*T 3"]:
-    """R v over any batch."""
+    """Return R v over any batch."""
     result: np.ndarray = np.einsum("...ij,...j->...i", rotation, vector)
     return result
 
 
 def unit(vector: Float[np.ndarray, "*T 3"]) -> Float[np.ndarray, "*T 3"]:
-    """v / |v|; a zero vector stays zero."""
+    """Return v / |v|; a zero vector stays zero."""
     result: np.ndarray = vector / np.maximum(np.linalg.norm(vector, axis=-1, keepdims=True), TINY)
     return result
 
@@ -57,7 +57,8 @@ def unit(vector: Float[np.ndarray, "*T 3"]) -> Float[np.ndarray, "*T 3"]:
 def rotate_about(
     axis: Float[np.ndarray, "*T 3"], cosine: np.ndarray, sine: np.ndarray
 ) -> Float[np.ndarray, "*T 3 3"]:
-    """Rodrigues' formula: rotation about a unit axis by an angle given as (cos, sin)."""
+    """Return the rotation about a unit axis by an angle given as (cos, sin) (Rodrigues'
+    formula)."""
     x, y, z = np.moveaxis(axis, -1, 0)
     versine = 1.0 - cosine
     diagonal = cosine + versine * (1.0 - x * x - y * y - z * z)
@@ -73,7 +74,7 @@ def rotate_about(
 def swing(
     start: Float[np.ndarray, "*T 3"], end: Float[np.ndarray, "*T 3"]
 ) -> Float[np.ndarray, "*T 3 3"]:
-    """Shortest rotation from the direction of `start` to that of `end`.
+    """Return the shortest rotation from the direction of `start` to that of `end`.
 
     Opposite directions turn by pi about any normal; a zero vector turns nothing.
     """
@@ -87,7 +88,7 @@ def swing(
 
 
 def any_normal(vector: Float[np.ndarray, "*T 3"]) -> Float[np.ndarray, "*T 3"]:
-    """A unit vector at right angles: the cross product with the least aligned axis."""
+    """Return a unit vector at right angles: the cross product with the least aligned axis."""
     least = np.eye(3)[np.argmin(np.abs(vector), axis=-1)]
     return unit(np.cross(vector, least))
 
@@ -95,7 +96,7 @@ def any_normal(vector: Float[np.ndarray, "*T 3"]) -> Float[np.ndarray, "*T 3"]:
 def twist(
     bone: Float[np.ndarray, "*T 3"], cos_sin: Float[np.ndarray, "*T 2"]
 ) -> Float[np.ndarray, "*T 3 3"]:
-    """Rotation about a rest bone by (cos, sin), which need not have length one."""
+    """Return the rotation about a rest bone by (cos, sin), which need not have length one."""
     length = np.linalg.norm(cos_sin, axis=-1, keepdims=True)
     unit_pair = np.where(length > TINY, cos_sin / np.maximum(length, TINY), [1.0, 0.0])
     return rotate_about(unit(bone), unit_pair[..., 0], unit_pair[..., 1])
@@ -104,7 +105,7 @@ def twist(
 def split(
     rotation: Float[np.ndarray, "*T 3 3"], bone: Float[np.ndarray, "*T 3"]
 ) -> tuple[Float[np.ndarray, "*T 3 3"], Float[np.ndarray, "*T 2"]]:
-    """The swing and the (cos, sin) of the twist whose product is the rotation."""
+    """Return the swing and the (cos, sin) of the twist whose product is the rotation."""
     swung = swing(bone, apply(rotation, bone))
     turned = np.swapaxes(swung, -1, -2) @ rotation
     axis = unit(bone)
@@ -118,7 +119,8 @@ def split(
 def triad(
     primary: Float[np.ndarray, "*T 3"], secondary: Float[np.ndarray, "*T 3"]
 ) -> Float[np.ndarray, "*T 3 3"]:
-    """Orthonormal columns: the first along `primary`, the third normal to both (TRIAD, 1964)."""
+    """Return orthonormal columns: the first along `primary`, the third normal to both (TRIAD,
+    1964)."""
     first = unit(primary)
     third = unit(np.cross(first, secondary))
     return np.stack([first, np.cross(third, first), third], -1)
@@ -127,7 +129,8 @@ def triad(
 def align(
     rest: tuple[np.ndarray, np.ndarray], posed: tuple[np.ndarray, np.ndarray]
 ) -> Float[np.ndarray, "*T 3 3"]:
-    """Rotation that takes the primary rest vector to the posed one and keeps the half plane."""
+    """Return the rotation that takes the primary rest vector to the posed one and keeps the half
+    plane."""
     result: np.ndarray = triad(*posed) @ np.swapaxes(triad(*rest), -1, -2)
     return result
 
@@ -135,7 +138,8 @@ def align(
 def kabsch(
     rest: Float[np.ndarray, "*T N 3"], posed: Float[np.ndarray, "*T N 3"]
 ) -> Float[np.ndarray, "*T 3 3"]:
-    """Least-squares rotation from rest to posed vectors (Kabsch 1976), never a reflection."""
+    """Return the least-squares rotation from rest to posed vectors (Kabsch 1976), never a
+    reflection."""
     spread = np.einsum("...ni,...nj->...ij", rest, posed)
     left, _, right = np.linalg.svd(spread)
     sign = np.linalg.det(np.swapaxes(right, -1, -2) @ np.swapaxes(left, -1, -2))

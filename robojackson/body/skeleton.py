@@ -59,19 +59,19 @@ SOLE_BELOW_TOE = 0.01
 
 
 def keypoint(name: str) -> int:
-    """Index of a keypoint; an unknown name raises `UnknownName` with the known ones."""
+    """Return the index of a keypoint; an unknown name raises `UnknownName` with the known ones."""
     if name not in KEYPOINT_NAMES:
         raise UnknownName("keypoint", name, "body.skeleton", KEYPOINT_NAMES)
     return KEYPOINT_NAMES.index(name)
 
 
 def pair(name: str) -> tuple[int, int]:
-    """Indices of the left and the right keypoint of a name without its side."""
+    """Return the indices of the left and the right keypoint of a name without its side."""
     return keypoint(f"left_{name}"), keypoint(f"right_{name}")
 
 
 def rest_offset(name: str) -> Float[np.ndarray, "3"]:
-    """Offset of a keypoint from its parent in the rest pose, metres."""
+    """Return the offset of a keypoint from its parent in the rest pose, metres."""
     side, _, bare = name.partition("_")
     if side == "right":
         return np.array(_LEFT_OFFSETS[bare]) * [-1.0, 1.0, 1.0]
@@ -82,7 +82,8 @@ REST_OFFSETS: Float[np.ndarray, "29 3"] = np.stack([rest_offset(n) for n in KEYP
 
 
 def assemble(offsets: Float[np.ndarray, "29 3"]) -> Float[np.ndarray, "29 3"]:
-    """Positions of the keypoints of a rest pose from their offsets, pelvis at its own offset."""
+    """Return the positions of the keypoints of a rest pose from their offsets, pelvis at its own
+    offset."""
     points = np.array(offsets, dtype=float)
     for index, parent in enumerate(PARENTS):
         if parent >= 0:

@@ -6,7 +6,7 @@ ORDER = 2
 
 
 def lowpass(values: np.ndarray, fps: float, cutoff_hz: float) -> np.ndarray:
-    """Second-order Butterworth forth and back along axis 0: no lag, order four in all.
+    """Return the second-order Butterworth forth and back along axis 0: no lag, order four in all.
 
     A cut-off at or above half the frame rate, or a clip too short to filter, changes nothing. The
     ends are reflected oddly, so that a straight line stays one.

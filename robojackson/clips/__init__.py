@@ -1,1 +1,1 @@
-"""clips"""
+"""Videos: reading, finding, assessing, and the people in them."""

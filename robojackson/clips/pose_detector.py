@@ -23,7 +23,7 @@ from robojackson.motion.landmark_track import LANDMARKS, LandmarkTrack, uneven
 Size = Literal["lite", "full", "heavy"]
 Watcher = Callable[[int, np.ndarray, np.ndarray], None]
 """Called with the number of a frame, its RGB image and its row (33, 7): image xyz, world xyz,
-visibility; NaN when nobody was found."""
+visibility; NaN where no person was detected."""
 SIZES: tuple[str, ...] = ("lite", "full", "heavy")
 ASSETS = Path(__file__).parent.parent / "assets"
 GRAPHICS_LIBRARIES = ("libEGL.so.1", "libGLESv2.so.2")
@@ -38,11 +38,11 @@ log = logging.getLogger(__name__)
 
 
 def model_path(size: str) -> Path:
-    """The bundle of one size.
+    """Return the bundle of one size.
 
     Raises:
         UnknownName: no such size.
-        MissingDependency: the bundle is not here; the message is the command that brings it.
+        MissingDependency: the bundle is missing; the message is the command that installs it.
     """
     if size not in SIZES:
         raise UnknownName("pose model", size, "clips.pose_detector", SIZES)
@@ -56,7 +56,7 @@ def model_path(size: str) -> Path:
 
 
 def missing_graphics_libraries() -> tuple[str, ...]:
-    """The shared libraries that MediaPipe links to and this machine lacks."""
+    """Return the shared libraries that MediaPipe links to and this machine lacks."""
     return tuple(name for name in GRAPHICS_LIBRARIES if not _loads(name))
 
 
@@ -67,7 +67,8 @@ def detect(
     progress: Callable[[int, int], None] | None = None,
     watch: Watcher | None = None,
 ) -> LandmarkTrack:
-    """Landmarks of whom the detector takes for the most prominent, NaN rows where nobody is found.
+    """Return landmarks of whom the detector takes for the most prominent, NaN rows where nobody is
+    found.
 
     Args:
         path: Video file.
@@ -97,7 +98,7 @@ def track_of(
     person: int = 0,
     notes: tuple[str, ...] = (),
 ) -> LandmarkTrack:
-    """The rows of all frames as a track."""
+    """Return the rows of all frames as a track."""
     table = rows.reshape(-1, LANDMARKS, 7)
     lost = max(info.frames - len(table), 0)
     if lost:
@@ -119,7 +120,7 @@ def track_of(
 
 @contextmanager
 def video_landmarker(size: str) -> Iterator[Callable[[np.ndarray, float], np.ndarray]]:
-    """A detector that follows one person through the frames: call(image, seconds) -> (33, 7).
+    """Yield a detector that follows one person through the frames: call(image, seconds) -> (33, 7).
 
     Raises:
         MissingDependency: no model bundle, or no EGL and GLES libraries.
@@ -151,7 +152,7 @@ class _QuietAtFirst:
         self._landmarker, self._found = landmarker, False
 
     def detect(self, picture: Any) -> Any:
-        """As the landmarker's."""
+        """Return what the landmarker detects; its first warnings are not printed."""
         with _quiet_stderr(enabled=not self._found):
             result = self._landmarker.detect(picture)
         self._found = self._found or bool(result.pose_landmarks)
@@ -167,7 +168,7 @@ def require_graphics() -> None:
 
 @contextmanager
 def still_landmarker(size: str) -> Iterator[Any]:
-    """An open PoseLandmarker for single pictures, which remembers nothing of the one before."""
+    """Yield an open PoseLandmarker for single pictures, without memory of earlier ones."""
     require_graphics()
     with _landmarker(model_path(size), still=True) as landmarker:
         yield _QuietAtFirst(landmarker)
@@ -175,7 +176,7 @@ def still_landmarker(size: str) -> Iterator[Any]:
 
 @contextmanager
 def _landmarker(model: Path, still: bool = False) -> Iterator[Any]:
-    """An open PoseLandmarker; MediaPipe is imported here because it takes seconds."""
+    """Yield an open PoseLandmarker; MediaPipe is imported here because it takes seconds."""
     with _quiet_stderr():
         from mediapipe.tasks import python as tasks
         from mediapipe.tasks.python import vision

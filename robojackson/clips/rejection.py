@@ -1,4 +1,4 @@
-"""Why a video is not danced: a kind and its figures; the words are made from them last."""
+"""Reasons against a video: a kind and its figures; the words are made from them last."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

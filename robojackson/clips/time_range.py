@@ -9,7 +9,7 @@ from robojackson.errors import BadConfiguration
 def span(
     info: VideoInfo, limits: VideoLimits, start_s: float | None, end_s: float | None
 ) -> tuple[float, float]:
-    """The range of a video that is meant, seconds; an end beyond the video is the video's.
+    """Return the range of a video that is meant, seconds; an end beyond the video is the video's.
 
     Raises:
         BadConfiguration: nothing is in it.

@@ -23,7 +23,7 @@ def trim(path: Path, start_s: float, end_s: float, out: Path) -> Path:
     """Re-encode a range of a video (H.264, upright, same times); `out` is whole or absent.
 
     A copy of packets would start at the key frame before `start_s`; a re-encoding starts where it
-    was told to.
+    was set to.
 
     Raises:
         TrackTooShort: the range holds no frame.

@@ -44,7 +44,7 @@ DAMAGE_ALLOWED = 0.2
 
 @config_dataclass
 class VideoLimits:
-    """What a clip may be.
+    """Limits of a clip.
 
     Attributes:
         max_duration_s: Longest clip, seconds; None is any length.
@@ -57,7 +57,7 @@ class VideoLimits:
 
 @dataclass(frozen=True)
 class VideoInfo:
-    """What a video file holds.
+    """Properties of a video file.
 
     Attributes:
         path: The file.
@@ -94,7 +94,7 @@ class VideoInfo:
 
 
 def list_videos(source: Path) -> tuple[Path, ...]:
-    """The file itself, or the videos directly inside a folder, by name.
+    """Return the file itself, or the videos directly inside a folder, by name.
 
     Raises:
         UnreadableVideo: no such file, or a folder without videos.
@@ -111,7 +111,7 @@ def list_videos(source: Path) -> tuple[Path, ...]:
 
 
 def probe(path: Path, limits: VideoLimits) -> VideoInfo:
-    """Size, rate and number of frames of a video, counted and not believed.
+    """Return the size, rate and number of frames of a video, counted, not taken from the header.
 
     Raises:
         UnreadableVideo: missing, empty, or not a video.
@@ -120,7 +120,7 @@ def probe(path: Path, limits: VideoLimits) -> VideoInfo:
     """
     with opened(path) as container:
         stream = video_stream(container, path)
-        told = declared_rate(stream)
+        declared = declared_rate(stream)
         promised = stream.frames
     stamps = packet_times(path)
     _require_complete(path, len(stamps), promised)
@@ -132,9 +132,9 @@ def probe(path: Path, limits: VideoLimits) -> VideoInfo:
             "with a frame rate (ffmpeg -r 30 -i IN OUT.mp4)",
             path,
         )
-    fps = rate(stamps, told)
+    fps = rate(stamps, declared)
     if not fps:
-        raise UnreadableVideo("the file tells no frame rate", path)
+        raise UnreadableVideo("the file declares no frame rate", path)
     rotation = -first.rotation % 360
     size = (first.height, first.width) if rotation % 180 else (first.width, first.height)
     frames = len(stamps)
@@ -146,7 +146,7 @@ def probe(path: Path, limits: VideoLimits) -> VideoInfo:
 def read_frames(
     path: Path, start_s: float | None = None, end_s: float | None = None
 ) -> Iterator[np.ndarray]:
-    """RGB images, uint8, upright, from `start_s` (included) to `end_s` (excluded), in order.
+    """Return RGB images, uint8, upright, from `start_s` (included) to `end_s` (excluded), in order.
 
     Raises:
         UnreadableVideo, TruncatedVideo: the file cannot be decoded to its end.
@@ -164,7 +164,7 @@ def timed_frames(
     end_s: float | None = None,
     short_side: int | None = None,
 ) -> Iterator[tuple[float, np.ndarray]]:
-    """The same with the time of each since the first frame; damaged frames are left out.
+    """Yield the same with the time of each since the first frame; damaged frames are left out.
 
     Args:
         path: Video file.
@@ -183,11 +183,11 @@ def timed_frames(
 
 
 def _decoded(path: Path) -> Iterator[tuple[float, VideoFrame]]:
-    """Frames and their timestamps."""
+    """Yield frames and their timestamps."""
     with opened(path) as container:
         stream = video_stream(container, path)
         stream.thread_type = "NONE"
-        told = declared_rate(stream) or 1.0  # where frames have no times
+        declared = declared_rate(stream) or 1.0  # where frames have no times
         time_s, good, bad = 0.0, 0, 0
         packets = container.demux(stream)
         while True:
@@ -203,7 +203,7 @@ def _decoded(path: Path) -> Iterator[tuple[float, VideoFrame]]:
                 return
             for frame in frames:
                 good += 1
-                time_s = good / told if frame.time is None else float(frame.time)
+                time_s = good / declared if frame.time is None else float(frame.time)
                 yield time_s, frame
 
 

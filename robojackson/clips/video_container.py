@@ -1,4 +1,4 @@
-"""Video containers, opened with one clear error, and what their packets tell without decoding."""
+"""Video containers, opened with one clear error, and what their packets hold without decoding."""
 
 from pathlib import Path
 
@@ -12,11 +12,11 @@ from robojackson.errors import TruncatedVideo, UnreadableVideo
 
 ISO_MEDIA_MARK = b"ftyp"
 RATE_TOLERANCE = 0.002
-"""A rate that is off the timestamps by more is not believed."""
+"""A declared rate that differs from the timestamps by more is ignored."""
 
 
 def opened(path: Path) -> av.container.InputContainer:
-    """An open container.
+    """Return an open container.
 
     Raises:
         UnreadableVideo: missing, empty, or not a video.
@@ -40,14 +40,14 @@ def opened(path: Path) -> av.container.InputContainer:
 
 
 def video_stream(container: av.container.InputContainer, path: Path) -> VideoStream:
-    """The first video stream of a container."""
+    """Return the first video stream of a container."""
     if not container.streams.video:
         raise UnreadableVideo("the file holds no video stream", path)
     return container.streams.video[0]
 
 
 def first_frame(container: av.container.InputContainer, path: Path) -> VideoFrame:
-    """The first frame that can be decoded."""
+    """Return the first frame that can be decoded."""
     try:
         return next(iter(container.decode(video=0)))
     except (StopIteration, av.FFmpegError) as cause:
@@ -55,7 +55,7 @@ def first_frame(container: av.container.InputContainer, path: Path) -> VideoFram
 
 
 def packet_times(path: Path) -> Float[np.ndarray, " T"]:
-    """When each frame is shown, seconds since the first, in order; nothing is decoded for it.
+    """Return when each frame is shown, seconds since the first, in order, without decoding.
 
     Raises:
         TruncatedVideo: the file cannot be read to its end.
@@ -75,12 +75,12 @@ def packet_times(path: Path) -> Float[np.ndarray, " T"]:
 
 
 def declared_rate(stream: VideoStream) -> float:
-    """Frames a second that the file tells; 0 where it tells none."""
+    """Return the frames a second that the file declares; 0 where it declares none."""
     return float(stream.average_rate or stream.guessed_rate or 0)
 
 
 def rate(stamps: np.ndarray, stated: float) -> float:
-    """Frames a second: what the file tells, unless its timestamps contradict it."""
+    """Return frames a second: the declared rate, unless the timestamps contradict it."""
     span_s = stamps[-1] if len(stamps) > 1 else 0.0
     if not span_s > 0.0:
         return stated

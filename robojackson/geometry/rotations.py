@@ -19,7 +19,7 @@ elements are made of, and how; float32, so that they leave the type of a quatern
 def quat_multiply(
     a: Float[np.ndarray, "*B 4"], b: Float[np.ndarray, "*B 4"]
 ) -> Float[np.ndarray, "*B 4"]:
-    """Hamilton product a * b of quaternions wxyz."""
+    """Return Hamilton product a * b of quaternions wxyz."""
     aw, ax, ay, az = np.moveaxis(a, -1, 0)
     bw, bx, by, bz = np.moveaxis(b, -1, 0)
     return np.stack(
@@ -34,13 +34,13 @@ def quat_multiply(
 
 
 def quat_conjugate(q: Float[np.ndarray, "*B 4"]) -> Float[np.ndarray, "*B 4"]:
-    """The inverse of a unit quaternion wxyz."""
+    """Return the inverse of a unit quaternion wxyz."""
     result: np.ndarray = q * np.array([1.0, -1.0, -1.0, -1.0])
     return result
 
 
 def quat_to_matrix(q: Float[np.ndarray, "*B 4"]) -> Float[np.ndarray, "*B 3 3"]:
-    """Rotation matrix of a unit quaternion wxyz.
+    """Return the rotation matrix of a unit quaternion wxyz.
 
     1 - 2 (y y + z z) on the diagonal, 2 (x y - w z) beside it, and so on: of two products each, all
     taken from one table, in a few calls however small the batch is.
@@ -54,36 +54,36 @@ def quat_to_matrix(q: Float[np.ndarray, "*B 4"]) -> Float[np.ndarray, "*B 3 3"]:
 
 
 def quat_angle(a: Float[np.ndarray, "*B 4"], b: Float[np.ndarray, "*B 4"]) -> np.ndarray:
-    """Angle between two unit quaternions wxyz, radians in [0, pi]."""
+    """Return the angle between two unit quaternions wxyz, radians in [0, pi]."""
     result: np.ndarray = 2.0 * np.arccos(np.clip(np.abs(np.sum(a * b, -1)), 0.0, 1.0))
     return result
 
 
 def to_rotation(q: Float[np.ndarray, "*B 4"]) -> Rotation:
-    """scipy Rotation of quaternions wxyz."""
+    """Return scipy Rotation of quaternions wxyz."""
     return Rotation.from_quat(q[..., [1, 2, 3, 0]])
 
 
 def from_rotation(rotation: Rotation) -> Float[np.ndarray, "*B 4"]:
-    """Quaternions wxyz of a scipy Rotation; the sign is scipy's."""
+    """Return quaternions wxyz of a scipy Rotation; the sign is scipy's."""
     result: np.ndarray = rotation.as_quat()[..., [3, 0, 1, 2]]
     return result
 
 
 def sign_continuous(q: Float[np.ndarray, "T 4"]) -> Float[np.ndarray, "T 4"]:
-    """The same rotations with signs chosen so that successive quaternions are nearest."""
+    """Return the same rotations with signs chosen so that successive quaternions are nearest."""
     flips = np.where(np.sum(q[1:] * q[:-1], -1) < 0, -1.0, 1.0)
     result: np.ndarray = q * np.concatenate([[1.0], np.cumprod(flips)])[:, None]
     return result
 
 
 def heading(q: Float[np.ndarray, "*B 4"]) -> np.ndarray:
-    """Angle of the body's x axis about z, radians (yaw of the z-y-x decomposition)."""
+    """Return the angle of the body's x axis about z, radians (yaw of the z-y-x decomposition)."""
     w, x, y, z = np.moveaxis(q, -1, 0)
     result: np.ndarray = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
     return result
 
 
 def wrapped(angle: np.ndarray) -> np.ndarray:
-    """The same angles in [-pi, pi), radians."""
+    """Return the same angles in [-pi, pi), radians."""
     return np.asarray((angle + np.pi) % (2 * np.pi) - np.pi)

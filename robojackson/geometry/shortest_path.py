@@ -17,8 +17,8 @@ def viterbi(
     """Return the state of each step on the cheapest path; of equally cheap states the first.
 
     Args:
-        node_cost: Of each state at each step, any unit.
-        edge_costs: Of each of the T - 1 changes, in the same unit, from row to column.
+        node_cost: Cost of each state at each step, any unit.
+        edge_costs: Costs of each of the T - 1 changes, in the same unit, from row to column.
     Raises:
         ValueError: there is no step, or the number of changes is not T - 1.
     """

@@ -1,1 +1,1 @@
-"""metrics"""
+"""Metrics, one definition each, for tests, flows and reports."""

@@ -1,4 +1,4 @@
-"""What an ablation shows: three claims of the paper, and effects move by move.
+"""Statistics of an ablation: three claims of the paper, and effects move by move.
 
 Pairs are seeds, each the mean over the moves that both setups have; `seed_statistics` has the
 tests. Nothing here knows where tables are kept.
@@ -24,10 +24,10 @@ Verdict = Literal["holds", "not shown", "reversed", "not measured"]
 
 @dataclass(frozen=True)
 class Claim:
-    """One sentence of the paper, and what was found.
+    """One claim of the paper, and the result.
 
     Attributes:
-        text: What it says.
+        text: The claim in words.
         treated, control: Setups that are compared.
         expected: 1 when the treated should be better, -1 when worse.
         verdict: `holds` and `reversed` only where the interval of the effect leaves out zero.
@@ -48,7 +48,7 @@ class Comparison:
 
     Attributes:
         treated, control: Setups that are compared.
-        effects: By move; None where it was not measured.
+        effects: Effects by move; None where it was not measured.
     """
 
     treated: str
@@ -61,16 +61,16 @@ def claims(
     walking: Mapping[str, bool],
     rng: np.random.Generator,
 ) -> list[Claim]:
-    """The paper's three claims, and the same two effects where the others are absent.
+    """Return the paper's three claims, and the same two effects where the others are absent.
 
     Args:
-        figures: By (move, setup), the figure of each seed; higher is better.
-        walking: Of each move, whether it is walking.
+        figures: The figure of each seed, by (move, setup); higher is better.
+        walking: Whether each move is walking.
     """
     dances = [move for move, walks in walking.items() if not walks]
     walks = [move for move, is_walking in walking.items() if is_walking]
     every, alone = list(walking), ("scratch-curiosity", "scratch")
-    asked = [
+    questions = [
         ("Pretraining helps", "pretrain", "scratch", 1, every),
         ("Curiosity helps on dances", "curiosity", "pretrain", 1, dances),
         ("Curiosity hurts on walking", "curiosity", "pretrain", -1, walks),
@@ -78,7 +78,7 @@ def claims(
         ("Curiosity hurts on walking, without pretraining", *alone, -1, walks),
         ("Pretraining helps, with curiosity", "curiosity", "scratch-curiosity", 1, every),
     ]  # fmt: skip
-    return [_claim(figures, *question, rng) for question in asked]
+    return [_claim(figures, *question, rng) for question in questions]
 
 
 def comparisons(
@@ -86,8 +86,8 @@ def comparisons(
     moves: Sequence[str],
     rng: np.random.Generator,
 ) -> list[Comparison]:
-    """The four effects of the 2 x 2 on every move alone, where a mean over moves may hide that one
-    gains what another loses.
+    """Return the four effects of the 2 x 2 on every move alone, where a mean over moves may hide
+    that one gains what another loses.
     """
     return [
         Comparison(
@@ -106,7 +106,7 @@ def _effect(
     moves: Sequence[str],
     rng: np.random.Generator,
 ) -> Effect | None:
-    """Pairs are seeds, each the mean over the moves that both setups have."""
+    """Return one effect; pairs are seeds, each the mean over the moves that both setups have."""
     pairs = _pairs(figures, treated, control, moves)
     return effect([a for a, _ in pairs], [b for _, b in pairs], rng) if pairs else None
 
@@ -132,7 +132,7 @@ def _pairs(
     control: str,
     moves: Sequence[str],
 ) -> list[tuple[float, float]]:
-    """For each seed that every move has in both setups, the means over the moves."""
+    """Return the means over the moves, for each seed that every move has in both setups."""
     columns = [figures.get((move, setup), {}) for setup in (treated, control) for move in moves]
     if not columns or not all(columns):
         return []

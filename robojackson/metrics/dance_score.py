@@ -1,7 +1,7 @@
-"""Whether a motion dances: the headline figure, which no impostor of `impostors` passes.
+"""The headline score of a dance, which no impostor of `impostors` passes.
 
-Millimetres say little of a dance: on a hip-shake whose joints stray 30 mm from their mean, a robot
-that does it half as large is 15 mm wrong, and a good estimate 20 mm. Velocities tell them apart.
+Millimetres mean little: on a hip-shake whose joints stray 30 mm from their mean, a robot
+that does it half as large is 15 mm wrong, and a good estimate 20 mm. Velocities separate the two.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ STILL_M = 1e-9
 
 
 def velocity_score(points: Float[np.ndarray, "T K 3"], truth: Float[np.ndarray, "T K 3"]) -> float:
-    """1 - sum |v - v_true|^2 / sum |v_true|^2 over all points and frames, path included.
+    """Return 1 - sum |v - v_true|^2 / sum |v_true|^2 over all points and frames, path included.
 
     The coefficient of determination of the velocities about rest: 1 is the truth, 0 a statue, and
     below it what moves otherwise. Half the amplitude has 0.75; a jump ruins it, because it squares.
@@ -25,7 +25,7 @@ def velocity_score(points: Float[np.ndarray, "T K 3"], truth: Float[np.ndarray, 
 
 
 def moving_score(velocity: Float[np.ndarray, "T K 3"], true: Float[np.ndarray, "T K 3"]) -> float:
-    """`velocity_score` of velocities, or of steps, in any unit that both share."""
+    """Return `velocity_score` of velocities, or of steps, in any unit that both share."""
     power = float(np.sum(true**2))
     if power <= STILL_M**2:
         return float("nan")
@@ -35,7 +35,8 @@ def moving_score(velocity: Float[np.ndarray, "T K 3"], true: Float[np.ndarray, "
 def aligned_velocity_score(
     points: Float[np.ndarray, "T K 3"], truth: Float[np.ndarray, "T K 3"]
 ) -> float:
-    """`velocity_score` after one rigid motion a clip: for an estimate in a world of its own."""
+    """Return `velocity_score` after one rigid motion a clip: for an estimate in a world of its
+    own."""
     return velocity_score(align_world(points, truth, scaled=False), truth)
 
 
@@ -45,7 +46,8 @@ def heading_score(
     truth: Float[np.ndarray, "T K 3"],
     true_root: Float[np.ndarray, "T 4"],
 ) -> float:
-    """`velocity_score` with each motion seen along its own heading: a slow turn costs nothing.
+    """Return `velocity_score` with each motion seen along its own heading: a slow turn costs
+    nothing.
 
     Args:
         points, truth: World positions, metres; unlike `rollout_score.heading_frame` the path
@@ -55,7 +57,7 @@ def heading_score(
 
 
 def _along(points: np.ndarray, root: np.ndarray) -> np.ndarray:
-    """Steps from frame to frame, turned by minus the heading."""
+    """Return the steps from frame to frame, turned by minus the heading."""
     yaw = heading(root[:-1])
     c, s = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
     x, y, z = np.moveaxis(np.diff(points, axis=0), -1, 0)

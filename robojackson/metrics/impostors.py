@@ -21,33 +21,33 @@ JUMP_M = 1.0
 
 
 def frozen_first(truth: Motion, fps: float) -> Motion:
-    """The first pose, for ever."""
+    """Return the first pose, held forever."""
     return np.repeat(truth[:1], len(truth), axis=0)
 
 
 def mean_pose(truth: Motion, fps: float) -> Motion:
-    """The mean pose, for ever."""
+    """Return the mean pose, held forever."""
     return np.repeat(truth.mean(0, keepdims=True), len(truth), axis=0)
 
 
 def half_amplitude(truth: Motion, fps: float) -> Motion:
-    """The right motion, half as large."""
+    """Return the right motion, half as large."""
     mean = truth.mean(0, keepdims=True)
     result: Motion = mean + (truth - mean) / 2.0
     return result
 
 
 def late(truth: Motion, fps: float) -> Motion:
-    """The right motion, 200 ms late."""
+    """Return the right motion, 200 ms late."""
     frames = np.arange(len(truth)) - round(LAG_S * fps)
     return truth[np.maximum(frames, 0)]
 
 
 def mirrored(truth: Motion, fps: float, sides: Sequence[tuple[int, int]]) -> Motion:
-    """Left for right, at the same place and with the same mean heading.
+    """Return left exchanged for right, at the same place and with the same mean heading.
 
     Args:
-        sides: Left and right joint of each pair; the first pair, the hips, tells the heading.
+        sides: Left and right joint of each pair; the first pair, the hips, gives the heading.
     """
     left, right = sides[0]
     across = (truth[:, left] - truth[:, right]).mean(0) * [1.0, 1.0, 0.0]
@@ -63,13 +63,13 @@ def mirrored(truth: Motion, fps: float, sides: Sequence[tuple[int, int]]) -> Mot
 
 
 def flailing(truth: Motion, fps: float, rng: np.random.Generator) -> Motion:
-    """Each joint wanders about its mean place as it likes."""
+    """Return each joint moving randomly about its mean place."""
     result: Motion = truth.mean(0, keepdims=True) + wander(truth.shape, fps, FLAIL_M, FLAIL_HZ, rng)
     return result
 
 
 def teleported(truth: Motion, fps: float) -> Motion:
-    """The right motion that jumps by a metre half way."""
+    """Return the right motion that jumps by a metre half way."""
     moved = np.array(truth)
     moved[len(truth) // 2 :] += [JUMP_M, 0.0, 0.0]
     return moved
@@ -78,7 +78,7 @@ def teleported(truth: Motion, fps: float) -> Motion:
 def honest(
     truth: Motion, fps: float, rng: np.random.Generator, size_m: float = HONEST_ERROR_M
 ) -> Motion:
-    """A good estimate: the truth plus a smooth error of 20 mm in the mean."""
+    """Return a good estimate: the truth plus a smooth error of 20 mm in the mean."""
     result: Motion = truth + wander(truth.shape, fps, size_m, HONEST_HZ, rng)
     return result
 
@@ -93,7 +93,7 @@ def wander(
 
 
 def impostors(sides: Sequence[tuple[int, int]], rng: np.random.Generator) -> Mapping[str, Impostor]:
-    """All seven by name: (truth, fps) -> motion."""
+    """Return all seven by name: (truth, fps) -> motion."""
     return {
         "frozen_first": frozen_first,
         "mean_pose": mean_pose,

@@ -14,7 +14,8 @@ def mpjpe(
     root: Float[np.ndarray, "T 3"] | None = None,
     target_root: Float[np.ndarray, "T 3"] | None = None,
 ) -> float:
-    """Mean distance of points to their targets, m; relative to the roots where these are given."""
+    """Return the mean distance of points to their targets, m; relative to the roots where these are
+    given."""
     if root is not None and target_root is not None:
         points, target = points - root[:, None], target - target_root[:, None]
     return float(np.linalg.norm(points - target, axis=-1).mean())
@@ -23,8 +24,8 @@ def mpjpe(
 def acceleration_ratio(
     points: Float[np.ndarray, "T K 3"], target: Float[np.ndarray, "T K 3"]
 ) -> float:
-    """Mean acceleration of points over that of their targets; NaN for fewer than three frames or a
-    target that does not accelerate."""
+    """Return the mean acceleration of points over that of their targets; NaN for fewer than three
+    frames or a target that does not accelerate."""
     if len(points) < 3:
         return float("nan")
     own, goal = (np.linalg.norm(np.diff(p, 2, axis=0), axis=-1).mean() for p in (points, target))

@@ -7,7 +7,8 @@ from jaxtyping import Float
 def curve(
     steps: Float[np.ndarray, " E"], values: Float[np.ndarray, " E"], grid: Float[np.ndarray, " G"]
 ) -> Float[np.ndarray, " G-1"]:
-    """Mean of the episodes that ended in each interval of the grid; an empty one keeps the last.
+    """Return the mean of the episodes that ended in each interval of the grid; an empty one keeps
+    the last.
 
     Before the first episode there is no value: NaN.
     """
@@ -21,14 +22,15 @@ def curve(
 
 
 def area(values: Float[np.ndarray, " G"]) -> float:
-    """Area under a curve over the whole budget, as a mean: what was had while learning."""
+    """Return the area under a curve over the whole budget, as a mean."""
     return float(np.nanmean(values)) if np.isfinite(values).any() else np.nan
 
 
 def steps_to(
     grid: Float[np.ndarray, " G"], values: Float[np.ndarray, " G-1"], threshold: float
 ) -> float:
-    """Steps after which the curve stays at the threshold or above; infinity if it never does."""
+    """Return the steps after which the curve stays at the threshold or above; infinity if it never
+    does."""
     below = np.flatnonzero(~(values >= threshold))
     if not len(below):
         return float(grid[1])

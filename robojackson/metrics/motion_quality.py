@@ -1,7 +1,7 @@
-"""How smooth a motion is and how it treats the floor, by itself and beside a truth.
+"""Smoothness of a motion and its contact with the floor, alone and beside a truth.
 
 Metres and seconds, world frame, z up, floor at z = 0. Definitions as in Shin et al., WHAM (CVPR
-2024) and Shen et al., GVHMR (SIGGRAPH Asia 2024) but for what is said below. None of them is a
+2024) and Shen et al., GVHMR (SIGGRAPH Asia 2024) except as noted below. None of them is a
 headline: a frozen pose is smooth, does not slide and stands well (`docs/metrics.md`).
 """
 
@@ -12,24 +12,25 @@ from robojackson.motion.smpl_sequence import AIR
 
 
 def acceleration(joints: Float[np.ndarray, "T J 3"], fps: float) -> float:
-    """Mean length of the second difference, m/s^2; a still clip has none."""
+    """Return the mean length of the second difference, m/s^2; a still clip has none."""
     return _mean_difference(joints, fps, 2)
 
 
 def jerk(joints: Float[np.ndarray, "T J 3"], fps: float) -> float:
-    """Mean length of the third difference, m/s^3 (WHAM's jitter is a tenth of it)."""
+    """Return the mean length of the third difference, m/s^3 (WHAM's jitter is a tenth of it)."""
     return _mean_difference(joints, fps, 3)
 
 
 def jitter(joints: Float[np.ndarray, "T J 3"], fps: float) -> float:
-    """WHAM's and GVHMR's jitter, 10 m/s^3: a tenth of the jerk."""
+    """Return WHAM's and GVHMR's jitter, 10 m/s^3: a tenth of the jerk."""
     return jerk(joints, fps) / 10.0
 
 
 def acceleration_error(
     joints: Float[np.ndarray, "T J 3"], truth: Float[np.ndarray, "T J 3"], fps: float
 ) -> float:
-    """Mean error of the second difference, m/s^2 (Accel of Kanazawa et al., HMMR, CVPR 2019).
+    """Return the mean error of the second difference, m/s^2 (Accel of Kanazawa et al., HMMR, CVPR
+    2019).
 
     No headline: a frozen pose has the truth's own acceleration as its error, a jittery estimate
     of the right motion more.
@@ -40,7 +41,8 @@ def acceleration_error(
 def foot_slide_mm(
     feet: Float[np.ndarray, "T K 3"], truth: Float[np.ndarray, "T K 3"], still_m: float = 0.01
 ) -> float:
-    """WHAM's foot sliding: mean step of foot points whose true step is below 1 cm, mm a frame.
+    """Return WHAM's foot sliding: mean step of foot points whose true step is below 1 cm, mm a
+    frame.
 
     Args:
         feet, truth: Foot points, one frame of axes.
@@ -52,7 +54,8 @@ def foot_slide_mm(
 
 
 def contact_f1(found: np.ndarray, true: np.ndarray) -> float:
-    """Harmonic mean of precision and recall (van Rijsbergen 1979) of contact flags of any shape.
+    """Return the harmonic mean of precision and recall (van Rijsbergen 1979) of contact flags of
+    any shape.
 
     1 where there is nothing to find and nothing is found.
     """
@@ -62,7 +65,8 @@ def contact_f1(found: np.ndarray, true: np.ndarray) -> float:
 
 
 def foot_slide(feet: Float[np.ndarray, "T K 3"], standing: np.ndarray, fps: float) -> float:
-    """Mean horizontal speed of points that stand in two successive frames, m/s; 0 if none do.
+    """Return the mean horizontal speed of points that stand in two successive frames, m/s; 0 if
+    none do.
 
     Args:
         feet: Foot points.
@@ -76,12 +80,12 @@ def foot_slide(feet: Float[np.ndarray, "T K 3"], standing: np.ndarray, fps: floa
 
 
 def floor_penetration(feet: Float[np.ndarray, "T K 3"]) -> float:
-    """Greatest depth of a foot point under the floor, metres."""
+    """Return the greatest depth of a foot point under the floor, metres."""
     return float(max(0.0, -feet[..., 2].min()))
 
 
 def unsupported(contact: np.ndarray, falling: np.ndarray) -> float:
-    """Share of the frames outside free fall in which nothing touches the floor."""
+    """Return the share of the frames outside free fall in which nothing touches the floor."""
     grounded = ~np.asarray(falling, bool)
     if not grounded.any():
         return 0.0

@@ -32,7 +32,8 @@ def procrustes(
     truth: Float[np.ndarray, "*B J 3"],
     scaled: bool = True,
 ) -> Similarity:
-    """Similarity (or rigid motion) that brings points nearest to the truth, never a reflection.
+    """Return the similarity (or rigid motion) that brings points nearest to the truth, never a
+    reflection.
 
     Umeyama, PAMI 1991, over any batch.
     """
@@ -49,19 +50,19 @@ def procrustes(
 
 
 def mpjpe(points: Float[np.ndarray, "T J 3"], truth: Float[np.ndarray, "T J 3"]) -> float:
-    """Mean distance of joints to the truth, as they are."""
+    """Return the mean distance of joints to the truth, as they are."""
     return float(np.linalg.norm(points - truth, axis=-1).mean())
 
 
 def pa_mpjpe(points: Float[np.ndarray, "T J 3"], truth: Float[np.ndarray, "T J 3"]) -> float:
-    """Mean distance after the best similarity in every frame."""
+    """Return the mean distance after the best similarity in every frame."""
     return mpjpe(procrustes(points, truth)(points), truth)
 
 
 def root_relative(
     points: Float[np.ndarray, "T J 3"], roots: Sequence[int]
 ) -> Float[np.ndarray, "T J 3"]:
-    """Positions minus the mean of the root joints (the two hips) in every frame."""
+    """Return the positions minus the mean of the root joints (the two hips) in every frame."""
     result: np.ndarray = points - points[:, list(roots)].mean(1, keepdims=True)
     return result
 
@@ -71,7 +72,8 @@ def align_clip(
     truth: Float[np.ndarray, "T J 3"],
     roots: Sequence[int],
 ) -> Float[np.ndarray, "T J 3"]:
-    """Root-relative points turned by ONE rotation for the whole clip, the nearest to the truth.
+    """Return the root-relative points turned by ONE rotation for the whole clip, the nearest to the
+    truth.
 
     Camera and world frames differ by a rotation that is the same in all frames; the best one over
     the clip stands for it, so that methods in different frames compare. No scale is fitted.
@@ -88,12 +90,13 @@ def rr_mpjpe(
     truth: Float[np.ndarray, "T J 3"],
     roots: Sequence[int],
 ) -> float:
-    """Root-relative MPJPE after one rotation for the whole clip (`align_clip`)."""
+    """Return the root-relative MPJPE after one rotation for the whole clip (`align_clip`)."""
     return mpjpe(align_clip(points, truth, roots), root_relative(truth, roots))
 
 
 def mpjve(
     points: Float[np.ndarray, "T J 3"], truth: Float[np.ndarray, "T J 3"], fps: float
 ) -> float:
-    """Mean error of joint velocities, position units a second; both in one frame of axes."""
+    """Return the mean error of joint velocities, position units a second; both in one frame of
+    axes."""
     return fps * mpjpe(np.diff(points, axis=0), np.diff(truth, axis=0))

@@ -1,6 +1,6 @@
 """Figures of a robot motion against its targets; arrays in, floats out.
 
-Metres, radians and seconds in; each name says its own unit out (mm, deg, cm/s).
+Metres, radians and seconds in; each name has its unit (mm, deg, cm/s).
 """
 
 import numpy as np
@@ -12,7 +12,7 @@ from robojackson.metrics import motion_quality
 def keypoint_error_mm(
     actual: Float[np.ndarray, "S K 3"], target: Float[np.ndarray, "S K 3"], weighted: np.ndarray
 ) -> Float[np.ndarray, "S W"]:
-    """Distance of each weighted keypoint to its target, millimetres."""
+    """Return the distance of each weighted keypoint to its target, millimetres."""
     return np.asarray(1e3 * np.linalg.norm(actual - target, axis=-1)[:, weighted])
 
 
@@ -21,7 +21,7 @@ def bone_angles_deg(
     target: Float[np.ndarray, "S K 3"],
     bones: list[tuple[int, int]],
 ) -> Float[np.ndarray, "S M"]:
-    """Angle between each bone and its target, degrees."""
+    """Return the angle between each bone and its target, degrees."""
     start, end = np.array(bones).T
     a, b = actual[:, end] - actual[:, start], target[:, end] - target[:, start]
     cosine = np.sum(a * b, -1) / (np.linalg.norm(a, axis=-1) * np.linalg.norm(b, axis=-1))
@@ -29,19 +29,19 @@ def bone_angles_deg(
 
 
 def jerk(points: Float[np.ndarray, "S K 3"], dt: float) -> float:
-    """Mean length of the third difference, m/s3."""
+    """Return the mean length of the third difference, m/s3."""
     return motion_quality.jerk(points, 1.0 / dt)
 
 
 def hinge_jerk_rms(hinges: Float[np.ndarray, "S J"], dt: float) -> float:
-    """Root mean square of the hinges' third difference, rad/s3."""
+    """Return the root mean square of the hinges' third difference, rad/s3."""
     return float(np.sqrt(np.mean((np.diff(hinges, 3, axis=0) / dt**3) ** 2)))
 
 
 def limit_excess(
     hinges: Float[np.ndarray, "S J"], lower: np.ndarray, upper: np.ndarray
 ) -> Float[np.ndarray, "S J"]:
-    """How far each hinge is outside its limits, radians."""
+    """Return how far each hinge is outside its limits, radians."""
     result: np.ndarray = np.maximum(np.maximum(lower - hinges, hinges - upper), 0.0)
     return result
 
@@ -49,7 +49,7 @@ def limit_excess(
 def slip_cm_s(
     sole_velocity: Float[np.ndarray, "M C 2"], planted: Bool[np.ndarray, "S C"]
 ) -> Float[np.ndarray, " P"]:
-    """Speed of the soles that should stand still, cm/s, over steps planted at both ends.
+    """Return the speed of the soles that should stand still, cm/s, over steps planted at both ends.
 
     Args:
         sole_velocity: Horizontal, from each step to the next, m/s; M is S for a cycle, else S - 1.
@@ -66,9 +66,9 @@ def unsupported(
     reach_m: float = 0.01,
     fall: float = 0.4,
 ) -> Bool[np.ndarray, " S"]:
-    """Steps in which no sole is near the floor and yet the body does not fall.
+    """Return the steps in which no sole is near the floor and yet the body does not fall.
 
-    A levitating motion is caught whatever its contact labels say.
+    A levitating motion is detected with any contact labels.
 
     Args:
         sole_height: Lowest points of the soles over the floor.

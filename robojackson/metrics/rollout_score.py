@@ -1,8 +1,8 @@
-"""How well a rollout dances: site error, skill against the best frozen pose, liveliness of limbs.
+"""Scores of a rollout: site error, skill against the best frozen pose, liveliness of limbs.
 
 Positions are in the pelvis-heading frame: relative to the pelvis site, turned so that the root's
-heading is +x. Metres, seconds. Millimetres alone say nothing: a frozen mean pose scores 51-74 mm
-on a hip-shake, so errors are told relative to the best frozen pose, and limbs by their velocities.
+heading is +x. Metres, seconds. Millimetres alone mean nothing: a frozen mean pose scores 51-74 mm
+on a hip-shake, so errors are given relative to the best frozen pose, and limbs by their velocities.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ FROZEN_CANDIDATES = 24
 
 @dataclass(frozen=True)
 class LimbResponse:
-    """How one limb end follows its reference, at the best lag.
+    """Response of one limb end to its reference, at the best lag.
 
     Attributes:
         gain: sum(v . v_ref) / sum(v_ref^2) over moving frames; 1 is the reference's amplitude.
@@ -37,7 +37,8 @@ class LimbResponse:
 def heading_frame(
     points: Float[np.ndarray, "*T K 3"], root: Float[np.ndarray, "*T 4"], pelvis: int
 ) -> Float[np.ndarray, "*T K 3"]:
-    """Points relative to the pelvis, turned by minus the root's heading (quaternion wxyz)."""
+    """Return the points relative to the pelvis, turned by minus the root's heading (quaternion
+    wxyz)."""
     yaw = heading(root)
     c, s = np.cos(yaw)[..., None], np.sin(yaw)[..., None]
     offset = points - points[..., pelvis, None, :]
@@ -48,13 +49,13 @@ def heading_frame(
 def site_error(
     points: Float[np.ndarray, "*T K 3"], target: Float[np.ndarray, "*T K 3"]
 ) -> Float[np.ndarray, "*T"]:
-    """Mean distance of the points, metres, both in the pelvis-heading frame."""
+    """Return the mean distance of the points, metres, both in the pelvis-heading frame."""
     result: np.ndarray = np.mean(np.linalg.norm(points - target, axis=-1), -1)
     return result
 
 
 def best_frozen_error(target: Float[np.ndarray, "T K 3"]) -> float:
-    """The lowest mean site error of a pose that never moves, metres.
+    """Return the lowest mean site error of a pose that never moves, metres.
 
     Candidates are the mean of the points and up to `FROZEN_CANDIDATES` poses of the clip itself.
     """
@@ -68,7 +69,7 @@ STILL_M = 1e-3
 
 
 def skill(error_m: float, frozen_error_m: float) -> float:
-    """1 - error / error of the best frozen pose: 1 is perfect, 0 no better than a statue.
+    """Return 1 - error / error of the best frozen pose: 1 is perfect, 0 no better than a statue.
 
     NaN where the reference itself hardly moves: a statue is perfect there.
     """

@@ -22,8 +22,8 @@ class Estimate:
     """A mean over seeds.
 
     Attributes:
-        mean: Of the samples that are finite; infinite where there are others only.
-        low, high: Of the 95 % interval; NaN with fewer than two such samples.
+        mean: Mean of the samples that are finite; infinite where there are others only.
+        low, high: Ends of the 95 % interval; NaN with fewer than two such samples.
         count: Samples that are finite.
     """
 
@@ -51,11 +51,12 @@ class Effect:
 
 
 def estimate(samples: Sequence[float], rng: np.random.Generator) -> Estimate:
-    """Mean and percentile-bootstrap interval of the finite ones of independent samples."""
-    told = np.asarray(samples, float)
-    values = told[np.isfinite(told)]
+    """Return the mean and percentile-bootstrap interval of the finite ones of independent
+    samples."""
+    numbers = np.asarray(samples, float)
+    values = numbers[np.isfinite(numbers)]
     if len(values) < 2:
-        beyond = np.inf if np.isinf(told).any() else np.nan
+        beyond = np.inf if np.isinf(numbers).any() else np.nan
         return Estimate(float(values[0]) if len(values) else beyond, np.nan, np.nan, len(values))
     if np.ptp(values) == 0:
         return Estimate(float(values[0]), float(values[0]), float(values[0]), len(values))
@@ -67,7 +68,7 @@ def estimate(samples: Sequence[float], rng: np.random.Generator) -> Estimate:
 
 
 def effect(treated: Sequence[float], control: Sequence[float], rng: np.random.Generator) -> Effect:
-    """How much better the treated are, pair by pair.
+    """Return how much better the treated are, pair by pair.
 
     Raises:
         ValueError: the samples are not pairs.
@@ -88,7 +89,8 @@ def effect(treated: Sequence[float], control: Sequence[float], rng: np.random.Ge
 def probability_of_improvement(
     first: Float[np.ndarray, " N"], second: Float[np.ndarray, " M"]
 ) -> float:
-    """Share of pairs (x, y) with x > y, ties counted half (Mann and Whitney's U over N M)."""
+    """Return the share of pairs (x, y) with x > y, ties counted half (Mann and Whitney's U over N
+    M)."""
     if not len(first) or not len(second):
         return np.nan
     return float(stats.mannwhitneyu(first, second).statistic) / (len(first) * len(second))

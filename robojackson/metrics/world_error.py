@@ -22,24 +22,26 @@ def align_world(
     frames: int | None = None,
     scaled: bool = True,
 ) -> Float[np.ndarray, "T J 3"]:
-    """All points by ONE similarity (or rigid motion), the nearest over the first `frames`."""
+    """Return all points by ONE similarity (or rigid motion), the nearest over the first
+    `frames`."""
     count = len(points) if frames is None else frames
     fit = procrustes(points[:count].reshape(-1, 3), truth[:count].reshape(-1, 3), scaled)
     return fit(points.reshape(-1, 3)).reshape(points.shape)
 
 
 def w_mpjpe(points: Float[np.ndarray, "T J 3"], truth: Float[np.ndarray, "T J 3"]) -> float:
-    """W-MPJPE: pieces of 100 frames, each aligned by its first two."""
+    """Return W-MPJPE: pieces of 100 frames, each aligned by its first two."""
     return _mean_over_segments(points, truth, 2)
 
 
 def wa_mpjpe(points: Float[np.ndarray, "T J 3"], truth: Float[np.ndarray, "T J 3"]) -> float:
-    """WA-MPJPE: pieces of 100 frames, each aligned as a whole."""
+    """Return WA-MPJPE: pieces of 100 frames, each aligned as a whole."""
     return _mean_over_segments(points, truth, None)
 
 
 def clip_mpjpe(points: Float[np.ndarray, "T J 3"], truth: Float[np.ndarray, "T J 3"]) -> float:
-    """Mean distance after ONE rigid motion for the whole clip, no scale: the headline in metres.
+    """Return the mean distance after ONE rigid motion for the whole clip, no scale: the headline in
+    metres.
 
     WA-MPJPE does not see a jump between two of its pieces, and shrinks a motion that has one.
     """
@@ -47,7 +49,8 @@ def clip_mpjpe(points: Float[np.ndarray, "T J 3"], truth: Float[np.ndarray, "T J
 
 
 def rte(root: Float[np.ndarray, "T 3"], truth: Float[np.ndarray, "T 3"]) -> float:
-    """Mean error of the root's path after a rigid motion, over the length of the true path.
+    """Return the mean error of the root's path after a rigid motion, over the length of the true
+    path.
 
     Infinite where the true root does not move.
     """
@@ -57,7 +60,7 @@ def rte(root: Float[np.ndarray, "T 3"], truth: Float[np.ndarray, "T 3"]) -> floa
 
 
 def _mean_over_segments(points: np.ndarray, truth: np.ndarray, frames: int | None) -> float:
-    """Mean over all frames; a last piece too short to align joins the one before it."""
+    """Return the mean over all frames; a last piece too short to align joins the one before it."""
     cuts = [*range(0, max(len(points) - 1, 1), SEGMENT_FRAMES), len(points)]
     moved = [
         align_world(points[start:end], truth[start:end], frames) for start, end in pairwise(cuts)

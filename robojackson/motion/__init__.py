@@ -1,1 +1,1 @@
-"""motion"""
+"""Data types of motions, each a table."""

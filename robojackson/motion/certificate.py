@@ -21,7 +21,7 @@ class Finding:
         start, end: Steps.
         cause: torque, no contact, support (the body is not over its feet) or fall rule.
         what: The mj_joint, or what is missing, in words.
-        repair: The smallest change that mends it, in words.
+        repair: The smallest change that repairs it, in words.
     """
 
     start: int
@@ -36,7 +36,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Certificate:
-    """What was found, a row a step.
+    """Feasibility of a motion, a row a step.
 
     Attributes:
         slack: What is left over, in tolerances: feasible up to 1.

@@ -1,4 +1,4 @@
-"""What the pose detector saw: one row a frame, NaN where nobody was found."""
+"""Landmarks of one person: one row a frame, NaN where no person was detected."""
 
 from dataclasses import dataclass, replace
 
@@ -37,13 +37,13 @@ class LandmarkTrack(TableFile):
         width, height: Size of the upright image, pixels.
         landmarks: Image coordinates divided by width and height, z in the scale of x.
         world_landmarks: Metres, origin between the hips, x right, y down, z away from the camera.
-        visibility: 0..1 a landmark, as the detector says.
+        visibility: 0..1 a landmark, as the detector estimates it.
         time_s: Seconds since the first frame; None where frame t is at t / fps.
-        person: Number of the person among those in the clip, the largest is 1; 0 who is alone.
-        notes: What the user must know of how he was seen.
+        person: Number of the person among those in the clip, the largest is 1; 0 for one alone.
+        notes: Warnings about how the person was detected.
         to_first: Takes pixels of each frame to those of the first, for a camera that moved; None
             where it stood.
-        people: Number of people that were told apart; 0 where one is alone.
+        people: Number of people that were identified; 0 for a single person.
         brightness: Mean grey level of the person, 0..1; None where it was not measured.
         sharpness: Share of the person's contrast that is fine detail; None as before.
     """
@@ -86,6 +86,7 @@ class LandmarkTrack(TableFile):
         return np.arange(len(self)) / self.fps if self.time_s is None else self.time_s
 
     def to_columns(self) -> tuple[Columns, Facts]:
+        """Return the columns and the metadata of the table."""
         columns = numbered("frame", len(self), 1.0 / self.fps) | {"time_s": self.times}
         columns |= {name: getattr(self, name) for name in ARRAYS}
         facts = {name: getattr(self, name) for name in FACTS}
@@ -95,6 +96,7 @@ class LandmarkTrack(TableFile):
 
     @classmethod
     def from_columns(cls, columns: Columns, facts: Facts) -> "LandmarkTrack":
+        """Build the object from columns and metadata."""
         time_s, fps = columns["time_s"], float(facts["fps"])
         return cls(
             fps=fps,
@@ -113,26 +115,27 @@ class LandmarkTrack(TableFile):
         )
 
     def nearest(self, time_s: float) -> int:
-        """The frame that was taken next to a time, seconds since the first."""
+        """Return the frame that was taken next to a time, seconds since the first."""
         return int(np.abs(self.times - time_s).argmin())
 
 
 def uneven(time_s: Float[np.ndarray, " T"], fps: float) -> bool:
-    """Whether frames lie off an even grid of that rate, as in a phone's variable frame rate."""
+    """Return whether frames lie off an even grid of that rate, as in a phone's variable frame
+    rate."""
     grid = np.arange(len(time_s)) / fps
     return bool((np.abs(time_s - grid) * fps > EVEN).any())
 
 
 def even_times(track: LandmarkTrack) -> Float[np.ndarray, " T"]:
-    """Times at equal spaces of 1 / fps from the first frame to the last, seconds."""
+    """Return the times at equal spaces of 1 / fps from the first frame to the last, seconds."""
     last = float(track.times[-1])
     return np.minimum(np.arange(round(last * track.fps) + 1) / track.fps, last)
 
 
 def evenly(track: LandmarkTrack) -> LandmarkTrack:
-    """The same motion at equal spaces of 1 / fps, as the stages after this one need it.
+    """Return the same motion at equal spaces of 1 / fps, as the stages after this one need it.
 
-    Linear between two frames; a frame between which and its neighbour nobody was found has nobody.
+    Linear between two frames; a frame next to a gap has no person.
     """
     if track.time_s is None:
         return track

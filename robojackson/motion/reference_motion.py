@@ -49,7 +49,7 @@ REFERENCE_MOTION = TableSchema(
 
 @dataclass(frozen=True, repr=False)
 class ReferenceMotion(TableFile):
-    """What the robot shall do, at its own control rate.
+    """The motion for a robot to follow, at its control rate.
 
     A cyclic motion has `len(self)` steps a cycle and continues with its first step, moved by
     `cycle_offset`; a motion that is not cyclic ends at its last step.
@@ -68,8 +68,8 @@ class ReferenceMotion(TableFile):
         torque_ratio: |torque| / limit a mj_joint with an actuator, from inverse dynamics.
         source_time_s: Time in the source clip that each step shows, seconds.
         joint_names, body_names, keypoint_names, contact_names: What the columns are.
-        scorecard: Figures that say how good the motion is.
-        certificate: What the robot cannot do in it; None where nobody has looked.
+        scorecard: Figures of the quality of the motion.
+        certificate: What the robot cannot do in it; None where it was not certified.
         robot_file: Path of the robot's YAML on the machine that made the motion; empty for one of
             `configs/robots`, and where a flow made it.
     """
@@ -108,6 +108,7 @@ class ReferenceMotion(TableFile):
         )
 
     def to_columns(self) -> tuple[Columns, Facts]:
+        """Return the columns and the metadata of the table."""
         columns = numbered("step", len(self), self.dt)
         columns |= {name: np.asarray(getattr(self, name)) for name in (*ARRAYS, "source_time_s")}
         facts = {name: getattr(self, name) for name in REFERENCE_MOTION.metadata}
@@ -119,6 +120,7 @@ class ReferenceMotion(TableFile):
 
     @classmethod
     def from_columns(cls, columns: Columns, facts: Facts) -> "ReferenceMotion":
+        """Build the object from columns and metadata."""
         arrays: dict[str, Any] = {name: columns[name] for name in ARRAYS}
         bodies, points = len(facts["body_names"]), len(facts["keypoint_names"])
         arrays["body_pos_w"] = arrays["body_pos_w"].reshape(-1, bodies, 3)
@@ -146,6 +148,7 @@ def _certificate(facts: Facts) -> Certificate | None:
 
 
 def poses_sha256(reference: ReferenceMotion) -> str:
-    """Digest of what a robot is asked to do: the poses, and whether they go on for ever."""
+    """Return the digest of what a robot has to do: the poses, and whether they go on for
+    ever."""
     poses = np.ascontiguousarray(reference.qpos, float).tobytes()
     return hashlib.sha256(poses + bytes([reference.cyclic])).hexdigest()

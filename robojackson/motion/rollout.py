@@ -1,4 +1,4 @@
-"""What a robot did, one row a control step."""
+"""The motion of a robot in simulation, one row a control step."""
 
 from dataclasses import dataclass
 
@@ -38,9 +38,11 @@ class Rollout(TableFile):
         return f"Rollout({len(self.qpos)} steps of {1000 * self.dt:g} ms)"
 
     def to_columns(self) -> tuple[Columns, Facts]:
+        """Return the columns and the metadata of the table."""
         columns = numbered("step", len(self.qpos), self.dt)
         return columns | {"qpos": self.qpos}, {"dt": self.dt}
 
     @classmethod
     def from_columns(cls, columns: Columns, facts: Facts) -> "Rollout":
+        """Build the object from columns and metadata."""
         return cls(dt=float(facts["dt"]), qpos=columns["qpos"])

@@ -93,12 +93,14 @@ class SmplSequence(TableFile):
         )
 
     def to_columns(self) -> tuple[Columns, Facts]:
+        """Return the columns and the metadata of the table."""
         columns = numbered("frame", len(self), 1.0 / self.fps)
         columns |= {name: np.asarray(getattr(self, name)) for name in ARRAYS}
         return columns, json_facts({name: getattr(self, name) for name in SMPL_SEQUENCE.metadata})
 
     @classmethod
     def from_columns(cls, columns: Columns, facts: Facts) -> "SmplSequence":
+        """Build the object from columns and metadata."""
         arrays = {name: columns[name] for name in ARRAYS}
         arrays["joints"] = arrays["joints"].reshape(-1, 24, 3)
         arrays["keypoints_w"] = arrays["keypoints_w"].reshape(-1, 29, 3)

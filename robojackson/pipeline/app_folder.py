@@ -22,7 +22,7 @@ def app_folder() -> Path:
 
 
 def is_checkout() -> bool:
-    """Whether the package is used from a checkout and not from site-packages."""
+    """Return whether the package is used from a checkout and not from site-packages."""
     return (app_folder() / "pyproject.toml").is_file()
 
 

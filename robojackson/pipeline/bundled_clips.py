@@ -7,7 +7,7 @@ from robojackson.pipeline.app_folder import app_folder
 
 
 def bundled(name: str) -> Path:
-    """The path of a bundled clip, whatever the working directory.
+    """Return the path of a bundled clip, from any working directory.
 
     Raises:
         MissingDependency: it is not there.

@@ -1,4 +1,4 @@
-"""A folder that one process holds at a time; the file that says so goes away with it."""
+"""A folder that one process locks at a time; the lock file is removed with the lock."""
 
 import fcntl
 import math
@@ -13,18 +13,18 @@ from robojackson.errors import StoreError
 
 FOR_EVER = math.inf
 A_MOMENT = 2.0
-"""Seconds for which a folder may be held only in order to see whether it is nobody's."""
+"""Seconds for which a folder may be held only to check whether it is unlocked."""
 POLL_S = 0.05
 
 
 @contextmanager
 def locked(folder: Path, name: str = "lock", patience_s: float = 0.0) -> Iterator[None]:
-    """Hold a folder for this thread; the kernel lets go when the process dies.
+    """Hold a folder for this thread; the kernel releases it when the process dies.
 
     Args:
-        patience_s: Time to wait for whoever holds it; infinite is for ever.
+        patience_s: Time to wait for the holder, seconds; infinite waits forever.
     Raises:
-        StoreError: somebody holds it still.
+        StoreError: another process still holds it.
     """
     path = folder / name
     with _held(path, time.monotonic() + patience_s):
@@ -35,7 +35,7 @@ def locked(folder: Path, name: str = "lock", patience_s: float = 0.0) -> Iterato
 
 
 def _held(path: Path, until: float) -> IO[str]:
-    """The locked file; one that was taken away between opening and locking is made anew."""
+    """Return the locked file; one that was removed between opening and locking is created again."""
     while True:
         path.parent.mkdir(parents=True, exist_ok=True)
         file = path.open("w")

@@ -1,4 +1,4 @@
-"""What the whole pipeline does with a video: one section a stage, each defined beside its code."""
+"""Configuration of the whole pipeline: one section a stage, each defined beside its code."""
 
 from pydantic import Field
 
@@ -21,18 +21,18 @@ class PipelineConfig:
 
     Attributes:
         robot: Name of the robot description (`configs/robots/<robot>.yaml`), or path of the YAML of
-            another, from the working directory of whoever runs the stages.
+            another, from the working directory of the process that runs the stages.
         setup: Name under which the training is recorded.
         minutes: Wall time of the whole pass, minutes; training gets what the other stages leave.
         scoring_detector: Size of the pose model that scores candidates.
         detector: Pose model that feeds mocap; best lets two vote.
-        dancer: Who of several people is danced.
+        dancer: Which of several people to follow.
         instant: Whether a tracker dances at once and nothing is trained.
         tracker: Name of the tracker (`configs/trackers`) whose dance is on the page first; null is
             the first for the robot whose file is here, `none` is no tracker.
         gate: Refuse to train on a reference motion that breaks a hard bar of its score card.
         network: Published networks whose weights the user brings; none by default.
-        video, stability, mocap, retarget, train, evaluate, render: Of the stages.
+        video, stability, mocap, retarget, train, evaluate, render: Configurations of the stages.
     """
 
     robot: str = "humanoid"

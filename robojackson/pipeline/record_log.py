@@ -15,8 +15,8 @@ class RecordLog:
 
     Attributes:
         files: Where the file is.
-        key: Of the file.
-        schema: Of the table.
+        key: Key of the file.
+        schema: Schema of the table.
         common: Columns that all rows share (run_id, move, setup, seed).
         resumes: Whether the rows that are there are of this run; else they go when it has its own.
     """

@@ -20,7 +20,8 @@ def robot_names() -> tuple[str, ...]:
 
 
 def is_file(robot: str) -> bool:
-    """Whether a robot is given by the path of its file: it has a separator or a file's suffix."""
+    """Return whether a robot is given by the path of its file: it has a separator or a file's
+    suffix."""
     separators = [sep for sep in (os.sep, os.altsep) if sep]
     suffix = Path(robot).suffix.lower()
     return suffix in (*SUFFIXES, *MODELS) or any(sep in robot for sep in separators)
@@ -77,6 +78,6 @@ def _in_package(mjcf: str) -> bool:
 
 
 def _beside(mjcf: str, folder: Path) -> str | None:
-    """The model from the folder of its description, where it is there."""
+    """Return the model from the folder of its description, where it is there."""
     model = folder / Path(mjcf).expanduser()
     return os.path.abspath(model) if not _in_package(mjcf) and model.is_file() else None

@@ -10,7 +10,7 @@ NAME_LENGTH = 60
 
 
 def run_name(text: str) -> str:
-    """A file's or a person's name as a part of run ids, folders and command lines.
+    """Return a file's or a person's name as a part of run ids, folders and command lines.
 
     ASCII letters, digits and `_.-`, never empty, at most `NAME_LENGTH` long; accents are dropped,
     and a name of which nothing is left gets a digest, so that two of them stay two.
@@ -21,17 +21,17 @@ def run_name(text: str) -> str:
 
 
 def slug_of(name: str) -> str:
-    """A name in the letters that a key of Prefect may have."""
+    """Return a name in the letters that a key of Prefect may have."""
     return re.sub(r"[^a-z0-9]+", "-", run_name(name).lower()).strip("-")
 
 
 def run_labels(move: str, setup: str, seed: int | None) -> dict[str, object]:
-    """The columns by which episodes and evaluations of a run are joined."""
+    """Return the columns by which episodes and evaluations of a run are joined."""
     move, setup = run_name(move), run_name(setup)
     return {"run_id": f"{move}-{setup}-s{seed}", "move": move, "setup": setup, "seed": seed}
 
 
 def motion_name(reference: str | PathLike[str]) -> str:
-    """A reference motion is called by its folder when its own name says nothing."""
+    """Return the name of a reference motion: its folder's where its own name is generic."""
     path = Path(reference).absolute()
     return path.parent.name if path.stem == "reference" else path.stem

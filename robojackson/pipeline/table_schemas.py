@@ -1,6 +1,6 @@
-"""What every table looks like: columns with unit and frame, and what its metadata must hold.
+"""Schemas of the tables: columns with unit and frame, and required metadata.
 
-A fixed-width list column is one vector a row; `Column.frame` says in which axes a vector is
+A fixed-width list column is one vector a row; `Column.frame` names the axes in which a vector is
 written (world: x forward, y left, z up).
 """
 

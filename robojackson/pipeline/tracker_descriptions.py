@@ -41,7 +41,8 @@ def require_tracker(robot: str, name: str | None = None) -> TrackerDescription |
     """Return a tracker of a robot that can be run at once.
 
     Args:
-        name: Of the tracker; the first whose file is here when None, no tracker when `none`.
+        name: Name of the tracker; when None, the first that is here, a fallback last; no tracker
+            when `none`.
 
     Raises:
         UnknownName: there is no such tracker.
@@ -55,9 +56,10 @@ def require_tracker(robot: str, name: str | None = None) -> TrackerDescription |
     if not known:
         every = [f"{each.name} ({each.robot})" for each in map(describe_tracker, tracker_names())]
         raise BadPolicy(f"there is no tracker for robot {robot!r}; trackers: {', '.join(every)}")
-    chosen = next((each for each in known if is_present(each)), known[0])
+    here = [each for each in known if is_present(each)] or known
+    chosen = min(here, key=lambda each: each.fallback)
     if chosen.robot != robot:
         raise BadPolicy(f"tracker {name!r} drives robot {chosen.robot!r}, not {robot!r}")
-    require_file(chosen)
-    require_runtime()
+    if require_file(chosen) is not None and chosen.network == "twist2":
+        require_runtime()
     return chosen

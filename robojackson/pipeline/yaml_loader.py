@@ -1,7 +1,7 @@
 """YAML to frozen dataclasses: unknown keys are refused with the file and the path of the key.
 
 A name such as `smoke` or `robots/humanoid` is a file of the user's `./configs` (or of the folder
-that ROBOJACKSON_CONFIGS names), else of the shipped ones; whatever has a YAML suffix is a path.
+that ROBOJACKSON_CONFIGS names), else of the shipped ones; a name with a YAML suffix is a path.
 A file with `extends: robots/g1` begins with the keys of that one; a key of its own replaces the
 whole of the other's. YAML is read as version 1.2 does it (`yaml_scalars`).
 """
@@ -32,7 +32,7 @@ def load(
     name_or_path: str | Path | None,
     overrides: Mapping[str, object] | None = None,
 ) -> Config:
-    """A configuration, with its defaults where the file says nothing.
+    """Return a configuration, with defaults for what the file does not set.
 
     Args:
         cls: A frozen pydantic dataclass.
@@ -65,7 +65,7 @@ def load(
 
 
 def build(cls: type[Config], values: Mapping[str, object], where: str) -> Config:
-    """A configuration from a mapping.
+    """Return a configuration from a mapping.
 
     Raises:
         BadConfiguration: an unknown key or a wrong value; the message has `where` and the key.
@@ -77,7 +77,7 @@ def build(cls: type[Config], values: Mapping[str, object], where: str) -> Config
 
 
 def find(name_or_path: str | Path) -> Path:
-    """The file of a configuration.
+    """Return the file of a configuration.
 
     Raises:
         UnknownName: there is none; the message lists those that exist.
@@ -97,19 +97,20 @@ def find(name_or_path: str | Path) -> Path:
 
 
 def folders() -> list[Path]:
-    """Where named configurations are looked for: the user's folder first, then the shipped one."""
+    """Return where named configurations are looked for: the user's folder first, then the shipped
+    one."""
     own = Path(os.environ.get(CONFIGS) or "configs").absolute()
     return [own, SHIPPED] if own != SHIPPED and own.is_dir() else [SHIPPED]
 
 
 def names(folder: str = "") -> tuple[str, ...]:
-    """The names of all configurations, or of those of one kind, such as `robots`."""
+    """Return the names of all configurations, or of those of one kind, such as `robots`."""
     found = {path.stem for base in folders() for path in (base / folder).glob("*.yaml")}
     return tuple(sorted(found))
 
 
 def _display_name(path: Path) -> str:
-    """What a person calls the file."""
+    """Return the name of the file for messages."""
     inside = path.is_relative_to(SHIPPED)
     return f"configs/{path.relative_to(SHIPPED).as_posix()}" if inside else str(path)
 
@@ -117,7 +118,8 @@ def _display_name(path: Path) -> str:
 def _read_extended(
     path: Path, below: tuple[Path, ...] = ()
 ) -> tuple[dict[str, Any], dict[str, str]]:
-    """The values of a file over those of the one that it extends, and the file of each key."""
+    """Return the values of a file over those of the one that it extends, and the file of each
+    key."""
     values, place = _read(path), _display_name(path)
     base, places = values.pop(EXTENDS, None), dict.fromkeys(values, place)
     if base is None:
@@ -165,7 +167,7 @@ def _set(values: dict[str, Any], keys: list[str], value: object) -> None:
 
 
 def _conflict(cause: ValidationError) -> tuple[str, ...]:
-    """The keys of values that do not go together, from the section that refuses them."""
+    """Return the keys of values that do not go together, from the section that refuses them."""
     error = cause.errors()[0].get("ctx", {}).get("error")
     return error.keys if isinstance(error, ConflictingValues) else ()
 
@@ -175,7 +177,7 @@ def _refusal(cls: type, cause: ValidationError, where: str) -> BadConfiguration:
 
 
 def _explain(cls: type, cause: ValidationError) -> str:
-    """The first error in one line."""
+    """Return the first error in one line."""
     error = cause.errors()[0]
     path = _keys(cause)
     where = ".".join(path) or cls.__name__
@@ -192,27 +194,29 @@ def _explain(cls: type, cause: ValidationError) -> str:
 
 
 def _expected(cause: ValidationError) -> str:
-    """What the first wrong value should be; of a union, every alternative."""
+    """Return what the first wrong value should be; of a union, every alternative."""
     errors = cause.errors()
     key = errors[0]["loc"]
     if not key or not _is_branch(key[-1]):
         return errors[0]["msg"]
-    told = [error["msg"] for error in errors if error["loc"][:-1] == key[:-1]]
-    return " or ".join([told[0], *(each.removeprefix("Input should be ") for each in told[1:])])
+    messages = [error["msg"] for error in errors if error["loc"][:-1] == key[:-1]]
+    return " or ".join(
+        [messages[0], *(each.removeprefix("Input should be ") for each in messages[1:])]
+    )
 
 
 def _keys(cause: ValidationError) -> list[str]:
-    """The path of the key of the first error."""
+    """Return the path of the key of the first error."""
     return [str(part) for part in cause.errors()[0]["loc"] if not _is_branch(part)]
 
 
 def _is_branch(part: int | str) -> bool:
-    """Pydantic puts the tried type of a union between the keys."""
+    """Return whether a key is the tried type of a union, which Pydantic puts between the keys."""
     return isinstance(part, str) and ("[" in part or part == "dataclass")
 
 
 def _keys_at(cls: Any, path: list[str]) -> list[str]:
-    """The keys that a dataclass allows at a path; none where it cannot be told."""
+    """Return the keys that a dataclass allows at a path; none where they are unknown."""
     for key in path:
         candidates = [c for c in (cls, *get_args(cls)) if is_dataclass(c)]
         if not candidates:

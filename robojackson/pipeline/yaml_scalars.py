@@ -1,4 +1,4 @@
-"""YAML as version 1.2 reads it: `yes`, `no`, `on` and `off` are words, and a key that stands twice
+"""Read YAML as version 1.2: `yes`, `no`, `on` and `off` are words, and a repeated key
 is an error.
 """
 
@@ -13,12 +13,13 @@ class Yaml12(yaml.SafeLoader):
     doubled keys."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        """Refuse a repeated key; return the mapping."""
         seen: set[Any] = set()
         for key_node, _ in node.value:
             key = self.construct_object(key_node, deep=True)
             if key in seen:
                 raise yaml.constructor.ConstructorError(
-                    None, None, f"key {key!r} stands twice", key_node.start_mark
+                    None, None, f"key {key!r} is listed twice", key_node.start_mark
                 )
             seen.add(key)
         result: dict[Any, Any] = super().construct_mapping(node, deep)

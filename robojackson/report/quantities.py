@@ -7,6 +7,7 @@ from typing import Any
 
 POLICY_TITLES: Mapping[str, tuple[str, str]] = {
     "trained": ("trained robot", ""),
+    "regulator": ("feedback", "the linear feedback of the control law, without a policy"),
     "hold": ("torque held", "the trained robot with its torque held for a whole control step"),
     "statue": ("statue", "holds the pose it starts in"),
     "mean_pose": ("mean pose", "holds the mean pose of the dance"),

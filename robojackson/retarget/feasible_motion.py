@@ -100,8 +100,8 @@ def make_feasible(
 
 
 def feasible_share(robot: Robot, motion: Feasible, config: RetargetConfig) -> float:
-    """Share of feasible steps of the clip or of its tails, whichever is less: a robot falls over
-    either."""
+    """Return the share of feasible steps of the clip or of its tails, whichever is less: a robot
+    falls over either."""
     return _least_share(motion, _slack(robot, motion, config))
 
 
@@ -110,13 +110,14 @@ def _least_share(motion: Feasible, slack: Float[np.ndarray, " S"]) -> float:
 
 
 def _excess(robot: Robot, motion: Feasible, config: RetargetConfig) -> float:
-    """Mean slack beyond the tolerance; one lost step counts as three tolerances."""
+    """Return the mean slack beyond the tolerance; a step without a solution counts as three
+    tolerances."""
     over = np.clip(_slack(robot, motion, config) - 1.0, 0.0, 3.0)
     return float(over[np.logical_or.reduce(motion.parts)].mean())
 
 
 def _slack(robot: Robot, motion: Feasible, config: RetargetConfig) -> Float[np.ndarray, " S"]:
-    """What is left over at the motion's own tempo, computed once a motion."""
+    """Return what is left over at the motion's own tempo, computed once a motion."""
     return np.asarray(_slacks(robot, motion, config, tempo.GRID[:1])[0])
 
 
@@ -144,16 +145,16 @@ def _solved(robot: Robot, motion: Feasible, weight: float, config: RetargetConfi
 
 
 def _spans(hard: Bool[np.ndarray, " S"], reach: int) -> Iterator[slice]:
-    """Steps that need repair and those within reach, as runs."""
+    """Return the steps that need repair and those within reach, as runs."""
     near = maximum_filter1d(hard.astype(int), 2 * reach + 1, mode="constant")
     edges = np.flatnonzero(np.diff(near, prepend=0, append=0))
     return (slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True))
 
 
 def _slowed(robot: Robot, motion: Feasible, config: RetargetConfig) -> Feasible | None:
-    """The motion at the tempo that its steps ask for, solved again.
+    """Return the motion solved again at the tempo that its steps need.
 
-    None where none asks, or where a hard bar would be broken.
+    None where none needs it, or where a hard bar would be broken.
     """
     aims = motion.aims
     slack = _slacks(robot, motion, config, tempo.GRID)
@@ -174,21 +175,21 @@ def _slowed(robot: Robot, motion: Feasible, config: RetargetConfig) -> Feasible 
     )
     solved = _solved(robot, slower, config.repair.weights[0], config)
     kept = _accepted(robot, slower, solved, config)
-    # Limbs that passed through each other between two steps are seen to do so when slowed down.
+    # Limbs that passed through each other between two steps show it when slowed down.
     return kept if _holds(robot, kept, config) else None
 
 
 def _accepted(robot: Robot, before: Feasible, after: Feasible, config: RetargetConfig) -> Feasible:
-    """The motion after a repair, or the one before where the repair broke a hard bar or bent it too
-    far."""
+    """Return the motion after a repair, or the one before where the repair broke a hard bar or bent
+    it too far."""
     dearest = config.repair.max_added_error_mm + _error_mm(robot, before)
     good = _error_mm(robot, after) <= dearest and _holds(robot, after, config)
     return after if good else before
 
 
 def _holds(robot: Robot, motion: Feasible, config: RetargetConfig) -> bool:
-    """Whether nothing is too deep in the floor or in another limb, nothing has jumped through one,
-    and no hinge is too fast."""
+    """Return whether nothing is too deep in the floor or in another limb, nothing has jumped
+    through one, and no hinge is too fast."""
     problem = Problem.of(robot, motion.aims, config.weights)
     broken = faults(problem, motion.qpos, config)
     if bad := broken.deep or broken.fast or broken.jumps:
@@ -213,7 +214,8 @@ def _repaired(robot: Robot, given: Feasible, found: Feasible, config: RetargetCo
 
 
 def _error_mm(robot: Robot, motion: Feasible) -> float:
-    """Mean keypoint error of the clip against the motion's own targets; tails may be bent."""
+    """Return the mean keypoint error of the clip against the motion's own targets; tails may be
+    bent."""
     at = pose(tree(robot), motion.qpos[motion.danced]).site_pos
     aims = motion.aims.keypoints_w[motion.danced]
     return float(keypoint_error_mm(at, aims, robot.keypoint_weights > 0).mean())

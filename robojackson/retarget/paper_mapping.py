@@ -36,7 +36,7 @@ _CORRECTED = _LITERAL | {"knee": ("knee", 1), "elbow": ("elbow", 2)}
 def mapped(
     sequence: SmplSequence, robot: Robot, time_s: Float[np.ndarray, " S"], corrected: bool
 ) -> Float[np.ndarray, "S nq"]:
-    """qpos by Table I at the given times in the clip."""
+    """Return qpos by Table I at the given times in the clip."""
     hinges_there = {name.partition("_")[2] for name in robot.joint_names}
     if missing := sorted(_LITERAL.keys() - hinges_there):
         raise BadConfiguration(
@@ -64,7 +64,7 @@ def _smoothed(values: np.ndarray, sigma: float) -> np.ndarray:
 
 
 def _root(sequence: SmplSequence, robot: Robot) -> Float[np.ndarray, "T 3"]:
-    """The torso where the globally scaled pelvis would hold it."""
+    """Return the torso where the globally scaled pelvis would hold it."""
     human = {name: sequence.keypoints_w[:, i] for i, name in enumerate(KEYPOINT_NAMES)}
     pelvis = sequence.keypoints_w[:, 0] * leg_ratio(human, robot)
     upright = pose(tree(robot), robot.model.qpos0[None])
@@ -93,5 +93,6 @@ def _hinges(sequence: SmplSequence, robot: Robot, corrected: bool) -> Float[np.n
 
 
 def _sign(side: str, hinge: str) -> float:
-    """Humanoid-v5 negates the left hip's x and z axes, and its knees bend about -y."""
+    """Return the sign of a hinge: Humanoid-v5 negates the left hip's x and z axes and bends knees
+    about -y."""
     return -1.0 if hinge == "knee" or (side == "left" and hinge in ("hip_x", "hip_z")) else 1.0

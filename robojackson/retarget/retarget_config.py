@@ -1,4 +1,4 @@
-"""How to retarget: what a user may change in `configs/`, under `retarget:`."""
+"""Configuration of retargeting: the section `retarget` of a configuration."""
 
 from typing import Annotated, Literal
 
@@ -13,7 +13,7 @@ from robojackson.retarget.targets.tails import TailConfig
 
 @config_dataclass
 class RepairConfig:
-    """How far a motion may be bent and slowed down so that the robot can do it.
+    """Limits of repairing and slowing a motion so that the robot can do it.
 
     Attributes:
         target_share: Share of feasible steps from which nothing more is done; 0 repairs nothing.
@@ -36,7 +36,7 @@ class RepairConfig:
 
 @config_dataclass
 class RetargetConfig:
-    """How to retarget.
+    """Configuration of retargeting.
 
     Attributes:
         method: optimise (ours), paper (Table I literally) or framefix (its signs corrected).
@@ -45,7 +45,7 @@ class RetargetConfig:
             that lets the robot do it.
         seed: Seed of the random starts of the per-frame solver.
         starts: Poses from which every frame is solved.
-        lean_deg: Largest lean that brings a body that stays on both feet over them, degrees.
+        lean_deg: Largest lean that puts a body that stays on both feet over them, degrees.
         stands_share: Share of steps on both feet from which a clip stays on both feet.
         depth_bar_m: Deepest penetration that is left as it is, metres.
         slip_bar_m_s: Largest mean slip of planted soles that is left as it is, m/s.
@@ -53,7 +53,7 @@ class RetargetConfig:
             the clip's own are not half as large; beyond it limbs have passed through each other,
             and another start is tried.
         tails: Stands before and after a motion that does not repeat.
-        cycle, weights, solver, repair: Of the stages.
+        cycle, weights, solver, repair: Configurations of the stages.
     """
 
     method: Literal["optimise", "paper", "framefix"] = "optimise"

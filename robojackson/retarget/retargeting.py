@@ -46,7 +46,8 @@ __all__ = ["RetargetConfig", "assemble", "retarget_motion"]
 def retarget_motion(
     sequence: SmplSequence, robot: Robot, config: RetargetConfig
 ) -> ReferenceMotion:
-    """The reference motion of a human motion, at the robot's control step, score card inside.
+    """Return the reference motion of a human motion, at the robot's control step, score card
+    inside.
 
     Raises:
         TrackTooShort: Fewer frames than the solver needs.
@@ -66,7 +67,7 @@ def retarget_motion(
         found, floor_mm = optimise(aims, robot, config)
         hovering = hovers(robot, found.qpos, aims.dt)
         if hovering.mean() > BARS["unsupported_share"] / 2 and aims.airborne.any():
-            _log.info("a flight that does not fall is taken back: solving again")
+            _log.info("removed a flight that does not fall: solving again")
             upright = with_tails(
                 targets(clip, robot, hovering[tailed.clip]), robot, config.tails
             ).aims
@@ -97,7 +98,7 @@ def assemble(
     tolerance: Tolerance,
     danced: Bool[np.ndarray, " S"] | None = None,
 ) -> ReferenceMotion:
-    """Everything that follows from the poses, and the score card.
+    """Return everything that follows from the poses, and the score card.
 
     Figures that are means or shares are those of the steps that are `danced`. `aims` are
     what the solver followed, perhaps leaned; `upright` is the dancer's own motion.
@@ -132,7 +133,7 @@ def assemble(
 
 
 def _tail_seconds(tailed: Tailed) -> dict[str, float]:
-    """How long the motion stands, and goes to and from the stand, around the clip."""
+    """Return how long the motion stands, and goes to and from the stand, around the clip."""
     dt, after = tailed.aims.dt, len(tailed.aims) - tailed.clip.stop
     return {"lead_s": tailed.clip.start * dt, "tail_s": after * dt} if after else {}
 
@@ -144,7 +145,7 @@ def _without_tails(
     aims: Targets,
     upright: Targets,
 ) -> dict[str, float]:
-    """Means and shares over the clip's own steps."""
+    """Return the means and shares over the clip's own steps."""
     found: Certificate = parts["certificate"]
     some = {name: parts[name][danced] for name in A_ROW_A_STEP}
     some["certificate"] = replace(found, slack=found.slack[danced], tempo=found.tempo[danced])
@@ -154,7 +155,8 @@ def _without_tails(
 
 
 def _slowing(able: Feasible, upright: Targets, robot: Robot) -> dict[str, float]:
-    """How much slower than the clip the motion is by its own choice, and the clip's own jerk."""
+    """Return how much slower than the clip the motion is by its own choice, and the clip's own
+    jerk."""
     source = upright.keypoints_w[:, robot.keypoint_weights > 0]
     return {
         "tempo_mean": len(upright) / len(able.steps),
@@ -166,7 +168,7 @@ def _slowing(able: Feasible, upright: Targets, robot: Robot) -> dict[str, float]
 def _notes(
     sequence: SmplSequence, clip: HumanClip, cycle: Cycle | None, config: RetargetConfig
 ) -> dict[str, float]:
-    """What was done to the clip."""
+    """Return what was done to the clip."""
     frames = len(sequence) if cycle is None else cycle.end - cycle.start
     stretch = 1.0
     if cycle is not None:

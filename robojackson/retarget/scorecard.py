@@ -23,11 +23,11 @@ from robojackson.robot.tree_kinematics import centre_of_mass, pose, sole_velocit
 def score(
     motion: ReferenceMotion, robot: Robot, aims: Targets, upright: Targets | None = None
 ) -> dict[str, float]:
-    """All figures of a motion; `passed` is 1 when every bar holds.
+    """Return all figures of a motion; `passed` is 1 when every bar holds.
 
     Args:
         aims: What the solver followed: contacts, and keypoints that may be leaned over the feet.
-        upright: The dancer's own keypoints, which fidelity is told against; `aims` when None.
+        upright: The dancer's own keypoints, which fidelity is measured against; `aims` when None.
     """
     card = {
         "steps": float(len(motion)),
@@ -57,14 +57,14 @@ def score(
 
 
 def hovers(robot: Robot, qpos: Float[np.ndarray, "S nq"], dt: float) -> Bool[np.ndarray, " S"]:
-    """Steps in which the robot neither stands nor falls."""
+    """Return the steps in which the robot neither stands nor falls."""
     posed = pose(tree(robot), qpos)
     soles = posed.ball_pos[..., 2] - robot.contact_radii
     return retarget_error.unsupported(soles, centre_of_mass(tree(robot), posed)[:, 2], dt)
 
 
 def _feasibility(motion: ReferenceMotion, robot: Robot) -> dict[str, float]:
-    """Shares of steps that the robot cannot do, and that the fall rule ends."""
+    """Return the shares of steps that the robot cannot do, and that the fall rule ends."""
     found = motion.certificate
     slack = np.full(len(motion), np.nan) if found is None else found.slack
     return {

@@ -1,4 +1,4 @@
-"""The gate: refuses a reference motion that training cannot follow, and says what would mend it."""
+"""The gate: refuse a reference motion that training cannot follow, and name the remedy."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -27,7 +27,7 @@ BARS: Mapping[str, float] = {
 }
 """Largest allowed value of each gated figure (issue 2, stage 4)."""
 
-_FINDINGS = 2  # that an error message tells
+_FINDINGS = 2  # that an error message lists
 _TRIM = "(`robojackson dance CLIP --start S --end S`)"
 _MENDING = {
     "infeasible_share": f"tempo: auto, a shorter range of the clip {_TRIM}, or a stronger robot",
@@ -43,26 +43,27 @@ _MENDING = {
 
 
 def failures(card: Mapping[str, float]) -> list[str]:
-    """Names of the gated figures over their bars; one that is missing or not a number fails."""
+    """Return the names of the gated figures over their bars; a missing or non-finite figure
+    fails."""
     return [name for name, bar in BARS.items() if not card.get(name, np.nan) <= bar]
 
 
 def scorecard_record(motion: ReferenceMotion) -> dict[str, Any]:
-    """The card as it is written beside the motion: the figures, and the findings in words."""
+    """Return the card as it is written beside the motion: its figures, and its findings in
+    words."""
     found = motion.certificate
     return {**motion.scorecard, "findings": [str(f) for f in found.findings] if found else []}
 
 
 def check(card: Mapping[str, Any]) -> None:
-    """The gate of training: a card with its figures and findings, as `scorecard_record` makes it.
+    """Apply the gate of training to a card with figures and findings (`scorecard_record`).
 
     Raises:
-        RejectedReference: A figure is over its bar; the message names it and what may mend it.
+        RejectedReference: A figure is over its bar; the message names it and the remedy.
     """
     if not set(BARS) & set(card):
         raise RejectedReference(
-            "reference refused: it has no score card, so nobody knows whether the robot can follow "
-            "it",
+            "reference refused: no score card shows whether the robot can follow it",
             "make one with `robojackson retarget`",
             forcible=True,
         )
@@ -83,7 +84,7 @@ def check(card: Mapping[str, Any]) -> None:
 
 
 def _reasons(name: str, card: Mapping[str, Any]) -> str:
-    """The first findings, where they are the reason."""
+    """Return the first findings, where they are the reason of the refusal."""
     findings = card.get("findings", ())
     if name not in ("infeasible_share", "fallen_share") or not findings:
         return ""

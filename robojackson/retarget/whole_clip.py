@@ -57,7 +57,7 @@ class Optimised:
 
 
 def optimise(aims: Targets, robot: Robot, config: RetargetConfig) -> tuple[Optimised, float]:
-    """Solve a clip for its targets; a solution that cannot hold the bars gives way to the next.
+    """Solve a clip for its targets; a solution that misses the bars is replaced by the next.
 
     Returns the solution and the kinematic floor: the mean keypoint error of every frame by itself,
     without contacts, smoothness or speed limits, millimetres.
@@ -76,7 +76,7 @@ def optimise(aims: Targets, robot: Robot, config: RetargetConfig) -> tuple[Optim
 
 
 def _sketch(coarse: Problem) -> Problem:
-    """The clip at a quarter of the control rate, where that leaves enough steps."""
+    """Return the clip at a quarter of the control rate, where that leaves enough steps."""
     count = len(coarse.targets)
     if count < _SKETCHED or (coarse.ring and count % 2):
         return coarse
@@ -84,7 +84,7 @@ def _sketch(coarse: Problem) -> Problem:
 
 
 def _refined(coarse: Problem, drawn: Solution, config: RetargetConfig) -> Solution:
-    """A sketch at twice its rate."""
+    """Return a sketch at twice its rate."""
     start = resample(drawn.qpos, np.arange(len(coarse.targets)) / 2, coarse.targets.cycle_offset)
     how = config.solver
     return solve(coarse, start, how, how.polish_iterations, how.rough_tolerance)
@@ -121,9 +121,10 @@ def polished(
 def _solutions(
     problem: Problem, free: Float[np.ndarray, "N nq"], config: RetargetConfig
 ) -> Iterator[Solution]:
-    """Coarse solutions, cheapest first; last, one that never lets limbs pass through each other.
+    """Yield the coarse solutions, cheapest first; last, one that never lets limbs pass through each
+    other.
 
-    Limbs that have tunnelled stay tangled whatever the weights; from the rest pose, where they are
+    Limbs that have tunnelled stay tangled with any weights; from the rest pose, where they are
     free, a strong repulsion keeps them so.
     """
     rest, how = rest_start(problem), config.solver
@@ -155,7 +156,7 @@ def _stand_upright(
 
 @dataclass(frozen=True)
 class Faults:
-    """Which bars a solution breaks, and by how much."""
+    """The bars that a solution breaks, and by how much."""
 
     deepest_m: float
     fastest: float
@@ -184,13 +185,13 @@ def faults(problem: Problem, qpos: Float[np.ndarray, "T nq"], config: RetargetCo
     fastest = float(np.abs(problem.velocity(qpos)[:, 6:]).max())
     posed, aims = pose(problem.tree, qpos), problem.targets
     slip, fast_slip = _slip(problem, posed)
-    found, asked = (_acceleration(p, aims) for p in (posed.site_pos, aims.keypoints_w))
+    found, required = (_acceleration(p, aims) for p in (posed.site_pos, aims.keypoints_w))
     return Faults(
         deepest_m=deepest,
         fastest=fastest,
         slip_m_s=slip,
         acceleration_m_s2=found,
-        jumps=found > max(config.jump_bar_m_s2, _OWN_ACCELERATION * asked),
+        jumps=found > max(config.jump_bar_m_s2, _OWN_ACCELERATION * required),
         deep=deepest > config.depth_bar_m,
         fast=fastest > problem.robot.description.max_joint_speed,
         slips=slip > config.slip_bar_m_s or fast_slip > _FAST_SLIP * config.slip_bar_m_s,
@@ -228,8 +229,8 @@ def harden(
 
 
 def _acceleration(points: Float[np.ndarray, "T K 3"], aims: Targets) -> float:
-    """Largest acceleration of a keypoint, m/s2, over a cycle's seam as well: a limb that has come
-    out on another's far side has passed through it between two steps."""
+    """Return the largest acceleration of a keypoint, m/s2, over a cycle's seam as well: a limb that
+    has come out on another's far side has passed through it between two steps."""
     if aims.cycle_offset is not None:
         points = np.concatenate([points, points[:2] + aims.cycle_offset])
     change = np.linalg.norm(np.diff(points, 2, axis=0), axis=-1) / aims.dt**2
@@ -237,7 +238,8 @@ def _acceleration(points: Float[np.ndarray, "T K 3"], aims: Targets) -> float:
 
 
 def _slip(problem: Problem, posed: Posed) -> tuple[float, float]:
-    """Speed of the soles that are planted in two successive steps: mean, 95th percentile, m/s."""
+    """Return the speed of the soles that are planted in two successive steps: mean, 95th
+    percentile, m/s."""
     aims = problem.targets
     speed = sole_velocities(problem.robot, posed, aims.dt, aims.cycle_offset)
     slip = slip_cm_s(speed, aims.contact == PLANTED) / 100

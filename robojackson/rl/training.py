@@ -7,6 +7,7 @@ dictionaries; writing tables is the caller's affair.
 """
 
 import logging
+from collections.abc import Sequence
 from pathlib import Path
 
 from robojackson.errors import BadConfiguration, BadPolicy
@@ -28,13 +29,13 @@ log = logging.getLogger(__name__)
 
 
 def train_policy(
-    reference: ReferenceMotion,
+    reference: ReferenceMotion | Sequence[ReferenceMotion],
     robot: Robot,
     config: TrainConfig,
     out: Path,
     hooks: Hooks | None = None,
 ) -> TrainResult:
-    """Teach the robot to follow a reference motion.
+    """Teach the robot to follow a reference motion, or several.
 
     Raises:
         BadConfiguration: it has no budget.

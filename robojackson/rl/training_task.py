@@ -1,5 +1,7 @@
 """What a training run learns, and how it ended."""
 
+import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +16,7 @@ class Task:
     Attributes:
         robot: Name of the robot.
         model_sha256: Digest of its MJCF.
-        reference_sha256: Digest of the reference's poses.
+        reference_sha256: Digest of the reference's poses; of several, the digest of their digests.
     """
 
     robot: str
@@ -22,9 +24,13 @@ class Task:
     reference_sha256: str
 
     @staticmethod
-    def of(reference: ReferenceMotion, robot: Robot) -> "Task":
-        """The task of following a reference with a robot."""
-        return Task(robot.description.name, robot.sha256, poses_sha256(reference))
+    def of(reference: ReferenceMotion | Sequence[ReferenceMotion], robot: Robot) -> "Task":
+        """The task of following a reference, or several, with a robot."""
+        motions = [reference] if isinstance(reference, ReferenceMotion) else reference
+        digests = [poses_sha256(motion) for motion in motions]
+        joined = hashlib.sha256("".join(digests).encode()).hexdigest()
+        found = digests[0] if len(digests) == 1 else joined
+        return Task(robot.description.name, robot.sha256, found)
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ ACTION_SCALE_RAD = 0.5
 
 @dataclass(frozen=True)
 class Actuation:
-    """What drives the hinges, in the order of qpos.
+    """Drives of the hinges, in the order of qpos.
 
     Attributes:
         torque_limit: Nm; infinite without a motor.
@@ -78,7 +78,7 @@ def actuation_of(
 def per_hinge(
     named: Mapping[str, float], joints: tuple[str, ...], place: str
 ) -> Float[np.ndarray, " J"]:
-    """Values of patterns a hinge, NaN where none matches; the last that matches counts.
+    """Return the values of patterns a hinge, NaN where none matches; the last that matches counts.
 
     Raises:
         UnknownName: a pattern that matches no hinge.
@@ -91,7 +91,7 @@ def per_hinge(
 
 
 def _first(*choices: Float[np.ndarray, " J"]) -> Float[np.ndarray, " J"]:
-    """The first that is a number, hinge by hinge."""
+    """Return the first that is a number, hinge by hinge."""
     result = choices[0]
     for choice in choices[1:]:
         result = np.where(np.isnan(result), choice, result)
@@ -101,10 +101,11 @@ def _first(*choices: Float[np.ndarray, " J"]) -> Float[np.ndarray, " J"]:
 def torque_limits(
     model: mujoco.MjModel, description: RobotDescription, joints: tuple[str, ...]
 ) -> Float[np.ndarray, " J"]:
-    """Limit of every hinge, infinite where nothing drives it; the description goes first.
+    """Return the limit of every hinge, infinite where nothing drives it; the description goes
+    first.
 
     A motor gives gear times gain times control range, several of one joint together; one without a
-    range, or a position or velocity servo, whatever its force range allows; the joint's own force
+    range, or a position or velocity servo, what its force range allows; the joint's own force
     range bounds all.
     """
     limit = np.full(len(joints), np.inf)
@@ -120,7 +121,7 @@ def torque_limits(
 
 
 def _force(model: mujoco.MjModel, index: int) -> float:
-    """Largest torque of one actuator."""
+    """Return the largest torque of one actuator."""
     gear = abs(float(model.actuator_gear[index, 0]))
     force = np.inf
     is_motor = model.actuator_biastype[index] == int(mujoco.mjtBias.mjBIAS_NONE)

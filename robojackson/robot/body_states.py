@@ -18,11 +18,11 @@ class BodyStates:
     """One row a frame.
 
     Attributes:
-        position, quaternion: Of the body frames, metres, wxyz.
+        position, quaternion: Position and quaternion of the body frames, metres, wxyz.
         linear, angular: Velocities of the body frames' origins, m/s and rad/s, world axes.
         com_velocity: MuJoCo's `cvel`: angular, then linear, about the centre of mass of the tree.
         subtree_com: Centre of mass of each body with all that hang from it, metres.
-        site_position, site_rotation: Of the sites, metres and row-major matrices.
+        site_position, site_rotation: Places of the sites, metres, and row-major matrices.
     """
 
     position: Float[np.ndarray, "T B 3"]
@@ -40,7 +40,7 @@ def body_states(
     qpos: Float[np.ndarray, "T nq"],
     qvel: Float[np.ndarray, "T nv"] | None = None,
 ) -> BodyStates:
-    """Forward kinematics frame by frame; without velocities everything stands still."""
+    """Return the forward kinematics frame by frame; without velocities everything stands still."""
     data = mujoco.MjData(model)
     moving = np.zeros((len(qpos), model.nv)) if qvel is None else qvel
     rows = [_row(model, data, *pair) for pair in zip(qpos, moving, strict=True)]
@@ -48,7 +48,7 @@ def body_states(
 
 
 def require_same_joints(reference: ReferenceMotion, model: mujoco.MjModel) -> None:
-    """The model's hinges are those of the reference motion, in the same order.
+    """Require that the model's hinges are those of the reference motion, in the same order.
 
     Raises:
         UnknownName: a joint of the reference that the model has not at its place.
@@ -60,7 +60,7 @@ def require_same_joints(reference: ReferenceMotion, model: mujoco.MjModel) -> No
 
 
 def names(model: mujoco.MjModel, kind: str) -> list[str]:
-    """Names of all bodies, joints or sites (`kind`), in MuJoCo's order."""
+    """Return names of all bodies, joints or sites (`kind`), in MuJoCo's order."""
     count = {"body": model.nbody, "joint": model.njnt, "site": model.nsite}[kind]
     accessor = getattr(model, kind)
     return [accessor(index).name for index in range(count)]
@@ -69,7 +69,7 @@ def names(model: mujoco.MjModel, kind: str) -> list[str]:
 def _row(
     model: mujoco.MjModel, data: mujoco.MjData, qpos: np.ndarray, qvel: np.ndarray
 ) -> tuple[np.ndarray, ...]:
-    """The fields of BodyStates for one pose."""
+    """Return the fields of BodyStates for one pose."""
     data.qpos[:], data.qvel[:] = qpos, qvel
     mujoco.mj_fwdPosition(model, data)
     mujoco.mj_comVel(model, data)

@@ -1,4 +1,4 @@
-"""What a robot must be: a free root with limited hinges, mirrored sides, level soles at rest."""
+"""Requirements of a robot: a free root with limited hinges, mirrored sides, level soles at rest."""
 
 import mujoco
 import numpy as np
@@ -14,7 +14,7 @@ _LABELS = ("left", "right")
 
 
 def check_joints(model: mujoco.MjModel, description: RobotDescription) -> None:
-    """One free joint, first, on the root body; every other joint a limited hinge."""
+    """Require one free joint, first, on the root body; every other joint is a limited hinge."""
     bodies = [model.body(index).name for index in range(model.nbody)]
     root = known("body", description.root_body, bodies, where(description, "root_body"))
     free = int(mujoco.mjtJoint.mjJNT_FREE)
@@ -30,7 +30,7 @@ def check_joints(model: mujoco.MjModel, description: RobotDescription) -> None:
 def check_names(
     description: RobotDescription, bodies: tuple[str, ...], joints: tuple[str, ...]
 ) -> None:
-    """Every body, joint and keypoint of contacts, weights and poses is known."""
+    """Require that every body, joint and keypoint of contacts, weights and poses is known."""
     if not description.contacts:
         raise BadConfiguration(f"{where(description, 'contacts')}: a robot needs feet")
     for name in description.contacts:
@@ -42,7 +42,8 @@ def check_names(
 
 
 def check_contact(description: RobotDescription, name: str, bodies: tuple[str, ...]) -> None:
-    """Body, keypoint and side of a contact are known, and the body carries the keypoint."""
+    """Require that body, keypoint and side of a contact are known, and the body carries the
+    keypoint."""
     point, place = description.contacts[name], where(description, f"contacts.{name}")
     known("body", point.body, bodies, f"{place}.body")
     known("keypoint", point.site, description.sites, f"{place}.site")
@@ -53,7 +54,7 @@ def check_contact(description: RobotDescription, name: str, bodies: tuple[str, .
 
 
 def check_symmetry(description: RobotDescription, lengths: dict[tuple[str, str], float]) -> None:
-    """Limbs of the same length on both sides."""
+    """Require limbs of the same length on both sides."""
     for a, b in _BONES:
         left = lengths[f"left_{a}", f"left_{b}"]
         right = lengths[f"right_{a}", f"right_{b}"]
@@ -65,7 +66,7 @@ def check_symmetry(description: RobotDescription, lengths: dict[tuple[str, str],
 
 
 def check_soles(description: RobotDescription, soles: np.ndarray) -> None:
-    """In the rest pose all soles are at one height, or the rest pose or the balls are wrong.
+    """Require all soles at one height in the rest pose; else the rest pose or the balls are wrong.
 
     Args:
         soles: Heights of the lowest points of the balls in the rest pose, metres.

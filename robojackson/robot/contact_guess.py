@@ -1,4 +1,4 @@
-"""Balls under the feet of a model that nobody has described: the corners of what it stands on.
+"""Balls under the feet of a model without a description: the corners of what it stands on.
 
 A foot that is one ball gets one contact; any other those four of its lowest points that are
 furthest out. Metres; x forward, y left, z up in the zero pose.
@@ -41,7 +41,7 @@ class _Ball:
 
 
 def guess_contacts(skeleton: Skeleton, keypoints: dict[str, Guess]) -> dict[str, ContactPoint]:
-    """The contacts of both feet, by name; none of a foot that cannot be told."""
+    """Return the contacts of both feet, by name; none for a foot that cannot be identified."""
     found: dict[str, ContactPoint] = {}
     for sign, side in ((1.0, SIDES[0]), (-1.0, SIDES[1])):
         leg, foot = skeleton.limbs.get(f"{side}_leg"), keypoints.get(f"{side}_foot")
@@ -66,7 +66,8 @@ def guess_contacts(skeleton: Skeleton, keypoints: dict[str, Guess]) -> dict[str,
 def toe_of(
     skeleton: Skeleton, foot: Guess, contacts: dict[str, ContactPoint], side: str
 ) -> Guess | None:
-    """The tip of a foot, between its two front corners, where it has an ankle to aim it with."""
+    """Return the tip of a foot, between its two front corners, where it has an ankle to aim it
+    with."""
     front = [contacts.get(f"{side}_toe_{edge}") for edge in ("out", "in")]
     leg = skeleton.limbs.get(f"{side}_leg")
     balls = [ball for ball in front if ball is not None]
@@ -91,7 +92,7 @@ def _contact(skeleton: Skeleton, ball: _Ball, foot: Guess, side: str, label: str
 
 
 def _standing(skeleton: Skeleton, leg: Limb) -> list[_Ball]:
-    """The lowest balls of a foot and of what is fixed to it."""
+    """Return the lowest balls of a foot and of what is fixed to it."""
     model, body = skeleton.model, foot_body(skeleton, leg)
     bodies = [body]
     for child in range(body + 1, model.nbody):

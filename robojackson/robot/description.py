@@ -51,12 +51,12 @@ class RobotSource:
 
     Attributes:
         package: Name in the package index.
-        version: Of the package.
+        version: Version of the package.
         wheel_sha256: Digest of its wheel.
         folder: Folder inside the wheel that holds the MJCF and its meshes.
         model_sha256: Digest of the MJCF.
         licence: Name of the model's licence.
-        copyright: Who holds the rights.
+        copyright: Holder of the rights.
         shared_folder: Folder that `robots add` fills; the robot's name when empty. Robots of one
             model share it.
     """
@@ -73,7 +73,7 @@ class RobotSource:
 
 @config_dataclass
 class SimulationDescription:
-    """How the physics is stepped; what is not named stays as the MJCF has it.
+    """Stepping of the physics; unset keys stay as in the MJCF.
 
     Attributes:
         timestep: Seconds a physics substep; a control step is a whole number of them.
@@ -92,7 +92,7 @@ class SimulationDescription:
 
 @config_dataclass
 class FallRule:
-    """When a robot has fallen.
+    """Rule by which a robot has fallen.
 
     Attributes:
         frame: `world`: the root is lower than `height` or tilted more than `tilt` (the paper's
@@ -111,7 +111,7 @@ class FallRule:
 
 @config_dataclass
 class StrictRule:
-    """What strict success forbids at every step, beside a fall.
+    """States that strict success forbids at every step, beside a fall.
 
     Attributes:
         sites: Largest mean distance of the keypoints, in the frame of pelvis and heading, m.
@@ -129,7 +129,7 @@ class StrictRule:
 
 @config_dataclass
 class RobotDescription:
-    """What `configs/robots/<name>.yaml` holds. Where it and its model lie is no part of what it is:
+    """Content of `configs/robots/<name>.yaml`. The place of file and model is no part of it:
     `mjcf` and `file` are not compared and in no cache key; the digest of the model is.
 
     Attributes:
@@ -142,7 +142,7 @@ class RobotDescription:
         weights: Keypoint -> weight of its squared error; zero where it is not named.
         contacts: Balls under the feet, by name.
         fixed_joints: Hinge, or pattern with `*`, -> angle at which it is welded, radians. The robot
-            goes without these hinges: whatever else names them is refused as unknown.
+            goes without these hinges: any other key that names them is refused as unknown.
         collision_excludes: Pairs of bodies that do not collide, beside those of the MJCF.
         rest_pose: Hinge -> rest angle, radians; zero where it is not named.
         max_joint_speed: Speed limit of the hinges in a reference motion, rad/s.
@@ -162,8 +162,10 @@ class RobotDescription:
         action_scale: Hinge -> how far a full action of a policy moves its target, rad.
         robust_action_factor: Factor on `action_scale` where a training pushes the robot: pushes
             need more torque than a dance.
-        feedforward: Share of the torques that a reference asks for by which the targets of the PD
+        feedforward: Share of the torques that a reference needs by which the targets of the PD
             law lead its joint angles, unitless.
+        feedback: Share of the linear-quadratic feedback along a reference by which the targets of
+            the PD law move, for policies that see all, unitless.
         stand_pose: Hinge -> angle of the default stand, radians; zero where it is not named.
         simulation: How the physics is stepped.
         fall: When the robot has fallen.
@@ -195,6 +197,7 @@ class RobotDescription:
     action_scale: Mapping[str, Positive] = Field(default_factory=dict)
     robust_action_factor: Positive = 1.0
     feedforward: float = Field(default=0.0, ge=0, le=2)
+    feedback: float = Field(default=0.0, ge=0, le=2)
     stand_pose: Mapping[str, float] = Field(default_factory=dict)
     simulation: SimulationDescription = Field(default_factory=SimulationDescription)
     fall: FallRule = Field(default_factory=FallRule)

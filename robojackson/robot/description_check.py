@@ -1,7 +1,7 @@
 """Everything that is wrong with a robot description, a line each, in one go.
 
 `load_robot` stops at the first error; here every name is looked up by itself, and what a robot can
-be loaded with although it is hardly meant is told, too.
+be loaded with although it is hardly meant is reported, too.
 """
 
 from collections.abc import Callable, Iterator
@@ -27,7 +27,8 @@ PAIRS = tuple(key.removeprefix("left_") for key in (*KEYPOINTS, *TOES) if key.st
 
 
 def problems(description: RobotDescription) -> list[str]:
-    """What is wrong, a line each; a description without problems is that of a robot that loads."""
+    """Return what is wrong, a line each; a description without problems is that of a robot that
+    loads."""
     found = list(dict.fromkeys(_unknown_names(description)))
     if found:
         return found
@@ -39,7 +40,7 @@ def problems(description: RobotDescription) -> list[str]:
 
 
 def _unknown_names(description: RobotDescription) -> Iterator[str]:
-    """What the model or the description has no name for."""
+    """Yield what the model or the description has no name for."""
     try:
         spec = read_spec(mjcf_path(description), description)
         fix_joints(spec, description)
@@ -76,7 +77,7 @@ def _error(check: Callable[..., Any], *given: Any) -> Iterator[str]:
 
 
 def _upright(robot: Robot) -> Iterator[str]:
-    """A root whose own axes are others: its heading and its falls would be measured wrong."""
+    """Yield a root whose own axes are others: its heading and its falls would be measured wrong."""
     data = mujoco.MjData(robot.model)
     mujoco.mj_kinematics(robot.model, data)
     axes = data.xmat[robot.model.body(robot.description.root_body).id].reshape(3, 3)
@@ -89,17 +90,18 @@ def _upright(robot: Robot) -> Iterator[str]:
 
 
 def _out_of_range(robot: Robot) -> Iterator[str]:
-    """Rest angles beyond a limit: the robot would stand otherwise than its soles were checked."""
+    """Yield the rest angles beyond a limit: the robot would stand otherwise than its soles were
+    checked."""
     place = where(robot.description, "rest_pose")
     for name, rest, low, high in zip(
         robot.joint_names, robot.rest, robot.lower, robot.upper, strict=True
     ):
-        if rest and not low <= rest <= high:  # zero is where nobody said anything
+        if rest and not low <= rest <= high:  # zero where nothing is given
             yield f"{place}.{name} is {rest:g}: beyond its range, {low:.3g} to {high:.3g} radians"
 
 
 def _sides(robot: Robot) -> Iterator[str]:
-    """Keypoints that are on the other side, or not mirrored, in the zero pose."""
+    """Yield the keypoints that are on the other side, or not mirrored, in the zero pose."""
     description, data = robot.description, mujoco.MjData(robot.model)
     mujoco.mj_kinematics(robot.model, data)
     at = dict(zip(robot.keypoint_names, data.site_xpos[robot.keypoint_sites], strict=True))

@@ -1,4 +1,4 @@
-"""When a robot has fallen: the rule of its description, bound to its size. Metres, radians."""
+"""Fall detection: the rule of the robot's description, bound to its size. Metres, radians."""
 
 from dataclasses import dataclass
 
@@ -30,7 +30,7 @@ class Fall:
 
     @staticmethod
     def of(robot: Robot, height: float | None = None, tilt: float | None = None) -> "Fall":
-        """The rule of a robot; `height` and `tilt` replace its numbers."""
+        """Return the rule of a robot; `height` and `tilt` replace its numbers."""
         rule = robot.description.fall
         return Fall(
             relative=rule.frame == "reference",
@@ -41,7 +41,8 @@ class Fall:
     def has_fallen(
         self, qpos: Float[np.ndarray, "N nq"], target: Float[np.ndarray, "N nq"]
     ) -> Bool[np.ndarray, " N"]:
-        """Which of N robots have fallen; `target` is the reference's state at the same step."""
+        """Return which of N robots have fallen; `target` is the reference's state at the same
+        step."""
         if not self.relative:
             upright = up_axis(qpos[:, 3:7])[:, 2]
             found: np.ndarray = (qpos[:, 2] < self.height) | (upright < np.cos(self.tilt))
@@ -53,13 +54,13 @@ class Fall:
 
 
 def up_axis(quaternion: Float[np.ndarray, "N 4"]) -> Float[np.ndarray, "N 3"]:
-    """The body's z axis in the world, for quaternions wxyz."""
+    """Return the body's z axis in the world, for quaternions wxyz."""
     w, x, y, z = np.asarray(quaternion).T
     return np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], -1)
 
 
 def standing_height(robot: Robot) -> float:
-    """Height of the root over the soles in the rest pose, metres."""
+    """Return the height of the root over the soles in the rest pose, metres."""
     data = mujoco.MjData(robot.model)
     data.qpos[:] = robot.standing
     mujoco.mj_kinematics(robot.model, data)

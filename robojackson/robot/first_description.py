@@ -1,6 +1,6 @@
 """A first description of a model, guessed from its names and its kinematic tree, as YAML to edit.
 
-Every line says what it was guessed from; what could not be told is a comment in its place.
+Every line names what it was guessed from; what could not be found is a comment in its place.
 """
 
 import json
@@ -27,7 +27,7 @@ BENT_RAD = 0.3
 SIDEWAYS = 0.9
 """Least share of y in the axis of a hinge that bends a leg forward."""
 SUBSTEPS, SHORTEST_S, LONGEST_S, USUAL_S = 5, 0.01, 0.03, 0.015
-"""Of a control step; training takes five steps of the model unless it is told otherwise."""
+"""Of a control step; training takes five steps of the model by default."""
 SIDE = re.compile("left|right", re.IGNORECASE)
 PLAIN = re.compile(r"(?!(?:true|false|null)$)[A-Za-z_][\w./-]*$", re.IGNORECASE)
 
@@ -37,9 +37,9 @@ class Draft:
     """A first description.
 
     Attributes:
-        name: Of the robot.
+        name: Name of the robot.
         text: The YAML.
-        guessed: Keys that want a look: no name said them.
+        guessed: Keys to check: no name gave them.
         left: Keys that nothing was found for.
     """
 
@@ -55,7 +55,7 @@ def first_description(path: Path, folder: Path, name: str) -> Draft:
     Args:
         path: The MJCF.
         folder: Where the description will be; a model below it is named from there.
-        name: Of the robot.
+        name: Name of the robot.
     Raises:
         BadConfiguration: no such file, or MuJoCo cannot load it.
     """
@@ -78,8 +78,8 @@ def first_description(path: Path, folder: Path, name: str) -> Draft:
     left += ["torque_limits"] if None in undriven.values() else []
     guessed = [f"sites.{key}" for key, guess in keypoints.items() if not guess.sure]
     lines = [
-        f"# {name}: a first description by `robojackson robots new`. A line with GUESS is not said",
-        "# by a name of the model; see it in the picture of `robojackson robots check`.",
+        f"# {name}: a first description by `robojackson robots new`. A line with GUESS is not",
+        "# given by a name; check it in the picture of `robojackson robots check`.",
         f"name: {_text(name)}",
         f"mjcf: {_text(_place(path, folder))}",
         f"root_body: {_text(model.body(skeleton.root).name)} # "
@@ -96,7 +96,8 @@ def first_description(path: Path, folder: Path, name: str) -> Draft:
 
 
 def guess_rest(skeleton: Skeleton) -> dict[str, float]:
-    """Knees a little bent over level feet, radians; hinges that cannot be at zero at a limit."""
+    """Return knees a little bent over level feet, radians; hinges that cannot be zero are at a
+    limit."""
     model, found = skeleton.model, dict[str, float]()
     for hinge in np.flatnonzero(model.jnt_type == int(mujoco.mjtJoint.mjJNT_HINGE)):
         low, high = model.jnt_range[hinge]
@@ -135,21 +136,23 @@ def _model(path: Path) -> mujoco.MjModel:
 
 
 def name_of_model(path: Path) -> str:
-    """What a model calls itself, else the name of its file, as a robot's name."""
+    """Return what a model calls itself, else the name of its file, as a robot's name."""
     text = path.read_text(errors="replace") if path.is_file() else ""
-    told = re.search(r"<mujoco[^>]*\bmodel=\"([^\"]+)\"", text)
-    name = re.sub(r"\W+", "_", told.group(1) if told else path.stem).strip("_").lower()
+    named = re.search(r"<mujoco[^>]*\bmodel=\"([^\"]+)\"", text)
+    name = re.sub(r"\W+", "_", named.group(1) if named else path.stem).strip("_").lower()
     return name or "robot"
 
 
 def _place(path: Path, folder: Path) -> str:
-    """The model's path from the folder of its description, or from the root where it is outside."""
+    """Return the model's path from the folder of its description, or from the root where it is
+    outside."""
     whole, base = Path(os.path.abspath(path)), Path(os.path.abspath(folder))
     return whole.relative_to(base).as_posix() if whole.is_relative_to(base) else str(whole)
 
 
 def _undriven(model: mujoco.MjModel) -> dict[str, float | None]:
-    """Hinges that no motor of the model drives -> their own torque limit, None without one."""
+    """Return the hinges that no motor of the model drives -> their own torque limit, None without
+    one."""
     hinges = np.flatnonzero(model.jnt_type == int(mujoco.mjtJoint.mjJNT_HINGE))
     joint = int(mujoco.mjtTrn.mjTRN_JOINT)
     driven = set(model.actuator_trnid[model.actuator_trntype == joint, 0].tolist())
@@ -216,7 +219,8 @@ def _rest_lines(rest: Mapping[str, float]) -> list[str]:
 
 
 def _torque_lines(undriven: Mapping[str, float | None]) -> list[str]:
-    """Limits that the hinges have themselves; the others as comments, both sides in one."""
+    """Return the limits that the hinges have themselves; the others as comments, both sides in
+    one."""
     known = {name: limit for name, limit in undriven.items() if limit is not None}
     lines = ["torque_limits: # newton-metres, of the hinges themselves: no motor drives them"]
     lines += [f"  {_text(name)}: {limit:g}" for name, limit in known.items()]
@@ -224,11 +228,11 @@ def _torque_lines(undriven: Mapping[str, float | None]) -> list[str]:
     if not unknown:
         return lines if known else []
     patterns = Counter(SIDE.sub("*", name) for name in unknown)
-    told = [
+    named = [
         p if n > 1 else next(x for x in unknown if SIDE.sub("*", x) == p)
         for p, n in patterns.items()
     ]
-    rest = [f"{_text(name)}: 50.0" for name in told]
+    rest = [f"{_text(name)}: 50.0" for name in named]
     note = "newton-metres, of hinges that no motor of the MJCF drives: fill in your motors'"
     if known:
         return [*lines, f"  # {note}", *(f"  # {line}" for line in rest)]
@@ -240,5 +244,5 @@ def _clock_lines(timestep: float) -> list[str]:
     if not SHORTEST_S <= steps * timestep <= LONGEST_S:
         steps = max(1, round(USUAL_S / timestep))
         note = f"; to train: --set track.control.substeps={steps}"
-    told = f"{steps} steps of {1e3 * timestep:g} ms of the model"
-    return [f"control_dt: {steps * timestep:g} # seconds: {told}{note}"]
+    named = f"{steps} steps of {1e3 * timestep:g} ms of the model"
+    return [f"control_dt: {steps * timestep:g} # seconds: {named}{note}"]

@@ -43,7 +43,7 @@ def remove(
     joints: Collection[str] = frozenset(),
     actuators: Collection[int] = frozenset(),
 ) -> None:
-    """Delete joints by name, actuators by index, and whatever refers to them.
+    """Delete joints by name, actuators by index, and everything that refers to them.
 
     That is tendons over the joints; actuators, equality constraints and sensors of joints and
     tendons; sensors of the actuators; and all keyframes, which hold a number a joint and actuator.
@@ -73,7 +73,7 @@ def remove(
 
 
 def _moved(actuator: mujoco.MjsActuator) -> mujoco.mjtObj:
-    """What kind of thing an actuator pulls at."""
+    """Return what kind of thing an actuator pulls at."""
     kind = mujoco.mjtTrn
     if actuator.trntype in (kind.mjTRN_JOINT, kind.mjTRN_JOINTINPARENT):
         return _JOINT
@@ -81,7 +81,7 @@ def _moved(actuator: mujoco.MjsActuator) -> mujoco.mjtObj:
 
 
 def _coupled(equality: mujoco.MjsEquality) -> mujoco.mjtObj:
-    """What kind of thing an equality constraint couples."""
+    """Return what kind of thing an equality constraint couples."""
     if equality.type == mujoco.mjtEq.mjEQ_JOINT:
         return _JOINT
     tendon = equality.type == mujoco.mjtEq.mjEQ_TENDON
@@ -127,7 +127,7 @@ def _turn_body(
 
 
 def _about(axis: np.ndarray, anchor: np.ndarray, angle: float) -> np.ndarray:
-    """Rotation about an axis through a point, 4 x 4."""
+    """Return the rotation about an axis through a point, 4 x 4."""
     quaternion = np.empty(4)
     mujoco.mju_axisAngle2Quat(quaternion, axis, angle)
     result = _pose(np.zeros(3), quaternion)

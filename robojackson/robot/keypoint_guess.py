@@ -1,4 +1,4 @@
-"""Where the human keypoints are on a model that nobody has described, and how sure that is.
+"""Find the human keypoints on a model without a description, and how sure that is.
 
 A joint of several hinges is where their axes come closest. Metres, in the frame of the body.
 """
@@ -24,9 +24,9 @@ class Guess:
 
     Attributes:
         body: Name.
-        offset: In the body, metres.
+        offset: Offset in the body, metres.
         why: What it was guessed from.
-        sure: Whether names say it.
+        sure: Whether names give it.
     """
 
     body: str
@@ -36,7 +36,7 @@ class Guess:
 
 
 def guess_keypoints(skeleton: Skeleton) -> dict[str, Guess]:
-    """The keypoints that can be told, by name; the others are missing."""
+    """Return the keypoints that can be identified, by name; the others are missing."""
     found: dict[str, Guess] = {}
     for side in SIDES:
         leg, arm = skeleton.limbs.get(f"{side}_leg"), skeleton.limbs.get(f"{side}_arm")
@@ -54,7 +54,7 @@ def guess_keypoints(skeleton: Skeleton) -> dict[str, Guess]:
 
 
 def foot_body(skeleton: Skeleton, leg: Limb) -> int:
-    """The body that stands on the floor: what the last ankle hinge moves, else the tip."""
+    """Return the body that stands on the floor: what the last ankle hinge moves, else the tip."""
     ankle = leg.parts["ankle"]
     return int(skeleton.model.jnt_bodyid[ankle[-1]]) if ankle else leg.bodies[-1]
 
@@ -69,7 +69,7 @@ def _guess(skeleton: Skeleton, body: int, at: np.ndarray, why: str, sure: bool) 
 
 
 def _meeting(skeleton: Skeleton, limb: Limb, part: str) -> Guess | None:
-    """Where the axes of a joint's hinges come closest, on the body that all of them move."""
+    """Return where the axes of a joint's hinges come closest, on the body that all of them move."""
     hinges = list(limb.parts[part])
     if not hinges:
         return None
@@ -88,7 +88,7 @@ def _meeting(skeleton: Skeleton, limb: Limb, part: str) -> Guess | None:
 
 
 def _anchor(skeleton: Skeleton, limb: Limb, part: str) -> Guess | None:
-    """The first hinge of a joint."""
+    """Return the first hinge of a joint."""
     if not limb.parts[part]:
         return None
     hinge = limb.parts[part][0]
@@ -98,7 +98,7 @@ def _anchor(skeleton: Skeleton, limb: Limb, part: str) -> Guess | None:
 
 
 def _foot(skeleton: Skeleton, leg: Limb) -> Guess | None:
-    """The ankle; of a foot without one its lowest geom, as of a ball foot."""
+    """Return the ankle; of a foot without one its lowest geom, as of a ball foot."""
     if leg.parts["ankle"]:
         return _meeting(skeleton, leg, "ankle")
     body = leg.bodies[-1]
@@ -110,7 +110,7 @@ def _foot(skeleton: Skeleton, leg: Limb) -> Guess | None:
 
 
 def _hand(skeleton: Skeleton, arm: Limb) -> Guess | None:
-    """The end of what follows the elbow, fingers left out."""
+    """Return the end of what follows the elbow, fingers left out."""
     if not arm.parts["elbow"]:
         return None
     model = skeleton.model
@@ -126,7 +126,7 @@ def _hand(skeleton: Skeleton, arm: Limb) -> Guess | None:
 
 
 def _pelvis(skeleton: Skeleton, found: dict[str, Guess]) -> Guess | None:
-    """Midway between the hips, on the body that carries both legs."""
+    """Return the point midway between the hips, on the body that carries both legs."""
     if not {"left_hip", "right_hip"} <= set(found):
         return None
     at = np.mean([_world(skeleton, found[f"{side}_hip"]) for side in SIDES], axis=0)
@@ -136,7 +136,7 @@ def _pelvis(skeleton: Skeleton, found: dict[str, Guess]) -> Guess | None:
 
 
 def _head(skeleton: Skeleton) -> Guess | None:
-    """What is called head, else the highest geom of the trunk."""
+    """Return the body called head, else the highest geom of the trunk."""
     model, data, trunk = skeleton.model, skeleton.data, skeleton.trunk
     named = [body for body in trunk if names_any(names_of(model, body), HEAD)]
     if named:
@@ -149,13 +149,13 @@ def _head(skeleton: Skeleton) -> Guess | None:
         return None
     called = [geom for geom in geoms if names_any(_geom_names(model, geom), HEAD)]
     geom = max(called or geoms, key=lambda geom: float(data.geom_xpos[geom][2]))
-    told = next((name for name in _geom_names(model, geom) if name), "without a name")
-    why = f"geom {told}" if called else f"highest geom of the trunk, {told}"
+    label = next((name for name in _geom_names(model, geom) if name), "without a name")
+    why = f"geom {label}" if called else f"highest geom of the trunk, {label}"
     return _guess(skeleton, int(model.geom_bodyid[geom]), data.geom_xpos[geom], why, bool(called))
 
 
 def geoms_of(model: mujoco.MjModel, body: int) -> list[int]:
-    """The geoms of a body."""
+    """Return the geoms of a body."""
     first = int(model.body_geomadr[body])
     return list(range(first, first + int(model.body_geomnum[body])))
 
@@ -166,7 +166,7 @@ def _geom_names(model: mujoco.MjModel, geom: int) -> list[str]:
 
 
 def _ends(skeleton: Skeleton, geom: int) -> list[Float[np.ndarray, "3"]]:
-    """Both ends of a capsule, the middle of anything else."""
+    """Return both ends of a capsule, the middle of anything else."""
     model, data = skeleton.model, skeleton.data
     centre = data.geom_xpos[geom]
     if model.geom_type[geom] not in ROUND:

@@ -1,4 +1,4 @@
-"""Legs and arms of a model that nobody has described: from names where they say it, else the tree.
+"""Find legs and arms of a model without a description: from names, else from the tree.
 
 World frame of the zero pose: x forward, y left, z up, metres. Hinges are joint indices.
 """
@@ -34,9 +34,9 @@ class Limb:
     """A leg or an arm.
 
     Attributes:
-        bodies: From the first that the other side does not share to the tip.
+        bodies: Bodies from the first that the other side does not share to the tip.
         parts: Name of each joint (hip, knee, ankle; shoulder, elbow, wrist) -> its hinges.
-        named: Whether names say which is which; else the distances of the hinges do.
+        named: Whether names identify them; else the distances of the hinges do.
     """
 
     bodies: tuple[int, ...]
@@ -60,7 +60,7 @@ class Skeleton:
         return [b for b in range(1, self.model.nbody) if not taken & set(path(self.model, b))]
 
     def local(self, body: int, point: Float[np.ndarray, "3"]) -> tuple[float, float, float]:
-        """A point of the world in the frame of a body, to a tenth of a millimetre."""
+        """Return a point of the world in the frame of a body, to a tenth of a millimetre."""
         turn = self.data.xmat[body].reshape(3, 3)
         x, y, z = np.round((point - self.data.xpos[body]) @ turn, 4) + 0.0
         return float(x), float(y), float(z)
@@ -90,7 +90,8 @@ def skeleton_of(model: mujoco.MjModel) -> Skeleton:
 
 
 def side_of(skeleton: Skeleton, body: int) -> str:
-    """Left or right by the names of a body and its joints, else by its place; empty: neither."""
+    """Return left or right by the names of a body and its joints, else by its place; empty:
+    neither."""
     for name in names_of(skeleton.model, body):
         plain = name.lower()
         tokens = re.split(
@@ -104,20 +105,20 @@ def side_of(skeleton: Skeleton, body: int) -> str:
 
 
 def names_of(model: mujoco.MjModel, body: int) -> list[str]:
-    """The name of a body and of its joints."""
+    """Return the name of a body and of its joints."""
     first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
     joints = [model.joint(index).name for index in range(first, first + count)]
     return [model.body(body).name, *joints]
 
 
 def names_any(names: Iterable[str], words: Iterable[str]) -> bool:
-    """Whether one of the names has one of the words in it."""
+    """Return whether one of the names has one of the words in it."""
     plain = [re.sub(r"[^a-z]", "", name.lower()) for name in names]
     return any(word in name for name in plain for word in words)
 
 
 def path(model: mujoco.MjModel, body: int) -> list[int]:
-    """Bodies from the root to a body."""
+    """Return the bodies from the root to a body."""
     found = []
     while body > 0:
         found.append(body)
@@ -126,7 +127,7 @@ def path(model: mujoco.MjModel, body: int) -> list[int]:
 
 
 def hinges_of(model: mujoco.MjModel, bodies: Iterable[int]) -> list[int]:
-    """The hinges between bodies and their parents, in order."""
+    """Return the hinges between bodies and their parents, in order."""
     hinge = int(mujoco.mjtJoint.mjJNT_HINGE)
     found: list[int] = []
     for body in bodies:
@@ -136,12 +137,12 @@ def hinges_of(model: mujoco.MjModel, bodies: Iterable[int]) -> list[int]:
 
 
 def _leg(skeleton: Skeleton, paths: list[list[int]]) -> list[int]:
-    """The path to the lowest tip."""
+    """Return the path to the lowest tip."""
     return min(paths, key=lambda found: skeleton.data.xpos[found[-1]][2], default=[])
 
 
 def _arm(skeleton: Skeleton, paths: list[list[int]]) -> list[int]:
-    """The path whose names are an arm's, or that has most hinges; of fingers the first."""
+    """Return the path whose names are an arm's, or that has most hinges; of fingers the first."""
     model = skeleton.model
     words = [word for part in ARM_WORDS.values() for word in part]
 
@@ -158,8 +159,8 @@ def _limb(skeleton: Skeleton, bodies: tuple[int, ...], words: Words) -> Limb:
     parts: dict[str, list[int]] = {name: [] for name in words}
     for hinge in hinges:
         own, body = [model.joint(hinge).name], [model.body(model.jnt_bodyid[hinge]).name]
-        told = (name for called in (own, body) for name in words if names_any(called, words[name]))
-        name = next(told, None)
+        kinds = (name for called in (own, body) for name in words if names_any(called, words[name]))
+        name = next(kinds, None)
         if name is not None:
             parts[name].append(hinge)
     first, second, _ = parts
@@ -171,7 +172,7 @@ def _limb(skeleton: Skeleton, bodies: tuple[int, ...], words: Words) -> Limb:
 def _by_distance(
     skeleton: Skeleton, bodies: tuple[int, ...], hinges: list[int], names: tuple[str, ...]
 ) -> dict[str, tuple[int, ...]]:
-    """Hinges that are close together are one joint; the joints are told by their order."""
+    """Return hinges grouped to joints by distance, in the order of the joints."""
     if not hinges:
         return dict.fromkeys(names, ())
     at = skeleton.data.xanchor[hinges]

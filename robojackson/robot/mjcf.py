@@ -27,13 +27,14 @@ PARTS = ("include", "model")
 
 
 def site_of(model: mujoco.MjModel, key: str) -> int:
-    """Index of a keypoint's site."""
+    """Return the index of a keypoint's site."""
     ours = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, f"{_OURS}{key}")
     return int(model.site(key).id if ours < 0 else ours)
 
 
 def robots_folder() -> Path:
-    """Where added robots are kept: inside the store, or in the cache where that is no folder."""
+    """Return where added robots are kept: inside the store, or in the cache where that is no
+    folder."""
     root = os.environ.get(STORE) or "store"
     if "://" in root:
         cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
@@ -42,13 +43,13 @@ def robots_folder() -> Path:
 
 
 def added_folder(description: RobotDescription) -> Path:
-    """Where `robojackson robots add` puts the model of a robot."""
+    """Return where `robojackson robots add` puts the model of a robot."""
     shared = description.source.shared_folder if description.source else ""
     return robots_folder() / (shared or description.name)
 
 
 def mjcf_path(description: RobotDescription) -> Path:
-    """The file of a description.
+    """Return the file of a description.
 
     Raises:
         BadConfiguration: It is not there, or not the one that was pinned.
@@ -89,7 +90,7 @@ def _in_package(description: RobotDescription, package: str, inside: str) -> Pat
 
 
 def compiled(description: RobotDescription, path: Path) -> mujoco.MjModel:
-    """The model with the keypoint sites, a floor, and scaled motors."""
+    """Return the model with the keypoint sites, a floor, and scaled motors."""
     _silence_mujoco()
     spec = read_spec(path, description)
     bodies = [body.name for body in spec.bodies if body.name != "world"]
@@ -107,7 +108,7 @@ def compiled(description: RobotDescription, path: Path) -> mujoco.MjModel:
 
 
 def model_sha256(path: Path) -> str:
-    """Digest of an MJCF; where it includes other files or has meshes, of all of them."""
+    """Return the digest of an MJCF; where it includes other files or has meshes, of all of them."""
     digests = [hashlib.sha256(file.read_bytes()) for file in _files(path)]
     if len(digests) == 1:
         return digests[0].hexdigest()
@@ -115,7 +116,7 @@ def model_sha256(path: Path) -> str:
 
 
 def _silence_mujoco() -> None:
-    """Keep MuJoCo's warnings out of the terminal and of a MUJOCO_LOG.TXT where the user stands.
+    """Keep MuJoCo's warnings out of the terminal and of a MUJOCO_LOG.TXT in the working folder.
 
     A simulation that diverges, as a robot that just learns to stand does, is counted in
     `data.warning`, which ends the episode.
@@ -126,7 +127,7 @@ def _silence_mujoco() -> None:
 
 
 def _files(path: Path) -> list[Path]:
-    """The MJCF and every file that it names, as MuJoCo finds them."""
+    """Return the MJCF and every file that it names, as MuJoCo finds them."""
     found, folders, texts = [path], [path.parent], [path]
     for text in texts:  # grows while it is read
         try:
@@ -145,7 +146,7 @@ def _files(path: Path) -> list[Path]:
 
 
 def read_spec(path: Path, description: RobotDescription) -> mujoco.MjSpec:
-    """The MJCF as it is.
+    """Return the MJCF as it is.
 
     Raises:
         BadConfiguration: MuJoCo cannot read it.

@@ -127,7 +127,7 @@ class Robot:
 
     @cached_property
     def standing(self) -> Float[np.ndarray, " nq"]:
-        """qpos of the rest pose, upright above the origin, root at its height in the MJCF."""
+        """The qpos of the rest pose, upright above the origin, root at its height in the MJCF."""
         qpos = self.model.qpos0.copy()
         qpos[7:] = np.clip(self.rest, self.lower, self.upper)
         result: np.ndarray = qpos
@@ -221,7 +221,7 @@ def _posed(model: mujoco.MjModel, hinges: Float[np.ndarray, " J"]) -> mujoco.MjD
 
 
 def _lengths(data: mujoco.MjData, keys: tuple[str, ...]) -> dict[tuple[str, str], float]:
-    """Distances between all pairs of keypoints, metres."""
+    """Return the distances between all pairs of keypoints, metres."""
     at = {key: data.site_xpos[site_of(data.model, key)].copy() for key in keys}
     return {(a, b): float(np.linalg.norm(at[a] - at[b])) for a in keys for b in keys}
 
@@ -229,7 +229,8 @@ def _lengths(data: mujoco.MjData, keys: tuple[str, ...]) -> dict[tuple[str, str]
 def _contact_arms(
     model: mujoco.MjModel, description: RobotDescription, rest: np.ndarray
 ) -> Float[np.ndarray, "C 3"]:
-    """Centres of the balls beside their keypoints in the rest pose; the soles must be level."""
+    """Return the centres of the balls beside their keypoints in the rest pose; the soles must be
+    level."""
     data = _posed(model, rest)
     balls = list(description.contacts.values())
     turns = [data.body(ball.body).xmat.reshape(3, 3) for ball in balls]

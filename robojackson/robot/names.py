@@ -8,12 +8,12 @@ from robojackson.robot.description import RobotDescription
 
 
 def where(description: RobotDescription, key: str) -> str:
-    """The place in the configuration that an error message names."""
+    """Return the place in the configuration that an error message names."""
     return f"{description.file or f'configs/robots/{description.name}.yaml'}: {key}"
 
 
 def known(kind: str, name: str, names: Iterable[str], place: str) -> str:
-    """The name itself, or UnknownName."""
+    """Return the name itself, or UnknownName."""
     names = list(names)
     if name not in names:
         raise UnknownName(kind, name, place, names)
@@ -21,7 +21,7 @@ def known(kind: str, name: str, names: Iterable[str], place: str) -> str:
 
 
 def matching(kind: str, pattern: str, names: Iterable[str], place: str) -> list[str]:
-    """The names that a pattern with `*` means, at least one, or UnknownName."""
+    """Return the names that a pattern with `*` means, at least one, or UnknownName."""
     names = list(names)
     found = [name for name in names if fnmatchcase(name, pattern)]
     if not found:

@@ -1,4 +1,4 @@
-"""What a robot description changes in its MJCF before it is compiled: joints, motors, stepping.
+"""Changes to an MJCF before it is compiled: joints, motors, stepping of the description.
 
 Metres, seconds, newton-metres. What the description does not name stays as the MJCF has it, so a
 description without these keys compiles to the stock model.
@@ -86,7 +86,7 @@ def _step_as(spec: mujoco.MjSpec, description: RobotDescription) -> None:
 
 
 def _rigid_geoms(body: mujoco.MjsBody) -> Iterator[mujoco.MjsGeom]:
-    """Geoms of a body and of those that are welded to it."""
+    """Yield the geoms of a body and of those that are welded to it."""
     yield from body.geoms
     for child in body.bodies:
         if not child.joints:
@@ -94,17 +94,17 @@ def _rigid_geoms(body: mujoco.MjsBody) -> Iterator[mujoco.MjsGeom]:
 
 
 def integrator_of(name: str) -> mujoco.mjtIntegrator:
-    """MuJoCo's integrator of a name: Euler, RK4, implicit or implicitfast."""
+    """Return MuJoCo's integrator of a name: Euler, RK4, implicit or implicitfast."""
     return getattr(mujoco.mjtIntegrator, f"mjINT_{name.upper()}")
 
 
 def is_plane(geom: mujoco.MjsGeom) -> bool:
-    """Whether a geom of a spec is an endless floor."""
+    """Return whether a geom of a spec is an infinite floor."""
     return bool(geom.type == mujoco.mjtGeom.mjGEOM_PLANE)
 
 
 def substeps_of(control_dt: float, timestep: float) -> int | None:
-    """Physics substeps of a control step; None where that is no whole number."""
+    """Return the physics substeps of a control step; None where that is no whole number."""
     count = round(control_dt / timestep)
     whole = count >= 1 and abs(count * timestep - control_dt) < SAME_S
     return count if whole else None

@@ -1,4 +1,4 @@
-"""From solved poses to a reference motion at the control step of the robot.
+"""Resample solved poses to a reference motion at the robot's control step.
 
 Hinges and root by cubic spline, the root quaternion by a cubic spline of its components, made unit;
 velocities are MuJoCo's tangent differences over two steps. Metres, radians, seconds, world frame.
@@ -14,7 +14,7 @@ from robojackson.robot.tree_kinematics import continuous, difference
 def resample(
     qpos: Float[np.ndarray, "N nq"], steps: Float[np.ndarray, " M"], cycle_offset: np.ndarray | None
 ) -> Float[np.ndarray, "M nq"]:
-    """qpos at fractional frame indices; a cycle continues with its first frame, moved by
+    """Return qpos at fractional frame indices; a cycle continues with its first frame, moved by
     `cycle`."""
     rows = continuous(qpos)
     if cycle_offset is None:
@@ -26,7 +26,8 @@ def resample(
 
 
 def _periodic(rows: np.ndarray, steps: np.ndarray, cycle_offset: np.ndarray) -> np.ndarray:
-    """Periodic spline of what is left when the steady travel of the cycle is taken out."""
+    """Return the periodic spline of what is left when the steady travel of the cycle is taken
+    out."""
     count = len(rows)
     travel = np.zeros(rows.shape[1])
     travel[:3] = cycle_offset / count
@@ -53,7 +54,8 @@ def _padded(rows: np.ndarray, steps: np.ndarray, cycle_offset: np.ndarray) -> np
 def velocities(
     qpos: Float[np.ndarray, "S nq"], dt: float, cycle_offset: np.ndarray | None
 ) -> Float[np.ndarray, "S nv"]:
-    """Central tangent differences; one-sided at the ends of a motion that does not repeat."""
+    """Return the central tangent differences; one-sided at the ends of a motion that does not
+    repeat."""
     steps = forward_velocities(qpos, dt, cycle_offset)
     if cycle_offset is not None:
         return np.asarray((steps + np.roll(steps, 1, axis=0)) / 2)
@@ -64,7 +66,8 @@ def velocities(
 def forward_velocities(
     qpos: Float[np.ndarray, "S nq"], dt: float, cycle_offset: np.ndarray | None
 ) -> Float[np.ndarray, "M nv"]:
-    """Velocities that lead from each step to the next; a cycle has one more than an open motion."""
+    """Return the velocities that lead from each step to the next; a cycle has one more than an open
+    motion."""
     following = qpos[1:]
     if cycle_offset is not None:
         first = qpos[:1].copy()
@@ -76,7 +79,7 @@ def forward_velocities(
 def accelerations(
     qpos: Float[np.ndarray, "S nq"], dt: float, cycle_offset: np.ndarray | None
 ) -> Float[np.ndarray, "S nv"]:
-    """Second tangent differences; the ends of an open motion repeat their neighbours."""
+    """Return second tangent differences; the ends of an open motion repeat their neighbours."""
     steps = forward_velocities(qpos, dt, cycle_offset)
     if cycle_offset is not None:
         return np.asarray((steps - np.roll(steps, 1, axis=0)) / dt)
@@ -85,17 +88,18 @@ def accelerations(
 
 
 def seam_angle(qpos: Float[np.ndarray, "S nq"], dt: float, cycle_offset: np.ndarray) -> float:
-    """Largest angle by which the step over the seam differs from its neighbours' mean, degrees."""
+    """Return the largest angle by which the step over the seam differs from its neighbours' mean,
+    degrees."""
     return float(np.degrees(np.abs(_seam_miss(qpos, dt, cycle_offset)[3:]).max()))
 
 
 def seam_speed(qpos: Float[np.ndarray, "S nq"], dt: float, cycle_offset: np.ndarray) -> float:
-    """Largest jump of an angular velocity over the seam, rad/s."""
+    """Return the largest jump of an angular velocity over the seam, rad/s."""
     return float(np.abs(_seam_miss(qpos, dt, cycle_offset)[3:]).max() / dt)
 
 
 def seam_shift(qpos: Float[np.ndarray, "S nq"], dt: float, cycle_offset: np.ndarray) -> float:
-    """How far the root's step over the seam differs from its neighbours' mean, metres."""
+    """Return how far the root's step over the seam differs from its neighbours' mean, metres."""
     return float(np.linalg.norm(_seam_miss(qpos, dt, cycle_offset)[:3]))
 
 

@@ -1,7 +1,7 @@
 """A robot's motion at the frame rate that another project's files have.
 
 qpos in MuJoCo's order: root xyz (metres, world), root quaternion wxyz, hinges (radians). A cyclic
-reference gives one cycle: no format of the field can say that a motion repeats.
+reference gives one cycle: no format of the field can express that a motion repeats.
 """
 
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ class SampledMotion:
         fps: Frames a second; frame t is at t / fps seconds.
         qpos: MuJoCo positions, root quaternion wxyz.
         qvel: MuJoCo velocities: root linear in the world, root angular in the body, hinges; None
-            where a file does not say.
+            where a file does not give it.
     """
 
     fps: float
@@ -39,7 +39,8 @@ class SampledMotion:
 
 
 def sampled(reference: ReferenceMotion, fps: float | None = None) -> SampledMotion:
-    """The reference motion at `fps`, by the splines of the solver; None keeps its control steps."""
+    """Return the reference motion at `fps`, by the splines of the solver; None keeps its control
+    steps."""
     if fps is None:
         return SampledMotion(1.0 / reference.dt, reference.qpos, reference.qvel)
     qpos = np.asarray(reference.qpos, float)
@@ -54,7 +55,8 @@ def sampled(reference: ReferenceMotion, fps: float | None = None) -> SampledMoti
 
 
 def _steps(reference: ReferenceMotion, fps: float) -> Float[np.ndarray, " T"]:
-    """Fractional steps of the frames: up to the last step, or all before the next cycle begins."""
+    """Return the fractional steps of the frames: up to the last step, or all before the next cycle
+    begins."""
     per_frame = 1.0 / (fps * reference.dt)
     if reference.cyclic:
         return np.arange(int(np.ceil(len(reference) / per_frame - 1e-6))) * per_frame

@@ -37,7 +37,7 @@ class Posed:
     root: int
 
     def __getitem__(self, frames: Int[np.ndarray, " M"]) -> "Posed":
-        """Some of the poses."""
+        """Return some of the poses."""
         arrays = ("body_pos", "body_rot", "anchor", "axis", "site_pos", "ball_pos")
         return replace(self, **{name: getattr(self, name)[frames] for name in arrays})
 
@@ -56,7 +56,7 @@ class Posed:
 
 
 def pose(tree: Tree, qpos: Float[np.ndarray, "T nq"]) -> Posed:
-    """Forward kinematics of every frame (equations of `mj_kinematics`)."""
+    """Return the forward kinematics of every frame (equations of `mj_kinematics`)."""
     frames, bodies, joints = len(qpos), len(tree.parent), len(tree.zero)
     body_pos, body_rot = np.zeros((frames, bodies, 3)), np.zeros((frames, bodies, 3, 3))
     anchor, axis = np.zeros((frames, joints, 3)), np.zeros((frames, joints, 3))
@@ -81,7 +81,7 @@ def pose(tree: Tree, qpos: Float[np.ndarray, "T nq"]) -> Posed:
 def placed(
     tree: Tree, body_pos: np.ndarray, body_rot: np.ndarray, anchor: np.ndarray, axis: np.ndarray
 ) -> Posed:
-    """Keypoints and balls on bodies that are placed already."""
+    """Return the keypoints and balls on bodies that are placed already."""
     sites = _fixed(body_pos, body_rot, tree.site_body, tree.site_position)
     balls = _fixed(body_pos, body_rot, tree.ball_body, tree.ball_position)
     return Posed(body_pos, body_rot, anchor, axis, sites, balls, tree.root)
@@ -90,14 +90,15 @@ def placed(
 def _fixed(
     body_pos: np.ndarray, body_rot: np.ndarray, bodies: np.ndarray, at: np.ndarray
 ) -> np.ndarray:
-    """World positions of points fixed to bodies."""
+    """Return the world positions of points fixed to bodies."""
     return np.asarray(body_pos[:, bodies] + (body_rot[:, bodies] @ at[..., None])[..., 0])
 
 
 def point_jacobian(
     tree: Tree, posed: Posed, points: Float[np.ndarray, "T P 3"], bodies: Int[np.ndarray, "*T P"]
 ) -> Float[np.ndarray, "T P 3 nv"]:
-    """World Jacobian of points fixed to bodies (`mj_jac`): columns axis x (point - anchor).
+    """Return the world Jacobian of points fixed to bodies (`mj_jac`): columns axis x (point -
+    anchor).
 
     One matrix product a frame: axis x p - axis x anchor = -[p]x axis + anchor x axis.
     """
@@ -110,12 +111,12 @@ def point_jacobian(
 
 
 def centre_of_mass(tree: Tree, posed: Posed) -> Float[np.ndarray, "T 3"]:
-    """Centre of mass of the robot."""
+    """Return the centre of mass of the robot."""
     return np.asarray(tree.mass @ _body_coms(tree, posed) / tree.mass.sum())
 
 
 def com_jacobian(tree: Tree, posed: Posed) -> Float[np.ndarray, "T 3 nv"]:
-    """Jacobian of the centre of mass: each axis turns the mass that hangs on it."""
+    """Return Jacobian of the centre of mass: each axis turns the mass that hangs on it."""
     share = tree.mass[:, None] / tree.mass.sum() * tree.moved_by
     arms = _body_coms(tree, posed).swapaxes(1, 2) @ share
     axis, moment = posed.screws
@@ -135,7 +136,7 @@ def _cross(a: Float[np.ndarray, "T 3 N"], b: Float[np.ndarray, "T 3 N"]) -> np.n
 def sole_velocities(
     robot: Robot, posed: Posed, dt: float, cycle_offset: Float[np.ndarray, "3"] | None
 ) -> Float[np.ndarray, "M C 2"]:
-    """Horizontal velocity of each ball's ground point from each step to the next, m/s.
+    """Return the horizontal velocity of each ball's ground point from each step to the next, m/s.
 
     (c_next - c) / dt - r (w_y, -w_x), with w from the turn of the foot between the steps: a ball
     that rolls without slip has none. A cycle has one more than an open motion.
@@ -155,7 +156,7 @@ def sole_velocities(
 def integrate(
     qpos: Float[np.ndarray, "T nq"], tangent: Float[np.ndarray, "T nv"]
 ) -> Float[np.ndarray, "T nq"]:
-    """qpos moved by a tangent vector (`mj_integratePos` with unit time)."""
+    """Return qpos moved by a tangent vector (`mj_integratePos` with unit time)."""
     out = np.empty_like(qpos)
     out[:, :3] = qpos[:, :3] + tangent[:, :3]
     turn = from_rotation(Rotation.from_rotvec(tangent[:, 3:6]))
@@ -168,18 +169,18 @@ def integrate(
 def difference(
     start: Float[np.ndarray, "T nq"], end: Float[np.ndarray, "T nq"]
 ) -> Float[np.ndarray, "T nv"]:
-    """Tangent vector from start to end (`mj_differentiatePos` with unit time)."""
+    """Return the tangent vector from start to end (`mj_differentiatePos` with unit time)."""
     turn = to_rotation(quat_multiply(quat_conjugate(start[:, 3:7]), end[:, 3:7])).as_rotvec()
     return np.concatenate([end[:, :3] - start[:, :3], turn, end[:, 7:] - start[:, 7:]], axis=1)
 
 
 def continuous(qpos: Float[np.ndarray, "T nq"]) -> Float[np.ndarray, "T nq"]:
-    """The same motion with root quaternions of continuous sign."""
+    """Return the same motion with root quaternions of continuous sign."""
     return np.concatenate([qpos[:, :3], sign_continuous(qpos[:, 3:7]), qpos[:, 7:]], axis=1)
 
 
 def _small_turns(matrix: Float[np.ndarray, "*B 3 3"]) -> Float[np.ndarray, "*B 3"]:
-    """Rotation vectors of turns under a right angle; NaN stays NaN."""
+    """Return the rotation vectors of turns under a right angle; NaN stays NaN."""
     skew = (matrix - matrix.swapaxes(-1, -2)) / 2
     sine_axis = np.stack([skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]], -1)
     sine = np.linalg.norm(sine_axis, axis=-1, keepdims=True).clip(1e-12)
@@ -187,7 +188,7 @@ def _small_turns(matrix: Float[np.ndarray, "*B 3 3"]) -> Float[np.ndarray, "*B 3
 
 
 def _about(axis: Float[np.ndarray, "3"], angle: Float[np.ndarray, " T"]) -> np.ndarray:
-    """Rotation matrices about a fixed unit axis (Rodrigues)."""
+    """Return the rotation matrices about a fixed unit axis (Rodrigues)."""
     x, y, z = axis
     skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     sine, cosine = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
@@ -196,7 +197,7 @@ def _about(axis: Float[np.ndarray, "3"], angle: Float[np.ndarray, " T"]) -> np.n
 
 
 def _minus_skew(v: Float[np.ndarray, "T P 3"]) -> Float[np.ndarray, "T P 3 3"]:
-    """Minus the cross product matrices: the matrix of w -> w x v."""
+    """Return minus the cross product matrices: the matrix of w -> w x v."""
     out = np.zeros((*v.shape, 3))
     out[..., 0, 1], out[..., 1, 2], out[..., 2, 0] = v[..., 2], v[..., 0], v[..., 1]
     out[..., 1, 0], out[..., 2, 1], out[..., 0, 2] = -v[..., 2], -v[..., 0], -v[..., 1]

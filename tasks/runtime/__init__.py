@@ -1,1 +1,1 @@
-"""How a stage becomes a cached task, and how its process is run."""
+"""Turn a stage into a cached task, and run its process."""

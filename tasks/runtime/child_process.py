@@ -51,7 +51,8 @@ async def run_process(
 
 
 def environment() -> dict[str, str]:
-    """Ours, with one OpenMP thread; stages of the same checkout or package."""
+    """Return this process's environment with one OpenMP thread; stages of the same checkout or
+    package."""
     found = os.environ.get("PYTHONPATH")
     path = os.pathsep.join([str(app_folder()), *([found] if found else [])])
     return {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": path, "PYTHONUNBUFFERED": "1"}
@@ -81,12 +82,12 @@ async def _read(process: Process) -> bytes:
 
 
 def _cause(run_id: str, code: int, work: Path, last: deque[str]) -> TrainingFailed:
-    """Which run died, why, where its log is."""
-    told = f"log: {work / LOG}"
+    """Return the error of a run: which one died, why, and where its log is."""
+    log = f"log: {work / LOG}"
     if code < 0:
         how = f"was killed by {signal.Signals(-code).name}"
         if -code == signal.SIGKILL:
             how += " (by hand, or out of memory)"
-        return TrainingCrashed(f"run {run_id} {how}; {told}; the same command resumes it")
-    said = last[-1] if last else "it said nothing"
-    return TrainingFailed(f"run {run_id} ended with exit code {code}: {said}; {told}")
+        return TrainingCrashed(f"run {run_id} {how}; {log}; the same command resumes it")
+    said = last[-1] if last else "no message"
+    return TrainingFailed(f"run {run_id} ended with exit code {code}: {said}; {log}")

@@ -1,4 +1,4 @@
-"""What a stage computes, as one digest: the syntax trees of the modules that it reaches.
+"""Digest of a stage's code: the syntax trees of the modules that it reaches.
 
 Imports are followed statically, also those inside functions. Comments, docstrings and layout are
 not in a syntax tree, so they change nothing; a changed formula does.
@@ -24,7 +24,7 @@ LAYOUT = (
     "robojackson.files.table_types",
     "robojackson.pipeline.table_schemas",
 )
-"""Modules that say how results stand in files."""
+"""Modules that define how results are laid out in files."""
 NOT_FOLLOWED = frozenset(("robojackson.files", "robojackson.pipeline"))
 """Packages that carry values and files and compute nothing; a change of the layout of tables is in
 every key by itself (`layout`)."""
@@ -33,22 +33,22 @@ NOT_ON_ALL_PYTHONS = frozenset(("type_params",))
 
 
 def digest(roots: Iterable[str], package: str = PACKAGE, folder: Path | None = None) -> str:
-    """Digest of all modules of `package` that the root modules reach.
+    """Return the digest of all modules of `package` that the root modules reach.
 
     Args:
         roots: Dotted names of modules; those outside the package count nothing.
         package: The package whose modules count.
         folder: Where the package is; found by its name when not given.
     """
-    wanted = (tuple(roots), package, folder)
-    known = _known.get(wanted)
+    key = (tuple(roots), package, folder)
+    known = _known.get(key)
     if known is None or not known.holds():
-        known = _known[wanted] = _digested(*wanted)
+        known = _known[key] = _digested(*key)
     return known.digest
 
 
 def template_digests(task: str, templates: Iterable[str]) -> list[str]:
-    """Digests of what makes a page besides the modules that every stage is keyed by.
+    """Return the digests of what makes a page besides the modules that every stage is keyed by.
 
     Args:
         task: Name of the module of the stage, which puts the page's content together.
@@ -67,7 +67,7 @@ class _Digested:
     files: tuple[tuple[Path, int, int], ...]
 
     def holds(self) -> bool:
-        """Whether no file has changed since: a thousand cells ask the same, so it is cheap."""
+        """Return whether no file has changed since; cheap, because a thousand cells check it."""
         try:
             return all(_version(path) == (path, *rest) for path, *rest in self.files)
         except OSError:
@@ -89,7 +89,8 @@ def _digested(roots: tuple[str, ...], package: str, folder: Path | None) -> _Dig
 
 
 def reached(roots: Iterable[str], package: str, folder: Path) -> list[str]:
-    """The modules of a package that are reached from the roots, the roots included, sorted."""
+    """Return the modules of a package that are reached from the roots, the roots included,
+    sorted."""
     found: set[str] = set()
     waiting = list(roots)
     while waiting:
@@ -107,14 +108,14 @@ def _is_not_followed(name: str) -> bool:
 
 
 def imports_of(path: Path, module: str = "") -> tuple[str, ...]:
-    """Every name that a file imports, dotted; `from a import b` gives `a` and `a.b`."""
+    """Return every name that a file imports, dotted; `from a import b` gives `a` and `a.b`."""
     names = _parsed(*_version(path))[1]
     is_package = path.name == "__init__.py"
     return tuple(_absolute(name, level, module, is_package) for name, level in names)
 
 
 def bare_tree(source: str) -> str:
-    """The syntax tree of a source without docstrings and version, as text.
+    """Return the syntax tree of a source without docstrings and version, as text.
 
     The text is the same on every Python that we run on, which `ast.dump` is not: fields that are
     empty are left out, and those that some versions lack.
@@ -144,7 +145,8 @@ def _text(value: object) -> str:
 
 
 def _is_empty_text(value: object) -> bool:
-    """Python 3.12.1 ends a nested format of an f-string with an empty text, others do not."""
+    """Return whether a node is an empty text: Python 3.12.1 ends a nested format with one, others
+    do not."""
     return isinstance(value, ast.Constant) and value.value == ""
 
 
@@ -153,7 +155,7 @@ def _counts(name: str, value: object) -> bool:
 
 
 def _is_silent(statement: ast.stmt) -> bool:
-    """A string that stands alone, or the version: neither is a formula."""
+    """Return whether a node is a string that stands alone, or the version: neither is a formula."""
     if isinstance(statement, ast.Expr):
         return isinstance(statement.value, ast.Constant) and isinstance(statement.value.value, str)
     if isinstance(statement, ast.Assign):
@@ -163,7 +165,8 @@ def _is_silent(statement: ast.stmt) -> bool:
 
 @lru_cache(maxsize=1024)
 def _parsed(path: Path, changed_ns: int, size: int) -> tuple[str, tuple[tuple[str, int], ...]]:
-    """Digest of a file's bare tree, and its imports as (name, level); read once a version."""
+    """Return the digest of a file's bare tree, and its imports as (name, level); read once a
+    version."""
     source = path.read_text(encoding="utf-8")
     with ONE_PARSER:
         tree = ast.parse(source)
@@ -220,6 +223,7 @@ def _folder_of(package: str) -> Path:
 
 @cache
 def layout() -> str:
-    """Digest of how results stand in files: a table of an older layout could not be read."""
+    """Return the digest of the layout of result files: a table of an older layout could not be
+    read."""
     files = [Path(str(import_module(name).__file__)) for name in LAYOUT]
     return hashlib.sha256("".join(bare_tree(f.read_text()) for f in files).encode()).hexdigest()

@@ -80,7 +80,7 @@ def cached_task(
 
     Args:
         function: What the task runs.
-        name: Of the task.
+        name: Name of the task.
         run_name: Returns the name of a run, when it begins.
         cache_key: Returns the key of a call from its parameters.
     """

@@ -12,14 +12,14 @@ from robojackson.robot.model import load_robot
 
 
 def robot_models(parameters: Mapping[str, Any]) -> list[str]:
-    """Digest of the model of the parameter `robot`."""
+    """Return the digest of the model of the parameter `robot`."""
     return [load_robot(parameters["robot"]).sha256]
 
 
 def robot_file(robot: RobotDescription, work: Path) -> Path:
     """Write the description of a robot for a process; return its path.
 
-    The motion that the process reads does not say where the description is, since it may have been
+    The motion that the process reads does not name its description's place, as it may have been
     made on another machine.
     """
     path = work.absolute() / "robot.yaml"

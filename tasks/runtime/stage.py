@@ -56,7 +56,7 @@ def records_only() -> Iterator[None]:
 
 
 def is_records_only() -> bool:
-    """Whether calls are answered from records alone (`records_only`)."""
+    """Return whether calls are answered from records alone (`records_only`)."""
     return _records_only.get()
 
 
@@ -72,10 +72,10 @@ def labelled(name: str) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class KeyRecipe:
-    """What the cache keys of a stage are made of.
+    """Ingredients of the cache keys of a stage.
 
     Attributes:
-        name: Of the stage.
+        name: Name of the stage.
         text: Bare syntax tree of its function.
         roots: Modules that it imports.
         models: Its parameters to the digests of the models that it loads.
@@ -89,7 +89,7 @@ class KeyRecipe:
     unkeyed: tuple[str, ...]
 
     def key(self, parameters: Mapping[str, Any]) -> str:
-        """The cache key of a call; a path below the folder of records."""
+        """Return the cache key of a call; a path below the folder of records."""
         keyed = {k: v for k, v in parameters.items() if k not in self.unkeyed}
         facts = {
             "task": [self.name, self.text],
@@ -108,7 +108,7 @@ class Stage(Generic[P, R]):
 
     Attributes:
         fn: The function itself.
-        recipe: Of its cache keys.
+        recipe: Recipe of its cache keys.
     """
 
     def __init__(self, fn: Callable[P, R], recipe: KeyRecipe) -> None:
@@ -160,7 +160,7 @@ class Stage(Generic[P, R]):
         """Return the recorded result of a call, or None where it would have to run.
 
         Args:
-            args, kwargs: Of the call; those without influence on the result may be left out.
+            args, kwargs: Arguments of the call; those without effect on the result may be omitted.
         """
         try:
             return self.required(*args, **kwargs)
@@ -182,7 +182,7 @@ class Stage(Generic[P, R]):
             raise NotRecorded(key) from cause
 
     def run_name(self) -> str:
-        """Name a task run after `labelled`; without it a few random digits tell runs apart."""
+        """Name a task run after `labelled`; without it random digits distinguish runs."""
         return f"{self.name}-{_label.get() or uuid.uuid4().hex[:3]}"
 
 
@@ -212,15 +212,15 @@ def stage(
 
 @cache
 def versions() -> dict[str, str]:
-    """Of the packages whose version is part of every key."""
+    """Return the versions of the packages that are part of every key."""
     return {name: version(name) for name in VERSIONED}
 
 
 def identity(value: Any) -> Any:
-    """What a value is, in JSON: artifacts by content, configurations by class and fields.
+    """Return what a value is, in JSON: artifacts by content, configurations by class and fields.
 
     Raises:
-        TypeError: a value whose content cannot be told, such as a path.
+        TypeError: a value without a content, such as a path.
     """
     if isinstance(value, Artifact):
         return {"sha256": value.sha256}

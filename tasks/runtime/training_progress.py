@@ -18,7 +18,7 @@ EVERY_S, LATER_S, SHARE = 5.0, 30.0, 0.05
 
 @asynccontextmanager
 async def show_progress(work: Path, name: str) -> AsyncIterator[None]:
-    """Show what a training in `work` says of itself for the time of a block, and where it ended."""
+    """Show the progress of a training in `work` for the time of a block, and where it ended."""
     bar = _Bar(work / FILE, name)
     watcher = asyncio.create_task(bar.watch())
     try:
@@ -41,9 +41,9 @@ class _Bar:
         from prefect.artifacts import acreate_progress_artifact
 
         key = re.sub(r"[^a-z0-9]+", "-", self._name.lower()).strip("-")
-        told = f"{self._name}: starting"
+        text = f"{self._name}: starting"
         with suppress(Exception):
-            self._artifact = await acreate_progress_artifact(0.0, key=key, description=told)
+            self._artifact = await acreate_progress_artifact(0.0, key=key, description=text)
         began = time.monotonic()
         while self._artifact is not None:
             lasted = time.monotonic() - began
@@ -51,7 +51,7 @@ class _Bar:
             await self.publish()
 
     async def publish(self) -> None:
-        """What the file says now."""
+        """Publish what the file contains now."""
         from prefect.artifacts import aupdate_progress_artifact
 
         with suppress(Exception):
@@ -62,13 +62,13 @@ class _Bar:
 
 
 def done(row: Mapping[str, Any]) -> float:
-    """Percent of the budget that is used up."""
+    """Return the percentage of the budget that is used."""
     used, left = float(row["seconds"]), float(row["seconds_left"])
     return round(100.0 * used / max(used + left, 1e-9), 1)
 
 
 def format_row(name: str, row: Mapping[str, Any]) -> str:
-    """A row of progress for a person."""
+    """Return a row of progress for a person."""
     minutes, seconds = divmod(int(row["seconds_left"]), 60)
     survived = row.get("survived_s")
     lived = "no episode has ended" if survived is None else f"survives {survived:.2f} s"

@@ -1,7 +1,7 @@
 """Processes that take work off the flow: decoding strangers' videos uses all cores and may crash.
 
 They are kept for the whole flow, because loading the pose model takes seconds. A clip that kills
-its process harms no other: whatever was under way is done again, each in a process of its own.
+its process harms no other: work under way is done again, each in a process of its own.
 """
 
 import os
@@ -24,7 +24,7 @@ _pool: ProcessPoolExecutor | None = None
 
 
 def cores() -> int:
-    """The cores that this process may use."""
+    """Return the cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -69,7 +69,7 @@ def _processes(count: int) -> ProcessPoolExecutor:
 
 
 def _begin(parent: int) -> None:
-    """One thread a library, Ctrl-C left to the parent, and no life after its death."""
+    """Use one thread a library, leave Ctrl-C to the parent, and end with it."""
     os.environ["OMP_NUM_THREADS"] = "1"
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     watch_parent(parent)

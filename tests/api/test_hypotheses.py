@@ -30,7 +30,7 @@ def test_files_are_numbered_from_one() -> None:
     assert hypothesis_files(PipelineConfig(), 2) == ["smpl_1.parquet", "smpl_2.parquet"]
 
 
-def test_none_are_made_unasked() -> None:
+def test_none_are_made_unless_requested() -> None:
     assert hypothesis_files(PipelineConfig(), 0) == []
 
 

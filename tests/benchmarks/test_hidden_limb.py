@@ -24,7 +24,7 @@ def test_the_same_seed_draws_the_same_cases() -> None:
     assert one == other
 
 
-def test_hidden_spans_have_the_length_asked_for_and_both_ends() -> None:
+def test_hidden_spans_have_the_length_requested_and_both_ends() -> None:
     for case in draw_cases({"a": (90, 30.0)}, 200, np.random.default_rng(5)):
         assert 6 <= case.end - case.start <= 30
         assert case.start >= 1

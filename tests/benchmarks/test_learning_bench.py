@@ -57,7 +57,7 @@ def test_a_line_tells_the_mean_and_the_worst_seed() -> None:
     assert told["beside"]["statue"]["survived_s"] == 10.0
 
 
-def test_steps_are_told_only_where_every_seed_tells_them() -> None:
+def test_steps_are_reported_only_where_every_seed_tells_them() -> None:
     first, second = rollouts(1.0, 1.0), rollouts(1.0, 1.0)
     first[0]["step"], second[0]["step"] = 1000, None
     assert line("walk", MOVES["walk"], 10.0, [first])["steps"] == 1000
@@ -71,7 +71,7 @@ def test_a_limb_that_flails_misses_its_own_bar_alone() -> None:
     assert [bar for bar, held in told["bars"].items() if not held] == ["gain left_hand 0.8-1.2"]
 
 
-def test_of_the_authors_clips_limbs_are_told_and_not_asked_for() -> None:
+def test_of_the_authors_clips_limbs_are_reported_and_not_requested() -> None:
     told = line("authors_apt1", MOVES["authors_apt1"], 10.0, [rollouts(1.0, 3.0)])
     assert not any("gain" in bar for bar in bars(told, MOVES["authors_apt1"]))
     assert told["limb_gain"]["head"] == 3.0
@@ -90,7 +90,7 @@ def test_without_the_authors_files_their_rows_are_left_out(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_rows_of_another_budget_are_told_apart(tmp_path: Path) -> None:
+def test_rows_of_another_budget_are_distinguished(tmp_path: Path) -> None:
     folders = Folders.at(tmp_path)
     own, brief = folders.row("walk", 0, 10.0), folders.row("walk", 0, 10.0, 1.0)
     assert (own.name, brief.name) == ("walk-s0.parquet", "walk-1min-s0.parquet")

@@ -74,7 +74,7 @@ def test_the_path_may_be_turned_shifted_and_scaled_but_not_tilted(walk: Truth) -
 
 
 @pytest.mark.parametrize("clip", ["dance_b", *HELD_OUT])
-def test_in_the_truths_contacts_nobody_levitates(clip: str) -> None:
+def test_in_the_truths_contacts_no_body_levitates(clip: str) -> None:
     feet = load_truth(clip).feet
     assert feet is not None
     assert (figures.true_contacts(feet, FPS) != AIR).any(1).all()

@@ -28,7 +28,7 @@ def test_no_motion_stands_in_two_lists() -> None:
     assert len(names) == len(set(names))
 
 
-def test_the_three_dances_that_judge_are_judged() -> None:
+def test_the_three_evaluation_dances_are_evaluated() -> None:
     assert {"cmu_05_02", "cmu_05_09", "cmu_05_18"} <= set(SPLIT.judged)
 
 
@@ -45,13 +45,13 @@ def test_another_reference_is_refused() -> None:
         require_frozen("g1_walk", FROZEN / "walk.parquet")
 
 
-def test_every_near_duplicate_is_one_of_a_judged_motion() -> None:
+def test_every_near_duplicate_is_one_of_a_evaluated_motion() -> None:
     for found in SPLIT.excluded.values():
         assert found["of"] in SPLIT.judged
         assert found["share"] >= DUPLICATE_SHARE
 
 
-def test_a_judged_motion_is_refused_for_training() -> None:
+def test_a_evaluated_motion_is_refused_for_training() -> None:
     SPLIT.require_trainable(SPLIT.train)
     with pytest.raises(ValueError, match="not for training: cmu_05_09"):
         SPLIT.require_trainable([*SPLIT.train, "cmu_05_09"])

@@ -45,7 +45,7 @@ def test_the_solution_poses_the_skeleton_onto_the_keypoints(method: str) -> None
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_every_bone_gets_the_twist_that_was_asked_for(method: str) -> None:
+def test_every_bone_gets_the_twist_that_was_requested(method: str) -> None:
     _, points, _ = pose_and_twist(2)
     angle = np.random.default_rng(2).uniform(-1.0, 1.0, size=(FRAMES, 23))
     wanted = np.stack([np.cos(angle), np.sin(angle)], -1)

@@ -72,7 +72,7 @@ def test_a_policy_that_sees_what_no_robot_measures_is_refused(folder: Path) -> N
 def test_another_mode_or_law_is_refused(folder: Path, facts: dict) -> None:
     policy = random_policy(stock(), swaying(stock()))
     Policy(policy.layers, {**policy.facts, **facts}).save(folder / "other.safetensors")
-    with pytest.raises(BadPolicy, match="wants mode track, law pd"):
+    with pytest.raises(BadPolicy, match="needs mode track, law pd"):
         export(folder / "other.safetensors", "deploy", folder / "pack")
 
 

@@ -108,7 +108,7 @@ def test_another_rate_than_the_files_is_told(smpl: Path, tmp_path: Path) -> None
     export(smpl, "bvh", tmp_path / "motion.bvh")
     told = import_motion(tmp_path / "motion.bvh", tmp_path, 60.0, None, "base", {})
     assert told["fps"] == 60.0
-    assert "the file says 30 frames a second: 60 was given" in told["notes"]
+    assert "the file has 30 frames a second: 60 was given" in told["notes"]
 
 
 def test_the_axis_that_points_up_can_be_given(smpl: Path, tmp_path: Path) -> None:

@@ -73,7 +73,9 @@ def test_a_motion_that_does_not_name_the_file_says_so(made: Made, tmp_path: Path
     from dataclasses import replace
 
     path = replace(ReferenceMotion.load(made.reference), robot_file="").save(tmp_path / "r.parquet")
-    with pytest.raises(UnknownName, match=r"'mine' .*does not say where .*give --robot FILE"):
+    with pytest.raises(
+        UnknownName, match=r"'mine' .*does not name its description.*give --robot FILE"
+    ):
         exporting.export(path, "gmr", tmp_path / "m.pkl")
 
 

@@ -69,14 +69,14 @@ def test_text_file_named_mp4_is_not_a_video(tmp_path: Path) -> None:
         probe(path, LIMITS)
 
 
-def test_empty_file_is_told_as_empty(tmp_path: Path) -> None:
+def test_empty_file_is_reported_as_empty(tmp_path: Path) -> None:
     path = tmp_path / "empty.mp4"
     path.touch()
     with pytest.raises(UnreadableVideo, match="empty"):
         probe(path, LIMITS)
 
 
-def test_missing_file_is_told_as_missing(tmp_path: Path) -> None:
+def test_missing_file_is_reported_as_missing(tmp_path: Path) -> None:
     with pytest.raises(UnreadableVideo, match="no such file"):
         probe(tmp_path / "nowhere.mp4", LIMITS)
 
@@ -168,7 +168,7 @@ def write_at(path: Path, times: np.ndarray) -> Path:
 UNEVEN_S = np.array([0.0, 0.04, 0.08, 0.12, 0.32, 0.52, 0.72, 0.76, 0.8])
 
 
-def test_a_varying_rate_is_told_and_its_mean_is_right(tmp_path: Path) -> None:
+def test_a_varying_rate_is_reported_and_its_mean_is_right(tmp_path: Path) -> None:
     info = probe(write_at(tmp_path / "phone.mp4", UNEVEN_S), LIMITS)
     assert info.uneven
     assert info.fps == pytest.approx(8 / 0.8)
@@ -206,7 +206,7 @@ def test_frames_that_are_all_shown_at_once_are_refused(write_video, monkeypatch)
         probe(path, LIMITS)
 
 
-def test_an_even_clip_is_told_as_even(write_video) -> None:
+def test_an_even_clip_is_reported_as_even(write_video) -> None:
     assert not probe(write_video(frames=30, fps=24), LIMITS).uneven
 
 

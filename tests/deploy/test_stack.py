@@ -151,7 +151,7 @@ def test_nonsense_is_refused_before_a_run_starts(stack: Stack) -> None:
 
 
 @pytest.mark.ci
-def test_a_dance_is_asked_for_by_its_name_and_not_by_nothing(stack: Stack) -> None:
+def test_a_dance_is_requested_by_its_name_and_not_by_nothing(stack: Stack) -> None:
     said = prefect(stack, "deployment", "run", "dance/on-demand", "-p", "source= ")
     assert said.returncode != 0
     assert "source" in said.stdout + said.stderr

@@ -158,9 +158,12 @@ def test_nonsense_is_refused_before_a_run_starts(wrong: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     ("wrong", "told"),
     [
-        ({"seeds": [1, 0, 1]}, r"--set seeds: 'seeds' is \[1, 0, 1\]: 1 stands twice"),
-        ({"moves": ["walk", "walk"]}, "--set moves: .*: walk stands twice"),
-        ({"setups": ["scratch", "pretrain", "scratch"]}, "--set setups: .*: scratch stands twice"),
+        ({"seeds": [1, 0, 1]}, r"--set seeds: 'seeds' is \[1, 0, 1\]: 1 is listed twice"),
+        ({"moves": ["walk", "walk"]}, "--set moves: .*: walk is listed twice"),
+        (
+            {"setups": ["scratch", "pretrain", "scratch"]},
+            "--set setups: .*: scratch is listed twice",
+        ),
     ],
 )
 def test_a_cell_that_would_stand_twice_in_a_study_is_refused(
@@ -299,7 +302,7 @@ def test_only_a_killed_process_is_started_again_and_not_for_ever(
     assert len(stage.limits) == attempts
 
 
-def test_training_and_judgement_share_the_time_of_a_cell(
+def test_training_and_evaluation_share_the_time_of_a_cell(
     store_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     limits: list[float] = []

@@ -72,7 +72,7 @@ def test_a_name_becomes_the_best_video(
 
 
 @pytest.mark.medium
-def test_a_video_that_was_brought_leaves_no_copy(
+def test_a_video_that_was_downloaded_leaves_no_copy(
     records: None, store_folder: Path, tmp_path: Path, short_clip: Path
 ) -> None:
     with serving(short_clip.read_bytes()) as web:
@@ -110,7 +110,7 @@ def test_without_a_net_and_without_a_choice_the_search_has_failed(
 
 
 @pytest.mark.medium
-def test_an_address_is_brought_without_a_search(
+def test_an_address_is_downloaded_without_a_search(
     records: None, store_folder: Path, tmp_path: Path, short_clip: Path
 ) -> None:
     with serving(short_clip.read_bytes()) as web:
@@ -119,7 +119,7 @@ def test_an_address_is_brought_without_a_search(
 
 
 @pytest.mark.medium
-def test_an_address_that_gives_nothing_is_told_with_its_reason(
+def test_an_address_that_gives_nothing_is_reported_with_its_reason(
     records: None, store_folder: Path, tmp_path: Path
 ) -> None:
     with serving(b"") as web, pytest.raises(SearchFailed, match="HTTP 404 not found"):

@@ -217,7 +217,7 @@ def test_a_clip_whose_landmarks_fail_leaves_its_neighbours_to_be_danced(
 
 
 @pytest.mark.medium
-def test_when_the_landmarks_of_all_clips_fail_the_first_cause_is_told(
+def test_when_the_landmarks_of_all_clips_fail_the_first_cause_is_reported(
     score: Callable[..., list[str]],
 ) -> None:
     with pytest.raises(NoPersonFound, match=r"^empty_1.mp4: no person 3"):

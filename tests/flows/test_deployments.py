@@ -56,7 +56,7 @@ def test_dances_can_be_named_from_outside() -> None:
     assert flow_of(nightly).validate_parameters({"dances": ["APT"]})["dances"] == ["APT"]
 
 
-def test_dances_are_asked_for_by_name() -> None:
+def test_dances_are_requested_by_name() -> None:
     wanted = next(d for d in DEPLOYMENTS if d["entrypoint"] == "flows.dance.dance")
     assert flow_of(wanted).validate_parameters({"source": "APT"})["source"] == "APT"
 

@@ -69,7 +69,7 @@ def test_the_walker_of_another_robot_is_what_its_trainings_start_from(
     assert walker_file(describe_robot(str(file)), "track") == store_folder / key
 
 
-def test_a_configuration_that_was_changed_begins_anew(
+def test_a_configuration_that_was_changed_starts_again(
     asked: list[list[str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     train(steps=64)
@@ -86,7 +86,7 @@ def test_a_walker_whose_flow_is_gone_is_not_trained(tmp_path: Path) -> None:
     assert not out.exists()
 
 
-def test_the_process_is_told_whose_it_is(
+def test_the_process_is_reported_whose_it_is(
     asked: list[list[str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(pretrain.os, "getpid", lambda: 4321)

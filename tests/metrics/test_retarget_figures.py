@@ -43,7 +43,7 @@ def test_slip_is_scored_where_both_ends_of_a_step_are_planted():
     np.testing.assert_allclose(retarget_error.slip_cm_s(velocity, planted), [10.0])
 
 
-def test_slip_of_a_lap_counts_the_step_over_the_seam():
+def test_slip_of_a_cycle_counts_the_step_over_the_seam():
     velocity = np.full((4, 1, 2), [0.3, 0.4])
     planted = np.array([[True], [False], [False], [True]])
     np.testing.assert_allclose(retarget_error.slip_cm_s(velocity, planted), [50.0])

@@ -33,7 +33,7 @@ def test_the_clip_keeps_its_length_when_frames_are_lost() -> None:
     assert (len(evenly(whole)) - 1) / whole.fps == pytest.approx(TIMES[-1], abs=0.5 / whole.fps)
 
 
-def test_nobody_stays_nobody() -> None:
+def test_no_person_stays_no_person() -> None:
     track = moving(TIMES)
     track.landmarks[3] = np.nan
     assert np.isnan(evenly(track).landmarks[:, 0, 0]).any()

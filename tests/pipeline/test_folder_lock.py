@@ -10,7 +10,7 @@ from robojackson.errors import StoreError
 from robojackson.pipeline.folder_lock import FOR_EVER, locked
 
 
-def test_a_second_holder_is_told_in_one_line(tmp_path: Path) -> None:
+def test_a_second_holder_is_reported_in_one_line(tmp_path: Path) -> None:
     held = pytest.raises(StoreError, match="another training is running there")
     with locked(tmp_path), held, locked(tmp_path):
         raise AssertionError("two hold it")

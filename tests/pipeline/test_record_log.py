@@ -52,7 +52,7 @@ def test_a_resumed_log_drops_what_came_after_the_checkpoint(tmp_path: Path) -> N
     assert saved_steps(store) == [10, 20, 25, 35, 45]
 
 
-def test_a_log_that_begins_anew_has_no_rows_of_the_one_before(tmp_path: Path) -> None:
+def test_a_log_that_starts_again_has_no_rows_of_the_one_before(tmp_path: Path) -> None:
     store = Store(tmp_path)
     first = a_log(store)
     first.append(episodes(10, 20, 30))

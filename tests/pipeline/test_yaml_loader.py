@@ -81,7 +81,7 @@ def test_a_value_out_of_its_range_is_refused(write) -> None:
         yaml_loader.load(Outer, write("seed: -1"))
 
 
-def test_a_value_that_fits_no_alternative_is_told_all_of_them(write) -> None:
+def test_a_value_that_fits_no_alternative_is_reported_all_of_them(write) -> None:
     told = r"'speed' is -1: Input should be 'auto' or greater than or equal to 0\.25$"
     with pytest.raises(BadConfiguration, match=told):
         yaml_loader.load(Outer, write("speed: -1"))
@@ -122,7 +122,7 @@ def test_a_number_may_be_written_with_an_exponent(write, text) -> None:
 
 
 def test_a_key_that_stands_twice_is_refused(write) -> None:
-    with pytest.raises(BadConfiguration, match="'seed' stands twice"):
+    with pytest.raises(BadConfiguration, match="'seed' is listed twice"):
         yaml_loader.load(Outer, write("seed: 1\nseed: 2\n"))
 
 
@@ -211,7 +211,7 @@ def test_whole_numbers_are_those_of_yaml_1_2(text: str, seed: int) -> None:
 
 @pytest.mark.medium
 @pytest.mark.parametrize("text", ["1:30", "2024-13-45", "{[1]: 2}", "9" * 5000, "[" * 3000])
-def test_what_is_no_value_is_told_with_its_key(text: str) -> None:
+def test_what_is_no_value_is_reported_with_its_key(text: str) -> None:
     with pytest.raises(BadConfiguration, match="seed"):
         yaml_loader.load(Outer, None, {"seed": text})
 
@@ -261,7 +261,7 @@ def test_a_wrong_key_is_named_with_the_file_that_it_stands_in(
         ("3", r"part\.yaml: extends is 3: "),
     ],
 )
-def test_a_base_that_cannot_be_is_told_with_the_file_that_names_it(
+def test_a_base_that_cannot_be_is_reported_with_the_file_that_names_it(
     extended: Path, base: str, told: str
 ) -> None:
     (extended / "part.yaml").write_text(f"extends: {base}\n")

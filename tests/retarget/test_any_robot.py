@@ -86,7 +86,7 @@ def test_a_pattern_that_means_no_joint_lists_the_joints(description):
         load_robot(replace(description, torque_limits={"*_tail": 1.0}))
 
 
-def test_soles_that_are_not_level_at_rest_are_told_with_their_heights(description):
+def test_soles_that_are_not_level_at_rest_are_reported_with_their_heights(description):
     rest = dict(description.rest_pose) | {"*_ankle_pitch": 0.3}
     with pytest.raises(BadConfiguration, match=r"soles are not level.*left_heel_in \d+"):
         load_robot(replace(description, rest_pose=rest))

@@ -57,7 +57,7 @@ def test_keypoints_and_bodies_are_the_forward_kinematics_of_qpos(clip: str, robo
 
 
 @pytest.mark.parametrize("clip", CLIPS)
-def test_the_lap_closes_in_pose_and_velocity(clip: str):
+def test_the_cycle_closes_in_pose_and_velocity(clip: str):
     motion = robot_motion(clip)
     assert motion.cyclic
     assert seam_angle(motion.qpos, motion.dt, motion.cycle_offset) < 5.0
@@ -121,7 +121,7 @@ def test_the_papers_mapping_is_at_least_five_times_worse(clip: str, method: str)
     assert theirs["planted_slip_cm_s"] > 5 * ours["planted_slip_cm_s"]
 
 
-def test_fidelity_is_told_against_the_dancer_and_not_against_what_was_leaned():
+def test_fidelity_is_reported_against_the_dancer_and_not_against_what_was_leaned():
     """The hip shake is leaned over the ball feet; the card must not hide what that costs."""
     card = robot_motion("hip_shake").scorecard
     head_mm = 1e3 * 1.5 * np.tan(np.radians(card["lean_deg"]))

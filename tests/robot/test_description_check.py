@@ -21,7 +21,7 @@ def test_a_shipped_robot_has_no_problems(name: str) -> None:
     assert problems(description(name)) == []
 
 
-def test_every_unknown_name_is_told_at_once(humanoid: RobotDescription) -> None:
+def test_every_unknown_name_is_reported_at_once(humanoid: RobotDescription) -> None:
     told = problems(
         replace(
             humanoid,
@@ -36,7 +36,7 @@ def test_every_unknown_name_is_told_at_once(humanoid: RobotDescription) -> None:
     assert [next(word for word in words if word in line) for line in told] == words
 
 
-def test_every_missing_site_is_told(humanoid: RobotDescription) -> None:
+def test_every_missing_site_is_reported(humanoid: RobotDescription) -> None:
     sites = {k: v for k, v in humanoid.sites.items() if k not in ("head", "left_hand")}
     weights = {k: v for k, v in humanoid.weights.items() if k in sites}
     told = problems(replace(humanoid, sites=sites, weights=weights))
@@ -51,7 +51,7 @@ def test_a_model_that_is_not_there_is_one_line(humanoid: RobotDescription) -> No
 @pytest.mark.parametrize(
     ("turn", "wrong"), [("0 0 100", True), ("0 80 0", True), ("0 10 10", False)]
 )
-def test_a_root_that_does_not_stand_upright_and_face_along_x_is_told(
+def test_a_root_that_does_not_stand_upright_and_face_along_x_is_reported(
     turn: str, wrong: bool, humanoid: RobotDescription, tmp_path: Path
 ) -> None:
     """It would be taken for one that has fallen."""
@@ -62,13 +62,13 @@ def test_a_root_that_does_not_stand_upright_and_face_along_x_is_told(
     assert any("root_body: the axes of 'torso'" in line for line in told) == wrong
 
 
-def test_limbs_of_different_length_are_told(humanoid: RobotDescription) -> None:
+def test_limbs_of_different_length_are_reported(humanoid: RobotDescription) -> None:
     sites = {**humanoid.sites, "left_hand": ("left_lower_arm", (0.1, -0.1, 0.1))}
     (told,) = problems(replace(humanoid, sites=sites))
     assert "they must be mirrored" in told
 
 
-def test_sides_that_are_swapped_are_told(humanoid: RobotDescription) -> None:
+def test_sides_that_are_swapped_are_reported(humanoid: RobotDescription) -> None:
     sites = dict(humanoid.sites)
     for name in ("shoulder", "elbow", "hand"):
         sites[f"left_{name}"], sites[f"right_{name}"] = (
@@ -79,7 +79,7 @@ def test_sides_that_are_swapped_are_told(humanoid: RobotDescription) -> None:
     assert all("to the right of" in line for line in told)
 
 
-def test_a_keypoint_off_its_mirror_image_is_told(humanoid: RobotDescription) -> None:
+def test_a_keypoint_off_its_mirror_image_is_reported(humanoid: RobotDescription) -> None:
     sites = {
         **humanoid.sites,
         "left_hip": ("left_thigh", (0.03, 0.0, 0.0)),
@@ -93,6 +93,6 @@ def test_a_keypoint_off_its_mirror_image_is_told(humanoid: RobotDescription) -> 
     assert "30 mm from the mirror image" in told[0]
 
 
-def test_a_rest_angle_beyond_its_range_is_told(humanoid: RobotDescription) -> None:
+def test_a_rest_angle_beyond_its_range_is_reported(humanoid: RobotDescription) -> None:
     (told,) = problems(replace(humanoid, rest_pose={**humanoid.rest_pose, "abdomen_z": 1.0}))
     assert "rest_pose.abdomen_z is 1: beyond its range" in told

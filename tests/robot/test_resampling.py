@@ -32,7 +32,7 @@ def test_the_samples_come_back(robot: Robot, cycle_offset, turns):
 
 
 @pytest.mark.parametrize("turns", [0, 1])
-def test_a_lap_continues_with_its_first_step_moved(robot: Robot, turns):
+def test_a_cycle_continues_with_its_first_step_moved(robot: Robot, turns):
     qpos = _turning(robot, turns)
     halves = resample(qpos, np.arange(2 * COUNT) / 2, CYCLE_OFFSET)
     assert seam_angle(halves, 0.015, CYCLE_OFFSET) < 0.05

@@ -149,7 +149,7 @@ def test_a_reader_beside_a_compaction_sees_every_row(tmp_path: Path) -> None:
     assert seen == sorted(seen)
 
 
-def test_one_dance_is_told_from_the_others(store: Store) -> None:
+def test_one_dance_is_distinguished_from_the_others(store: Store) -> None:
     candidate_catalogue.append(store, [row("a"), row("b", dance='O\'Hara "x"')])
     found = [
         [r["video_id"] for r in candidate_catalogue.records(store, d)]
@@ -227,7 +227,7 @@ def test_what_a_person_looked_for_is_nothing_to_the_nightly_runs(store: Store) -
     assert candidate_catalogue.known(store, "APT", "refresh") == {("youtube", "steady")}
 
 
-def test_a_video_that_could_never_be_judged_is_told(store: Store) -> None:
+def test_a_video_that_could_never_be_assessed_is_reported(store: Store) -> None:
     candidate_catalogue.append(
         store, [row("bad", decision="failed"), row("seen", decision="failed")]
     )

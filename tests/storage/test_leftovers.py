@@ -75,14 +75,14 @@ def test_files_and_folders_that_are_held_stay(store: Store) -> None:
         assert files(store) == before
 
 
-def test_a_judgement_that_nobody_makes_is_taken_away(store: Store) -> None:
+def test_a_evaluation_without_a_process_is_removed(store: Store) -> None:
     folder = work(store, "evaluate-1")
     assert sweep(store) == [folder]
     assert not folder.exists()
 
 
 @pytest.mark.parametrize("lock", ["task.lock", "lock"])
-def test_a_finished_training_stays_while_somebody_is_at_it(store: Store, lock: str) -> None:
+def test_a_finished_training_stays_while_a_process_uses_it(store: Store, lock: str) -> None:
     folder = work(store, f"train-{RUN[-12:]}")
     finish(store)
     with locked(folder, lock):
@@ -104,7 +104,7 @@ def test_only_a_checkpoint_that_is_still_needed_is_kept(
     assert folder.exists() == kept
 
 
-def test_a_file_that_is_swept_before_it_is_held_is_begun_anew(
+def test_a_file_that_is_swept_before_it_is_held_is_started_again(
     store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Another process may sweep between the making of a temporary file and its lock."""

@@ -141,12 +141,12 @@ def test_a_full_remote_disk_is_one_line_and_leaves_nothing() -> None:
     assert FullDisk.store == {}
 
 
-def test_a_full_store_is_told_before_any_work() -> None:
+def test_a_full_store_is_reported_before_any_work() -> None:
     with pytest.raises(StoreError, match=r"^cannot write the store fulldisk://dances: No space"):
         Store("fulldisk://dances").require_writable()
 
 
-def test_a_disk_with_too_little_room_is_told_with_both_figures(
+def test_a_disk_with_too_little_room_is_reported_with_both_figures(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     usage = shutil.disk_usage(tmp_path)._replace(free=12_300_000)
@@ -172,7 +172,7 @@ def test_the_environment_names_the_store(monkeypatch: pytest.MonkeyPatch, tmp_pa
     assert Store.from_environment().root == str(tmp_path / "elsewhere")
 
 
-def test_a_file_for_a_store_is_told_at_once(tmp_path: Path) -> None:
+def test_a_file_for_a_store_is_reported_at_once(tmp_path: Path) -> None:
     (tmp_path / "clip.mp4").write_text("a video")
     with pytest.raises(StoreError, match="a file; a folder is wanted"):
         Store(tmp_path / "clip.mp4")

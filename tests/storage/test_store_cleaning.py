@@ -76,7 +76,7 @@ def test_an_old_result_of_a_young_record_stays(store: Store) -> None:
     assert not store.exists(old)
 
 
-def test_what_is_younger_than_asked_stays(store: Store) -> None:
+def test_what_is_younger_than_requested_stays(store: Store) -> None:
     store.save("mocap", "smpl.parquet", b"young")
     store.work("train-1").joinpath("checkpoint.zip").write_bytes(b"young")
     assert plan(store, USUAL, DAY_S).going == []

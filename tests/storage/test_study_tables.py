@@ -78,7 +78,7 @@ def test_a_question_about_a_study_sees_no_other(store: Store) -> None:
         assert ask("SELECT DISTINCT study FROM episodes") == [{"study": "smoke"}]
 
 
-def test_a_cell_that_was_trained_anew_replaces_its_rows(store: Store) -> None:
+def test_a_cell_that_was_trained_again_replaces_its_rows(store: Store) -> None:
     for run_id, survived in (("r1", 1.0), ("r2", 2.0)):
         study_tables.write(store, cell(run_id=run_id), made(store, survived))
         study_tables.note(store, cell(run_id=run_id), {"run_id": run_id})
@@ -111,7 +111,7 @@ def test_provenance_is_a_table_beside_the_rows(store: Store) -> None:
         (0.0, 0.5, 0.0, 0.0),  # fell
     ],
 )
-def test_a_line_a_cell_judges_nothing_that_is_too_short(
+def test_a_line_a_cell_evaluates_nothing_that_is_too_short(
     success: float, survived_s: float, statue: float, known: float | None, store: Store
 ) -> None:
     same = {**NAMES, "phase": 0, "reset": 0, "clip_fraction": 1.0, "fell": success == 0}

@@ -70,7 +70,7 @@ def test_the_same_weights_under_another_name_are_the_same_key(tmp_path: Path) ->
     assert keys[0] == keys[1]
 
 
-def test_missing_weights_are_told_before_anything_runs(tmp_path: Path) -> None:
+def test_missing_weights_are_reported_before_anything_runs(tmp_path: Path) -> None:
     config = replace(NetworkConfig(), hybrik=str(tmp_path / "gone.pth"))
     with pytest.raises(BadWeights, match="no such file"):
         _models({"network": config})

@@ -46,7 +46,7 @@ def commits(store: Store) -> list[str]:
     return [row["git_commit"] for row in study_tables.query(store, "SELECT git_commit FROM runs")]
 
 
-def test_rows_that_are_made_anew_get_the_commit_that_made_them(
+def test_rows_that_are_made_again_get_the_commit_that_made_them(
     store_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     store = Store(store_folder)
@@ -68,7 +68,7 @@ def test_without_git_the_commit_is_what_the_environment_says(
     publish_tables._commit.cache_clear()
 
 
-def test_the_repository_around_an_installed_package_is_not_asked(
+def test_the_repository_around_an_installed_package_is_not_requested(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(publish_tables, "is_checkout", lambda: False)

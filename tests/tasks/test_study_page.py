@@ -93,7 +93,7 @@ def test_the_claims_are_about_the_yardstick_and_have_its_sign(folder: Path) -> N
 
 
 @pytest.mark.medium
-def test_an_effect_is_told_for_every_move_alone(folder: Path) -> None:
+def test_an_effect_is_reported_for_every_move_alone(folder: Path) -> None:
     first, *_, last = results(folder)["comparisons"]
     assert (first["treated"], first["control"]) == ("pretrain", "scratch")
     means = {move: found["difference"]["mean"] for move, found in first["effects"].items()}
@@ -141,7 +141,7 @@ def test_the_smoke_study_says_that_its_numbers_mean_nothing() -> None:
 
 
 @pytest.mark.medium
-def test_what_setups_of_one_reward_pay_to_bodies_that_do_not_dance_is_told_once(
+def test_what_setups_of_one_reward_pay_to_bodies_that_do_not_dance_is_reported_once(
     folder: Path,
 ) -> None:
     page = (folder / "index.html").read_text()
@@ -155,7 +155,7 @@ def test_the_code_that_made_the_rows_is_named(folder: Path) -> None:
 
 
 @pytest.mark.medium
-def test_what_the_walker_had_learnt_before_is_told(folder: Path) -> None:
+def test_what_the_walker_had_learnt_before_is_reported(folder: Path) -> None:
     page = (folder / "index.html").read_text()
     assert "pretrain begin with networks (walker) that had learnt for 671,296 control steps" in page
 

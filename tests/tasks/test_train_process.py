@@ -39,13 +39,13 @@ def ends(pid: int, within_s: float = 10.0) -> bool:
     return False
 
 
-def test_a_process_that_is_killed_is_told_with_its_run_and_cause(tmp_path: Path) -> None:
+def test_a_process_that_is_killed_is_reported_with_its_run_and_cause(tmp_path: Path) -> None:
     with pytest.raises(TrainingFailed, match=r"run walk-scratch-s0 was killed by SIGKILL") as told:
         run("import os; os.kill(os.getpid(), 9)", tmp_path)
     assert str(tmp_path / child_process.LOG) in str(told.value)
 
 
-def test_a_process_that_fails_is_told_with_its_last_line(tmp_path: Path) -> None:
+def test_a_process_that_fails_is_reported_with_its_last_line(tmp_path: Path) -> None:
     with pytest.raises(TrainingFailed, match="exit code 3: the disk is full"):
         run("import sys; print('the disk is full', file=sys.stderr); sys.exit(3)", tmp_path)
 

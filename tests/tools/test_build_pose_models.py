@@ -62,7 +62,7 @@ def test_bundle_parts_are_stored_and_not_compressed() -> None:
         assert {i.compress_type for i in bundle.infolist()} == {zipfile.ZIP_STORED}
 
 
-def test_without_npm_the_way_around_is_told(
+def test_without_npm_the_way_around_is_reported(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(build_pose_models.shutil, "which", lambda name: None)

@@ -45,7 +45,7 @@ def test_half_the_rate_keeps_every_second_frame() -> None:
     np.testing.assert_allclose(half.root_position, motion.root_position[::2], atol=1e-12)
 
 
-def test_second_lap_starts_where_the_first_ended_on_the_floor() -> None:
+def test_second_cycle_starts_where_the_first_ended_on_the_floor() -> None:
     motion = some_motion(7)
     twice = deepmimic.repeated(motion, 2)
     np.testing.assert_allclose(twice.root_position[7, [0, 2]], motion.root_position[6, [0, 2]])

@@ -31,7 +31,7 @@ def test_ankles_stand_at_the_stance(name: str, side: float) -> None:
     np.testing.assert_allclose(track, np.tile(expected, (len(track), 1)), atol=1e-9)
 
 
-def test_a_lap_of_four_seconds_has_120_frames() -> None:
+def test_a_cycle_of_four_seconds_has_120_frames() -> None:
     assert len(author(Dance(), BODY)) == 120
 
 

@@ -1,1 +1,1 @@
-"""How shipped assets and pictures of the documentation are made."""
+"""Make shipped assets, generated pages and pictures of the documentation."""

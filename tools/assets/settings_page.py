@@ -47,7 +47,7 @@ class Chapter:
     """The keys of some commands.
 
     Attributes:
-        title, about: Of the part of the page.
+        title, about: Heading and introduction of the part of the page.
         kind: Dataclass of the configuration.
         usual: Name of the configuration that the commands use when none is named.
     """
@@ -94,7 +94,7 @@ class Setting:
 
     Attributes:
         key: Its path.
-        unit: Of a number; empty for all else.
+        unit: Unit of a number; empty for all else.
         default: As YAML.
         allowed: The range, or the values.
         meaning: What it is.
@@ -108,7 +108,7 @@ class Setting:
 
 
 def settings(chapter: Chapter) -> Iterator[Setting]:
-    """Every key of a configuration, in the order of its file.
+    """Yield every key of a configuration, in the order of its file.
 
     Raises:
         ValueError: a key without a meaning, or a number without a unit.
@@ -117,7 +117,7 @@ def settings(chapter: Chapter) -> Iterator[Setting]:
 
 
 def page() -> str:
-    """The whole page."""
+    """Return the whole page."""
     parts = [HEAD]
     for chapter in CHAPTERS:
         parts.append(f"## {chapter.title}\n\n{chapter.about} Configuration by itself: "
@@ -136,7 +136,7 @@ def page() -> str:
 
 
 def meanings(kind: type) -> dict[str, str]:
-    """What the section `Attributes` of a dataclass's docstring says of each field.
+    """Return the meaning of each field from the section `Attributes` of a dataclass's docstring.
 
     Several fields may share a text (`a, b: text`), which readers of docstrings do not know.
     """
@@ -153,7 +153,7 @@ def meanings(kind: type) -> dict[str, str]:
 
 
 def unit_of(name: str, meaning: str, schema: Mapping[str, Any]) -> str | None:
-    """The unit of a number, None where nothing names it; empty for what is no number."""
+    """Return the unit of a number, None where nothing names it; empty for other values."""
     types = {each.get("type") for each in _alternatives(schema)} - {"null"}
     if not types & set(NUMBERS):
         return ""
@@ -170,7 +170,7 @@ def unit_of(name: str, meaning: str, schema: Mapping[str, Any]) -> str | None:
 
 
 def allowed_of(schema: Mapping[str, Any]) -> str:
-    """What is checked of a value."""
+    """Return what is checked of a value."""
     return " or ".join(dict.fromkeys(_allowed(each) for each in _alternatives(schema)))
 
 

@@ -1,4 +1,4 @@
-"""One clip of pairs: a motion, a person, a camera, things in the way; BlazePose looks at it all."""
+"""One clip of pairs: a motion, a person, a camera, occluders; BlazePose's detections of it."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -35,7 +35,7 @@ REACH = 1.5
 def choose_motion(
     files: list[Path], cache: dict[Path, deepmimic.Motion], rng: np.random.Generator
 ) -> tuple[str, deepmimic.Motion]:
-    """An invented dance, or a captured motion changed."""
+    """Return an invented dance, or a captured motion changed."""
     count = int(rng.integers(*FRAMES))
     if rng.uniform() < INVENTED or not files:
         motion, name = gestures.invent(rng, count, FPS), "invented"
@@ -69,7 +69,7 @@ def _captured(
 
 
 def facing(motion: deepmimic.Motion, rng: np.random.Generator) -> deepmimic.Motion:
-    """Turned so that the middle frame faces the camera, more or less."""
+    """Return turned so that the middle frame faces the camera, more or less."""
     middle = motion.rotations["root"][len(motion) // 2].apply([1.0, 0.0, 0.0])
     angle = -np.arctan2(-middle[2], middle[0]) + np.radians(rng.normal(0.0, 12.0))
     turn = Rotation.from_rotvec([0.0, angle, 0.0])

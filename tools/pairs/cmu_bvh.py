@@ -94,7 +94,7 @@ def _rotations(nodes: Mapping[str, Node], table: np.ndarray) -> dict[str, Rotati
 
 
 def _turned(world: Rotation, limb: np.ndarray | None) -> Rotation:
-    """From the file's axes to DeepMimic's; a limb's rest is to hang down."""
+    """Return the rotation from the file's axes to DeepMimic's; a limb at rest hangs down."""
     rest = Rotation.identity()
     if limb is not None:
         rest, _ = Rotation.align_vectors([limb / np.linalg.norm(limb)], [DOWN])

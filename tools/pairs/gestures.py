@@ -23,7 +23,7 @@ UPPER = ("chest", "neck", "left_shoulder", "left_elbow", "right_shoulder", "righ
 
 
 def invent(rng: np.random.Generator, count: int, fps: float) -> deepmimic.Motion:
-    """A dance of `count` frames."""
+    """Return a dance of `count` frames."""
     beat = rng.uniform(0.3, 1.1)
     root = _turns(rng, count, fps, beat, heading=True)
     feet, hips, air = _steps(rng, count, fps, beat * rng.choice([1.0, 2.0]))
@@ -37,7 +37,7 @@ def invent(rng: np.random.Generator, count: int, fps: float) -> deepmimic.Motion
 
 
 def with_gestures(motion: deepmimic.Motion, rng: np.random.Generator) -> deepmimic.Motion:
-    """The motion with an invented upper body."""
+    """Return the motion with an invented upper body."""
     upper = _upper(rng, len(motion), motion.fps, rng.uniform(0.3, 1.1), motion.rotations["root"])
     return replace(motion, rotations={**motion.rotations, **upper})
 
@@ -45,7 +45,7 @@ def with_gestures(motion: deepmimic.Motion, rng: np.random.Generator) -> deepmim
 def _keys(
     rng: np.random.Generator, count: int, fps: float, beat: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Position of each frame between keys (whole numbers are keys), eased and held."""
+    """Return the position of each frame between keys (whole numbers are keys), eased and held."""
     lengths = beat * rng.choice([0.5, 1.0, 1.0, 2.0], size=int(count / fps / beat * 2) + 6)
     times = np.concatenate([[-lengths[0] * rng.uniform()], np.cumsum(lengths)])
     place = np.interp(np.arange(count) / fps, times, np.arange(len(times)))
@@ -64,7 +64,7 @@ def _curve(rng: np.random.Generator, keys: np.ndarray, place: np.ndarray) -> np.
 def _turns(
     rng: np.random.Generator, count: int, fps: float, beat: float, heading: bool
 ) -> Rotation:
-    """Rotation of a part of the trunk: yaw, pitch forward, roll."""
+    """Return the rotation of a part of the trunk: yaw, pitch forward, roll."""
     place, keys = _keys(rng, count, fps, beat)
     wild = rng.uniform() < 0.35
     spread = np.radians([14.0, 9.0, 8.0]) * rng.uniform(0.3, 1.6, 3) * (1.7 if wild else 1.0)
@@ -87,7 +87,7 @@ def _turns(
 
 
 def _spin(rng: np.random.Generator, time: np.ndarray) -> np.ndarray:
-    """Half a turn to three turns at 120 to 450 degrees a second, radians."""
+    """Return half a turn to three turns at 120 to 450 degrees a second, radians."""
     angle = np.pi * rng.uniform(1.0, 6.0) * rng.choice([-1.0, 1.0])
     length = np.abs(angle) / np.radians(rng.uniform(120.0, 450.0))
     s = np.clip((time - rng.uniform(-0.5, time[-1])) / length, 0.0, 1.0)
@@ -129,7 +129,7 @@ def _across(rotation: Rotation) -> Rotation:
 def _arm_keys(
     rng: np.random.Generator, count: int, style: np.ndarray
 ) -> tuple[Rotation, np.ndarray]:
-    """Left shoulder in the chest's frame, and the bend of the elbow."""
+    """Return left shoulder in the chest's frame, and the bend of the elbow."""
     middles = np.array([[0.1, -1, -0.2], [0.1, 0, -1], [0.2, 1, -0.4], [1, 0, -0.1], [0.4, 0, -1]])
     chosen = rng.choice(len(middles), count, p=style)
     spread = np.array([0.3, 0.4, 0.4, 0.4, 0.9])[chosen, None]
@@ -150,7 +150,8 @@ def _arm_keys(
 def _steps(
     rng: np.random.Generator, count: int, fps: float, beat: float
 ) -> tuple[dict[str, np.ndarray], np.ndarray, dict[str, np.ndarray]]:
-    """Ankles, the middle of the pelvis over the floor with its drop, and the share in the air."""
+    """Return the ankles, the middle of the pelvis over the floor with its drop, and the share in
+    the air."""
     place, keys = _keys(rng, count, fps, beat)
     half = rng.uniform(0.07, 0.3)
     wild = rng.choice([0.05, 0.25, 0.5], p=[0.4, 0.4, 0.2])
@@ -185,7 +186,8 @@ def _steps(
 def _pelvis(
     root: Rotation, feet: dict[str, np.ndarray], hips: np.ndarray, rng: np.random.Generator
 ) -> np.ndarray:
-    """As high as the lower foot allows, less the drop; feet turn with the heading."""
+    """Return the pelvis as high as the lower foot allows, less the drop; feet turn with the
+    heading."""
     forward = root.apply(FORWARD)
     heading = Rotation.from_rotvec(np.arctan2(-forward[:, 2], forward[:, 0])[:, None] * UP)
     position = np.array(hips)

@@ -57,7 +57,7 @@ class Person:
         self.marks = _surface_marks(body)
 
     def posed(self, motion: deepmimic.Motion) -> Posed:
-        """Rotation from rest and head of every bone."""
+        """Return the rotation from rest and head of every bone."""
         poses = self.body._bone_poses(motion)
         rest = self.body.rest_bones[None, :, :3, :3]
         turns = poses[:, :, :3, :3] @ np.swapaxes(rest, -1, -2)
@@ -71,7 +71,7 @@ class Person:
         return Posed(turns.astype(np.float32), heads.astype(np.float32))
 
     def skin(self, posed: Posed, frame: int) -> np.ndarray:
-        """Vertices of one frame, with clothes."""
+        """Return the vertices of one frame, with clothes."""
         turns = posed.turns[frame]
         shift = posed.heads[frame] - np.einsum("bij,bj->bi", turns, self.heads)
         table = np.concatenate([turns.reshape(-1, 9), shift], 1)
@@ -80,7 +80,7 @@ class Person:
         return vertices + mixed[:, 9:]
 
     def landmarks(self, posed: Posed, names: tuple[str, ...]) -> np.ndarray:
-        """True places of BlazePose's landmarks, (T, 33, 3); NaN where there is none."""
+        """Return True places of BlazePose's landmarks, (T, 33, 3); NaN where there is none."""
         result = np.full((len(posed.heads), len(names), 3), np.nan, np.float32)
         for column, name in enumerate(names):
             side, _, part = name.partition("_")
@@ -96,13 +96,13 @@ class Person:
 
 
 def draw_person(model: Body, rng: np.random.Generator) -> Person:
-    """Somebody."""
+    """Draw a random person."""
     phenotype = {name: float(rng.uniform(*ends)) for name, ends in PHENOTYPE.items()}
     return Person(Body(phenotype, model.model), rng)
 
 
 def clothes(body: Body, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Colour of every vertex, and how thick the cloth is over it, metres."""
+    """Return the colour of every vertex, and how thick the cloth is over it, metres."""
     skin = np.array([0.80, 0.58, 0.47]) * rng.uniform(0.25, 1.1) * rng.normal(1.0, 0.05, 3)
     shirt, trousers, shoes = rng.uniform(0.03, 0.95, (3, 3))
     hair = np.array([0.25, 0.17, 0.1]) * rng.uniform(0.2, 2.5)
@@ -138,7 +138,7 @@ def clothes(body: Body, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarra
 
 
 def _surface_marks(body: Body) -> dict[str, tuple[str, np.ndarray]]:
-    """Landmarks on the skin: a bone and the point in the rest pose."""
+    """Return landmarks on the skin: a bone and the point in the rest pose."""
     bones = np.array(body.dominant_bones())
     points = body.rest_vertices
     head = points[bones == "head"]

@@ -49,11 +49,11 @@ class View:
     height: int
 
     def see(self, points: np.ndarray) -> np.ndarray:
-        """World to camera."""
+        """Return the world to camera."""
         return points @ self.rotation.T + self.shift
 
     def matrix(self) -> np.ndarray:
-        """World to OpenGL's clip space."""
+        """Return the world to OpenGL's clip space."""
         flip = np.diag([1.0, -1.0, -1.0, 1.0])
         view = np.eye(4)
         view[:3, :3], view[:3, 3] = self.rotation, self.shift
@@ -107,7 +107,7 @@ def film(posed: Posed, rng: np.random.Generator, angles: Angles) -> View:
 
 
 def background(view: View, rng: np.random.Generator) -> np.ndarray:
-    """A floor, a wall and blurred stuff, float RGB 0..1."""
+    """Return a floor, a wall and blurred stuff, float RGB 0..1."""
     shape = (view.height, view.width)
     rows, columns = np.mgrid[0 : view.height, 0 : view.width]
     rays = np.stack(
@@ -131,7 +131,8 @@ def background(view: View, rng: np.random.Generator) -> np.ndarray:
 def occluders(
     seen: np.ndarray, limbs: list[list[int]], view: View, fps: float, rng: np.random.Generator
 ) -> np.ndarray:
-    """Boxes (T, N, 4) of pixels x0 y0 x1 y1 over a limb for 0.2 to 1 s; NaN where there is none."""
+    """Return the boxes (T, N, 4) of pixels x0 y0 x1 y1 over a limb for 0.2 to 1 s; NaN where there
+    is none."""
     count = len(seen)
     boxes = np.full((count, 3, 4), np.nan)
     if rng.uniform() < 0.45:

@@ -39,7 +39,7 @@ class RefusedMotion(ValueError):
 
 
 def motion_name(path: Path) -> str:
-    """`humanoid3d_jump.txt.gz` is jump, `01_03.bvh` is 01_03."""
+    """Return the name of a motion: `humanoid3d_jump.txt.gz` is jump, `01_03.bvh` is 01_03."""
     return path.name.split(".")[0].removeprefix("humanoid3d_")
 
 
@@ -57,13 +57,13 @@ def check_allowed(path: Path) -> None:
 
 
 def find(folders: list[Path]) -> list[Path]:
-    """The training motions in folders; other files there are passed over."""
+    """Return the training motions in folders; other files there are passed over."""
     files = sorted(path for folder in folders for path in folder.iterdir() if path.is_file())
     return [path for path in files if motion_name(path) in ALLOWED]
 
 
 def read(path: Path, fps: float) -> deepmimic.Motion:
-    """A motion of the list at a frame rate."""
+    """Return a motion of the list at a frame rate."""
     check_allowed(path)
     if ".bvh" in path.suffixes:
         return deepmimic.resampled(cmu_bvh.read(path), fps)
@@ -71,7 +71,7 @@ def read(path: Path, fps: float) -> deepmimic.Motion:
 
 
 def window(motion: deepmimic.Motion, start: int, count: int) -> deepmimic.Motion:
-    """Frames from `start`; a motion that is too short is played to and fro."""
+    """Return frames from `start`; a motion that is too short is played to and fro."""
     index = np.arange(start, start + count) % max(2 * len(motion) - 2, 1)
     index = np.where(index < len(motion), index, 2 * len(motion) - 2 - index)
     return replace(
@@ -82,7 +82,7 @@ def window(motion: deepmimic.Motion, start: int, count: int) -> deepmimic.Motion
 
 
 def mirrored(motion: deepmimic.Motion) -> deepmimic.Motion:
-    """The motion in a mirror: z, the right, changes its sign."""
+    """Return the motion in a mirror: z, the right, changes its sign."""
     rotations = {}
     for name, rotation in motion.rotations.items():
         vectors = rotation.as_rotvec() * np.array([-1.0, -1.0, 1.0])
@@ -100,7 +100,8 @@ def grafted(motion: deepmimic.Motion, other: deepmimic.Motion) -> deepmimic.Moti
 
 
 def gathered(motion: deepmimic.Motion, reach: float) -> deepmimic.Motion:
-    """The motion without its travel if it goes farther over the floor than `reach`, metres."""
+    """Return the motion without its travel if it goes farther over the floor than `reach`,
+    metres."""
     position = np.array(motion.root_position)
     flat = position[:, [0, 2]]
     if np.ptp(flat, axis=0).max() <= reach:

@@ -1,1 +1,1 @@
-"""How the bundled clips are made."""
+"""Render the bundled clips."""

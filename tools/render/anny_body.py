@@ -1,7 +1,7 @@
 """A parametric human body (Anny) put into the poses of a motion file.
 
 Anny's world: x left, y backward (the body faces -y), z up; metres. Its 104 bones are posed by world
-orientations: limbs point along the motion's limbs whatever the body's rest pose is, the spine and
+orientations: limbs point along the motion's limbs for any rest pose, the spine and
 neck share the bend between their ends.
 """
 
@@ -90,7 +90,7 @@ class Body:
         self.triangles = np.asarray(self.model.get_triangular_faces()).astype(np.int32)
 
     def head_of(self, bone: str) -> Float[np.ndarray, "3"]:
-        """Where a bone begins in the rest pose, metres."""
+        """Return where a bone begins in the rest pose, metres."""
         return self.rest_bones[self.bone_names.index(bone), :3, 3]
 
     @property
@@ -100,13 +100,13 @@ class Body:
         return leg / (deepmimic.THIGH_LENGTH + deepmimic.SHIN_LENGTH)
 
     def dominant_bones(self) -> list[str]:
-        """The bone with the greatest skinning weight, one a vertex."""
+        """Return the bone with the greatest skinning weight, one a vertex."""
         weights = self.model.vertex_bone_weights.numpy()
         indices = self.model.vertex_bone_indices.numpy()
         return [self.bone_names[i] for i in indices[np.arange(len(indices)), weights.argmax(1)]]
 
     def posed(self, motion: deepmimic.Motion) -> PosedBody:
-        """The body in the poses of a motion, standing on the floor."""
+        """Return the body in the poses of a motion, standing on the floor."""
         poses = self._bone_poses(motion)
         vertices, bones = zip(*(self._skinned(part) for part in _batches(poses)), strict=True)
         v, b = np.concatenate(vertices), np.concatenate(bones)
@@ -126,7 +126,7 @@ class Body:
     def _world_rotation(
         self, bone: str, rotations: Mapping[str, Rotation]
     ) -> Float[np.ndarray, "T 3 3"]:
-        """Rotation from the rest pose to the motion's pose, Anny's axes."""
+        """Return the rotation from the rest pose to the motion's pose, Anny's axes."""
         base, _, suffix = bone.partition(".")
         side = {"L": "left", "R": "right"}.get(suffix, "")
         for prefix, (joint, limb) in FOLLOWS.items():

@@ -75,7 +75,8 @@ class Camera:
 
 
 def camera_for(hips: Float[np.ndarray, "T 3"], yaw: float, width: int, height: int) -> Camera:
-    """A camera that holds the whole path of the hips; yaw in degrees about z, 0 is the front."""
+    """Return a camera that holds the whole path of the hips; yaw in degrees about z, 0 is the
+    front."""
     centre = np.array([hips[:, 0].mean(), hips[:, 1].mean(), LOOK_AT_HEIGHT])
     distance = BASE_DISTANCE + 0.8 * float(np.ptp(hips[:, :2], axis=0).max())
     angle = np.radians(yaw)
@@ -84,7 +85,7 @@ def camera_for(hips: Float[np.ndarray, "T 3"], yaw: float, width: int, height: i
 
 
 def colours(body: Body) -> Float[np.ndarray, "V 3"]:
-    """Clothes, skin and hair by the bone that moves each vertex."""
+    """Return the clothes, skin and hair by the bone that moves each vertex."""
     head, waist = body.head_of("head"), body.head_of("root")[2] + WAIST_ABOVE_ROOT
     table = np.tile(np.array(SKIN), (len(body.rest_vertices), 1))
     for index, bone in enumerate(body.dominant_bones()):
@@ -105,7 +106,7 @@ def colours(body: Body) -> Float[np.ndarray, "V 3"]:
 def frames(
     posed: PosedBody, colour: Float[np.ndarray, "V 3"], camera: Camera, width: int, height: int
 ) -> Iterator[UInt8[np.ndarray, "H W 3"]]:
-    """The pictures, RGB, one a frame."""
+    """Yield the pictures, RGB, one a frame."""
     context = moderngl.create_context(standalone=True, backend="egl")  # type: ignore[arg-type]
     context.enable(moderngl.DEPTH_TEST)
     program = context.program(vertex_shader=VERTEX_SHADER, fragment_shader=FRAGMENT_SHADER)
@@ -136,7 +137,7 @@ def frames(
 def vertex_normals(
     vertices: Float[np.ndarray, "V 3"], triangles: np.ndarray
 ) -> Float[np.ndarray, "V 3"]:
-    """Unit normals, the mean of the faces around each vertex weighted by their areas."""
+    """Return the unit normals, the mean of the faces around each vertex weighted by their areas."""
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     face = np.cross(b - a, c - a)
     corners = triangles.T.ravel()
@@ -167,7 +168,7 @@ def _perspective(aspect: float) -> Float[np.ndarray, "4 4"]:
 
 
 def _floor_mesh(camera: Camera) -> bytes:
-    """Two triangles around the point that the camera looks at."""
+    """Return two triangles around the point that the camera looks at."""
     eye = -camera.view[:3, :3].T @ camera.view[:3, 3]
     forward = -camera.view[2, :3]
     centre = eye + forward * (LOOK_AT_HEIGHT - eye[2]) / min(forward[2], -1e-6)

@@ -65,7 +65,7 @@ class Motion:
 
 
 def read(path: Path, fps: float, loops: int = 1) -> Motion:
-    """A clip resampled to `fps`; every further loop continues where the last one ended."""
+    """Return a clip resampled to `fps`; every further loop continues where the last one ended."""
     text = gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()
     frames = np.array(json.loads(text)["Frames"], dtype=float)
     if frames.ndim != 2 or frames.shape[1] != FRAME_NUMBERS:
@@ -90,7 +90,8 @@ def write(path: Path, motion: Motion) -> None:
 
 
 def resampled(motion: Motion, fps: float) -> Motion:
-    """The same motion at another rate; the first frame stays, rotations go along geodesics."""
+    """Return the same motion at another rate; the first frame stays, rotations go along
+    geodesics."""
     source = np.arange(len(motion)) / motion.fps
     times = np.arange(0.0, source[-1] + 1e-6, 1.0 / fps).clip(max=source[-1])
     position = np.stack([np.interp(times, source, p) for p in motion.root_position.T], -1)
@@ -99,7 +100,7 @@ def resampled(motion: Motion, fps: float) -> Motion:
 
 
 def repeated(motion: Motion, loops: int) -> Motion:
-    """`loops` cycles, each moved on the floor by the distance that a cycle covers."""
+    """Return `loops` cycles, each moved on the floor by the distance that a cycle covers."""
     cycle = (motion.root_position[-1] - motion.root_position[0]) * np.array([1.0, 0.0, 1.0])
     position = np.concatenate([motion.root_position + k * cycle for k in range(loops)])
     rotations = {n: Rotation.concatenate([r] * loops) for n, r in motion.rotations.items()}

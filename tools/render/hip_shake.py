@@ -1,4 +1,4 @@
-"""Author the bundled hip-shake: a cyclic dance of one lap, written as a DeepMimic motion file.
+"""Author the bundled hip-shake: a cyclic dance of one cycle, written as a DeepMimic motion file.
 
     python -m tools.render.hip_shake -o hip_shake.txt
     python -m tools.render.render_dancer hip_shake.txt -o clips/hip_shake
@@ -6,7 +6,7 @@
 The pelvis sways from foot to foot and rolls, the chest leans and turns against it, the arms swing
 lightly with bent elbows, both feet stay planted: hips and feet are given and the legs follow by
 two-bone inverse kinematics on the body that will be filmed. Every curve is a smooth function of
-phases that grow by whole turns in a lap, so the last frame continues in the first with every
+phases that grow by whole turns in a cycle, so the last frame continues in the first with every
 derivative.
 
 The figures are chosen for a robot with ball feet, hips that close by 5 degrees, shoulders of two
@@ -40,23 +40,23 @@ LEFT, RIGHT = 1.0, -1.0
 
 @dataclass(frozen=True)
 class Dance:
-    """The choreography; degrees where it says so, else metres and seconds.
+    """The choreography; degrees where noted, else metres and seconds.
 
     Attributes:
-        lap_s: Length of a lap.
-        sways: Left-right sways in a lap.
+        lap_s: Length of a cycle.
+        sways: Left-right sways in a cycle.
         fps: Frames a second of the file.
-        rubato: Radians by which the sway runs ahead of and behind the beat within a lap.
-        swell: Share by which the sway's width grows and shrinks within a lap.
+        rubato: Radians by which the sway runs ahead of and behind the beat within a cycle.
+        swell: Share by which the sway's width grows and shrinks within a cycle.
         sway: Half the way of the pelvis between the feet.
         roll_deg: Pelvis roll at the end of a sway, the loaded hip up.
         pelvis_yaw_deg, chest_yaw_deg: Turn of the pelvis, and of the chest against it.
         chest_roll_deg: Lean of the chest against the sway.
         lean_deg: Forward lean of the trunk.
         bounce: Rise of the pelvis over a foot above the middle of the sway, half of it.
-        dip: Half the slow change of the knee bend within a lap.
-        half_stance: From the middle to an ankle.
-        toe_out_deg: Of each foot.
+        dip: Half the slow change of the knee bend within a cycle.
+        half_stance: Distance from the middle to an ankle.
+        toe_out_deg: Outward turn of each foot.
         knee_deg: Mean bend of the knees at the middle of the sway.
         abduction_deg, abduction_swing_deg: Upper arm away from the trunk, mean and half the swing;
             an arm rises while the hips are on the other side. A single camera sees this swing
@@ -94,12 +94,12 @@ class Dance:
 
 @dataclass(frozen=True)
 class Measures:
-    """What the choreography must know of the body, metres.
+    """Measures of the body for the choreography, metres.
 
     Attributes:
-        hips: From the root to the left and the right hip, upright.
+        hips: Hips from the root to the left and the right hip, upright.
         thigh, shin: Lengths.
-        ankle_height: Of the ankle over the floor.
+        ankle_height: Height of the ankle over the floor.
         scale: Size of the body over that of the motion file's humanoid.
     """
 
@@ -111,7 +111,7 @@ class Measures:
 
 
 def measure(body: "Body") -> Measures:
-    """The lengths of a body, in world axes."""
+    """Return the lengths of a body, in world axes."""
     knee, ankle, root = (body.head_of(bone) for bone in ("lowerleg01.L", "foot.L", "root"))
     hips = {
         side: ANNY_TO_WORLD @ (body.head_of(f"upperleg01.{name}") - root)
@@ -123,7 +123,7 @@ def measure(body: "Body") -> Measures:
 
 
 def author(dance: Dance, measures: Measures) -> deepmimic.Motion:
-    """One lap of the dance; the frame after the last would be the first."""
+    """Return one cycle of the dance; the frame after the last equals the first."""
     lap = 2.0 * np.pi * np.arange(round(dance.lap_s * dance.fps)) / (dance.lap_s * dance.fps)
     beat = dance.sways * lap + dance.rubato * np.sin(lap)
     width = 1.0 + dance.swell * np.sin(lap + 0.6)
@@ -143,7 +143,8 @@ def solve_leg(
     hip: Float[np.ndarray, "T 3"], ankle: Float[np.ndarray, "3"], toe: Float[np.ndarray, "3"],
     thigh: float, shin: float,
 ) -> tuple[Rotation, Rotation]:  # fmt: skip
-    """World rotations of thigh and shin that reach from hip to ankle, the knee towards the toe.
+    """Return the world rotations of thigh and shin that reach from hip to ankle, the knee towards
+    the toe.
 
     Raises:
         ValueError: the ankle is out of reach.
@@ -162,7 +163,7 @@ def solve_leg(
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Command line."""
+    """Run the command line."""
     from tools.render.anny_body import Body
 
     parser = argparse.ArgumentParser(
@@ -186,7 +187,8 @@ def _pelvis_rotation(dance: Dance, beat: np.ndarray, width: np.ndarray) -> Rotat
 def _root_position(
     dance: Dance, measures: Measures, lap: np.ndarray, beat: np.ndarray, width: np.ndarray
 ) -> Float[np.ndarray, "T 3"]:
-    """Sway, bounce and slow dip around the height at which the knees have their mean bend."""
+    """Return the sway, bounce and slow dip around the height at which the knees have their mean
+    bend."""
     hip = measures.hips[LEFT]
     bend = np.radians(dance.knee_deg)
     reach_squared = (
@@ -200,7 +202,8 @@ def _root_position(
 
 
 def _trunk(dance: Dance, beat: np.ndarray, width: np.ndarray) -> dict[str, Rotation]:
-    """The chest leans and turns against the pelvis; the head stays nearly level."""
+    """Return the trunk: the chest leans and turns against the pelvis; the head stays nearly
+    level."""
     lean = np.full_like(beat, dance.lean_deg)
     roll = dance.chest_roll_deg * width * np.sin(beat)
     chest = _yaw_pitch_roll(-dance.chest_yaw_deg * np.sin(beat - np.pi / 3), lean, roll)
@@ -211,7 +214,7 @@ def _trunk(dance: Dance, beat: np.ndarray, width: np.ndarray) -> dict[str, Rotat
 def _leg(
     dance: Dance, measures: Measures, side: float, name: str, hip: Float[np.ndarray, "T 3"]
 ) -> dict[str, Rotation]:
-    """A leg from a moving hip to a planted foot."""
+    """Return a leg from a moving hip to a planted foot."""
     toe_out = side * np.radians(dance.toe_out_deg)
     ankle = np.array([0.0, side * dance.half_stance, measures.ankle_height])
     toe = np.array([np.cos(toe_out), np.sin(toe_out), 0.0])
@@ -223,7 +226,7 @@ def _leg(
 def _arm(
     dance: Dance, side: float, name: str, lap: np.ndarray, beat: np.ndarray, chest: Rotation
 ) -> dict[str, Rotation]:
-    """An arm that rises to the side while the hips are on the other side."""
+    """Return an arm that rises to the side while the hips are on the other side."""
     swing = -side * (1.0 + 0.2 * np.cos(lap)) * np.sin(beat - 0.4)
     abduction = np.radians(dance.abduction_deg + dance.abduction_swing_deg * swing)
     flexion = np.radians(dance.flexion_deg + dance.flexion_swing_deg * swing)
@@ -245,7 +248,7 @@ def _arm(
 
 
 def _limb_rotation(along: Float[np.ndarray, "T 3"], right: Float[np.ndarray, "T 3"]) -> Rotation:
-    """The rotation that takes a limb hanging down with its hinge to the right to `along`."""
+    """Return the rotation that takes a limb hanging down with its hinge to the right to `along`."""
     up, left = -along, -right
     return Rotation.from_matrix(np.stack([np.cross(left, up), left, up], -1))
 

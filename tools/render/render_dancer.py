@@ -28,11 +28,11 @@ logger = logging.getLogger("render_dancer")
 
 @dataclass(frozen=True)
 class Shot:
-    """How a motion is filmed.
+    """Camera and length of a rendered clip.
 
     Attributes:
         yaw: Degrees that the camera goes around the dancer; 0 is the front.
-        loops: Laps of the motion.
+        loops: Cycles of the motion.
         fps: Frames a second of the video.
         width, height: Pixels.
         quality: Constant rate factor of H.264; lower is better and larger.
@@ -59,7 +59,7 @@ def render(motion_file: Path, out: Path, shot: Shot, phenotype: dict[str, float]
 
 
 def write_video(path: Path, pictures: Iterable[np.ndarray], shot: Shot) -> None:
-    """H.264 that browsers play, from RGB pictures."""
+    """Write H.264 that browsers play, from RGB pictures."""
     writer = imageio_ffmpeg.write_frames(
         str(path),
         (shot.width, shot.height),
@@ -77,7 +77,7 @@ def write_video(path: Path, pictures: Iterable[np.ndarray], shot: Shot) -> None:
 def write_truth(
     path: Path, body: Body, posed: PosedBody, camera: dance_floor.Camera, fps: int
 ) -> None:
-    """The joints that the video shows, and the camera that shows them."""
+    """Write the joints that the video shows, and the camera that shows them."""
     columns = [body.bone_names.index(bone) for bone in JOINT_BONES.values()]
     np.savez_compressed(
         path,
@@ -92,7 +92,7 @@ def write_truth(
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Command line."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

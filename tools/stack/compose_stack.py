@@ -40,7 +40,7 @@ QUICK = {
     "PREFECT_RUNNER_POLL_FREQUENCY": "2",
     "ROBOJACKSON_SILENCE_S": os.environ.get("ROBOJACKSON_SILENCE_S", "75"),
 }
-"""For a stack that is tested: workers that ask often, and runs that are soon given up (on a machine
+"""For a stack under test: workers that poll often, and runs that are soon given up (on a machine
 that is busy, set the variable: a run whose imports take 150 s would be given up)."""
 CLIENT = "flow-worker"
 """The service whose environment a command beside the stack gets."""
@@ -49,7 +49,7 @@ BACKUP = "/backup"
 
 
 def passwords() -> dict[str, str]:
-    """What a user writes into .env: new secrets."""
+    """Return what a user writes into .env: new secrets."""
     made = {name: secrets.token_hex(16) for name in PASSWORDS}
     return {**made, "PREFECT_AUTH": f"robojackson:{secrets.token_hex(16)}"}
 
@@ -59,7 +59,7 @@ class Stack:
     """All services of the compose file.
 
     Attributes:
-        folder: For logs, data and homes.
+        folder: Folder for logs, data and homes.
         given: Values of the variables, as in .env.
         scale: How many of a service.
         more: Environment for all services besides the file's.
@@ -89,7 +89,7 @@ class Stack:
         return self
 
     def start(self, name: str, wait: bool = True) -> None:
-        """Start a service, as many of it as the scale asks for.
+        """Start a service, as many of it as the scale sets.
 
         Args:
             wait: Return when it is healthy, or has ended well.
@@ -128,7 +128,7 @@ class Stack:
         return {pid for service in self.services.values() for pid in service.pids}
 
     def client(self) -> dict[str, str]:
-        """The environment of a command beside the stack: what a worker has."""
+        """Return the environment of a command beside the stack: what a worker has."""
         return self._environment(CLIENT, "client")
 
     def _order(self) -> list[str]:
@@ -150,8 +150,8 @@ class Stack:
         log = self.folder / f"{full}.log"
         if name == "postgres":
             test = self.file[name]["healthcheck"]["test"][1]
-            wanted = self.file[name]["environment"]
-            return postgres.service(wanted, test, self.ports[name], self.folder, log)
+            arguments = self.file[name]["environment"]
+            return postgres.service(arguments, test, self.ports[name], self.folder, log)
         if name == "s3":
             return self._s3(log)
         environment = self._environment(name, full)
@@ -163,7 +163,7 @@ class Stack:
         return Service(full, _found(words), environment, check and _found(check), log)
 
     def _environment(self, name: str, full: str) -> dict[str, str]:
-        """The file's, with the addresses of this machine, and a home as in a container."""
+        """Return the file's, with the addresses of this machine, and a home as in a container."""
         home = self.folder / "home" / full
         home.mkdir(parents=True, exist_ok=True)
         ours = {k: self._there(str(v)) for k, v in self.file[name]["environment"].items()}
@@ -179,7 +179,7 @@ class Stack:
         return {**host, **fixed, **ours, **self.more}
 
     def _there(self, text: str) -> str:
-        """Names of other services as addresses of this machine."""
+        """Return names of other services as addresses of this machine."""
         for name, port in PORTS.items():
             text = re.sub(rf"(?<=[/@]){name}:{port}\b", f"127.0.0.1:{self.ports[name]}", text)
         return text
@@ -193,20 +193,21 @@ class Stack:
 
 
 def _here(text: str, environment: dict[str, str], name: str) -> str:
-    """A health check's address with the port that the service has on this machine."""
+    """Return a health check's address with the port that the service has on this machine."""
     kind = "SERVER_API" if name == "prefect-server" else "WORKER_WEBSERVER"
     return re.sub(r"localhost:\d+", f"127.0.0.1:{environment[f'PREFECT_{kind}_PORT']}", text)
 
 
 def _found(words: list[str]) -> list[str]:
-    """A command whose program is that of our environment, as the image has it on its PATH."""
+    """Return a command whose program is that of our environment, as the image has it on its
+    PATH."""
     path = Path(sys.executable).parent / words[0]
     return [str(path) if path.exists() else words[0], *words[1:]]
 
 
 @contextmanager
 def running(folder: Path, **options: Any) -> Iterator[Stack]:
-    """A stack for the time of a block; of its processes, database and sockets nothing stays."""
+    """Yield a stack; of its processes, database and sockets nothing stays afterwards."""
     stack = Stack(folder, **options)
     try:
         yield stack.up()
@@ -216,14 +217,15 @@ def running(folder: Path, **options: Any) -> Iterator[Stack]:
 
 
 def main() -> None:
+    """Run the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument("--folder", type=Path, default=None)
     parser.add_argument("--scale", action="append", default=[], metavar="SERVICE=N")
-    wanted = parser.parse_args()
-    scale = {name: int(count) for name, count in (text.split("=") for text in wanted.scale)}
-    folder = wanted.folder or Path(tempfile.mkdtemp(prefix="robojackson-"))
+    arguments = parser.parse_args()
+    scale = {name: int(count) for name, count in (text.split("=") for text in arguments.scale)}
+    folder = arguments.folder or Path(tempfile.mkdtemp(prefix="robojackson-"))
     for how in (signal.SIGINT, signal.SIGTERM):  # a shell's `&` takes the first away
         signal.signal(how, signal.default_int_handler)
     with suppress(KeyboardInterrupt), running(folder, scale=scale) as stack:

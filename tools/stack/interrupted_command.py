@@ -18,12 +18,12 @@ LIMIT_S = 100.0
 
 @dataclass(frozen=True)
 class End:
-    """How an interrupted command ended.
+    """End of an interrupted command.
 
     Attributes:
         moment_s: When it was interrupted, seconds after its start.
-        acknowledged_s, ended_s: From the signal to the first line about it, and to the end.
-        saving: Whether it said that a checkpoint is being saved.
+        acknowledged_s, ended_s: Seconds from the signal to the first line about it, and to the end.
+        saving: Whether it announced that a checkpoint is being saved.
         code: Exit code.
         lines: What it wrote after the signal.
         faults: What is wrong with it, empty if nothing is.

@@ -17,25 +17,29 @@ from tools.stack.service import Service, StackError
 USER = "postgres"
 
 
-def service(wanted: Mapping[str, str], check: str, port: int, folder: Path, log: Path) -> Service:
-    """The database server of a stack.
+def service(settings: Mapping[str, str], check: str, port: int, folder: Path, log: Path) -> Service:
+    """Return the database server of a stack.
 
     Args:
-        wanted: Environment of the image: POSTGRES_USER, POSTGRES_PASSWORD, POSTGRES_DB.
+        settings: Environment of the image: POSTGRES_USER, POSTGRES_PASSWORD, POSTGRES_DB.
         check: The file's health check, a line of shell.
-        port, folder, log: Where it listens, keeps its data's path, and says what it does.
+        port, folder, log: Where it listens, keeps its data's path, and writes its log.
     """
     home = _home(folder)
     user = USER if os.geteuid() == 0 else None
     if not (home / "data").exists():
-        _initialise(home, wanted, user)
-    access = {"PGPORT": str(port), "PGHOST": "127.0.0.1", "PGPASSWORD": wanted["POSTGRES_PASSWORD"]}
+        _initialise(home, settings, user)
+    access = {
+        "PGPORT": str(port),
+        "PGHOST": "127.0.0.1",
+        "PGPASSWORD": settings["POSTGRES_PASSWORD"],
+    }
     command = [program("postgres"), "-D", str(home / "data"), "-p", str(port), "-h", "127.0.0.1"]
     return Service(
         "postgres",
         [*command, "-k", str(home)],
         {**os.environ, **access},
-        ["sh", "-c", f"{check} && {_database(wanted)}"],
+        ["sh", "-c", f"{check} && {_database(settings)}"],
         log,
         user,
     )
@@ -48,7 +52,7 @@ def remove(folder: Path) -> None:
 
 
 def program(name: str) -> str:
-    """Path of one of PostgreSQL's programs.
+    """Return the path of one of PostgreSQL's programs.
 
     Raises:
         StackError: it is not installed.
@@ -59,22 +63,23 @@ def program(name: str) -> str:
     return str(found[-1])
 
 
-def _initialise(home: Path, wanted: Mapping[str, str], user: str | None) -> None:
+def _initialise(home: Path, settings: Mapping[str, str], user: str | None) -> None:
     secret = home / "password"
-    secret.write_text(wanted["POSTGRES_PASSWORD"])
+    secret.write_text(settings["POSTGRES_PASSWORD"])
     if user:
         shutil.chown(secret, user)
-    words = ["--username", wanted["POSTGRES_USER"], "--pwfile", str(secret)]
+    words = ["--username", settings["POSTGRES_USER"], "--pwfile", str(secret)]
     making = [program("initdb"), "-D", str(home / "data"), "-A", "scram-sha-256", *words]
     subprocess.run(making, user=user, check=True, capture_output=True, cwd="/")
     secret.unlink()
 
 
-def _database(wanted: Mapping[str, str]) -> str:
-    """Shell that makes the database, as the image does at its first start, and asks it."""
-    user, name = wanted["POSTGRES_USER"], wanted["POSTGRES_DB"]
-    asked = f"psql -U {user} -d {name} -c 'select 1'"
-    return f"{{ {asked} 2>/dev/null || createdb -U {user} {name}; {asked}; }}"
+def _database(settings: Mapping[str, str]) -> str:
+    """Return the shell that makes the database, as the image does at its first start, and asks
+    it."""
+    user, name = settings["POSTGRES_USER"], settings["POSTGRES_DB"]
+    probe = f"psql -U {user} -d {name} -c 'select 1'"
+    return f"{{ {probe} 2>/dev/null || createdb -U {user} {name}; {probe}; }}"
 
 
 def _home(folder: Path) -> Path:

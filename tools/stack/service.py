@@ -28,11 +28,11 @@ class Service:
     """One process of the stack.
 
     Attributes:
-        name: In the compose file, with a number behind it for a second one.
+        name: Name in the compose file, with a number behind it for a second one.
         command: Words of the process.
         environment: Whole environment of the process.
         check: Command that succeeds when the service is healthy; None for one that ends by itself.
-        log: File that takes what it says.
+        log: File that takes its output.
         user: Name of the user that runs it, if another than ours.
         grace_s: Time to end by itself before it is killed.
     """
@@ -47,6 +47,7 @@ class Service:
     process: subprocess.Popen[bytes] | None = None
 
     def start(self) -> None:
+        """Start the process."""
         with self.log.open("ab") as out:
             self.process = subprocess.Popen(
                 self.command,
@@ -59,7 +60,8 @@ class Service:
             )
 
     def healthy(self) -> bool:
-        """Whether its own check says so; for one that ends by itself, whether it ended well."""
+        """Return whether its health check succeeds; for a one-shot service, whether it ended
+        well."""
         assert self.process is not None
         code = self.process.poll()
         if self.check is None:
@@ -96,21 +98,21 @@ class Service:
             signal_group(self.process.pid, how)
 
     def murder(self) -> bool:
-        """SIGKILL; whether it was that which ended the process."""
+        """Send SIGKILL; return whether that ended the process."""
         if self.process is None or self.process.poll() is not None:
             return False
         self.kill()
         return self.process.wait(SECONDS_TO_END) == -signal.SIGKILL
 
     def stop(self) -> None:
-        """End it: ask, wait, kill."""
+        """End it: SIGTERM, wait, SIGKILL."""
         if self.process is not None:
             request = signal.SIGINT if self.user else signal.SIGTERM
             end_group(self.process, self.grace_s, request)
 
 
 def interpolate(value: Any, given: Mapping[str, str]) -> Any:
-    """Compose's `${NAME:?message}` and `${NAME:-default}` in all strings of a value.
+    """Return the compose's `${NAME:?message}` and `${NAME:-default}` in all strings of a value.
 
     Raises:
         StackError: a variable that must be set is not.
@@ -132,7 +134,7 @@ def _variable(found: re.Match[str], given: Mapping[str, str]) -> str:
 
 
 def free_port() -> int:
-    """A port that nobody listens on now."""
+    """Return a port on which nothing listens now."""
     with socket.socket() as found:
         found.bind(("127.0.0.1", 0))
         return int(found.getsockname()[1])

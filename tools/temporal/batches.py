@@ -27,9 +27,9 @@ class Batch:
 
     Attributes:
         flat, local, visibility: As in `features.ClipView`, of the landmarks that are read.
-        constant: What the network is told of the clip.
-        distance: Of the hips as placed, metres.
-        truth: Of the same landmarks, NaN-free, metres.
+        constant: What the network knows of the clip.
+        distance: Distance of the hips as placed, metres.
+        truth: Truth of the same landmarks, NaN-free, metres.
         good: 1 in the frames that count, else 0.
     """
 
@@ -42,7 +42,7 @@ class Batch:
     good: np.ndarray
 
     def numbers(self) -> np.ndarray:
-        """The network's input (B, L, F), as `features.numbers` orders it."""
+        """Return the network's input (B, L, F), as `features.numbers` orders it."""
         shape = self.flat.shape[:2]
         constant = np.broadcast_to(self.constant[:, None], (*shape, self.constant.shape[1]))
         parts = (self.flat.reshape(*shape, -1), self.local.reshape(*shape, -1), self.visibility)
@@ -50,7 +50,7 @@ class Batch:
 
 
 def table(examples: Sequence[Example]) -> Batch:
-    """Whole examples, the last frame held to a common length with no weight."""
+    """Return whole examples, the last frame held to a common length with no weight."""
 
     def stack(values: Sequence[np.ndarray]) -> np.ndarray:
         index = [np.minimum(np.arange(LONGEST), len(v) - 1) for v in values]
@@ -70,12 +70,12 @@ def table(examples: Sequence[Example]) -> Batch:
 
 
 def lengths(good: np.ndarray) -> np.ndarray:
-    """Frames of each row up to the last that counts."""
+    """Return frames of each row up to the last that counts."""
     return LONGEST - np.argmax(good[:, ::-1] > 0, axis=1)
 
 
 def windows(whole: Batch, rows: np.ndarray, frames: int, rng: np.random.Generator) -> Batch:
-    """A window of each row, anywhere in it."""
+    """Return a window of each row, anywhere in it."""
     latest = np.maximum(lengths(whole.good[rows]) - frames, 0)
     starts = rng.integers(0, latest + 1)
     index = (rows[:, None], np.minimum(starts[:, None] + np.arange(frames), LONGEST - 1))
@@ -84,7 +84,7 @@ def windows(whole: Batch, rows: np.ndarray, frames: int, rng: np.random.Generato
 
 
 def joined(first: Batch, second: Batch) -> Batch:
-    """Both."""
+    """Return both batches as one."""
     return Batch(
         **{
             f.name: np.concatenate([getattr(first, f.name), getattr(second, f.name)])
@@ -94,7 +94,7 @@ def joined(first: Batch, second: Batch) -> Batch:
 
 
 def change(batch: Batch, how: Change, rng: np.random.Generator) -> Batch:
-    """The windows, changed."""
+    """Return the windows, changed."""
     count = len(batch.flat)
     batch = _mirrored(batch, rng.uniform(size=count) < 0.5)
     angle = np.radians(rng.normal(0.0, how.roll_deg, count))

@@ -40,7 +40,7 @@ class Example:
         sight: What was seen.
         truth: All landmarks along the rays, NaN where there is none, metres.
         good: Frames that count.
-        distance: Of the hips from the camera, metres.
+        distance: Distance of the hips from the camera, metres.
         motion: Its name.
     """
 
@@ -52,26 +52,27 @@ class Example:
 
 
 def along_rays(truth_c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Landmarks before the camera (T, 33, 3) along the ray to the hips, and the hips' distance."""
+    """Return landmarks before the camera (T, 33, 3) along the ray to the hips, and the hips'
+    distance."""
     root = truth_c[:, features.HIPS].mean(1)
     axes = np.swapaxes(features.axes_along(root), -1, -2)
     return apply(axes[:, None], truth_c - root[:, None]), np.linalg.norm(root, axis=-1)
 
 
 def flattened(truth: np.ndarray, distance: np.ndarray) -> np.ndarray:
-    """What `ClipView.flat` would be without an error."""
+    """Return what `ClipView.flat` would be without an error."""
     away = distance[:, None, None]
     return truth[..., :2] * away / (away + truth[..., 2:])
 
 
 def body_size(truth: np.ndarray) -> float:
-    """Sum of the lengths of trunk and limbs, metres: median over the clip."""
+    """Return the sum of the lengths of trunk and limbs, metres: median over the clip."""
     lengths = [np.linalg.norm(truth[:, a] - truth[:, b], axis=-1) for a, b in BONES]
     return float(np.median(np.sum(lengths, axis=0)))
 
 
 def read(path: Path) -> Example | None:
-    """The example of a pair file; None if the detector lost the person too often."""
+    """Return the example of a pair file; None if the detector lost the person too often."""
     with np.load(path) as pair:
         stride = int(pair["stride"])
         seen, (width, height) = pair["seen"][::stride].astype(float), pair["size"].tolist()
@@ -95,7 +96,7 @@ def read(path: Path) -> Example | None:
 
 
 def sight_of(track: LandmarkTrack) -> ClipView:
-    """As in `recover_motion`, up to the network."""
+    """Return the view of the clip, as in `recover_motion`, up to the network."""
     config, landmarks = MocapConfig(), repair(track)
     focal = pinhole_camera.guess_focal(track.width, track.height)
     lens = pinhole_camera.Pinhole(focal, track.width, track.height)
@@ -104,7 +105,7 @@ def sight_of(track: LandmarkTrack) -> ClipView:
 
 
 def load(folder: Path) -> tuple[list[Example], list[Example]]:
-    """Training and validation examples of a folder of pairs."""
+    """Return the training and validation examples of a folder of pairs."""
     training: list[Example] = []
     validation: list[Example] = []
     for path in sorted(folder.glob("[0-9]*_[0-9]*.npz")):

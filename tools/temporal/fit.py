@@ -23,17 +23,17 @@ from tools.temporal.truths import Bank
 
 @dataclass(frozen=True)
 class FitConfig:
-    """How the lifter is fitted.
+    """Configuration of fitting the lifter.
 
     Attributes:
-        steps: Of the optimiser.
+        steps: Steps of the optimiser.
         batch: Windows a step.
         rate: Learning rate, warmed up over 100 steps, then a cosine.
         decay: Weight decay.
         invented: Share of windows of the invented detector, at the first and the last step.
         velocity, spread: Weights of these losses beside that of the place.
         average: Memory of the running mean of the weights, which is what is kept.
-        change: Of the windows.
+        change: Change of the windows.
     """
 
     steps: int = 6000
@@ -49,7 +49,7 @@ class FitConfig:
 
 @dataclass
 class Progress:
-    """All that a run needs to go on."""
+    """State that a run needs to resume."""
 
     step: int
     net: Lifter
@@ -60,14 +60,14 @@ class Progress:
 
 @dataclass(frozen=True)
 class Source:
-    """Where batches come from."""
+    """Source of batches."""
 
     real: Batch
     bank: Bank | None
     detector: Detector
 
     def draw(self, config: FitConfig, share: float, rng: np.random.Generator) -> Batch:
-        """A batch, changed."""
+        """Return a batch, changed."""
         frames, count = config.change.frames, config.batch
         made = round(count * share) if self.bank else 0
         rows = rng.integers(0, len(self.real.good), count - made)
@@ -87,7 +87,7 @@ def source(examples: Sequence[Example], bank: Bank | None) -> Source:
 
 
 def begin(examples: Sequence[Example], config: FitConfig, seed: int) -> Progress:
-    """A fresh network, its input normalised by the examples."""
+    """Return a fresh network, its input normalised by the examples."""
     torch.manual_seed(seed)
     net = Lifter()
     numbers = np.concatenate([features.numbers(e.sight)[::10] for e in examples])
@@ -126,7 +126,8 @@ def fit(
 def losses_of(
     correction: torch.Tensor, log_spread: torch.Tensor, batch: Batch
 ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]:
-    """Mean distance of joints (m), of their steps (m a frame), likelihood of the spread; errors."""
+    """Return the mean distance of joints (m), of their steps (m a frame), likelihood of the spread;
+    errors."""
     flat, body, good = (torch.from_numpy(np.ascontiguousarray(v, np.float32)) for v in (
         batch.flat[:, :, TWELVE], batch.truth[:, :, TWELVE], batch.good))  # fmt: skip
     depth = torch.from_numpy(np.ascontiguousarray(batch.local[:, :, TWELVE, 2], np.float32))
@@ -143,7 +144,8 @@ def losses_of(
 
 
 def validate(net: Lifter, examples: Sequence[Example]) -> dict[str, float]:
-    """PA-MPJPE and root-relative MPJPE of detector and network on examples, mm, mean of clips."""
+    """Return PA-MPJPE and root-relative MPJPE of detector and network on examples, mm, mean of
+    clips."""
     net.eval()
     rows = []
     for example in examples:
@@ -166,7 +168,7 @@ def validate(net: Lifter, examples: Sequence[Example]) -> dict[str, float]:
 
 
 def averaged(progress: Progress) -> Lifter:
-    """The network with the running mean of its weights."""
+    """Return the network with the running mean of its weights."""
     net = Lifter()
     net.load_state_dict(progress.mean)
     return net

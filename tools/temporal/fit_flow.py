@@ -1,7 +1,7 @@
 """Fitting the flow on the lifter's errors, with NIKI's losses (Li et al., CVPR 2023).
 
 Inverse: the error's z is likely under an AR(1) process of standard normals. Forward: z = 0 is the
-lifter's own answer. Boundary: a clean clip has z = 0. Independence: z tells nothing of the pose
+lifter's own answer. Boundary: a clean clip has z = 0. Independence: z carries nothing of the pose
 (maximum mean discrepancy between (pose, z) and (pose, noise)).
 """
 
@@ -28,7 +28,7 @@ def fit_flow(
     seed: int,
     watch: Callable[[int, dict[str, float]], None],
 ) -> Flow:
-    """A flow for a trained lifter, which stays as it is; fitted to the real pairs alone."""
+    """Return a flow for a trained lifter, which stays as it is; fitted to the real pairs alone."""
     torch.manual_seed(seed)
     lifter.eval()
     flow = Flow()
@@ -50,7 +50,7 @@ def fit_flow(
 def flow_losses(
     flow: Flow, lifter: Lifter, batch: Batch, rng: np.random.Generator
 ) -> dict[str, torch.Tensor]:
-    """The four losses."""
+    """Return the four losses."""
     error, h = _errors(lifter, batch)
     good = torch.from_numpy(batch.good)
     body = torch.from_numpy(np.ascontiguousarray(batch.truth[:, :, TWELVE], np.float32))
@@ -65,7 +65,7 @@ def flow_losses(
 
 
 def cleaned(batch: Batch) -> Batch:
-    """The windows as a perfect detector would see the person."""
+    """Return the windows as a perfect detector would see the person."""
     away = batch.distance[..., None, None]
     flat = batch.truth[..., :2] * away / (away + batch.truth[..., 2:])
     seen = np.ones_like(batch.visibility)
@@ -73,7 +73,7 @@ def cleaned(batch: Batch) -> Batch:
 
 
 def independence(body: torch.Tensor, z: torch.Tensor, rng: np.random.Generator) -> torch.Tensor:
-    """Discrepancy between pose with z and pose with noise, on some frames."""
+    """Return the discrepancy between pose with z and pose with noise, on some frames."""
     chosen = torch.from_numpy(rng.permutation(len(z))[:SAMPLE])
     pose = body[chosen].flatten(1)
     pose = pose / (pose.std() + 1e-6)
@@ -85,7 +85,8 @@ def independence(body: torch.Tensor, z: torch.Tensor, rng: np.random.Generator) 
 
 
 def discrepancy(x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
-    """Maximum mean discrepancy with inverse multiquadric kernels (Gretton et al. 2012)."""
+    """Return the maximum mean discrepancy with inverse multiquadric kernels (Gretton et al.
+    2012)."""
     joined = torch.cat([x, y])
     squares = torch.cdist(joined, joined) ** 2
     size = squares.mean().detach()
@@ -95,7 +96,7 @@ def discrepancy(x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
 
 
 def _errors(lifter: Lifter, batch: Batch) -> tuple[torch.Tensor, torch.Tensor]:
-    """Error over spread (B, T, 36), and features."""
+    """Return the error over spread (B, T, 36), and features."""
     with torch.no_grad():
         h = lifter.features(torch.from_numpy(batch.numbers()))
         correction, log_spread = lifter.head(h)
@@ -105,7 +106,7 @@ def _errors(lifter: Lifter, batch: Batch) -> tuple[torch.Tensor, torch.Tensor]:
 
 
 def _log_likelihood(flow: Flow, z: torch.Tensor, good: torch.Tensor) -> torch.Tensor:
-    """Of a course of z under the AR(1) prior, nats a frame."""
+    """Return the log-likelihood of a course of z under the AR(1) prior, nats a frame."""
     memory = torch.sigmoid(flow.memory)
     fresh = 1.0 - memory**2
     step = z[:, 1:] - memory * z[:, :-1]

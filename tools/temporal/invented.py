@@ -53,7 +53,7 @@ def _row(truth: np.ndarray) -> np.ndarray:
 
 
 def _errors(real: Batch) -> np.ndarray:
-    """Errors of depth and image of what was seen, (B, T, 5 N)."""
+    """Return the errors of depth and image of what was detected, (B, T, 5 N)."""
     away = real.distance[..., None, None]
     ideal = real.truth[..., :2] * away / (away + real.truth[..., 2:])
     errors = np.concatenate([real.local - real.truth, real.flat - ideal], -1)

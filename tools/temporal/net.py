@@ -27,7 +27,7 @@ class Block(nn.Module):
         self.dropout = nn.Dropout(dropout)
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
-        """(B, T, C) to the same."""
+        """Return (B, T, C) to the same."""
         normal, count, d = self.norm(x), x.shape[1], self.dilation
         first, last = normal[:, :1].expand(-1, d, -1), normal[:, -1:].expand(-1, d, -1)
         held = torch.cat([first, normal, last], 1)
@@ -53,19 +53,19 @@ class Lifter(nn.Module):
         nn.init.zeros_(self.leave.bias)
 
     def features(self, x: torch.Tensor) -> torch.Tensor:
-        """Input (B, T, COUNT) to what the last layer and the flow read, (B, T, C)."""
+        """Return the input (B, T, COUNT) to what the last layer and the flow read, (B, T, C)."""
         h = self.enter((x - self.mean) * self.scale)
         for block in self.blocks:
             h = block(h)
         return h
 
     def head(self, h: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Correction (B, T, 12, 3) and log spread (B, T, 12, 2)."""
+        """Return the correction (B, T, 12, 3) and log spread (B, T, 12, 2)."""
         out = self.leave(h).unflatten(-1, (JOINTS, 5))
         return out[..., :3], out[..., 3:].clamp(-SPREAD_RANGE, SPREAD_RANGE) + LOG_SPREAD
 
     def forward(self, x: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Correction and log spread of a clip."""
+        """Return the correction and log spread of a clip."""
         return self.head(self.features(x))
 
 
@@ -79,7 +79,7 @@ class Flow(nn.Module):
         self.couplings = nn.ModuleList(_coupling() for _ in range(error_flow.LAYERS))
 
     def forward(self, x: torch.Tensor, h: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Error to z, and the logarithm of the volume change."""
+        """Return the error to z, and the logarithm of the volume change."""
         condition = torch.relu(self.read(h))
         volume = x.new_zeros(x.shape[:-1])
         for layer in range(error_flow.LAYERS):
@@ -89,7 +89,7 @@ class Flow(nn.Module):
         return x, volume
 
     def inverse(self, z: torch.Tensor, h: torch.Tensor) -> torch.Tensor:
-        """z to error."""
+        """Return z to error."""
         condition = torch.relu(self.read(h))
         for layer in reversed(range(error_flow.LAYERS)):
             kept, scale, shift = self._nets(z, condition, layer)

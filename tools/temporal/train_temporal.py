@@ -67,8 +67,8 @@ def train(
         if now.step % 300 == 0 or now.step == config.steps:
             now.curve[-1] |= fit.validate(fit.averaged(now), validation)
         keep(now, state)
-        told = ", ".join(f"{k} {v:.4g}" for k, v in now.curve[-1].items())
-        log.info("%s; %.0f CPU s left", told, (config.steps - now.step) * step_s)
+        figures = ", ".join(f"{k} {v:.4g}" for k, v in now.curve[-1].items())
+        log.info("%s; %.0f CPU s left", figures, (config.steps - now.step) * step_s)
 
     bank = bank_of(pairs, motions, count, seed) if count else None
     where = fit.source(training, bank)
@@ -91,7 +91,7 @@ def train(
 
 
 def save(lifter: Lifter, flow: Flow, path: Path) -> None:
-    """Both in one file, half precision but for the normalisation of the input."""
+    """Write both networks to one file, half precision but for the normalisation of the input."""
     arrays = dict(lifter.state_dict())
     arrays |= {f"flow.{name}": value for name, value in flow.state_dict().items()}
     keep_exact = ("mean", "scale")
@@ -134,7 +134,7 @@ def resume(progress: fit.Progress, path: Path) -> None:
 
 
 def draw_curve(report: dict[str, object], path: Path) -> None:
-    """The curve as a picture."""
+    """Draw the curve as a picture."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -144,11 +144,11 @@ def draw_curve(report: dict[str, object], path: Path) -> None:
     assert isinstance(curve, list)
     figure, axes = pyplot.subplots(figsize=(7, 4))
     axes.plot([c["step"] for c in curve], [1e3 * c["place"] for c in curve], label="training")
-    judged = [c for c in curve if "rr_network" in c]
+    evaluated = [c for c in curve if "rr_network" in c]
     for key, label in (("rr_network", "validation"), ("pa_network", "validation, PA")):
-        axes.plot([c["step"] for c in judged], [c[key] for c in judged], "o-", label=label)
+        axes.plot([c["step"] for c in evaluated], [c[key] for c in evaluated], "o-", label=label)
     for key in ("rr_detector", "pa_detector"):
-        axes.axhline(judged[-1][key], ls=":", c="grey")
+        axes.axhline(evaluated[-1][key], ls=":", c="grey")
     axes.set(xlabel="step", ylabel="MPJPE, mm (dotted: the detector)", ylim=(0, None))
     axes.legend()
     figure.tight_layout()
@@ -156,7 +156,7 @@ def draw_curve(report: dict[str, object], path: Path) -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Command line."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -8,7 +8,7 @@ from robojackson.files.file_tree import FileTree, in_one_line
 from robojackson.files.local_folder import sha256_of_file
 from robojackson.pipeline.folder_lock import A_MOMENT, locked
 from robojackson.pipeline.tracker_descriptions import describe_tracker, tracker_names
-from robojackson.rl.trackers.tracker_description import TrackerDescription
+from robojackson.rl.trackers.tracker_description import TrackerDescription, TrackerFile
 from robojackson.rl.trackers.tracker_file import is_present, open_tracker, tracker_path
 
 LOCK = ".add.lock"
@@ -47,32 +47,35 @@ def add_tracker(name: str, file: Path | None = None) -> Entry:
         StoreError: the store cannot be written.
     """
     tracker = describe_tracker(name)
-    path = tracker_path(tracker)
-    told = {"tracker": name, "file": str(path), "licence": tracker.licence}
+    pinned, path = tracker.file, tracker_path(tracker)
+    told = {"tracker": name, "file": str(path or ""), "licence": tracker.licence}
+    if pinned is None or pinned.url is None or path is None:
+        open_tracker(tracker)
+        return {**told, "added": False}
     if file is not None and not path.is_file():
-        _require_pinned(tracker, file)
+        _require_pinned(name, pinned, file)
     with in_one_line(f"cannot write {path.parent}"):
         path.parent.mkdir(parents=True, exist_ok=True)
     with locked(path.parent, LOCK, A_MOMENT):
-        if path.is_file() and sha256_of_file(path) == tracker.file.sha256:
+        if path.is_file() and sha256_of_file(path) == pinned.sha256:
             return {**told, "added": False}
         if file is not None:
-            _require_pinned(tracker, file)
+            _require_pinned(name, pinned, file)
             FileTree(path.parent).write(path.name, file)
         else:
             with in_one_line(f"cannot write {path}"):
-                download(tracker.file.url, path, tracker.file.size, tracker.file.sha256)
+                download(pinned.url, path, pinned.size, pinned.sha256)
     open_tracker(tracker)  # a file that cannot be run is reported now
     return {**told, "added": True}
 
 
-def _require_pinned(tracker: TrackerDescription, file: Path) -> None:
+def _require_pinned(name: str, pinned: TrackerFile, file: Path) -> None:
     with in_one_line(f"cannot read {file}", StoreError):
         digest = sha256_of_file(file)
-    if digest != tracker.file.sha256:
+    if digest != pinned.sha256:
         raise BadPolicy(
-            f"{file} is not the file that tracker {tracker.name!r} pins: its sha256 is {digest}, "
-            f"expected {tracker.file.sha256}; {tracker.file.url} is its address"
+            f"{file} is not the file that tracker {name!r} pins: its sha256 is {digest}, "
+            f"expected {pinned.sha256}; {pinned.url} is its address"
         )
 
 

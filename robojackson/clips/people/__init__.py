@@ -1,1 +1,1 @@
-"""Who is in a clip, and how the camera moves around them."""
+"""People in a clip, and how the camera moves around them."""

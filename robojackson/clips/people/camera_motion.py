@@ -1,7 +1,7 @@
 """Does the camera stand still? Displacement of the background between two frames, a few a second.
 
 Corners outside the person's box are followed by Lucas-Kanade; the camera moved if most of them did
-(the median: somebody who walks by is a few corners). Displacements are shares of the image's
+(the median: a person who walks by is a few corners). Displacements are shares of the image's
 diagonal, a frame.
 """
 
@@ -22,12 +22,14 @@ LEAST_TEXTURE = 3e-3
 
 @config_dataclass
 class CameraConfig:
-    """Attributes:
-    samples_per_s: Pairs of frames that are compared, a second.
-    fewest: Pairs that are compared in a short clip.
-    short_side: Pixels of the short side of the pictures that are compared.
-    corners: Most corners that are followed.
-    still: Displacement of a camera that stands, image diagonals a frame.
+    """Configuration of measuring the camera's motion.
+
+    Attributes:
+        samples_per_s: Pairs of frames that are compared, a second.
+        fewest: Pairs that are compared in a short clip.
+        short_side: Pixels of the short side of the pictures that are compared.
+        corners: Most corners that are followed.
+        still: Displacement of a camera that stands, image diagonals a frame.
     """
 
     samples_per_s: float = Field(default=2.0, gt=0)
@@ -47,7 +49,7 @@ class CameraMotion:
         self.displacements: list[float] = []
 
     def add_frame(self, index: int, image: np.ndarray, xy: Float[np.ndarray, "33 2"]) -> None:
-        """Frame number `index`, RGB, with the landmarks of the person in it."""
+        """Add frame number `index`, RGB, with the landmarks of the person in it."""
         if self._before is not None:
             after = self._small(image)
             self.displacements.append(displacement(self._before, after, xy, self._config.corners))
@@ -73,7 +75,8 @@ def displacement(
     xy: Float[np.ndarray, "33 2"],
     corners: int,
 ) -> float:
-    """How far the background moved, in diagonals; NaN where nothing in it could be followed."""
+    """Return how far the background moved, in diagonals; NaN where nothing in it could be
+    followed."""
     height, width = before.shape
     mask = np.full_like(before, 255)
     person = box(xy, PERSON_MARGIN, width, height)
@@ -95,6 +98,7 @@ def displacement(
 
 
 def spread(frames: int, fps: float, per_second: float, fewest: int) -> frozenset[int]:
-    """Numbers of frames, evenly spread over a clip: so many a second, and at least so many."""
-    wanted = min(max(round(frames / fps * per_second), fewest), max(frames, 0))
-    return frozenset(int((i + 0.5) * frames / wanted) for i in range(wanted))
+    """Return the numbers of frames, evenly spread over a clip: so many a second, and at least so
+    many."""
+    count = min(max(round(frames / fps * per_second), fewest), max(frames, 0))
+    return frozenset(int((i + 0.5) * frames / count) for i in range(count))

@@ -1,4 +1,4 @@
-"""How the camera moved: the background of every frame laid onto that of the first.
+"""Motion of the camera: register the background of every frame with that of the first.
 
 Corners outside the person's box are followed by Lucas-Kanade from frame to frame; what most of them
 did together (RANSAC) is the camera's motion as a homography, exact for a camera that turns or zooms
@@ -29,7 +29,7 @@ CORNERS, FEWEST = 160, 12
 CELLS = 3, 4
 """Rows and columns of the image that share the corners evenly."""
 RENEW = 0.6
-"""Corners are found anew when fewer than this share of them is left."""
+"""Corners are found again when fewer than this share of them is left."""
 INLIER = 1.5
 """Pixels of the small picture; a corner further off did not move with the background."""
 AGREED = 0.5
@@ -68,29 +68,29 @@ class CameraPath:
 
     @property
     def moved(self) -> bool:
-        """Whether the camera moved, as far as it was seen."""
+        """Whether the camera moved, as far as the background shows it."""
         return bool(self.stray > STILL)
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What the user must know; nothing where the camera stood."""
-        told = []
+        messages = []
         lost = np.flatnonzero(self.jumps)
         if len(lost):
-            told.append(
+            messages.append(
                 f"the background jumps in {len(lost)} frames (first: {lost[0]}), a cut or a "
                 "violent shake: the path through the room is not to be trusted"
             )
         if self.blind.mean() > BLIND_SHARE:
-            told.append(
+            messages.append(
                 f"whether the camera moved cannot be seen in {self.blind.mean():.0%} of the "
                 "frames: the background shows no corners"
             )
         if self.moved:
-            told.append(
+            messages.append(
                 f"the camera moved by {self.stray:.0%} of the image: taken out by its background"
             )
-        return tuple(told)
+        return tuple(messages)
 
 
 def camera_path(
@@ -99,12 +99,12 @@ def camera_path(
     width: int,
     height: int,
 ) -> CameraPath:
-    """The camera's motion.
+    """Return the camera's motion.
 
     Args:
         images: RGB frames, upright, of any one size.
-        landmarks: Of the person, 0..1, NaN where nobody was found.
-        width, height: Of the full upright image, pixels.
+        landmarks: Landmarks of the person, 0..1, NaN where no person was detected.
+        width, height: Width and height of the full upright image, pixels.
     """
     follower = CameraFollower()
     for image, xy in zip(images, landmarks, strict=False):
@@ -115,14 +115,14 @@ def camera_path(
 def warp(
     points: Float[np.ndarray, "T N 2"], to_first: Float[np.ndarray, "T 3 3"]
 ) -> Float[np.ndarray, "T N 2"]:
-    """Pixels of each frame as pixels of the first."""
+    """Return pixels of each frame as pixels of the first."""
     ahead = np.concatenate([points, np.ones((*points.shape[:2], 1))], -1)
     moved = np.einsum("tij,tnj->tni", to_first, ahead)
     return np.asarray(moved[..., :2] / moved[..., 2:])
 
 
 def stray_of(to_first: Float[np.ndarray, "T 3 3"], width: int, height: int) -> float:
-    """Greatest displacement of the corners and the middle of the image, diagonals."""
+    """Return the greatest displacement of the corners and the middle of the image, diagonals."""
     marks = np.array([[0, 0], [1, 0], [0, 1], [1, 1], [0.5, 0.5]]) * [width, height]
     moved = warp(np.broadcast_to(marks, (len(to_first), 5, 2)), to_first)
     return float(np.linalg.norm(moved - marks, axis=-1).max() / np.hypot(width, height))
@@ -171,7 +171,8 @@ class CameraFollower:
         self._before = grey
 
     def _followed(self, grey: np.ndarray) -> np.ndarray | None:
-        """From this frame to the start of the link; None where the background was lost."""
+        """Return the map from this frame to the start of the link; None where the background was
+        lost."""
         before = self._before
         if before is None or before.shape != grey.shape or len(self._at) < FEWEST_STANDING:
             return None
@@ -189,7 +190,8 @@ class CameraFollower:
         return fit
 
     def _moving(self, now: np.ndarray, start: np.ndarray) -> tuple[np.ndarray | None, np.ndarray]:
-        """What most corners did together, if they are spread over the image; and which did."""
+        """Return what most corners did together, if they are spread over the image; and which
+        did."""
         fit, inlier = cv2.findHomography(now, start, cv2.RANSAC, INLIER)
         if fit is None:
             return None, np.zeros(len(now), bool)
@@ -200,7 +202,8 @@ class CameraFollower:
         return (np.asarray(fit) if hull >= SPREAD * np.prod(self.size) else None), agreed
 
     def _changed(self, grey: np.ndarray, xy: np.ndarray) -> bool:
-        """Whether the background is another picture than before; blurred, so that noise is none."""
+        """Return whether the background is another picture than before; blurred, so that noise is
+        none."""
         if self._before is None:
             return False
         if self._before.shape != grey.shape:
@@ -211,14 +214,14 @@ class CameraFollower:
 
 
 def _still(now: np.ndarray, start: np.ndarray) -> np.ndarray | None:
-    """No motion at all, if enough corners have kept their place."""
+    """Return the identity if enough corners have kept their place."""
     near = np.linalg.norm((now - start)[:, 0], axis=-1) < MATCHED_SHARE
     stands = near.sum() >= max(FEWEST_STANDING, STANDS * len(near))
     return np.eye(3) if stands else None
 
 
 def _mask(grey: np.ndarray, xy: np.ndarray) -> np.ndarray:
-    """255 outside the person's box."""
+    """Return 255 outside the person's box."""
     mask = np.full_like(grey, 255)
     person = box(xy, PERSON_MARGIN, grey.shape[1], grey.shape[0])
     if person:
@@ -228,7 +231,8 @@ def _mask(grey: np.ndarray, xy: np.ndarray) -> np.ndarray:
 
 
 def _corners(grey: np.ndarray, xy: np.ndarray) -> Float32[np.ndarray, "N 1 2"]:
-    """The best corners of each cell of the image: one striking thing has no more votes than others.
+    """Return the best corners of each cell of the image: one striking thing has no more votes than
+    others.
 
     What is no corner but noise is lost at once by Lucas-Kanade (`LEAST_TEXTURE`).
     """

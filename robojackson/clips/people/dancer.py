@@ -1,8 +1,8 @@
 """The dancer of a clip in which there may be others: one person, the same from first to last frame.
 
-A clip of one is looked at once. Where a few frames show somebody else, everybody is looked for in
-every frame (`person_detection`) and told apart (`identity`); then the dancer is followed as if he
-were alone, with all others painted over, because the detector sees best whom it follows. The
+A clip of one person is processed once. Where a few frames show another, all people are detected in
+every frame (`person_detection`) and identified (`identity`); then the dancer is followed as if
+alone, with all others painted over, because the detector is best on the person it follows. The
 largest steady person is number 1 and danced by default.
 """
 
@@ -37,15 +37,15 @@ Progress = Callable[[int, int], None]
 
 @config_dataclass
 class DancerConfig:
-    """How the dancer is found among others.
+    """Configuration of following one dancer among others.
 
     Attributes:
-        number: Whom to dance: 1 is the largest steady person, None too.
-        scouts: The few frames in which somebody else is looked for.
-        detection, identity: Of everybody in every frame.
-        astray: Body heights; a row further than this from where the person must be is another's.
+        number: The person to follow: 1 is the largest steady person, and so is None.
+        scouts: The few frames in which other people are looked for.
+        detection, identity: Configurations of detecting and identifying all people in every frame.
+        astray: Body heights; a detection further than this from the expected place is another's.
         crowding: People nearer than this hide one another, body heights.
-        longest_gap_s: He is looked for in gaps up to this, seconds.
+        longest_gap_s: Longest gap in which the person is looked for, seconds.
     """
 
     number: int | None = Field(default=None, ge=1)
@@ -65,18 +65,18 @@ def track_dancer(
     progress: Progress | None = None,
     watch: Watcher | None = None,
 ) -> LandmarkTrack:
-    """Landmarks of one person, NaN rows where he is not seen.
+    """Return the landmarks of one person, NaN rows where they are not visible.
 
     Args:
         path: Video file.
         info: What `probe` found in it.
         size: lite, full or heavy.
-        config: Whom to follow, and how.
+        config: Which person to follow, and how.
         progress: Called with (frames done, frames in all); others in view make it several passes.
         watch: Sees every frame with the landmarks of the first pass, which are the track's where
             it tells of no others (`people` 0).
     Raises:
-        NoPersonFound: there is no person of that number; the message tells who is there.
+        NoPersonFound: there is no person of that number; the message lists the people.
         MissingDependency: no model bundle, or no EGL and GLES libraries.
     """
     if config.number is None or config.number == 1:
@@ -106,7 +106,8 @@ def _scouted(
     progress: Progress | None,
     also: Watcher | None,
 ) -> tuple[LandmarkTrack, bool]:
-    """The track of a person who is alone, and whether somebody else was seen in a few frames."""
+    """Return the track of a person who is alone, and whether another person was detected in a few
+    frames."""
     with still_landmarker(SCOUT) as landmarker:
         scouts = People(info.frames, info.fps, landmarker, config.scouts)
 
@@ -127,16 +128,16 @@ def _followed(
     config: DancerConfig,
     progress: Progress | None,
 ) -> Float[np.ndarray, "T 33 7"]:
-    """Rows of one person, the others painted over; what is known of everybody where that goes
-    astray."""
+    """Return rows of one person, the others painted over; what is known of everybody where that
+    goes astray."""
     known = cast.rows[chosen]
     others = np.array([rows for number, rows in enumerate(cast.rows) if number != chosen])
-    wanted = near_known(known, cast.time_s, config.longest_gap_s)
+    needed = near_known(known, cast.time_s, config.longest_gap_s)
     found = np.full_like(known, np.nan)
     with video_landmarker(size) as detect_frame:
         frames = timed_frames(path, short_side=SHORT_SIDE)
         for index, (time_s, image) in zip(range(len(known)), frames, strict=False):
-            if wanted[index]:
+            if needed[index]:
                 width = config.detection.limb_width
                 found[index] = detect_frame(
                     mask_others(image, known[index], others[:, index], width), time_s
@@ -150,7 +151,7 @@ def _followed(
 def near_known(
     known: Float[np.ndarray, "T 33 7"], time_s: Float[np.ndarray, " T"], gap_s: float
 ) -> Bool[np.ndarray, " T"]:
-    """Frames that are no further from one in which he was seen."""
+    """Return the frames that are near enough to one in which the person was detected."""
     seen = time_s[~np.isnan(known[:, 0, 0])]
     return np.asarray(np.abs(time_s[:, None] - seen).min(1) <= gap_s)
 
@@ -161,7 +162,7 @@ def mask_others(
     others: Float[np.ndarray, "P 33 7"],
     limb_width: float,
 ) -> UInt8[np.ndarray, "H W 3"]:
-    """The picture with all others painted over where they do not cover the person."""
+    """Return the picture with all others painted over where they do not cover the person."""
     height, width = image.shape[:2]
     clear = image.copy()
     kept = np.zeros((height, width), bool)
@@ -181,7 +182,8 @@ def checked(
     size: tuple[int, int],
     config: DancerConfig,
 ) -> Float[np.ndarray, "T 33 7"]:
-    """What was found of a person, what was known where that is astray, NaN where neither is.
+    """Return the detections of a person, the known position where one is astray, NaN where neither
+    exists.
 
     While nobody saw him he may be found on the line from the place before to the place after, if no
     other's line comes near.
@@ -212,7 +214,7 @@ def _course(
 
 
 def _shifted(progress: Progress | None, frames: int, before: int, passes: int) -> Progress | None:
-    """Progress of one pass over the frames, so many of which are done before it."""
+    """Return the progress of one pass over the frames, so many of which are done before it."""
     if progress is None:
         return None
     return lambda done, total: progress(before * frames + done, passes * frames)

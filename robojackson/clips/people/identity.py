@@ -1,7 +1,7 @@
-"""Who is who: the detections of all frames put together to one track a person.
+"""Identity: join the detections of all frames to one track a person.
 
-The ends of the tracklets in which nobody can be mistaken are linked to the beginnings of later
-ones, all at once (a path cover of least cost, by the Hungarian method): two who cross are told
+The ends of unambiguous tracklets are linked to the beginnings of later
+ones, all at once (a path cover of least cost, by the Hungarian method): two who cross are kept
 apart by where both were going, by their sizes and by their colours. What was seen of the two as
 one is left out when it is short, and goes to whom it fits best when it is long.
 """
@@ -24,7 +24,7 @@ NEAR = 30
 
 @config_dataclass
 class IdentityConfig:
-    """How much may change from one detection of a person to the next.
+    """Allowed changes from one detection of a person to the next.
 
     Attributes:
         tracklets: What a tracklet is.
@@ -38,8 +38,8 @@ class IdentityConfig:
         growth: Change of size, ratio.
         colour: Change of the mean colours, units of CIELAB.
         parting: Cost of ending one person and beginning another, unitless.
-        shortest_s: Who is seen for less than this is nobody, seconds.
-        least_share: Who is seen in less than this share of the clip is nobody.
+        shortest_s: Shortest time for which a person is visible, seconds.
+        least_share: Least share of the clip in which a person is visible.
     """
 
     tracklets: TrackletConfig = Field(default_factory=TrackletConfig)
@@ -63,7 +63,7 @@ def identify(
     size: tuple[int, int],
     config: IdentityConfig,
 ) -> list[Float[np.ndarray, "T 33 7"]]:
-    """One track a person, NaN where he is not seen, the largest steady one first.
+    """Return one track a person, NaN where they are not visible, the largest steady one first.
 
     Args:
         frames: All detections of every frame.
@@ -86,7 +86,8 @@ def identify(
 def by_size(
     tracks: Sequence[Float[np.ndarray, "T 33 7"]], size: tuple[int, int]
 ) -> list[Float[np.ndarray, "T 33 7"]]:
-    """The largest steady person first: median stature in the image times the share of frames."""
+    """Return the largest steady person first: median stature in the image times the share of
+    frames."""
 
     def weight(track: np.ndarray) -> float:
         seen = ~np.isnan(track[:, 0, 0])
@@ -100,7 +101,7 @@ def _lasts(tracklet: Tracklet, shortest_s: float, period_s: float) -> bool:
 
 
 def chains(tracklets: list[Tracklet], config: IdentityConfig) -> list[list[Tracklet]]:
-    """Tracklets in order, one list a person."""
+    """Return the tracklets in order, one list a person."""
     from scipy.optimize import linear_sum_assignment
 
     count = len(tracklets)
@@ -127,18 +128,19 @@ def chains(tracklets: list[Tracklet], config: IdentityConfig) -> list[list[Track
 def assign_merged(
     blends: list[Tracklet], chains: list[list[Tracklet]], config: IdentityConfig
 ) -> list[list[Tracklet]]:
-    """Each tracklet of two seen as one to the person whom it fits best and who has no other
+    """Return each tracklet of two seen as one to the person whom it fits best and who has no other
     there."""
-    told = [list(chain) for chain in chains]
+    merged = [list(chain) for chain in chains]
     for blend in sorted(blends, key=lambda tracklet: -len(tracklet.frames)):
-        costs = [_fit(blend, chain, config) for chain in told]
+        costs = [_fit(blend, chain, config) for chain in merged]
         if costs and min(costs) < IMPOSSIBLE:
-            told[int(np.argmin(costs))].append(blend)
-    return told
+            merged[int(np.argmin(costs))].append(blend)
+    return merged
 
 
 def _fit(tracklet: Tracklet, chain: list[Tracklet], config: IdentityConfig) -> float:
-    """Cost of a tracklet in a gap of a chain: the mean of the links to both of its neighbours."""
+    """Return the cost of a tracklet in a gap of a chain: the mean of the links to both of its
+    neighbours."""
     first, last = tracklet.frames[0], tracklet.frames[-1]
     if any(p.frames[0] <= last and p.frames[-1] >= first for p in chain):
         return IMPOSSIBLE
@@ -150,7 +152,7 @@ def _fit(tracklet: Tracklet, chain: list[Tracklet], config: IdentityConfig) -> f
 
 
 def _link(before: Tracklet, after: Tracklet, config: IdentityConfig) -> float:
-    """Sum of the changes across a gap, each over what it may be."""
+    """Return the sum of the changes across a gap, each over its allowed change."""
     gap_s = after.time_s[0] - before.time_s[-1]
     tall = float(np.median(before.tall[-NEAR:])), float(np.median(after.tall[:NEAR]))
     reach = min(config.reach + config.reach_speed * gap_s, config.farthest) * max(tall)
@@ -166,7 +168,7 @@ def _link(before: Tracklet, after: Tracklet, config: IdentityConfig) -> float:
 
 
 def _led(tracklet: Tracklet, gap_s: float, config: IdentityConfig, ends: bool) -> np.ndarray:
-    """Where a tracklet leads to after its end, or came from before its beginning, pixels."""
+    """Return where a tracklet leads to after its end, or came from before its beginning, pixels."""
     time_s, place = np.array(tracklet.time_s), np.array(tracklet.place)
     edge = -1 if ends else 0
     close = np.abs(time_s - time_s[edge]) <= config.memory_s
@@ -179,7 +181,7 @@ def _led(tracklet: Tracklet, gap_s: float, config: IdentityConfig, ends: bool) -
 
 
 def _mean(colours: list[np.ndarray]) -> np.ndarray:
-    """Mean of those that were seen."""
+    """Return the mean of the visible values."""
     table = np.array(colours)
     known = ~np.isnan(table)
     total = np.where(known, table, 0.0).sum(0)

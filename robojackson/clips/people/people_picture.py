@@ -15,22 +15,23 @@ MARGIN = 0.08
 
 
 def draw_people(path: Path, cast: TrackedPeople) -> bytes:
-    """PNG."""
-    wanted = best_frame(cast)
+    """Return the picture as PNG."""
+    chosen = best_frame(cast)
     frames = timed_frames(path, short_side=LONG_SIDE)
-    image = next(image for index, (_, image) in enumerate(frames) if index == wanted)
+    image = next(image for index, (_, image) in enumerate(frames) if index == chosen)
     factor = min(1.0, LONG_SIDE / max(image.shape[:2]))
     picture = cv2.resize(image, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
     height, width = picture.shape[:2]
     for number, rows in enumerate(cast.rows, start=1):
-        corners = box(rows[wanted, :, :2], MARGIN, width, height)
+        corners = box(rows[chosen, :, :2], MARGIN, width, height)
         if corners:
             _frame(picture, corners, number)
     return cv2.imencode(".png", picture[..., ::-1])[1].tobytes()
 
 
 def best_frame(cast: TrackedPeople) -> int:
-    """The frame with most people in it, and among those the one with the largest distances."""
+    """Return the frame with most people in it, and among those the one with the largest
+    distances."""
     places = np.array([rows[:, 0, 0] for rows in cast.rows])
     count = (~np.isnan(places)).sum(0)
     apart = np.array([_nearest(column[~np.isnan(column)]) for column in places.T])

@@ -1,8 +1,8 @@
-"""How many people are in a clip. The paper could not tell two dancers apart.
+"""Count the people in a clip. The paper could not separate two dancers.
 
-PoseLandmarker asked for several people at once finds one of two who stand side by side in every
-second frame (measured), so a few frames a second are asked again with whoever was found painted
-over, until nobody is left.
+PoseLandmarker with several poses finds one of two people who stand side by side in every
+second frame (measured), so a few frames a second are processed again with found people painted
+over, until none is left.
 """
 
 from typing import Any
@@ -21,13 +21,15 @@ PERSON_MARGIN = 0.15
 
 @config_dataclass
 class PeopleConfig:
-    """Attributes:
-    samples_per_s: Frames that are looked at, a second.
-    fewest: Frames that are looked at in a short clip.
-    most: People that are counted at most.
-    short_side: Pixels of the short side of the pictures that are looked at.
-    smallest: A person below this size is in the background, heights of the first person.
-    visibility: Least mean visibility of the landmarks of a person, 0..1.
+    """Configuration of counting people.
+
+    Attributes:
+        samples_per_s: Frames that are looked at, a second.
+        fewest: Frames that are looked at in a short clip.
+        most: People that are counted at most.
+        short_side: Pixels of the short side of the pictures that are looked at.
+        smallest: A person below this size is in the background, heights of the first person.
+        visibility: Least mean visibility of the landmarks of a person, 0..1.
     """
 
     samples_per_s: float = Field(default=1.0, gt=0)
@@ -47,7 +49,7 @@ class People:
         self.counts: list[int] = []
 
     def add_frame(self, index: int, image: np.ndarray, xy: Float[np.ndarray, "33 2"]) -> None:
-        """Frame number `index`, RGB, with the landmarks of the person in it."""
+        """Add frame number `index`, RGB, with the landmarks of the person in it."""
         if index in self._chosen:
             self.counts.append(self._count(image, xy))
 
@@ -75,7 +77,7 @@ class People:
         return found
 
     def _look(self, small: np.ndarray) -> np.ndarray | None:
-        """Landmarks of a person who is still in the picture, columns x, y, visibility."""
+        """Return landmarks of a person who is still in the picture, columns x, y, visibility."""
         import mediapipe
 
         picture = mediapipe.Image(image_format=mediapipe.ImageFormat.SRGB, data=small)

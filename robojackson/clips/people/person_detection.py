@@ -1,9 +1,9 @@
 """Everybody in one picture. BlazePose finds one person well and a second one badly.
 
-Asked for several people at once, PoseLandmarker misses one of two who stand side by side in every
+With several poses, PoseLandmarker misses one of two people who stand side by side in every
 second frame, and in most after they crossed (measured): its detector throws away circles that
-overlap. So whoever is found is painted over, limb by limb, and the picture is looked at again until
-nobody is left: 94-99 % of two dancers who cross.
+overlap. So each found person is painted over, limb by limb, and the detector runs again until
+none is left: 94-99 % of two dancers who cross.
 """
 
 from dataclasses import dataclass
@@ -33,13 +33,15 @@ FEWEST_PIXELS = 12
 
 @config_dataclass
 class PersonDetectionConfig:
-    """Attributes:
-    most: People that are looked for in a picture.
-    limb_width: Width of the paint over a limb, body heights.
-    short_side: Pixels of the short side of the pictures that are looked at.
-    visibility: Least mean visibility of the landmarks of a person, 0..1.
-    smallest: A person below this size is in the background, heights of the largest.
-    apart: Two finds with their trunks nearer than this are one person, body heights.
+    """Configuration of detecting all people in a picture.
+
+    Attributes:
+        most: People that are looked for in a picture.
+        limb_width: Width of the paint over a limb, body heights.
+        short_side: Pixels of the short side of the pictures that are looked at.
+        visibility: Least mean visibility of the landmarks of a person, 0..1.
+        smallest: A person below this size is in the background, heights of the largest.
+        apart: Two finds with their trunks nearer than this are one person, body heights.
     """
 
     most: int = Field(default=5, ge=2)
@@ -52,7 +54,7 @@ class PersonDetectionConfig:
 
 @dataclass(frozen=True)
 class PersonDetection:
-    """Somebody in one frame.
+    """One person in one frame.
 
     Attributes:
         row: Image xyz, world xyz, visibility of the landmarks.
@@ -66,7 +68,7 @@ class PersonDetection:
 def detect_people(
     image: UInt8[np.ndarray, "H W 3"], landmarker: Any, config: PersonDetectionConfig
 ) -> list[PersonDetection]:
-    """All people in a picture, the one that the detector likes best first."""
+    """Return all people in a picture, in the detector's order."""
     factor = min(1.0, config.short_side / min(image.shape[:2]))
     small = cv2.resize(image, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
     painted = np.zeros(small.shape[:2], bool)
@@ -84,7 +86,7 @@ def detect_people(
 
 
 def detect_person(landmarker: Any, image: np.ndarray) -> np.ndarray | None:
-    """One person in a single picture, (33, 7); None for nobody."""
+    """Return one person in a single picture, (33, 7); None without one."""
     import mediapipe
 
     rows = np.ascontiguousarray(image)
@@ -95,7 +97,7 @@ def detect_person(landmarker: Any, image: np.ndarray) -> np.ndarray | None:
 def silhouette(
     xy: Float[np.ndarray, "33 2"], width: int, height: int, limb_width: float
 ) -> Bool[np.ndarray, "H W"]:
-    """The pixels that a person covers, limbs `limb_width` body heights wide."""
+    """Return the pixels that a person covers, limbs `limb_width` body heights wide."""
     points = np.round(xy * [width, height]).astype(np.int32)
     tall = float(stature(points))
     thick = max(2, round(limb_width * tall))
@@ -120,7 +122,7 @@ def paint(image: UInt8[np.ndarray, "H W 3"], mask: Bool[np.ndarray, "H W"]) -> N
 def mean_colours(
     image: UInt8[np.ndarray, "H W 3"], xy: Float[np.ndarray, "33 2"], hidden: np.ndarray
 ) -> Float[np.ndarray, " 6"]:
-    """Mean colour of trunk and thighs where nothing hides them."""
+    """Return the mean colour of trunk and thighs where nothing hides them."""
     height, width = image.shape[:2]
     points = np.round(xy * [width, height]).astype(np.int32)
     upper, lower = np.zeros((2, height, width), np.uint8)
@@ -143,7 +145,7 @@ def _colour(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
 def _near(
     found: list[PersonDetection], size: tuple[int, ...], smallest: float
 ) -> list[PersonDetection]:
-    """Without the people of the background."""
+    """Return the detections without the people of the background."""
     tall = [float(stature(other.row[:, :2] * size)) for other in found]
     limit = smallest * max(tall, default=0.0)
     return [other for other, height in zip(found, tall, strict=True) if height >= limit]

@@ -1,4 +1,4 @@
-"""What the landmarks of a clip say of the person: in full view or cut off, and how large."""
+"""Extent of the person in a clip, from landmarks: in full view or cut off, and how large."""
 
 from collections.abc import Sequence
 
@@ -25,13 +25,13 @@ POINTS = {
 }
 """Landmarks of BlazePose."""
 BODY = tuple(name for name in POINTS if not name.endswith(("elbow", "wrist")))
-"""Arms pass behind the body and out of the picture in any dance, so they are not asked for."""
+"""Arms pass behind the body and out of the picture in any dance, so they are not required."""
 MIRROR = (0, 4, 5, 6, 1, 2, 3, 8, 7, 10, 9) + tuple(i + (1 if i % 2 else -1) for i in range(11, 33))
 """Number of the landmark that each one becomes in a mirror."""
 
 
 def indices(names: Sequence[str]) -> list[int]:
-    """Numbers of landmarks by name."""
+    """Return the numbers of landmarks by name."""
     for name in names:
         if name not in POINTS:
             raise UnknownName("landmark", name, "clips.people.person_extent", POINTS)
@@ -39,12 +39,12 @@ def indices(names: Sequence[str]) -> list[int]:
 
 
 def trunk() -> list[int]:
-    """Numbers of the trunk's corners."""
+    """Return the numbers of the trunk's corners."""
     return indices(("left_shoulder", "right_shoulder", "left_hip", "right_hip"))
 
 
 def full_body(track: LandmarkTrack, visibility: float) -> Bool[np.ndarray, " T"]:
-    """Frames in which head, trunk and legs are inside the image and seen."""
+    """Return frames in which head, trunk and legs are inside the image and seen."""
     chosen = indices(BODY)
     xy = track.landmarks[:, chosen, :2]
     inside = ((xy >= 0.0) & (xy <= 1.0)).all((1, 2))
@@ -52,14 +52,15 @@ def full_body(track: LandmarkTrack, visibility: float) -> Bool[np.ndarray, " T"]
 
 
 def heights_px(track: LandmarkTrack) -> Float[np.ndarray, " T"]:
-    """From the highest to the lowest landmark, pixels, NaN where nobody was found."""
+    """Return the distance from the highest to the lowest landmark, pixels, NaN where nobody was
+    found."""
     rows = track.landmarks[..., 1] * track.height
     result: np.ndarray = rows.max(1) - rows.min(1)
     return result
 
 
 def stature(points: Float[np.ndarray, "*T 33 2"]) -> Float[np.ndarray, "*T"]:
-    """Nose to neck to hips to the foot of the longer leg: a size that no pose changes much.
+    """Return nose to neck to hips to the foot of the longer leg: a size that poses hardly change.
 
     Args:
         points: Landmarks in pixels.
@@ -83,12 +84,12 @@ def stature(points: Float[np.ndarray, "*T 33 2"]) -> Float[np.ndarray, "*T"]:
 def box(
     xy: Float[np.ndarray, "33 2"], margin: float, width: int, height: int
 ) -> tuple[int, int, int, int] | None:
-    """The person's box (x0, y0, x1, y1) in pixels of an image, None when nobody is in it.
+    """Return the person's box (x0, y0, x1, y1) in pixels of an image, None without a person.
 
     Args:
         xy: Landmarks in image coordinates, 0..1.
         margin: Added on each side, in sizes of the box.
-        width, height: Of the image, pixels.
+        width, height: Width and height of the image, pixels.
     """
     if np.isnan(xy).any():
         return None

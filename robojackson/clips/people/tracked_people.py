@@ -1,4 +1,4 @@
-"""Everybody in a clip: who is there, how large, where and when; 1 is the largest steady person."""
+"""All people of a clip: how large, where and when; number 1 is the largest steady person."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -24,13 +24,13 @@ LEFT, RIGHT = 0.4, 0.6
 
 @dataclass(frozen=True)
 class Person:
-    """Somebody in a clip.
+    """One person of a clip.
 
     Attributes:
         number: 1 is the largest steady person.
         height_px: Median size in the image, pixels.
-        detected_share: Share of the frames in which he is seen.
-        from_s, to_s: When he is seen first and last, seconds.
+        detected_share: Share of the frames in which the person is detected.
+        from_s, to_s: First and last detection, seconds.
         place: Median place in the image from the left, 0..1.
     """
 
@@ -51,10 +51,10 @@ class Person:
 
 @dataclass(frozen=True)
 class TrackedPeople:
-    """Everybody in a clip.
+    """All people of a clip.
 
     Attributes:
-        rows: One track a person, number 1 first; NaN where he is not seen.
+        rows: One track a person, number 1 first; NaN where not detected.
         time_s: When each frame was taken, seconds.
         info: The file.
     """
@@ -65,12 +65,12 @@ class TrackedPeople:
 
     @property
     def people(self) -> list[Person]:
-        """Who is there, in order of their numbers."""
+        """The people, in order of their numbers."""
         return [self._person(number, rows) for number, rows in enumerate(self.rows, start=1)]
 
     def __str__(self) -> str:
-        told = "; ".join(str(person) for person in self.people)
-        return told or "nobody is seen for long enough"
+        listed = "; ".join(str(person) for person in self.people)
+        return listed or "no person is visible for long enough"
 
     def _person(self, number: int, rows: np.ndarray) -> Person:
         seen = np.flatnonzero(~np.isnan(rows[:, 0, 0]))
@@ -92,7 +92,7 @@ def track_people(
     identity: IdentityConfig,
     progress: Callable[[int, int], None] | None = None,
 ) -> TrackedPeople:
-    """Everybody in every frame, told apart."""
+    """Return all people in every frame, with their identities."""
     found: list[list[PersonDetection]] = []
     times: list[float] = []
     with still_landmarker(SCOUT) as landmarker:

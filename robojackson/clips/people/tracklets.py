@@ -1,8 +1,8 @@
-"""Stretches of frames in which one person was followed and nobody could be taken for another.
+"""Stretches of frames in which one person was followed without ambiguity.
 
 From one frame to the next, people are matched by the Hungarian method. Where they touch (two claim
 one detection, one vanishes or appears beside another) the tracklets of all of them end; what
-follows beside somebody who vanished may be either of the two, and says so. Pixels and seconds.
+follows beside a person who vanished may be either of the two, and is marked. Pixels and seconds.
 """
 
 from collections.abc import Sequence
@@ -19,12 +19,14 @@ from robojackson.config import config_dataclass
 
 @config_dataclass
 class TrackletConfig:
-    """Attributes:
-    step: Distance of the trunk from one frame to the next, body heights.
-    step_speed: That distance as a speed, body heights a second: what counts at low frame rates.
-    growth: Change of size from one frame to the next, ratio, that counts half of such a step.
-    crowding: People whose trunks are nearer than this touch, body heights.
-    pause_s: A tracklet outlives so long a gap, seconds.
+    """Configuration of tracklets.
+
+    Attributes:
+        step: Distance of the trunk from one frame to the next, body heights.
+        step_speed: That distance as a speed, body heights a second: it counts at low frame rates.
+        growth: Change of size from one frame to the next, ratio, that counts half of such a step.
+        crowding: People whose trunks are nearer than this touch, body heights.
+        pause_s: A tracklet outlives so long a gap, seconds.
     """
 
     step: float = Field(default=0.12, gt=0)
@@ -45,7 +47,7 @@ class Tracklet:
         place: Middle of the trunk, pixels.
         tall: Stature, pixels.
         colours: Colours.
-        blended: Whether it may be either of two who were seen as one.
+        blended: Whether it may be either of two people detected as one.
     """
 
     frames: list[int] = field(default_factory=list)
@@ -62,6 +64,7 @@ class Tracklet:
             getattr(self, name).extend(getattr(other, name))
 
     def add(self, frame: int, time_s: float, seen: PersonDetection, size: tuple[int, int]) -> None:
+        """Add a detection of a frame."""
         points = seen.row[:, :2] * size
         self.frames.append(frame)
         self.time_s.append(time_s)
@@ -77,7 +80,7 @@ def find_tracklets(
     size: tuple[int, int],
     config: TrackletConfig,
 ) -> list[Tracklet]:
-    """Stretches without doubt, and those of two seen as one."""
+    """Return the unambiguous stretches, and those of two people detected as one."""
     done: list[Tracklet] = []
     alive: list[Tracklet] = []
     for index, detections in enumerate(frames):
@@ -108,7 +111,7 @@ def _tracklet_of(index: int, now: float, seen: PersonDetection, size: tuple[int,
 def _claims(
     alive: Sequence[Tracklet], seen: Sequence[Tracklet], config: TrackletConfig
 ) -> dict[int, int]:
-    """Which tracklet goes on with which detection, the least change in all."""
+    """Return which tracklet continues with which detection, with the least total change."""
     from scipy.optimize import linear_sum_assignment
 
     if not alive or not seen:
@@ -124,7 +127,7 @@ def _touches(
     resumes: dict[int, int],
     config: TrackletConfig,
 ) -> tuple[set[int], set[int]]:
-    """Tracklets that end because people touch, and detections that may be either of two.
+    """Return the tracklets that end because people touch, and detections that may be either of two.
 
     Beside somebody who just vanished a detection may be his; beside somebody who just appeared both
     are seen apart again.
@@ -153,7 +156,7 @@ def _near(one: Tracklet, other: Tracklet, config: TrackletConfig) -> bool:
 
 
 def _step(before: Tracklet, after: Tracklet, config: TrackletConfig) -> float:
-    """How far a detection is from a tracklet, 1 is as far as it may be."""
+    """Return how far a detection is from a tracklet, 1 is as far as it may be."""
     away_s = after.time_s[0] - before.time_s[-1]
     tall = max(before.tall[-1], after.tall[0])
     moved = np.linalg.norm(after.place[0] - before.place[-1]) / tall

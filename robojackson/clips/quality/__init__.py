@@ -1,1 +1,1 @@
-"""How fit a clip is for motion capture, and which candidate is best."""
+"""Fitness of a clip for motion capture, and choice of the best candidate."""

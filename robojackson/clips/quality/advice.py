@@ -1,4 +1,4 @@
-"""What to do better when a clip is filmed again: kinds with figures; the words are made last.
+"""Advice for filming a clip again: kinds with figures; the words are made last.
 
 Derived from the clip alone, that is from the landmarks and what was measured beside them. The same
 advice is given by `mocap`, by `dance` and by the page of a run.
@@ -31,7 +31,7 @@ LIMITS: Mapping[Kind, float] = {
 }
 """Where advice begins: frames a second, seconds, pixels, share of the frames with a person, share
 of all frames, a count, share of the image's diagonal, grey level 0..1, share of fine detail. Under
-two seconds no evaluation can judge; the pixels are those of a search's filter; the last two are
+two seconds are too short to evaluate; the pixels are those of a search's filter; the last two are
 half of what the bundled clips have at the worst."""
 AT_MOST: tuple[Kind, ...] = ("body_outside", "people", "camera_moves")
 """Figures that are advised against above their limit; the others below it."""
@@ -39,7 +39,7 @@ AT_MOST: tuple[Kind, ...] = ("body_outside", "people", "camera_moves")
 
 @dataclass(frozen=True)
 class Advice:
-    """One thing to do better.
+    """One piece of advice.
 
     Attributes:
         kind: What it is about.
@@ -61,7 +61,8 @@ class Advice:
 
 
 def advise(track: LandmarkTrack) -> tuple[Advice, ...]:
-    """What to do better, the gravest kinds of a list by hand first; nothing for a good clip."""
+    """Return what to do better, the gravest kinds of a list by hand first; nothing for a good
+    clip."""
     return tuple(
         Advice(kind, value, LIMITS[kind])
         for kind, value in _figures(track).items()
@@ -70,7 +71,7 @@ def advise(track: LandmarkTrack) -> tuple[Advice, ...]:
 
 
 def _figures(track: LandmarkTrack) -> dict[Kind, float | None]:
-    """Every figure that advice is about; None where it was not measured."""
+    """Return every figure that advice is about; None where it was not measured."""
     seen = track.detected
     height = float(np.median(heights_px(track)[seen])) if seen.any() else None
     moved = None if track.to_first is None else stray_of(track.to_first, track.width, track.height)
@@ -88,7 +89,7 @@ def _figures(track: LandmarkTrack) -> dict[Kind, float | None]:
 
 
 def _outside(track: LandmarkTrack) -> float:
-    """Share of the frames with a person in which head, trunk or legs leave the image."""
+    """Return the share of the frames with a person in which head, trunk or legs leave the image."""
     xy = track.landmarks[track.detected][:, indices(BODY), :2]
     return float(((xy < 0.0) | (xy > 1.0)).any((1, 2)).mean())
 
@@ -104,7 +105,7 @@ _WORDS: Mapping[Kind, Callable[[Advice], str]] = {
         "camera upright"
     ),
     "person_missing": lambda a: (
-        f"the person is seen in {a.value:.0%} of the frames: choose a range with --start and "
+        f"the person is detected in {a.value:.0%} of the frames: choose a range with --start and "
         "--end, or film without anything in between"
     ),
     "people": lambda a: (

@@ -26,9 +26,11 @@ from robojackson.motion.landmark_track import LandmarkTrack
 
 @config_dataclass
 class AssessmentConfig:
-    """Attributes:
-    detector: Size of the pose model.
-    video, stability, cuts, camera, people, drawing: Of the parts.
+    """Configuration of the assessment of a clip.
+
+    Attributes:
+        detector: Size of the pose model.
+        video, stability, cuts, camera, people, drawing: Configurations of the parts.
     """
 
     detector: Size = "lite"
@@ -42,7 +44,7 @@ class AssessmentConfig:
 
 @dataclass(frozen=True)
 class Quality:
-    """What Algorithm 1 does not see.
+    """Figures beyond Algorithm 1.
 
     Attributes:
         frames: Frames in the clip.
@@ -71,7 +73,7 @@ class Quality:
 
 @dataclass(frozen=True)
 class Assessment:
-    """All that is known of a clip.
+    """All figures of a clip.
 
     Attributes:
         info: The file.
@@ -104,7 +106,7 @@ def assess_video(
 
 
 class _Eyes:
-    """All that looks at the frames beside the pose detector."""
+    """All observers of the frames beside the pose detector."""
 
     def __init__(self, info: VideoInfo, config: AssessmentConfig, landmarker: Any) -> None:
         self._info, self._config = info, config
@@ -114,13 +116,13 @@ class _Eyes:
         self._paint = Paint(info.frames, info.fps, config.drawing)
 
     def add_frame(self, index: int, image: np.ndarray, row: np.ndarray) -> None:
-        """Frame number `index`, RGB, and the landmarks found in it, NaN for nobody."""
+        """Add frame number `index`, RGB, and the landmarks found in it, NaN for nobody."""
         self._changes.add_frame(image)
         for eye in (self._camera, self._people, self._paint):
             eye.add_frame(index, image, row[:, :2])
 
     def quality(self, track: LandmarkTrack) -> Quality:
-        """What they saw in the whole clip."""
+        """Return the figures of the whole clip."""
         config = self._config
         apart = round(config.cuts.shortest_scene_s * self._info.fps)
         cuts = together(self._changes.cuts, leaps(track, config.cuts), apart)
@@ -141,6 +143,6 @@ class _Eyes:
 
 
 def _median(values: np.ndarray) -> float:
-    """Median of the numbers that are there, 0 when there are none."""
+    """Return the median of the numbers that are there, 0 when there are none."""
     known = values[~np.isnan(values)]
     return float(np.median(known)) if len(known) else 0.0

@@ -1,4 +1,4 @@
-"""Which candidate is danced: the lowest score of Algorithm 1 among those that no filter rejects."""
+"""Rank candidates: the lowest score of Algorithm 1 among those that no filter rejects wins."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ Share = Annotated[float, Field(ge=0, le=1)]
 
 @config_dataclass
 class FilterConfig:
-    """What a clip must be. None switches a filter off; its figure stays in the table.
+    """Filters of clips. None switches a filter off; its figure stays in the table.
 
     Attributes:
         rank_by: The score a second or a frame, which do not favour short clips, or the paper's sum.
@@ -51,7 +51,7 @@ class Ranked:
     """A candidate's place.
 
     Attributes:
-        name: Of the candidate.
+        name: Name of the candidate.
         place: 1 is danced; None when it is rejected.
         rejections: Why it is rejected; empty when it is not.
     """
@@ -81,7 +81,7 @@ def objections(score: Stability, quality: Quality, config: FilterConfig) -> list
 
 
 def order(scores: Mapping[str, Stability], config: FilterConfig) -> list[str]:
-    """Names of the clips, the steadiest first; those without a person last."""
+    """Return names of the clips, the steadiest first; those without a person last."""
 
     def figure(name: str) -> tuple[bool, float]:
         score = scores[name]
@@ -100,7 +100,7 @@ def rank(
     against: Mapping[str, Sequence[Rejection]],
     copied: Mapping[str, Rejection],
 ) -> list[Ranked]:
-    """Places of all clips: those that nothing speaks against first, then the rejected ones.
+    """Return the places of all clips: accepted ones first, then the rejected ones.
 
     Args:
         ordered: The steadiest first.

@@ -18,14 +18,16 @@ from robojackson.motion.landmark_track import LandmarkTrack
 
 @config_dataclass
 class CutConfig:
-    """Attributes:
-    threshold: PySceneDetect's change of hue, saturation and lightness at a cut, 0..255.
-    shortest_scene_s: Two cuts nearer than this are one, seconds.
-    leap: Mean displacement of all landmarks between two frames at a jump cut, body heights.
-    leap_speed: That leap as a speed, body heights a second: what counts at low frame rates.
-    moving_level: Change of a pixel that is motion and not the noise of the encoder, 0..255.
-    moving_share: Least part of a picture that such pixels are when it moves, share.
-    short_side: Pixels of the short side of the small pictures that are compared.
+    """Configuration of finding cuts.
+
+    Attributes:
+        threshold: PySceneDetect's change of hue, saturation and lightness at a cut, 0..255.
+        shortest_scene_s: Two cuts nearer than this are one, seconds.
+        leap: Mean displacement of all landmarks between two frames at a jump cut, body heights.
+        leap_speed: That leap as a speed, body heights a second: it counts at low frame rates.
+        moving_level: Change of a pixel that is motion and not the noise of the encoder, 0..255.
+        moving_share: Least part of a picture that such pixels are when it moves, share.
+        short_side: Pixels of the short side of the small pictures that are compared.
     """
 
     threshold: float = Field(default=27.0, gt=0)
@@ -52,7 +54,7 @@ class Changes:
         self.cuts: list[int] = []
 
     def add_frame(self, image: UInt8[np.ndarray, "H W 3"]) -> None:
-        """The next frame, RGB."""
+        """Add the next frame, RGB."""
         from scenedetect import FrameTimecode
 
         step = max(1, min(image.shape[:2]) // self._config.short_side)
@@ -75,14 +77,15 @@ class Changes:
 
 
 def leaps(track: LandmarkTrack, config: CutConfig) -> list[int]:
-    """Frames in which the whole person is suddenly elsewhere: jump cuts inside a scene."""
+    """Return frames in which the whole person is suddenly elsewhere: jump cuts inside a scene."""
     speed = displacement(track)
     limit = max(config.leap, config.leap_speed / track.fps)
     return [int(index) + 1 for index in np.flatnonzero(speed > limit)]
 
 
 def displacement(track: LandmarkTrack) -> Float[np.ndarray, " T-1"]:
-    """Median displacement of the landmarks from frame to frame, body heights; NaN in gaps."""
+    """Return the median displacement of the landmarks from frame to frame, body heights; NaN in
+    gaps."""
     size = np.array([track.width, track.height])
     steps = np.linalg.norm(np.diff(track.landmarks[..., :2] * size, axis=0), axis=-1)
     tall = np.nanmedian(heights_px(track)) if track.detected.any() else np.nan
@@ -91,7 +94,7 @@ def displacement(track: LandmarkTrack) -> Float[np.ndarray, " T-1"]:
 
 
 def together(scenes: list[int], jumps: list[int], frames_apart: int) -> list[int]:
-    """Both kinds of cut, those within `frames_apart` of one another counted once."""
+    """Return both kinds of cut, those within `frames_apart` of one another counted once."""
     found: list[int] = []
     for frame in sorted((*scenes, *jumps)):
         if not found or frame - found[-1] > frames_apart:

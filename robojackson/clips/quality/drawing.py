@@ -1,6 +1,6 @@
 """Is the dancer drawn? The paper's own example of a bad clip is a cartoon that dances.
 
-A pose detector takes a good drawing for a person. What tells it from one is paint: inside a drawn
+A pose detector takes a good drawing for a person. The difference is paint: inside a drawn
 body neighbouring pixels are equal, on skin and cloth light, folds and the camera's noise differ.
 """
 
@@ -25,11 +25,13 @@ LIMB_WIDTH = 0.03
 
 @config_dataclass
 class DrawingConfig:
-    """Attributes:
-    samples_per_s: Frames that are looked at, a second.
-    fewest: Frames that are looked at in a short clip.
-    short_side: Pixels of the short side of the pictures that are looked at.
-    level: Largest difference of neighbouring pixels of one paint, 0..255.
+    """Configuration of recognising drawings.
+
+    Attributes:
+        samples_per_s: Frames that are looked at, a second.
+        fewest: Frames that are looked at in a short clip.
+        short_side: Pixels of the short side of the pictures that are looked at.
+        level: Largest difference of neighbouring pixels of one paint, 0..255.
     """
 
     samples_per_s: float = Field(default=0.5, gt=0)
@@ -47,7 +49,7 @@ class Paint:
         self._shares: list[float] = []
 
     def add_frame(self, index: int, image: np.ndarray, xy: Float[np.ndarray, "33 2"]) -> None:
-        """Frame number `index`, RGB, with the landmarks of the person in it."""
+        """Add frame number `index`, RGB, with the landmarks of the person in it."""
         if index in self._chosen and not np.isnan(xy).any():
             factor = min(1.0, self._config.short_side / min(image.shape[:2]))
             small = cv2.resize(image, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
@@ -55,12 +57,12 @@ class Paint:
 
     @property
     def flat_share(self) -> float:
-        """Share of the body in flat colour, median of the frames; 0 where nobody was found."""
+        """Share of the body in flat colour, median of the frames; 0 without a person."""
         return float(np.median(self._shares)) if self._shares else 0.0
 
 
 def flat_share(image: UInt8[np.ndarray, "H W 3"], xy: np.ndarray, level: int) -> float:
-    """Share of the body's pixels whose 3 x 3 neighbours have the same colour."""
+    """Return the share of the body's pixels whose 3 x 3 neighbours have the same colour."""
     square = np.ones((3, 3), np.uint8)
     apart = cv2.subtract(cv2.dilate(image, square), cv2.erode(image, square)).max(-1)
     inside = apart[body(xy, image.shape[1], image.shape[0])]
@@ -68,7 +70,7 @@ def flat_share(image: UInt8[np.ndarray, "H W 3"], xy: np.ndarray, level: int) ->
 
 
 def body(xy: Float[np.ndarray, "33 2"], width: int, height: int) -> Bool[np.ndarray, "H W"]:
-    """The pixels of trunk and limbs."""
+    """Return the pixels of trunk and limbs."""
     points = np.round(xy * [width, height]).astype(np.int32)
     mask = np.zeros((height, width), np.uint8)
     trunk = indices(("left_shoulder", "right_shoulder", "left_hip", "right_hip"))

@@ -1,4 +1,4 @@
-"""Copies of a clip among candidates, mirrored ones included, told by how the person moves.
+"""Copies of a clip among candidates, mirrored ones included, recognised by how the person moves.
 
 A copy may be smaller, cropped, recoloured, recompressed or start later, so pictures are not
 compared but poses: landmarks relative to the hips, divided by the body's height.
@@ -22,11 +22,13 @@ Poses = Float[np.ndarray, "N 33 2"]
 
 @config_dataclass
 class DuplicateConfig:
-    """Attributes:
-    distance: Mean distance of the landmarks below which two clips show the same, body heights.
-    rate: Poses a second that are compared.
-    lag_s: Longest delay between two copies, seconds.
-    overlap: Least share of the shorter clip that both must show.
+    """Configuration of finding copies.
+
+    Attributes:
+        distance: Mean distance of the landmarks below which two clips show the same, body heights.
+        rate: Poses a second that are compared.
+        lag_s: Longest delay between two copies, seconds.
+        overlap: Least share of the shorter clip that both must show.
     """
 
     distance: float = Field(default=0.03, gt=0)
@@ -41,7 +43,7 @@ def find_duplicates(
     """Return the clips that are copies, each with the rejection that names the clip that stays.
 
     Args:
-        tracks: By name, the best picture first: of two copies the later one is the copy.
+        tracks: Tracks by name, the best picture first: of two copies the later one is the copy.
         config: Limits.
     """
     found: dict[str, Rejection] = {}
@@ -59,7 +61,8 @@ def find_duplicates(
 
 
 def poses(track: LandmarkTrack, rate: float) -> Poses:
-    """Landmarks relative to the middle of the hips, in body heights, `rate` times a second."""
+    """Return landmarks relative to the middle of the hips, in body heights, `rate` times a
+    second."""
     size = np.array([track.width, track.height])
     xy = track.landmarks[..., :2] * size
     hips = xy[:, indices(("left_hip", "right_hip"))].mean(1, keepdims=True)
@@ -71,13 +74,14 @@ def poses(track: LandmarkTrack, rate: float) -> Poses:
 
 
 def mirrored(seen: Poses) -> Poses:
-    """The same poses in a mirror: left is right, in the image and in the names."""
+    """Return the same poses in a mirror: left is right, in the image and in the names."""
     result: Poses = seen[:, list(MIRROR)] * np.array([-1.0, 1.0])
     return result
 
 
 def distance(one: Poses, two: Poses, config: DuplicateConfig) -> float:
-    """Least mean distance over all delays, which cost a little; infinite when nothing overlaps."""
+    """Return the least mean distance over all delays, which cost a little; infinite when nothing
+    overlaps."""
     shortest = min(len(one), len(two))
     least = max(2, int(config.overlap * shortest))
     longest = int(config.lag_s * config.rate)
@@ -87,7 +91,7 @@ def distance(one: Poses, two: Poses, config: DuplicateConfig) -> float:
 
 
 def _at(one: Poses, two: Poses, lag: int, least: int) -> float:
-    """Mean distance when the second clip starts `lag` poses after the first."""
+    """Return the mean distance when the second clip starts `lag` poses after the first."""
     begin, end = max(0, lag), min(len(one), len(two) + lag)
     if end - begin < least:
         return np.inf

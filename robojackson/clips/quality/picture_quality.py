@@ -1,4 +1,4 @@
-"""How light and how sharp a person is in the pictures of a clip; a few of them are looked at."""
+"""Brightness and sharpness of a person in a clip, measured on a few frames."""
 
 import cv2
 import numpy as np
@@ -52,7 +52,7 @@ class PictureQuality:
 
 
 def detail_share(grey: UInt8[np.ndarray, "H W"]) -> float:
-    """Standard deviation of the Laplacian over that of the grey levels, at one size."""
+    """Return the standard deviation of the Laplacian over that of the grey levels, at one size."""
     factor = TALL / grey.shape[0]
     way = cv2.INTER_AREA if factor < 1.0 else cv2.INTER_CUBIC
     width = max(round(grey.shape[1] * factor), 3)

@@ -32,8 +32,10 @@ STABILITY_SCORE = TableSchema(
 
 @config_dataclass
 class StabilityConfig:
-    """Attributes:
-    visibility_threshold: A landmark below this visibility (0..1) counts as missing.
+    """Configuration of the stability score.
+
+    Attributes:
+        visibility_threshold: A landmark below this visibility (0..1) counts as missing.
     """
 
     visibility_threshold: float = Field(default=0.5, ge=0, le=1)
@@ -46,7 +48,7 @@ class Stability(TableFile):
     Attributes:
         frames: Frames in the clip.
         detected: Frames in which a person was found.
-        missing_joints: M, landmarks not seen, summed over the clip.
+        missing_joints: M, landmarks not visible, summed over the clip.
         jitter: J, normalised image units, summed over the clip.
         stability_score: M + J; lower is steadier.
         missing_joints_per_frame, jitter_per_frame: M and J divided by the number of frames.
@@ -65,16 +67,18 @@ class Stability(TableFile):
     score_per_second: float
 
     def to_columns(self) -> tuple[Columns, Facts]:
+        """Return the columns and the metadata of the table."""
         names = (column.name for column in STABILITY_SCORE.columns)
         return {name: np.array([getattr(self, name)]) for name in names}, {}
 
     @classmethod
     def from_columns(cls, columns: Columns, facts: Facts) -> "Stability":
+        """Build the object from columns and metadata."""
         return cls(**{name: values[0].item() for name, values in columns.items()})
 
 
 def stability(track: LandmarkTrack, config: StabilityConfig) -> Stability:
-    """M + J of a track; a clip without a person has M = 33 T and J = 0."""
+    """Return M + J of a track; a clip without a person has M = 33 T and J = 0."""
     frames = len(track)
     missing = missing_joints(track.visibility, config.visibility_threshold)
     moved = jitter(track.landmarks[..., :2])
@@ -91,12 +95,12 @@ def stability(track: LandmarkTrack, config: StabilityConfig) -> Stability:
 
 
 def missing_joints(visibility: Float[np.ndarray, "T 33"], threshold: float) -> int:
-    """M: landmarks under the threshold, and all 33 of every undetected (NaN) frame."""
+    """Return M: landmarks under the threshold, and all 33 of every undetected (NaN) frame."""
     return int(np.count_nonzero(~(visibility >= threshold)))
 
 
 def jitter(xy: Float[np.ndarray, "T 33 2"]) -> float:
-    """Mean landmark displacement between consecutive frames, summed over the clip.
+    """Return the mean landmark displacement between consecutive frames, summed over the clip.
 
     J = sum_t 1/N sum_j |L_j,t - L_j,t-1|_2   (Algorithm 1; N = 33)
 

@@ -1,7 +1,7 @@
-"""What a detector's word is worth. BlazePose reports a visibility of .99 for what it cannot see.
+"""Correct the detector's visibility: BlazePose reports .99 even for hidden landmarks.
 
 It draws a whole body wherever it finds a part of one, and a face on the back of a head. So its
-visibility is multiplied by what the picture itself tells: nothing outside the image was seen, no
+visibility is multiplied by what the picture allows: nothing outside the image is visible, no
 face of a person who is turned away, and little in frames beside a gap.
 """
 
@@ -23,7 +23,7 @@ FACE = slice(0, 11)
 FROM_BEHIND, NO_FACE = 0.8, 0.2
 """Times the visibility of a body that is seen from behind, and of its face."""
 BACK_WIDTH = 0.15
-"""Trunk lengths between both shoulders, and hips, in the image of somebody who is turned away."""
+"""Trunk lengths between both shoulders, and hips, in the image of a person who is turned away."""
 VISIBLE = 0.3
 """Weighed visibility of a landmark that was seen."""
 TRUNK_SHARE = 0.3
@@ -34,14 +34,14 @@ PARTS = {
     "feet": ("left_ankle", "right_ankle"),
     "arms": ("left_elbow", "right_elbow", "left_wrist", "right_wrist"),
 }
-"""What is told when it is not seen in a larger share of the frames than `NOTED_SHARE`."""
+"""Parts that a note names when they are hidden in more of the frames than `NOTED_SHARE`."""
 
 
 def weigh_visibility(track: LandmarkTrack) -> LandmarkTrack:
-    """The track with the visibility that the picture allows, and notes of what was not seen.
+    """Return the track with the visibility that the picture allows, and notes of what was hidden.
 
     Raises:
-        NoPersonFound: the hips are hardly ever seen, as in a clip of a face.
+        NoPersonFound: the hips are hardly ever visible, as in a clip of a face.
     """
     visibility = track.visibility * inside(track) * steady(track)[:, None]
     away = turned_away(track)
@@ -58,7 +58,7 @@ def weigh_visibility(track: LandmarkTrack) -> LandmarkTrack:
 
 
 def inside(track: LandmarkTrack) -> Float[np.ndarray, "T 33"]:
-    """1 for landmarks inside the image, 0 for those further beyond its edge than `EDGE`."""
+    """Return 1 for landmarks inside the image, 0 for those further beyond its edge than `EDGE`."""
     scale = np.array([track.width, track.height]) / track.height
     xy = track.landmarks[..., :2]
     beyond = np.maximum(np.maximum(-xy, xy - 1.0), 0.0) * scale
@@ -66,7 +66,8 @@ def inside(track: LandmarkTrack) -> Float[np.ndarray, "T 33"]:
 
 
 def turned_away(track: LandmarkTrack) -> Bool[np.ndarray, " T"]:
-    """Frames in which left shoulder and left hip are both at the left in the image: a back."""
+    """Return frames in which left shoulder and left hip are both at the left in the image: a
+    back."""
     points = track.landmarks[..., :2] * (track.width, track.height)
     across = [
         points[:, POINTS[f"left_{name}"], :] - points[:, POINTS[f"right_{name}"], :]
@@ -81,14 +82,15 @@ def turned_away(track: LandmarkTrack) -> Bool[np.ndarray, " T"]:
 
 
 def steady(track: LandmarkTrack) -> Float[np.ndarray, " T"]:
-    """1, less in the frames beside a gap, where the detector is about to lose the person."""
+    """Return 1, less in the frames beside a gap, where the detector is about to lose the person."""
     lost = ~track.detected
     near = np.convolve(lost, np.ones(2 * GAP_FRAMES + 1), mode="same")[: len(lost)] > 0
     return np.where(near, BESIDE_GAP, 1.0)
 
 
 def unseen(track: LandmarkTrack) -> tuple[str, ...]:
-    """Parts of the body that are not seen, and in how many of the frames with a person."""
+    """Return the parts of the body that are not visible, and in how many of the frames with a
+    person."""
     visibility = track.visibility[track.detected]
     unseen_share = {
         part: float((visibility[:, indices(names)] < VISIBLE).all(1).mean())

@@ -1,8 +1,8 @@
-"""Where videos are looked for. A new source is one new file beside this one.
+"""Sources of videos. A new source is one new file beside this one.
 
-The file defines `search`, and its name is the name of the source. `IS_LOCAL = True` says that it
-reads this machine's disk, so that a mistake is reported before anything is started; `page` says
-which page of the web it asks, so that a missing network is.
+The file defines `search`, and its name is the name of the source. `IS_LOCAL = True` means that it
+reads this machine's disk, so that a mistake is reported before anything is started; `page` names
+the page of the web that it reads, so that a missing network is.
 """
 
 from datetime import datetime
@@ -17,16 +17,16 @@ from robojackson.errors import UnknownName
 
 
 class Source(Protocol):
-    """What a file of this folder offers."""
+    """Interface of a file of this folder."""
 
     def search(
         self, query: str, address: str, count: int, config: WebConfig, now: datetime
     ) -> list[VideoCandidate]:
-        """Videos for a query, in the source's own order, nothing downloaded.
+        """Return videos for a query, in the source's own order, nothing downloaded.
 
         Args:
             query: Words to look for; a source that cannot look for words offers all it has.
-            address: Of the folder, the list, the site or the server; empty for the usual one.
+            address: Address of the folder, list, site or server; empty for the usual one.
             count: How many at most.
             config: Manners on the web.
             now: Noted in the candidates.
@@ -36,12 +36,12 @@ class Source(Protocol):
 
 
 def names() -> tuple[str, ...]:
-    """All sources."""
+    """Return all sources."""
     return tuple(sorted(module.name for module in iter_modules(__path__)))
 
 
 def source(name: str) -> Source:
-    """The source of a name.
+    """Return the source of a name.
 
     Raises:
         UnknownName: there is no such file; the message lists those that are.
@@ -61,7 +61,7 @@ def is_local(name: str) -> bool:
 
 
 def page_of(name: str, query: str, address: str) -> str:
-    """Return the address of the web page that a source asks first; empty where there is none.
+    """Return the address of the web page that a source reads first; empty where there is none.
 
     Raises:
         UnknownName: as `source`.

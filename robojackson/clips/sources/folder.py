@@ -16,7 +16,8 @@ IS_LOCAL = True
 def search(
     query: str, address: str, count: int, config: WebConfig, now: datetime
 ) -> list[VideoCandidate]:
-    """The videos directly inside a folder, by name; all of them, whatever count and words are."""
+    """Return the videos directly inside a folder, by name; all of them, for any count and words
+    are."""
     folder = Path(address or query)
     try:
         paths = list_videos(folder)

@@ -17,14 +17,15 @@ LARGEST_PAGE = 4_000_000
 
 
 def page(query: str, address: str) -> str:
-    """The one that lists the files."""
+    """Return the page that lists the files."""
     return address or query
 
 
 def search(
     query: str, address: str, count: int, config: WebConfig, now: datetime
 ) -> list[VideoCandidate]:
-    """The video files that a page links to, on the same server; all of them, whatever the words."""
+    """Return the video files that a page links to, on the same server; all of them, for any
+    words."""
     page = web_address(address or query)
     if not page:
         raise SearchFailed(f"server: {clean_text(address or query)} is no http address")
@@ -46,8 +47,8 @@ def _page(address: str, config: WebConfig) -> str:
         with opener.open(address, timeout=config.timeout_s) as answer:
             return bytes(answer.read(LARGEST_PAGE)).decode("utf-8", "replace")
     except (OSError, ValueError) as cause:
-        told = f"HTTP {cause.code}" if isinstance(cause, urllib.error.HTTPError) else cause
-        raise SearchFailed(f"server: {clean_text(address)}: {clean_text(told)}") from cause
+        reason = f"HTTP {cause.code}" if isinstance(cause, urllib.error.HTTPError) else cause
+        raise SearchFailed(f"server: {clean_text(address)}: {clean_text(reason)}") from cause
 
 
 def _is_video(url: str, page: str) -> bool:
@@ -70,6 +71,6 @@ class _Links(HTMLParser):
         self.found: list[str] = []
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Part of HTMLParser."""
+        """Collect the links of a page (part of HTMLParser)."""
         if tag == "a":
             self.found += [value for name, value in attrs if name == "href" and value]

@@ -11,14 +11,14 @@ from robojackson.errors import SearchFailed
 
 
 def page(query: str, address: str) -> str:
-    """The site's own."""
+    """Return the page of the site."""
     return address
 
 
 def search(
     query: str, address: str, count: int, config: WebConfig, now: datetime
 ) -> list[VideoCandidate]:
-    """The videos of a page; `{query}` in its address becomes the words, quoted."""
+    """Return the videos of a page; `{query}` in its address becomes the words, quoted."""
     if not address:
         raise SearchFailed("site: no address; give one such as https://host/search?q={query}")
     page = address.replace("{query}", quote_plus(query))
@@ -28,6 +28,6 @@ def search(
 def candidates(
     info: Mapping[str, Any], query: str, now: datetime, page: str = ""
 ) -> list[VideoCandidate]:
-    """The candidates of what yt-dlp returned for a page."""
+    """Return the candidates of what yt-dlp returned for a page."""
     found = (from_info(entry, query, now, page) for entry in entries(info))
     return [candidate for candidate in found if candidate is not None]

@@ -17,7 +17,8 @@ log = logging.getLogger(__name__)
 def search(
     query: str, address: str, count: int, config: WebConfig, now: datetime
 ) -> list[VideoCandidate]:
-    """One candidate an address, unopened; what is no http address is left out with a warning."""
+    """Return one candidate an address, unopened; what is no http address is left out with a
+    warning."""
     lines = _lines(address or query)
     found = [(line, web_address(line)) for line in lines]
     for line, url in found:
@@ -37,7 +38,7 @@ def _candidate(url: str, query: str, now: datetime) -> VideoCandidate:
 
 
 def _lines(text: str) -> list[str]:
-    """The lines of a file, or the words of a text."""
+    """Return the lines of a file, or the words of a text."""
     if "://" not in text:
         path = Path(text)
         try:

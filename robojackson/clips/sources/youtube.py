@@ -10,13 +10,13 @@ PREFIX, PAGE = "ytsearch", "https://www.youtube.com"
 
 
 def page(query: str, address: str) -> str:
-    """YouTube's; unknown for another search prefix."""
+    """Return YouTube's page; unknown for another search prefix."""
     return PAGE if not address or address.startswith(PREFIX) else ""
 
 
 def search(
     query: str, address: str, count: int, config: WebConfig, now: datetime
 ) -> list[VideoCandidate]:
-    """The first videos of a search; `address` may be another search prefix of yt-dlp."""
+    """Return the first videos of a search; `address` may be another search prefix of yt-dlp."""
     prefix = address or PREFIX
     return candidates(listing(f"{prefix}{count}:{query}", config), query, now)[:count]

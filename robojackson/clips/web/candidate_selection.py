@@ -1,4 +1,4 @@
-"""Which of the videos that a search found are worth a download: decided before any is."""
+"""Select the search results that are worth a download, before any is downloaded."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -12,12 +12,12 @@ from robojackson.config import config_dataclass
 
 @config_dataclass
 class SelectionConfig:
-    """What is kept of a search.
+    """Rules of the selection.
 
     Attributes:
         max_duration_s: A video of this length or longer is dropped, seconds; a short has less.
         top: How many of the most watched are kept.
-        searched: How many the search is asked for; most of what it finds is dropped.
+        searched: How many results to request; most of them are dropped.
     """
 
     max_duration_s: float = Field(default=60.0, gt=0)
@@ -27,7 +27,7 @@ class SelectionConfig:
 
 @dataclass(frozen=True)
 class Selection:
-    """What is left of a search.
+    """Result of a selection.
 
     Attributes:
         selected: The most watched first.
@@ -44,15 +44,16 @@ def select(
     config: SelectionConfig,
     failed: Collection[tuple[str, str]] = (),
 ) -> Selection:
-    """The videos to download: no long ones, no live streams, each once, the most watched first.
+    """Return the videos to download: no long ones, no live streams, each once, the most watched
+    first.
 
     One that failed before waits until there is no other: or a few that always fail would take all
     places every night.
 
-    A video whose length the source does not tell is kept: the downloaded file will tell.
+    A video of unknown length is kept: the downloaded file will show its length.
 
     Args:
-        found: In the order of the search, which breaks ties of the view count.
+        found: Candidates in the order of the search, which breaks ties of the view count.
         known: Keys of videos that were assessed before.
         config: Limits.
         failed: Keys of videos that could not be had or assessed before.

@@ -1,4 +1,4 @@
-"""Which format of a video is downloaded: a small one to score, a good one to dance.
+"""Choose the format to download: a small one to score, a good one to dance.
 
 Robots do not listen, so a format without sound is as good as one with it, and nothing is ever
 merged. The short side of the image counts: shorts stand upright.
@@ -19,9 +19,11 @@ DIRECT_PROTOCOLS = ("http", "https")
 
 @config_dataclass
 class FormatConfig:
-    """Attributes:
-    score_short_side: Fewest pixels of the short side of the image that is scored.
-    dance_short_side: Most pixels of the short side of the image that is danced.
+    """Configuration of the formats of downloads.
+
+    Attributes:
+        score_short_side: Fewest pixels of the short side of the image that is scored.
+        dance_short_side: Most pixels of the short side of the image that is danced.
     """
 
     score_short_side: int = Field(default=360, ge=16)
@@ -29,7 +31,7 @@ class FormatConfig:
 
 
 def choose(formats: Sequence[Format], purpose: Purpose, config: FormatConfig) -> Format | None:
-    """The format to download, None when none has an image.
+    """Return the format to download, None when none has an image.
 
     To score: the smallest of at least `score_short_side`, or the largest there is. To dance: the
     largest of at most `dance_short_side`, or the smallest there is. A format whose size is unknown
@@ -47,24 +49,25 @@ def choose(formats: Sequence[Format], purpose: Purpose, config: FormatConfig) ->
 
 
 def short_side(format_: Format) -> int:
-    """Pixels of the shorter side of the image; 0 when the format does not tell."""
+    """Return pixels of the shorter side of the image; 0 when the format does not give it."""
     width, height = format_.get("width"), format_.get("height")
     sides = [int(side) for side in (width, height) if side]
     return min(sides) if sides else 0
 
 
 def _cost(format_: Format) -> tuple[int, bool, float]:
-    """Least first: the smaller image, one file rather than pieces, fewer bytes."""
+    """Return the least first: the smaller image, one file rather than pieces, fewer bytes."""
     return short_side(format_), format_.get("protocol") not in DIRECT_PROTOCOLS, _bytes(format_)
 
 
 def _quality(format_: Format) -> tuple[int, bool, float]:
-    """Greatest first: the larger image, one file rather than pieces, more frames, more bits."""
+    """Return a sort key, best greatest: larger image, one file rather than pieces, more frames,
+    more bits."""
     rate = float(format_.get("fps") or 0) + 1e-6 * float(format_.get("tbr") or 0)
     return short_side(format_), format_.get("protocol") in DIRECT_PROTOCOLS, rate
 
 
 def _bytes(format_: Format) -> float:
-    """Size of the file, or its bit rate, which orders formats of one video alike."""
+    """Return the size of the file, or its bit rate, which orders formats of one video alike."""
     size = format_.get("filesize") or format_.get("filesize_approx")
     return float(size or format_.get("tbr") or float("inf"))

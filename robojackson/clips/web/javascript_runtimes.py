@@ -9,7 +9,7 @@ from pathlib import Path
 PROGRAMS = {"deno": "deno", "node": "node", "bun": "bun", "quickjs": "qjs"}
 """yt-dlp's name of a runtime to its program, the best first."""
 OLDEST = {"deno": (2, 3), "node": (22,), "bun": (1, 2, 11)}
-"""Versions that yt-dlp 2026.10 asks for."""
+"""Versions that yt-dlp 2026.10 needs."""
 VERSION_TIMEOUT_S = 10.0
 ADVICE = (
     "a JavaScript runtime, without which yt-dlp misses formats of YouTube: "
@@ -18,13 +18,13 @@ ADVICE = (
 
 
 def runtimes() -> dict[str, str]:
-    """Those that are installed, beside Python or on the path: name to program."""
+    """Return the installed runtimes, beside Python or on the path: name to program."""
     found = {name: _place(program) for name, program in PROGRAMS.items()}
     return {name: place for name, place in found.items() if place}
 
 
 def usable() -> str | None:
-    """The best one that is new enough, None where there is none."""
+    """Return the best one that is new enough, None where there is none."""
     for name, program in runtimes().items():
         if name not in OLDEST or _version(program) >= OLDEST[name]:
             return name
@@ -37,7 +37,7 @@ def _place(program: str) -> str | None:
 
 
 def _version(program: str) -> tuple[int, ...]:
-    """(22, 1, 0) of what it says of itself; () when it says nothing."""
+    """Return its version as (22, 1, 0); () when it prints none."""
     try:
         said = subprocess.run(
             [program, "--version"],

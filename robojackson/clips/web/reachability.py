@@ -1,6 +1,6 @@
-"""Whether a site of the web can be reached at all: one attempt, before anything costly begins.
+"""Check that a site can be reached: one attempt, before anything costly begins.
 
-A search without a network would otherwise start Prefect's server, and ask again and again.
+A search without a network would otherwise start Prefect's server, and retry again and again.
 """
 
 import socket
@@ -39,7 +39,7 @@ def require_reachable(page: str, proxy: str | None = None, patience_s: float = P
 
 
 def _usual_proxy(page: str, host: str) -> str:
-    """The proxy that the environment names for a page; empty where it names none."""
+    """Return the proxy that the environment names for a page; empty where it names none."""
     if urllib.request.proxy_bypass(host):
         return ""
     proxies = urllib.request.getproxies()
@@ -47,7 +47,7 @@ def _usual_proxy(page: str, host: str) -> str:
 
 
 def _refusal(address: str, patience_s: float) -> str:
-    """Why no connection could be made; empty where one was.
+    """Return why no connection could be made; empty where one was.
 
     In a thread, since name resolution has no time limit of its own.
     """
@@ -64,12 +64,12 @@ def _attempt(address: str, patience_s: float) -> str:
     try:
         socket.create_connection(_place(address), patience_s).close()
     except (OSError, ValueError) as cause:
-        told = cause.strerror if isinstance(cause, OSError) and cause.strerror else str(cause)
-        return clean_text(told or type(cause).__name__)
+        detail = cause.strerror if isinstance(cause, OSError) and cause.strerror else str(cause)
+        return clean_text(detail or type(cause).__name__)
     return ""
 
 
 def _place(address: str) -> tuple[str, int]:
-    """Host and port of an address; one without a scheme is a proxy's."""
+    """Return the host and port of an address; one without a scheme is a proxy's."""
     parts = urlsplit(address if "://" in address else f"http://{address}")
     return parts.hostname or "", parts.port or PORTS.get(parts.scheme, 80)

@@ -1,4 +1,4 @@
-"""Why a request to the web failed, and whether it is worth another try."""
+"""Explain why a request to the web failed, and whether to retry it."""
 
 import math
 import re
@@ -15,11 +15,13 @@ CONNECTION = re.compile(r"^HTTPS?Connection\([^)]*\): ")
 
 
 class Failure(NamedTuple):
-    """Attributes:
-    reason: In one line.
-    passing: Whether another attempt makes sense.
-    wait_s: Seconds that the server asks to wait.
-    most_retries: How often it makes sense at most; a name that cannot be resolved is soon sure.
+    """Why a request failed, and whether to retry it.
+
+    Attributes:
+        reason: Reason in one line.
+        passing: Whether another attempt makes sense.
+        wait_s: Seconds that the server requests to wait.
+        most_retries: How often it makes sense at most; a name that cannot be resolved is soon sure.
     """
 
     reason: str
@@ -29,14 +31,14 @@ class Failure(NamedTuple):
 
 
 def explain(failure: BaseException) -> Failure:
-    """What an error of yt-dlp, or one inside it, means."""
+    """Return what an error of yt-dlp, or one inside it, means."""
     from yt_dlp.networking.exceptions import HTTPError, IncompleteRead, TransportError
     from yt_dlp.utils import ContentTooShortError
 
     for cause in _causes(failure):
         if isinstance(cause, HTTPError):
-            asked = str(cause.response.headers.get("Retry-After") or "")
-            wait_s = float(asked) if asked.isdigit() else 0.0
+            retry_after = str(cause.response.headers.get("Retry-After") or "")
+            wait_s = float(retry_after) if retry_after.isdigit() else 0.0
             answered = clean_text(cause.reason or "", 60)
             return Failure(_status(cause.status, answered), _is_passing(cause.status), wait_s)
         if isinstance(cause, IncompleteRead | ContentTooShortError):
@@ -54,7 +56,7 @@ def explain(failure: BaseException) -> Failure:
 
 
 def _causes(failure: BaseException) -> list[BaseException]:
-    """An error and all that yt-dlp hid inside it, the innermost first."""
+    """Return an error and all that yt-dlp hid inside it, the innermost first."""
     found: list[BaseException] = []
     waiting: list[Any] = [failure]
     while waiting:
@@ -78,7 +80,7 @@ def _is_passing(status: int) -> bool:
 
 
 def _line(error: BaseException) -> str:
-    """yt-dlp's message without its prefixes and its advice about reporting bugs."""
+    """Return yt-dlp's message without its prefixes and its advice about reporting bugs."""
     text = clean_text(str(error) or type(error).__name__, 10 * REASON_LENGTH)
     text = text.removeprefix("ERROR: ").split("; please report this issue")[0]
     return clean_text(text.split(" (caused by")[0], REASON_LENGTH)

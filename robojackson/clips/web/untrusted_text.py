@@ -1,4 +1,4 @@
-"""What the web says in words: titles, ids and addresses. None of it is trusted.
+"""Text from the web: titles, ids and addresses. None of it is trusted.
 
 A title may hold control characters, a thousand letters or letters that run from right to left; an
 id may be `../../x`. What leaves this module fits into one cell of a table and one part of a path.
@@ -18,7 +18,7 @@ SAFE_IN_URL = "%/:=&?~#+!$,;'@()*[]-._"
 
 
 def clean_text(text: object, length: int = TITLE_LENGTH) -> str:
-    """One line of printable characters, at most `length` of them.
+    """Return one line of printable characters, at most `length` of them.
 
     Control and formatting characters (escape sequences, joiners, overrides of the writing
     direction) go, runs of white space become one space, and no letter keeps more than two marks.
@@ -37,7 +37,7 @@ def clean_text(text: object, length: int = TITLE_LENGTH) -> str:
 
 
 def isolated(text: str) -> str:
-    """The text itself, or set apart where it holds letters that run from right to left.
+    """Return the text itself, or set apart where it holds letters that run from right to left.
 
     A terminal that knows the two isolates keeps the cells beside it where they are; the isolates
     take no room.
@@ -48,7 +48,7 @@ def isolated(text: str) -> str:
 
 
 def safe_name(raw: object, address: str = "") -> str:
-    """A part of a path: letters, digits, `_` and `-`, at most 64.
+    """Return a part of a path: letters, digits, `_` and `-`, at most 64.
 
     A name that is one already stays as it is. Another one becomes its readable letters and a
     digest, so that two names never become one.
@@ -66,7 +66,8 @@ def safe_name(raw: object, address: str = "") -> str:
 
 
 def web_address(raw: object) -> str:
-    """An http or https address without spaces and control characters; empty for another one."""
+    """Return an http or https address without spaces and control characters; empty for another
+    one."""
     text = "".join(c for c in str(raw or "") if unicodedata.category(c)[0] not in "CZ")
     try:
         parts = urlsplit(text)
@@ -78,6 +79,6 @@ def web_address(raw: object) -> str:
 
 
 def in_markdown(text: str) -> str:
-    """The text with everything escaped that Markdown or HTML would take for itself."""
+    """Return the text with everything escaped that Markdown or HTML would take for itself."""
     escaped = text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
     return re.sub(r"([\\`*_{}\[\]()#+!|~-])", r"\\\1", escaped)

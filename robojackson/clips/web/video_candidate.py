@@ -1,4 +1,4 @@
-"""A video that may be danced, as its source tells of it before anything is downloaded."""
+"""A video that may be danced, as its source describes it before anything is downloaded."""
 
 import math
 from collections.abc import Mapping
@@ -24,12 +24,12 @@ class VideoCandidate:
         title: One line.
         query: What was searched for.
         source: Where it was found: `folder`, or the name of yt-dlp's extractor.
-        duration_s: Seconds; None when the source does not tell.
+        duration_s: Seconds; None when the source does not give it.
         view_count: How often it was watched.
         width, height: Pixels.
         thumbnail: Address of a picture, `` without one.
         live: Whether it is, was or will be a live stream.
-        retrieved_at: When the source told this; not part of what the video is.
+        retrieved_at: When the source was queried; not part of the video's identity.
     """
 
     video_id: str
@@ -47,14 +47,15 @@ class VideoCandidate:
 
     @property
     def key(self) -> tuple[str, str]:
-        """What tells two videos apart."""
+        """Identity of a video."""
         return self.source, self.video_id
 
 
 def from_info(
     info: Mapping[str, Any], query: str, retrieved_at: datetime, page: str = ""
 ) -> VideoCandidate | None:
-    """The candidate of a dictionary that yt-dlp returned, flat or full; None without an address.
+    """Return the candidate of a dictionary that yt-dlp returned, flat or full; None without an
+    address.
 
     Args:
         info: One entry; https://github.com/yt-dlp/yt-dlp#output-template names its keys.
@@ -83,7 +84,7 @@ def from_info(
 
 
 def _address(info: Mapping[str, Any]) -> str:
-    """The page of a video, or its file where a page holds several."""
+    """Return the page of a video, or its file where a page holds several."""
     formats = info.get("formats") or []
     last = formats[-1].get("url") if formats and isinstance(formats[-1], Mapping) else None
     is_embedded = bool(formats) and info.get("_type", "video") == "video"
@@ -93,7 +94,7 @@ def _address(info: Mapping[str, Any]) -> str:
 
 
 def _thumbnail(info: Mapping[str, Any]) -> str:
-    """The widest picture that a flat entry lists, or the one of a full entry."""
+    """Return the widest picture that a flat entry lists, or the one of a full entry."""
     listed = [t for t in info.get("thumbnails") or [] if isinstance(t, Mapping)]
     widest = max(listed, key=lambda t: _number(t.get("width")) or 0.0, default={})
     return web_address(info.get("thumbnail") or widest.get("url"))

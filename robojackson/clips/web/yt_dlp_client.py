@@ -1,7 +1,7 @@
 """The one place that talks to yt-dlp: what an address holds, and the file behind it.
 
 yt-dlp's Python API, quiet, with our retries around it: a server that is busy, silent or cuts the
-line is asked again after 1, 2, 4 ... times the back-off (or when it says; once where the name
+line is retried after 1, 2, 4 ... times the back-off (or when it says; once where the name
 cannot be resolved), and a file goes on where it stopped. Every failure becomes one line of reason.
 Sizes in bytes, times in seconds.
 """
@@ -31,12 +31,12 @@ log = logging.getLogger(__name__)
 
 @config_dataclass
 class WebConfig:
-    """Manners towards the servers of others.
+    """Limits towards the servers of others.
 
     Attributes:
         retries: How often a request that failed for now is made again.
         backoff_s: Wait before the first of them, seconds; it doubles each time.
-        longest_wait_s: Longest wait that a server may ask for, seconds.
+        longest_wait_s: Longest wait that a server may request, seconds.
         timeout_s: Longest silence of a server, seconds.
         longest_download_s: Longest time that one file may take, seconds.
         rate_limit_bytes_s: Fastest download, bytes a second; None is no limit.
@@ -44,7 +44,7 @@ class WebConfig:
         largest_file_mb: A file beyond this is not downloaded, megabytes.
         cookies_file: Netscape cookie file that is passed through.
         proxy: Address of a proxy that is passed through.
-        language: Two letters in which titles are asked for; empty is the site's own choice.
+        language: Language of the titles, two letters; empty is the site's own choice.
     """
 
     retries: int = Field(default=4, ge=0)
@@ -74,7 +74,8 @@ class Offer:
 
 
 def listing(address: str, config: WebConfig) -> dict[str, Any]:
-    """What a search or a page holds, flat: no page of a video is opened, no video downloaded.
+    """Return what a search or a page holds, flat: no page of a video is opened, no video
+    downloaded.
 
     Raises:
         SearchFailed: the message has the address and the reason.
@@ -87,7 +88,7 @@ def listing(address: str, config: WebConfig) -> dict[str, Any]:
 
 
 def offer(url: str, purpose: Purpose, formats: FormatConfig, config: WebConfig) -> Offer:
-    """The format of a video that would be downloaded.
+    """Return the format of a video that would be downloaded.
 
     Raises:
         DownloadFailed: there is none, or the page cannot be had; the message is the reason.
@@ -103,7 +104,7 @@ def offer(url: str, purpose: Purpose, formats: FormatConfig, config: WebConfig) 
 
 
 def fetch(chosen: Offer, folder: Path, config: WebConfig, progress: Progress | None = None) -> Path:
-    """The file of an offer; what an interrupted download left in the folder is continued.
+    """Return the file of an offer; what an interrupted download left in the folder is continued.
 
     Raises:
         DownloadFailed: the message is the reason.
@@ -125,7 +126,7 @@ def fetch(chosen: Offer, folder: Path, config: WebConfig, progress: Progress | N
 
 
 def entries(info: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """The videos of a listing; a page of one video is a listing of one."""
+    """Return the videos of a listing; a page of one video is a listing of one."""
     found = info.get("entries")
     return [info] if found is None else [entry for entry in found if entry]
 
@@ -177,7 +178,7 @@ def _download(info: Mapping[str, Any], options: dict[str, Any]) -> None:
 
 
 def _selector(purpose: Purpose, formats: FormatConfig) -> Callable[[Mapping[str, Any]], Any]:
-    """Our choice in the form in which yt-dlp asks for it."""
+    """Return our choice in the form that yt-dlp expects."""
 
     def select(context: Mapping[str, Any]) -> Any:
         chosen = choose(context["formats"], purpose, formats)
@@ -187,7 +188,7 @@ def _selector(purpose: Purpose, formats: FormatConfig) -> Callable[[Mapping[str,
 
 
 def _watch(progress: Progress | None, config: WebConfig) -> Callable[[Mapping[str, Any]], None]:
-    """A hook for yt-dlp that passes bytes on and stops a download that takes too long."""
+    """Return a hook for yt-dlp that passes bytes on and stops a download that takes too long."""
     began = time.monotonic()
 
     def hook(state: Mapping[str, Any]) -> None:
@@ -203,19 +204,19 @@ def _watch(progress: Progress | None, config: WebConfig) -> Callable[[Mapping[st
 
 
 def _patiently(attempt: Callable[[], Result], config: WebConfig) -> Result:
-    """The result of an attempt, repeated while what goes wrong may go right later."""
+    """Return the result of an attempt, repeated while the failure may be temporary."""
     from yt_dlp.utils import YoutubeDLError
 
     for number in range(config.retries + 1):
         try:
             return attempt()
         except (YoutubeDLError, OSError, ValueError, RecursionError) as cause:
-            reason, transient, asked_s, most = explain(cause)
+            reason, transient, retry_after_s, most = explain(cause)
             if not transient or number >= min(config.retries, most):
                 tried = f" ({number + 1} attempts)" if number else ""
                 raise DownloadFailed(f"{reason}{tried}") from cause
-            wait_s = min(max(config.backoff_s * 2**number, asked_s), config.longest_wait_s)
-            log.info("%s; again in %.3g s", reason, wait_s)
+            wait_s = min(max(config.backoff_s * 2**number, retry_after_s), config.longest_wait_s)
+            log.info("%s; retrying in %.3g s", reason, wait_s)
             time.sleep(wait_s)
     raise AssertionError("unreachable")
 

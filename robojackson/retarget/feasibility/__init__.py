@@ -1,1 +1,1 @@
-"""What the robot can do of a motion: dynamics, contact forces, tempo."""
+"""Feasibility of a motion on a robot: dynamics, contact forces, tempo."""

@@ -1,7 +1,7 @@
 """Certify a motion: which steps the robot can do, which joint or contact fails in the others.
 
 A step fails for a torque when it would be feasible without torque limits; otherwise nothing that
-the soles can push makes up for the missing support. Joins what fails in a row to one finding.
+the soles can push replaces the missing support. Joins what fails in a row to one finding.
 """
 
 from collections.abc import Iterator, Sequence
@@ -34,7 +34,7 @@ class Certified:
 
 @dataclass(frozen=True)
 class _Failure:
-    """Why one step fails: cause, the joint or part, how much, and the tempo that mends it."""
+    """Failure of one step: cause, the joint or part, how much, and the tempo that repairs it."""
 
     cause: Cause
     part: str
@@ -50,18 +50,18 @@ def certify(
     cycle_offset: np.ndarray | None,
     tolerance: Tolerance,
 ) -> Certified:
-    """What the robot can and cannot do of a motion."""
-    asked, near, forces = _demand(robot, qpos, dt, cycle_offset, tolerance)
-    found = contact_wrench.supply(asked)
-    slack = tempo.slower_slacks(asked, forces, found.slack)
-    free = _without_limits(asked, found)
+    """Return what the robot can and cannot do of a motion."""
+    needs, near, forces = _demand(robot, qpos, dt, cycle_offset, tolerance)
+    found = contact_wrench.supply(needs)
+    slack = tempo.slower_slacks(needs, forces, found.slack)
+    free = _without_limits(needs, found)
     failures = [
         _failure(robot, step, found, free, near, slack, tolerance)
         for step in range(len(qpos))
     ]  # fmt: skip
     falls = _falls(robot, qpos)
     findings = sorted((*_joined(failures), *_joined(falls)), key=lambda finding: finding.start)
-    ratio = np.abs(_motor_torque(asked, found)) / robot.torque_limit
+    ratio = np.abs(_motor_torque(needs, found)) / robot.torque_limit
     return Certified(
         Certificate(found.slack, tempo.feasible_tempo(slack), tuple(findings)),
         ratio[:, robot.actuated],
@@ -76,9 +76,9 @@ def motor_torques(
     cycle_offset: np.ndarray | None,
     tolerance: Tolerance,
 ) -> Float[np.ndarray, "S J"]:
-    """Torque of every hinge's motor that the motion asks for, within its limit, Nm."""
-    asked, *_ = _demand(robot, qpos, dt, cycle_offset, tolerance)
-    return _motor_torque(asked, contact_wrench.supply(asked))
+    """Return the torque of every hinge's motor that the motion needs, within its limit, Nm."""
+    needs, *_ = _demand(robot, qpos, dt, cycle_offset, tolerance)
+    return _motor_torque(needs, contact_wrench.supply(needs))
 
 
 def _demand(
@@ -88,35 +88,35 @@ def _demand(
     cycle_offset: np.ndarray | None,
     tolerance: Tolerance,
 ) -> tuple[contact_wrench.Demand, Bool[np.ndarray, "S C"], FreeSpace]:
-    """What a motion asks for at its own tempo, which soles are near the floor, and the parts of
-    the force."""
+    """Return what a motion needs at its own tempo, which soles are near the floor, and the parts
+    of the force."""
     forces = inverse_dynamics.free_space(robot, qpos, dt, cycle_offset)
     posed = pose(inverse_dynamics.linkage(robot), qpos)
     near = inverse_dynamics.touching(robot, posed)
-    asked = inverse_dynamics.demand(robot, qpos, forces.at(1.0), near, tolerance, posed)
-    return asked, near, forces
+    needs = inverse_dynamics.demand(robot, qpos, forces.at(1.0), near, tolerance, posed)
+    return needs, near, forces
 
 
 def fallen(robot: Robot, qpos: Float[np.ndarray, "S nq"]) -> Bool[np.ndarray, " S"]:
-    """Steps that the fall rule ends."""
+    """Return the steps that the fall rule ends."""
     return np.array([failure is not None for failure in _falls(robot, qpos)])
 
 
-def _motor_torque(asked: contact_wrench.Demand, found: Supply) -> Float[np.ndarray, "S J"]:
-    """Torque of the motors: what a hinge presses on its stop beyond its limit is the stop's."""
-    limit = 1.0 / np.where(asked.ease > 0, asked.ease, np.inf)
-    upper = np.where(np.isinf(asked.upper) & (asked.ease > 0), limit, np.inf)
-    lower = np.where(np.isinf(asked.lower) & (asked.ease > 0), -limit, -np.inf)
+def _motor_torque(needs: contact_wrench.Demand, found: Supply) -> Float[np.ndarray, "S J"]:
+    """Return the torque of the motors; beyond its limit a hinge on its stop is held by the stop."""
+    limit = 1.0 / np.where(needs.ease > 0, needs.ease, np.inf)
+    upper = np.where(np.isinf(needs.upper) & (needs.ease > 0), limit, np.inf)
+    lower = np.where(np.isinf(needs.lower) & (needs.ease > 0), -limit, -np.inf)
     result: np.ndarray = np.clip(found.torque, lower, upper)
     return result
 
 
-def _without_limits(asked: contact_wrench.Demand, found: Supply) -> Supply:
-    """What endless torques would leave over; steps that are feasible keep what they have."""
+def _without_limits(needs: contact_wrench.Demand, found: Supply) -> Supply:
+    """Return the slack with unlimited torques; steps that are feasible keep their slack."""
     hard = np.flatnonzero(found.slack > 1.0)
     if not len(hard):
         return found
-    some = asked.at(hard)
+    some = needs.at(hard)
     endless = np.full_like(some.upper, np.inf)
     free = contact_wrench.supply(replace(some, lower=-endless, upper=endless))
     torque, left = found.torque.copy(), found.left.copy()
@@ -164,7 +164,7 @@ def _falls(robot: Robot, qpos: Float[np.ndarray, "S nq"]) -> list[_Failure | Non
 
 
 def _joined(failures: Sequence[_Failure | None]) -> Iterator[Finding]:
-    """Findings of failures of one cause and part that follow each other."""
+    """Yield the findings of failures of one cause and part that follow each other."""
     run: list[tuple[int, _Failure]] = []
     for step, failure in enumerate(failures):
         if failure is None:
@@ -183,7 +183,7 @@ def _continues(last: tuple[int, _Failure], step: int, failure: _Failure) -> bool
 
 
 def _finding(run: list[tuple[int, _Failure]]) -> Finding:
-    """The middle failure tells how much, and the slowest tempo mends all."""
+    """Return one finding: the middle failure gives its figures, the slowest tempo repairs all."""
     start, end = run[0][0], run[-1][0] + 1
     failures = sorted((failure for _, failure in run), key=_size)
     usual, slowest = failures[len(failures) // 2], min(failure.tempo for failure in failures)
@@ -195,13 +195,13 @@ def _finding(run: list[tuple[int, _Failure]]) -> Finding:
 
 
 def _size(failure: _Failure) -> float:
-    """How bad a failure is beside others of its kind."""
+    """Return the size of a failure relative to others of its kind."""
     sign = -1.0 if failure.part == "height" else 1.0
     return sign * failure.amount + GRAVITY * failure.lever_m
 
 
 def _describe(worst: _Failure) -> tuple[str, str]:
-    """What fails, and what mends it where a slower tempo does not."""
+    """Return what fails, and the remedy where a slower tempo is none."""
     if worst.cause == "torque":
         return (
             f"{worst.part} torque {worst.amount:.2f}x its limit",
@@ -224,5 +224,6 @@ def _describe(worst: _Failure) -> tuple[str, str]:
 
 
 def _reach_cm(failure: _Failure) -> float:
-    """How far the body stands beside its support: as a lever, and as a push at a metre's height."""
+    """Return how far the body stands beside its support: as a lever, and as a push at a metre's
+    height."""
     return 100 * (failure.lever_m + failure.amount / GRAVITY)

@@ -1,8 +1,8 @@
-"""Which contact pushes and joint torques together produce a motion, and what they leave over.
+"""Solve for the contact pushes and joint torques that produce a motion, and their residual.
 
 For every step: pushes p >= 0 along the edges of the friction pyramids and torques inside their
 limits that leave the least of  f - G p - torques,  f being the generalised force of the motion in
-free space (root 6, then the hinges). What is left is told in units of a tolerance, so a step is
+free space (root 6, then the hinges). The residual is given in units of a tolerance, so a step is
 feasible when its slack is at most 1. Newtons, newton-metres; all steps are solved at once.
 """
 
@@ -28,7 +28,7 @@ _SINGULAR = 1e-13  # share of what the feet can give that keeps its square root 
 
 @config_dataclass
 class Tolerance:
-    """What may be left over in a step that counts as feasible: a tracking robot makes up for it.
+    """Residual of a step that still counts as feasible: a tracking robot compensates for it.
 
     Attributes:
         force_bw: Force on the root, body weights.
@@ -43,7 +43,7 @@ class Tolerance:
 
 @dataclass(frozen=True)
 class Demand:
-    """What a motion asks for and what may give it, a row a step.
+    """The force that a motion needs and what may supply it, a row a step.
 
     Attributes:
         force: Generalised force of the motion in free space.
@@ -51,8 +51,8 @@ class Demand:
         spread: Wrench of one body weight along each pyramid edge.
         usable: Edges of contacts that touch.
         lower, upper: Torque limits of the hinges; infinite where a stop carries.
-        scale: Of each row of the force: slack a newton or newton-metre.
-        ease: Of each hinge: one over its torque limit; 0 without a motor.
+        scale: Scale of each row of the force: slack a newton or newton-metre.
+        ease: Ease of each hinge: one over its torque limit; 0 without a motor.
     """
 
     force: Float[np.ndarray, "S nv"]
@@ -70,7 +70,7 @@ class Demand:
         return np.asarray(self.feet @ self.spread)
 
     def at(self, rows: np.ndarray) -> "Demand":
-        """Some of the steps."""
+        """Return the demand of some of the steps."""
         parts = ("force", "feet", "spread", "usable", "lower", "upper")
         return replace(self, **{name: getattr(self, name)[rows] for name in parts})
 
@@ -81,7 +81,7 @@ class Supply:
 
     Attributes:
         pushes: Along the edges, body weights.
-        torque: Of the hinges, inside limits or not, newton-metres.
+        torque: Torque of the hinges, inside limits or not, newton-metres.
         left: What is left over of each row, in tolerances; zero on a hinge inside its limits.
         slack: Its norm; feasible up to 1.
     """
@@ -130,14 +130,14 @@ class Root:
     mix: Float[np.ndarray, "S W W"]
 
     def __matmul__(self, matrix: Float[np.ndarray, "S nv M"]) -> Float[np.ndarray, "S nv M"]:
-        """R times a matrix a step."""
+        """Return R times a matrix a step."""
         out = self.size[..., None] * matrix
         out -= (self.wrench @ self.mix.swapaxes(1, 2)) @ (self.wrench.swapaxes(1, 2) @ out)
         return np.asarray(out)
 
 
 def supply(demand: Demand) -> Supply:
-    """The pushes that leave the least."""
+    """Return the pushes that leave the smallest residual."""
     point = solve_box(_box(demand, 0.0))
     pushes = point.x[:, : demand.usable.shape[1]] * demand.usable
     given = (demand.feet @ (demand.spread @ pushes[..., None]))[..., 0]
@@ -148,13 +148,13 @@ def supply(demand: Demand) -> Supply:
 
 
 def relaxed(demand: Demand, barrier: float, start: Point | None = None) -> Relaxed:
-    """The same, smooth: the second derivative tells how near all limits are.
+    """Return the same, smooth: the second derivative grows near every limit.
 
     V(f) = min_x |S f - A x|^2 / 2 + ...: V' = S left, V'' = S (1 + A Q^-1 A^T)^-1 S with Q the
     curvature of prices and barrier.
 
     Args:
-        start: Of a problem nearby.
+        start: Solution of a nearby problem.
     """
     box = _box(demand, barrier)
     point = solve_box(box, start)
@@ -179,7 +179,7 @@ def _root(box: Box, point: Point, scale: Float[np.ndarray, " nv"]) -> Root:
 
 
 def _box(demand: Demand, relax: float) -> Box:
-    """The problem in tolerances; torques as shares of their limits."""
+    """Return the problem in tolerances; torques as shares of their limits."""
     steps, count = demand.usable.shape
     edges = np.zeros((steps, count))
     unit = np.where(demand.ease > 0, demand.ease, 1.0)

@@ -1,4 +1,4 @@
-"""What inverse dynamics reads of a robot, read once a robot.
+"""Constants of a robot for inverse dynamics, computed once a robot.
 
 Copying a model with meshes costs as much as the dynamics of a thousand steps, so what is derived of
 a robot is cached by its identity. Kilograms, metres, radians, newton-metres.
@@ -29,12 +29,12 @@ class ForceModel:
         bodies: Bodies that move and have mass, and of each:
         last_dof: The lowest degree of freedom that moves it,
         mass, com, inertia: about the centre of mass, in the frame of the body.
-        parent: Of each dof: the lowest one above it; the root's six are two joints of three,
+        parent: Parent of each dof: the lowest one above it; the root's six are two joints of three,
             which no other precedes.
         above: 1 where dof i (row) moves dof j (column), or is of its joint.
         below: 1 where j is moved by i, and i is not of its joint; `upper` both or itself.
-        carried_mass: Of all bodies that a dof moves.
-        stiffness, spring, damping, armature: Of the dofs; `spring` of the hinges.
+        carried_mass: Mass of all bodies that a dof moves.
+        stiffness, spring, damping, armature: Parameters of the dofs; `spring` of the hinges.
         gravity: m/s2.
     """
 
@@ -69,7 +69,7 @@ class _Same:
 
 
 def once_a_robot(read: Callable[[Robot], _T]) -> Callable[[Robot], _T]:
-    """Cache what is read of a robot; its model must not be changed afterwards."""
+    """Cache what is computed from a robot; its model must not be changed afterwards."""
     cached = lru_cache(maxsize=_CACHED_ROBOTS)(lambda key: read(key.robot))
 
     @wraps(read)
@@ -81,7 +81,7 @@ def once_a_robot(read: Callable[[Robot], _T]) -> Callable[[Robot], _T]:
 
 @once_a_robot
 def unconstrained(robot: Robot) -> mujoco.MjModel:
-    """The robot's model without contacts and stops."""
+    """Return the robot's model without contacts and stops."""
     out = copy.copy(robot.model)
     off = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT
     out.opt.disableflags |= int(off)
@@ -136,7 +136,7 @@ def _parents(model: mujoco.MjModel) -> Int[np.ndarray, " nv"]:
 
 
 def _lowest_dofs(model: mujoco.MjModel) -> Int[np.ndarray, " B"]:
-    """Of every body the lowest dof that moves it, -1 where none does."""
+    """Return the lowest dof that moves each body, -1 where none does."""
     lowest = np.full(model.nbody, -1)
     for body in range(1, model.nbody):
         count, first = model.body_dofnum[body], model.body_dofadr[body]

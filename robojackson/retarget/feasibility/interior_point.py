@@ -30,7 +30,7 @@ class Box:
         stiff: A of the torques, a diagonal under the six rows of the root.
         target: b.
         lower, upper: Bounds of pushes, then torques; infinite where there is none.
-        price: Of the squares of pushes, then torques.
+        price: Weight of the squares of pushes, then torques.
         relax: Weight of the barrier, mu.
     """
 
@@ -50,15 +50,15 @@ class Box:
         return result
 
     def moved(self, pushes: Float[np.ndarray, "S E"]) -> Float[np.ndarray, "S nv"]:
-        """A times pushes."""
+        """Return A times pushes."""
         return _times(self.feet, _times(self.spread, pushes))
 
     def felt(self, rows: Float[np.ndarray, "S nv"]) -> Float[np.ndarray, "S E"]:
-        """A transposed times rows."""
+        """Return A transposed times rows."""
         return _times(self.spread.swapaxes(1, 2), _times(self.feet.swapaxes(1, 2), rows))
 
     def at(self, rows: np.ndarray) -> "Box":
-        """Some of the problems."""
+        """Return some of the problems."""
         if len(rows) == len(self.target):
             return self
         parts = ("feet", "spread", "target", "lower", "upper")
@@ -74,21 +74,21 @@ class Point:
     high: Float[np.ndarray, "S n"]
 
     def above(self, box: Box) -> np.ndarray:
-        """Distance to the lower bounds."""
+        """Return the distance to the lower bounds."""
         return np.where(np.isfinite(box.lower), self.x - box.lower, _FAR)
 
     def below(self, box: Box) -> np.ndarray:
-        """Distance to the upper bounds."""
+        """Return the distance to the upper bounds."""
         return np.where(np.isfinite(box.upper), box.upper - self.x, _FAR)
 
     def barrier(self, box: Box) -> Float[np.ndarray, "S n"]:
-        """Curvature of the bounds."""
+        """Return the curvature of the bounds' barrier."""
         result: np.ndarray = self.low / self.above(box) + self.high / self.below(box)
         return result
 
 
 def solve_box(box: Box, start: Point | None = None) -> Point:
-    """The best unknowns of every row.
+    """Return the best unknowns of every row.
 
     Args:
         start: Those of a problem nearby; only one with a barrier gains by it.
@@ -116,7 +116,7 @@ def _first(box: Box) -> Point:
 
 
 def _begun(box: Box, start: Point) -> Point:
-    """A start; rows that are not inside their bounds begin anew."""
+    """Return a start; rows outside their bounds start from the default."""
     found = _first(box)
     if start.x.shape != found.x.shape:
         return found
@@ -130,14 +130,14 @@ def _begun(box: Box, start: Point) -> Point:
 
 
 def left_over(box: Box, x: Float[np.ndarray, "S n"]) -> Float[np.ndarray, "S nv"]:
-    """b - A x."""
+    """Return the residual b - A x."""
     left = box.target - box.moved(x[:, : box.edges])
     left[:, 6:] -= box.stiff * x[:, box.edges :]
     return np.asarray(left)
 
 
 def value(box: Box, point: Point) -> Float[np.ndarray, " S"]:
-    """The cost, barrier included."""
+    """Return the cost, barrier included."""
     squares = np.sum(left_over(box, point.x) ** 2, axis=1) + np.sum(box.price * point.x**2, axis=1)
     walls = np.where(np.isfinite(box.lower), np.log(point.above(box)), 0.0)
     walls += np.where(np.isfinite(box.upper), np.log(point.below(box)), 0.0)
@@ -145,14 +145,14 @@ def value(box: Box, point: Point) -> Float[np.ndarray, " S"]:
 
 
 def _gaps(point: Point, box: Box) -> Float[np.ndarray, " S"]:
-    """Mean complementarity of each row."""
+    """Return the mean complementarity of each row."""
     products = point.above(box) * point.low + point.below(box) * point.high
     bounds = np.isfinite(box.lower).sum(axis=1) + np.isfinite(box.upper).sum(axis=1)
     return np.asarray(products.sum(axis=1) / np.maximum(bounds, 1))
 
 
 def _advanced(point: Point, box: Box, gaps: np.ndarray) -> tuple[Point, Float[np.ndarray, " S"]]:
-    """One primal-dual step of every row, and how far it wanted to go."""
+    """Return every row after one primal-dual step, and the length of the full step."""
     above, below = point.above(box), point.below(box)
     centre = np.maximum(_CENTRING * gaps, box.relax)[:, None]
     push_low = np.isfinite(box.lower) * (centre / above)
@@ -169,7 +169,7 @@ def _advanced(point: Point, box: Box, gaps: np.ndarray) -> tuple[Point, Float[np
 
 
 def _room(value: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """Largest share of a change, at most all of it, that keeps every value positive."""
+    """Return the largest share of a change, at most all of it, that keeps every value positive."""
     falling = (change < 0) & (value > 0)
     ratio = np.where(falling, -value / np.where(falling, change, 1.0), np.inf)
     return np.asarray(np.minimum(1.0, _TO_THE_WALL * ratio.min(axis=1)))
@@ -184,7 +184,8 @@ def _gradient(box: Box, x: np.ndarray) -> np.ndarray:
 
 
 def _newton(box: Box, barrier: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Torques first, then (Q + G' C G) p = r with Q diagonal and C as small as the wrenches."""
+    """Return the torques first, then (Q + G' C G) p = r with Q diagonal and C as small as the
+    wrenches."""
     edges, stiff = box.edges, box.stiff
     own = stiff**2 + box.price[edges:] + barrier[:, edges:]
     weight = np.ones(box.target.shape)

@@ -1,4 +1,4 @@
-"""Inverse dynamics of a motion: what it asks for in free space, and what soles and motors can give.
+"""Inverse dynamics of a motion: the force needed in free space, and what soles and motors supply.
 
 The force of a motion at another tempo k follows from two evaluations: gravity and springs do not
 change, damping goes with k, inertia and Coriolis with k^2. Soles push along the edges of friction
@@ -38,20 +38,20 @@ class FreeSpace:
     inertial: Float[np.ndarray, "S nv"]
 
     def at(self, tempo: float | Float[np.ndarray, " S"]) -> Float[np.ndarray, "S nv"]:
-        """The force at a tempo beside the motion's own, one for all steps or one a step."""
+        """Return the force at a tempo beside the motion's own, one for all steps or one a step."""
         k = np.broadcast_to(np.asarray(tempo, float), len(self.still))[:, None]
         return np.asarray(self.still + k * self.damped + k**2 * self.inertial)
 
 
 def body_weight(robot: Robot) -> float:
-    """Newtons."""
+    """Return the weight of the robot, newtons."""
     return float(robot.model.body_mass.sum()) * GRAVITY
 
 
 def free_space(
     robot: Robot, qpos: Float[np.ndarray, "S nq"], dt: float, cycle_offset: np.ndarray | None
 ) -> FreeSpace:
-    """The force of a motion, by its parts."""
+    """Return the force of a motion, by its parts."""
     model = unconstrained(robot)
     speed, acceleration = velocities(qpos, dt, cycle_offset), accelerations(qpos, dt, cycle_offset)
     whole = inverse(model, qpos, speed, acceleration)
@@ -63,7 +63,7 @@ def free_space(
 def inverse(
     model: mujoco.MjModel, qpos: np.ndarray, speed: np.ndarray, acceleration: np.ndarray
 ) -> Float[np.ndarray, "S nv"]:
-    """`mj_inverse` of every step."""
+    """Return `mj_inverse` of every step."""
     data = mujoco.MjData(model)
     out = np.empty_like(speed)
     for step in range(len(qpos)):
@@ -81,7 +81,7 @@ def demand(
     tolerance: Tolerance,
     posed: Posed | None = None,
 ) -> Demand:
-    """What a motion asks for beside what the touching soles and the motors may give.
+    """Return the force that a motion needs from the touching soles and the motors.
 
     Args:
         posed: The kinematics, where they are known.
@@ -103,22 +103,23 @@ def demand(
 
 
 def sole_points(robot: Robot, posed: Posed) -> Float[np.ndarray, "S C 3"]:
-    """Lowest points of the balls under the feet."""
+    """Return the lowest points of the balls under the feet."""
     ground = posed.ball_pos.copy()
     ground[..., 2] -= robot.contact_radii
     return np.asarray(ground)
 
 
 def touching(robot: Robot, posed: Posed) -> Bool[np.ndarray, "S C"]:
-    """Soles near the floor, whatever their labels."""
+    """Return the soles near the floor, for any labels."""
     return np.asarray(sole_points(robot, posed)[..., 2] < NEAR_M)
 
 
 def wrenches(
     robot: Robot, posed: Posed
 ) -> tuple[Float[np.ndarray, "S nv W"], Float[np.ndarray, "S W E"]]:
-    """Generalised force of a unit wrench at each foot (about the middle of its soles, moments
-    first), and the wrenches of a unit push along each edge of each sole's friction pyramid."""
+    """Return the generalised force of a unit wrench at each foot (about the middle of its soles,
+    moments first), and the wrenches of a unit push along each edge of each sole's friction pyramid.
+    """
     points, count = sole_points(robot, posed), len(posed.axis)
     bodies, foot = np.unique(robot.contact_bodies, return_inverse=True)
     along = directions(robot)
@@ -144,7 +145,7 @@ def wrenches(
 
 @once_a_robot
 def directions(robot: Robot) -> Float[np.ndarray, "C 3 E"]:
-    """The edges of each sole's friction pyramid, upward part 1."""
+    """Return the edges of each sole's friction pyramid, upward part 1."""
     angle = np.arange(_EDGES) * 2 * np.pi / _EDGES
     flat = sole_friction(robot)[:, None, None] * np.stack([np.cos(angle), np.sin(angle)])
     return np.concatenate([flat, np.ones((len(flat), 1, _EDGES))], axis=1)
@@ -152,8 +153,9 @@ def directions(robot: Robot) -> Float[np.ndarray, "C 3 E"]:
 
 @once_a_robot
 def sole_friction(robot: Robot) -> Float[np.ndarray, " C"]:
-    """Sliding friction of each sole on the floor, as MuJoCo pairs geoms: the larger of the two,
-    or that of the one with the higher priority. Of a foot's geoms the most slippery counts."""
+    """Return the sliding friction of each sole on the floor, as MuJoCo pairs geoms: the larger of
+    the two, or that of the one with the higher priority. Of a foot's geoms the most slippery
+    counts."""
     model = robot.model
     touches = (model.geom_contype | model.geom_conaffinity) != 0
     plane = model.geom_type == int(mujoco.mjtGeom.mjGEOM_PLANE)

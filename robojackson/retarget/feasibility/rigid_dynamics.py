@@ -55,7 +55,7 @@ def slopes(
     speed: Float[np.ndarray, "N nv"],
     rate: Float[np.ndarray, "N nv"],
 ) -> Slopes:
-    """The force in free space (`mj_inverse` without constraints), and its derivatives."""
+    """Return the force in free space (`mj_inverse` without constraints), and its derivatives."""
     count, unknowns = speed.shape
     force, square = np.empty((count, unknowns)), (count, unknowns, unknowns)
     out = Slopes(force, np.empty(square), np.empty(square), np.empty(square))
@@ -103,7 +103,7 @@ class _Load(NamedTuple):
     push: Vector
 
     def times(self, motion: Pair) -> Pair:
-        """Inertia times a motion."""
+        """Return the inertia times a motion."""
         turn, shift = motion
         return (
             apply(self.inertia, turn) + cross(self.first, shift),
@@ -111,7 +111,7 @@ class _Load(NamedTuple):
         )
 
     def bends(self, turn: Vector) -> Pair:
-        """B times a motion: only its angular part counts."""
+        """Return B times a motion: only its angular part counts."""
         return apply(self.bend, turn), -2 * cross(self.momentum, turn)
 
 
@@ -163,7 +163,7 @@ def _moving(
 
 
 def _summed(model: ForceModel, parts: Pair, start: Pair) -> Pair:
-    """Sums down the tree: of each link, what its own and all dofs above it add."""
+    """Return the sums down the tree: of each link, what its own and all dofs above it add."""
     out = (np.empty_like(parts[0]), np.empty_like(parts[1]))
     for total, part, first in zip(out, parts, start, strict=True):
         total[:, :3] = (first + part[:, :3].sum(axis=1))[:, None]
@@ -174,7 +174,7 @@ def _summed(model: ForceModel, parts: Pair, start: Pair) -> Pair:
 
 
 def _above(model: ForceModel, moving: Pair, start: Pair) -> Pair:
-    """That of the link above each dof's own."""
+    """Return the value of the link above each dof's own."""
     out = (moving[0][:, model.parent], moving[1][:, model.parent])
     for part, first in zip(out, start, strict=True):
         part[:, :3] = first[:, None]
@@ -206,7 +206,7 @@ def _bodies(model: ForceModel, posed: Posed, rows: slice, moving: _Moving) -> _L
 
 
 def _loads(model: ForceModel, own: _Load) -> _Load:
-    """Sums up the tree: of each dof, those of all bodies that it moves."""
+    """Return the sums up the tree: of each dof, those of all bodies that it moves."""
     flat = [part.reshape(-1, *part.shape[-2:]) for part in own[1:]]
     joined = np.concatenate(flat)
     total = np.zeros((len(joined), len(model.parent), joined.shape[-1]))
@@ -222,5 +222,5 @@ def _loads(model: ForceModel, own: _Load) -> _Load:
 
 
 def _wide(*parts: Vector) -> Float[np.ndarray, "N K nv"]:
-    """Components as rows, dofs as columns of a matrix a step."""
+    """Return the components as rows, dofs as columns of a matrix a step."""
     return np.ascontiguousarray(np.concatenate(parts).transpose(2, 0, 1))

@@ -12,17 +12,17 @@ Pair = tuple[Vector, Vector]
 
 
 def dot(a: Vector, b: Vector) -> np.ndarray:
-    """Scalar products."""
+    """Return the scalar products."""
     return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
 def apply(matrix: np.ndarray, vector: Vector) -> Vector:
-    """Matrices (3, 3, ...) times vectors."""
+    """Return matrices (3, 3, ...) times vectors."""
     return np.stack([dot(row, vector) for row in matrix])
 
 
 def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Products of matrices (3, 3, ...)."""
+    """Return the products of matrices (3, 3, ...)."""
     return np.stack([apply(a, b[:, k]) for k in range(3)], axis=1)
 
 
@@ -40,15 +40,15 @@ def cross(a: Vector, b: Vector) -> Vector:
 
 
 def added(a: Pair, b: Pair) -> Pair:
-    """Sums of motions or of forces."""
+    """Return the sums of motions or of forces."""
     return a[0] + b[0], a[1] + b[1]
 
 
 def cross_motion(v: Pair, x: Pair) -> Pair:
-    """v x x of motions."""
+    """Return v x x of motions."""
     return cross(v[0], x[0]), cross(v[0], x[1]) + cross(v[1], x[0])
 
 
 def cross_force(v: Pair, f: Pair) -> Pair:
-    """v x* f of a motion and a force."""
+    """Return v x* f of a motion and a force."""
     return cross(v[0], f[0]) + cross(v[1], f[1]), cross(v[0], f[1])

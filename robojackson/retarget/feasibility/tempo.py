@@ -36,41 +36,41 @@ def slacks(
     tolerance: Tolerance,
     grid: Float[np.ndarray, " K"] = GRID,
 ) -> Float[np.ndarray, "K S"]:
-    """What is left over at every tempo of the grid, in tolerances.
+    """Return the slack at every tempo of the grid, in tolerances.
 
     A step that is feasible at the first one is tried at no other.
     """
     forces = inverse_dynamics.free_space(robot, qpos, dt, cycle_offset)
     posed = pose(inverse_dynamics.linkage(robot), qpos)
     near = inverse_dynamics.touching(robot, posed)
-    asked = inverse_dynamics.demand(robot, qpos, forces.at(grid[0]), near, tolerance, posed)
-    return slower_slacks(asked, forces, contact_wrench.supply(asked).slack, grid)
+    needs = inverse_dynamics.demand(robot, qpos, forces.at(grid[0]), near, tolerance, posed)
+    return slower_slacks(needs, forces, contact_wrench.supply(needs).slack, grid)
 
 
 def slower_slacks(
-    asked: Demand,
+    needs: Demand,
     forces: FreeSpace,
     slack: Float[np.ndarray, " S"],
     grid: Float[np.ndarray, " K"] = GRID,
 ) -> Float[np.ndarray, "K S"]:
-    """What is left over at every tempo of the grid, where it is known at the first."""
+    """Return the slack at every tempo of the grid, given it at the first."""
     found = np.repeat(slack[None], len(grid), axis=0)
     hard = np.flatnonzero(slack > 1.0)
     if len(hard):
-        some = asked.at(hard)
+        some = needs.at(hard)
         for row, k in zip(found[1:], grid[1:], strict=True):
             row[hard] = contact_wrench.supply(replace(some, force=forces.at(k)[hard])).slack
     return found
 
 
 def feasible_tempo(slack: Float[np.ndarray, "K S"], within: float = 1.0) -> Float[np.ndarray, " S"]:
-    """The fastest tempo of the grid at which each step is feasible; 0 where none is."""
+    """Return the fastest tempo of the grid at which each step is feasible; 0 where none is."""
     fits = slack <= within
     return np.where(fits.any(axis=0), GRID[fits.argmax(axis=0)], 0.0)
 
 
 def required_rate(slack: Float[np.ndarray, "K S"]) -> Float[np.ndarray, " S"]:
-    """The tempo that each step asks for: 1 where slowing down does not help.
+    """Return the tempo that each step needs: 1 where slowing down does not help.
 
     A step that no tempo makes feasible is slowed to the best one, where that is much better.
     """
@@ -81,15 +81,15 @@ def required_rate(slack: Float[np.ndarray, "K S"]) -> Float[np.ndarray, " S"]:
     return np.where(fits > 0, fits, partly)
 
 
-def smooth_rate(wanted: Float[np.ndarray, " S"], dt: float, ring: bool) -> Float[np.ndarray, " S"]:
-    """The wanted tempos, spread over their neighbours and smoothed; never faster than 1."""
+def smooth_rate(rates: Float[np.ndarray, " S"], dt: float, ring: bool) -> Float[np.ndarray, " S"]:
+    """Return the target tempos, spread over their neighbours and smoothed; never faster than 1."""
     mode = "wrap" if ring else "nearest"
-    spread = minimum_filter1d(wanted, 2 * round(_REACH_S / dt) + 1, mode=mode)
+    spread = minimum_filter1d(rates, 2 * round(_REACH_S / dt) + 1, mode=mode)
     return np.asarray(gaussian_filter1d(spread, _SMOOTH_S / dt, mode=mode))
 
 
 def warp(rate: Float[np.ndarray, " S"], ring: bool) -> Float[np.ndarray, " M"]:
-    """Fractional steps of the given motion that the steps of the slower one show.
+    """Return the fractional steps of the given motion that the steps of the slower one show.
 
     The step s is passed at the time t with dt/ds = 1 / rate(s); t is stretched by less than a step
     so that the motion ends with a whole one.
@@ -103,7 +103,7 @@ def warp(rate: Float[np.ndarray, " S"], ring: bool) -> Float[np.ndarray, " M"]:
 
 
 def warped(aims: Targets, steps: Float[np.ndarray, " M"]) -> Targets:
-    """The targets at fractional steps."""
+    """Return the targets at fractional steps."""
     nearest = np.round(steps).astype(int) % len(aims)
     return replace(
         aims,
@@ -118,7 +118,8 @@ def warped(aims: Targets, steps: Float[np.ndarray, " M"]) -> Targets:
 def times_at(
     time_s: Float[np.ndarray, " S"], steps: Float[np.ndarray, " M"]
 ) -> Float[np.ndarray, " M"]:
-    """Times in the source clip at fractional steps; the last step is as long as the one before."""
+    """Return the times in the source clip at fractional steps; the last step is as long as the one
+    before."""
     following = np.append(time_s, 2 * time_s[-1] - time_s[-2])
     result: np.ndarray = np.interp(steps, np.arange(len(following)), following)
     return result

@@ -1,4 +1,4 @@
-"""Lean: bring the body over feet that are balls at the ankles.
+"""Lean: put the body over feet that are balls at the ankles.
 
 A person stands with the centre of mass some centimetres in front of the ankles, and one camera
 tilts whole bodies by degrees. A ball foot can balance neither. The median distance from the zero
@@ -19,7 +19,8 @@ from robojackson.robot.tree_kinematics import Posed, centre_of_mass, pose
 
 
 def moment_points(problem: Problem, posed: Posed) -> Float[np.ndarray, "N 2"]:
-    """Zero moment points of the linear inverted pendulum, c - h/g c''; ends repeat neighbours."""
+    """Return zero moment points of the linear inverted pendulum, c - h/g c''; ends repeat
+    neighbours."""
     com, cycle_offset = centre_of_mass(problem.tree, posed), problem.targets.cycle_offset
     flat, height = com[:, :2], com[:, 2:].mean()
     if cycle_offset is None:
@@ -33,7 +34,8 @@ def moment_points(problem: Problem, posed: Posed) -> Float[np.ndarray, "N 2"]:
 
 
 def lean(problem: Problem, qpos: Float[np.ndarray, "N nq"]) -> Float[np.ndarray, "2"]:
-    """Forward and left shift at one metre of height that puts the body over its support."""
+    """Return the forward and left shift at one metre of height that puts the body over its
+    support."""
     posed = pose(problem.tree, qpos)
     feet = posed.ball_pos[..., :2]
     touching = problem.targets.contact != AIR
@@ -49,7 +51,7 @@ def lean(problem: Problem, qpos: Float[np.ndarray, "N nq"]) -> Float[np.ndarray,
 
 
 def leaned(aims: Targets, shift: Float[np.ndarray, "2"]) -> Targets:
-    """Targets moved along the floor by `shift` for each metre of their height."""
+    """Return the targets moved along the floor by `shift` for each metre of their height."""
     forward, left = _axes(aims)
     move = shift[0] * forward + shift[1] * left
     keypoints = aims.keypoints_w.copy()
@@ -59,7 +61,7 @@ def leaned(aims: Targets, shift: Float[np.ndarray, "2"]) -> Targets:
 
 @dataclass(frozen=True)
 class Support:
-    """Where the soles in contact can carry.
+    """Support of the soles in contact.
 
     Attributes:
         nearest: The point of their convex hull next to a given point, which itself may be in it.
@@ -75,7 +77,7 @@ def support(
     feet: Float[np.ndarray, "N C 2"],
     touching: Bool[np.ndarray, "N C"],
 ) -> Support:
-    """The hull of the contacts; of two it is a segment, of one a point, of none nothing.
+    """Return the hull of the contacts; of two it is a segment, of one a point, of none nothing.
 
     The border is made of segments between contacts, and no segment between contacts leaves the
     hull: the nearest point of all segments is the nearest of the hull, unless the point is inside.
@@ -101,7 +103,7 @@ def support(
 
 
 def _axes(aims: Targets) -> tuple[np.ndarray, np.ndarray]:
-    """Horizontal unit vectors forward and left of the trunk, (N, 2) each."""
+    """Return the horizontal unit vectors forward and left of the trunk, (N, 2) each."""
     left = aims.heading[:, :2, 1]
     left = left / np.linalg.norm(left, axis=1, keepdims=True).clip(1e-6)
     return np.stack([left[:, 1], -left[:, 0]], axis=1), left

@@ -26,7 +26,7 @@ class Normal:
 
     @classmethod
     def empty(cls, frames: int, unknowns: int) -> "Normal":
-        """Zero cost."""
+        """Return normal equations of zero cost."""
         blocks = np.zeros((_REACH, frames, unknowns, unknowns))
         return cls(0.0, np.zeros((frames, unknowns)), blocks)
 
@@ -72,7 +72,7 @@ class Normal:
 
 
 def _rows(frames: Int[np.ndarray, " M"]) -> Int[np.ndarray, " M"] | slice:
-    """A slice where it serves: it is faster."""
+    """Return a slice where possible: it is faster than an index array."""
     if len(frames) and (np.diff(frames) == 1).all():
         return slice(int(frames[0]), int(frames[-1]) + 1)
     return frames
@@ -122,7 +122,7 @@ class Chain:
     def step(
         self, normal: Normal, free: Bool[np.ndarray, "N nv"], damping: float
     ) -> Float[np.ndarray, "N nv"]:
-        """Levenberg-Marquardt step of the free unknowns; the others stay.
+        """Return Levenberg-Marquardt step of the free unknowns; the others stay.
 
         Raises:
             numpy.linalg.LinAlgError: The damped matrix is not positive definite.
@@ -149,7 +149,7 @@ class Chain:
     def _masked(
         self, normal: Normal, free: np.ndarray, damping: float, k: int, rows: slice
     ) -> np.ndarray:
-        """Blocks (k, rows) without the unknowns that are held, damped."""
+        """Return the blocks (k, rows) without the unknowns that are held, damped."""
         others = free[rows] if k == 0 else free[np.arange(rows.start, rows.stop) + k - len(free)]
         blocks = normal.blocks[k, rows] * (free[rows][:, :, None] & others[:, None])
         if k == 0:
@@ -159,7 +159,7 @@ class Chain:
         return np.asarray(blocks)
 
     def _open_band(self, normal: Normal, free: np.ndarray, damping: float) -> np.ndarray:
-        """The band of an open chain, column by column as LAPACK wants it.
+        """Return the band of an open chain, column by column in LAPACK's layout.
 
         Entry (a, b) of block (k, t) stands in column (t + k) nv + b, `bandwidth - k nv + a - b`
         from its top: in memory one strided square for each block. Built a few frames at a time,

@@ -61,7 +61,7 @@ class Weights:
 
 @dataclass
 class Warm:
-    """What one evaluation of the cost leaves to the next: where the pushes' solver has arrived."""
+    """State that one evaluation of the cost leaves to the next: the solution of the pushes."""
 
     point: Point | None = None
 
@@ -89,5 +89,5 @@ class Problem:
         return self.targets.cycle_offset is not None
 
     def velocity(self, qpos: Float[np.ndarray, "N nq"]) -> Float[np.ndarray, "M nv"]:
-        """Forward differences; a ring has one a frame, an open clip one fewer."""
+        """Return the forward differences; a ring has one a frame, an open clip one fewer."""
         return forward_velocities(qpos, self.targets.dt, self.targets.cycle_offset)

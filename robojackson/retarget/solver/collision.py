@@ -46,7 +46,7 @@ class _Models:
         self._made: dict[tuple[float, bool], mujoco.MjModel] = {}
 
     def with_margin(self, clearance: float, feet: bool) -> mujoco.MjModel:
-        """The copy in which geoms touch below the clearance."""
+        """Return the copy in which geoms touch below the clearance."""
         if (clearance, feet) not in self._made:
             model = copy.copy(self._robot.model)
             model.geom_margin[:] = clearance
@@ -72,7 +72,7 @@ class Detector:
         self.data = mujoco.MjData(self.model)
 
     def touches(self, qpos: Float[np.ndarray, "N nq"]) -> Touches:
-        """All contacts nearer than the clearance."""
+        """Return all contacts nearer than the clearance."""
         found = _Found([], [], [], [], [])
         for index, row in enumerate(qpos):
             self.data.qpos[:] = row
@@ -81,7 +81,8 @@ class Detector:
         return found.joined(self.model)
 
     def detect_posed(self, tree: Tree, qpos: Float[np.ndarray, "N nq"]) -> tuple[Posed, Touches]:
-        """The same, with the forward kinematics that it takes anyway (`tree_kinematics.pose`)."""
+        """Return the same, with the forward kinematics that it computes anyway
+        (`tree_kinematics.pose`)."""
         data, model, found, count = self.data, self.model, _Found([], [], [], [], []), len(qpos)
         now, sources = data.qpos, (data.xpos, data.xmat, data.xanchor, data.xaxis)
         kept = [np.empty((count, *source.shape)) for source in sources]

@@ -25,7 +25,7 @@ _SETTLING_S = 0.15  # seconds
 
 
 def add_contacts(problem: Problem, posed: Posed, out: Normal) -> None:
-    """Contact height, floor under feet in the air, and no slip of planted soles."""
+    """Add contact height, floor under feet in the air, and no slip of planted soles."""
     robot, weights, contact = problem.robot, problem.weights, problem.targets.contact
     ground = posed.ball_pos.copy()
     ground[..., 2] -= robot.contact_radii
@@ -42,7 +42,7 @@ def add_contacts(problem: Problem, posed: Posed, out: Normal) -> None:
 
 
 def _no_slip(problem: Problem, posed: Posed, rows: np.ndarray, out: Normal) -> None:
-    """A planted ball rolls without slip: what its centre moves beyond its rolling costs.
+    """Add the no-slip term: motion of a planted ball's centre beyond its rolling costs.
 
     The derivative of the slip is the Jacobian of the ground point, at each of the two steps its
     own.
@@ -69,7 +69,7 @@ def _no_slip(problem: Problem, posed: Posed, rows: np.ndarray, out: Normal) -> N
 
 
 def add_collisions(problem: Problem, posed: Posed, touches: Touches, out: Normal) -> None:
-    """Penetration hinge of self contacts and of the floor under anything but the feet."""
+    """Add the penetration hinge of self contacts and of the floor under all bodies but the feet."""
     feet = np.isin(touches.bodies, problem.robot.foot_bodies).any(axis=1)
     keep = (touches.distance < problem.weights.clearance) & ~(touches.floor & feet)
     if not keep.any():
@@ -89,7 +89,7 @@ def add_collisions(problem: Problem, posed: Posed, touches: Touches, out: Normal
 
 
 def add_balance(problem: Problem, posed: Posed, out: Normal) -> None:
-    """The zero moment point of the centre of mass stays in the hull of the soles in contact.
+    """Add the balance term: the zero moment point stays in the hull of the soles in contact.
 
     zmp = c - h/g c'' (linear inverted pendulum); residual = zmp - nearest point of the support.
     A ball foot cannot take a moment: on one foot the support is a point, on two a segment. While
@@ -120,7 +120,7 @@ def add_balance(problem: Problem, posed: Posed, out: Normal) -> None:
 
 
 def _settled(touching: Bool[np.ndarray, "N C"], dt: float, ring: bool) -> Float[np.ndarray, " N"]:
-    """0 where nothing touches or the contacts change, 1 from some time before and after."""
+    """Return 0 where nothing touches or the contacts change, 1 from some time before and after."""
     changes = (touching != np.roll(touching, 1, axis=0)).any(axis=1)
     changes[0] &= ring
     still = ~(changes | np.roll(changes, -1))
@@ -133,7 +133,8 @@ def _settled(touching: Bool[np.ndarray, "N C"], dt: float, ring: bool) -> Float[
 def _robust_weight(
     problem: Problem, away: Float[np.ndarray, "N 2"], carried: np.ndarray, out: Normal
 ) -> Float[np.ndarray, " N"]:
-    """Square roots of Cauchy weights; corrects the cost from the squares to Cauchy's loss.
+    """Return the square roots of Cauchy weights; corrects the cost from the squares to Cauchy's
+    loss.
 
     A wrong contact label puts the support where no body could stand: it must not bend the motion.
     """
@@ -147,6 +148,6 @@ def _robust_weight(
 
 
 def _neighbours(frames: int, ring: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Frames with two neighbours, the ones before and the ones after."""
+    """Return frames with two neighbours, the ones before and the ones after."""
     inner = np.arange(frames) if ring else np.arange(1, frames - 1)
     return inner, (inner - 1) % frames, (inner + 1) % frames

@@ -20,7 +20,7 @@ _ROOT_ACCELERATION = np.array([8.0] * 3 + [3.0] * 3)  # m/s2 and rad/s2 beside t
 
 
 def linearise(problem: Problem, qpos: Float[np.ndarray, "N nq"]) -> Normal:
-    """Cost, gradient and Gauss-Newton blocks at a motion."""
+    """Return the cost, gradient and Gauss-Newton blocks at a motion."""
     out = Normal.empty(len(qpos), qpos.shape[1] - 1)
     posed, touches = problem.detector.detect_posed(problem.tree, qpos)
     velocity = problem.velocity(qpos)
@@ -63,7 +63,7 @@ def _posture(problem: Problem, qpos: np.ndarray, out: Normal) -> None:
 
 
 def _acceleration(problem: Problem, velocity: np.ndarray, out: Normal) -> None:
-    """Second differences, coupling three frames with coefficients 1, -2, 1."""
+    """Add second differences, which couple three frames with coefficients 1, -2, 1."""
     dt, frames = problem.targets.dt, len(out.gradient)
     following = np.concatenate([velocity[1:], velocity[:1]]) if problem.ring else velocity[1:]
     acceleration = (following - velocity[: len(following)]) / dt
@@ -82,7 +82,7 @@ def _acceleration(problem: Problem, velocity: np.ndarray, out: Normal) -> None:
 
 
 def _speed(problem: Problem, velocity: np.ndarray, out: Normal) -> None:
-    """Hinge on hinge speeds over their share of the limit."""
+    """Add a hinge loss on hinge speeds over their share of the limit."""
     limit = problem.weights.speed_share * problem.robot.description.max_joint_speed
     excess = np.sign(velocity) * np.maximum(0.0, np.abs(velocity) - limit)
     excess[:, :6] = 0.0

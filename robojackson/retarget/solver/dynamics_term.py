@@ -42,10 +42,10 @@ def add_dynamics(
     at = posed[inner]
     found_slopes = force_slopes(problem, at, qpos[inner], speed, rate)
     touching = problem.targets.contact[inner] != AIR
-    asked = inverse_dynamics.demand(
+    needs = inverse_dynamics.demand(
         problem.robot, qpos[inner], found_slopes.force, touching, problem.weights.tolerance, at
     )
-    found = contact_wrench.relaxed(asked, problem.weights.dynamics_barrier, problem.warm.point)
+    found = contact_wrench.relaxed(needs, problem.weights.dynamics_barrier, problem.warm.point)
     problem.warm.point = found.point
     loss = _loss(problem.weights, found.value)
     here = found_slopes.position - 2 / dt**2 * found_slopes.acceleration
@@ -63,8 +63,9 @@ def add_dynamics(
 def force_slopes(
     problem: Problem, posed: Posed, qpos: np.ndarray, speed: np.ndarray, rate: np.ndarray
 ) -> Slopes:
-    """The force and its derivatives in the tangent space of each step: analytic where the model
-    has nothing but rigid bodies, springs and damping, by finite differences of MuJoCo's otherwise.
+    """Return the force and its derivatives in the tangent space of each step: analytic where the
+    model has nothing but rigid bodies, springs and damping, by finite differences of MuJoCo's
+    otherwise.
     """
     robot = problem.robot
     if rigid(robot):
@@ -74,7 +75,8 @@ def force_slopes(
 
 @once_a_robot
 def rigid(robot: Robot) -> bool:
-    """Whether the analytic force is MuJoCo's: a model may have fluid, tendons or dry friction."""
+    """Return whether the analytic force is MuJoCo's: a model may have fluid, tendons or dry
+    friction."""
     rng = np.random.default_rng(0)
     qpos = np.tile(robot.standing, (_PROBES, 1))
     qpos[:, 7:] = rng.uniform(robot.lower, robot.upper, (_PROBES, len(robot.lower)))
@@ -88,7 +90,7 @@ def rigid(robot: Robot) -> bool:
 def inverse_slopes(
     model: mujoco.MjModel, qpos: np.ndarray, speed: np.ndarray, rate: np.ndarray
 ) -> Slopes:
-    """The same by finite differences."""
+    """Return the same by finite differences."""
     data, count = mujoco.MjData(model), speed.shape[1]
     force = np.empty_like(speed)
     matrices = np.empty((3, len(qpos), count, count))

@@ -30,7 +30,7 @@ _JUMP_COST = 0.02  # m2/rad2: price of a hinge change between frames beside keyp
 
 
 def rest_start(problem: Problem) -> Float[np.ndarray, "N nq"]:
-    """The rest pose in every frame, turned to the trunk and hung at the hip target."""
+    """Return the rest pose in every frame, turned to the trunk and hung at the hip target."""
     robot, targets = problem.robot, problem.targets
     qpos = np.tile(robot.standing, (len(targets), 1))
     qpos[:, 3:7] = from_rotation(Rotation.from_matrix(targets.heading))
@@ -53,7 +53,7 @@ class FrameStart:
 
 
 def frame_start(problem: Problem, rng: np.random.Generator, seeds: int) -> FrameStart:
-    """Best of several per-frame solutions, chosen along the clip.
+    """Return the best of several per-frame solutions, chosen along the clip.
 
     A long clip is solved in every second frame, with a spline between them.
     """
@@ -70,8 +70,8 @@ def frame_start(problem: Problem, rng: np.random.Generator, seeds: int) -> Frame
     pick = viterbi(cost.reshape(seeds, -1).T, _jump_costs(poses[..., 7:].swapaxes(0, 1)))
     picked = continuous(poses[pick, np.arange(len(frames))])
     best = poses[cost.reshape(seeds, -1).argmin(axis=0), np.arange(len(frames))]
-    at, wanted = pose(problem.tree, best).site_pos, problem.targets.keypoints_w[frames]
-    floor = keypoint_error_mm(at, wanted, problem.robot.keypoint_weights > 0).mean()
+    at, target = pose(problem.tree, best).site_pos, problem.targets.keypoints_w[frames]
+    floor = keypoint_error_mm(at, target, problem.robot.keypoint_weights > 0).mean()
     between = np.arange(len(problem.targets)) / stride
     motion = picked if stride == 1 else resample(picked, between, None)
     return FrameStart(motion, float(floor))
@@ -80,7 +80,8 @@ def frame_start(problem: Problem, rng: np.random.Generator, seeds: int) -> Frame
 def _per_frame(
     problem: Problem, start: Float[np.ndarray, "P nq"], frames: Int[np.ndarray, " P"]
 ) -> tuple[Float[np.ndarray, "P nq"], Float[np.ndarray, " P"]]:
-    """Damped Gauss-Newton on keypoints and posture, all poses at once, without coupling."""
+    """Return the damped Gauss-Newton on keypoints and posture, all poses at once, without
+    coupling."""
     qpos, cost = clip_to_limits(problem.robot, start), np.zeros(len(start))
     moving = np.arange(len(start))
     for _ in range(_ITERATIONS):
@@ -95,7 +96,7 @@ def _per_frame(
 def _frame_step(
     problem: Problem, qpos: Float[np.ndarray, "P nq"], frames: Int[np.ndarray, " P"]
 ) -> tuple[Float[np.ndarray, "P nv"], Float[np.ndarray, " P"]]:
-    """The step of each pose, and its keypoint cost before it."""
+    """Return the step of each pose, and its keypoint cost before it."""
     weight, unknowns = problem.weights.posture, qpos.shape[1] - 1
     normal = Normal.empty(len(qpos), unknowns)
     cost = keypoint_normal(problem, pose(problem.tree, qpos), normal, frames)

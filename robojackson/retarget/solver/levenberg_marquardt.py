@@ -31,7 +31,7 @@ _HELD = 2  # steps of the window before it that an acceleration reaches back to
 
 @config_dataclass
 class SolverConfig:
-    """When the solver stops.
+    """Stopping rules of the solver.
 
     Attributes:
         iterations: Most Newton steps from each start, at the coarsest rate.
@@ -66,22 +66,22 @@ def solve(
     tolerance: float | None = None,
     spans: Sequence[slice] | None = None,
 ) -> Solution:
-    """Lower the cost from a start until the decrease is below the tolerance.
+    """Return a lower-cost motion, iterated from a start until the decrease is below the tolerance.
 
     A long clip is solved window after window, so that time is linear in its length and memory does
     not grow with it: each window begins in the poses that the one before it found and looks beyond
     the end of what is kept of it.
 
     Args:
-        tolerance: That of the configuration when None.
+        tolerance: Stopping tolerance; that of the configuration when None.
         spans: The steps that may change, of a clip that does not repeat; all when None.
     """
-    wanted = config.tolerance if tolerance is None else tolerance
+    stop_at = config.tolerance if tolerance is None else tolerance
     qpos = clip_to_limits(problem.robot, start)
     cost = 0.0
     for window in _windows(len(qpos), None if problem.ring else spans, problem.ring):
         part = replace(problem, targets=select_steps(problem.targets, window.all), warm=Warm())
-        found = _solve_window(part, qpos[window.all], config, iterations, wanted, window)
+        found = _solve_window(part, qpos[window.all], config, iterations, stop_at, window)
         qpos[window.all] = found.qpos
         cost += found.normal.cost
         _log.debug("steps %d-%d, cost %.5f", window.all.start, window.all.stop, found.normal.cost)
@@ -96,14 +96,14 @@ class _Window:
     free: slice
 
     def held(self) -> Bool[np.ndarray, " N"]:
-        """Which of its steps stay as they are."""
+        """Return which of its steps stay as they are."""
         step = np.arange(self.all.start, self.all.stop)
         result: np.ndarray = (step < self.free.start) | (step >= self.free.stop)
         return result
 
 
 def _windows(frames: int, spans: Sequence[slice] | None, ring: bool) -> Iterator[_Window]:
-    """Windows of about the same length that overlap, in each span."""
+    """Yield the windows of about the same length that overlap, in each span."""
     if ring:
         yield _Window(slice(0, frames), slice(0, frames))
         return
@@ -142,7 +142,7 @@ def _solve_window(
 
 
 def clip_to_limits(robot: Robot, qpos: Float[np.ndarray, "N nq"]) -> Float[np.ndarray, "N nq"]:
-    """The same motion with every hinge inside its limits."""
+    """Return the same motion with every hinge inside its limits."""
     out = qpos.copy()
     out[:, 7:] = np.clip(out[:, 7:], robot.lower, robot.upper)
     return out
@@ -160,7 +160,7 @@ class _State:
 def _descend(
     problem: Problem, chain: Chain, state: _State, config: SolverConfig, held: np.ndarray
 ) -> _State | None:
-    """One accepted step, more damped after each failure; None when nothing lowers the cost.
+    """Return one accepted step, more damped after each failure; None when nothing lowers the cost.
 
     The damping follows how much of the predicted decrease came true (Nielsen 1999).
     """
@@ -189,7 +189,7 @@ def _descend(
 def free_unknowns(
     robot: Robot, qpos: Float[np.ndarray, "N nq"], gradient: Float[np.ndarray, "N nv"]
 ) -> Bool[np.ndarray, "N nv"]:
-    """Unknowns that are not pressed against a limit."""
+    """Return the unknowns that are not pressed against a limit."""
     hinges, push = qpos[:, 7:], gradient[:, 6:]
     held = (hinges <= robot.lower + _AT_LIMIT) & (push > 0)
     held |= (hinges >= robot.upper - _AT_LIMIT) & (push < 0)

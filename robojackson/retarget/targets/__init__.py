@@ -1,1 +1,1 @@
-"""What the robot is to follow: keypoints, contacts, the cycle of a clip."""
+"""Targets of the solver: keypoints, contacts, the cycle of a clip."""

@@ -1,4 +1,4 @@
-"""Laps: find where a clip repeats itself, close it, and put it on the robot's clock.
+"""Cycles: find where a clip repeats itself, close it, and put it on the robot's clock.
 
 A clip is nearly cyclic when some later frame has the pose and the velocity of an early one, seen
 from the hips and the heading. The cycle between them is closed by spreading what is left of the
@@ -35,7 +35,7 @@ _SECONDS = 0.1  # velocity differences count over this time beside pose differen
 
 @config_dataclass
 class CycleConfig:
-    """When a clip counts as cyclic.
+    """Conditions under which a clip counts as cyclic.
 
     Attributes:
         tolerance_m: Largest seam: mean keypoint distance plus a tenth of a second of the mean
@@ -76,7 +76,8 @@ def human_clip(
     tempo: float,
     config: CycleConfig,
 ) -> tuple[HumanClip, Cycle | None]:
-    """The clip at the solver's steps, closed to a cycle where it is (or is said to be) cyclic.
+    """Return the clip at the solver's steps, closed to a cycle where it is (or is said to be)
+    cyclic.
 
     Raises:
         TrackTooShort: Fewer steps than the solver needs.
@@ -87,7 +88,7 @@ def human_clip(
             f"retarget: at least {_MIN_STEPS * dt:.2f} s are needed"
         )
     cycle = None if cyclic == "no" else find_cycle(sequence, config)
-    if cycle is None and cyclic == "yes":  # whoever turns on with every cycle is turned back
+    if cycle is None and cyclic == "yes":  # a body that turns with every cycle is turned back
         cycle = find_cycle(sequence, replace(config, heading_deg=180.0))
     if cycle is None or (cyclic == "auto" and not _nearly_cyclic(cycle, config)):
         return _open_clip(sequence, dt, tempo), None
@@ -100,7 +101,7 @@ def _nearly_cyclic(cycle: Cycle, config: CycleConfig) -> bool:
 
 
 def find_cycle(sequence: SmplSequence, config: CycleConfig) -> Cycle | None:
-    """The whole clip where it is a loop; else the cycle with the smallest seam, longer ones
+    """Return the whole clip where it is a loop; else the cycle with the smallest seam, longer ones
     preferred when they are as good."""
     pose, speed, yaw = _features(sequence)
     frames = len(sequence)
@@ -127,14 +128,14 @@ def find_cycle(sequence: SmplSequence, config: CycleConfig) -> Cycle | None:
 def _seams(
     pose: np.ndarray, speed: np.ndarray, yaw: np.ndarray, start: int, ends: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Seam, metres, and heading change, radians, of the cycles from one start."""
+    """Return the seam, metres, and heading change, radians, of the cycles from one start."""
     seam = np.linalg.norm(pose[ends] - pose[start], axis=-1).mean(axis=1)
     seam += _SECONDS * np.linalg.norm(speed[ends] - speed[start], axis=-1).mean(axis=1)
     return seam, np.abs(wrapped(yaw[ends] - yaw[start]))
 
 
 def _limb_angle(a: Float[np.ndarray, "L 3"], b: Float[np.ndarray, "L 3"]) -> float:
-    """Largest angle between the limbs of two poses, degrees."""
+    """Return the largest angle between the limbs of two poses, degrees."""
     first = np.stack([a[i + 2] - a[i] for i in _BONE_STARTS])
     second = np.stack([b[i + 2] - b[i] for i in _BONE_STARTS])
     lengths = np.linalg.norm(first, axis=1) * np.linalg.norm(second, axis=1)
@@ -143,7 +144,8 @@ def _limb_angle(a: Float[np.ndarray, "L 3"], b: Float[np.ndarray, "L 3"]) -> flo
 
 
 def _features(sequence: SmplSequence) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Limbs seen from hips and heading, their velocities, the heading; one frame past the end."""
+    """Return the limbs seen from hips and heading, their velocities, the heading; one frame past
+    the end."""
     points = _extended(sequence.keypoints_w)
     yaw = heading(points)
     limbs = _turned(points[:, _COMPARED] - _ground_point(points)[:, None], -yaw)
@@ -156,26 +158,27 @@ def _extended(points: Float[np.ndarray, "T 29 3"]) -> Float[np.ndarray, "T+1 29 
 
 
 def heading(points: Float[np.ndarray, "T 29 3"]) -> Float[np.ndarray, " T"]:
-    """Unwrapped angle of the body's forward axis about z, from hips and shoulders, radians."""
+    """Return the unwrapped angle of the body's forward axis about z, from hips and shoulders,
+    radians."""
     across = points[:, _HIPS[0]] - points[:, _HIPS[1]]
     across = across + points[:, _SHOULDERS[0]] - points[:, _SHOULDERS[1]]
     return np.asarray(np.unwrap(np.arctan2(-across[:, 0], across[:, 1])))
 
 
 def _ground_point(points: np.ndarray) -> Float[np.ndarray, "T 3"]:
-    """The point of the floor under the hips."""
+    """Return the point of the floor under the hips."""
     return np.asarray((points[:, _HIPS[0]] + points[:, _HIPS[1]]) / 2 * [1.0, 1.0, 0.0])
 
 
 def _turned(vectors: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Vectors (T, P, 3) turned about z by an angle a frame."""
+    """Return vectors (T, P, 3) turned about z by an angle a frame."""
     cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
     x, y, z = np.moveaxis(vectors, -1, 0)
     return np.stack([cosine * x - sine * y, sine * x + cosine * y, z], axis=-1)
 
 
 def _open_clip(sequence: SmplSequence, dt: float, tempo: float) -> HumanClip:
-    """The whole clip; an odd number of steps, so that every second one is a coarser clip."""
+    """Return the whole clip; an odd number of steps, so that every second one is a coarser clip."""
     last = (len(sequence) - 1) / sequence.fps
     pairs = int(np.floor(last / tempo / (2 * dt) + 1e-9))
     time_s = np.arange(2 * pairs + 1) * dt * tempo
@@ -192,7 +195,7 @@ def _open_clip(sequence: SmplSequence, dt: float, tempo: float) -> HumanClip:
 def _closed_clip(
     sequence: SmplSequence, cycle: Cycle, dt: float, tempo: float, config: CycleConfig
 ) -> HumanClip:
-    """A cycle with an even number of steps; the clock is stretched to fit (under one step a
+    """Return a cycle with an even number of steps; the clock is stretched to fit (under one step a
     cycle)."""
     seconds = (cycle.end - cycle.start) / sequence.fps
     steps = max(2 * round(seconds / tempo / (2 * dt)), _MIN_STEPS)

@@ -1,4 +1,4 @@
-"""How the human's feet are turned, for robots that have soles and not balls.
+"""Orientation of the human's feet, for robots with soles instead of balls.
 
 A foot points from the ankle to the big toe. How far that line slopes when the sole is flat depends
 on the skeleton, so it is measured where heel and toe are both planted. World frame, metres.
@@ -19,7 +19,7 @@ _ENOUGH = 5  # frames on a flat foot from which its slope is measured
 def foot_frames(
     human: Mapping[str, np.ndarray], clip: HumanClip
 ) -> dict[str, Float[np.ndarray, "N 3 3"]]:
-    """Rotation of each foot from standing upright along x: columns forward, left, up."""
+    """Return the rotation of each foot from standing upright along x: columns forward, left, up."""
     out = {}
     for side in ("left", "right"):
         ankle, toe = human[f"{side}_ankle"], human[f"{side}_big_toe"]
@@ -30,7 +30,7 @@ def foot_frames(
 
 
 def _flat_slope(aim: Float[np.ndarray, "N 3"], clip: HumanClip, side: str) -> float:
-    """Downward slope of ankle to toe on a flat sole, radians."""
+    """Return the downward slope of ankle to toe on a flat sole, radians."""
     own = [index for index, name in enumerate(CONTACT_POINTS) if name.startswith(side)]
     standing = (clip.contact[:, own] == PLANTED).all(axis=1)
     if standing.sum() < _ENOUGH:

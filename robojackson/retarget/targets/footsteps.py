@@ -23,7 +23,7 @@ CLEARANCE_M = 0.05
 NARROWEST, WIDEST, STAGGERED = 0.5, 2.5, 1.5
 """Distance of the feet across (least, largest) and along the heading, in widths of the stand."""
 TURNED_RAD = 0.8
-"""Between the heading and a foot, from which that foot is to be placed anew."""
+"""Between the heading and a foot, from which that foot is to be placed again."""
 SAME_M, SAME_RAD = 0.03, 0.2
 """A foot so close to its place stays."""
 
@@ -33,15 +33,15 @@ class Placement:
     """One foot on the floor.
 
     Attributes:
-        place: Of the ankle over the floor, m.
-        yaw: Of the toes, rad.
+        place: Place of the ankle over the floor, m.
+        yaw: Yaw of the toes, rad.
     """
 
     place: Float[np.ndarray, "2"]
     yaw: float
 
     def near(self, other: "Placement") -> bool:
-        """Whether a foot may stay where it is."""
+        """Return whether a foot may stay where it is."""
         apart = float(np.linalg.norm(self.place - other.place))
         return apart < SAME_M and abs(_turn(self.yaw, other.yaw)) < SAME_RAD
 
@@ -66,7 +66,7 @@ class Walk:
 
 
 def feet_of(points: Float[np.ndarray, "K 3"], heading: float, robot: Robot) -> Feet:
-    """Where a pose has its feet; a robot without toes has them along the heading (rad)."""
+    """Return where a pose has its feet; a robot without toes has them along the heading (rad)."""
     names = robot.keypoint_names
     found = {}
     for side in SIDES:
@@ -77,7 +77,7 @@ def feet_of(points: Float[np.ndarray, "K 3"], heading: float, robot: Robot) -> F
 
 
 def stand_over(feet: Feet, heading: float, robot: Robot) -> Float[np.ndarray, "K 3"]:
-    """Keypoints of the robot's stand between the feet, soles on the floor."""
+    """Return the keypoints of the robot's stand between the feet, soles on the floor."""
     found = own_stand(robot) @ about_up(heading).T
     found[:, :2] += np.mean([feet[side].place for side in SIDES], 0)
     place_feet(found, feet, robot)
@@ -85,7 +85,8 @@ def stand_over(feet: Feet, heading: float, robot: Robot) -> Float[np.ndarray, "K
 
 
 def own_stand(robot: Robot) -> Float[np.ndarray, "K 3"]:
-    """Keypoints of the robot's stand along +x, the middle of its ankles over the origin."""
+    """Return the keypoints of the robot's stand along +x, the middle of its ankles over the
+    origin."""
     names = robot.keypoint_names
     data = mujoco.MjData(robot.model)
     data.qpos[:] = robot.standing
@@ -108,7 +109,7 @@ def place_feet(points: Float[np.ndarray, "K 3"], feet: Feet, robot: Robot) -> No
 
 
 def stand_feet(feet: Feet, heading: float, robot: Robot) -> Feet:
-    """Where the robot's stand has its feet, around the middle of those given."""
+    """Return where the robot's stand has its feet, around the middle of those given."""
     middle = np.mean([feet[side].place for side in SIDES], 0)
     own, names = own_stand(robot) @ about_up(heading).T, robot.keypoint_names
     return {
@@ -117,9 +118,9 @@ def stand_feet(feet: Feet, heading: float, robot: Robot) -> Feet:
 
 
 def stands_badly(feet: Feet, heading: float, robot: Robot) -> bool:
-    """Whether the feet are crossed, close, far apart, staggered or turned away."""
-    wanted = stand_feet(feet, heading, robot)
-    width = float(np.linalg.norm(wanted["left"].place - wanted["right"].place))
+    """Return whether the feet are crossed, close, far apart, staggered or turned away."""
+    goal = stand_feet(feet, heading, robot)
+    width = float(np.linalg.norm(goal["left"].place - goal["right"].place))
     apart = about_up(heading)[:2, :2].T @ (feet["left"].place - feet["right"].place)
     turned = max(abs(_turn(heading, foot.yaw)) for foot in feet.values())
     across = float(apart[1]) / width
@@ -128,23 +129,23 @@ def stands_badly(feet: Feet, heading: float, robot: Robot) -> bool:
 
 
 def steps_into_stand(feet: Feet, heading: float, robot: Robot, dt: float) -> Walk | None:
-    """Steps that bring the feet into the robot's stand; None where they stand well.
+    """Return the steps that bring the feet into the robot's stand; None where they stand well.
 
     Args:
         feet: Where the feet are, both on the floor, the body between them.
-        heading: Of the stand, rad.
+        heading: Heading of the stand, rad.
         dt: Seconds a step of the motion.
     """
     if not stands_badly(feet, heading, robot):
         return None
-    wanted = stand_feet(feet, heading, robot)
+    goal = stand_feet(feet, heading, robot)
     ahead = about_up(heading)[:2, 0]
     order = sorted(SIDES, key=lambda side: -float(feet[side].place @ ahead))
     now, body, parts, air = dict(feet), _middle(feet), [], []
-    for side in (side for side in order if not feet[side].near(wanted[side])):
+    for side in (side for side in order if not feet[side].near(goal[side])):
         other = now[SIDES[1 - SIDES.index(side)]]
         parts.append(_shifted(now, body, other.place, heading, robot, dt))
-        body, step = other.place, now | {side: wanted[side]}
+        body, step = other.place, now | {side: goal[side]}
         parts.append(_swung(now, step, side, body, heading, robot, dt))
         air += [np.zeros((len(parts[-2]), 2), bool), np.zeros((len(parts[-1]), 2), bool)]
         air[-1][:, SIDES.index(side)] = True
@@ -166,7 +167,7 @@ def _shifted(
     robot: Robot,
     dt: float,
 ) -> Float[np.ndarray, "N K 3"]:
-    """The body moves from over one place to over another, the feet stay."""
+    """Return steps in which the body moves from one place to another and the feet stay."""
     stand = stand_over(feet, heading, robot)
     found = []
     for share in _smooth(SHIFT_S, dt):
@@ -186,7 +187,7 @@ def _swung(
     robot: Robot,
     dt: float,
 ) -> Float[np.ndarray, "N K 3"]:
-    """One foot goes to its new place through the air, the body stays over the other."""
+    """Return steps in which one foot swings to its new place and the body stays over the other."""
     names, start, end = robot.keypoint_names, before[side], after[side]
     ankle = names.index(f"{side}_foot")
     turn = _turn(start.yaw, end.yaw)
@@ -203,22 +204,23 @@ def _swung(
 
 
 def _smooth(seconds: float, dt: float) -> Float[np.ndarray, " N"]:
-    """Shares of a way from rest to rest, without its beginning: fifth-order polynomial."""
+    """Return the shares of a way from rest to rest, without its beginning: fifth-order
+    polynomial."""
     t = np.arange(1, max(2, round(seconds / dt)) + 1) / max(2, round(seconds / dt))
     return np.asarray(t**3 * (10 - 15 * t + 6 * t**2))
 
 
 def _turn(start: float, end: float) -> float:
-    """From one yaw to another the shorter way, rad."""
+    """Return the shorter turn from one yaw to another, rad."""
     return float(wrapped(np.asarray(end - start)))
 
 
 def yaw_of(ahead: Float[np.ndarray, "3"]) -> float:
-    """Heading of a direction, rad."""
+    """Return the heading of a direction, rad."""
     return float(np.arctan2(ahead[1], ahead[0]))
 
 
 def about_up(yaw: float) -> Float[np.ndarray, "3 3"]:
-    """Rotation matrix about the vertical."""
+    """Return the rotation matrix about the vertical."""
     c, s = np.cos(yaw), np.sin(yaw)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

@@ -24,7 +24,8 @@ _SHORTEST_FLIGHT = 0.08  # s
 
 
 def free_fall(human: Mapping[str, np.ndarray], clip: HumanClip) -> Bool[np.ndarray, " N"]:
-    """Stretches without contact over which the hips lose speed as fast as a falling body does."""
+    """Return the stretches without contact over which the hips lose speed as fast as a falling body
+    does."""
     hips = (human["left_hip"] + human["right_hip"])[:, 2] / 2
     smooth = gaussian_filter1d(hips, 0.02 / clip.dt, mode=clip.edges)
     cycles = clip.cycle_offset is not None
@@ -41,7 +42,7 @@ def free_fall(human: Mapping[str, np.ndarray], clip: HumanClip) -> Bool[np.ndarr
 def without(
     airborne: Bool[np.ndarray, " N"], hovering: np.ndarray, cycles: bool
 ) -> Bool[np.ndarray, " N"]:
-    """The flights in which the body hovers in less than a third of the steps."""
+    """Return the flights in which the body hovers in less than a third of the steps."""
     out = np.zeros_like(airborne)
     for steps in stretches(airborne, cycles):
         out[steps] = hovering[steps].mean() < 1 / 3
@@ -49,14 +50,14 @@ def without(
 
 
 def stretches(flags: Bool[np.ndarray, " N"], cycles: bool) -> list[Int[np.ndarray, " M"]]:
-    """The steps of each stretch of True; one over the seam of a cycle is one."""
+    """Return the steps of each stretch of True; one over the seam of a cycle is one."""
     first = int(flags.argmin()) if cycles else 0
     rolled = np.roll(flags, -first)
     return [np.arange(start + first, end + first) % len(flags) for start, end in runs(rolled)]
 
 
 def runs(flags: Bool[np.ndarray, " N"]) -> list[tuple[int, int]]:
-    """First and one-past-last index of each stretch of True."""
+    """Return first and one-past-last index of each stretch of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
@@ -64,9 +65,10 @@ def runs(flags: Bool[np.ndarray, " N"]) -> list[tuple[int, int]]:
 def ball_contact(
     clip: HumanClip, robot: Robot, balls: Float[np.ndarray, "N C 3"], airborne: np.ndarray
 ) -> Int[np.ndarray, "N C"]:
-    """States of the robot's balls: those of the human points they follow, planted where slow.
+    """Return the states of the robot's balls: those of the human points they follow, planted where
+    slow.
 
-    A foot that stands still near the floor is planted whatever its label; a body that touches
+    A foot that stands still near the floor is planted with any label; a body that touches
     nothing and does not fall stands on its lowest foot.
     """
     mode = clip.edges
@@ -91,7 +93,7 @@ def ball_contact(
 
 
 def follows(point: ContactPoint, human: str) -> bool:
-    """Whether a ball follows a human contact point, such as `left_heel`."""
+    """Return whether a ball follows a human contact point, such as `left_heel`."""
     side, _, part = human.partition("_")
     return point.side == side and point.label in (part, "either")
 
@@ -99,7 +101,7 @@ def follows(point: ContactPoint, human: str) -> bool:
 def _standing_runs(
     still: Bool[np.ndarray, " N"], path: Float[np.ndarray, "N 3"]
 ) -> Bool[np.ndarray, " N"]:
-    """Only the stretches in which the foot does not wander; the others slide on purpose."""
+    """Return only the stretches in which the foot does not drift; the others slide on purpose."""
     out = np.zeros(len(still), bool)
     for start, end in runs(still):
         flat = path[start:end, :2]
@@ -111,7 +113,8 @@ def _standing_runs(
 def ground_shift(
     soles: Float[np.ndarray, "N C"], contact: Int[np.ndarray, "N C"], clip: HumanClip
 ) -> Float[np.ndarray, " N"]:
-    """What lifts the lowest carrying sole of each step to z = 0; interpolated in the air."""
+    """Return the shift that puts the lowest carrying sole of each step at z = 0; interpolated in
+    the air."""
     carried = (contact != AIR).any(axis=1)
     if not carried.any():
         shift = np.full(len(soles), -soles.min())
@@ -126,7 +129,7 @@ def ground_shift(
 
 
 def _speed(path: Float[np.ndarray, "N 3"], clip: HumanClip) -> Float[np.ndarray, " N"]:
-    """Horizontal speed, m/s."""
+    """Return the horizontal speed, m/s."""
     flat = path[:, :2]
     if clip.cycle_offset is not None:
         flat = np.concatenate(

@@ -36,10 +36,10 @@ class HumanClip:
 def at_steps(
     keypoints: Float[np.ndarray, "T 29 3"], fps: float, time_s: Float[np.ndarray, " N"]
 ) -> Float[np.ndarray, "N 29 3"]:
-    """Keypoints at any times inside the clip by cubic spline."""
+    """Return the keypoints at any times inside the clip by cubic spline."""
     return np.asarray(CubicSpline(np.arange(len(keypoints)) / fps, keypoints)(time_s))
 
 
 def labels_at(values: np.ndarray, fps: float, time_s: Float[np.ndarray, " N"]) -> np.ndarray:
-    """Values of the nearest frame."""
+    """Return the values of the nearest frame."""
     return np.asarray(values[np.clip(np.round(time_s * fps).astype(int), 0, len(values) - 1)])

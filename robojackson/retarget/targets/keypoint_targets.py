@@ -1,4 +1,4 @@
-"""Where the robot's keypoints should be: every human bone keeps its direction, takes robot length.
+"""Targets of the robot's keypoints: human bones keep their directions and take robot lengths.
 
 The root is scaled by the ratio of the leg lengths and lifted or lowered until the lowest sole is on
 the floor, unless the body is in free fall. Metres, seconds, world frame (z up, floor at z = 0).
@@ -35,7 +35,7 @@ BONES: tuple[tuple[str, str], ...] = tuple(
 
 @dataclass(frozen=True)
 class Targets:
-    """What the solver aims at.
+    """Targets of the solver.
 
     Attributes:
         keypoints_w: Targets of the robot's keypoints, metres.
@@ -62,7 +62,7 @@ class Targets:
 def targets(
     clip: HumanClip, robot: Robot, hovering: Bool[np.ndarray, " N"] | None = None
 ) -> Targets:
-    """Bone-direction targets, contact states of the soles and the ground refit.
+    """Return the bone-direction targets, contact states of the soles and the ground refit.
 
     Args:
         clip: The human.
@@ -100,7 +100,8 @@ def targets(
 
 
 def leg_ratio(human: Mapping[str, np.ndarray], robot: Robot) -> float:
-    """Robot leg over human leg, hip to sole; the lowest 2 % of ankles give the ankle's height."""
+    """Return robot leg over human leg, hip to sole; the lowest 2 % of ankles give the ankle's
+    height."""
     length = robot.lengths
     robot_leg = length["left_hip", "left_knee"] + length["left_knee", "left_foot"]
     ankles = np.minimum(human["left_ankle"][:, 2], human["right_ankle"][:, 2])
@@ -138,7 +139,8 @@ def _chain(
 
 
 def _trunk_length(robot: Robot) -> float:
-    """Hip centre to shoulder centre: both are centres of mirrored pairs, so Pythagoras serves."""
+    """Return hip centre to shoulder centre: both are centres of mirrored pairs, so Pythagoras
+    serves."""
     length = robot.lengths
     slope = length["left_hip", "left_shoulder"]
     half = (length["left_hip", "right_hip"] - length["left_shoulder", "right_shoulder"]) / 2
@@ -158,20 +160,20 @@ def _trunk_frame(human: Mapping[str, np.ndarray]) -> Float[np.ndarray, "N 3 3"]:
     return np.stack([np.cross(across, up), across, up], axis=-1)
 
 
-def every_second(wanted: Targets) -> Targets:
-    """The same targets at half the rate."""
-    return replace(select_steps(wanted, slice(None, None, 2)), dt=2 * wanted.dt)
+def every_second(clip_targets: Targets) -> Targets:
+    """Return the same targets at half the rate."""
+    return replace(select_steps(clip_targets, slice(None, None, 2)), dt=2 * clip_targets.dt)
 
 
-def select_steps(wanted: Targets, steps: slice | Bool[np.ndarray, " N"]) -> Targets:
-    """Some of the steps, or all of them in another order."""
+def select_steps(clip_targets: Targets, steps: slice | Bool[np.ndarray, " N"]) -> Targets:
+    """Return some of the steps, or all of them in another order."""
     return replace(
-        wanted,
-        keypoints_w=wanted.keypoints_w[steps],
-        weights=wanted.weights[steps],
-        contact=wanted.contact[steps],
-        heading=wanted.heading[steps],
-        airborne=wanted.airborne[steps],
+        clip_targets,
+        keypoints_w=clip_targets.keypoints_w[steps],
+        weights=clip_targets.weights[steps],
+        contact=clip_targets.contact[steps],
+        heading=clip_targets.heading[steps],
+        airborne=clip_targets.airborne[steps],
     )
 
 

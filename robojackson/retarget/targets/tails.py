@@ -45,9 +45,9 @@ class TailConfig:
     """Whether and how long a motion that does not repeat begins and ends standing.
 
     Attributes:
-        use: `auto`: on robots that are judged beside the reference (`fall.frame: reference`).
+        use: `auto`: on robots that are evaluated beside the reference (`fall.frame: reference`).
         lead_s: Stand before the clip, seconds.
-        blend_s: From the stand into the clip, and back, seconds.
+        blend_s: Blend from the stand into the clip, and back, seconds.
         stand_s: Stand after the clip, seconds.
         steps: Whether steps lead from feet on which no robot stands well into the robot's stand.
     """
@@ -59,9 +59,9 @@ class TailConfig:
     steps: bool = True
 
     def wanted(self, robot: Robot) -> bool:
-        """Whether a robot's motions get tails."""
-        judged = robot.description.fall.frame == "reference"
-        return self.use == "yes" or (self.use == "auto" and judged)
+        """Return whether a robot's motions get tails."""
+        by_reference = robot.description.fall.frame == "reference"
+        return self.use == "yes" or (self.use == "auto" and by_reference)
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class Tailed:
     stand: int = 0
 
     def source_time(self, time_s: Float[np.ndarray, " N"]) -> Float[np.ndarray, " S"]:
-        """Time in the clip of every step; tails show its first and its last moment."""
+        """Return the time in the clip of every step; tails show its first and its last moment."""
         after = len(self.aims) - self.clip.stop
         return np.pad(time_s, (self.clip.start, after), mode="edge")
 
@@ -100,7 +100,7 @@ def with_tails(aims: Targets, robot: Robot, config: TailConfig) -> Tailed:
 def settled(
     qpos: Float[np.ndarray, "S nq"], stands: Sequence[slice], dt: float
 ) -> Float[np.ndarray, "S nq"]:
-    """A motion whose stands are still: the solver lets what no target holds wander slowly.
+    """Return a motion whose stands are still: the solver lets untargeted hinges drift slowly.
 
     Every stand becomes its middle pose, over `SETTLE_S` from the side of the clip.
 
@@ -128,7 +128,7 @@ def settled(
 
 
 def _tail(aims: Targets, robot: Robot, config: TailConfig, stand_s: float) -> Targets:
-    """What follows the last step: the way into the stand, and the stand."""
+    """Return what follows the last step: the way into the stand, and the stand."""
     steps = max(2, round(config.blend_s / aims.dt))
     held = round(stand_s / aims.dt)
     last, before = aims.keypoints_w[-1], aims.keypoints_w[-2]
@@ -172,7 +172,7 @@ def _pelvis(points: Float[np.ndarray, "K 3"], robot: Robot) -> Float[np.ndarray,
 
 
 def _columns_of_feet(robot: Robot) -> Int[np.ndarray, " F"]:
-    """Keypoints of the feet, toes included."""
+    """Return the keypoints of the feet, toes included."""
     names = robot.keypoint_names
     return np.array([i for i, name in enumerate(names) if name.endswith(("_foot", "_toe"))])
 
@@ -183,7 +183,8 @@ def _polynomial(
     end: Float[np.ndarray, "K 3"],
     time: Float[np.ndarray, " T"],
 ) -> Float[np.ndarray, "T K 3"]:
-    """From a place with a speed (a unit of time) to rest, accelerations zero at both ends."""
+    """Return a path from a place and a speed (per unit of time) to rest, without acceleration at
+    both ends."""
     t = time[:, None, None]
     way = t**3 * (10 - 15 * t + 6 * t**2)
     swing = t - t**3 * (6 - 8 * t + 3 * t**2)
@@ -200,7 +201,7 @@ def _headings(
 
 
 def _reversed(aims: Targets) -> Targets:
-    """The same backwards in time."""
+    """Return the same backwards in time."""
     return select_steps(aims, slice(None, None, -1))
 
 

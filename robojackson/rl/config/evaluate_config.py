@@ -4,8 +4,9 @@ from pydantic import Field
 
 from robojackson.config import config_dataclass
 
-TRAINED, VARIANTS = "trained", ("hold",)
-"""What tables call the trained policy, and the same under another law of its torque."""
+TRAINED, VARIANTS = "trained", ("hold", "regulator")
+"""What tables call the trained policy, the same under another law of its torque, and the feedback
+that its control law has, without the policy."""
 
 
 @config_dataclass

@@ -89,7 +89,7 @@ class TqcConfig:
     steps_per_round: int = Field(default=8, ge=1)
     updates_per_round: int = Field(default=24, ge=1)
     learning_rate: float = Field(default=5e-4, gt=0, lt=1)
-    buffer: int = Field(default=300_000, ge=1_000, le=300_000)
+    buffer: int = Field(default=300_000, ge=1_000, le=1_000_000)
     warmup: int = Field(default=2_000, ge=1)
     batch: int = Field(default=256, ge=1)
     tau: float = Field(default=0.01, gt=0, le=1)

@@ -23,6 +23,9 @@ class ControlConfig:
             null.
         feedforward: Share of the torques that the reference asks for by which the targets lead its
             joint angles, unitless; 0 follows the angles alone; the robot's when null.
+        feedback: Share of the linear-quadratic feedback along the reference by which the targets
+            move, unitless; 0 leaves balance to the policy alone; when null the robot's, or 0 where
+            the policy does not see all.
         residual: Largest offset that the policy adds to the reference's joint angles, rad; the
             robot's action scale when null.
         action_factor: Factor on the robot's action scale; when null 1, or the robot's
@@ -35,6 +38,7 @@ class ControlConfig:
     stiffness: float | None = Field(default=None, gt=0)
     damping: float | None = Field(default=None, ge=0)
     feedforward: float | None = Field(default=None, ge=0, le=2)
+    feedback: float | None = Field(default=None, ge=0, le=2)
     residual: float | None = Field(default=None, gt=0)
     arm_residual: float | None = Field(default=None, gt=0)
     action_factor: float | None = Field(default=None, gt=0)
@@ -185,12 +189,13 @@ class TrackConfig:
 
     Attributes:
         observation: What the policy sees: `full`, all that a simulation knows, or `onboard`, what a
-            real robot measures by itself (the critics see all).
+            real robot measures by itself (the critics see all), or `preview`, that and the
+            reference ahead.
         episode_seconds: Time limit of a training episode, s; its end is bootstrapped.
         threads: Threads that step the simulations.
     """
 
-    observation: Literal["full", "onboard"] = "full"
+    observation: Literal["full", "onboard", "preview"] = "full"
     control: ControlConfig = Field(default_factory=ControlConfig)
     reset: ResetConfig = Field(default_factory=ResetConfig)
     reward: RewardConfig = Field(default_factory=RewardConfig)

@@ -5,7 +5,7 @@ step is worth, how an episode begins. Episodes end by a fall, by getting lost, a
 that is not cyclic, or by the time limit; only the last is a truncation and is bootstrapped.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
@@ -51,7 +51,7 @@ class StepResult:
 
 
 class TrackingCore:
-    """N robots that follow one reference motion.
+    """N robots that follow one reference motion or several.
 
     Attributes:
         episode: Episodes that ended so far; the paper's curriculum goes by it.
@@ -61,20 +61,20 @@ class TrackingCore:
     def __init__(
         self,
         robot: Robot,
-        reference: ReferenceMotion,
+        reference: ReferenceMotion | Sequence[ReferenceMotion],
         config: TrackConfig | PaperConfig,
         n: int,
         seed: int,
         rewards: Mapping[str, RewardFunction] = MappingProxyType({}),
     ) -> None:
-        names = robot.keypoint_names
-        if names != reference.keypoint_names:
-            unknown = sorted(set(reference.keypoint_names) ^ set(names))
-            raise UnknownName("keypoint", ", ".join(unknown), "reference motion", names)
+        motions = [reference] if isinstance(reference, ReferenceMotion) else list(reference)
+        for motion in motions:
+            _require_keypoints(motion, robot)
         self.config, self.n = config, n
-        self.mode = mode_of(robot, reference, config, n, seed, rewards)
+        self.mode = mode_of(robot, motions, config, n, seed, rewards)
         self.sim, self.clip, self.limit = self.mode.sim, self.mode.clip, self.mode.limit
-        require_same_clock(self.sim.dt, reference.dt)
+        for motion in motions:
+            require_same_clock(self.sim.dt, motion.dt)
         self.rng = np.random.default_rng(seed)
         self.episode = 0
         self.step_index = np.zeros(n, int)
@@ -178,9 +178,21 @@ OBSERVED = ("qpos", "qvel", "points", "com", "broken", "previous", "count", "pus
 """What a simulation shows of its copies."""
 
 
+def _require_keypoints(reference: ReferenceMotion, robot: Robot) -> None:
+    """Refuse a motion of other keypoints than the robot's.
+
+    Raises:
+        UnknownName: with those that differ.
+    """
+    names = robot.keypoint_names
+    if names != reference.keypoint_names:
+        unknown = sorted(set(reference.keypoint_names) ^ set(names))
+        raise UnknownName("keypoint", ", ".join(unknown), "reference motion", names)
+
+
 def mode_of(
     robot: Robot,
-    reference: ReferenceMotion,
+    motions: Sequence[ReferenceMotion],
     config: TrackConfig | PaperConfig,
     n: int,
     seed: int,
@@ -189,10 +201,13 @@ def mode_of(
     """The mode that a configuration belongs to.
 
     Raises:
-        BadConfiguration: a user's reward terms for the paper's mode, whose reward is the paper's.
+        BadConfiguration: a user's reward terms for the paper's mode, whose reward is the paper's,
+            or several motions, of which it follows one.
     """
     if not isinstance(config, PaperConfig):
-        return TrackMode(robot, reference, config, n, seed, rewards)
+        return TrackMode(robot, motions, config, n, seed, rewards)
     if rewards:
         raise BadConfiguration("reward terms of your own need mode=track; paper has the paper's")
-    return PaperMode(robot, reference, config, n, seed)
+    if len(motions) > 1:
+        raise BadConfiguration("several motions need mode=track; paper follows one")
+    return PaperMode(robot, motions[0], config, n, seed)

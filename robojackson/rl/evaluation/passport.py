@@ -10,11 +10,11 @@ from typing import Any
 
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import EvaluateConfig, RandomConfig
-from robojackson.rl.evaluation.controllers import Evaluated, trained_driver
+from robojackson.rl.evaluation.controllers import Evaluated, sees_ahead, trained_driver
 from robojackson.rl.evaluation.rollout_records import RolloutScorer
 from robojackson.rl.evaluation.rollouts import Conditions, Driver, roll_out
 from robojackson.rl.evaluation.starts import starts_of, summarise
-from robojackson.rl.sim.feedforward import lead_of
+from robojackson.rl.sim.preview import driven_clip
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.variation import Variation, varied
 from robojackson.robot.fall import Fall
@@ -104,7 +104,7 @@ def passport(
     config = replace(config, resets=1)
     rows: list[dict[str, Any]] = []
     driver = trained_driver(policy, robot, reference)
-    clip = Clip(reference, lead_of(robot, reference, driver.control))
+    clip = driven_clip(robot, reference, driver.control, sees_ahead(policy))
     every = cases(robot, config.seed)
     for number, case in enumerate(every):
         progress(case.name, number, len(every))

@@ -28,8 +28,7 @@ from robojackson.rl.evaluation.controllers import (
     control_of,
     drivers,
     equipped,
-    fact,
-    mode_of,
+    sees_ahead,
 )
 from robojackson.rl.evaluation.passport import passport
 from robojackson.rl.evaluation.reward_audit import RewardAudit, audit_both_readings, audit_record
@@ -40,8 +39,8 @@ from robojackson.rl.evaluation.starts import starts_of, summarise
 from robojackson.rl.evaluation.verdict import verdict_on, without_short_figures
 from robojackson.rl.modes.paper_mode import facing_ahead
 from robojackson.rl.policy import Policy
-from robojackson.rl.sim.feedforward import lead_of
-from robojackson.rl.sim.reference_clip import Clip
+from robojackson.rl.policy_facts import fact, mode_of
+from robojackson.rl.sim.preview import driven_clip
 from robojackson.rl.sim.simulation import control_step, require_same_clock
 from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
@@ -90,7 +89,7 @@ def evaluate_policy(
     environment = environment_of(policy, control)
     if isinstance(environment, PaperConfig):
         reference = facing_ahead(reference)
-    clip = Clip(reference, lead_of(robot, reference, control))
+    clip = driven_clip(robot, reference, control, sees_ahead(policy))
     starts, labels = starts_of(robot, clip, config)
     horizon = clip.horizon(starts.step, config.seconds)
     judge, meter = (

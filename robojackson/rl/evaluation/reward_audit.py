@@ -19,6 +19,8 @@ from robojackson.rl.config.train_config import (
 from robojackson.rl.evaluation.reward_meter import RewardMeter
 from robojackson.rl.evaluation.rollouts import Driver, Moment, Starts, roll_out
 from robojackson.rl.modes.paper_mode import facing_ahead
+from robojackson.rl.modes.track_mode import control_of
+from robojackson.rl.sim.preview import driven_clip
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.robot.fall import Fall
@@ -51,8 +53,10 @@ def audit_reward(
     robot: Robot, reference: ReferenceMotion, environment: TrackConfig | PaperConfig
 ) -> RewardAudit:
     """What the reward of an environment pays to bodies that do not dance."""
-    motion = facing_ahead(reference)
-    clip = Clip(motion)
+    tracks = isinstance(environment, TrackConfig)
+    motion = reference if tracks else facing_ahead(reference)
+    law = control_of(environment) if isinstance(environment, TrackConfig) else ControlConfig()
+    clip = driven_clip(robot, motion, law) if tracks else Clip(motion)
     meter = RewardMeter(robot, motion, clip, environment)
     earned = {
         name: float(np.mean(_earned(robot, clip, meter, qpos, qvel)))
@@ -60,7 +64,7 @@ def audit_reward(
     }
     perfect = earned.pop("perfect")
     of = {name: value / perfect for name, value in earned.items()}
-    of["zero_residual"] = _replayed(robot, clip, meter) / (perfect * _most(clip))
+    of["zero_residual"] = _replayed(robot, clip, law, meter) / (perfect * _most(clip))
     return RewardAudit(perfect, of)
 
 
@@ -122,10 +126,10 @@ def _earned(
     return meter(Moment(sim, at, before, still, np.zeros(n, bool)))["return_own"]
 
 
-def _replayed(robot: Robot, clip: Clip, meter: RewardMeter) -> float:
-    """What the reference's hinge angles earn as targets, up to the fall."""
+def _replayed(robot: Robot, clip: Clip, law: ControlConfig, meter: RewardMeter) -> float:
+    """What the reference earns under the control law without a policy, up to the fall."""
     driver = Driver(
-        ControlConfig(),
+        law,
         lambda sim, following, start, last: sim.reference_angles(following),
     )
     at = clip.at(np.zeros(1, int))

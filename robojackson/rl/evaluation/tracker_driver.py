@@ -3,15 +3,11 @@
 import numpy as np
 
 from robojackson.motion.reference_motion import ReferenceMotion
-from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.evaluation.rollouts import Driver
 from robojackson.rl.sim.reference_clip import Clip, ClipStep
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.rl.trackers.tracker import Follower, Tracker, TrackerInput
 from robojackson.robot.model import Robot
-
-CONTROL = ControlConfig(feedforward=0.0)
-"""A tracker's targets are its own: nothing leads them."""
 
 
 def tracker_driver(tracker: Tracker, robot: Robot, reference: ReferenceMotion) -> Driver:
@@ -23,7 +19,7 @@ def tracker_driver(tracker: Tracker, robot: Robot, reference: ReferenceMotion) -
     Raises:
         BadPolicy: the tracker is for another robot.
     """
-    return Driver(CONTROL, _Command(tracker, robot, reference))
+    return Driver(tracker.control, _Command(tracker, robot, reference))
 
 
 class _Command:

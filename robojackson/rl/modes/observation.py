@@ -6,7 +6,8 @@ difference to its reference.
 
 `full` is all that a simulation knows. `onboard` is what a robot measures by itself: gyroscope,
 attitude and joints (the inputs of mjlab's tracking task without state estimation): 9 + 5 numbers a
-hinge, 154 on the Unitree G1. While it learns, the rest follows for the critics alone.
+hinge, 154 on the Unitree G1. `preview` is that and the reference ahead (`sim.preview`), for
+policies that follow more than one motion. While it learns, the rest follows for the critics alone.
 """
 
 from typing import Literal
@@ -15,12 +16,13 @@ import numpy as np
 from jaxtyping import Float
 
 from robojackson.geometry.rotations import quat_to_matrix
+from robojackson.rl.sim.preview import preview_size
 from robojackson.rl.sim.reference_clip import ClipStep
 from robojackson.robot.model import Robot
 
 SPEED_SCALE, HINGE_SPEED_SCALE, POINT_SCALE, ROOT_SCALE, CLIP = 0.3, 0.1, 2.0, 3.0, 10.0
 USUAL_HEIGHT_M = 1.2
-Kind = Literal["full", "onboard"]
+Kind = Literal["full", "onboard", "preview"]
 """Which inputs the policy gets."""
 
 
@@ -37,8 +39,10 @@ class Observer:
         self._kind, self._rest = kind, robot.standing[7:]
         points = 3 * len(robot.keypoint_names)
         self.size = self.actor_size = 24 + 4 * hinges + motors + points
-        if kind == "onboard":
+        if kind != "full":
             self.actor_size = 9 + 4 * hinges + motors
+            if kind == "preview":
+                self.actor_size += preview_size(hinges)
             self.size = self.actor_size + 15 + points
 
     def observe(
@@ -81,9 +85,10 @@ class Observer:
                 target.qpos[:, 7:] - qpos[:, 7:], aimed, travel, apart, done,
             ]  # fmt: skip
         else:
+            ahead = [] if target.preview is None else [target.preview]
             parts = [
                 gyro, *attitude, qpos[:, 7:] - self._rest, speeds,
-                target.qpos[:, 7:] - self._rest, aimed, done,
+                target.qpos[:, 7:] - self._rest, aimed, done, *ahead,
                 height, gravity, velocity, phase, offset, travel, apart,
             ]  # fmt: skip
         result: np.ndarray = np.clip(np.concatenate(parts, 1), -CLIP, CLIP).astype(np.float32)

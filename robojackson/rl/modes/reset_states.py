@@ -10,21 +10,25 @@ from jaxtyping import Float, Int
 
 from robojackson.geometry.rotations import heading
 from robojackson.rl.config.train_config import ResetConfig
-from robojackson.rl.sim.reference_clip import Clip
+from robojackson.rl.sim.reference_clip import STRIDE, Clip
 from robojackson.robot.model import Robot
 
-BIN_SECONDS = 0.25
-FORGET = 0.02
+BIN_SECONDS, MOST_BINS = 0.25, 250
+FORGET, FORGET_OF_MANY = 0.02, 0.1
+"""Share by which an episode's end moves the average of its bin; with several motions each bin is
+seen less often."""
 EVEN = 0.5
 SETTLED_STATES = 4096
 
 
 class StartPhases:
-    """Adaptive distribution over the start steps of a clip."""
+    """Adaptive distribution over the start steps of all motions of a clip."""
 
     def __init__(self, clip: Clip, failure_share: float) -> None:
-        self._last = clip.steps if clip.cyclic else max(1, clip.steps - 1)
-        self._bins = max(1, round(self._last * clip.dt / BIN_SECONDS))
+        self._clip, self._steps = clip, clip.starts()
+        self._last = len(self._steps)
+        self._bins = min(max(1, round(self._last * clip.dt / BIN_SECONDS)), MOST_BINS)
+        self._forget = FORGET if self._steps[-1] < STRIDE else FORGET_OF_MANY
         self.failures = np.full(self._bins, EVEN)
         self._share = failure_share
 
@@ -35,7 +39,7 @@ class StartPhases:
         bins = rng.choice(self._bins, size=count, p=weight / weight.sum())
         inside = (bins + rng.random(count)) * self._last / self._bins
         weak = np.minimum(inside.astype(int), self._last - 1)
-        return np.where(rng.random(count) < self._share, weak, uniform)
+        return self._steps[np.where(rng.random(count) < self._share, weak, uniform)]
 
     def forget(self) -> None:
         """Take every phase for equally hard."""
@@ -43,9 +47,9 @@ class StartPhases:
 
     def record(self, start: Int[np.ndarray, " I"], failed: np.ndarray) -> None:
         """Learn from ended episodes: the step each began at and whether it fell or got lost."""
-        bins = (start % self._last) * self._bins // self._last
+        bins = self._clip.row(start) * self._bins // self._last
         for index, bad in zip(bins, failed, strict=True):
-            self.failures[index] += FORGET * (float(bad) - self.failures[index])
+            self.failures[index] += self._forget * (float(bad) - self.failures[index])
 
 
 class SettledStates:

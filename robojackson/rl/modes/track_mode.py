@@ -5,7 +5,8 @@ to the reference's next hinge angles and followed by the PD law of `Simulation`.
 `observation.Observer`. Reward: `rewards.reward_terms`. Episodes start as `reset_states` says.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
@@ -14,7 +15,7 @@ from jaxtyping import Float, Int
 
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.paper_config import BETA
-from robojackson.rl.config.train_config import RewardConfig, TrackConfig
+from robojackson.rl.config.train_config import ControlConfig, RewardConfig, TrackConfig
 from robojackson.rl.modes.mode import EpisodeStart, Score
 from robojackson.rl.modes.observation import Observer
 from robojackson.rl.modes.reset_states import (
@@ -35,8 +36,8 @@ from robojackson.rl.modes.rewards import (
     tracked_points,
     tracking_errors,
 )
-from robojackson.rl.sim.feedforward import lead_of
-from robojackson.rl.sim.reference_clip import Clip, ClipStep
+from robojackson.rl.sim.preview import driven_clip
+from robojackson.rl.sim.reference_clip import ClipStep
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
@@ -47,24 +48,25 @@ PERFECT_OF_THE_PAPER = 5.0
 
 
 class TrackMode:
-    """Tracking of one reference motion by N robots (`Mode` protocol)."""
+    """Tracking of one reference motion or several by N robots (`Mode` protocol)."""
 
     repeats = 1
 
     def __init__(
         self,
         robot: Robot,
-        reference: ReferenceMotion,
+        reference: ReferenceMotion | Sequence[ReferenceMotion],
         config: TrackConfig,
         n: int,
         seed: int,
         rewards: Mapping[str, RewardFunction] = MappingProxyType({}),
     ) -> None:
         self._config, self._rewards = config, rewards
-        self.clip = Clip(reference, lead_of(robot, reference, config.control))
+        ahead, control = config.observation == "preview", control_of(config)
+        self.clip = driven_clip(robot, reference, control, ahead)
         names = robot.keypoint_names
         self._which = tracked_points(names)
-        self.sim = Simulation(robot, config.control, n, config.threads, config.random, seed)
+        self.sim = Simulation(robot, control, n, config.threads, config.random, seed)
         self.starts = StartPhases(self.clip, config.reset.failure_share)
         self._settled = SettledStates(robot.model.nq, robot.model.nv)
         self._stand = default_standing_pose(robot)
@@ -119,13 +121,13 @@ class TrackMode:
         return {}
 
     def record_finished(self, indices: Int[np.ndarray, " I"], step: Int[np.ndarray, " I"]) -> None:
-        """Keep the last states of episodes that reached the time limit of a cyclic clip."""
-        if not self.clip.cyclic:
-            return
+        """Keep the last states of episodes that reached the time limit of a cyclic motion."""
         for i, at in zip(indices, step, strict=True):
-            qpos = self.sim.qpos[i].copy()
-            qpos[:2] -= self.clip.at(np.array([at])).qpos[0, :2]
-            self._settled.add(qpos, self.sim.qvel[i], int(at % self.clip.steps))
+            now = np.array([at])
+            if self.clip.repeats(now)[0]:
+                qpos = self.sim.qpos[i].copy()
+                qpos[:2] -= self.clip.at(now).qpos[0, :2]
+                self._settled.add(qpos, self.sim.qvel[i], int(self.clip.folded(now)[0]))
 
     def forget(self) -> None:
         self.starts.forget()
@@ -137,6 +139,14 @@ class TrackMode:
     def restore(self, state: dict[str, Any]) -> None:
         self.starts.failures = np.array(state["failures"])
         self._settled.restore(state)
+
+
+def control_of(config: TrackConfig) -> ControlConfig:
+    """The control law of a training: feedback of all that a simulation knows is for policies that
+    see as much."""
+    if config.observation == "full" or config.control.feedback is not None:
+        return config.control
+    return replace(config.control, feedback=0.0)
 
 
 def evaluate_step(

@@ -77,6 +77,13 @@ def feedforward_share(robot: Robot, control: ControlConfig) -> float:
     return robot.description.feedforward if named is None else named
 
 
+def feedback_share(robot: Robot, control: ControlConfig) -> float:
+    """Share of the linear feedback along the reference that the targets get: the robot's own,
+    unless the configuration names one."""
+    named = control.feedback
+    return robot.description.feedback if named is None else named
+
+
 def actuation_facts(robot: Robot, control: ControlConfig) -> dict[str, list[float]]:
     """What a policy's actions mean, in the robot's order of motors, for the policy's file."""
     kp, kd = gains(robot, control)

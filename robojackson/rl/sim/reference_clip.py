@@ -1,10 +1,13 @@
-"""A reference motion as arrays that a thousand environments can read at their own step.
+"""Reference motions as arrays that a thousand environments can read at their own step.
 
-A cyclic clip goes on for ever: step s is step s mod S of cycle s // S, moved by that many cycle
-offsets. A clip that is not cyclic holds its last step. Frames and units as in `ReferenceMotion`.
+A cyclic motion goes on for ever: step s is step s mod S of cycle s // S, moved by that many cycle
+offsets. A motion that is not cyclic holds its last step. Step s of the m-th motion of several is
+`m * STRIDE + s`. Frames and units as in `ReferenceMotion`.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -13,6 +16,24 @@ from robojackson.errors import RejectedReference, TrackTooShort
 from robojackson.motion.reference_motion import ReferenceMotion
 
 LEAST_STEPS = 8
+STRIDE = 1_000_000
+"""Steps by which the motions of a clip are told apart; no episode is as long."""
+
+
+class StepLaw(Protocol):
+    """What moves the targets of N robots at one step of their references."""
+
+    def targets(
+        self, qpos: Float[np.ndarray, "N nq"], qvel: Float[np.ndarray, "N nv"]
+    ) -> Float[np.ndarray, "N nu"]:
+        """Return by how much the motors' targets move, rad."""
+
+
+class Law(Protocol):
+    """A feedback along the joined motions of a clip (`feedback.Feedback`)."""
+
+    def at(self, row: Int[np.ndarray, " N"], shift: Float[np.ndarray, "N 3"]) -> StepLaw:
+        """Return it at rows whose cycles have moved them by `shift`, m."""
 
 
 @dataclass(frozen=True)
@@ -21,8 +42,11 @@ class ClipStep:
 
     Attributes:
         moved: Velocities of the points, m/s.
-        phase: 0..1 of the clip.
+        phase: 0..1 of the motion.
         lead: Offset of the motors' targets from the reference's angles, rad; None without one.
+        preview: What the policy sees of the steps ahead (`preview.preview_of`); None without one.
+        feedback: How the targets move on the way to this step, given qpos and qvel now, rad; None
+            without one.
     """
 
     step: Int[np.ndarray, " N"]
@@ -32,35 +56,74 @@ class ClipStep:
     moved: Float[np.ndarray, "N K 3"]
     phase: Float[np.ndarray, " N"]
     lead: Float[np.ndarray, "N nu"] | None = None
+    preview: Float[np.ndarray, "N P"] | None = None
+    feedback: Callable[[np.ndarray, np.ndarray], Float[np.ndarray, "N nu"]] | None = None
 
 
 class Clip:
-    """Random access to a reference motion by step.
+    """Random access to reference motions by step.
 
     Args:
-        lead: Offset of the motors' targets from the reference's angles at every step, rad.
+        references: One motion or several, of one robot and control step.
+        lead: Offset of the motors' targets from the reference's angles at every step, rad; the
+            steps of all motions, one after the other.
+        preview: What the policy sees of the steps ahead, of the same steps.
+        law: Feedback along the same steps.
+
+    Attributes:
+        steps: Of all motions together.
+        cyclic: Whether every motion repeats.
+        dt: Seconds a step.
 
     Raises:
         TrackTooShort, RejectedReference: too few steps, or values that are no numbers.
     """
 
     def __init__(
-        self, reference: ReferenceMotion, lead: Float[np.ndarray, "S nu"] | None = None
+        self,
+        references: ReferenceMotion | Sequence[ReferenceMotion],
+        lead: Float[np.ndarray, "S nu"] | None = None,
+        preview: Float[np.ndarray, "S P"] | None = None,
+        law: Law | None = None,
     ) -> None:
-        if len(reference) < LEAST_STEPS:
-            raise TrackTooShort(
-                f"the reference motion has {len(reference)} steps, {LEAST_STEPS} are the least"
-            )
-        if not np.isfinite(reference.qpos).all() or not np.isfinite(reference.qvel).all():
-            raise RejectedReference("the reference motion holds values that are no numbers")
-        self.steps, self.cyclic, self.dt = len(reference), reference.cyclic, reference.dt
-        self._qpos = np.asarray(reference.qpos, float)
-        self._qvel = np.asarray(reference.qvel, float)
-        self._points = np.asarray(reference.keypoints_w, float)
-        self._offset = np.asarray(reference.cycle_offset, float)
-        self._lead = lead
-        self._moved = self._velocities()
+        motions = [references] if isinstance(references, ReferenceMotion) else list(references)
+        for motion in motions:
+            _require_usable(motion)
+        self._length = np.array([len(motion) for motion in motions])
+        self._first = np.cumsum(self._length) - self._length
+        self._cyclic = np.array([motion.cyclic for motion in motions])
+        self._offset = np.stack([np.asarray(motion.cycle_offset, float) for motion in motions])
+        self.steps, self.dt = int(self._length.sum()), motions[0].dt
+        self.cyclic = bool(self._cyclic.all())
+        self._qpos = np.concatenate([np.asarray(motion.qpos, float) for motion in motions])
+        self._qvel = np.concatenate([np.asarray(motion.qvel, float) for motion in motions])
+        self._points = np.concatenate([np.asarray(m.keypoints_w, float) for m in motions])
+        self._moved = np.concatenate([_velocities(motion) for motion in motions])
+        self._lead, self._preview, self._law = lead, preview, law
         self._last: ClipStep | None = None
+
+    def starts(self) -> Int[np.ndarray, " R"]:
+        """Steps from which a motion can be followed: all, but the end of one that ends."""
+        usable = np.where(self._cyclic, self._length, np.maximum(1, self._length - 1))
+        return np.concatenate([m * STRIDE + np.arange(count) for m, count in enumerate(usable)])
+
+    def row(self, step: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
+        """Rows of the joined steps of all motions, without the end of those that end."""
+        usable = np.where(self._cyclic, self._length, np.maximum(1, self._length - 1))
+        motion, index = np.divmod(step, STRIDE)
+        result: np.ndarray = (np.cumsum(usable) - usable)[motion] + index % usable[motion]
+        return result
+
+    def folded(self, step: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
+        """The same steps within the first cycle of their motions."""
+        motion, index = np.divmod(step, STRIDE)
+        result: np.ndarray = motion * STRIDE + index % self._length[motion]
+        return result
+
+    def repeats(self, step: Int[np.ndarray, " N"]) -> np.ndarray:
+        """Whether the motion of each step is cyclic."""
+        result: np.ndarray = self._cyclic[step // STRIDE]
+        return result
 
     def at(self, step: Int[np.ndarray, " N"]) -> ClipStep:
         """The reference at each environment's step; read-only: what is asked for twice in a row, as
@@ -70,26 +133,45 @@ class Clip:
         return self._last
 
     def _read(self, step: Int[np.ndarray, " N"]) -> ClipStep:
-        cycle, index = self._split(step)
-        offset = cycle[:, None] * self._offset
-        qpos = self._qpos[index].copy()
-        qpos[:, :3] += offset
-        points = self._points[index] + offset[:, None]
-        arrays = qpos, self._qvel[index], points, self._moved[index], index / self.steps
+        row, shift, phase = self._split(step)
+        qpos = self._qpos[row].copy()
+        qpos[:, :3] += shift
+        points = self._points[row] + shift[:, None]
+        arrays = qpos, self._qvel[row], points, self._moved[row], phase
         for array in arrays:
             array.setflags(write=False)
-        return ClipStep(step, *arrays, None if self._lead is None else self._lead[index])
+        lead = None if self._lead is None else self._lead[row]
+        preview = None if self._preview is None else self._preview[row]
+        return ClipStep(step, *arrays, lead, preview, self._feedback(step))
+
+    def _feedback(
+        self, step: np.ndarray
+    ) -> Callable[[np.ndarray, np.ndarray], Float[np.ndarray, "N nu"]] | None:
+        """The feedback on the way to each step."""
+        law = self._law
+        if law is None:
+            return None
+
+        def targets(qpos: np.ndarray, qvel: np.ndarray) -> Float[np.ndarray, "N nu"]:
+            row, shift, _ = self._split(step - 1)
+            return law.at(row, shift).targets(qpos, qvel)
+
+        return targets
 
     def gather(
         self, values: Float[np.ndarray, "S P 3"], step: Int[np.ndarray, " N"]
     ) -> Float[np.ndarray, "N P 3"]:
         """Other points of the clip's steps, world, at each environment's step."""
-        cycle, index = self._split(step)
-        return np.asarray(values[index] + (cycle[:, None] * self._offset)[:, None])
+        row, shift, _ = self._split(step)
+        return np.asarray(values[row] + shift[:, None])
 
     def ended(self, step: Int[np.ndarray, " N"]) -> np.ndarray:
-        """Whether a clip that is not cyclic has been danced to its end."""
-        return np.zeros(len(step), bool) if self.cyclic else step >= self.steps - 1
+        """Whether a motion that is not cyclic has been danced to its end."""
+        if self.cyclic:
+            return np.zeros(len(step), bool)
+        motion, index = np.divmod(step, STRIDE)
+        result: np.ndarray = ~self._cyclic[motion] & (index >= self._length[motion] - 1)
+        return result
 
     def horizon(self, start: Int[np.ndarray, " N"], seconds: float) -> Int[np.ndarray, " N"]:
         """Steps of rollouts: the given time when cyclic, else from each start to the clip's end."""
@@ -97,14 +179,36 @@ class Clip:
             return np.full(len(start), max(1, round(seconds / self.dt)))
         return self.steps - 1 - start
 
-    def _velocities(self) -> Float[np.ndarray, "S K 3"]:
-        """Backward differences, as a simulation that is read once a step sees them."""
-        before = np.roll(self._points, 1, axis=0)
-        before[0] = self._points[-1] - self._offset if self.cyclic else self._points[0]
-        result: np.ndarray = (self._points - before) / self.dt
-        return result
+    def _split(
+        self, step: np.ndarray
+    ) -> tuple[Int[np.ndarray, " N"], Float[np.ndarray, "N 3"], Float[np.ndarray, " N"]]:
+        """Rows of the joined arrays, how far the cycles have moved them, and the phase."""
+        motion, index = np.divmod(step, STRIDE)
+        length = self._length[motion]
+        cycle = np.where(self._cyclic[motion], index // length, 0)
+        index = np.minimum(index - cycle * length, length - 1)
+        shift: np.ndarray = cycle[:, None] * self._offset[motion]
+        return self._first[motion] + index, shift, index / length
 
-    def _split(self, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        if self.cyclic:
-            return step // self.steps, step % self.steps
-        return np.zeros_like(step), np.minimum(step, self.steps - 1)
+
+def _require_usable(motion: ReferenceMotion) -> None:
+    """Refuse what nobody can follow.
+
+    Raises:
+        TrackTooShort, RejectedReference: too few steps, or values that are no numbers.
+    """
+    if len(motion) < LEAST_STEPS:
+        raise TrackTooShort(
+            f"the reference motion has {len(motion)} steps, {LEAST_STEPS} are the least"
+        )
+    if not np.isfinite(motion.qpos).all() or not np.isfinite(motion.qvel).all():
+        raise RejectedReference("the reference motion holds values that are no numbers")
+
+
+def _velocities(motion: ReferenceMotion) -> Float[np.ndarray, "S K 3"]:
+    """Backward differences, as a simulation that is read once a step sees them."""
+    points = np.asarray(motion.keypoints_w, float)
+    before = np.roll(points, 1, axis=0)
+    before[0] = points[-1] - motion.cycle_offset if motion.cyclic else points[0]
+    result: np.ndarray = (points - before) / motion.dt
+    return result

@@ -24,6 +24,7 @@ from robojackson.rl.sim.disturbances import Disturbances
 from robojackson.rl.sim.motors import (
     Motors,
     actuation_facts,
+    feedback_share,
     feedforward_share,
     gains,
     residual_scale,
@@ -47,14 +48,15 @@ BAD_STATE = [
 def resolved(
     control: ControlConfig, robot: Robot, random: RandomConfig | None = None
 ) -> ControlConfig:
-    """The law of control with the robot's substeps, feed-forward and action factor where it names
-    none."""
+    """The law of control with the robot's substeps, feed-forward, feedback and action factor where
+    it names none."""
     pushed = random is not None and random.pushes > 0
     usual = robot.description.robust_action_factor if pushed else 1.0
     return replace(
         control,
         substeps=control.substeps or robot.substeps,
         feedforward=feedforward_share(robot, control),
+        feedback=feedback_share(robot, control),
         action_factor=control.action_factor or usual,
     )
 
@@ -192,7 +194,11 @@ class Simulation:
     def reference_angles(self, step: ClipStep) -> Float[np.ndarray, "N nu"]:
         """Target hinge angles that follow a reference step with nothing learnt, rad."""
         angles: np.ndarray = step.qpos[:, 7:][:, self.motors.hinge]
-        return angles if step.lead is None else angles + step.lead
+        if step.lead is not None:
+            angles = angles + step.lead
+        if step.feedback is not None and self.control.feedback:
+            angles = angles + step.feedback(*self.sensed())
+        return angles
 
     def close(self) -> None:
         """Stop the threads."""

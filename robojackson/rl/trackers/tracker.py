@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 from jaxtyping import Float
 
+from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.sim.reference_clip import ClipStep
 from robojackson.rl.trackers.tracker_description import TrackerDescription
 from robojackson.robot.model import Robot
@@ -44,10 +45,14 @@ class Tracker(Protocol):
     Attributes:
         description: What is known of it.
         window: Steps of the reference that it sees, counted from the present one; 1 is the next.
+        control: The law of control that follows its targets.
+        sees_ahead: Whether a step of the window carries a preview (`sim.preview`).
     """
 
     description: TrackerDescription
     window: tuple[int, ...]
+    control: ControlConfig
+    sees_ahead: bool
 
     def equip(self, robot: Robot) -> Robot:
         """Return the robot with the gains that the network was trained with.

@@ -6,27 +6,28 @@ Names of hinges are bound to a robot by `equipment.equip`. Metres, radians, seco
 from collections.abc import Mapping
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from robojackson.config import config_dataclass
+from robojackson.errors import ConflictingValues
 from robojackson.robot.description import Digest, Positive, Weight
 
 
 @config_dataclass
 class TrackerFile:
-    """The file of a network; `robojackson trackers add NAME` downloads it.
+    """The file of a network; `robojackson trackers add NAME` downloads it where it does not ship.
 
     Attributes:
-        url: Address of the file, of one commit.
-        name: What it is called in the store.
+        url: Address of the file, of one commit; null for one that ships with RoboJackson.
+        name: What it is called in the store, or among the assets.
         size: Bytes.
         sha256: Digest of its content; another file is refused.
     """
 
-    url: Annotated[str, Field(pattern=r"^https?://")]
     name: Annotated[str, Field(pattern=r"^[\w.-]+$")]
     size: Annotated[int, Field(ge=1)]
     sha256: Digest
+    url: Annotated[str, Field(pattern=r"^https?://")] | None = None
 
 
 @config_dataclass
@@ -36,8 +37,11 @@ class TrackerDescription:
     Attributes:
         name: Name of the tracker.
         robot: Name of the robot that it drives.
-        network: Layout of its observation and action.
-        file: Where the network comes from.
+        network: Layout of its observation and action: `twist2`; `policy`, a policy file of ours; or
+            `regulator`, linear-quadratic feedback without a network. The last two take gains and
+            scales from their file or robot: nothing is given from `action_scale` on.
+        file: Where the network comes from; null for `regulator`, which has none.
+        fallback: Whether it is taken by itself only where no other tracker of its robot is here.
         homepage: Where its authors describe it.
         licence: Under which its authors publish the file.
         trained_on: Motions that its authors name.
@@ -56,17 +60,26 @@ class TrackerDescription:
 
     name: str
     robot: str
-    network: Literal["twist2"]
-    file: TrackerFile
+    network: Literal["twist2", "policy", "regulator"]
     licence: str
     trained_on: str
     homepage: str
     control_dt: Positive
-    action_scale: Positive
-    action_limit: Positive
-    joints: tuple[str, ...]
-    stiffness: Mapping[str, Positive]
-    damping: Mapping[str, Weight]
+    file: TrackerFile | None = None
+    fallback: bool = False
+    action_scale: Positive = 1.0
+    action_limit: Positive = 1.0
+    joints: tuple[str, ...] = ()
+    stiffness: Mapping[str, Positive] = Field(default_factory=dict)
+    damping: Mapping[str, Weight] = Field(default_factory=dict)
     default_pose: Mapping[str, float] = Field(default_factory=dict)
     unmeasured_speeds: tuple[str, ...] = ()
     timestep: Positive | None = None
+
+    @model_validator(mode="after")
+    def _complete(self) -> "TrackerDescription":
+        if self.file is None and self.network != "regulator":
+            raise ConflictingValues(f"network {self.network!r} needs a file", "network", "file")
+        if self.network == "twist2" and not self.joints:
+            raise ConflictingValues("network 'twist2' needs the joints", "network", "joints")
+        return self

@@ -5,27 +5,39 @@ from pathlib import Path
 
 from robojackson.errors import BadPolicy
 from robojackson.files.local_folder import sha256_of_file
+from robojackson.rl.trackers.policy_tracker import PolicyTracker
+from robojackson.rl.trackers.regulator_tracker import RegulatorTracker
 from robojackson.rl.trackers.tracker import Tracker
 from robojackson.rl.trackers.tracker_description import TrackerDescription
 from robojackson.rl.trackers.twist2 import Twist2Tracker
 from robojackson.robot.mjcf import robots_folder
 
-NETWORKS: Mapping[str, Callable[[TrackerDescription, Path], Tracker]] = {"twist2": Twist2Tracker}
-"""By `TrackerDescription.network`."""
+NETWORKS: Mapping[str, Callable[[TrackerDescription, Path], Tracker]] = {
+    "twist2": Twist2Tracker,
+    "policy": PolicyTracker,
+}
+"""Of files, by `TrackerDescription.network`."""
+ASSETS = Path(__file__).parent.parent.parent / "assets"
 
 
-def tracker_path(description: TrackerDescription) -> Path:
-    """Return where `robojackson trackers add` puts the file of a tracker."""
+def tracker_path(description: TrackerDescription) -> Path | None:
+    """Return where the file of a tracker ships, or where `robojackson trackers add` puts it; None
+    for one without a file."""
+    if description.file is None:
+        return None
+    if description.file.url is None:
+        return ASSETS / description.file.name
     return robots_folder().parent / "trackers" / description.name / description.file.name
 
 
 def is_present(description: TrackerDescription) -> bool:
     """Whether the file of a tracker is here; whether it is the pinned one is not checked."""
-    return tracker_path(description).is_file()
+    path = tracker_path(description)
+    return path is None or path.is_file()
 
 
-def require_file(description: TrackerDescription, file: Path | None = None) -> Path:
-    """Return the file of a tracker.
+def require_file(description: TrackerDescription, file: Path | None = None) -> Path | None:
+    """Return the file of a tracker; None for one without a file.
 
     Args:
         file: Where it is, if not in the store.
@@ -34,7 +46,11 @@ def require_file(description: TrackerDescription, file: Path | None = None) -> P
         BadPolicy: it is not here, or is not the one that was pinned.
     """
     path, name = file or tracker_path(description), description.name
+    if description.file is None or path is None:
+        return None
     how = f"run: robojackson trackers add {name}"
+    if description.file.url is None:
+        how = "install RoboJackson again"
     if not path.is_file():
         raise BadPolicy(f"tracker {name!r} is not here ({path}); {how}")
     if sha256_of_file(path) != description.file.sha256:
@@ -53,4 +69,6 @@ def open_tracker(description: TrackerDescription, file: Path | None = None) -> T
         MissingDependency: what runs it is not installed.
     """
     path = require_file(description, file)
+    if path is None:
+        return RegulatorTracker(description)
     return NETWORKS[description.network](description, path)

@@ -19,6 +19,7 @@ import numpy as np
 from jaxtyping import Float
 
 from robojackson.geometry.rotations import quat_to_matrix
+from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.sim.reference_clip import ClipStep
 from robojackson.rl.trackers.equipment import Layout, equip, layout_of
 from robojackson.rl.trackers.onnx_network import OnnxNetwork
@@ -28,6 +29,8 @@ from robojackson.robot.model import Robot
 
 GYRO_SCALE, SPEED_SCALE = 0.25, 0.05
 """Of angular velocities and of joint speeds in the observation."""
+CONTROL = ControlConfig(feedforward=0.0, feedback=0.0)
+"""The targets are the network's own: nothing leads them."""
 HISTORY = 10
 """Frames before the present one that the network sees."""
 
@@ -50,6 +53,7 @@ class Twist2Tracker:
         joints = len(description.joints)
         self.description = description
         self.window: tuple[int, ...] = (1,)
+        self.control, self.sees_ahead = CONTROL, False
         self._network = OnnxNetwork(path, observation_size(joints), joints)
 
     def equip(self, robot: Robot) -> Robot:

@@ -153,17 +153,22 @@ def test_without_the_file_the_error_is_the_command_that_brings_it(pin, tmp_path:
 
 def test_an_unknown_tracker_lists_those_that_are(pin) -> None:
     pin()
-    with pytest.raises(UnknownName, match=r"unknown tracker 'twist3'.*standin, twist2"):
+    with pytest.raises(UnknownName, match=r"unknown tracker 'twist3'.*regulator, standin, twist2"):
         add_tracker("twist3")
 
 
 def test_the_list_says_robot_licence_training_and_whether_it_is_here(pin, network: Path) -> None:
     pin()
     before, told = listed(), in_process("trackers").out
-    assert before == {"standin": False, "twist2": False}
+    assert before == {"regulator": True, "standin": False, "twist2": False}
     assert all(word in told for word in ("g1", "MIT", "AMASS", "robojackson trackers add twist2"))
     assert in_process("trackers", "add", NAME, "--file", network).code == 0
-    assert listed() == {"standin": True, "twist2": False}
+    assert listed() == {"regulator": True, "standin": True, "twist2": False}
+
+
+def test_a_tracker_without_a_file_has_nothing_to_add() -> None:
+    said = in_process("trackers", "add", "regulator", "--json")
+    assert (said.code, said.answer["added"], said.answer["file"]) == (0, False, "")
 
 
 def listed() -> dict[str, bool]:

@@ -28,14 +28,14 @@ def path_of(images: list[np.ndarray]) -> CameraPath:
     return camera_path(images, NOBODY[: len(images)], WIDTH, HEIGHT)
 
 
-def test_a_camera_that_stands_is_told_to_stand() -> None:
+def test_a_camera_that_stands_is_reported_to_stand() -> None:
     found = path_of([view(wall(), WIDTH)] * FRAMES)
     assert not found.moved
     assert found.notes == ()
     assert np.allclose(found.to_first, np.eye(3))
 
 
-def test_a_pan_is_measured_and_told() -> None:
+def test_a_pan_is_measured_and_reported() -> None:
     offsets = WIDTH + np.round(np.linspace(0, 120, FRAMES)).astype(int)
     found = path_of([view(wall(), x) for x in offsets])
     middle = np.tile([[WIDTH / 2.0, HEIGHT / 2.0]], (FRAMES, 1, 1))
@@ -72,7 +72,7 @@ def test_a_person_who_moves_is_no_background() -> None:
     assert not camera_path(images, marks, WIDTH, HEIGHT).moved
 
 
-def test_a_cut_is_told() -> None:
+def test_a_cut_is_reported() -> None:
     images = [view(wall(0), WIDTH)] * 20 + [view(wall(9), WIDTH)] * 20
     found = path_of(images)
     assert np.flatnonzero(found.jumps).tolist() == [20]
@@ -80,7 +80,7 @@ def test_a_cut_is_told() -> None:
 
 
 @pytest.mark.medium
-def test_a_violent_shake_is_told() -> None:
+def test_a_violent_shake_is_reported() -> None:
     rng = np.random.default_rng(2)
     picture = wall()
     images = [
@@ -90,7 +90,7 @@ def test_a_violent_shake_is_told() -> None:
     assert "violent shake" in path_of(images).notes[0]
 
 
-def test_a_bare_wall_is_told_to_show_nothing() -> None:
+def test_a_bare_wall_is_reported_to_show_nothing() -> None:
     bare = np.full((HEIGHT, WIDTH, 3), 127, np.uint8)
     assert "cannot be seen" in path_of([bare] * FRAMES).notes[0]
 
@@ -127,7 +127,7 @@ def tiles(seed: int = 0) -> np.ndarray:
 
 
 @pytest.mark.parametrize("background", [wall, tiles])
-def test_somebody_else_who_walks_through_is_no_motion_of_the_camera(
+def test_another_person_who_walks_through_is_no_motion_of_the_camera(
     background: Callable[[int], np.ndarray],
 ) -> None:
     blots, images, marks = wall(1), [], []

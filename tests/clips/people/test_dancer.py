@@ -56,7 +56,7 @@ def gap(rows: np.ndarray, begin: int, end: int) -> np.ndarray:
     return holed
 
 
-def test_a_row_of_somebody_else_is_not_taken() -> None:
+def test_a_row_of_another_person_is_not_taken() -> None:
     found = FULL.copy()
     found[4] = FAR[4]
     assert hips_x(checked(found, [FULL], 0, TIMES, SIZE, DancerConfig())) == pytest.approx(
@@ -103,7 +103,7 @@ def whose(rows: np.ndarray, places: np.ndarray) -> tuple[set[int], float]:
 
 
 @pytest.mark.medium
-def test_two_who_cross_in_the_same_clothes_are_told_apart(crossed: Crossed) -> None:
+def test_two_who_cross_in_the_same_clothes_are_distinguished(crossed: Crossed) -> None:
     shown = [whose(rows, crossed.places) for rows in crossed.cast.rows]
     assert sorted(people for people, _ in shown) == [{0}, {1}]
     assert min(share for _, share in shown) > 0.85

@@ -74,7 +74,7 @@ def test_who_leaves_and_returns_is_the_same() -> None:
     assert not np.isnan(hips_x(track)[75:]).any()
 
 
-def test_a_ghost_of_a_few_frames_is_nobody() -> None:
+def test_a_ghost_of_a_few_frames_is_no_person() -> None:
     frames = [[seen(100)] + ([seen(400)] if 20 <= i < 24 else []) for i in range(90)]
     assert len(tracks(frames)) == 1
 
@@ -88,5 +88,5 @@ def test_the_largest_steady_person_is_the_first() -> None:
     assert first == pytest.approx([300, 100, 520])
 
 
-def test_nobody_in_any_frame_is_no_track() -> None:
+def test_no_person_in_any_frame_is_no_track() -> None:
     assert tracks([[]] * 10) == []

@@ -80,7 +80,7 @@ def test_a_clip_without_anybody_says_that_only() -> None:
     assert kinds(track) == {"person_missing": 0.0}
 
 
-def test_ten_frames_a_second_are_told_in_these_words() -> None:
+def test_ten_frames_a_second_are_reported_in_these_words() -> None:
     (found,) = advise(replace(good_track(), fps=10.0))
     assert str(found) == "10 frames a second: film at 30"
 

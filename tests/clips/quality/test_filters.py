@@ -191,7 +191,7 @@ def test_the_height_is_from_head_to_foot_in_pixels() -> None:
     assert heights_px(track_of(a_body()[None])) == pytest.approx([60.0])
 
 
-def test_the_box_of_nobody_is_none() -> None:
+def test_the_box_of_no_person_is_none() -> None:
     assert box(NOBODY, 0.1, 100, 100) is None
 
 

@@ -32,7 +32,7 @@ def test_a_still_visible_clip_scores_zero() -> None:
     assert stability(still_track(10), StabilityConfig()).stability_score == 0.0
 
 
-def test_nobody_in_the_clip_is_an_answer() -> None:
+def test_no_person_in_the_clip_is_an_answer() -> None:
     empty = track_of(np.full((7, 33, 2), np.nan), np.full((7, 33), np.nan))
     result = stability(empty, StabilityConfig())
     assert (result.detected, result.missing_joints, result.jitter) == (0, 33 * 7, 0.0)

@@ -23,19 +23,19 @@ def test_a_body_in_full_view_keeps_its_visibility() -> None:
     assert weigh_visibility(track).notes == ()
 
 
-def test_legs_below_the_picture_are_not_seen_and_told() -> None:
+def test_legs_below_the_picture_are_not_seen_and_reported() -> None:
     found = weigh_visibility(track_of(standing(y=460.0)))
     assert found.visibility[:, 25:33].max() == 0.0
     assert found.visibility[:, :23].min() == pytest.approx(0.99)
     assert found.notes == ("legs not seen in 100% of the frames: invented",)
 
 
-def test_feet_alone_are_told_as_feet() -> None:
+def test_feet_alone_are_reported_as_feet() -> None:
     found = weigh_visibility(track_of(standing(y=410.0)))
     assert found.notes == ("feet not seen in 100% of the frames: invented",)
 
 
-def test_a_share_of_the_frames_is_told_as_it_is() -> None:
+def test_a_share_of_the_frames_is_reported_as_it_is() -> None:
     rows = np.concatenate([standing(240.0, 5), standing(460.0, 15)])
     assert weigh_visibility(track_of(rows)).notes == (
         "legs not seen in 75% of the frames: invented",

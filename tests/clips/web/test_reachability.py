@@ -83,7 +83,7 @@ def test_a_source_says_which_page_it_asks(source: str, address: str, page: str) 
 
 
 @pytest.mark.medium
-def test_a_name_that_cannot_be_resolved_is_asked_for_twice_at_most(unresolved: None) -> None:
+def test_a_name_that_cannot_be_resolved_is_requested_twice_at_most(unresolved: None) -> None:
     patient = WebConfig(retries=4, backoff_s=0.01, request_pause_s=0.0)
     with pytest.raises(SearchFailed, match=r"no connection \(Failed to resolve .*\(2 attempts\)"):
         listing("http://nowhere.invalid/clip.mp4", patient)

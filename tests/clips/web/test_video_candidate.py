@@ -128,7 +128,7 @@ def test_a_video_that_is_found_twice_is_kept_once() -> None:
     )
 
 
-def test_a_video_that_was_judged_is_dropped() -> None:
+def test_a_video_that_was_assessed_is_dropped() -> None:
     left = select([one()], {("youtube", "AbCdEfGhIjK")}, SelectionConfig())
     assert [str(why) for _, why in left.dropped] == ["assessed before"]
 

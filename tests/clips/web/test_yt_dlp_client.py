@@ -44,7 +44,7 @@ def test_a_failure_of_the_server_is_a_reason(
         get(web, path, tmp_path)
 
 
-def test_what_cannot_come_right_is_asked_for_once(web: Web, tmp_path: Path) -> None:
+def test_what_cannot_come_right_is_requested_once(web: Web, tmp_path: Path) -> None:
     with pytest.raises(DownloadFailed):
         get(web, "missing/clip.mp4", tmp_path)
     assert web.times("/missing/clip.mp4") == 1

@@ -28,7 +28,7 @@ def test_it_lists_what_would_go_and_removes_nothing(store: Store) -> None:
 
 
 @pytest.mark.parametrize("word", ["--delete", "--yes"])
-def test_it_removes_when_it_is_told_to(word: str, store: Store) -> None:
+def test_it_removes_when_it_should(word: str, store: Store) -> None:
     said = clean(store, "--older-than", "0", word)
     assert said.out.splitlines()[-1] == "Removed: 1 item, 2.0 MB."
     assert store.list() == []

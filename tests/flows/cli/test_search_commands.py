@@ -12,7 +12,7 @@ def test_an_empty_catalogue_says_what_fills_it(tmp_path: Path) -> None:
     assert "--source folder" in said.out
 
 
-def test_a_dance_that_was_never_judged_says_how_to_look_for_it(tmp_path: Path) -> None:
+def test_a_dance_that_was_never_assessed_says_how_to_look_for_it(tmp_path: Path) -> None:
     said = in_process("catalogue", "--dance", "it's", ROBOJACKSON_STORE=str(tmp_path / "store"))
     assert "robojackson find 'it'" in said.out
 

@@ -34,7 +34,7 @@ def refreshed(**made: bool) -> dict[str, Any]:
     return {"dances": dances, "failed": {}, "not_due": []}
 
 
-def test_a_chosen_video_is_judged_and_danced_next() -> None:
+def test_a_chosen_video_is_assessed_and_danced_next() -> None:
     told = find_verdict(found(row("chosen"), row("accepted"), row("rejected")))
     assert "APT cover is the steadiest of 3, 3.46 a second" in told["verdict"]["sentence"]
     assert "2 may be danced" in told["verdict"]["sentence"]

@@ -57,7 +57,7 @@ def named(address: str) -> Iterator[None]:
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_a_server_that_refuses_us_is_told_with_what_to_set(
+def test_a_server_that_refuses_us_is_reported_with_what_to_set(
     name: str, guarded: str, store_folder: Path
 ) -> None:
     told = rf"{guarded} refuses us \(401 Unauthorized\); set PREFECT_API_AUTH_STRING"
@@ -67,7 +67,9 @@ def test_a_server_that_refuses_us_is_told_with_what_to_set(
 
 @pytest.mark.medium
 @pytest.mark.parametrize("name", COMMANDS)
-def test_a_server_that_is_not_there_is_told_with_what_to_do(name: str, store_folder: Path) -> None:
+def test_a_server_that_is_not_there_is_reported_with_what_to_do(
+    name: str, store_folder: Path
+) -> None:
     address = f"http://127.0.0.1:{free_port()}/api"
     told = rf"{address} does not answer \(.*\); start it"
     with named(address), pytest.raises(DeploymentFailed, match=told):

@@ -83,7 +83,7 @@ def test_the_chosen_one_is_marked() -> None:
     assert [line[1] for line in lines if "1.25" in line] == ["►", "✗"]
 
 
-def test_a_figure_that_nobody_has_takes_no_room() -> None:
+def test_a_figure_without_values_takes_no_room() -> None:
     head = ranking_table.lines([row("a")], 140)[1]
     assert "views" not in head
     assert "ppl" in head

@@ -25,7 +25,7 @@ def test_a_query_that_the_book_knows_is_that_dance() -> None:
 
 
 @pytest.mark.parametrize(("top", "judged"), [(None, ALL), (2, 2)])
-def test_a_folder_is_judged_whole_unless_a_number_is_given(top, judged, tmp_path: Path) -> None:
+def test_a_folder_is_assessed_whole_unless_a_number_is_given(top, judged, tmp_path: Path) -> None:
     (tmp_path / "a.mp4").write_text("")
     assert find_dance(str(tmp_path), "folder", "", top, FindConfig()).top == judged
 

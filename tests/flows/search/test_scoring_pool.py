@@ -30,7 +30,9 @@ def test_a_cluster_that_is_there_is_used() -> None:
     assert asked.address == "tcp://127.0.0.1:8786"
 
 
-def test_dask_that_is_not_installed_is_told_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_dask_that_is_not_installed_is_reported_in_one_line(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setitem(sys.modules, "prefect_dask", None)
     with pytest.raises(MissingDependency, match=r"pip install 'robojackson\[dask\]'"):
         scorers({VARIABLE: "local"})

@@ -53,13 +53,13 @@ def test_every_run_comes_back_as_itself(quick: pytest.MonkeyPatch) -> None:
     assert all(run.state is not None and run.state.is_completed() for run in ended)
 
 
-def test_all_runs_together_are_asked_for_once_a_look(quick: pytest.MonkeyPatch) -> None:
+def test_all_runs_together_are_requested_once_a_look(quick: pytest.MonkeyPatch) -> None:
     server = Server()
     wait_for(waiting(5), server, quick)
     assert server.asked == 5  # one more ends a look: not five questions a look
 
 
-def test_a_run_that_has_ended_is_not_asked_for(quick: pytest.MonkeyPatch) -> None:
+def test_a_run_that_has_ended_is_not_requested(quick: pytest.MonkeyPatch) -> None:
     server = Server()
     wait_for([FlowRun(id=uuid4(), flow_id=uuid4(), state=Completed())], server, quick)
     assert server.asked == 0

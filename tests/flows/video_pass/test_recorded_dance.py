@@ -57,7 +57,7 @@ def test_a_missing_file_starts_the_flow_which_makes_it_again(dances: Dances) -> 
 
 
 @pytest.mark.slow
-def test_whoever_wants_every_task_to_run_gets_the_flow(dances: Dances) -> None:
+def test_forcing_every_task_runs_the_flow(dances: Dances) -> None:
     said = dances.run(PREFECT_TASKS_REFRESH_CACHE="true", PREFECT_API_URL="http://127.0.0.1:9/api")
     assert said.code == 1
     assert "http://127.0.0.1:9/api does not answer" in said.err

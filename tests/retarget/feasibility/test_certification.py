@@ -139,7 +139,7 @@ def test_a_deep_squat_names_the_knee_that_fails(robot: Robot):
     assert "motors" in finding.repair
 
 
-def test_an_arm_swung_too_fast_is_mended_by_a_slower_tempo(robot: Robot):
+def test_an_arm_swung_too_fast_is_repaired_by_a_slower_tempo(robot: Robot):
     qpos, time = _held(_resting(robot), 60), np.arange(60) * DT
     qpos[:, 7 + robot.joint_names.index("left_elbow")] += 0.8 * np.sin(2 * np.pi * 2.2 * time)
     found = _certified(robot, qpos)

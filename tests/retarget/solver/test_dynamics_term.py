@@ -130,7 +130,7 @@ def test_a_limb_that_jumps_is_a_fault_that_heavier_weights_do_not_mend(robot: Ro
     assert not faults(problem, jumping, fast).jumps
 
 
-def test_a_limb_that_comes_out_elsewhere_after_a_lap_has_jumped(robot: Robot):
+def test_a_limb_that_comes_out_elsewhere_after_a_cycle_has_jumped(robot: Robot):
     problem = _problem(robot)
     drifting = _gliding(problem)
     drifting[:, 9] += np.linspace(0.0, np.radians(60), len(drifting))

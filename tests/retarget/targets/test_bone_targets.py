@@ -89,7 +89,7 @@ def _jump(cycles: bool = False) -> HumanClip:
 
 
 @pytest.mark.parametrize("shift", [0, 22, 27, 31, 33])
-def test_a_jump_over_the_seam_of_a_lap_is_one_jump(robot: Robot, shift: int):
+def test_a_jump_over_the_seam_of_a_cycle_is_one_jump(robot: Robot, shift: int):
     """Wherever the cycle begins, the same steps of it are in the air."""
     whole = _jump(cycles=True)
     turned = replace(

@@ -73,7 +73,7 @@ def test_a_body_that_turns_away_is_not_cyclic():
     assert cycle is None
 
 
-def test_whoever_turns_on_with_every_cycle_is_closed_on_request():
+def test_a_dancer_who_turns_on_with_every_cycle_is_closed_on_request():
     clip, cycle = human_clip(_swaying(60, 30, yaw=np.pi / 60), 0.015, "yes", 1.0, CONFIG)
     assert cycle is not None
     assert clip.cycle_offset is not None

@@ -47,7 +47,7 @@ def test_a_stand_needs_no_step(robot: Robot) -> None:
 
 
 @pytest.mark.parametrize("turn", [0.9, -0.9])
-def test_a_foot_that_is_turned_away_is_placed_anew(robot: Robot, turn: float) -> None:
+def test_a_foot_that_is_turned_away_is_placed_again(robot: Robot, turn: float) -> None:
     feet = dict(own_feet(robot))
     feet["left"] = replace(feet["left"], yaw=HEADING + turn)
     walk = steps_into_stand(feet, HEADING, robot, DT)

@@ -85,7 +85,7 @@ def test_a_cycle_gets_none(robot: Robot, aims: Targets) -> None:
     assert with_tails(cycle, robot, TAILS).aims is cycle
 
 
-def test_by_itself_a_robot_that_is_judged_beside_the_reference_gets_them(robot: Robot) -> None:
+def test_by_itself_a_robot_that_is_evaluated_beside_the_reference_gets_them(robot: Robot) -> None:
     other = load_robot(replace(robot.description, fall=FallRule(frame="reference", height=0.25)))
     assert TailConfig().wanted(other)
     assert not TailConfig().wanted(robot)

@@ -9,6 +9,7 @@ import pytest
 from robojackson.errors import BadPolicy
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.evaluate_config import EvaluateConfig
+from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
 from robojackson.rl.evaluation.tracker_driver import tracker_driver
 from robojackson.rl.sim.motors import Motors
@@ -27,6 +28,7 @@ class Replay:
     """A tracker that gives the next step's angles, and keeps what it is shown."""
 
     window: tuple[int, ...] = (1, 4)
+    control, sees_ahead = ControlConfig(feedforward=0.0, feedback=0.0), False
 
     def __init__(self, description: TrackerDescription) -> None:
         self.description = description

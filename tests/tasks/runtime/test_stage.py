@@ -240,7 +240,7 @@ def test_the_weights_of_the_temporal_network_are_part_of_the_key(tmp_path: Path)
     assert keys[0] != keys[1]
 
 
-def test_the_key_of_a_training_holds_the_minutes_that_were_asked_for() -> None:
+def test_the_key_of_a_training_holds_the_minutes_that_were_requested() -> None:
     """Not those that the clock left, so that the same call again does not train again."""
     recipe = train_policy.train_policy.recipe
     robot = description("humanoid")

@@ -1,0 +1,112 @@
+"""What a policy's file says it was trained for, checked against the robot that it shall drive."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TypeVar, get_args
+
+import numpy as np
+from pydantic import TypeAdapter, ValidationError
+
+from robojackson.errors import BadPolicy
+from robojackson.rl.config.train_config import ControlConfig
+from robojackson.rl.modes.observation import Kind, Observer
+from robojackson.rl.policy import Policy
+from robojackson.rl.sim.motors import Motors, actuation_facts
+from robojackson.rl.sim.stock_humanoid import stock_observation_size
+from robojackson.robot.model import Robot
+
+T = TypeVar("T")
+
+
+def mode_of(policy: Policy) -> str:
+    """`track` or `paper`."""
+    return str(policy.facts.get("mode", "track"))
+
+
+def policy_control(policy: Policy, robot: Robot) -> ControlConfig:
+    """The control law that a policy was trained with.
+
+    Raises:
+        BadPolicy: the policy was trained for another robot, or its file says no control law.
+    """
+    trained_for = policy.facts.get("robot", robot.description.name)
+    if trained_for != robot.description.name:
+        raise BadPolicy(
+            f"the policy was trained for robot {trained_for!r}, not for {robot.description.name!r}"
+        )
+    if "control" not in policy.facts:
+        raise BadPolicy("the policy's file says nothing of its control law")
+    sizes = observation_sizes(policy, robot)
+    if policy.observation_size not in sizes:
+        raise BadPolicy(
+            f"the policy takes {policy.observation_size} observations and robot "
+            f"{robot.description.name!r} gives {sizes[0]}: it was trained for another robot"
+        )
+    if policy.action_size != robot.model.nu:
+        raise BadPolicy(
+            f"the policy gives {policy.action_size} actions and robot {robot.description.name!r} "
+            f"takes {robot.model.nu}: it was trained for another robot"
+        )
+    control = fact(policy, "control", ControlConfig)
+    if control.feedback is None:  # trained before there was any
+        control = replace(control, feedback=0.0)
+    _require_same_actuation(policy, robot, control)
+    return control
+
+
+def _require_same_actuation(policy: Policy, robot: Robot, control: ControlConfig) -> None:
+    """Refuse a robot whose gains or action scale have changed since the policy was trained.
+
+    Raises:
+        BadPolicy: naming the first motor that differs.
+    """
+    recorded = policy.facts.get("actuation")
+    if mode_of(policy) != "track" or not isinstance(recorded, Mapping):
+        return
+    motors = [robot.joint_names[hinge] for hinge in Motors.of(robot.model).hinge]
+    for name, now in actuation_facts(robot, control).items():
+        then = np.asarray(recorded.get(name, now), float)
+        if then.shape == (len(motors),) and np.allclose(then, now, rtol=1e-6):
+            continue
+        same_shape = then.shape == (len(motors),)
+        worst = int(np.argmax(np.abs(then - now))) if same_shape else 0
+        was = f"{then[worst]:g}" if same_shape else f"{then.size} numbers"
+        raise BadPolicy(
+            f"the policy was trained with {name} {was} of {motors[worst]} and robot "
+            f"{robot.description.name!r} has {now[worst]:g} now: restore the robot's YAML or train "
+            "anew"
+        )
+
+
+def fact(policy: Policy, name: str, kind: type[T]) -> T:
+    """A configuration out of a policy's file.
+
+    Raises:
+        BadPolicy: it holds what this version does not know.
+    """
+    try:
+        return TypeAdapter(kind).validate_python(policy.facts[name])
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, (name, *first["loc"])))
+        raise BadPolicy(
+            f"the policy's file says {where} = {first['input']!r} ({first['msg']}): it is of "
+            "another version of RoboJackson; train it anew"
+        ) from error
+
+
+def observation_of(policy: Policy) -> Kind:
+    """Which inputs a policy of mode `track` takes."""
+    held = policy.facts.get("environment")
+    said = held.get("observation", "full") if isinstance(held, Mapping) else "full"
+    kinds: dict[object, Kind] = {kind: kind for kind in get_args(Kind)}
+    return kinds.get(said, "full")
+
+
+def observation_sizes(policy: Policy, robot: Robot) -> tuple[int, ...]:
+    """Lengths of the observations that a policy may take."""
+    model = robot.model
+    if mode_of(policy) == "paper":
+        joints = model.nq - 2 + model.nv
+        return stock_observation_size(model.nq, model.nv, model.nbody), joints
+    return (Observer(robot, observation_of(policy)).actor_size,)

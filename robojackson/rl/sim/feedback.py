@@ -1,0 +1,133 @@
+"""The linear feedback that drives a robot along its reference, before anything is learnt.
+
+`regulator` computes it once for a motion, robot and control law; it is kept beside the added
+robots, because it takes a few seconds of processor for every second of motion.
+"""
+
+import hashlib
+import io
+import json
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from zipfile import BadZipFile
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from robojackson.errors import StoreError
+from robojackson.files.file_tree import FileTree
+from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
+from robojackson.rl.config.train_config import ControlConfig
+from robojackson.rl.sim.feedforward import lead_of
+from robojackson.rl.sim.motors import actuation_facts, feedback_share, residual_scale
+from robojackson.rl.sim.reference_clip import Clip
+from robojackson.rl.sim.regulator import Gains, regulator, settings
+from robojackson.rl.sim.simulation import Simulation, resolved
+from robojackson.rl.sim.tangent import state_difference
+from robojackson.robot.mjcf import robots_folder
+from robojackson.robot.model import Robot
+
+FOLDER = "feedback"
+VARIED = ("body_mass", "body_ipos", "body_inertia", "geom_friction", "dof_armature")
+"""Arrays of a model that `variation` changes."""
+LARGEST = 2.0
+"""Full actions of a policy that the feedback moves a target at most: so much that a policy of a few
+minutes can still correct it."""
+
+
+@dataclass(frozen=True)
+class StepFeedback:
+    """The feedback of N robots at one step of their references."""
+
+    gain: Float[np.ndarray, "N nu X"]
+    offset: Float[np.ndarray, "N nu"]
+    qpos: Float[np.ndarray, "N nq"]
+    qvel: Float[np.ndarray, "N nv"]
+    limit: Float[np.ndarray, " nu"]
+
+    def targets(
+        self, qpos: Float[np.ndarray, "N nq"], qvel: Float[np.ndarray, "N nv"]
+    ) -> Float[np.ndarray, "N nu"]:
+        """Return by how much the motors' targets move, rad."""
+        apart = state_difference(qpos, qvel, self.qpos, self.qvel)
+        moved = (self.gain @ apart[:, :, None])[:, :, 0] + self.offset
+        result: np.ndarray = -np.clip(moved, -self.limit, self.limit)
+        return result
+
+
+@dataclass(frozen=True)
+class Feedback:
+    """The feedback along one motion or several, their steps one after the other.
+
+    Attributes:
+        limit: Of the targets' offsets, rad.
+    """
+
+    gains: Gains
+    limit: Float[np.ndarray, " nu"]
+
+    def at(self, row: Int[np.ndarray, " N"], shift: Float[np.ndarray, "N 3"]) -> StepFeedback:
+        """Return it at rows of the joined motions, whose cycles have moved them by `shift`, m."""
+        gains = self.gains
+        qpos = gains.qpos[row]
+        qpos[:, :3] += shift
+        return StepFeedback(gains.gain[row], gains.offset[row], qpos, gains.qvel[row], self.limit)
+
+
+def feedback_of(
+    robot: Robot, references: Sequence[ReferenceMotion], control: ControlConfig
+) -> Feedback | None:
+    """Return the feedback along motions; None where the control law has none."""
+    share = feedback_share(robot, control)
+    if not share or control.law != "pd":
+        return None
+    found = [_kept(robot, motion, control) for motion in references]
+    joined = Gains(*(np.concatenate([getattr(one, name) for one in found])
+                     for name in ("gain", "offset", "qpos", "qvel")))  # fmt: skip
+    action = residual_scale(robot, ControlConfig())
+    scaled = Gains(share * joined.gain, share * joined.offset, joined.qpos, joined.qvel)
+    return Feedback(scaled, LARGEST * action)
+
+
+def _kept(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> Gains:
+    """Return the regulator of a motion, computed where it was not before."""
+    path = robots_folder().parent / FOLDER / f"{_digest(robot, motion, control)}.npz"
+    if path.is_file():
+        # What cannot be read is computed anew.
+        with suppress(OSError, ValueError, KeyError, BadZipFile), np.load(path) as arrays:
+            return Gains(*(arrays[one.name].astype(float) for one in fields(Gains)))
+    gains = regulator_of(robot, motion, control)
+    _keep(path, gains)
+    return gains
+
+
+def _keep(path: Path, gains: Gains) -> None:
+    content = io.BytesIO()
+    arrays = {name: getattr(gains, name).astype(np.float32) for name in ("gain", "offset")}
+    np.savez_compressed(content, qpos=gains.qpos, qvel=gains.qvel, **arrays)
+    with suppress(StoreError):  # a store that takes nothing: computed anew the next time
+        FileTree(path.parent).write(path.name, content.getvalue())
+
+
+def regulator_of(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> Gains:
+    """Compute the regulator of a motion under a control law."""
+    plain = replace(control, feedback=0.0)
+    sim = Simulation(robot, plain, 1)
+    clip = Clip(motion, lead_of(robot, motion, control))
+    return regulator(sim, clip, residual_scale(robot, ControlConfig()))
+
+
+def _digest(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> str:
+    """Return what the gains depend on, as a name."""
+    law = resolved(replace(control, feedback=0.0), robot)
+    named = {name: getattr(law, name) for name in ("substeps", "feedforward")}
+    facts = [poses_sha256(motion), robot.sha256, named, actuation_facts(robot, ControlConfig()),
+             actuation_facts(robot, control), settings(), asdict(robot.description)]  # fmt: skip
+    digest = hashlib.sha256(json.dumps(facts, sort_keys=True, default=str).encode())
+    model = robot.model
+    for name in VARIED:  # a variation of the robot has its name and its file
+        digest.update(np.ascontiguousarray(getattr(model, name)).tobytes())
+    digest.update(f"{model.opt.timestep} {model.opt.integrator}".encode())
+    return digest.hexdigest()[:32]

@@ -1,0 +1,67 @@
+"""What a policy sees of the reference ahead: a general tracker needs it in place of a phase.
+
+For every step and every time ahead, in the heading frame of the reference's root at that step: the
+root's displacement (m), its turn (sine, cosine) and height (m), where up is in its own frame, and
+the hinges' offsets from the stand (rad). Nothing of it depends on the robot's state, so it is
+computed once.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from robojackson.geometry.rotations import heading, quat_to_matrix
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.rl.config.train_config import ControlConfig
+from robojackson.rl.sim.feedback import feedback_of
+from robojackson.rl.sim.feedforward import lead_of
+from robojackson.rl.sim.reference_clip import Clip
+from robojackson.robot.model import Robot
+
+AHEAD_S = (0.1, 0.2, 0.4, 0.7)
+ROOT_NUMBERS = 9
+"""Of the root, a time ahead: displacement 3, turn 2, height 1, up 3."""
+DISTANCE_SCALE = 3.0
+
+
+def preview_size(hinges: int) -> int:
+    """Return the numbers a step of a robot with so many hinges."""
+    return len(AHEAD_S) * (ROOT_NUMBERS + hinges)
+
+
+def preview_of(reference: ReferenceMotion, robot: Robot) -> Float[np.ndarray, "S P"]:
+    """Return what is seen ahead of every step of a reference motion."""
+    clip, now = Clip(reference), np.arange(len(reference))
+    here = clip.at(now)
+    yaw = np.asarray(heading(here.qpos[:, 3:7]))
+    parts: list[np.ndarray] = []
+    for seconds in AHEAD_S:
+        there = clip.at(now + round(seconds / reference.dt))
+        moved = there.qpos[:, :2] - here.qpos[:, :2]
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        ahead = np.stack([cos * moved[:, 0] + sin * moved[:, 1],
+                          cos * moved[:, 1] - sin * moved[:, 0]], 1)  # fmt: skip
+        turn = np.asarray(heading(there.qpos[:, 3:7])) - yaw
+        rise = there.qpos[:, 2:3] - here.qpos[:, 2:3]
+        height = there.qpos[:, 2:3] - robot.standing[2]
+        up = quat_to_matrix(there.qpos[:, 3:7])[:, 2, :]
+        angles = there.qpos[:, 7:] - robot.standing[7:]
+        scaled = DISTANCE_SCALE * np.concatenate([ahead, rise, height], 1)
+        parts += [scaled, np.sin(turn)[:, None], np.cos(turn)[:, None], up, angles]
+    return np.concatenate(parts, 1)
+
+
+def driven_clip(
+    robot: Robot,
+    references: ReferenceMotion | Sequence[ReferenceMotion],
+    control: ControlConfig,
+    ahead: bool = False,
+) -> Clip:
+    """Return the clip with its feed-forward, its feedback and, if `ahead`, the preview."""
+    motions = [references] if isinstance(references, ReferenceMotion) else list(references)
+    leads = [lead_of(robot, motion, control) for motion in motions]
+    driven = [lead for lead in leads if lead is not None]
+    lead = np.concatenate(driven) if driven else None
+    seen = np.concatenate([preview_of(motion, robot) for motion in motions]) if ahead else None
+    return Clip(motions, lead, seen, feedback_of(robot, motions, control))

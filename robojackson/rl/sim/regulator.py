@@ -1,0 +1,175 @@
+"""A time-varying linear-quadratic regulator along a reference motion (TVLQR; Tassa et al., 2014).
+
+The robot with its PD law is one discrete system: state (root position, root orientation, hinges and
+their velocities, in MuJoCo's tangent space), input (targets of the motors), one control step. It is
+differentiated along the reference with steps as large as the errors that the feedback shall correct
+(`STEPS`): differences that span a contact's opening and closing say what happens on average, those
+of 1e-6 what happens at one side of it, and a regulator made of these falls at the first step. The
+Riccati recursion then gives, for every step of the reference, a gain and an offset that corrects
+what the reference itself gets wrong. Metres, radians, seconds.
+"""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+from mujoco import rollout
+
+from robojackson.rl.sim.reference_clip import Clip
+from robojackson.rl.sim.simulation import Simulation
+from robojackson.rl.sim.tangent import state_difference, state_plus
+
+ROOT_STEP_M, TURN_STEP, HINGE_STEP = 0.008, 0.02, 0.04
+VELOCITY_STEP, SPIN_STEP, HINGE_SPEED_STEP, TARGET_STEP = 0.2, 0.4, 0.8, 0.1
+"""Half-widths of the differences: m, rad, rad, m/s, rad/s, rad/s, rad."""
+PLACE, ATTITUDE, HINGE, VELOCITY, HINGE_SPEED = 20.0, 40.0, 4.0, 0.5, 0.02
+"""Weights of squared errors in the cost: m-2, rad-2, rad-2, (m/s or rad/s)-2, (rad/s)-2."""
+EFFORT = 0.45
+"""Weight of a squared offset of the targets, in full actions of the policy."""
+LAPS, STILL = 3, 200
+"""Backward passes over a motion that repeats; steps of the stand after one that ends."""
+HEIGHTS_M = np.linspace(-0.006, 0.002, 9)
+"""By which the root may be moved so that the soles press as the reference asks."""
+ROWS = 3200
+"""States that are simulated at once."""
+
+
+def settings() -> list[float]:
+    """Return the numbers above: a regulator made with others is another one."""
+    steps = [ROOT_STEP_M, TURN_STEP, HINGE_STEP, VELOCITY_STEP, SPIN_STEP, HINGE_SPEED_STEP]
+    weights = [TARGET_STEP, PLACE, ATTITUDE, HINGE, VELOCITY, HINGE_SPEED, EFFORT, LAPS, STILL]
+    return [*steps, *weights, *HEIGHTS_M.tolist()]
+
+
+@dataclass(frozen=True)
+class Gains:
+    """A regulator: targets = those of the reference - gain @ (state - nominal) - offset.
+
+    Attributes:
+        gain: Of every step of the reference.
+        offset: Of the targets, rad.
+        qpos, qvel: Nominal state.
+    """
+
+    gain: Float[np.ndarray, "S nu X"]
+    offset: Float[np.ndarray, "S nu"]
+    qpos: Float[np.ndarray, "S nq"]
+    qvel: Float[np.ndarray, "S nv"]
+
+
+def regulator(sim: Simulation, clip: Clip, action: Float[np.ndarray, " nu"]) -> Gains:
+    """Return the regulator of a motion.
+
+    Args:
+        sim: One robot under the control law, without disturbances.
+        clip: One motion.
+        action: Radians that a full action moves each target.
+    """
+    steps = np.arange(clip.steps)
+    now, following = clip.at(steps), clip.at(steps + 1)
+    targets = sim.reference_angles(following)
+    qpos, qvel = _settled(sim, now.qpos, now.qvel, targets, following.qvel[:, 2]), now.qvel
+    after = np.roll(qpos, -1, 0), np.roll(qvel, -1, 0)
+    if clip.cyclic:
+        after[0][-1, :3] += following.qpos[-1, :3] - now.qpos[0, :3]
+    else:
+        after[0][-1], after[1][-1] = qpos[-1], qvel[-1]
+    by_state, by_target, defect = _linearised(sim, (qpos, qvel), targets, after)
+    gain, offset = _riccati(by_state, by_target, defect, action, clip.cyclic)
+    return Gains(gain, offset, qpos, np.array(qvel))
+
+
+def advance(
+    sim: Simulation,
+    qpos: Float[np.ndarray, "B nq"],
+    qvel: Float[np.ndarray, "B nv"],
+    targets: Float[np.ndarray, "B nu"],
+) -> tuple[Float[np.ndarray, "B nq"], Float[np.ndarray, "B nv"]]:
+    """Return the states one control step later, under the PD law of a simulation."""
+    model, motors, hinge = sim.model, sim.motors, sim.motors.hinge
+    data, nq = mujoco.MjData(model), model.nq
+    state = np.concatenate([np.zeros((len(qpos), 1)), qpos, qvel], 1)
+    for _ in range(sim.control.substeps or 1):
+        angles, speeds = state[:, 8 : 1 + nq][:, hinge], state[:, 7 + nq :][:, hinge]
+        torque = sim.kp * (targets - angles) - sim.kd * speeds
+        control = np.clip(torque, -motors.limit, motors.limit) / motors.gear
+        state = np.asarray(rollout.rollout(model, data, state, control[:, None])[0])[:, 0]
+    return state[:, 1 : 1 + nq], state[:, 1 + nq :]
+
+
+def _settled(
+    sim: Simulation,
+    qpos: np.ndarray,
+    qvel: np.ndarray,
+    targets: np.ndarray,
+    rise: Float[np.ndarray, " S"],
+) -> Float[np.ndarray, "S nq"]:
+    """Return the states at the height from which the root moves up and down as it shall."""
+    missed = []
+    for height in HEIGHTS_M:
+        moved = qpos.copy()
+        moved[:, 2] += height
+        missed.append(np.abs(advance(sim, moved, qvel, targets)[1][:, 2] - rise))
+    result = qpos.copy()
+    result[:, 2] += HEIGHTS_M[np.argmin(missed, 0)]
+    return result
+
+
+def _linearised(
+    sim: Simulation,
+    state: tuple[np.ndarray, np.ndarray],
+    targets: np.ndarray,
+    after: tuple[np.ndarray, np.ndarray],
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the derivatives by state and by target, and what the nominal states miss."""
+    nv, nu = sim.model.nv, sim.model.nu
+    width = np.concatenate([
+        np.repeat([ROOT_STEP_M, TURN_STEP, HINGE_STEP], [3, 3, nv - 6]),
+        np.repeat([VELOCITY_STEP, SPIN_STEP, HINGE_SPEED_STEP, TARGET_STEP], [3, 3, nv - 6, nu]),
+    ])  # fmt: skip
+    moves = np.concatenate([np.diag(width), -np.diag(width)])
+    found = []
+    chunk = max(1, ROWS // len(moves))
+    for first in range(0, len(targets), chunk):
+        rows = slice(first, first + chunk)
+        begun = state_plus(state[0][rows, None], state[1][rows, None], moves[:, : 2 * nv])
+        aims = targets[rows, None] + moves[:, 2 * nv :]
+        ended = advance(sim, *(np.concatenate(list(a)) for a in (*begun, aims)))
+        shape = (len(aims), len(moves), -1)
+        qpos, qvel = (part.reshape(shape) for part in ended)
+        found.append(state_difference(qpos, qvel, after[0][rows, None], after[1][rows, None]))
+    change = np.concatenate(found)
+    half = len(width)
+    slope = np.swapaxes((change[:, :half] - change[:, half:]) / (2 * width[:, None]), 1, 2)
+    return slope[:, :, : 2 * nv], slope[:, :, 2 * nv :], change.mean(1)
+
+
+def _riccati(
+    by_state: Float[np.ndarray, "S X X"],
+    by_target: Float[np.ndarray, "S X nu"],
+    defect: Float[np.ndarray, "S X"],
+    action: Float[np.ndarray, " nu"],
+    cyclic: bool,
+) -> tuple[Float[np.ndarray, "S nu X"], Float[np.ndarray, "S nu"]]:
+    """Return gains and offsets of the cost that is least over the rest of the motion."""
+    steps, size = by_state.shape[:2]
+    hinges = size // 2 - 6
+    cost = np.diag(np.concatenate([
+        np.repeat([PLACE, ATTITUDE, HINGE], [3, 3, hinges]),
+        np.repeat([VELOCITY, HINGE_SPEED], [6, hinges]),
+    ]))  # fmt: skip
+    effort = np.diag(EFFORT / action**2)
+    gain, offset = np.zeros((steps, len(action), size)), np.zeros((steps, len(action)))
+    value, slope = cost, np.zeros(size)
+    order = np.tile(np.arange(steps)[::-1], LAPS if cyclic else 1)
+    order = order if cyclic else np.concatenate([np.full(STILL, steps - 2), order])
+    for t in order:
+        a, b, missed = by_state[t], by_target[t], defect[t]
+        weighted = effort + b.T @ value @ b
+        both = np.linalg.solve(weighted, b.T @ np.column_stack([value @ a, value @ missed + slope]))
+        gain[t], offset[t] = both[:, :-1], both[:, -1]
+        slope = (a - b @ gain[t]).T @ (slope + value @ missed)
+        value = cost + a.T @ value @ (a - b @ gain[t])
+        value = (value + value.T) / 2
+    return gain, offset

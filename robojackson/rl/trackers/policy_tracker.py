@@ -1,0 +1,59 @@
+"""A policy file of ours as a tracker: trained on many motions, it sees the reference ahead."""
+
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from robojackson.errors import BadPolicy
+from robojackson.rl.config.train_config import ControlConfig
+from robojackson.rl.modes.observation import Observer
+from robojackson.rl.policy import Policy, load_policy
+from robojackson.rl.policy_facts import fact, observation_of, policy_control
+from robojackson.rl.sim.motors import Motors, residual_scale
+from robojackson.rl.trackers.equipment import require_robot
+from robojackson.rl.trackers.tracker import Follower, TrackerInput
+from robojackson.rl.trackers.tracker_description import TrackerDescription
+from robojackson.robot.model import Robot
+
+
+class PolicyTracker:
+    """A policy that was trained with `track.observation: preview` (`Tracker` protocol).
+
+    Raises:
+        BadPolicy: the file is damaged, or its policy sees no reference ahead.
+    """
+
+    def __init__(self, description: TrackerDescription, path: Path) -> None:
+        self.description, self.policy = description, load_policy(path)
+        if observation_of(self.policy) != "preview":
+            raise BadPolicy(f"{path}: a policy of one motion, not a tracker: it sees nothing ahead")
+        self.window: tuple[int, ...] = (1,)
+        self.control, self.sees_ahead = fact(self.policy, "control", ControlConfig), True
+
+    def equip(self, robot: Robot) -> Robot:
+        require_robot(robot, self.description)
+        policy_control(self.policy, robot)
+        return robot
+
+    def follow(self, robot: Robot, n: int) -> Follower:
+        require_robot(robot, self.description)
+        return _PolicyFollower(self.policy, self.control, robot, n)
+
+
+class _PolicyFollower:
+    """N robots with the last action of each."""
+
+    def __init__(self, policy: Policy, control: ControlConfig, robot: Robot, n: int) -> None:
+        self._policy, self._observer = policy, Observer(robot, "preview")
+        self._hinge = Motors.of(robot.model).hinge
+        self._scale = residual_scale(robot, control)
+        self._action: Float[np.ndarray, "N nu"] = np.zeros((n, robot.model.nu))
+
+    def targets(self, seen: TrackerInput) -> Float[np.ndarray, "N nu"]:
+        (step,) = seen.window
+        observed = self._observer.observe(seen.qpos, seen.qvel, seen.points, step, self._action)
+        self._action = self._policy.act(observed[:, : self._observer.actor_size])
+        follow = step.qpos[:, 7:][:, self._hinge] + (0.0 if step.lead is None else step.lead)
+        targets: np.ndarray = follow + self._scale * self._action
+        return targets

@@ -1,0 +1,50 @@
+"""The linear-quadratic feedback along a reference as a tracker: it needs no network and no file.
+
+It holds motions that keep both feet near the floor, from the first second on and on any robot whose
+contacts the physics knows; steps and jumps need a policy (`docs/learning.md`, "Linear feedback").
+"""
+
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from robojackson.rl.config.train_config import ControlConfig
+from robojackson.rl.sim.motors import Motors
+from robojackson.rl.trackers.equipment import require_robot
+from robojackson.rl.trackers.tracker import Follower, TrackerInput
+from robojackson.rl.trackers.tracker_description import TrackerDescription
+from robojackson.robot.model import Robot
+
+
+class RegulatorTracker:
+    """Feedback along the reference alone (`Tracker` protocol)."""
+
+    def __init__(self, description: TrackerDescription, path: Path | None = None) -> None:
+        self.description = description
+        self.window: tuple[int, ...] = (1,)
+        self.control, self.sees_ahead = ControlConfig(feedforward=1.0, feedback=1.0), False
+
+    def equip(self, robot: Robot) -> Robot:
+        require_robot(robot, self.description)
+        return robot
+
+    def follow(self, robot: Robot, n: int) -> Follower:
+        require_robot(robot, self.description)
+        return _RegulatorFollower(robot)
+
+
+class _RegulatorFollower:
+    """N robots; the feedback has no memory."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._hinge = Motors.of(robot.model).hinge
+
+    def targets(self, seen: TrackerInput) -> Float[np.ndarray, "N nu"]:
+        (step,) = seen.window
+        targets: np.ndarray = step.qpos[:, 7:][:, self._hinge]
+        if step.lead is not None:
+            targets = targets + step.lead
+        if step.feedback is not None:
+            targets = targets + step.feedback(seen.qpos, seen.qvel)
+        return targets

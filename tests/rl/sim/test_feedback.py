@@ -1,0 +1,151 @@
+"""Linear-quadratic feedback: it keeps a robot on its reference, and is computed once."""
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.rl.config.train_config import ControlConfig, EvaluateConfig, TrackConfig
+from robojackson.rl.evaluation.rollouts import Driver, roll_out
+from robojackson.rl.evaluation.starts import starts_of
+from robojackson.rl.modes.track_mode import control_of
+from robojackson.rl.policy import Policy
+from robojackson.rl.policy_facts import policy_control
+from robojackson.rl.sim import feedback, regulator
+from robojackson.rl.sim.preview import driven_clip
+from robojackson.rl.sim.regulator import Gains
+from robojackson.rl.sim.simulation import Simulation
+from robojackson.rl.sim.tangent import state_difference, state_plus
+from robojackson.robot.fall import Fall
+from robojackson.robot.model import Robot
+from tests.fixtures.deploy_policies import random_policy
+
+LED = ControlConfig(feedforward=1.0)
+FED = dataclasses.replace(LED, feedback=1.0)
+
+
+@pytest.fixture(autouse=True)
+def store(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """One for all tests of this file: the gains are computed once."""
+    folder = tmp_path_factory.getbasetemp() / "feedback_store"
+    folder.mkdir(exist_ok=True)
+    monkeypatch.setenv("ROBOJACKSON_STORE", str(folder))
+    return folder
+
+
+def survived_s(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> float:
+    clip = driven_clip(robot, motion, control)
+    starts, _ = starts_of(robot, clip, EvaluateConfig(phases=8, resets=1))
+    horizon = clip.horizon(starts.step, 5.0)
+    driver = Driver(control, lambda sim, step, start, last: sim.reference_angles(step))
+    done = roll_out(robot, clip, driver, starts, horizon, 1, Fall.of(robot))
+    return float(done.length.mean()) * motion.dt
+
+
+def test_states_are_moved_and_compared_as_mujoco_does(robot: Robot) -> None:
+    model, rng = robot.model, np.random.default_rng(0)
+    qpos = np.tile(robot.standing, (5, 1))
+    change = rng.normal(0, 0.7, (5, 2 * model.nv))
+    change[0] = 0.0
+    moved, qvel = state_plus(qpos, np.zeros((5, model.nv)), change)
+    for row in range(5):
+        theirs = qpos[row].copy()
+        mujoco.mj_integratePos(model, theirs, change[row, : model.nv], 1.0)
+        np.testing.assert_allclose(moved[row], theirs, atol=1e-12)
+    back = state_difference(moved, qvel, qpos, np.zeros((5, model.nv)))
+    np.testing.assert_allclose(back, change, atol=1e-9)
+
+
+def test_the_regulator_sees_the_physics_that_the_robot_is_in(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    sim = Simulation(robot, LED, 3)
+    clip = driven_clip(robot, sway, LED)
+    at, following = clip.at(np.array([0, 20, 40])), clip.at(np.array([1, 21, 41]))
+    targets = sim.reference_angles(following)
+    qpos, qvel = regulator.advance(sim, at.qpos, at.qvel, targets)
+    sim.place(np.arange(3), at.qpos, at.qvel)
+    sim.step(targets)
+    np.testing.assert_allclose(qpos, sim.qpos, atol=1e-4)
+    np.testing.assert_allclose(qvel, sim.qvel, atol=2e-2)
+
+
+def test_feedback_keeps_a_robot_up_that_falls_without_it(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    alone, fed = (survived_s(robot, sway, control) for control in (LED, FED))
+    assert fed > 1.5 * alone, f"{fed:.2f} s with feedback, {alone:.2f} s without"
+
+
+def test_on_its_nominal_path_the_feedback_adds_its_offset_alone(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    found = feedback.feedback_of(robot, [sway], FED)
+    assert found is not None
+    row, shift = np.array([3, 50]), np.array([[0.0, 0, 0], [2.0, -1.0, 0]])
+    step = found.at(row, shift)
+    moved = found.gains.qpos[row] + np.pad(shift, ((0, 0), (0, step.qpos.shape[1] - 3)))
+    offset = -np.clip(found.gains.offset[row], -found.limit, found.limit)
+    np.testing.assert_allclose(step.targets(moved, found.gains.qvel[row]), offset, atol=1e-9)
+    far = moved + 0.0
+    far[:, 7:] += 5.0
+    assert np.abs(step.targets(far, found.gains.qvel[row])).max() <= found.limit.max() + 1e-12
+
+
+def test_gains_are_computed_once_and_again_where_the_file_is_damaged(
+    robot: Robot, sway: ReferenceMotion, store: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept = feedback.feedback_of(robot, [sway], FED)
+    calls: list[int] = []
+    compute = feedback.regulator_of
+
+    def counted(*given: Any) -> Gains:
+        calls.append(1)
+        return compute(*given)
+
+    monkeypatch.setattr(feedback, "regulator_of", counted)
+    again = feedback.feedback_of(robot, [sway], FED)
+    assert not calls
+    assert kept is not None
+    assert again is not None
+    np.testing.assert_allclose(again.gains.gain, kept.gains.gain, rtol=1e-5, atol=1e-6)
+    for file in (store / feedback.FOLDER).glob("*.npz"):
+        file.write_bytes(file.read_bytes()[:100])
+    assert feedback.feedback_of(robot, [sway], FED) is not None
+    assert calls == [1]
+    other = dataclasses.replace(sway, qpos=sway.qpos + [0.0, 0, 0, 0, 0, 0, 0, *[1e-3] * 17])
+    assert feedback.feedback_of(robot, [other], FED) is not None
+    assert calls == [1, 1]
+
+
+def test_half_a_share_is_half_the_feedback(robot: Robot, sway: ReferenceMotion) -> None:
+    whole, half = (
+        feedback.feedback_of(robot, [sway], dataclasses.replace(FED, feedback=share))
+        for share in (1.0, 0.5)
+    )
+    assert whole is not None
+    assert half is not None
+    np.testing.assert_allclose(half.gains.gain, whole.gains.gain / 2, rtol=1e-5, atol=1e-6)
+    assert feedback.feedback_of(robot, [sway], LED) is None, "the humanoid has none by itself"
+
+
+@pytest.mark.parametrize("kind", ["onboard", "preview"])
+def test_who_does_not_see_all_gets_none(kind: str) -> None:
+    config = TrackConfig(observation=kind)  # type: ignore[arg-type]
+    assert control_of(config).feedback == 0.0
+    named = dataclasses.replace(config, control=FED)
+    assert control_of(named).feedback == 1.0
+    assert control_of(TrackConfig()).feedback is None
+
+
+def test_a_policy_from_before_has_none(robot: Robot, sway: ReferenceMotion) -> None:
+    policy = random_policy(robot, sway)
+    said = policy.facts["control"]
+    assert isinstance(said, dict)
+    before = {name: value for name, value in said.items() if name != "feedback"}
+    old = Policy(policy.layers, {**policy.facts, "control": before})
+    assert policy_control(old, robot).feedback == 0.0

@@ -1,0 +1,90 @@
+"""Our own trackers: feedback along the reference, and a policy of many motions."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from robojackson.errors import BadPolicy
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.pipeline.tracker_descriptions import describe_tracker, require_tracker
+from robojackson.rl.config.train_config import EvaluateConfig
+from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
+from robojackson.rl.trackers.policy_tracker import PolicyTracker
+from robojackson.rl.trackers.regulator_tracker import RegulatorTracker
+from robojackson.rl.trackers.tracker_description import TrackerDescription
+from robojackson.rl.trackers.tracker_file import is_present, open_tracker
+from robojackson.robot.model import Robot
+from tests.fixtures.deploy_policies import random_policy
+from tests.fixtures.robots import robot_motion, stock
+from tests.fixtures.stand_in_tracker import stand_in
+
+SHORT = EvaluateConfig(phases=3, resets=1, seconds=1.5)
+REGULATOR = TrackerDescription(
+    name="regulator", robot="humanoid", network="regulator", licence="ours", trained_on="nothing",
+    homepage="here", control_dt=0.015, fallback=True,
+)  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def _store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROBOJACKSON_STORE", str(tmp_path / "store"))
+
+
+@pytest.fixture(scope="module")
+def motion() -> ReferenceMotion:
+    return robot_motion("dance_b")
+
+
+def test_the_regulator_is_evaluated_like_a_policy(motion: ReferenceMotion) -> None:
+    found = evaluate_policy(open_tracker(REGULATOR), motion, stock(), SHORT).summary
+    assert found["tracker"] == "regulator"
+    baselines = found["baselines"]
+    assert isinstance(baselines, dict)
+    assert found["survived_s"] > 0.4
+    assert found["survived_s"] > 1.2 * baselines["zero_residual"]["survived_s"]
+
+
+def test_the_regulator_is_for_its_robot() -> None:
+    with pytest.raises(BadPolicy, match="drives robot 'g1', not 'humanoid'"):
+        RegulatorTracker(replace(REGULATOR, robot="g1")).equip(stock())
+
+
+def test_a_network_goes_before_the_regulator(tmp_path: Path, monkeypatch) -> None:
+    described = {"regulator": REGULATOR, "standin": stand_in(tmp_path)[1]}
+    module = "robojackson.pipeline.tracker_descriptions"
+    monkeypatch.setattr(f"{module}.trackers_of", lambda robot: list(described.values()))
+    assert require_tracker("humanoid") == REGULATOR, "the network's file is not here yet"
+    monkeypatch.setattr(f"{module}.is_present", lambda each: True)
+    monkeypatch.setattr(f"{module}.require_file", lambda each: tmp_path)
+    assert require_tracker("humanoid") == described["standin"]
+
+
+def test_the_shipped_regulator_needs_no_file() -> None:
+    shipped = describe_tracker("regulator")
+    assert is_present(shipped)
+    assert shipped.fallback
+
+
+def test_only_the_regulator_does_without_a_file() -> None:
+    for network in ("twist2", "policy"):
+        with pytest.raises(ValidationError, match="needs a file"):
+            replace(REGULATOR, network=network)  # type: ignore[arg-type]
+
+
+def test_a_policy_of_many_motions_is_a_tracker(motion: ReferenceMotion, tmp_path: Path) -> None:
+    robot: Robot = stock()
+    policy = random_policy(robot, motion, "preview")
+    path = policy.save(tmp_path / "dancer.safetensors")
+    tracker = PolicyTracker(replace(REGULATOR, network="regulator"), path)
+    as_tracker = evaluate_policy(tracker, motion, robot, SHORT)
+    as_policy = evaluate_policy(policy, motion, robot, SHORT)
+    np.testing.assert_allclose(as_tracker.rollout_qpos, as_policy.rollout_qpos, atol=1e-9)
+
+
+def test_a_policy_of_one_motion_is_none(motion: ReferenceMotion, tmp_path: Path) -> None:
+    path = random_policy(stock(), motion, "onboard").save(tmp_path / "one.safetensors")
+    with pytest.raises(BadPolicy, match="sees nothing ahead"):
+        PolicyTracker(REGULATOR, path)

@@ -1,0 +1,1 @@
+"""How the dancer that ships was taught: its motions, its training, its figures."""
