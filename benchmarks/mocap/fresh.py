@@ -38,7 +38,7 @@ LANDMARKS = [landmark(name) for name in JOINTS]
 
 
 def seed_of(weights: Path) -> int:
-    """The first 32 bits of a file's sha256."""
+    """Return the first 32 bits of a file's sha256."""
     return int.from_bytes(hashlib.sha256(weights.read_bytes()).digest()[:4], "big")
 
 

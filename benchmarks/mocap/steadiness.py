@@ -40,7 +40,7 @@ Edit = Callable[[np.ndarray], np.ndarray]
 
 
 def joints(sequence: SmplSequence) -> Float[np.ndarray, "T 12 3"]:
-    """The twelve joints, metres."""
+    """Return the twelve joints, metres."""
     return sequence.joints[:, [keypoint(name) for name in JOINTS]]
 
 

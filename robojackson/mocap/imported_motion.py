@@ -29,8 +29,7 @@ from robojackson.formats.foreign_motion import (
     require_person,
     skeleton_under,
 )
-from robojackson.mocap.grounding import contacts
-from robojackson.mocap.grounding import flight
+from robojackson.mocap.grounding import contacts, flight
 from robojackson.mocap.grounding import floor as ground
 from robojackson.mocap.landmarks import pinhole_camera
 from robojackson.mocap.landmarks.blazepose import fill_gaps

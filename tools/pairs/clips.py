@@ -95,7 +95,7 @@ def shoot(
     name: str, motion: deepmimic.Motion, stride: int, body: Body, studio: scenery.Studio,
     rng: np.random.Generator, angles: scenery.Angles | None = None, hidden: bool = True,
 ) -> dict[str, Any]:  # fmt: skip
-    """What BlazePose sees of a motion and what is true, with things in the way if `hidden`."""
+    """Return what BlazePose sees of a motion and what is true; occluded if `hidden`."""
     person = people.draw_person(body, rng)
     posed = person.posed(motion)
     low = posed.heads[..., 2].min(1)

@@ -44,7 +44,7 @@ class Node:
 
 
 def read(path: Path) -> deepmimic.Motion:
-    """The whole file."""
+    """Return the whole file."""
     content = path.read_bytes()
     text = (gzip.decompress(content) if path.suffix == ".gz" else content).decode()
     header, _, body = text.partition("MOTION")

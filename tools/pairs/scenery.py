@@ -82,7 +82,7 @@ def draw_angles(rng: np.random.Generator) -> Angles:
 
 
 def film(posed: Posed, rng: np.random.Generator, angles: Angles) -> View:
-    """A camera that sees the clip."""
+    """Return a camera that sees the clip."""
     width, height = SIZES[rng.integers(len(SIZES))]
     points = posed.heads
     centre = (points.max((0, 1)) + points.min((0, 1))) / 2.0
@@ -168,7 +168,7 @@ class Studio:
         self, person: Person, posed: Posed, view: View, boxes: np.ndarray,
         rng: np.random.Generator, stride: int = 1,
     ) -> Iterator[np.ndarray]:  # fmt: skip
-        """The pictures of each `stride`-th frame, RGB bytes."""
+        """Yield the pictures of each `stride`-th frame, RGB bytes."""
         target = self._target(view.width, view.height)
         self.paint.write(person.colour.astype("f4").tobytes())
         self.program["camera"] = tuple(view.matrix().T.ravel())

@@ -93,7 +93,7 @@ def mirrored(motion: deepmimic.Motion) -> deepmimic.Motion:
 
 
 def grafted(motion: deepmimic.Motion, other: deepmimic.Motion) -> deepmimic.Motion:
-    """The motion with the chest, head and arms of another as they move about its own pelvis."""
+    """Give the motion chest, head and arms of another as they move about its own pelvis."""
     turn = motion.rotations["root"] * other.rotations["root"].inv()
     limbs = {name: turn * other.rotations[name] for name in UPPER}
     return replace(motion, rotations={**motion.rotations, **limbs})

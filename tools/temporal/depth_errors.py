@@ -65,8 +65,10 @@ class Change:
 
 
 def misjudged(local: np.ndarray, how: Change, rng: np.random.Generator) -> np.ndarray:
-    """The detector's body tilted, flattened or deepened, each landmark's depth shifted; in some
-    windows drifting and with limbs reversed, or without any depth."""
+    """Tilt, flatten or deepen the detector's body and shift each landmark's depth.
+
+    In some windows it drifts and limbs are reversed, or there is no depth at all.
+    """
     count, frames, landmarks = local.shape[:3]
     angles = np.radians(rng.normal(0.0, 1.0, (count, 2)) * how.tilt_deg)
     turns = Rotation.from_euler("xy", angles).as_matrix().astype(np.float32)

@@ -35,7 +35,7 @@ HIPS = [ORDER.index(index) for index in features.HIPS]
 def film(
     bank: Bank, rows: np.ndarray, frames: int, sizes: np.ndarray, rng: np.random.Generator
 ) -> Batch:
-    """A window of each row as an exact detector would see it.
+    """Return a window of each row as an exact detector would see it.
 
     Args:
         bank: The motions.
@@ -67,7 +67,7 @@ def film(
 
 
 def with_constants(batch: Batch) -> Batch:
-    """The windows with what the network is told of the clip, from what is seen in them."""
+    """Add what the network is told of the clip, from what is seen in them."""
     pairs = [[(f"{s}_{a}", f"{s}_{b}") for s in ("left", "right")]
              for a, b in features.CHAINS.values()]  # fmt: skip
     pairs += [[(f"left_{name}", f"right_{name}")] for name in features.WIDTHS]

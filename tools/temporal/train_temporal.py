@@ -42,7 +42,7 @@ def check_motions(examples: list[Example]) -> None:
 
 
 def bank_of(folder: Path, motions: list[Path], count: int, seed: int) -> truths.Bank:
-    """The motions without pictures, made once."""
+    """Return the motions without pictures, made once."""
     path = folder / f"bank-{seed}-{count}.npz"
     if not path.exists():
         log.info("making %d motions without pictures", count)

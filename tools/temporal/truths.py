@@ -56,7 +56,7 @@ def make(folders: list[Path], count: int, seed: int) -> Bank:
 
 
 def kept(path: Path, folders: list[Path], count: int, seed: int) -> Bank:
-    """The bank of a file, made if it is not there."""
+    """Return the bank of a file, made if it is not there."""
     if not path.exists():
         bank = make(folders, count, seed)
         np.savez(path, points=bank.points.astype(np.float16), lengths=bank.lengths)

@@ -142,21 +142,20 @@ class CameraFollower:
         self._found = 0
 
     def path(self, frames: int, width: int, height: int) -> CameraPath:
-        """The camera's motion over so many frames, pixels of the full upright image."""
+        """Return the camera's motion over so many frames, pixels of the full upright image."""
         small = np.array(self.to_first[:frames])
         missing = max(frames - len(small), 0)
         small = np.concatenate([small, np.repeat(small[-1:], missing, axis=0)])
-        blind = np.array((self.blind + [True] * missing)[: len(small)])
-        jumps = np.array((self.jumps + [False] * missing)[: len(small)])
+        blind = np.array((self.blind + [True] * missing)[:frames])
+        jumps = np.array((self.jumps + [False] * missing)[:frames])
         scale = np.diag([width / self.size[0], height / self.size[1], 1.0])
         full = scale @ small @ np.linalg.inv(scale)
         stray = stray_of(full, width, height)
-        if stray <= STILL:
-            full = np.broadcast_to(np.eye(3), full.shape).copy()
-        return CameraPath(full, jumps, blind, stray)
+        still = np.broadcast_to(np.eye(3), full.shape).copy()
+        return CameraPath(still if stray <= STILL else full, jumps, blind, stray)
 
     def add_frame(self, image: UInt8[np.ndarray, "H W 3"], xy: Float[np.ndarray, "33 2"]) -> None:
-        """The next frame, RGB, and the person in it, 0..1, NaN where nobody was found."""
+        """Take the next frame, RGB, and the person in it, 0..1, NaN where nobody was found."""
         grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
         self.size = (grey.shape[1], grey.shape[0])
         step = self._followed(grey)
