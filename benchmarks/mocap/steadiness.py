@@ -111,7 +111,7 @@ def main() -> None:
     table = Table("clip, mm", "mirror", "10 frames a second", "half size", "encoded again")
     for video in parser.parse_args().videos:
         found = measure(video)
-        row = [f"{found[column.header]:.0f}" for column in table.columns[1:]]
+        row = [f"{found[str(column.header)]:.0f}" for column in table.columns[1:]]
         table.add_row(video.stem, *row)
     Console().print(table)
 
