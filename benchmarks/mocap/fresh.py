@@ -63,7 +63,7 @@ def make(number: int, seed: int, files: dict[str, Path], tools: tuple[Any, Any])
     body, studio = tools
     return clips.shoot(
         MOTIONS[number % 10], motion, stride, body, studio, rng, angles, hidden=False
-    )  # type: ignore[arg-type]
+    )
 
 
 def measure(path: Path) -> tuple[str, float, dict[str, float], dict[str, float]]:
