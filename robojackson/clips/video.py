@@ -157,6 +157,10 @@ def read_frames(
     return (image for _, image in timed_frames(path, start_s, end_s))
 
 
+NEARLY = 1.1
+"""Making an image smaller costs more than a tenth of its pixels."""
+
+
 def timed_frames(
     path: Path,
     start_s: float | None = None,
@@ -168,7 +172,8 @@ def timed_frames(
     Args:
         path: Video file.
         start_s, end_s: Range, seconds.
-        short_side: Larger images are made smaller until their short side has so many pixels.
+        short_side: Images that are larger by more than a tenth are made smaller until their short
+            side has so many pixels.
     """
     origin = None
     for stamp, frame in _decoded(path):
@@ -207,7 +212,7 @@ def _decoded(path: Path) -> Iterator[tuple[float, VideoFrame]]:
 
 def _upright(frame: VideoFrame, short_side: int | None) -> np.ndarray:
     shortest = min(frame.width, frame.height)
-    if short_side is not None and shortest > short_side:
+    if short_side is not None and shortest > NEARLY * short_side:
         factor = short_side / shortest
         width, height = round(frame.width * factor), round(frame.height * factor)
         small = frame.reformat(width, height, format="rgb24", interpolation="AREA")

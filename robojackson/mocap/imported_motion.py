@@ -29,7 +29,7 @@ from robojackson.formats.foreign_motion import (
     require_person,
     skeleton_under,
 )
-from robojackson.mocap.grounding import contacts
+from robojackson.mocap.grounding import contacts, flight
 from robojackson.mocap.grounding import floor as ground
 from robojackson.mocap.landmarks import pinhole_camera
 from robojackson.mocap.landmarks.blazepose import fill_gaps
@@ -56,8 +56,8 @@ def ground_foreign_motion(motion: ForeignMotion, fps: float) -> SmplSequence:
     feet = foot_points(pose, motion.rest_joints)
     lowest = feet[..., 2].min(1)
     height = ground.centre_of_mass(pose.points)[:, 2]
-    falling = ground.free_fall(height, fps)
-    flying = ground.flight(lowest, height, falling, fps)
+    falling = flight.free_fall(height, fps)
+    flying = flight.flight(lowest, height, falling, fps)
     floor = float(np.median(lowest[~flying] if (~flying).any() else lowest))
     notes = list(motion.notes)
     if abs(floor) > FLOOR_M:

@@ -140,10 +140,12 @@ def test_both_solves_give_a_grounded_motion(hip_shake: LandmarkTrack, method: st
 
 
 @pytest.mark.medium
-def test_a_jump_leaves_the_floor_and_comes_back(hip_shake: LandmarkTrack) -> None:
-    """The recorded person thrown up for 0.6 s: 0.44 m high at the top, both feet in the air."""
+@pytest.mark.parametrize("height_m", [0.1, 0.25, 0.45])
+def test_a_jump_is_as_high_as_it_was(hip_shake: LandmarkTrack, height_m: float) -> None:
+    """The recorded person thrown up: the rise within a fifth or 3 cm, no foot held meanwhile."""
+    speed = np.sqrt(2.0 * 9.81 * height_m)
     time = np.arange(len(hip_shake)) / hip_shake.fps - 1.5
-    height = np.where((time > 0) & (time < 0.6), 2.943 * time - 4.905 * time**2, 0.0)
+    height = np.maximum(speed * time - 4.905 * time**2, 0.0) * (time > 0.0)
     still = np.repeat(hip_shake.landmarks[:1], len(hip_shake), axis=0)
     body_px = np.ptp(still[0, :, 1])
     still[..., 1] -= (height * body_px / 1.65)[:, None]
@@ -155,7 +157,7 @@ def test_a_jump_leaves_the_floor_and_comes_back(hip_shake: LandmarkTrack) -> Non
     found = recover_motion(track, MocapConfig())
     rise = found.joints[:, 0, 2] - found.joints[0, 0, 2]
     top = int(height.argmax())
-    assert rise[top] == pytest.approx(0.44, abs=0.12)
-    assert (found.contact[top - 3 : top + 4] == AIR).all()
+    assert rise[top] == pytest.approx(height_m, rel=0.2, abs=0.03)
+    assert (found.contact[top - 1 : top + 2] == AIR).all()
     assert (found.contact[:30] == PLANTED).all()
     assert abs(rise[-1]) < 0.02

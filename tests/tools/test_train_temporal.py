@@ -10,10 +10,13 @@ from robojackson.mocap.temporal import error_flow, features, temporal_network
 from robojackson.mocap.temporal.features import ClipView
 from tools.pairs.sources import RefusedMotion
 from tools.temporal import batches, train_temporal
-from tools.temporal.batches import Batch, Change
+from tools.temporal.batches import Batch
+from tools.temporal.depth_errors import Change, misjudged
 from tools.temporal.examples import Example, flattened
+from tools.temporal.filming import HIPS, film, with_constants
 from tools.temporal.fit_flow import discrepancy
 from tools.temporal.net import Flow, Lifter
+from tools.temporal.truths import FRAMES, Bank
 
 
 @pytest.fixture(scope="module")
@@ -92,13 +95,51 @@ def test_batches_give_the_numbers_that_the_stage_gives() -> None:
 def test_changed_windows_are_still_seen_as_they_are() -> None:
     how = Change(
         40, shift_m=0.0, tilt_deg=(0.0, 0.0), depth=0.0, depth_shift_m=0.0, shake_m=0.0,
-        hidden=0.0, metre=0.0,
+        hidden=0.0, metre=0.0, bad_depth=0.0, no_depth=0.0, strides=(1.0, 0.0, 0.0),
     )  # fmt: skip
     changed = batches.change(batch_of(person()), how, np.random.default_rng(4))
     away = changed.distance[..., None, None]
     ideal = changed.truth[..., :2] * away / (away + changed.truth[..., 2:])
     assert np.allclose(changed.flat, ideal, atol=1e-4)
     assert np.allclose(changed.local, changed.truth, atol=1e-4)
+
+
+def bank() -> Bank:
+    """One motion of somebody who sways."""
+    rng = np.random.default_rng(8)
+    still = rng.uniform(-0.1, 0.1, (len(features.INPUT_LANDMARKS), 3))
+    sway = 0.02 * np.sin(np.arange(FRAMES) / 7.0)[:, None, None] * [1.0, 0.0, 0.0]
+    return Bank((still + sway)[None].astype(np.float32), np.array([FRAMES]))
+
+
+def test_filmed_windows_are_seen_exactly() -> None:
+    """From any camera: the image is that of the truth, the bones keep their lengths."""
+    rows, sizes = np.zeros(6, int), np.full(6, 4.0)
+    filmed = film(bank(), rows, 30, sizes, np.random.default_rng(3))
+    hips = filmed.truth[:, :, HIPS].mean(2)
+    assert np.abs(hips).max() < 1e-4
+    bones = np.linalg.norm(filmed.truth[:, :, 3] - filmed.truth[:, :, 5], axis=-1)
+    still = bank().points[0]
+    assert np.allclose(bones, 4.0 * np.linalg.norm(still[0, 3] - still[0, 5]), rtol=1e-3)
+    assert np.ptp(filmed.truth[:, 0, 3], axis=0).min() > 0.05  # the cameras stand elsewhere
+
+
+def test_filmed_constants_are_those_of_the_stage() -> None:
+    filmed = film(bank(), np.zeros(2, int), 30, np.ones(2), np.random.default_rng(4))
+    sight = person(30).sight
+    sight.flat[:, features.INPUT_LANDMARKS] = filmed.flat[1]
+    sight.local[:, features.INPUT_LANDMARKS] = filmed.local[1]
+    sight.root[:] = np.outer(filmed.distance[1], [0.0, 0.0, 1.0])
+    told = with_constants(filmed).constant[1]
+    assert np.allclose(told, features.constants(sight), rtol=1e-3)
+
+
+def test_a_detector_without_depth_sees_the_image_alone() -> None:
+    local = np.random.default_rng(5).normal(size=(3, 20, 23, 3)).astype(np.float32)
+    how = Change(tilt_deg=(0.0, 0.0), bad_depth=0.0, no_depth=1.0)
+    seen = misjudged(local, how, np.random.default_rng(6))
+    assert (seen[..., 2] == 0.0).all()
+    assert np.allclose(seen[..., :2], local[..., :2], atol=1e-6)
 
 
 def test_hidden_limbs_are_not_visible() -> None:
@@ -136,7 +177,7 @@ def test_a_kept_state_goes_on_where_it_was(tmp_path: Path) -> None:
     from tools.temporal import fit
 
     config = fit.FitConfig(steps=4, batch=2, change=Change(frames=20))
-    where = fit.source([person()], [], 1)
+    where = fit.source([person()], None)
 
     def nothing(now: fit.Progress, step_s: float) -> None:
         pass

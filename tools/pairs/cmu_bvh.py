@@ -3,6 +3,7 @@
 Of the file: x to the person's left, y up, z forward, rest pose a T; lengths in its own unit.
 """
 
+import gzip
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -44,7 +45,9 @@ class Node:
 
 def read(path: Path) -> deepmimic.Motion:
     """Return the whole file."""
-    header, _, body = path.read_text().partition("MOTION")
+    content = path.read_bytes()
+    text = (gzip.decompress(content) if path.suffix == ".gz" else content).decode()
+    header, _, body = text.partition("MOTION")
     nodes = _nodes(header.split())
     lines = body.strip().splitlines()
     fps = 1.0 / float(lines[1].split()[-1])

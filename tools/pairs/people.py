@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from tools.render import deepmimic, stage
+from tools.render import dance_floor, deepmimic
 from tools.render.anny_body import Body
 
 PHENOTYPE: Mapping[str, tuple[float, float]] = {
@@ -52,7 +52,7 @@ class Person:
         self.parents = [int(p) for p in body.model.bone_parents]
         self.bare = body.rest_vertices.astype(np.float32)
         self.colour, thickness = clothes(body, rng)
-        normals = stage.vertex_normals(self.bare, body.triangles)
+        normals = dance_floor.vertex_normals(self.bare, body.triangles)
         self.rest = (self.bare + normals * thickness[:, None]).astype(np.float32)
         self.marks = _surface_marks(body)
 
@@ -112,7 +112,7 @@ def clothes(body: Body, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarra
     loose = rng.uniform(0.0, 0.025, 2) * (rng.uniform(size=2) < 0.7)
     table = np.tile(skin, (len(body.rest_vertices), 1))
     thick = np.zeros(len(table))
-    head, waist = body.head_of("head"), body.head_of("root")[2] + stage.WAIST_ABOVE_ROOT
+    head, waist = body.head_of("head"), body.head_of("root")[2] + dance_floor.WAIST_ABOVE_ROOT
     for index, bone in enumerate(body.dominant_bones()):
         point = body.rest_vertices[index]
         lower = bone.startswith("lowerleg") or bone.startswith("upperleg02")
@@ -128,10 +128,10 @@ def clothes(body: Body, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarra
             table[index], thick[index] = shirt, loose[0]
         elif bone.startswith(("foot", "toe")) and not barefoot:
             table[index], thick[index] = shoes, 0.006
-        elif bone.startswith("head") and stage._is_hair(point - head):
+        elif bone.startswith("head") and dance_floor._is_hair(point - head):
             table[index], thick[index] = hair, 0.01
         elif bone.startswith("eye"):
-            table[index] = stage.EYES
+            table[index] = dance_floor.EYES
     wave = np.sin(body.rest_vertices @ rng.normal(0.0, rng.choice([3.0, 15.0, 40.0]), (3, 3)))
     pattern = 1.0 + rng.uniform(0.0, 0.4) * wave.mean(1, keepdims=True)
     return np.where(thick[:, None] > 0.0, table * pattern, table).astype(np.float32), thick

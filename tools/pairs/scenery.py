@@ -64,14 +64,29 @@ class View:
         return clip @ flip @ view
 
 
-def film(posed: Posed, rng: np.random.Generator) -> View:
-    """Return a camera that sees the clip, mostly from the front, anything from the side and
-    behind."""
+@dataclass(frozen=True)
+class Angles:
+    """From where a camera looks: radians, and how much of the picture the motion fills."""
+
+    yaw: float
+    pitch: float
+    fills: float
+
+
+def draw_angles(rng: np.random.Generator) -> Angles:
+    """On any side, looking up by 20 to down by 60 degrees, near or far."""
+    level = rng.uniform() < 0.5
+    yaw = rng.uniform(-np.pi, np.pi)
+    pitch = np.radians(rng.normal(6.0, 9.0) if level else rng.uniform(-20.0, 60.0))
+    return Angles(yaw, float(pitch), float(np.exp(rng.uniform(np.log(0.35), np.log(1.15)))))
+
+
+def film(posed: Posed, rng: np.random.Generator, angles: Angles) -> View:
+    """Return a camera that sees the clip."""
     width, height = SIZES[rng.integers(len(SIZES))]
     points = posed.heads
     centre = (points.max((0, 1)) + points.min((0, 1))) / 2.0
-    spread = rng.choice([25.0, 60.0, 180.0], p=[0.4, 0.35, 0.25])
-    yaw, pitch = np.radians(rng.uniform(-spread, spread)), np.radians(rng.normal(10.0, 14.0))
+    yaw, pitch, fills = angles.yaw, angles.pitch, angles.fills
     forward = np.array([-np.sin(yaw) * np.cos(pitch), np.cos(yaw) * np.cos(pitch), -np.sin(pitch)])
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
@@ -80,7 +95,6 @@ def film(posed: Posed, rng: np.random.Generator) -> View:
     turn = np.array([[np.cos(roll), -np.sin(roll), 0], [np.sin(roll), np.cos(roll), 0], [0, 0, 1]])
     rotation = turn @ rotation
     focal = float(np.hypot(width, height) * np.exp(rng.uniform(np.log(0.55), np.log(1.7))))
-    fills = rng.choice([0.65, 0.85, 1.0, 1.15], p=[0.2, 0.35, 0.3, 0.15])
     distance = 4.0
     for _ in range(6):
         shift = np.array([0.0, 0.0, distance]) - rotation @ centre
@@ -151,9 +165,10 @@ class Studio:
         self.targets: dict[tuple[int, int], moderngl.Framebuffer] = {}
 
     def frames(
-        self, person: Person, posed: Posed, view: View, boxes: np.ndarray, rng: np.random.Generator
-    ) -> Iterator[np.ndarray]:
-        """Yield the pictures, RGB bytes."""
+        self, person: Person, posed: Posed, view: View, boxes: np.ndarray,
+        rng: np.random.Generator, stride: int = 1,
+    ) -> Iterator[np.ndarray]:  # fmt: skip
+        """Yield the pictures of each `stride`-th frame, RGB bytes."""
         target = self._target(view.width, view.height)
         self.paint.write(person.colour.astype("f4").tobytes())
         self.program["camera"] = tuple(view.matrix().T.ravel())
@@ -166,7 +181,7 @@ class Studio:
         noise = noise.astype(np.float32)
         grey, gain = rng.uniform() < 0.08, rng.uniform(0.6, 1.15)
         blur = float(rng.uniform() < 0.25) * rng.uniform(0.3, 1.2)
-        for frame in range(len(posed.heads)):
+        for frame in range(0, len(posed.heads), stride):
             self.points.write(person.skin(posed, frame).astype("f4").tobytes())
             target.use()
             target.clear(0.0, 0.0, 0.0, 0.0)

@@ -8,21 +8,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from robojackson.mocap.landmarks.blazepose import BODY, MIRROR, landmark
+from robojackson.mocap.landmarks.blazepose import BODY, MIRROR
 from robojackson.mocap.temporal import features
 from robojackson.mocap.temporal.features import FPS, INPUT_LANDMARKS
+from tools.temporal.depth_errors import LIMBS, ORDER, Change, misjudged
 from tools.temporal.examples import Example
 
-ORDER = [int(index) for index in INPUT_LANDMARKS]
 SWAP = [ORDER.index(int(MIRROR[index])) for index in INPUT_LANDMARKS]
 TWELVE = [ORDER.index(int(index)) for index in BODY]
-LIMBS = [
-    [ORDER.index(landmark(f"{side}_{name}")) for name in names]
-    for side in ("left", "right")
-    for names in (("elbow", "wrist", "index", "pinky"), ("knee", "ankle", "heel", "foot_index"))
-]
 LONGEST = 150
 """Frames of the longest example that are kept."""
 
@@ -53,39 +47,6 @@ class Batch:
         constant = np.broadcast_to(self.constant[:, None], (*shape, self.constant.shape[1]))
         parts = (self.flat.reshape(*shape, -1), self.local.reshape(*shape, -1), self.visibility)
         return np.concatenate([*parts, constant], -1).astype(np.float32)
-
-
-@dataclass(frozen=True)
-class Change:
-    """Strength of the augmentation of windows.
-
-    Attributes:
-        frames: Length of a window.
-        roll_deg: Roll of the camera, standard deviation.
-        size: Size of the person, standard deviation of the logarithm.
-        metre: Scale of the detector's metre, likewise.
-        shift_m: Shift of each landmark for a whole window, across the image: joints are not defined
-            alike everywhere.
-        tilt_deg: Tilt of the detector's body about the image's x and y axes, and
-        depth: the logarithm of its depth, and
-        depth_shift_m: the depth of each landmark, for the whole window, standard deviations:
-            the detector errs in other ways on pictures of real people than on rendered ones.
-        shake_m: Shake of each landmark in each frame.
-        hidden: Chance of hidden limbs.
-        hidden_s: How long they are hidden.
-    """
-
-    frames: int = 81
-    roll_deg: float = 12.0
-    size: float = 0.07
-    metre: float = 0.04
-    shift_m: float = 0.012
-    tilt_deg: tuple[float, float] = (8.0, 6.0)
-    depth: float = 0.15
-    depth_shift_m: float = 0.03
-    shake_m: float = 0.003
-    hidden: float = 0.5
-    hidden_s: tuple[float, float] = (0.2, 1.0)
 
 
 def table(examples: Sequence[Example]) -> Batch:
@@ -146,11 +107,12 @@ def change(batch: Batch, how: Change, rng: np.random.Generator) -> Batch:
     grown = size[:, None, None, None]
     flat = _disturbed(batch.flat @ roll[..., :2, :2] * grown, how, rng)
     local = batch.local @ roll * grown * metre[:, None, None, None]
-    local = _disturbed(_misjudged(local, how, rng), how, rng)
+    local = _disturbed(misjudged(local, how, rng), how, rng)
     visibility = np.array(batch.visibility)
     for row in np.flatnonzero(rng.uniform(size=count) < how.hidden):
         for _ in range(rng.integers(1, 3)):
             hide((flat[row], local[row]), visibility[row], how.hidden_s, rng)
+    _thin((flat, local, visibility), rng.choice(3, count, p=how.strides) + 1)
     half = (batch.constant.shape[1] - 1) // 2
     factors = np.stack([size] * half + [size * metre] * half + [1.0 / size], -1)
     return replace(
@@ -183,6 +145,21 @@ def hide(
     visibility[start:end, limb] = 0.0
 
 
+def _thin(seen: Sequence[np.ndarray], strides: np.ndarray) -> None:
+    """Keep each second or third frame, the others between them, in place."""
+    for stride in (2, 3):
+        rows = np.flatnonzero(strides == stride)
+        for values in seen:
+            count = values.shape[1]
+            frames = np.arange(count)
+            low = np.minimum(frames // stride * stride, count - 1)
+            high = np.minimum(low + stride, (count - 1) // stride * stride)
+            part = ((frames - low) / stride).reshape(-1, *[1] * (values.ndim - 2))
+            part = part.astype(values.dtype)
+            chosen = values[rows]
+            values[rows] = chosen[:, low] * (1 - part) + chosen[:, high] * part
+
+
 def _mirrored(batch: Batch, which: np.ndarray) -> Batch:
     flip = np.array([-1.0, 1.0, 1.0], np.float32)
     pick = which[:, None, None, None]
@@ -193,18 +170,6 @@ def _mirrored(batch: Batch, which: np.ndarray) -> Batch:
         truth=np.where(pick, batch.truth[:, :, SWAP] * flip, batch.truth),
         visibility=np.where(pick[..., 0], batch.visibility[:, :, SWAP], batch.visibility),
     )
-
-
-def _misjudged(local: np.ndarray, how: Change, rng: np.random.Generator) -> np.ndarray:
-    """Return the detector's body tilted, flattened or deepened, each landmark's depth shifted."""
-    count, landmarks = len(local), local.shape[2]
-    angles = np.radians(rng.normal(0.0, 1.0, (count, 2)) * how.tilt_deg)
-    turns = Rotation.from_euler("xy", angles).as_matrix().astype(np.float32)
-    turned = local @ turns[:, None]
-    deep = np.exp(rng.normal(0.0, how.depth, (count, 1, 1))).astype(np.float32)
-    shift = rng.standard_normal((count, 1, landmarks), np.float32) * how.depth_shift_m
-    turned[..., 2] = turned[..., 2] * deep + shift
-    return np.asarray(turned)
 
 
 def _disturbed(values: np.ndarray, how: Change, rng: np.random.Generator) -> np.ndarray:

@@ -15,14 +15,14 @@ from robojackson.errors import NoPersonFound
 from robojackson.mocap.landmarks import pinhole_camera
 from robojackson.mocap.landmarks.blazepose import BODY, landmark, repair
 from robojackson.mocap.recover import MocapConfig
-from robojackson.mocap.temporal import features
+from robojackson.mocap.temporal import features, temporal_lift
 from robojackson.mocap.temporal.features import ClipView
 from robojackson.motion.landmark_track import LandmarkTrack
 
 FOLLOWED_M = 0.25
 """Mean distance across the image over which the detector is not on the person."""
 LEAST_FOUND, LEAST_FOLLOWED = 0.85, 0.6
-VALIDATION_MOTIONS = ("long_walk2", "punch", "stealthy_walk1", "01_03")
+VALIDATION_MOTIONS = ("long_walk2", "punch", "stealthy_walk1", "01_03", "05_15")
 VALIDATION_EACH = 12
 """Besides these motions, every clip whose number divides by this is kept for validation."""
 BONES = [
@@ -30,8 +30,6 @@ BONES = [
     for side in ("left", "right")
     for a, b in features.CHAINS.values()
 ]
-Truth = tuple[np.ndarray, np.ndarray, float]
-"""A clip without pictures: landmarks along the rays, distance, guessed focal length over true."""
 
 
 @dataclass(frozen=True)
@@ -76,18 +74,21 @@ def body_size(truth: np.ndarray) -> float:
 def read(path: Path) -> Example | None:
     """Return the example of a pair file; None if the detector lost the person too often."""
     with np.load(path) as pair:
-        seen, (width, height) = pair["seen"].astype(float), pair["size"].tolist()
+        stride = int(pair["stride"])
+        seen, (width, height) = pair["seen"][::stride].astype(float), pair["size"].tolist()
         truth_c, motion, fps = pair["truth"].astype(float), str(pair["motion"]), float(pair["fps"])
-    track = LandmarkTrack(fps, width, height, seen[..., :3], seen[..., 3:6], seen[..., 6])
+    track = LandmarkTrack(fps / stride, width, height, seen[..., :3], seen[..., 3:6], seen[..., 6])
     if track.detected.mean() < LEAST_FOUND:
         return None
+    places = features.time_grid(len(seen), track.fps)
     try:
-        sight = sight_of(weigh_visibility(track))
+        sight = temporal_lift.at(sight_of(weigh_visibility(track)), places)
     except NoPersonFound:
         return None
-    truth, distance = along_rays(truth_c)
+    truth, distance = along_rays(truth_c[: len(places)])
+    found = track.detected[np.round(places).astype(int)]
     flat, ideal = sight.flat[:, BODY], flattened(truth[:, BODY], distance)
-    good = track.detected & (np.linalg.norm(flat - ideal, axis=-1).mean(1) < FOLLOWED_M)
+    good = found & (np.linalg.norm(flat - ideal, axis=-1).mean(1) < FOLLOWED_M)
     if good.mean() < LEAST_FOLLOWED:
         return None
     scale = (flat[good] * ideal[good]).sum() / (ideal[good] ** 2).sum()

@@ -12,10 +12,13 @@ from robojackson.metrics import pose_error
 from robojackson.mocap.landmarks.blazepose import BODY
 from robojackson.mocap.temporal import features
 from robojackson.mocap.temporal.temporal_lift import corrected
-from tools.temporal.batches import TWELVE, Batch, Change, change, joined, table, windows
-from tools.temporal.examples import Example, Truth
+from tools.temporal.batches import TWELVE, Batch, change, joined, table, windows
+from tools.temporal.depth_errors import Change
+from tools.temporal.examples import Example
+from tools.temporal.filming import film, with_constants
 from tools.temporal.invented import Detector
 from tools.temporal.net import Lifter
+from tools.temporal.truths import Bank
 
 
 @dataclass(frozen=True)
@@ -33,14 +36,14 @@ class FitConfig:
         change: Change of the windows.
     """
 
-    steps: int = 3000
-    batch: int = 48
+    steps: int = 6000
+    batch: int = 32
     rate: float = 1.5e-3
     decay: float = 0.02
-    invented: tuple[float, float] = (0.8, 0.6)
+    invented: tuple[float, float] = (0.85, 0.75)
     velocity: float = 3.0
     spread: float = 0.01
-    average: float = 0.995
+    average: float = 0.997
     change: Change = field(default_factory=Change)
 
 
@@ -60,29 +63,27 @@ class Source:
     """Source of batches."""
 
     real: Batch
-    invented: Batch | None
+    bank: Bank | None
     detector: Detector
 
     def draw(self, config: FitConfig, share: float, rng: np.random.Generator) -> Batch:
         """Return a batch, changed."""
         frames, count = config.change.frames, config.batch
-        made = round(count * share) if self.invented else 0
+        made = round(count * share) if self.bank else 0
         rows = rng.integers(0, len(self.real.good), count - made)
         batch = windows(self.real, rows, frames, rng)
-        if self.invented and made:
-            rows = rng.integers(0, len(self.invented.good), made)
-            cut = windows(self.invented, rows, frames, rng)
-            batch = joined(batch, self.detector.disturb(cut, rng))
+        if self.bank and made:
+            rows = rng.integers(0, len(self.bank), made)
+            sizes = rng.choice(self.detector.sizes, made)
+            filmed = film(self.bank, rows, frames, sizes, rng)
+            batch = joined(batch, with_constants(self.detector.see(filmed, rng)))
         return change(batch, config.change, rng)
 
 
-def source(examples: Sequence[Example], truths: Sequence[Truth], seed: int) -> Source:
-    """Return the tables of the real pairs, and of what the invented detector sees of the truths."""
+def source(examples: Sequence[Example], bank: Bank | None) -> Source:
+    """Tables of the real pairs, and the detector that they invent for the bank."""
     real = table(examples)
-    detector = Detector(real, examples)
-    rng = np.random.default_rng([seed, 1])
-    seen = table([detector.sees(truth, rng) for truth in truths]) if truths else None
-    return Source(real, seen, detector)
+    return Source(real, bank, Detector(real, examples))
 
 
 def begin(examples: Sequence[Example], config: FitConfig, seed: int) -> Progress:

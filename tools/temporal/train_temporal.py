@@ -3,7 +3,7 @@
     python -m tools.pairs MOTIONS... -o pairs          (an hour or more; see there)
     python -m tools.temporal.train_temporal pairs --motions MOTIONS... -o temporal.safetensors
 
-Reads the pairs, makes truths without pictures from the same motions (kept beside the pairs), fits
+Reads the pairs, makes a bank of motions without pictures (kept beside the pairs), fits
 the lifter, then the flow. Seeded; the state is kept beside the weights every 100 steps, and the
 same command goes on from there. Writes the weights (half precision), and REPORT.json and REPORT.png
 with the curve and the validation. Motions outside the list of `tools/pairs/sources.py` are refused
@@ -17,18 +17,17 @@ import sys
 from dataclasses import asdict
 from pathlib import Path
 
-import numpy as np
 import torch
 from safetensors.torch import load_file, save_file
 
 from tools.pairs import sources
-from tools.temporal import fit
-from tools.temporal.examples import Example, Truth, load
+from tools.temporal import fit, truths
+from tools.temporal.examples import Example, load
 from tools.temporal.fit_flow import fit_flow
 from tools.temporal.net import Flow, Lifter
 
 log = logging.getLogger("train_temporal")
-INVENTED = "invented"
+INVENTED, GESTURES = "invented", "gestures"
 
 
 def check_motions(examples: list[Example]) -> None:
@@ -37,29 +36,17 @@ def check_motions(examples: list[Example]) -> None:
     Raises:
         RefusedMotion: such a motion.
     """
-    for name in {example.motion.split("+")[0] for example in examples}:
-        if name != INVENTED:
+    for name in {part for example in examples for part in example.motion.split("+")}:
+        if name not in (INVENTED, GESTURES):
             sources.check_allowed(Path(name))
 
 
-def truths_of(folder: Path, motions: list[Path], count: int, seed: int) -> list[Truth]:
-    """Return the truths without pictures, made once."""
-    path = folder / f"truths-{seed}-{count}.npz"
+def bank_of(folder: Path, motions: list[Path], count: int, seed: int) -> truths.Bank:
+    """Return the motions without pictures, made once."""
+    path = folder / f"bank-{seed}-{count}.npz"
     if not path.exists():
-        from tools.temporal import truths  # needs tools/requirements.txt, as the rendering does
-
-        log.info("making %d truths without pictures", count)
-        made = truths.make(motions, count, seed)
-        lengths = [len(item[0]) for item in made]
-        np.savez(
-            path, truth=np.concatenate([m[0] for m in made]),
-            distance=np.concatenate([m[1] for m in made]), wrong=[m[2] for m in made],
-            lengths=lengths,
-        )  # fmt: skip
-    with np.load(path) as data:
-        edges = np.cumsum(data["lengths"])[:-1]
-        parts = (np.split(data["truth"], edges), np.split(data["distance"], edges), data["wrong"])
-        return [(t, d, float(w)) for t, d, w in zip(*parts, strict=True)]
+        log.info("making %d motions without pictures", count)
+    return truths.kept(path, motions, count, seed)
 
 
 def train(
@@ -83,8 +70,8 @@ def train(
         figures = ", ".join(f"{k} {v:.4g}" for k, v in now.curve[-1].items())
         log.info("%s; %.0f CPU s left", figures, (config.steps - now.step) * step_s)
 
-    synthetic = truths_of(pairs, motions, count, seed) if count else []
-    where = fit.source(training, synthetic, seed)
+    bank = bank_of(pairs, motions, count, seed) if count else None
+    where = fit.source(training, bank)
     fit.fit(progress, where, config, seed, watch)
     lifter = fit.averaged(progress)
     flow_curve: list[dict[str, float]] = []
@@ -97,7 +84,7 @@ def train(
     save(lifter, flow, out)
     return {
         "clips": len(training), "frames": sum(len(e.truth) for e in training),
-        "validation_clips": len(validation), "truths": len(synthetic), "seed": seed,
+        "validation_clips": len(validation), "bank": len(bank or ()), "seed": seed,
         "config": asdict(config), "curve": progress.curve, "flow": flow_curve,
         "validation": fit.validate(lifter, validation),
     }  # fmt: skip
@@ -181,14 +168,14 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--flow-steps", type=int, default=600)
     parser.add_argument("--first", type=Path, help="weights to begin with, as of a shorter run")
     parser.add_argument("--rate", type=float, default=fit.FitConfig().rate)
-    parser.add_argument("--truths", type=int, default=2500)
+    parser.add_argument("--bank", type=int, default=6000)
     parser.add_argument("--seed", type=int, default=7)
     options = parser.parse_args(arguments)
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     torch.set_num_threads(1)
     config = fit.FitConfig(steps=options.steps, rate=options.rate)
     report = train(
-        options.pairs, options.motions, options.out, config, options.truths, options.seed,
+        options.pairs, options.motions, options.out, config, options.bank, options.seed,
         options.flow_steps, options.first,
     )  # fmt: skip
     target = options.report or options.out.with_suffix("")

@@ -1,25 +1,41 @@
-"""Motions without pictures: many more truths than can be rendered, for the invented detector."""
+"""Motions without pictures: many more than can be rendered, filmed anew in every batch."""
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from robojackson.mocap.landmarks.blazepose import LANDMARK_NAMES
-from robojackson.mocap.landmarks.pinhole_camera import guess_focal
 from robojackson.mocap.temporal.features import INPUT_LANDMARKS
-from tools.pairs import people, scenery, sources
-from tools.pairs.clips import choose_motion
-from tools.render import deepmimic
-from tools.render.anny_body import Body
-from tools.temporal.examples import VALIDATION_MOTIONS, Truth, along_rays
+from tools.temporal.examples import VALIDATION_MOTIONS, body_size
 
-PEOPLE = 60
-NEAREST_M = 1.0
+PEOPLE = 80
+FRAMES = 150
 
 
-def make(folders: list[Path], count: int, seed: int) -> list[Truth]:
-    """Return so many clips: landmarks along the rays, distance, and the guessed focal over the
-    true."""
+@dataclass(frozen=True)
+class Bank:
+    """Motions of bodies of size one (`body_size`), world z up.
+
+    Attributes:
+        points: The landmarks that the network reads.
+        lengths: Frames of each motion; the last frame is held up to `FRAMES`.
+    """
+
+    points: np.ndarray
+    lengths: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+
+def make(folders: list[Path], count: int, seed: int) -> Bank:
+    """So many motions of people of all shapes; captured ones of the list, changed, or invented."""
+    from tools.pairs import people, sources
+    from tools.pairs.clips import choose_motion
+    from tools.render import deepmimic
+    from tools.render.anny_body import Body
+
     rng = np.random.default_rng([seed, count])
     files = [
         path for path in sources.find(folders)
@@ -27,14 +43,22 @@ def make(folders: list[Path], count: int, seed: int) -> list[Truth]:
     ]  # fmt: skip
     body, cache = Body(), dict[Path, deepmimic.Motion]()
     crowd = [people.draw_person(body, rng) for _ in range(PEOPLE)]
-    made: list[Truth] = []
-    while len(made) < count:
+    points = np.zeros((count, FRAMES, len(INPUT_LANDMARKS), 3), np.float32)
+    lengths = np.zeros(count, int)
+    for row in range(count):
         person = crowd[rng.integers(PEOPLE)]
         posed = person.posed(choose_motion(files, cache, rng)[1])
-        view = scenery.film(posed, rng)
-        truth, distance = along_rays(view.see(person.landmarks(posed, LANDMARK_NAMES)))
-        if distance.min() < NEAREST_M or not np.isfinite(truth[:, INPUT_LANDMARKS]).all():
-            continue
-        wrong = guess_focal(view.width, view.height) / view.focal
-        made.append((np.nan_to_num(truth).astype(np.float32), distance, wrong))
-    return made
+        marks = person.landmarks(posed, LANDMARK_NAMES)[:FRAMES]
+        marks = marks[:, INPUT_LANDMARKS] / body_size(marks)
+        lengths[row] = len(marks)
+        points[row] = marks[np.minimum(np.arange(FRAMES), len(marks) - 1)]
+    return Bank(points, lengths)
+
+
+def kept(path: Path, folders: list[Path], count: int, seed: int) -> Bank:
+    """Return the bank of a file, made if it is not there."""
+    if not path.exists():
+        bank = make(folders, count, seed)
+        np.savez(path, points=bank.points.astype(np.float16), lengths=bank.lengths)
+    with np.load(path) as data:
+        return Bank(data["points"].astype(np.float32), data["lengths"])

@@ -106,20 +106,10 @@ def camera_path(
         landmarks: Landmarks of the person, 0..1, NaN where no person was detected.
         width, height: Width and height of the full upright image, pixels.
     """
-    chain = _Chain()
+    follower = CameraFollower()
     for image, xy in zip(images, landmarks, strict=False):
-        chain.add_frame(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), xy)
-    small = np.array(chain.to_first[: len(landmarks)])
-    missing = max(len(landmarks) - len(small), 0)
-    small = np.concatenate([small, np.repeat(small[-1:], missing, axis=0)])
-    blind = np.array((chain.blind + [True] * missing)[: len(small)])
-    jumps = np.array((chain.jumps + [False] * missing)[: len(small)])
-    scale = np.diag([width / chain.size[0], height / chain.size[1], 1.0])
-    full = scale @ small @ np.linalg.inv(scale)
-    stray = stray_of(full, width, height)
-    if stray <= STILL:
-        full = np.broadcast_to(np.eye(3), full.shape).copy()
-    return CameraPath(full, jumps, blind, stray)
+        follower.add_frame(image, xy)
+    return follower.path(len(landmarks), width, height)
 
 
 def warp(
@@ -138,8 +128,8 @@ def stray_of(to_first: Float[np.ndarray, "T 3 3"], width: int, height: int) -> f
     return float(np.linalg.norm(moved - marks, axis=-1).max() / np.hypot(width, height))
 
 
-class _Chain:
-    """Follows corners from frame to frame."""
+class CameraFollower:
+    """Follows corners from frame to frame, as the frames pass by."""
 
     def __init__(self) -> None:
         self.to_first: list[np.ndarray] = []
@@ -151,8 +141,22 @@ class _Chain:
         self._from = self._at = np.zeros((0, 1, 2), np.float32)
         self._found = 0
 
-    def add_frame(self, grey: UInt8[np.ndarray, "H W"], xy: Float[np.ndarray, "33 2"]) -> None:
-        """Add the next frame."""
+    def path(self, frames: int, width: int, height: int) -> CameraPath:
+        """Return the camera's motion over so many frames, pixels of the full upright image."""
+        small = np.array(self.to_first[:frames])
+        missing = max(frames - len(small), 0)
+        small = np.concatenate([small, np.repeat(small[-1:], missing, axis=0)])
+        blind = np.array((self.blind + [True] * missing)[:frames])
+        jumps = np.array((self.jumps + [False] * missing)[:frames])
+        scale = np.diag([width / self.size[0], height / self.size[1], 1.0])
+        full = scale @ small @ np.linalg.inv(scale)
+        stray = stray_of(full, width, height)
+        still = np.broadcast_to(np.eye(3), full.shape).copy()
+        return CameraPath(still if stray <= STILL else full, jumps, blind, stray)
+
+    def add_frame(self, image: UInt8[np.ndarray, "H W 3"], xy: Float[np.ndarray, "33 2"]) -> None:
+        """Take the next frame, RGB, and the person in it, 0..1, NaN where nobody was found."""
+        grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
         self.size = (grey.shape[1], grey.shape[0])
         step = self._followed(grey)
         last = self.to_first[-1] if self.to_first else np.eye(3)

@@ -21,6 +21,7 @@ from robojackson.clips.people.person_extent import stature, trunk
 from robojackson.clips.people.tracked_people import SCOUT, TrackedPeople, track_people
 from robojackson.clips.pose_detector import (
     SHORT_SIDE,
+    Watcher,
     detect,
     still_landmarker,
     track_of,
@@ -62,6 +63,7 @@ def track_dancer(
     size: str,
     config: DancerConfig,
     progress: Progress | None = None,
+    watch: Watcher | None = None,
 ) -> LandmarkTrack:
     """Return the landmarks of one person, NaN rows where they are not visible.
 
@@ -71,12 +73,14 @@ def track_dancer(
         size: lite, full or heavy.
         config: Which person to follow, and how.
         progress: Called with (frames done, frames in all); others in view make it several passes.
+        watch: Sees every frame with the landmarks of the first pass, which are the track's where
+            it tells of no others (`people` 0).
     Raises:
         NoPersonFound: there is no person of that number; the message lists the people.
         MissingDependency: no model bundle, or no EGL and GLES libraries.
     """
     if config.number is None or config.number == 1:
-        single, others = _scouted(path, info, size, config, progress)
+        single, others = _scouted(path, info, size, config, progress, watch)
         if not others:
             return single
     passes = 3 if config.number in (None, 1) else 2
@@ -95,7 +99,12 @@ def track_dancer(
 
 
 def _scouted(
-    path: Path, info: VideoInfo, size: str, config: DancerConfig, progress: Progress | None
+    path: Path,
+    info: VideoInfo,
+    size: str,
+    config: DancerConfig,
+    progress: Progress | None,
+    also: Watcher | None,
 ) -> tuple[LandmarkTrack, bool]:
     """Return the track of a person who is alone, and whether another person was detected in a few
     frames."""
@@ -104,6 +113,8 @@ def _scouted(
 
         def watch(index: int, image: np.ndarray, row: np.ndarray) -> None:
             scouts.add_frame(index, image, row[:, :2])
+            if also:
+                also(index, image, row)
 
         track = detect(path, info, size, progress, watch)
     return track, max(scouts.counts, default=0) > 1

@@ -1,7 +1,5 @@
 """Brightness and sharpness of a person in a clip, measured on a few frames."""
 
-from collections.abc import Iterable, Iterator
-
 import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -9,7 +7,7 @@ from jaxtyping import Float, UInt8
 from robojackson.clips.people.person_extent import box
 
 SAMPLES = 16
-"""Pictures that are looked at."""
+"""Pictures that are looked at, and up to twice as many."""
 MARGIN = 0.05
 """Around the person, sizes of his box."""
 TALL = 192
@@ -19,45 +17,38 @@ LEAST_PX = 24
 
 
 class PictureQuality:
-    """Looks at some of the pictures of a clip as they pass by.
+    """Looks at some of the pictures of a clip as they pass by, evenly spread however long it is."""
 
-    Args:
-        landmarks: Landmarks of the person in every frame, 0..1, NaN where no person was detected.
-    """
+    def __init__(self) -> None:
+        self._looks: list[tuple[float, float]] = []
+        self._step, self._seen = 1, 0
 
-    def __init__(self, landmarks: Float[np.ndarray, "T 33 2"]) -> None:
-        seen = np.flatnonzero(np.isfinite(landmarks).all((1, 2)))
-        chosen = np.linspace(0, len(seen) - 1, min(SAMPLES, len(seen))).round().astype(int)
-        self._landmarks, self._chosen = landmarks, set(seen[chosen].tolist())
-        self._light: list[float] = []
-        self._sharp: list[float] = []
-
-    def watch(
-        self, images: Iterable[UInt8[np.ndarray, "H W 3"]]
-    ) -> Iterator[UInt8[np.ndarray, "H W 3"]]:
-        """Yield the same pictures, RGB, one a frame."""
-        for index, image in enumerate(images):
-            if index in self._chosen:
-                self._look(image, self._landmarks[index])
-            yield image
+    def add_frame(self, image: UInt8[np.ndarray, "H W 3"], xy: Float[np.ndarray, "33 2"]) -> None:
+        """Take the next picture, RGB, and the person in it, 0..1, NaN where nobody was found."""
+        if not np.isfinite(xy).all():
+            return
+        if self._seen % self._step == 0:
+            self._look(image, xy)
+        self._seen += 1
+        if len(self._looks) >= 2 * SAMPLES:
+            self._looks, self._step = self._looks[::2], 2 * self._step
 
     @property
     def brightness(self) -> float | None:
         """Mean grey level of the person's box, 0..1, median of the pictures; None for none."""
-        return float(np.median(self._light)) if self._light else None
+        return float(np.median([light for light, _ in self._looks])) if self._looks else None
 
     @property
     def sharpness(self) -> float | None:
         """Share of the contrast that is fine detail, `detail_share`; None for none."""
-        return float(np.median(self._sharp)) if self._sharp else None
+        return float(np.median([sharp for _, sharp in self._looks])) if self._looks else None
 
     def _look(self, image: np.ndarray, xy: np.ndarray) -> None:
         found = box(xy, MARGIN, image.shape[1], image.shape[0])
         if found is None or min(found[2] - found[0], found[3] - found[1]) < LEAST_PX:
             return
         grey = cv2.cvtColor(image[found[1] : found[3], found[0] : found[2]], cv2.COLOR_RGB2GRAY)
-        self._light.append(float(grey.mean()) / 255.0)
-        self._sharp.append(detail_share(grey))
+        self._looks.append((float(grey.mean()) / 255.0, detail_share(grey)))
 
 
 def detail_share(grey: UInt8[np.ndarray, "H W"]) -> float:

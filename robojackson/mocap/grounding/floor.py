@@ -11,19 +11,12 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from robojackson.body.feet import stretches
 from robojackson.body.forward_kinematics import unit
 from robojackson.body.skeleton import keypoint, pair
 from robojackson.body.smoothing import lowpass
 from robojackson.config import config_dataclass
 
 GRAVITY = 9.81
-FALL_CUTOFF_HZ = 6.0
-SHORTEST_FALL_S = 0.1
-FALL_SHARE = 0.35
-"""Least mean acceleration of a whole flight, of gravity."""
-FLIGHT_EDGE_S = 0.15
-"""Smoothing hides so much of the beginning and of the end of a free fall, seconds."""
 CAMERA_UP = np.array([0.0, -1.0, 0.0])
 AXIS_WEIGHTS = np.array([1.0, 1.0, 0.4])
 """Of a speed in the camera frame; in depth a single camera sees mostly noise."""
@@ -177,59 +170,6 @@ def centre_of_mass(points: Float[np.ndarray, "T 29 3"]) -> Float[np.ndarray, "T 
         + 0.044 * segment("elbow", "wrist", 0.5)
     )
     return result
-
-
-def free_fall(height: Float[np.ndarray, " T"], fps: float) -> np.ndarray:
-    """Frames in which the pelvis falls freely: its acceleration is below -g / 2 for a while.
-
-    Args:
-        height: Height of the pelvis, metres.
-        fps: Frames a second.
-    """
-    if len(height) < 5:
-        return np.zeros(len(height), bool)
-    acceleration = np.gradient(np.gradient(lowpass(height, fps, FALL_CUTOFF_HZ))) * fps**2
-    falling = acceleration < -GRAVITY / 2.0
-    for start, end in stretches(falling):
-        if (end - start) / fps < SHORTEST_FALL_S:
-            falling[start:end] = False
-    result: np.ndarray = falling
-    return result
-
-
-def flight(
-    lowest: Float[np.ndarray, " T"],
-    height: Float[np.ndarray, " T"],
-    falling: np.ndarray,
-    fps: float,
-) -> np.ndarray:
-    """Free fall and the frames around it in which the feet still rise or have not yet landed.
-
-    Smoothing spreads the push and the landing into the fall, so that only its middle is seen. What
-    it cannot change is the mean: a flight grows only while its mean acceleration is that of a fall.
-
-    Args:
-        lowest: Height of the lowest foot point, metres; any level.
-        height: Of the centre of mass, metres; any level.
-        falling: Frames of free fall.
-        fps: Frames a second.
-    """
-    most = round(FLIGHT_EDGE_S * fps)
-    speed = np.gradient(height) * fps
-    flying = np.array(falling, bool)
-
-    def falls(start: int, end: int) -> bool:
-        duration = (end - 1 - start) / fps
-        return bool(speed[end - 1] - speed[start] < -FALL_SHARE * GRAVITY * duration)
-
-    for start, end in stretches(flying):
-        first, last = max(start - most, 0), min(end + most, len(lowest))
-        while start > first and lowest[start - 1] < lowest[start] and falls(start - 1, end):
-            start -= 1
-        while end < last and lowest[end] < lowest[end - 1] and falls(start, end + 1):
-            end += 1
-        flying[start + 1 : end - 1] = True
-    return flying
 
 
 def floor_height(

@@ -13,6 +13,7 @@ from robojackson.body import feet
 from robojackson.body.smoothing import lowpass
 from robojackson.config import config_dataclass
 from robojackson.mocap.grounding import contacts, foot_pinning, leg_ik
+from robojackson.mocap.grounding import flight as air
 from robojackson.mocap.grounding import floor as ground
 from robojackson.mocap.grounding.foot_pinning import FootPinningConfig
 from robojackson.mocap.pose.posed_body import Body
@@ -53,13 +54,15 @@ class _Evidence:
     along: Float[np.ndarray, "T 4"]
     slope: Float[np.ndarray, " T"]
     falling: np.ndarray
+    jumps: np.ndarray
     config: GroundingConfig
 
     def states(self, body: Body) -> Int[np.ndarray, "T 4"]:
         height = body.feet[..., 2]
-        return contacts.contacts(
+        found = contacts.contacts(
             height, self.speed, self.falling, self.fps, self.config.contact, self.along
         )
+        return np.where(self.jumps[:, None], AIR, found).astype(np.int8)
 
     def dropped(self, body: Body, airborne: np.ndarray) -> Body:
         """The floor under the lowest foot point brought to z = 0."""
@@ -71,11 +74,12 @@ class _Evidence:
 def ground_body(body: Body, fps: float, config: GroundingConfig) -> Stance:
     """The body on the floor, its feet level and pinned where they stand, and the contacts."""
     height = ground.centre_of_mass(body.pose.points)[:, 2]
-    falling = ground.free_fall(height, fps)
-    flying = ground.flight(body.feet[..., 2].min(1), height, falling, fps)
+    jumps = air.ballistic(height, body.feet[..., 2].min(1), fps)
+    falling = air.free_fall(height, fps) | jumps
+    flying = air.flight(body.feet[..., 2].min(1), height, falling, fps) | jumps
     speed, root = contacts.image_speed(body.feet, fps), body.pose.points[:, 0]
     along = contacts.ray_speed(body.feet, fps)
-    evidence = _Evidence(fps, speed, along, root[:, 1] / root[:, 0], falling, config)
+    evidence = _Evidence(fps, speed, along, root[:, 1] / root[:, 0], falling, jumps, config)
     bias = np.full((len(falling), 2), feet.pitch_bias(body.feet, fps))
     body = evidence.dropped(body.aimed(feet.turn_feet(body.pose.points, bias)), flying)
     planted = pinned = evidence.states(body) == PLANTED
@@ -85,7 +89,7 @@ def ground_body(body: Body, fps: float, config: GroundingConfig) -> Stance:
         states = evidence.states(body)
         pinned, planted = planted, planted | (states == PLANTED)
         airborne = (states == AIR).all(1)
-        flying = ground.flight(body.feet[..., 2].min(1), height, airborne, fps)
+        flying = jumps | air.flight(body.feet[..., 2].min(1), height, airborne, fps)
     body = evidence.dropped(body, flying)
     for _ in range(LIFTS):
         body = body.aimed(leg_ik.move_feet(body.pose.points, leg_ik.lift_offsets(body.feet)), share)

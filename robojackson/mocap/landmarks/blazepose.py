@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
+from robojackson.body.forward_kinematics import unit
 from robojackson.clips.people.camera_path import warp
 from robojackson.errors import NoPersonFound, TrackTooShort, UnknownName
 from robojackson.geometry.shortest_path import viterbi
@@ -30,7 +31,12 @@ which one is real, under eight cameras."""
 SWAP_PRIOR_M = 0.003
 """What a frame with exchanged sides costs, metres of mean displacement; tuned on person_cam2."""
 SWAP_FPS = 15.0
-"""At fewer frames a second a turn looks like an exchange: 10 of 26 frames of a dancer at 8 were."""
+"""At fewer frames a second a turn looks like an exchange (10 of 26 frames of a dancer at 8 were):
+there it is one only where shoulders and hips face the other way from one frame to the next."""
+FEWEST_FPS = 6.0
+"""At fewer yet nothing tells an exchange from a turn."""
+FACING_PRIOR = 0.03
+"""What a frame with exchanged sides costs there, half turns."""
 
 
 def landmark(name: str) -> int:
@@ -95,7 +101,7 @@ def repair(track: LandmarkTrack) -> Landmarks:
         missed = len(track) - int(found.sum())
         raise NoPersonFound(f"no person found in {missed} of {len(track)} frames")
     seen = track_landmarks(track)
-    return raise_hips(unswap(seen) if track.fps >= SWAP_FPS else seen)
+    return raise_hips(unswap(seen, track.fps))
 
 
 def track_landmarks(track: LandmarkTrack) -> Landmarks:
@@ -135,9 +141,9 @@ def fill_gaps(values: np.ndarray, found: np.ndarray) -> np.ndarray:
     return np.stack(filled, -1).reshape(values.shape)
 
 
-def unswap(landmarks: Landmarks) -> Landmarks:
+def unswap(landmarks: Landmarks, fps: float) -> Landmarks:
     """Exchange left and right of the body in the frames where that makes the track continuous."""
-    swap = swapped_frames(landmarks)
+    swap = swapped_frames(landmarks, fps)
     if not swap.any():
         return landmarks
     return replace(
@@ -149,18 +155,39 @@ def unswap(landmarks: Landmarks) -> Landmarks:
     )
 
 
-def swapped_frames(landmarks: Landmarks) -> np.ndarray:
+def swapped_frames(landmarks: Landmarks, fps: float) -> np.ndarray:
     """The likeliest frames in which the detector took left for right, by dynamic programming.
 
     Each frame is kept or crossed; a step costs the mean displacement of the body's landmarks (image
-    at the person's scale and depth, metres), a crossed frame a little more.
+    at the person's scale and depth, metres) or, where frames are far apart, the turn of shoulders
+    and hips; a crossed frame a little more.
     """
+    if fps < FEWEST_FPS:
+        return np.zeros(len(landmarks.image), bool)
+    same, other = _steps(landmarks) if fps >= SWAP_FPS else _turns(landmarks)
+    prior = SWAP_PRIOR_M if fps >= SWAP_FPS else FACING_PRIOR
+    changes = np.stack([same, other, other, same], -1).reshape(-1, 2, 2)
+    crossing = np.tile([0.0, prior], (len(landmarks.image), 1))
+    return viterbi(crossing, changes).astype(bool)
+
+
+def _steps(landmarks: Landmarks) -> tuple[np.ndarray, np.ndarray]:
+    """Displacement from frame to frame with sides as they are, and with those of one exchanged."""
     span = np.linalg.norm(np.ptp(landmarks.image[:, BODY], axis=1), axis=-1).mean()
     metres = landmarks.image * (PERSON_M / max(span, 1.0))
     features = np.concatenate([metres, landmarks.local[..., 2:]], -1)
     kept, crossed = features[:, NECK_DOWN], features[:, MIRROR][:, NECK_DOWN]
     same = np.linalg.norm(kept[1:] - kept[:-1], axis=-1).mean(-1)
     other = np.linalg.norm(crossed[1:] - kept[:-1], axis=-1).mean(-1)
-    changes = np.stack([same, other, other, same], -1).reshape(-1, 2, 2)
-    crossing = np.tile([0.0, SWAP_PRIOR_M], (len(kept), 1))
-    return viterbi(crossing, changes).astype(bool)
+    return same, other
+
+
+def _turns(landmarks: Landmarks) -> tuple[np.ndarray, np.ndarray]:
+    """Turn of the line from right to left, half turns, and what it would be with one exchanged."""
+    pairs = [
+        landmarks.local[:, one] - landmarks.local[:, other] for one, other in (HIPS, SHOULDERS)
+    ]
+    line = unit(np.sum(pairs, axis=0))
+    cosine = np.clip(np.sum(line[1:] * line[:-1], -1), -1.0, 1.0)
+    turn = np.arccos(cosine) / np.pi
+    return turn, 1.0 - turn

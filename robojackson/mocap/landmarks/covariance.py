@@ -63,11 +63,11 @@ def covariances(
     jacobian, _ = residuals(body, evidence, config)
     normal = np.einsum("tri,trj->tij", jacobian, jacobian)
     count = len(normal) + len(normal) % 2
-    coupling = _second_difference(len(normal), count) * stiffness(evidence.fps, config)
+    coupling = _second_difference(stiffness(body, evidence.fps, config), count)
     blocks = np.zeros((count, SIZE, SIZE))
     blocks[: len(normal)] = normal
     blocks[len(normal) :] = np.eye(SIZE)
-    blocks += np.eye(SIZE) * coupling[0][:, None, None]
+    blocks += np.eye(SIZE) * coupling[0][:, None]
     return _diagonal_of_inverse(*_paired(blocks, coupling))[: len(normal)]
 
 
@@ -81,30 +81,29 @@ def root_relative(covariance: Float[np.ndarray, "T 36 36"]) -> Float[np.ndarray,
     return result
 
 
-def _second_difference(frames: int, count: int) -> Float[np.ndarray, "3 T"]:
-    """Diagonals 0, 1 and 2 of D2' D2 over so many frames, padded with zeros."""
+def _second_difference(stiff: Float[np.ndarray, "S 36"], count: int) -> Float[np.ndarray, "3 T 36"]:
+    """Diagonals 0, 1 and 2 of D2' W D2 over two frames more than weights, padded with zeros."""
     second = np.array([1.0, -2.0, 1.0])
-    diagonals = np.zeros((3, count))
-    if frames < 3:
-        return diagonals
+    diagonals = np.zeros((3, count, SIZE))
+    frames = len(stiff) + 2
     for start in range(3):
         for apart in range(3 - start):
             product = second[start] * second[start + apart]
-            diagonals[apart, start : frames - 2 + start] += product
+            diagonals[apart, start : frames - 2 + start] += product * stiff
     return diagonals
 
 
 def _paired(blocks: np.ndarray, coupling: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Block tridiagonal form over pairs of frames: diagonal blocks, and those above them."""
     pairs, eye = len(blocks) // 2, np.eye(SIZE)
+    one, two = (coupling[apart][:, None] * eye for apart in (1, 2))
     diagonal = np.zeros((pairs, 2, SIZE, 2, SIZE))
     diagonal[:, 0, :, 0], diagonal[:, 1, :, 1] = blocks[0::2], blocks[1::2]
-    inside = coupling[1][0::2, None, None] * eye
-    diagonal[:, 0, :, 1] = diagonal[:, 1, :, 0] = inside
+    diagonal[:, 0, :, 1] = diagonal[:, 1, :, 0] = one[0::2]
     above = np.zeros((pairs, 2, SIZE, 2, SIZE))
-    above[:, 0, :, 0] = coupling[2][0::2, None, None] * eye
-    above[:, 1, :, 0] = coupling[1][1::2, None, None] * eye
-    above[:, 1, :, 1] = coupling[2][1::2, None, None] * eye
+    above[:, 0, :, 0] = two[0::2]
+    above[:, 1, :, 0] = one[1::2]
+    above[:, 1, :, 1] = two[1::2]
     return diagonal.reshape(pairs, 2 * SIZE, -1), above.reshape(pairs, 2 * SIZE, -1)
 
 

@@ -8,10 +8,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
-from robojackson.clips.people.camera_path import camera_path
+import cv2
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from robojackson.clips.people.camera_path import CameraFollower
 from robojackson.clips.people.dancer import DancerConfig, track_dancer
 from robojackson.clips.quality.picture_quality import PictureQuality
-from robojackson.clips.video import VideoInfo, timed_frames
+from robojackson.clips.video import NEARLY, VideoInfo, timed_frames
 from robojackson.mocap.landmarks.model_fusion import fuse_tracks
 from robojackson.motion.landmark_track import LandmarkTrack
 
@@ -46,25 +50,65 @@ def detect_landmarks(
         progress: Called with (frames done, frames in all) once a frame and model.
     """
     models = models_of(quality)
-    tracks = []
+    tracks, background = [], Background()
     for turn, size in enumerate(models):
-        tracks.append(track_dancer(path, info, size, dancer, _part(progress, turn, len(models))))
+        watch = background.add_frame if len(models) == 1 else None
+        part = _part(progress, turn, len(models))
+        tracks.append(track_dancer(path, info, size, dancer, part, watch))
+    if len(tracks) == 1 and background.frames == len(tracks[0]) and not tracks[0].people:
+        return background.told(tracks[0])
     return with_camera(path, fuse_tracks(tracks) if len(tracks) > 1 else tracks[0])
 
 
 def with_camera(path: Path, track: LandmarkTrack) -> LandmarkTrack:
     """The track with the path of the camera, notes of it, and how well the person is seen."""
+    background = Background()
     images = (image for _, image in timed_frames(path, short_side=SHORT_SIDE))
-    marks = track.landmarks[..., :2]
-    looks = PictureQuality(marks)
-    found = camera_path(looks.watch(images), marks, track.width, track.height)
-    return replace(
-        track,
-        notes=(*track.notes, *found.notes),
-        to_first=found.to_first if found.moved else None,
-        brightness=looks.brightness,
-        sharpness=looks.sharpness,
-    )
+    for index, (image, row) in enumerate(zip(images, track.landmarks, strict=False)):
+        background.add_frame(index, image, row)
+    return background.told(track)
+
+
+class Background:
+    """What the pictures tell besides the landmarks, as they pass by."""
+
+    def __init__(self) -> None:
+        self.frames = 0
+        self._camera, self._looks = CameraFollower(), PictureQuality()
+
+    def add_frame(
+        self, index: int, image: UInt8[np.ndarray, "H W 3"], row: Float[np.ndarray, "33 _"]
+    ) -> None:
+        """Frame number `index` in RGB, of any size, with the person's landmarks."""
+        self.frames = index + 1
+        small, xy = shrunk(image), row[:, :2]
+        self._camera.add_frame(small, xy)
+        self._looks.add_frame(small, xy)
+
+    def told(self, track: LandmarkTrack) -> LandmarkTrack:
+        """The track of the same frames with all of it."""
+        found = self._camera.path(len(track), track.width, track.height)
+        return replace(
+            track,
+            notes=(*track.notes, *found.notes),
+            to_first=found.to_first if found.moved else None,
+            brightness=self._looks.brightness,
+            sharpness=self._looks.sharpness,
+        )
+
+
+def shrunk(image: UInt8[np.ndarray, "H W 3"]) -> UInt8[np.ndarray, "H W 3"]:
+    """The picture with a short side of about `SHORT_SIDE`; whole factors are far less work."""
+    factor = max(min(image.shape[:2]) // SHORT_SIDE, 1)
+    height, width = (side // factor for side in image.shape[:2])
+    if factor > 1:
+        whole = np.ascontiguousarray(image[: height * factor, : width * factor])
+        image = cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)
+    if min(height, width) > NEARLY * SHORT_SIDE:
+        scale = SHORT_SIDE / min(height, width)
+        size = (round(width * scale), round(height * scale))
+        image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    return np.asarray(image)
 
 
 def _part(progress: Progress | None, turn: int, turns: int) -> Progress | None:

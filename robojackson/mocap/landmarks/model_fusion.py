@@ -15,7 +15,6 @@ from robojackson.body.forward_kinematics import swing
 from robojackson.mocap.landmarks.blazepose import (
     MIRROR,
     SHOULDERS,
-    SWAP_FPS,
     landmark,
     swapped_frames,
     track_landmarks,
@@ -50,9 +49,9 @@ def _shape(track: LandmarkTrack) -> tuple[int, int, int, float]:
 
 
 def _unswapped(track: LandmarkTrack) -> LandmarkTrack:
-    if track.detected.sum() < 2 or track.fps < SWAP_FPS:  # a turn would look like an exchange
+    if track.detected.sum() < 2:
         return track
-    swap = swapped_frames(track_landmarks(track))
+    swap = swapped_frames(track_landmarks(track), track.fps)
     pick = np.where(swap[:, None], MIRROR, np.arange(len(MIRROR)))
     frames = np.arange(len(track))[:, None]
     return replace(

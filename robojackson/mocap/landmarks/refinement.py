@@ -15,6 +15,7 @@ from scipy.linalg import solveh_banded
 from robojackson.body.forward_kinematics import unit
 from robojackson.body.skeleton import keypoint
 from robojackson.config import config_dataclass
+from robojackson.mocap.landmarks.banded_matrix import add_acceleration, to_bands
 from robojackson.mocap.landmarks.blazepose import BODY, LANDMARK_NAMES, landmark
 
 SHAPE = (len(BODY), 3)
@@ -33,6 +34,8 @@ BONES = tuple(
 ORDER = [LANDMARK_NAMES[index] for index in BODY]
 HIPS = [ORDER.index("left_hip"), ORDER.index("right_hip")]
 LEAST_VISIBILITY = 0.1
+SUDDEN = 1.5
+"""Spreads of acceleration from which on it counts less than squared."""
 
 
 @config_dataclass
@@ -49,10 +52,10 @@ class RefineConfig:
     """
 
     enabled: bool = True
-    image_m: float = 0.03
+    image_m: float = 0.02
     depth_m: float = 0.07
-    bone_m: float = 0.02
-    acceleration_mps2: float = 30.0
+    bone_m: float = 0.03
+    acceleration_mps2: float = 20.0
     rounds: int = 12
 
 
@@ -151,21 +154,29 @@ def _step(
     jacobian, residual = residuals(body, evidence, config)
     normal = np.einsum("tri,trj->tij", jacobian, jacobian)
     moment = np.einsum("tri,tr->ti", jacobian, residual)
-    bands = _to_bands(normal)
-    stiff = stiffness(evidence.fps, config)
+    bands = to_bands(normal)
+    stiff = stiffness(body, evidence.fps, config)
     second = np.diff(body.reshape(count, SIZE), 2, axis=0) * stiff
     for offset, factor in enumerate((1.0, -2.0, 1.0)):
         moment[offset : count - 2 + offset] += factor * second
     if count > 2:
-        _add_acceleration(bands, count, stiff)
+        add_acceleration(bands, stiff)
     step = solveh_banded(bands, -moment.reshape(-1))
     result: np.ndarray = step.reshape(count, *SHAPE)
     return result
 
 
-def stiffness(fps: float, config: RefineConfig) -> float:
-    """Weight of the squared second difference of a coordinate, 1/m^2; the same at any rate."""
-    return (fps**2 / config.acceleration_mps2) ** 2 * 30.0 / fps
+def stiffness(
+    body: Float[np.ndarray, "T 12 3"], fps: float, config: RefineConfig
+) -> Float[np.ndarray, "T-2 36"]:
+    """Weight of the squared second difference of each coordinate, 1/m^2, pseudo-Huber.
+
+    A frame says as much at any rate, so that a clip of few frames is not smoothed more: detectors
+    err alike in neighbouring frames. What truly accelerates, as a kick does, is let go.
+    """
+    acceleration = np.diff(body, 2, axis=0) * fps**2 / config.acceleration_mps2
+    robust = (1.0 + (acceleration**2).sum(-1) / SUDDEN**2) ** -0.5
+    return np.repeat(robust * (fps**2 / config.acceleration_mps2) ** 2, 3, axis=1)
 
 
 def residuals(
@@ -223,23 +234,3 @@ def _bones(body: np.ndarray, evidence: Evidence, spread: float) -> tuple[np.ndar
     jacobian[:, each, ends] = along
     jacobian[:, each, starts] = -along
     return jacobian, (np.linalg.norm(bone, axis=-1) - evidence.lengths) / spread
-
-
-def _to_bands(blocks: Float[np.ndarray, "T 36 36"]) -> np.ndarray:
-    """Upper banded storage (scipy) of a block-diagonal symmetric matrix, with two frames above."""
-    above = 2 * SIZE
-    bands = np.zeros((above + 1, len(blocks) * SIZE))
-    for offset in range(SIZE):
-        values = np.zeros((len(blocks), SIZE))
-        values[:, offset:] = np.diagonal(blocks, offset, axis1=1, axis2=2)
-        bands[above - offset] = values.reshape(-1)
-    return bands
-
-
-def _add_acceleration(bands: np.ndarray, count: int, stiff: float) -> None:
-    """Add D2' D2 of every coordinate: it couples frames one and two apart."""
-    second = np.diff(np.eye(3), 2, axis=0)[0]
-    for first, left in enumerate(second):
-        for last in range(first, 3):
-            columns = slice(last * SIZE, (count - 2 + last) * SIZE)
-            bands[2 * SIZE - (last - first) * SIZE, columns] += stiff * left * second[last]

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
+from pydantic import Field
 
 from robojackson.config import config_dataclass
 from robojackson.mocap.landmarks.blazepose import BODY
@@ -30,8 +31,9 @@ class TemporalConfig:
     Attributes:
         enabled: Whether to correct the detector at all.
         weights: Weights file; None is the one that comes with the package.
-        trust: Share of the correction that is applied to what was seen; the detector errs otherwise
-            on real people than on rendered ones, and a hidden joint has nothing else to go by.
+        detector_m: Spread of the detector's own depth, metres: what was seen stays the nearer to it
+            the less sure the network is, a hidden joint has nothing else to go by; 0 leaves all
+            that was seen to the detector.
         depth_floor_m: Least spread of a corrected depth, metres.
         hypothesis: 0 is the likeliest motion; n > 0 the n-th sample of what hidden limbs may do.
         seed: Seed of the samples.
@@ -39,7 +41,7 @@ class TemporalConfig:
 
     enabled: bool = True
     weights: str | None = None
-    trust: float = 0.8
+    detector_m: float = Field(default=0.12, ge=0)
     depth_floor_m: float = 0.02
     hypothesis: int = 0
     seed: int = 0
@@ -63,8 +65,8 @@ class Lifted:
     spread: Float[np.ndarray, "T 12 2"]
 
     def depth_sd(self, least_m: float) -> Float[np.ndarray, "T 12"]:
-        """Standard deviation of the depths, metres: 1.25 times a mean absolute error (Gauss)."""
-        return np.maximum(1.25 * self.spread[..., 1], least_m)
+        """Standard deviation of the depths, metres."""
+        return depth_sd(self.spread, least_m)
 
 
 def lift(
@@ -94,10 +96,25 @@ def lift(
         rng = np.random.default_rng([config.seed, config.hypothesis])
         change = change + imagine(hidden, spread, coarse.visibility, weights, rng)
     back = np.clip(np.arange(len(placed)) * features.FPS / fps, 0.0, len(places) - 1.0)
-    seen = 1.0 - unseen(visibility)[..., None]
-    change = (1.0 - (1.0 - config.trust) * seen) * features.resample(change, back)
-    points = features.to_camera(sight, corrected(sight, change))
-    return Lifted(carry_along(placed, points), features.resample(spread, back))
+    spread, change = features.resample(spread, back), features.resample(change, back)
+    hidden_share = unseen(visibility)
+    share = hidden_share + (1.0 - hidden_share) * believed(spread, config)
+    points = features.to_camera(sight, corrected(sight, share[..., None] * change))
+    return Lifted(carry_along(placed, points), spread)
+
+
+def believed(
+    spread: Float[np.ndarray, "T 12 2"], config: TemporalConfig
+) -> Float[np.ndarray, "T 12"]:
+    """Share of the correction: the weight of the network's depth beside the detector's."""
+    detector = config.detector_m**2
+    network = depth_sd(spread, config.depth_floor_m) ** 2
+    return np.asarray(detector / (detector + network))
+
+
+def depth_sd(spread: Float[np.ndarray, "T 12 2"], least_m: float) -> Float[np.ndarray, "T 12"]:
+    """Standard deviation of the depths, metres: 1.25 times a mean absolute error (Gauss)."""
+    return np.maximum(1.25 * spread[..., 1], least_m)
 
 
 def corrected(sight: ClipView, change: Float[np.ndarray, "T 12 3"]) -> Float[np.ndarray, "T 12 3"]:
@@ -110,12 +127,19 @@ def corrected(sight: ClipView, change: Float[np.ndarray, "T 12 3"]) -> Float[np.
 def correct(
     sight: ClipView, weights: error_flow.Weights
 ) -> tuple[np.ndarray, Float[np.ndarray, "T 12 2"], np.ndarray]:
-    """Correction (T, 12, 3), spread, and the features of the plain view."""
+    """Correction (T, 12, 3), spread, and the features of the plain view.
+
+    Where plain and mirrored view do not agree, the network is out of what it knows: their distance
+    adds to the spread.
+    """
     plain, spread, hidden = run(sight, weights)
     other, other_spread, _ = run(features.mirror(sight), weights)
     flip = np.array([-1.0, 1.0, 1.0])
-    change = (plain + features.mirror_body(other) * flip) / 2.0
-    return change, np.sqrt(spread * features.mirror_body(other_spread)), hidden
+    again = features.mirror_body(other) * flip
+    apart = np.abs(plain - again) / 2.0
+    apart = np.stack([apart[..., :2].mean(-1), apart[..., 2]], -1)
+    said = np.sqrt(spread * features.mirror_body(other_spread))
+    return (plain + again) / 2.0, np.hypot(said, apart), hidden
 
 
 def imagine(

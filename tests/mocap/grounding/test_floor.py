@@ -9,6 +9,7 @@ from robojackson.body.forward_kinematics import forward
 from robojackson.body.skeleton import REST_JOINTS, keypoint, pair
 from robojackson.body.smoothing import lowpass
 from robojackson.geometry.frames import CAMERA_TO_WORLD
+from robojackson.mocap.grounding import flight as air
 from robojackson.mocap.grounding import floor as ground
 
 FRAMES = 60
@@ -68,8 +69,8 @@ def test_centre_of_mass_moves_with_the_body() -> None:
 
 def test_a_thrown_body_falls_freely_and_a_standing_one_does_not() -> None:
     time = np.arange(30) / 30.0
-    assert ground.free_fall(1.0 + 3.0 * time - 4.905 * time**2, 30.0)[5:-5].all()
-    assert not ground.free_fall(np.full(30, 0.9), 30.0).any()
+    assert air.free_fall(1.0 + 3.0 * time - 4.905 * time**2, 30.0)[5:-5].all()
+    assert not air.free_fall(np.full(30, 0.9), 30.0).any()
 
 
 def test_floor_follows_the_lowest_foot() -> None:
@@ -85,19 +86,37 @@ def test_floor_does_not_rise_with_a_jump() -> None:
     assert np.abs(ground.floor_height(lowest, falling, 30.0, 3.0)).max() < 1e-9
 
 
+@pytest.mark.parametrize("height_m", [0.1, 0.25, 0.45])
+def test_a_jump_is_ballistic_as_long_as_it_lasts(height_m: float) -> None:
+    speed = np.sqrt(2.0 * 9.81 * height_m)
+    time = np.arange(60) / 30.0 - 0.7
+    rise = np.maximum(speed * time - 4.905 * time**2, 0.0) * (time > 0.0)
+    seen = lowpass(rise, 30.0, 4.0)
+    found = np.flatnonzero(air.ballistic(1.0 + seen, 0.02 + seen, 30.0))
+    true = np.flatnonzero(rise > 0.0)
+    assert abs(found[0] - true[0]) <= 2
+    assert abs(found[-1] - true[-1]) <= 2
+
+
+def test_somebody_who_drops_into_a_squat_does_not_jump() -> None:
+    time = np.arange(60) / 30.0
+    height = 1.0 - 0.4 * np.clip((time - 0.7) / 0.25, 0.0, 1.0) ** 2
+    assert not air.ballistic(height, np.zeros(60), 30.0).any()
+
+
 def test_flight_reaches_from_the_last_to_the_first_touch() -> None:
     lowest = np.array([0.0, 0.0, 0.1, 0.3, 0.4, 0.3, 0.1, 0.0, 0.0])
     falling = np.zeros(9, bool)
     falling[3:6] = True
     height = -4.905 * ((np.arange(9) - 4) / 30.0) ** 2
-    assert np.flatnonzero(ground.flight(lowest, height, falling, 30.0)).tolist() == [2, 3, 4, 5, 6]
+    assert np.flatnonzero(air.flight(lowest, height, falling, 30.0)).tolist() == [2, 3, 4, 5, 6]
 
 
 def test_feet_that_rise_while_the_body_does_not_fall_are_no_flight() -> None:
     lowest = np.array([0.0, 0.0, 0.1, 0.3, 0.4, 0.3, 0.1, 0.0, 0.0])
     falling = np.zeros(9, bool)
     falling[4] = True
-    found = ground.flight(lowest, np.zeros(9), falling, 30.0)
+    found = air.flight(lowest, np.zeros(9), falling, 30.0)
     assert np.flatnonzero(found).tolist() == [4]
 
 

@@ -67,6 +67,20 @@ def test_exchanged_sides_are_put_back(hip_shake: LandmarkTrack, frames: list[int
     assert np.allclose(repaired.image, repair(hip_shake).image)
 
 
+@pytest.mark.parametrize("frames", [[20], list(range(8, 13))])
+def test_exchanged_sides_are_put_back_at_ten_frames_a_second(
+    hip_shake: LandmarkTrack, frames: list[int]
+) -> None:
+    arrays = (hip_shake.landmarks, hip_shake.world_landmarks, hip_shake.visibility)
+    landmarks, world, visibility = (array[::3] for array in arrays)
+    slow = replace(
+        hip_shake, fps=10.0, landmarks=landmarks, world_landmarks=world, visibility=visibility
+    )
+    repaired = repair(swapped(slow, frames))
+    assert repaired.swapped == len(frames)
+    assert np.allclose(repaired.image, repair(slow).image)
+
+
 def test_undetected_frames_are_invalid_and_invisible(hip_shake: LandmarkTrack) -> None:
     repaired = repair(without(hip_shake, [20, 21]))
     assert np.flatnonzero(~repaired.valid).tolist() == [20, 21]

@@ -40,7 +40,8 @@ def test_covariances_are_the_blocks_of_the_inverse_of_the_whole_matrix(frames: i
         dense[36 * t : 36 * t + 36, 36 * t : 36 * t + 36] = jacobian[t].T @ jacobian[t]
     if frames > 2:
         second = np.kron(np.diff(np.eye(frames), 2, axis=0), np.eye(36))
-        dense += second.T @ second * (FPS**2 / CONFIG.acceleration_mps2) ** 2
+        stiff = refinement.stiffness(body, FPS, CONFIG).ravel()
+        dense += second.T @ np.diag(stiff) @ second
     whole = np.linalg.inv(dense).reshape(frames, 36, frames, 36)
     expected = whole[np.arange(frames), :, np.arange(frames)]
     assert np.allclose(covariances(body, evidence, CONFIG), expected, rtol=1e-4, atol=1e-9)

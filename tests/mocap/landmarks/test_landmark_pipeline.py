@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from robojackson.clips.people.dancer import DancerConfig
-from robojackson.clips.video import VideoLimits, probe
+from robojackson.clips.video import VideoLimits, probe, timed_frames
 from robojackson.mocap.landmarks import landmark_pipeline
 from robojackson.motion.landmark_track import LandmarkTrack
 
@@ -18,7 +18,7 @@ def followed(hip_shake: LandmarkTrack, monkeypatch: pytest.MonkeyPatch) -> list[
     """The pose models that were asked, each of which sees the recorded track."""
     asked: list[str] = []
 
-    def follow(path, info, size, dancer, progress=None) -> LandmarkTrack:
+    def follow(path, info, size, dancer, progress=None, watch=None) -> LandmarkTrack:
         asked.append(size)
         for done in (60, 120):
             if progress:
@@ -60,3 +60,24 @@ def test_a_camera_that_stands_leaves_the_track_without_a_note(followed: list[str
     found = look("full")
     assert found.to_first is None
     assert found.notes == ()
+
+
+def test_pictures_that_pass_by_tell_what_a_second_look_tells(hip_shake: LandmarkTrack) -> None:
+    """One decoding at full size and one made small from the start."""
+    background = landmark_pipeline.Background()
+    rows = hip_shake.landmarks
+    for index, ((_, image), row) in enumerate(zip(timed_frames(CLIP), rows, strict=True)):
+        background.add_frame(index, image, row)
+    once = background.told(hip_shake)
+    twice = landmark_pipeline.with_camera(CLIP, hip_shake)
+    assert once.to_first is None
+    assert twice.to_first is None
+    assert once.brightness == pytest.approx(twice.brightness, rel=0.02)
+    assert once.sharpness == pytest.approx(twice.sharpness, rel=0.1)
+
+
+@pytest.mark.parametrize("size", [(1920, 1080), (480, 640), (300, 320), (100, 90)])
+def test_pictures_are_made_about_as_small_as_wanted(size: tuple[int, int]) -> None:
+    small = landmark_pipeline.shrunk(np.zeros((*size, 3), np.uint8))
+    assert min(small.shape[:2]) <= 1.2 * landmark_pipeline.SHORT_SIDE
+    assert small.shape[0] / small.shape[1] == pytest.approx(size[0] / size[1], rel=0.02)

@@ -61,6 +61,17 @@ def test_bones_come_nearer_to_the_persons_lengths() -> None:
     assert worst(refined) < 0.2 * worst(noisy)
 
 
+def test_a_clip_of_few_frames_is_not_smoothed_away() -> None:
+    """An arm that swings by 40 cm once a second, thinned to ten frames a second."""
+    moving = true_clip()
+    time = np.arange(FRAMES) / FPS
+    moving[:, BODY[4], 1] += 0.4 * np.sin(2.0 * np.pi * time)
+    slow = moving[::3]
+    found = refine(slow, VISIBLE[::3], REST_JOINTS, FPS / 3.0, CONFIG)
+    swing = np.ptp(found[:, BODY[4], 1]) / np.ptp(slow[:, BODY[4], 1])
+    assert 0.85 < swing < 1.1
+
+
 def test_one_step_is_that_of_a_dense_solver() -> None:
     """The banded matrix against the same normal equations written out in full."""
     body = with_noisy_depth(true_clip(), 0.05, 4)[:8, BODY]
@@ -79,9 +90,10 @@ def test_one_step_is_that_of_a_dense_solver() -> None:
         part = slice(36 * frame, 36 * (frame + 1))
         dense[part, part] = jacobian[frame].T @ jacobian[frame]
         moment[part] = jacobian[frame].T @ residual[frame]
-    second = np.kron(np.diff(np.eye(8), 2, axis=0), np.eye(36)) * FPS**2 / CONFIG.acceleration_mps2
-    dense += second.T @ second
-    moment += second.T @ second @ body.reshape(-1)
+    second = np.kron(np.diff(np.eye(8), 2, axis=0), np.eye(36))
+    smooth = second.T @ np.diag(refinement.stiffness(body, FPS, CONFIG).ravel()) @ second
+    dense += smooth
+    moment += smooth @ body.reshape(-1)
     expected = np.linalg.solve(dense, -moment).reshape(body.shape)
     assert np.allclose(refinement._step(body, evidence, CONFIG), expected, atol=1e-9)
 

@@ -51,9 +51,17 @@ def test_lifting_twice_gives_the_same(seen: Landmarks, placed: np.ndarray) -> No
     assert np.array_equal(lifted(seen, placed).points, lifted(seen, placed).points)
 
 
-def test_no_trust_changes_nothing_of_the_body(seen: Landmarks, placed: np.ndarray) -> None:
-    image = lifted(seen, placed, trust=0.0).points[:, BODY]
+def test_a_sure_detector_is_left_as_it_is(seen: Landmarks, placed: np.ndarray) -> None:
+    image = lifted(seen, placed, detector_m=0.0).points[:, BODY]
     assert np.allclose(image[..., :2] / image[..., 2:], _rays(placed), atol=2e-3)
+
+
+def test_the_less_sure_the_network_is_the_less_it_is_believed() -> None:
+    spread = np.array([0.02, 0.05, 0.1, 0.3])[:, None, None] * np.ones((4, 12, 2))
+    share = temporal_lift.believed(spread, TemporalConfig())[:, 0]
+    assert (np.diff(share) < 0.0).all()
+    assert share[0] > 0.9
+    assert share[-1] < 0.15
 
 
 def test_the_mirrored_person_is_lifted_to_the_mirror_image(

@@ -1,0 +1,102 @@
+"""When a body flies: free fall, and jumps from the last to the first touch. World z up; metres."""
+
+import numpy as np
+from jaxtyping import Float
+
+from robojackson.body.feet import stretches
+from robojackson.body.smoothing import lowpass
+from robojackson.mocap.grounding.floor import GRAVITY
+
+FALL_CUTOFF_HZ = 6.0
+SHORTEST_FALL_S = 0.1
+FALL_SHARE = 0.35
+"""Least mean acceleration of a whole flight, of gravity."""
+FLIGHT_EDGE_S = 0.15
+"""Smoothing hides so much of the beginning and of the end of a free fall, seconds."""
+FLIGHT_MARGIN_S, RISE_SHARE = 0.07, 0.45
+"""Of a jump: what the change of sign misses at either end, and the least rise of the feet, share of
+that of a body in the air for so long."""
+
+
+def free_fall(height: Float[np.ndarray, " T"], fps: float) -> np.ndarray:
+    """Frames in which the pelvis falls freely: its acceleration is below -g / 2 for a while.
+
+    Args:
+        height: Height of the pelvis, metres.
+        fps: Frames a second.
+    """
+    if len(height) < 5:
+        return np.zeros(len(height), bool)
+    acceleration = np.gradient(np.gradient(lowpass(height, fps, FALL_CUTOFF_HZ))) * fps**2
+    falling = acceleration < -GRAVITY / 2.0
+    for start, end in stretches(falling):
+        if (end - start) / fps < SHORTEST_FALL_S:
+            falling[start:end] = False
+    result: np.ndarray = falling
+    return result
+
+
+def ballistic(
+    height: Float[np.ndarray, " T"], lowest: Float[np.ndarray, " T"], fps: float
+) -> np.ndarray:
+    """Frames of jumps: the body falls freely, and the feet rise as far as its fall asks for.
+
+    Push and landing accelerate upward, so that a flight lasts from one change of sign of the
+    acceleration to the next, whatever the smoothing.
+
+    Args:
+        height: Of the centre of mass, metres; any level.
+        lowest: Of the lowest foot point, metres; any level.
+        fps: Frames a second.
+    """
+    falling = free_fall(height, fps)
+    flying = np.zeros(len(height), bool)
+    if not falling.any():
+        return flying
+    smooth = lowpass(height, fps, FALL_CUTOFF_HZ)
+    downward = np.gradient(np.gradient(smooth)) < 0.0
+    margin = max(round(FLIGHT_MARGIN_S * fps), 1)
+    for start, end in stretches(downward):
+        if not falling[start:end].any():
+            continue
+        first, last = max(start - margin, 0), min(end + margin, len(height))
+        ground = max(lowest[first], lowest[last - 1])
+        rise = GRAVITY / 8.0 * ((last - first) / fps) ** 2
+        if lowest[first:last].max() - ground > RISE_SHARE * rise:
+            flying[first:last] = True
+    return flying
+
+
+def flight(
+    lowest: Float[np.ndarray, " T"],
+    height: Float[np.ndarray, " T"],
+    falling: np.ndarray,
+    fps: float,
+) -> np.ndarray:
+    """Free fall and the frames around it in which the feet still rise or have not yet landed.
+
+    Smoothing spreads the push and the landing into the fall, so that only its middle is seen. What
+    it cannot change is the mean: a flight grows only while its mean acceleration is that of a fall.
+
+    Args:
+        lowest: Height of the lowest foot point, metres; any level.
+        height: Of the centre of mass, metres; any level.
+        falling: Frames of free fall.
+        fps: Frames a second.
+    """
+    most = round(FLIGHT_EDGE_S * fps)
+    speed = np.gradient(height) * fps
+    flying = np.array(falling, bool)
+
+    def falls(start: int, end: int) -> bool:
+        duration = (end - 1 - start) / fps
+        return bool(speed[end - 1] - speed[start] < -FALL_SHARE * GRAVITY * duration)
+
+    for start, end in stretches(flying):
+        first, last = max(start - most, 0), min(end + most, len(lowest))
+        while start > first and lowest[start - 1] < lowest[start] and falls(start - 1, end):
+            start -= 1
+        while end < last and lowest[end] < lowest[end - 1] and falls(start, end + 1):
+            end += 1
+        flying[start + 1 : end - 1] = True
+    return flying
