@@ -3,6 +3,11 @@
 const Dance = (() => {
   const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
   const doubles = (text) => new Float64Array(bytes(text));
+  /* Numbers of 16 bits, as IEEE 754 has them. */
+  const halves = (text) => Float32Array.from(new Uint16Array(bytes(text)), (word) => {
+    const sign = word & 0x8000 ? -1 : 1, power = (word >> 10) & 31, part = word & 1023;
+    return sign * (power ? 2 ** (power - 15) * (1 + part / 1024) : 2 ** -24 * part);
+  });
 
   async function load(zipped) {
     const stream = new Blob([bytes(zipped)]).stream().pipeThrough(new DecompressionStream('gzip'));
@@ -30,6 +35,10 @@ const Dance = (() => {
       Object.assign(this, { nq, nv, nu });
       for (const name of ['qpos', 'qvel', 'points', 'lead']) this[name] = dance[name] && doubles(dance[name]);
       this.steps = this.qpos.length / nq;
+      if (dance.feedback) {
+        const { gain, offset, qpos, qvel } = dance.feedback;
+        this.feedback = { gain: halves(gain), offset: doubles(offset), qpos: doubles(qpos), qvel: doubles(qvel), apart: new Float64Array(2 * nv) };
+      }
       this.layers = dance.layers.map(({ weight, bias, inputs }) => ({ inputs, weight: new Float32Array(bytes(weight)), bias: new Float32Array(bytes(bias)) }));
       this.sites = dance.sites.map((name) => mujoco.mj_name2id(this.model, mujoco.mjtObj.mjOBJ_SITE.value, name));
       this.friction = Float64Array.from(this.model.geom_friction);
@@ -107,13 +116,34 @@ const Dance = (() => {
       return values;
     }
 
+    /* How the feedback along the reference moves a target, as `feedback.StepFeedback`. */
+    correct() {
+      const { nq, nv, nu, feedback } = this, { qpos, qvel } = this.data, { row, moved } = this.at(this.step), { apart, gain } = feedback;
+      const from = row * nq, own = feedback.qpos;
+      for (let k = 0; k < 3; k++) apart[k] = qpos[k] - own[from + k] - moved[k];
+      const [w, x, y, z] = [3, 4, 5, 6].map((k) => qpos[k]), [a, b, c, d] = [3, 4, 5, 6].map((k) => own[from + k]);
+      let turn = [a * w + b * x + c * y + d * z, a * x - b * w - c * z + d * y, a * y + b * z - c * w - d * x, a * z - b * y + c * x - d * w];
+      if (turn[0] < 0) turn = turn.map((value) => -value);
+      const sine = Math.hypot(turn[1], turn[2], turn[3]), factor = sine > 1e-12 ? (2 * Math.atan2(sine, turn[0])) / sine : 2;
+      for (let k = 0; k < 3; k++) apart[3 + k] = factor * turn[1 + k];
+      for (let k = 6; k < nv; k++) apart[k] = qpos[k + 1] - own[from + k + 1];
+      for (let k = 0; k < nv; k++) apart[nv + k] = qvel[k] - feedback.qvel[row * nv + k];
+      return Float64Array.from({ length: nu }, (_, k) => {
+        let sum = feedback.offset[row * nu + k];
+        for (let i = 0, at = (row * nu + k) * 2 * nv; i < 2 * nv; i++, at++) sum += gain[at] * apart[i];
+        const most = this.dance.feedback.limit[k];
+        return -Math.min(most, Math.max(-most, sum));
+      });
+    }
+
     /* One control step, as `Simulation.step`; false where the robot has fallen. */
     advance() {
       const { mujoco, model, data, dance, nu } = this, { row } = this.at(this.mode === 'statue' ? this.first : this.step + 1);
       const action = this.mode === 'policy' ? this.act(this.observe()) : new Float32Array(nu);
+      const moves = this.feedback && this.mode === 'policy' ? this.correct() : new Float64Array(nu);
       for (let k = 0; k < nu; k++) {
         const lead = this.lead && this.mode !== 'statue' ? this.lead[row * nu + k] : 0;
-        this.targets[k] = this.qpos[row * this.nq + 7 + dance.hinge[k]] + lead + dance.action[k] * action[k];
+        this.targets[k] = this.qpos[row * this.nq + 7 + dance.hinge[k]] + lead + moves[k] + dance.action[k] * action[k];
         this.last[k] = action[k];
       }
       for (let substep = 0; substep < dance.substeps; substep++) {

@@ -9,7 +9,7 @@ import numpy as np
 
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.report.web.shapes import packed, robot_shape
-from robojackson.rl.config.train_config import EvaluateConfig
+from robojackson.rl.config.train_config import ControlConfig, EvaluateConfig
 from robojackson.rl.evaluation.controllers import control_of, trained_driver
 from robojackson.rl.evaluation.rollouts import Starts
 from robojackson.rl.evaluation.starts import starts_of
@@ -23,9 +23,10 @@ from robojackson.rl.modes.observation import (
 )
 from robojackson.rl.policy import Policy
 from robojackson.rl.policy_facts import mode_of, observation_of
+from robojackson.rl.sim.feedback import feedback_of
 from robojackson.rl.sim.feedforward import lead_of
-from robojackson.rl.sim.motors import Motors, feedback_share, gains, residual_scale
-from robojackson.rl.sim.reference_clip import Clip
+from robojackson.rl.sim.motors import Motors, gains, residual_scale
+from robojackson.rl.sim.preview import driven_clip
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.robot.fall import Fall
 from robojackson.robot.mjcf import described_spec, mjcf_path
@@ -42,15 +43,14 @@ OBSERVED = ("full", "onboard")
 def live_data(policy: Policy, reference: ReferenceMotion, robot: Robot) -> dict[str, object] | None:
     """Return everything of a live dance; None where a browser cannot run it.
 
-    That is a policy of the paper's mode, of another observation or with feedback along the
-    reference, or a robot whose meshes collide.
+    That is a policy of the paper's mode or of another observation, or a robot whose meshes collide.
     """
     if mode_of(policy) != "track":
         return None
     control = control_of(policy, robot)
     if control.law != "pd" or _has_colliding_meshes(robot.model):
         return None
-    if feedback_share(robot, control) or observation_of(policy) not in OBSERVED:
+    if observation_of(policy) not in OBSERVED:
         return None
     motors, (kp, kd) = Motors.of(robot.model), gains(robot, control)
     lead, fall = lead_of(robot, reference, control), Fall.of(robot)
@@ -63,6 +63,7 @@ def live_data(policy: Policy, reference: ReferenceMotion, robot: Robot) -> dict[
         "qvel": packed(reference.qvel, np.float64),
         "points": packed(reference.keypoints_w, np.float64),
         "lead": None if lead is None else packed(lead, np.float64),
+        "feedback": _feedback(robot, reference, control),
         "cyclic": bool(reference.cyclic),
         "offset": np.asarray(reference.cycle_offset, float).tolist(),
         "sites": names,
@@ -120,7 +121,7 @@ def model_xml(robot: Robot) -> str:
 def records(policy: Policy, reference: ReferenceMotion, robot: Robot) -> list[dict[str, object]]:
     """Return noisy starts all over the motion and where the bodies are `SUBSTEPS` later."""
     control = control_of(policy, robot)
-    clip = Clip(reference, lead_of(robot, reference, control))
+    clip = driven_clip(robot, reference, control)
     starts, _ = starts_of(robot, clip, EvaluateConfig(phases=RECORDS, resets=1))
     starts = Starts(starts.step[:RECORDS], starts.qpos[:RECORDS], starts.qvel[:RECORDS])
     driver, count = trained_driver(policy, robot, reference), len(starts.step)
@@ -144,6 +145,21 @@ def records(policy: Policy, reference: ReferenceMotion, robot: Robot) -> list[di
         }
         for i in range(count)
     ]
+
+
+def _feedback(
+    robot: Robot, reference: ReferenceMotion, control: ControlConfig
+) -> dict[str, object] | None:
+    """Return the feedback along the reference, its gains in 16 bits; None without one."""
+    found = feedback_of(robot, [reference], control)
+    if found is None:
+        return None
+    gains = found.gains
+    return {
+        "gain": packed(gains.gain, np.float16),
+        **{name: packed(getattr(gains, name), np.float64) for name in ("offset", "qpos", "qvel")},
+        "limit": found.limit.tolist(),
+    }
 
 
 def _has_colliding_meshes(model: mujoco.MjModel) -> bool:
