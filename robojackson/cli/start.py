@@ -3,6 +3,7 @@
 import atexit
 import os
 import sys
+import threading
 from collections.abc import Callable
 from typing import NoReturn
 
@@ -35,8 +36,16 @@ def start(command: Callable[[], int]) -> NoReturn:
         os.environ["MUJOCO_GL"] = os.environ.get("MUJOCO_GL") or "disable"
     end.code = guarded(lambda: _run(command))
     if NEEDS_ITS_END not in sys.modules:
+        _wait_for_threads()
         end.leave()
     sys.exit(end.code)
+
+
+def _wait_for_threads() -> None:
+    """Wait for threads that are not daemons, as Python does at its end."""
+    for thread in threading.enumerate():
+        if thread is not threading.current_thread() and not thread.daemon:
+            thread.join()
 
 
 NEEDS_ITS_END = "prefect"

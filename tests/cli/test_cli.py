@@ -229,7 +229,7 @@ def test_dance_refuses_bad_input_before_prefect_starts(
     ("words", "told"),
     [
         ("find nosuchfolder --source folder", "nosuchfolder: no such file or folder"),
-        ("find nosuch.txt --source urls", "nosuch.txt: cannot be read"),
+        ("find nosuch.txt --source urls", "nosuch.txt: no such file"),
         ("find x --set bogus.key=3", "--set bogus.key: unknown key"),
         ("find x --config nosuch", "unknown configuration 'nosuch'"),
         ("find x --source nosuch", "unknown source 'nosuch'"),
