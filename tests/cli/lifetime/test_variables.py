@@ -36,6 +36,7 @@ def test_a_store_that_can_be_none_is_refused(store: str) -> None:
     [
         {"MUJOCO_GL": "egl", "JAX_PLATFORMS": "cpu,cuda", "OMP_NUM_THREADS": "2,1"},
         {"ROBOJACKSON_STORE": "s3://robojackson/a", "XLA_FLAGS": "--xla_cpu_x=1 --xla_y"},
+        {"XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1"},
         {"ROBOJACKSON_STORE": "never/made", "PREFECT_API_URL": "https://[::1]:4200/api"},
         {"MUJOCO_GL": "", "ROBOJACKSON_STORE": "", "PREFECT_LOGGING_LEVEL": "debug"},
         {"ROBOJACKSON_STORE": "memory://x", "PREFECT_LOGGING_LEVEL": "10"},
