@@ -52,7 +52,7 @@ def _level(value: str) -> str:
 
 
 def _flags(value: str) -> str:
-    """XLA ends the process for a flag that it does not know; words without a dash it passes over."""
+    """XLA ends the process for a flag that it does not know; other words it passes over."""
     dashed = [word for word in value.split() if word.startswith("-")]
     wrong = not dashed or any(not word.startswith("--xla") for word in dashed)
     return "flags of XLA begin with --xla" if wrong else ""
