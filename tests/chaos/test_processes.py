@@ -10,7 +10,7 @@ import pytest
 
 from tools.stack.processes import forks
 
-FORKS = "import os, time; print(os.fork(), flush=True); time.sleep(60)"
+FORKS = "import os, time; child = os.fork(); child and print(child, flush=True); time.sleep(60)"
 STARTS = (
     "import subprocess, sys, time; other = [sys.executable, '-c', 'import time; time.sleep(60)'];"
     "print(subprocess.Popen(other).pid, flush=True); time.sleep(60)"
