@@ -100,25 +100,15 @@ async def perform(
         moved = to_reference(best.clip, robot, settings)
         if settings.gate:
             check(json.loads(Store.from_environment().read(moved["scorecard"].key)))
-        tracked = (
-            None
-            if tracker is None
-            else track(
-                tracker,
-                best,
-                moved,
-                robot,
-                settings,
-                labels,
-                page_settings(best, candidates, robot, settings),
-            )
-        )
+        shown = page_settings(best, candidates, robot, settings)
+        tracked = None
+        if tracker is not None:
+            tracked = track(tracker, best, moved, robot, settings, labels, shown)
         if tracked is not None and settings.instant:
             made = tracked.made
         else:
             made = await _trained(best, moved, robot, settings, labels, began, tracked)
         folder = "" if tracked is None else tracked.folder
-        shown = page_settings(best, candidates, robot, settings)
         return {**made, **write_page(made, labels.move, best.name, shown, folder)}
 
 

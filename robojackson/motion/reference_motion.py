@@ -4,7 +4,7 @@ World frame: x forward, y left, z up, metres, the floor at z = 0; quaternions wx
 """
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -183,6 +183,13 @@ def _require_widths(arrays: Mapping[str, np.ndarray], facts: Facts) -> None:
             raise ValueError(f"{name} has a name twice")
     if (abs(np.linalg.norm(arrays["qpos"][:, 3:7], axis=1) - 1.0) > UNIT).any():
         raise ValueError("qpos: the root's quaternion has not length one")
+
+
+def motions_of(
+    references: ReferenceMotion | Sequence[ReferenceMotion],
+) -> list[ReferenceMotion]:
+    """Return one motion or several as a list."""
+    return [references] if isinstance(references, ReferenceMotion) else list(references)
 
 
 def _certificate(facts: Facts) -> Certificate | None:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
+from robojackson.motion.reference_motion import ReferenceMotion, motions_of, poses_sha256
 from robojackson.robot.model import Robot
 
 
@@ -26,8 +26,7 @@ class Task:
     @staticmethod
     def of(reference: ReferenceMotion | Sequence[ReferenceMotion], robot: Robot) -> "Task":
         """The task of following a reference, or several, with a robot."""
-        motions = [reference] if isinstance(reference, ReferenceMotion) else reference
-        digests = [poses_sha256(motion) for motion in motions]
+        digests = [poses_sha256(motion) for motion in motions_of(reference)]
         joined = hashlib.sha256("".join(digests).encode()).hexdigest()
         found = digests[0] if len(digests) == 1 else joined
         return Task(robot.description.name, robot.sha256, found)

@@ -4,8 +4,6 @@ python -m tools.assets.data_contracts_page            writes the page (so does `
 python -m tools.assets.data_contracts_page --check    fails when the page is not up to date
 """
 
-import argparse
-import sys
 from pathlib import Path
 
 from robojackson.clips.quality.stability import STABILITY_SCORE
@@ -16,6 +14,7 @@ from robojackson.motion.rollout import ROLLOUT
 from robojackson.motion.smpl_sequence import SMPL_SEQUENCE
 from robojackson.pipeline.table_schemas import EPISODE_RECORD, EVALUATION_RECORD, VIDEO_CANDIDATE
 from storage.candidate_catalogue import CANDIDATE_RECORD
+from tools.assets.generated_page import write_or_check
 
 PAGE = Path(__file__).parents[2] / "docs" / "data_contracts.md"
 HEAD = """# Data contracts
@@ -67,13 +66,7 @@ def _row(column: Column) -> str:
 
 def main() -> None:
     """Write the page, or compare it."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--check", action="store_true", help="only compare")
-    text = page()
-    if not parser.parse_args().check:
-        PAGE.write_text(text)
-    elif not PAGE.is_file() or PAGE.read_text() != text:
-        sys.exit(f"{PAGE.name} is not up to date: make docs")
+    write_or_check(PAGE, page(), __doc__)
 
 
 if __name__ == "__main__":

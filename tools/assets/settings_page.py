@@ -8,11 +8,9 @@ docstring says nothing, or a number without a unit, is an error.
     python -m tools.assets.settings_page --check    fails when the page is not up to date
 """
 
-import argparse
 import inspect
 import json
 import re
-import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
@@ -25,6 +23,7 @@ from configs.study_config import Study
 from robojackson.files.json_types import to_json_types
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.yaml_loader import load
+from tools.assets.generated_page import write_or_check
 
 PAGE = Path(__file__).parents[2] / "docs" / "settings.md"
 HEAD = """# Every setting
@@ -216,13 +215,7 @@ def _allowed(schema: Mapping[str, Any]) -> str:
 
 def main() -> None:
     """Write the page, or compare it."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--check", action="store_true", help="only compare")
-    text = page()
-    if not parser.parse_args().check:
-        PAGE.write_text(text)
-    elif not PAGE.is_file() or PAGE.read_text() != text:
-        sys.exit(f"{PAGE.name} is not up to date: make docs")
+    write_or_check(PAGE, page(), __doc__)
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from robojackson.errors import BadConfiguration, UnknownName
-from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.reference_motion import ReferenceMotion, motions_of
 from robojackson.rl.config.train_config import PaperConfig, TrackConfig
 from robojackson.rl.env.episode_totals import EpisodeTotals
 from robojackson.rl.modes.mode import Mode, Score
@@ -67,7 +67,7 @@ class TrackingCore:
         seed: int,
         rewards: Mapping[str, RewardFunction] = MappingProxyType({}),
     ) -> None:
-        motions = [reference] if isinstance(reference, ReferenceMotion) else list(reference)
+        motions = motions_of(reference)
         for motion in motions:
             _require_keypoints(motion, robot)
         self.config, self.n = config, n

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TypeVar
 
 import numpy as np
 from pydantic import PositiveInt
@@ -22,7 +21,6 @@ from robojackson.rl.sim.stock_humanoid import stock_observation
 from robojackson.rl.trackers.tracker import Tracker
 from robojackson.robot.model import Robot
 
-T = TypeVar("T")
 Evaluated = Policy | Tracker
 """Who may be evaluated: a policy that was trained on a motion, or a tracker of any."""
 Command = Callable[[Simulation, ClipStep, np.ndarray, np.ndarray], np.ndarray]
@@ -54,9 +52,9 @@ def drivers(
     found = {TRAINED: trained_driver(policy, robot, reference)}
     if control.law == "pd" and isinstance(policy, Policy):
         found["hold"] = replace(found[TRAINED], control=replace(control, law="hold"))
+        if resolved(control, robot).feedback:
+            found["regulator"] = Driver(control, _follow)
     usual = control if control.law == "pd" else ControlConfig(substeps=control.substeps)
-    if resolved(usual, robot).feedback and isinstance(policy, Policy):
-        found["regulator"] = Driver(usual, _follow)
     return found | _baselines(reference, robot, replace(usual, feedback=0.0), seed)
 
 

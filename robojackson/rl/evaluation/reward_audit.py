@@ -53,10 +53,12 @@ def audit_reward(
     robot: Robot, reference: ReferenceMotion, environment: TrackConfig | PaperConfig
 ) -> RewardAudit:
     """What the reward of an environment pays to bodies that do not dance."""
-    tracks = isinstance(environment, TrackConfig)
-    motion = reference if tracks else facing_ahead(reference)
-    law = control_of(environment) if isinstance(environment, TrackConfig) else ControlConfig()
-    clip = driven_clip(robot, motion, law) if tracks else Clip(motion)
+    if isinstance(environment, TrackConfig):
+        motion, law = reference, control_of(environment)
+        clip = driven_clip(robot, motion, law)
+    else:
+        motion, law = facing_ahead(reference), ControlConfig()
+        clip = Clip(motion)
     meter = RewardMeter(robot, motion, clip, environment)
     earned = {
         name: float(np.mean(_earned(robot, clip, meter, qpos, qvel)))

@@ -62,7 +62,8 @@ class Feedback:
     """The feedback along one motion or several, their steps one after the other.
 
     Attributes:
-        limit: Of the targets' offsets, rad.
+        gains: Gains and nominal states, scaled by the share of the control law.
+        limit: Largest offset of each target, rad.
     """
 
     gains: Gains
@@ -95,7 +96,7 @@ def _kept(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> Gain
     """Return the regulator of a motion, computed where it was not before."""
     path = robots_folder().parent / FOLDER / f"{_digest(robot, motion, control)}.npz"
     if path.is_file():
-        # What cannot be read is computed anew.
+        # A damaged file is computed again.
         with suppress(OSError, ValueError, KeyError, BadZipFile), np.load(path) as arrays:
             return Gains(*(arrays[one.name].astype(float) for one in fields(Gains)))
     gains = regulator_of(robot, motion, control)
@@ -107,7 +108,7 @@ def _keep(path: Path, gains: Gains) -> None:
     content = io.BytesIO()
     arrays = {name: getattr(gains, name).astype(np.float32) for name in ("gain", "offset")}
     np.savez_compressed(content, qpos=gains.qpos, qvel=gains.qvel, **arrays)
-    with suppress(StoreError):  # a store that takes nothing: computed anew the next time
+    with suppress(StoreError):  # a store that takes nothing: computed again next time
         FileTree(path.parent).write(path.name, content.getvalue())
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from robojackson.geometry.rotations import heading, quat_to_matrix
-from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.reference_motion import ReferenceMotion, motions_of
 from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.sim.feedback import feedback_of
 from robojackson.rl.sim.feedforward import lead_of
@@ -59,7 +59,7 @@ def driven_clip(
     ahead: bool = False,
 ) -> Clip:
     """Return the clip with its feed-forward, its feedback and, if `ahead`, the preview."""
-    motions = [references] if isinstance(references, ReferenceMotion) else list(references)
+    motions = motions_of(references)
     leads = [lead_of(robot, motion, control) for motion in motions]
     driven = [lead for lead in leads if lead is not None]
     lead = np.concatenate(driven) if driven else None

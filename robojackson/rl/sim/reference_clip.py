@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from robojackson.errors import RejectedReference, TrackTooShort
-from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.reference_motion import ReferenceMotion, motions_of
 
 LEAST_STEPS = 8
 STRIDE = 1_000_000
@@ -59,6 +59,15 @@ class ClipStep:
     preview: Float[np.ndarray, "N P"] | None = None
     feedback: Callable[[np.ndarray, np.ndarray], Float[np.ndarray, "N nu"]] | None = None
 
+    def angles(self, hinge: Int[np.ndarray, " nu"]) -> Float[np.ndarray, "N nu"]:
+        """Return the motors' targets that follow the step, with its lead and without feedback.
+
+        Args:
+            hinge: Index among the hinges of each motor's.
+        """
+        angles: np.ndarray = self.qpos[:, 7:][:, hinge]
+        return angles if self.lead is None else angles + self.lead
+
 
 class Clip:
     """Random access to reference motions by step.
@@ -86,7 +95,7 @@ class Clip:
         preview: Float[np.ndarray, "S P"] | None = None,
         law: Law | None = None,
     ) -> None:
-        motions = [references] if isinstance(references, ReferenceMotion) else list(references)
+        motions = motions_of(references)
         for motion in motions:
             _require_usable(motion)
         self._length = np.array([len(motion) for motion in motions])
@@ -192,7 +201,7 @@ class Clip:
 
 
 def _require_usable(motion: ReferenceMotion) -> None:
-    """Refuse what nobody can follow.
+    """Refuse a motion that no robot can follow.
 
     Raises:
         TrackTooShort, RejectedReference: too few steps, or values that are no numbers.

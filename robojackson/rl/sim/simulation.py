@@ -193,9 +193,7 @@ class Simulation:
 
     def reference_angles(self, step: ClipStep) -> Float[np.ndarray, "N nu"]:
         """Target hinge angles that follow a reference step with nothing learnt, rad."""
-        angles: np.ndarray = step.qpos[:, 7:][:, self.motors.hinge]
-        if step.lead is not None:
-            angles = angles + step.lead
+        angles = step.angles(self.motors.hinge)
         if step.feedback is not None and self.control.feedback:
             angles = angles + step.feedback(*self.sensed())
         return angles

@@ -54,6 +54,5 @@ class _PolicyFollower:
         (step,) = seen.window
         observed = self._observer.observe(seen.qpos, seen.qvel, seen.points, step, self._action)
         self._action = self._policy.act(observed[:, : self._observer.actor_size])
-        follow = step.qpos[:, 7:][:, self._hinge] + (0.0 if step.lead is None else step.lead)
-        targets: np.ndarray = follow + self._scale * self._action
+        targets: np.ndarray = step.angles(self._hinge) + self._scale * self._action
         return targets

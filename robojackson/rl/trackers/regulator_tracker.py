@@ -42,9 +42,7 @@ class _RegulatorFollower:
 
     def targets(self, seen: TrackerInput) -> Float[np.ndarray, "N nu"]:
         (step,) = seen.window
-        targets: np.ndarray = step.qpos[:, 7:][:, self._hinge]
-        if step.lead is not None:
-            targets = targets + step.lead
+        targets = step.angles(self._hinge)
         if step.feedback is not None:
             targets = targets + step.feedback(seen.qpos, seen.qvel)
         return targets
