@@ -50,6 +50,8 @@ def add_tracker(name: str, file: Path | None = None) -> Entry:
     pinned, path = tracker.file, tracker_path(tracker)
     told = {"tracker": name, "file": str(path or ""), "licence": tracker.licence}
     if pinned is None or pinned.url is None or path is None:
+        if file is not None:
+            raise BadPolicy(f"tracker {name!r} takes no file: it ships; leave out --file")
         open_tracker(tracker)
         return {**told, "added": False}
     if file is not None and not path.is_file():

@@ -98,10 +98,27 @@ def _kept(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> Gain
     if path.is_file():
         # A damaged file is computed again.
         with suppress(OSError, ValueError, KeyError, BadZipFile), np.load(path) as arrays:
-            return Gains(*(arrays[one.name].astype(float) for one in fields(Gains)))
+            found = Gains(*(arrays[one.name].astype(float) for one in fields(Gains)))
+            if _fits(found, robot, motion):
+                return found
     gains = regulator_of(robot, motion, control)
     _keep(path, gains)
     return gains
+
+
+def _fits(gains: Gains, robot: Robot, motion: ReferenceMotion) -> bool:
+    """Return whether gains have the shapes of a motion of the robot, and finite numbers."""
+    steps, model = len(motion), robot.model
+    sizes = {
+        "gain": (steps, model.nu, 2 * model.nv),
+        "offset": (steps, model.nu),
+        "qpos": (steps, model.nq),
+        "qvel": (steps, model.nv),
+    }
+    arrays = {name: getattr(gains, name) for name in sizes}
+    return all(arrays[name].shape == size for name, size in sizes.items()) and all(
+        np.isfinite(array).all() for array in arrays.values()
+    )
 
 
 def _keep(path: Path, gains: Gains) -> None:

@@ -169,6 +169,8 @@ def test_the_list_says_robot_licence_training_and_whether_it_is_here(pin, networ
 def test_a_tracker_without_a_file_has_nothing_to_add() -> None:
     said = in_process("trackers", "add", "regulator", "--json")
     assert (said.code, said.answer["added"], said.answer["file"]) == (0, False, "")
+    with pytest.raises(BadPolicy, match="'regulator' takes no file"):
+        add_tracker("regulator", Path("README.md"))
 
 
 def listed() -> dict[str, bool]:

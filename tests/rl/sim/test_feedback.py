@@ -117,9 +117,15 @@ def test_gains_are_computed_once_and_again_where_the_file_is_damaged(
         file.write_bytes(file.read_bytes()[:100])
     assert feedback.feedback_of(robot, [sway], FED) is not None
     assert calls == [1]
+    for file in (store / feedback.FOLDER).glob("*.npz"):
+        np.savez(
+            file, gain=np.zeros((2, 2)), offset=np.zeros(3), qpos=np.zeros(1), qvel=np.zeros(1)
+        )
+    assert feedback.feedback_of(robot, [sway], FED) is not None
+    assert calls == [1, 1], "gains of another shape were taken"
     other = dataclasses.replace(sway, qpos=sway.qpos + [0.0, 0, 0, 0, 0, 0, 0, *[1e-3] * 17])
     assert feedback.feedback_of(robot, [other], FED) is not None
-    assert calls == [1, 1]
+    assert calls == [1, 1, 1]
 
 
 def test_half_a_share_is_half_the_feedback(robot: Robot, sway: ReferenceMotion) -> None:
