@@ -1,4 +1,4 @@
-"""One file of a known digest from the web, whole or not at all; what was cut off goes on."""
+"""Download one file of a known digest, whole or not at all; resume a download that was cut off."""
 
 import http.client
 import os
@@ -13,21 +13,21 @@ TIMEOUT_S = 30.0
 ATTEMPTS = 3
 """Connections in a row that may break off."""
 PART = ".part"
-"""Ending of a file that is not whole yet."""
+"""Suffix of a file that is not complete yet."""
 REJECTED, PARTIAL = 416, 206
 """HTTP: no such range; a part of the file."""
 
 
 def download(url: str, target: Path, size: int, sha256: str) -> None:
-    """Bring a file; where an earlier call was cut off, its rest.
+    """Download a file; resume where an earlier call was cut off.
 
     Args:
-        target: Where it appears once it is whole and the pinned one; its folder exists.
+        target: Path of the complete file with the expected digest; its folder exists.
         size: Bytes.
         sha256: Digest of its content.
 
     Raises:
-        DownloadFailed: the server cannot be reached or refuses it, or it gives another file.
+        DownloadFailed: the server cannot be reached, refuses the file, or sends another file.
         OSError: the target cannot be written.
     """
     part = target.with_name(target.name + PART)
@@ -46,14 +46,14 @@ def download(url: str, target: Path, size: int, sha256: str) -> None:
     if digest != sha256 or part.stat().st_size != size:
         part.unlink()
         raise DownloadFailed(
-            f"{url} gives another file than the pinned one: its sha256 is {digest}, expected "
-            f"{sha256}; nothing was kept"
+            f"{url} sends another file than the pinned one: its sha256 is {digest}, expected "
+            f"{sha256}; nothing was saved"
         )
     part.replace(target)
 
 
 def _fetch(url: str, part: Path, size: int) -> None:
-    """Append what is missing of a file to its part; one byte more where the file is longer."""
+    """Append the missing bytes of a file to its part; one byte more where the file is longer."""
     have = part.stat().st_size if part.is_file() else 0
     if have >= size:
         return
@@ -66,7 +66,9 @@ def _fetch(url: str, part: Path, size: int) -> None:
         if have and cause.code == REJECTED:
             part.unlink()
             return
-        raise DownloadFailed(f"{url} cannot be had: HTTP {cause.code} {cause.reason}") from cause
+        raise DownloadFailed(
+            f"{url} cannot be downloaded: HTTP {cause.code} {cause.reason}"
+        ) from cause
     with answer, part.open("ab" if have and answer.status == PARTIAL else "wb") as file:
         left = size + 1 - file.tell()
         while left > 0 and (piece := answer.read(min(CHUNK, left))):
@@ -83,7 +85,7 @@ def _require_whole(url: str, part: Path, size: int, cut: Exception | None) -> No
     reason = getattr(cut, "reason", None) or cut or "the server ended it"
     if not have:
         raise DownloadFailed(
-            f"{url} cannot be had: {reason}; check the network, then try again"
+            f"{url} cannot be downloaded: {reason}; check the network, then try again"
         ) from cut
     raise DownloadFailed(
         f"{url} was cut off after {have:,} of {size:,} bytes ({reason}); the same command goes on"
@@ -91,6 +93,6 @@ def _require_whole(url: str, part: Path, size: int, cut: Exception | None) -> No
 
 
 def _is_remote(cause: Exception) -> bool:
-    """Whether it was the network, not the disk, that failed."""
+    """Return whether the network failed, not the disk."""
     network = (urllib.error.URLError, http.client.HTTPException, TimeoutError, ConnectionError)
     return isinstance(cause, network)

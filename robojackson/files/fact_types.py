@@ -1,6 +1,6 @@
-"""What facts about a whole table may be: types for the metadata of a schema, checked by pydantic.
+"""Types for the metadata of a table schema, checked by pydantic.
 
-Numbers are finite and within what the world allows; text and lists have an end.
+Numbers are finite and physically plausible; text and lists are bounded.
 """
 
 from typing import Annotated, Any
@@ -29,5 +29,5 @@ Figures = dict[Text, Number | None]
 
 
 def many(kind: Any, count: int) -> object:
-    """Return the type of a list of exactly so many."""
+    """Return the type of a list of exactly `count` values."""
     return Annotated[list[kind], Field(min_length=count, max_length=count)]

@@ -1,6 +1,6 @@
-"""Files by key under one root, where every failure is one line that names the file.
+"""Files by key under one root; every failure is one line that names the file.
 
-Commands write their results through it; the store of the flows is one of these, at any address.
+Commands write their results through it; the store of the flows is a `FileTree` at any address.
 """
 
 import os
@@ -23,7 +23,7 @@ class FileTree:
 
     Attributes:
         root: Path or address, as given.
-        place: The folder or whatever else keeps the files.
+        place: The folder or other storage that holds the files.
     """
 
     def __init__(self, root: str | Path, place: Place | None = None) -> None:
@@ -46,22 +46,22 @@ class FileTree:
         return digest
 
     def read(self, key: str) -> bytes:
-        """The content of a file."""
+        """Return the content of a file."""
         with in_one_line(f"cannot read {self.address(key)}"):
             return self.place.read(key)
 
     def sha256(self, key: str) -> str:
-        """Digest of a file's content."""
+        """Return the digest of a file's content."""
         with in_one_line(f"cannot read {self.address(key)}"):
             return self.place.sha256(key)
 
     def exists(self, key: str) -> bool:
-        """Whether there is a file under that key."""
+        """Return whether a file exists under the key."""
         with in_one_line(f"cannot look at {self.address(key)}"):
             return self.place.exists(key)
 
     def remove(self, key: str) -> None:
-        """Take a file away; one that is gone already is no error."""
+        """Remove a file; a missing file is no error."""
         with in_one_line(f"cannot remove {self.address(key)}"):
             try:
                 self.place.remove(key)
@@ -69,16 +69,16 @@ class FileTree:
                 return
 
     def list(self, prefix: str = "") -> list[str]:
-        """Keys under a folder, sorted."""
+        """Return the sorted keys under a folder."""
         with in_one_line(f"cannot list {self.address(prefix)}"):
             return sorted(self.place.list(prefix))
 
     def address(self, key: str) -> str:
-        """The path or URL of a key, for people."""
+        """Return the path or URL of a key, for messages."""
         return self.place.address(key)
 
     def require_writable(self) -> None:
-        """Raise the one line of a place that is full or refuses a write, before any work."""
+        """Raise a one-line error where the place is full or refuses a write, before any work."""
         key = f"{TEMPORARY}{os.getpid()}"
         with in_one_line(f"cannot write the store {self.root}"):
             self.place.put(key, b"robojackson " * 1024)
@@ -86,16 +86,16 @@ class FileTree:
 
 
 def digest_of(content: bytes | Path) -> str:
-    """Digest of bytes, or of a local file, in hexadecimal."""
+    """Return the digest of bytes, or of a local file, in hexadecimal."""
     return sha256_of(content) if isinstance(content, bytes) else sha256_of_file(content)
 
 
 @contextmanager
 def in_one_line(what: str, error: type[RoboJacksonError] = StoreError) -> Iterator[None]:
-    """Turn whatever a place raises into one line.
+    """Turn any exception of a place into a one-line error.
 
     Args:
-        what: What could not be done, the beginning of the line.
+        what: The operation that failed; the line begins with it.
         error: Class of the error that is raised; an error of ours passes unchanged.
     """
     try:
@@ -110,7 +110,7 @@ def in_one_line(what: str, error: type[RoboJacksonError] = StoreError) -> Iterat
 
 @contextmanager
 def without_empty_folders(out: Path) -> Iterator[None]:
-    """After a failure, the folders that were made for results and are empty go away again."""
+    """Remove the empty folders that were made for results when the command fails."""
     missing = [path for path in (out, *out.parents) if not path.exists()]
     try:
         yield
@@ -123,9 +123,9 @@ def without_empty_folders(out: Path) -> Iterator[None]:
 
 @contextmanager
 def results_in(out: Path) -> Iterator[FileTree]:
-    """A folder for results, refused at once when it cannot be written.
+    """Yield a folder for results; raise at once where it cannot be written.
 
-    It is made with the first result, so that nothing is left of a command that has none.
+    The folder is created with the first result, so that a command without results leaves nothing.
     """
     there = next(path for path in (out.absolute(), *out.absolute().parents) if path.exists())
     FileTree(there).require_writable()
@@ -133,7 +133,7 @@ def results_in(out: Path) -> Iterator[FileTree]:
 
 
 def _is_text(key: str) -> bool:
-    """Whether a name can be printed; a file system takes any bytes."""
+    """Return whether a name can be printed; a file system takes any bytes."""
     try:
         key.encode()
     except UnicodeEncodeError:

@@ -1,4 +1,4 @@
-"""The door for files from outside: one plain file, of a size that is read; JSON that has an end."""
+"""Read files from outside: one plain file of limited size; JSON of limited depth."""
 
 import json
 from pathlib import Path
@@ -15,20 +15,20 @@ LARGEST = 2**28
 def require_file(
     path: Path, error: type[RoboJacksonError] = StoreError, largest: int = LARGEST
 ) -> None:
-    """Refuse a path that cannot be read as one file.
+    """Raise an error for a path that cannot be read as one file.
 
     Args:
-        path: Of the file.
+        path: The file.
         error: Class of the error.
-        largest: Bytes.
+        largest: Largest allowed size, bytes.
 
     Raises:
-        RoboJacksonError: it is a folder, a device or a pipe, not there, or too large.
+        RoboJacksonError: the path is a folder, a device or a pipe, missing, or too large.
     """
     if path.is_dir():
         raise error("a folder, not a file", path)
     if not path.is_file():
-        raise error("no such file" if not path.exists() else "a device or a pipe, no file", path)
+        raise error("no such file" if not path.exists() else "a device or a pipe, not a file", path)
     if (size := path.stat().st_size) > largest:
         raise error(f"{size:,} bytes; at most {largest:,} are read", path)
 
@@ -36,10 +36,10 @@ def require_file(
 def read_file(
     path: Path, error: type[RoboJacksonError] = StoreError, largest: int = LARGEST
 ) -> bytes:
-    """Return the content of a file, refused as `require_file` does.
+    """Return the content of a file, checked by `require_file`.
 
     Raises:
-        RoboJacksonError: it cannot be read.
+        RoboJacksonError: the file cannot be read.
     """
     require_file(path, error, largest)
     try:
@@ -51,10 +51,10 @@ def read_file(
 def read_text(
     path: Path, error: type[RoboJacksonError] = StoreError, largest: int = LARGEST
 ) -> str:
-    """Return the content of a file of text, a byte order mark left out.
+    """Return the content of a text file without its byte order mark.
 
     Raises:
-        RoboJacksonError: it cannot be read, or is no text.
+        RoboJacksonError: the file cannot be read, or is not text.
     """
     try:
         return read_file(path, error, largest).decode("utf-8-sig")
@@ -63,19 +63,19 @@ def read_text(
 
 
 def parse_json(text: str | bytes, finite: bool = False) -> Json:
-    """Return what a JSON text holds.
+    """Return the value of a JSON text.
 
     Args:
-        finite: Whether NaN and infinity, which Python's JSON knows, are refused.
+        finite: Whether to refuse NaN and infinity, which Python's JSON accepts.
 
     Raises:
-        ValueError: it is damaged, or its lists and objects stand too deep in each other.
+        ValueError: the text is damaged, or its lists and objects are nested too deeply.
     """
     try:
         return json.loads(text, parse_constant=_no_constant if finite else None)
     except RecursionError:
-        raise ValueError("lists and objects stand too deep in each other") from None
+        raise ValueError("lists and objects are nested too deeply") from None
 
 
 def _no_constant(name: str) -> NoReturn:
-    raise ValueError(f"{name} is no number")
+    raise ValueError(f"{name} is not a number")

@@ -1,7 +1,7 @@
 """A folder on a disk whose files are written whole or not at all.
 
 A write goes to a temporary name, is flushed to the disk and then renamed. Errors are those of the
-operating system; `file_tree.FileTree` words them.
+operating system; `file_tree.FileTree` turns them into messages.
 """
 
 import fcntl
@@ -14,35 +14,35 @@ from typing import Any, Protocol
 
 CHUNK = 1 << 20
 TEMPORARY = ".part-"
-"""Beginning of the names of files that are being written."""
+"""Prefix of the names of files that are being written."""
 
 
 class Place(Protocol):
-    """What a store needs of a place; keys are relative, `/` between their parts."""
+    """Interface of a place that keeps files; keys are relative, `/` between their parts."""
 
     def create(self) -> None:
-        """Make the place itself (a folder, a bucket), if it is not there."""
+        """Create the place itself (a folder, a bucket) if it does not exist."""
 
     def put(self, key: str, source: Path | bytes) -> None:
-        """Write a whole file or none."""
+        """Write a whole file or nothing."""
 
     def read(self, key: str) -> bytes:
-        """The content of a file."""
+        """Return the content of a file."""
 
     def sha256(self, key: str) -> str:
-        """Digest of the content of a file."""
+        """Return the digest of a file's content."""
 
     def exists(self, key: str) -> bool:
-        """Whether there is such a file."""
+        """Return whether the file exists."""
 
     def remove(self, key: str) -> None:
-        """Take a file away."""
+        """Remove a file."""
 
     def list(self, prefix: str) -> list[str]:
-        """The keys of the files under a folder."""
+        """Return the keys of the files under a folder."""
 
     def address(self, key: str) -> str:
-        """What a person calls the file."""
+        """Return the name of a file for messages."""
 
 
 class LocalFolder:
@@ -51,12 +51,14 @@ class LocalFolder:
     def __init__(self, root: Path) -> None:
         self.root = root.absolute()
         if self.root.is_file():
-            raise NotADirectoryError("a file; a folder is wanted")
+            raise NotADirectoryError("a file; expected a folder")
 
     def create(self) -> None:
+        """Create the folder and its parents."""
         self.root.mkdir(parents=True, exist_ok=True)
 
     def put(self, key: str, source: Path | bytes) -> None:
+        """Write a file under a temporary name, flush it to the disk, and rename it."""
         target = (self.root / key).resolve()  # a link stays one
         if target.is_dir():
             raise IsADirectoryError("a folder; name a file in it")
@@ -64,7 +66,7 @@ class LocalFolder:
             raise OSError("a device or a pipe; name a file")
         mode = target.stat().st_mode & 0o777 if target.exists() else None
         target.parent.mkdir(parents=True, exist_ok=True)
-        name, file = _begun(target.parent)
+        name, file = _open_temporary(target.parent)
         try:
             with file:
                 _fill(file, source)
@@ -78,40 +80,46 @@ class LocalFolder:
             name.unlink(missing_ok=True)
 
     def read(self, key: str) -> bytes:
+        """Return the content of a file."""
         return (self.root / key).read_bytes()
 
     def sha256(self, key: str) -> str:
+        """Return the digest of a file's content."""
         return sha256_of_file(self.root / key)
 
     def exists(self, key: str) -> bool:
+        """Return whether the file exists."""
         return (self.root / key).is_file()
 
     def remove(self, key: str) -> None:
+        """Remove a file; a missing file is no error."""
         (self.root / key).unlink(missing_ok=True)
 
     def list(self, prefix: str) -> list[str]:
+        """Return the keys of the files under a folder, without temporary files."""
         found = (p for p in (self.root / prefix).rglob("*") if p.is_file())
         return [p.relative_to(self.root).as_posix() for p in found if TEMPORARY not in p.name]
 
     def address(self, key: str) -> str:
+        """Return the path of a file."""
         return str(self.root / key)
 
 
 def sha256_of(data: bytes) -> str:
-    """Digest of bytes, in hexadecimal."""
+    """Return the digest of bytes, in hexadecimal."""
     return hashlib.sha256(data).hexdigest()
 
 
 def sha256_of_file(path: Path) -> str:
-    """Digest of a local file, in hexadecimal; a device has no end."""
+    """Return the digest of a local file, in hexadecimal; raise for a device, which has no end."""
     if path.exists() and not path.is_file() and not path.is_dir():
-        raise OSError("a device or a pipe, no file")
+        raise OSError("a device or a pipe, not a file")
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _begun(folder: Path) -> tuple[Path, Any]:
-    """A temporary file that is held: what nobody holds is a dead process's, and swept away."""
+def _open_temporary(folder: Path) -> tuple[Path, Any]:
+    """Open a temporary file and lock it; one without a lock belongs to a dead process."""
     while True:
         name = folder / f"{TEMPORARY}{secrets.token_hex(8)}"
         handle = os.open(name, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)  # umask
@@ -119,7 +127,7 @@ def _begun(folder: Path) -> tuple[Path, Any]:
         fcntl.flock(file, fcntl.LOCK_EX)
         if name.exists():
             return name, file
-        file.close()  # it was swept away before it was held
+        file.close()  # another process removed it before it was locked
 
 
 def _fill(file: Any, source: Path | bytes) -> None:

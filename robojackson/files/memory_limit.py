@@ -1,4 +1,4 @@
-"""A ceiling on the memory that reading something from outside may take in this process."""
+"""Limit the memory that this process may allocate while it reads something from outside."""
 
 import sys
 from collections.abc import Iterator
@@ -9,15 +9,16 @@ MOST = 2**29
 """Bytes beyond what the process has when it begins to read."""
 
 VIDEO_MEMORY = 5 * 2**29
-"""The same while a stranger's video is read: room for the detector and the stacks of its threads,
-of which a tenth becomes resident."""
+"""The same while a foreign video is read: room for the detector and the stacks of its threads, of
+which a tenth becomes resident."""
 
 
 @contextmanager
 def limited_memory(most: int = MOST) -> Iterator[None]:
-    """Inside, an allocation beyond `most` further bytes fails instead of filling the machine.
+    """Make an allocation beyond `most` further bytes fail instead of filling the machine.
 
-    What fails raises `MemoryError`, or the error of the library that asked for it. Linux only.
+    The failing allocation raises `MemoryError`, or an error of the library that made it. Linux
+    only.
     """
     if sys.platform != "linux":
         yield
@@ -34,6 +35,6 @@ def limited_memory(most: int = MOST) -> Iterator[None]:
 
 
 def data_bytes() -> int:
-    """Return how much memory of its own this process has mapped, bytes."""
+    """Return how much private memory this process has mapped, bytes."""
     lines = Path("/proc/self/status").read_text().splitlines()
     return next(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmData:"))

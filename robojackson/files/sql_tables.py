@@ -1,7 +1,7 @@
-"""Questions in DuckDB's SQL about tables in memory: no other file is reached, no question endless.
+"""SQL queries (DuckDB) on tables in memory, without access to other files and with limits.
 
-Threads, memory, time and rows of a question have limits. DuckDB's own memory limit does not count
-every string, so the whole process gets a ceiling as well while it answers.
+Threads, memory, time and rows of a query are limited. DuckDB's own memory limit does not count
+every string, so the whole process gets a ceiling as well while a query runs.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 Rows = list[dict[str, Any]]
 Given = Mapping[str, object]
 RunQuery = Callable[..., Rows]
-"""A question in SQL and its parameters to rows."""
+"""Run a query in SQL with its parameters and return rows."""
 LIMITS: dict[str, str | bool | int | float | list[str]] = {
     "threads": 1,
     "memory_limit": "384MB",
@@ -39,11 +39,11 @@ MOST_MEMORY = 2**29
 def answering(
     about: str, known: Mapping[str, pa.Table], limited: bool = True
 ) -> Iterator[RunQuery]:
-    """Tables by name, to which any number of questions can be put.
+    """Yield a function that runs queries on tables by name.
 
     Args:
-        about: What the tables are, for errors.
-        limited: Whether an answer has limits; false where the questions are our own.
+        about: Name of the tables in errors.
+        limited: Whether queries have limits; false where the queries are our own.
     """
     import duckdb
 
@@ -55,20 +55,24 @@ def answering(
         connection.execute("SET enable_external_access = false")
         connection.execute("SET lock_configuration = true")
 
-        def ask(sql: str, given: Given | None = None) -> Rows:
+        def run_query(sql: str, given: Given | None = None) -> Rows:
             try:
                 if not limited:
                     return _rows(connection, sql, given or {}, most=None)
                 with _limits(connection):
                     return _rows(connection, sql, given or {}, MOST_ROWS)
             except duckdb.InterruptException as cause:
-                raise BadTable(f"{about}: no answer in {MOST_SECONDS:g} s; ask for less") from cause
+                raise BadTable(
+                    f"{about}: no answer in {MOST_SECONDS:g} s; reduce the query"
+                ) from cause
             except (duckdb.OutOfMemoryException, MemoryError) as cause:
-                raise BadTable(f"{about}: the answer takes too much memory; ask less") from cause
+                raise BadTable(
+                    f"{about}: the answer takes too much memory; reduce the query"
+                ) from cause
             except (duckdb.Error, RuntimeError, ValueError, OverflowError) as cause:
                 raise BadTable(f"{about}: {' '.join(str(cause).split())}"[:2000]) from cause
 
-        yield ask
+        yield run_query
 
 
 @contextmanager
@@ -85,12 +89,12 @@ def _limits(connection: "DuckDBPyConnection") -> Iterator[None]:
 
 def _rows(connection: "DuckDBPyConnection", sql: str, given: Given, most: int | None) -> Rows:
     if connection.execute(sql, dict(given)) is None:
-        raise BadTable("there is no question in the text")
+        raise BadTable("there is no query in the text")
     names = [column[0] for column in connection.description or ()]
     tables.require_distinct(names)
     if not names:
         return []
     found = connection.fetchall() if most is None else connection.fetchmany(most + 1)
     if most is not None and len(found) > most:
-        raise BadTable(f"more than {most:,} rows; ask for fewer (LIMIT), or aggregate them")
+        raise BadTable(f"more than {most:,} rows; use LIMIT, or aggregate them")
     return [dict(zip(names, row, strict=True)) for row in found]

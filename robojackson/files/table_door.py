@@ -1,7 +1,7 @@
-"""The door for tables: a Parquet file is read when its promise is modest, and is what it should be.
+"""Read Parquet tables from outside: check the declared size first, then the schema.
 
-Before anything is decoded, its footer says how many numbers it holds; text is read as indices into
-a list of distinct values, since a few bytes can promise the same long text for every row.
+Before anything is decoded, the footer gives the number of values; text is read as indices into a
+list of distinct values, since a few bytes can declare the same long text for every row.
 """
 
 import io
@@ -17,15 +17,16 @@ from robojackson.files.foreign_file import parse_json
 from robojackson.files.table_types import Column, Facts, TableSchema
 
 MAKERS = {"SmplSequence": "mocap", "ReferenceMotion": "retarget"}
-"""Which command writes a table that other commands read."""
+"""The command that writes each table that other commands read."""
 MOST_NUMBERS = 2**25
-"""In one table, null ones included: 17 minutes of SMPL at 120 frames a second."""
+"""Largest number of values in one table, nulls included: 17 minutes of SMPL at 120 frames a
+second."""
 MOST_TEXT = 2**28
-"""Bytes of text in one column, every row counted."""
+"""Largest size of the text in one column, all rows counted, bytes."""
 
 
 def read_parquet(data: bytes, where: str) -> pa.Table:
-    """Return the table of a Parquet file that promises no more than is read.
+    """Return the table of a Parquet file whose declared size is within the limits.
 
     Raises:
         BadTable: not Parquet, damaged, or too large.
@@ -33,7 +34,7 @@ def read_parquet(data: bytes, where: str) -> pa.Table:
     try:
         plain = pq.ParquetFile(io.BytesIO(data))
         text = _text_columns(plain, where)
-        # Small; a thread may outlive us.
+        # Small files; a thread may outlive this process.
         found = pq.read_table(io.BytesIO(data), read_dictionary=text, use_threads=False)
         for name in text:
             _require_little(found.column(name), name, where)
@@ -44,7 +45,7 @@ def read_parquet(data: bytes, where: str) -> pa.Table:
 
 
 def _text_columns(file: pq.ParquetFile, where: str) -> list[str]:
-    """Refuse too many numbers; return the columns of text."""
+    """Raise for too many numbers; return the columns of text."""
     footer = file.metadata
     groups = [footer.row_group(i) for i in range(footer.num_row_groups)]
     held = sum(g.column(i).num_values for g in groups for i in range(g.num_columns))
@@ -60,7 +61,9 @@ def _text_columns(file: pq.ParquetFile, where: str) -> list[str]:
         if pa.types.is_string(field.type):
             text.append(field.name)
         elif not (pa.types.is_primitive(items) or pa.types.is_null(items)):
-            raise BadTable(f"column {field.name[:80]!r} is {field.type}, no numbers or text", where)
+            raise BadTable(
+                f"column {field.name[:80]!r} is {field.type}, neither numbers nor text", where
+            )
     return text
 
 
@@ -71,7 +74,7 @@ def _require_little(column: pa.ChunkedArray, name: str, where: str) -> None:
 
 
 def check(schema: TableSchema, table: pa.Table, where: str) -> pa.Table:
-    """Return the table itself, if it is what its schema says.
+    """Return the table itself, if it matches its schema.
 
     Raises:
         BadTable: the message names the column (or metadata key), what is wrong and the file.
@@ -80,9 +83,10 @@ def check(schema: TableSchema, table: pa.Table, where: str) -> pa.Table:
     names = table.column_names
     for name in (column.name for column in schema.columns):
         if names.count(name) != 1:
-            told = "is missing" if name not in names else f"stands {names.count(name)} times"
+            problem = "is missing" if name not in names else f"occurs {names.count(name)} times"
             raise BadTable(
-                f"column {name!r} of {schema.name} {told}. It has: {', '.join(names)[:400]}", where
+                f"column {name!r} of {schema.name} {problem}. It has: {', '.join(names)[:400]}",
+                where,
             )
     for name in names:
         _check_column(require_known(schema, name, where), table, where)
@@ -93,10 +97,10 @@ def check(schema: TableSchema, table: pa.Table, where: str) -> pa.Table:
 
 
 def facts_of(schema: TableSchema, table: pa.Table, where: str) -> Facts:
-    """Return the facts of a table that its schema knows.
+    """Return the metadata of a table that its schema declares.
 
     Raises:
-        BadTable: one is not what the schema says.
+        BadTable: a value does not match the schema.
     """
     found = {key: value for key, value in metadata_of(table).items() if key in schema.facts}
     for key, value in found.items():
@@ -105,13 +109,13 @@ def facts_of(schema: TableSchema, table: pa.Table, where: str) -> Facts:
         except ValidationError as cause:
             error = cause.errors()[0]
             place = ".".join(map(str, (key, *error["loc"])))
-            said = f"{place} is {error['input']!r:.80}: {error['msg']}"
-            raise BadTable(f"metadata of {schema.name} is wrong: {said}", where) from cause
+            problem = f"{place} is {error['input']!r:.80}: {error['msg']}"
+            raise BadTable(f"metadata of {schema.name} is wrong: {problem}", where) from cause
     return found
 
 
 def metadata_of(table: pa.Table) -> Facts:
-    """Return the facts about the whole table; what is not JSON is not ours and left out."""
+    """Return the metadata of a whole table; values that are not JSON are left out."""
     facts: Facts = {}
     for key, value in (table.schema.metadata or {}).items():
         try:
@@ -125,7 +129,7 @@ def require_known(schema: TableSchema, name: str, where: str = "rows") -> Column
     """Return a column of the schema.
 
     Raises:
-        BadTable: it has none of that name.
+        BadTable: the schema has no column of that name.
     """
     column = schema.column(name)
     if column is None:
@@ -140,7 +144,7 @@ def numbers_of(column: Column, table: pa.Table, where: str) -> np.ndarray:
     """Return a column as an array of finite numbers within its bounds, NaN rows where it is null.
 
     Raises:
-        BadTable: a number is not finite, or beyond what it can be.
+        BadTable: a number is not finite, or out of bounds.
     """
     array = table.column(column.name).combine_chunks()
     if not column.is_vector:
@@ -172,16 +176,16 @@ def _require_same(schema: TableSchema, table: pa.Table, where: str) -> None:
 
 def _check_column(column: Column, table: pa.Table, where: str) -> None:
     found = table.column(column.name)
-    wanted = column.field().type
+    declared = column.field().type
     same = (
         pa.types.is_fixed_size_list(found.type)
         and found.type.value_type == column.type
         and column.width in (None, found.type.list_size)
         if column.is_vector
-        else found.type == wanted
+        else found.type == declared
     )
     if not same:
-        expected = str(wanted).replace("[-1]", "")
+        expected = str(declared).replace("[-1]", "")
         raise BadTable(f"column {column.name!r} is {found.type}, expected {expected}", where)
     if found.null_count and not column.nullable:
         raise BadTable(f"column {column.name!r} has {found.null_count} empty rows", where)

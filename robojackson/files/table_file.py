@@ -1,4 +1,4 @@
-"""What a table of its own knows: its schema, and how it is taken apart and put together."""
+"""Base class of dataclasses that are one Parquet table: schema, conversion to columns and back."""
 
 import json
 from os import PathLike
@@ -28,7 +28,7 @@ class TableFile:
 
     @classmethod
     def from_columns(cls, columns: Columns, facts: Facts) -> Self:
-        """Return the value of which these are columns and metadata."""
+        """Return the value with these columns and this metadata."""
         raise NotImplementedError
 
     def to_bytes(self) -> bytes:

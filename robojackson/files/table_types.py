@@ -23,12 +23,12 @@ class Column:
     """One column.
 
     Attributes:
-        name: Of the column or table.
+        name: Name of the column.
         type: Of one number (or text).
         unit: SI symbol, `1` for a ratio, `` for what has none.
         frame: Axes of a vector, `` for a scalar.
-        width: Numbers a row; 1 is a scalar, None a vector whose width the file itself tells.
-        nullable: Whether a row may have none.
+        width: Numbers a row; 1 is a scalar, None a vector whose width the file itself gives.
+        nullable: Whether a row may be empty.
         least, most: Bounds of the numbers of a table that is a dataclass.
     """
 
@@ -43,11 +43,11 @@ class Column:
 
     @property
     def is_vector(self) -> bool:
-        """Whether a row holds more than one number."""
+        """Return whether a row holds more than one number."""
         return self.width != 1
 
     def field(self, width: int | None = None) -> pa.Field:
-        """The column in Arrow's words, with unit and frame in its metadata."""
+        """Return the column as an Arrow field, with unit and frame in its metadata."""
         size = self.width or width or -1
         type_ = pa.list_(self.type, size) if self.is_vector else self.type
         notes = {"unit": self.unit, "frame": self.frame}
@@ -59,13 +59,13 @@ class TableSchema:
     """One table.
 
     Attributes:
-        name: Of the column or table.
+        name: Name of the table.
         row: What one row is.
         columns: All fixed columns.
         metadata: Keys that the file's metadata must have and the types of their JSON values
             (`fact_types`).
-        optional: Those that it may have.
-        dynamic: Beginnings of further columns, float64, nullable, with their unit; which of them a
+        optional: Keys that the metadata may have.
+        dynamic: Prefixes of further columns, float64, nullable, with their unit; which of them a
             file has depends on the reward and the robot.
     """
 
@@ -78,11 +78,11 @@ class TableSchema:
 
     @cached_property
     def facts(self) -> Mapping[str, TypeAdapter[object]]:
-        """What checks the metadata, by key."""
+        """Return the validators of the metadata, by key."""
         return {key: TypeAdapter(kind) for key, kind in {**self.metadata, **self.optional}.items()}
 
     def column(self, name: str) -> Column | None:
-        """The column of that name, also a dynamic one; None where the table has no such column."""
+        """Return the column of that name, also a dynamic one; None for an unknown name."""
         for column in self.columns:
             if column.name == name:
                 return column

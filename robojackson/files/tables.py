@@ -1,8 +1,8 @@
-"""Dataclasses of the stages to Parquet and back, each file checked against its schema.
+"""Convert dataclasses of the stages to Parquet and back; check each file against its schema.
 
-Parquet with zstd; vectors are fixed-size lists; units and frames stand in the fields' metadata,
-facts about the whole table (fps, names) as JSON in the schema's. A file that violates its schema is
-a `BadTable` that names the column and the file.
+Parquet with zstd; vectors are fixed-size lists; units and frames are in the fields' metadata, facts
+about the whole table (fps, names) are JSON in the schema's metadata. A file that violates its
+schema raises `BadTable`, which names the column and the file.
 """
 
 import io
@@ -28,21 +28,23 @@ Row = Mapping[str, Any]
 
 
 class Tabular(Protocol):
-    """What can be a table (`table_file.TableFile` is the base class of those that are)."""
+    """Interface of a table (`table_file.TableFile` is the base class of the tables)."""
 
     SCHEMA: ClassVar[TableSchema]
 
-    def to_columns(self) -> tuple[dict[str, np.ndarray], dict[str, Any]]: ...
+    def to_columns(self) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+        """Return the columns by name and the metadata of the table."""
 
     @classmethod
-    def from_columns(cls, columns: dict[str, np.ndarray], facts: dict[str, Any]) -> Self: ...
+    def from_columns(cls, columns: dict[str, np.ndarray], facts: dict[str, Any]) -> Self:
+        """Return the value with these columns and this metadata."""
 
 
 Value = TypeVar("Value", bound=Tabular)
 
 
 def encode(value: Tabular) -> bytes:
-    """A stage's dataclass as a Parquet file."""
+    """Return a stage's dataclass as a Parquet file."""
     schema = value.SCHEMA
     columns, metadata = value.to_columns()
     arrays = [_vector_column(c, columns[c.name]) for c in schema.columns]
@@ -54,7 +56,7 @@ def encode(value: Tabular) -> bytes:
 
 
 def decode(cls: type[Value], data: bytes, where: str) -> Value:
-    """The dataclass that a Parquet file holds.
+    """Return the dataclass that a Parquet file holds.
 
     Raises:
         BadTable: not Parquet, another table, or a column or metadata key that is wrong.
@@ -67,14 +69,14 @@ def decode(cls: type[Value], data: bytes, where: str) -> Value:
     try:
         return cls.from_columns(columns, facts_of(schema, table, where))
     except (KeyError, ValueError, TypeError) as cause:
-        raise BadTable(f"the {schema.name} contradicts itself: {cause}", where) from cause
+        raise BadTable(f"the {schema.name} is inconsistent: {cause}", where) from cause
 
 
 def encode_rows(schema: TableSchema, rows: Iterable[Row]) -> bytes:
-    """Records, one mapping a row, as a Parquet file.
+    """Return records, one mapping a row, as a Parquet file.
 
     Raises:
-        BadTable: a row lacks a column that may not be empty, or has one the table does not know.
+        BadTable: a row lacks a required column, or has one that the table does not know.
     """
     listed = list(rows)
     names = dict.fromkeys(c.name for c in schema.columns)
@@ -85,7 +87,7 @@ def encode_rows(schema: TableSchema, rows: Iterable[Row]) -> bytes:
 
 
 def decode_rows(schema: TableSchema, data: bytes, where: str) -> list[dict[str, Any]]:
-    """The records of a Parquet file.
+    """Return the records of a Parquet file.
 
     Raises:
         BadTable: not Parquet, another table, or a column that is wrong.
@@ -97,10 +99,10 @@ def decode_rows(schema: TableSchema, data: bytes, where: str) -> list[dict[str, 
 def decode_table(
     schema: TableSchema, data: bytes, where: str, *, earlier: bool = False
 ) -> pa.Table:
-    """The records of a Parquet file, as an Arrow table.
+    """Return the records of a Parquet file as an Arrow table.
 
     Args:
-        earlier: Whether it may be of an earlier version: nullable columns that it lacks are empty.
+        earlier: Whether an earlier version is accepted: nullable columns that it lacks are empty.
     Raises:
         BadTable: not Parquet, another table, or a column that is wrong.
     """
@@ -137,7 +139,7 @@ def _scalar_column(schema: TableSchema, column: Column, rows: Sequence[Row]) -> 
 
 
 def _without_nan(value: Any) -> Any:
-    """Return a Python scalar, None where it is NaN; infinity and times stay what they are."""
+    """Return a Python scalar, None where it is NaN; infinity and times are unchanged."""
     scalar = value.item() if isinstance(value, np.generic) else value
     return None if isinstance(scalar, float) and np.isnan(scalar) else scalar
 
@@ -157,6 +159,6 @@ def _to_bytes(
 
 
 def require_distinct(names: Sequence[str]) -> None:
-    """Raise `BadTable` for an answer with two columns of one name: rows by name would lose one."""
+    """Raise `BadTable` for two columns of one name: rows by name would lose one."""
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise BadTable(f"two columns are called {', '.join(twice)}: name them with AS")

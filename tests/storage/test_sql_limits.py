@@ -17,7 +17,7 @@ from storage.store import Store
         ("SELECT list(range) FROM range(400000000)", "memory"),
         ("SELECT * FROM range(200000)", "100,000 rows"),
         ("SET memory_limit = '9GB'", "locked"),
-        ("--", "no question"),
+        ("--", "no query"),
     ],
 )
 def test_a_question_has_limits(sql: str, told: str, tmp_path: Path) -> None:

@@ -174,7 +174,7 @@ def test_the_environment_names_the_store(monkeypatch: pytest.MonkeyPatch, tmp_pa
 
 def test_a_file_for_a_store_is_reported_at_once(tmp_path: Path) -> None:
     (tmp_path / "clip.mp4").write_text("a video")
-    with pytest.raises(StoreError, match="a file; a folder is wanted"):
+    with pytest.raises(StoreError, match="a file; expected a folder"):
         Store(tmp_path / "clip.mp4")
 
 

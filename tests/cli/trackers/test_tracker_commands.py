@@ -107,7 +107,7 @@ def test_a_refusal_is_one_line_with_its_code(pin, kind: str, words: str) -> None
 def test_offline_is_one_line(pin) -> None:
     path = pin()
     write_yaml_for_nobody(path, pin)
-    with pytest.raises(DownloadFailed, match=r"cannot be had: .*; check the network"):
+    with pytest.raises(DownloadFailed, match=r"cannot be downloaded: .*; check the network"):
         add_tracker(NAME)
 
 
