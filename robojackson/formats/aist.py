@@ -23,7 +23,7 @@ WHERE = "AIST++ pickle"
 
 
 def read(data: bytes) -> ForeignMotion:
-    """The motion of a pickle, nothing in it executed.
+    """Return the motion of a pickle; nothing in it is executed.
 
     Raises:
         BadTable: not such a file.
@@ -34,7 +34,7 @@ def read(data: bytes) -> ForeignMotion:
     same_length(WHERE, smpl_poses=poses, smpl_trans=trans)
     scaling = numbers(content.get("smpl_scaling", 1.0)).ravel()
     if scaling.size != 1 or not np.isfinite(scaling[0]) or scaling[0] <= 0.0:
-        raise BadTable(f"{WHERE}: 'smpl_scaling' is {scaling}; wanted one number above zero")
+        raise BadTable(f"{WHERE}: 'smpl_scaling' is {scaling}; expected one number above zero")
     return ForeignMotion(
         fps=FPS,
         rotations=matrices(poses),

@@ -31,7 +31,7 @@ _BODY = 3 * BODY_JOINTS
 
 
 def write(sequence: SmplSequence) -> bytes:
-    """The .npz of a motion, SMPL+H."""
+    """Return the .npz of a motion, SMPL+H."""
     poses = np.zeros((len(sequence), 156))
     poses[:, :_BODY] = body_vectors(sequence)[:, :_BODY]
     pelvis = sequence.transl + sequence.rest_joints[0]
@@ -49,7 +49,7 @@ def write(sequence: SmplSequence) -> bytes:
 
 
 def read(data: bytes) -> ForeignMotion:
-    """The motion of an .npz.
+    """Return the motion of an .npz.
 
     Raises:
         BadTable: not such a file.
@@ -74,12 +74,12 @@ def read(data: bytes) -> ForeignMotion:
 
 
 def _poses(content: dict[str, np.ndarray]) -> np.ndarray:
-    """The body's joints, of SMPL (72), SMPL+H (156) or SMPL-X (165) rows."""
+    """Return the body's joints of SMPL (72), SMPL+H (156) or SMPL-X (165) rows."""
     if "poses" not in content:
         raise BadTable(f"{WHERE}: neither 'poses' nor 'pose_body' is in it")
     width = content["poses"].shape[-1] if content["poses"].ndim else 0
     if width not in (_BODY, 72, 156, 165):
-        raise BadTable(f"{WHERE}: 'poses' is {content['poses'].shape}; wanted 66, 72, 156 or 165")
+        raise BadTable(f"{WHERE}: 'poses' is {content['poses'].shape}; expected 66, 72, 156 or 165")
     return rows(content, "poses", width, WHERE)[:, : 72 if width == 72 else _BODY]
 
 

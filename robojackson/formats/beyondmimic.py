@@ -19,7 +19,7 @@ FPS = 50
 
 
 def write(reference: ReferenceMotion, model: mujoco.MjModel) -> bytes:
-    """The .npz of a reference motion.
+    """Return the .npz of a reference motion.
 
     Raises:
         UnknownName: the model has other joints than the reference motion.
@@ -29,7 +29,7 @@ def write(reference: ReferenceMotion, model: mujoco.MjModel) -> bytes:
 
 
 def motion_arrays(motion: SampledMotion, model: mujoco.MjModel) -> dict[str, np.ndarray]:
-    """The arrays of the .npz of a motion whose velocities are known."""
+    """Return the arrays of the .npz of a motion whose velocities are known."""
     qvel = np.asarray(motion.qvel)
     states = body_states(model, motion.qpos, qvel)
     figures = {
@@ -49,7 +49,7 @@ def motion_arrays(motion: SampledMotion, model: mujoco.MjModel) -> dict[str, np.
 
 
 def read(data: bytes) -> SampledMotion:
-    """The motion of an .npz.
+    """Return the motion of an .npz.
 
     Raises:
         BadTable: not such a file.

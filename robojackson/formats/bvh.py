@@ -33,20 +33,20 @@ from robojackson.motion.smpl_sequence import SmplSequence
 
 CENTIMETRE = 0.01
 UNITS = (1.0, CENTIMETRE, 0.001, 0.0254, 0.0254 / 0.45)
-"""Metres; the last is that of the CMU files."""
+"""Candidate units of length in metres; the last is that of the CMU files."""
 LEG = (0.55, 1.15)
-"""Hip to ankle of a person, metres."""
+"""Typical leg length (hip to ankle), metres."""
 CHILDS_LEG = 0.2
-"""The shortest of a person who walks, metres."""
+"""Shortest leg length of a walking person, metres."""
 USUAL_LEG = 0.82
 ROUNDS = 3
-"""Of rotations and skeleton, each found from the other."""
+"""Iterations in which rotations and skeleton are found from each other."""
 ORDER = "ZXY"
 _ENDS = {parent: index for index, parent in enumerate(PARENTS) if index >= len(JOINT_NAMES)}
 
 
 def write(sequence: SmplSequence) -> bytes:
-    """The BVH of a motion: rotations Z, X, Y in degrees, positions in centimetres."""
+    """Return the BVH of a motion: rotations Z, X, Y in degrees, positions in centimetres."""
     rest = sequence.rest_joints / CENTIMETRE
     lines = ["HIERARCHY"]
     order: list[int] = []
@@ -62,7 +62,7 @@ def write(sequence: SmplSequence) -> bytes:
 
 
 def _branch(index: int, rest: np.ndarray, depth: int, lines: list[str], order: list[int]) -> None:
-    """One joint and all below it; `order` collects the joints as they come."""
+    """Append one joint and all below it; `order` collects the joints in the order of the file."""
     order.append(index)
     pad, inner = "  " * depth, "  " * (depth + 1)
     channels = " ".join(f"{axis}rotation" for axis in ORDER)
@@ -84,7 +84,7 @@ def _offset(pad: str, offset: np.ndarray) -> str:
 
 
 def read(data: bytes) -> ForeignMotion:
-    """The motion of a BVH, y up.
+    """Return the motion of a BVH, y up.
 
     Raises:
         BadTable: not a BVH, or one in which no person can be found.
@@ -97,7 +97,7 @@ def read(data: bytes) -> ForeignMotion:
 
 
 def _own(tree: Tree, names: list[str]) -> ForeignMotion:
-    """A skeleton with SMPL's joints."""
+    """Return the motion of a skeleton with SMPL's joints."""
     nodes = [names.index(name) for name in JOINT_NAMES]
     offsets = np.array(REST_OFFSETS)
     for index, at in enumerate(nodes):
@@ -120,14 +120,16 @@ def _own(tree: Tree, names: list[str]) -> ForeignMotion:
 
 
 def _require_parent(node: Node, names: list[str], index: int) -> None:
-    wanted = JOINT_NAMES[PARENTS[index]] if index else None
+    parent = JOINT_NAMES[PARENTS[index]] if index else None
     found = names[node.parent] if node.parent >= 0 else None
-    if found != wanted:
-        raise BadTable(f"{WHERE}: {node.name} hangs on {found}; in SMPL's tree it is {wanted}")
+    if found != parent:
+        raise BadTable(
+            f"{WHERE}: the parent of {node.name} is {found}; in SMPL's tree it is {parent}"
+        )
 
 
 def _other(tree: Tree) -> ForeignMotion:
-    """Any other skeleton, by the positions of its joints."""
+    """Return the motion of any other skeleton, solved from the positions of its joints."""
     points = keypoints_of(tree)
     lengths = np.zeros(len(PARENTS))
     for index, parent in enumerate(PARENTS[1:], start=1):
@@ -150,7 +152,7 @@ def _other(tree: Tree) -> ForeignMotion:
 
 
 def _chest_twist(points: np.ndarray, rest: np.ndarray) -> analytic_solve.TwistRule:
-    """The chest turns until its collars lie as they do; no other joint is twisted."""
+    """Turn the chest until its collars match; twist no other joint."""
     chest, (left, right) = keypoint("spine3"), pair("collar")
     axis = unit(rest[keypoint("neck")] - rest[chest])
     line = unit(points[:, left] - points[:, right])
@@ -168,8 +170,8 @@ def _chest_twist(points: np.ndarray, rest: np.ndarray) -> analytic_solve.TwistRu
 
 
 def _unit(rest: Float[np.ndarray, "29 3"], ours: bool = False) -> tuple[float, tuple[str, ...]]:
-    """Metres a unit of the file: the one that gives a person's legs; we write centimetres, of
-    children too.
+    """Return the metres in a unit of the file, chosen so that the legs have a person's length, and
+    notes. Our own files are in centimetres.
     """
     bones = [("left_knee", "left_hip"), ("left_ankle", "left_knee")]
     leg = sum(float(np.linalg.norm(rest[keypoint(a)] - rest[keypoint(b)])) for a, b in bones)

@@ -1,6 +1,6 @@
-"""What a file of another project says of a human motion, in its own axes and its own place.
+"""A human motion of another project's file, in its own axes and place.
 
-`mocap.imported_motion` brings it to the world and to the floor. SMPL's bodies turn about the
+`mocap.imported_motion` moves it to the world and onto the floor. SMPL's bodies turn about the
 pelvis of their template, so that in their files pelvis = transl + PELVIS; metres, radians.
 """
 
@@ -29,13 +29,13 @@ Y_UP_TO_WORLD, Z_UP_TO_WORLD = SMPL_TO_WORLD, np.eye(3)
 BODY_JOINTS = 22
 """Joints that SMPL, SMPL+H and SMPL-X share: SMPL's two hands are fingers in the others."""
 LARGEST = 1e8
-"""Of any number in a file."""
+"""Largest magnitude of any number in a file."""
 LEGS_M = (0.2, 3.0)
-"""Hip to ankle of whoever may be a person, metres."""
+"""Range of a person's leg length (hip to ankle), metres."""
 MAX_LISTED = 12
-"""Names of a file's arrays that an error tells."""
+"""Number of a file's arrays that an error names."""
 REST_KEY = "rest_joints"
-"""Of a skeleton in our own files; other projects do not read it."""
+"""Name of the skeleton in our own files; other projects do not read it."""
 
 
 @dataclass(frozen=True)
@@ -43,12 +43,13 @@ class ForeignMotion:
     """A motion as a file has it.
 
     Attributes:
-        fps: Frames a second; None where the file does not say.
-        rotations: Of the 24 joints relative to their parents, the root's to the file's axes.
-        pelvis: Metres, file's axes.
+        fps: Frames a second; None where the file does not contain it.
+        rotations: Rotations of the 24 joints relative to their parents, the root's to the file's
+            axes.
+        pelvis: Position of the pelvis, metres, file's axes.
         rest_joints: The skeleton that the rotations pose; our own where the file has none.
         to_world: Rotation from the file's axes to x forward, y left, z up.
-        betas: SMPL's shape.
+        betas: SMPL's shape coefficients.
         notes: Warnings for the user.
     """
 
@@ -66,17 +67,18 @@ class ForeignMotion:
 
 @dataclass(frozen=True)
 class HybrikMotion:
-    """What the file says, one row a frame in which a person was found.
+    """The content of a HybrIK file, one row a frame in which a person was found.
 
     Attributes:
         points: 29 keypoints relative to the pelvis, metres, camera axes.
-        pixels: The same in the image.
+        pixels: The same keypoints in the image, pixels.
         twist: cos and sin of joints 1..23.
-        rotations: Of the 24 joints relative to their parents; None in files of NIKI's demo.
-        confidence: 0..1 a keypoint.
+        rotations: Rotations of the 24 joints relative to their parents; None in files of NIKI's
+            demo.
+        confidence: Confidence of each keypoint, 0..1.
         frame: Number of each row's frame, from 0.
-        betas: SMPL's shape, the clip's mean.
-        width, height: Of the image, pixels.
+        betas: SMPL's shape coefficients, the clip's mean.
+        width, height: Size of the image, pixels.
     """
 
     points: Float[np.ndarray, "N 29 3"]
@@ -94,7 +96,7 @@ class HybrikMotion:
 
 
 def rows(content: Mapping[str, Any], name: str, width: int, where: str) -> np.ndarray:
-    """One array of a file as frames of `width` numbers, float64.
+    """Return one array of a file as frames of `width` numbers, float64.
 
     Raises:
         BadTable: it is missing, has another shape, holds NaN, or too few frames.
@@ -103,17 +105,17 @@ def rows(content: Mapping[str, Any], name: str, width: int, where: str) -> np.nd
         raise BadTable(f"{where}: {name!r} is missing. It has: {listed(content)}")
     found = numbers(content[name])
     if found.dtype.kind != "f" or not found.size:
-        raise BadTable(f"{where}: {name!r} is no array of numbers, one row a frame")
+        raise BadTable(f"{where}: {name!r} is not an array of numbers with one row a frame")
     table = found.reshape(len(found), -1)
     if len(table) < 2 or table.shape[1] != width:
-        raise BadTable(f"{where}: {name!r} is {found.shape}; wanted (frames >= 2, {width})")
+        raise BadTable(f"{where}: {name!r} is {found.shape}; expected (frames >= 2, {width})")
     if not (np.abs(table) < LARGEST).all():
         raise BadTable(f"{where}: {name!r} holds numbers that are not finite, or over {LARGEST:g}")
     return table
 
 
 def numbers(value: Any) -> np.ndarray:
-    """Numbers of any shape, at least one axis; none where the value is something else."""
+    """Return numbers of any shape with at least one axis; an empty array for any other value."""
     try:
         with np.errstate(all="ignore"), warnings.catch_warnings():
             warnings.simplefilter("error")  # of complex numbers, whose half would be lost
@@ -123,45 +125,45 @@ def numbers(value: Any) -> np.ndarray:
 
 
 def number(value: Any) -> float | None:
-    """One finite number, such as a frame rate; None where it is something else."""
+    """Return one finite number, such as a frame rate; None for any other value."""
     found = numbers(value).ravel()
     return float(found[0]) if found.size == 1 and np.isfinite(found[0]) else None
 
 
 def listed(names: Collection[Any]) -> str:
-    """Some names of a file, for a message."""
-    told = ", ".join(str(name)[:40] for name in islice(names, MAX_LISTED))
+    """Return some names of a file, for a message."""
+    listing = ", ".join(str(name)[:40] for name in islice(names, MAX_LISTED))
     more = len(names) - MAX_LISTED
-    return (told or "nothing") + (f" and {more} more" if more > 0 else "")
+    return (listing or "nothing") + (f" and {more} more" if more > 0 else "")
 
 
 def require_person(points: Float[np.ndarray, "*T 29 3"], what: str) -> None:
-    """Legs as long as a person's, all else finite and within reach.
+    """Check that legs are as long as a person's and all numbers finite and within reach.
 
     Raises:
-        BadTable: they are not; such a body breaks what comes after it.
+        BadTable: they are not; such a body breaks the following stages.
     """
     hip, knee, ankle = (points[..., keypoint(f"left_{n}"), :] for n in ("hip", "knee", "ankle"))
     with np.errstate(all="ignore"):
         bones = np.linalg.norm(knee - hip, axis=-1) + np.linalg.norm(ankle - knee, axis=-1)
     legs = float(np.median(bones))
     if not LEGS_M[0] <= legs <= LEGS_M[1] or not (np.abs(points) < LARGEST).all():
-        raise BadTable(f"{what}: no person's, its legs are {legs:.3g} m long")
+        raise BadTable(f"{what}: not a person, its legs are {legs:.3g} m long")
 
 
 def same_length(where: str, **tables: np.ndarray) -> None:
-    """All arrays have as many frames.
+    """Check that all arrays have the same number of frames.
 
     Raises:
-        BadTable: they have not.
+        BadTable: the numbers differ.
     """
     if len({len(table) for table in tables.values()}) > 1:
-        told = ", ".join(f"{name} {len(table)}" for name, table in tables.items())
-        raise BadTable(f"{where}: arrays of different length ({told})")
+        listing = ", ".join(f"{name} {len(table)}" for name, table in tables.items())
+        raise BadTable(f"{where}: arrays of different length ({listing})")
 
 
 def matrices(vectors: Float[np.ndarray, "T N"]) -> Float[np.ndarray, "T 24 3 3"]:
-    """Rotation matrices of axis-angle rows; joints that a row lacks are not turned."""
+    """Return rotation matrices of axis-angle rows; joints that a row lacks are not turned."""
     given = vectors.reshape(len(vectors), -1, 3)[:, :24]
     full = np.zeros((len(vectors), 24, 3))
     full[:, : given.shape[1]] = given
@@ -170,20 +172,20 @@ def matrices(vectors: Float[np.ndarray, "T N"]) -> Float[np.ndarray, "T 24 3 3"]
 
 
 def body_vectors(sequence: SmplSequence) -> Float[np.ndarray, "T 72"]:
-    """Axis-angle of all 24 joints."""
+    """Return the axis-angle vectors of all 24 joints."""
     return np.concatenate([sequence.global_orient, sequence.body_pose], axis=1)
 
 
 def turned_root(
     sequence: SmplSequence, turn: Float[np.ndarray, "3 3"]
 ) -> tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"]]:
-    """Root's axis-angle and pelvis in other axes."""
+    """Return the root's axis-angle and the pelvis in other axes."""
     root = Rotation.from_matrix(turn) * Rotation.from_rotvec(sequence.global_orient)
     return root.as_rotvec(), (sequence.transl + sequence.rest_joints[0]) @ turn.T
 
 
 def betas_of(content: Mapping[str, Any]) -> Float[np.ndarray, "10"]:
-    """The first ten shape numbers of a file, zeros where it has none; a clip's mean."""
+    """Return the first ten shape coefficients of a file, zeros where it has none; a clip's mean."""
     found = numbers(content.get("betas", np.zeros(10)))
     with np.errstate(all="ignore"):
         mean = found.reshape(-1, found.shape[-1]).mean(0) if found.size else np.zeros(10)
@@ -192,7 +194,7 @@ def betas_of(content: Mapping[str, Any]) -> Float[np.ndarray, "10"]:
 
 
 def skeleton_of(content: Mapping[str, Any]) -> Float[np.ndarray, "29 3"]:
-    """The rest joints of a file of ours, else our own skeleton."""
+    """Return the rest joints of a file of ours, else our own skeleton."""
     found = numbers(content.get(REST_KEY, REST_JOINTS))
     good = found.shape == REST_JOINTS.shape and np.isfinite(found).all()
     return found if good else REST_JOINTS.copy()
@@ -201,7 +203,7 @@ def skeleton_of(content: Mapping[str, Any]) -> Float[np.ndarray, "29 3"]:
 def skeleton_under(
     rotations: Float[np.ndarray, "T 24 3 3"], points: Float[np.ndarray, "T 29 3"]
 ) -> Float[np.ndarray, "29 3"]:
-    """The rest joints that rotations pose onto points, least squares over the clip.
+    """Return the rest joints whose rotations best give the points, least squares over the clip.
 
     A bone is its parent's rotation times its rest offset, so that the offset is the mean of the
     bone seen from the parent.

@@ -1,6 +1,6 @@
-"""What a module of this package declares: that it writes a format (`EXPORT`), reads one (`IMPORT`).
+"""Declarations of a format module: it writes a format (`EXPORT`), reads one (`IMPORT`), or both.
 
-`registry` finds every module that declares one; nothing else lists them.
+`registry` finds every module with a declaration; no other list exists.
 """
 
 import io
@@ -32,7 +32,7 @@ class RobotExporter:
 
     Attributes:
         name: Value of `robojackson export --to`.
-        write: Returns the content of a file.
+        write: Function that returns the content of a file.
     """
 
     name: str
@@ -48,22 +48,25 @@ class PersonExporter:
 
 
 class PolicyNetwork(Protocol):
-    """What is written of a policy (`rl.policy.Policy` is one).
+    """The parts of a policy that exporters write (`rl.policy.Policy` is one).
 
     Attributes:
         layers: (weight (in, out), bias (out,)); ReLU between them, tanh at the end.
-        facts: What the policy was trained for.
+        facts: Metadata of the policy: robot, motion and configuration of its training.
         observation_size: Length of an observation.
     """
 
     @property
-    def layers(self) -> Layers: ...
+    def layers(self) -> Layers:
+        """Weights and biases, first layer first."""
 
     @property
-    def facts(self) -> Mapping[str, object]: ...
+    def facts(self) -> Mapping[str, object]:
+        """Metadata of the policy's training."""
 
     @property
-    def observation_size(self) -> int: ...
+    def observation_size(self) -> int:
+        """Length of an observation."""
 
 
 @dataclass(frozen=True)
@@ -76,11 +79,11 @@ class PolicyExporter:
 
 @dataclass(frozen=True)
 class Content:
-    """A file whose format is to be recognised by what is in it.
+    """A file whose format is recognised by its content.
 
     Attributes:
-        data: Its bytes.
-        where: How errors name it.
+        data: Bytes of the file.
+        where: Name of the file in errors.
     """
 
     data: bytes
@@ -88,12 +91,12 @@ class Content:
 
     @property
     def head(self) -> bytes:
-        """Its first characters, without a byte order mark and blanks."""
+        """Return the first characters of the file without a byte order mark and blanks."""
         return self.data[:64].removeprefix(BYTE_ORDER_MARK).lstrip()
 
     @cached_property
     def members(self) -> frozenset[str]:
-        """Names in a zip, without their folders; empty for another file.
+        """Return the names in a zip without their folders; empty for another file.
 
         Raises:
             BadTable: a damaged zip.
@@ -110,10 +113,10 @@ class Content:
 
     @cached_property
     def pickled(self) -> Mapping[str, object]:
-        """The dictionary in a pickle, read without running anything; empty for another file.
+        """Return the dictionary in a pickle, read without running anything; empty for another file.
 
         Raises:
-            BadTable: a pickle that asks for anything but arrays, or a damaged one.
+            BadTable: a damaged pickle, or one that holds anything but arrays.
         """
         if not self.data.startswith(b"\x80"):
             return {}
@@ -122,13 +125,13 @@ class Content:
 
 @dataclass(frozen=True)
 class Importer:
-    """A format of human motions that is read.
+    """A format of human motions that can be read.
 
     Attributes:
         name: Of the format.
-        read: Returns the motion in a file.
-        recognises: Whether a file is of this format.
-        fps: Frames a second where a file does not say; None where it has to.
+        read: Function that returns the motion in a file.
+        recognises: Function that returns whether a file is of this format.
+        fps: Frames a second where a file has none; None where the file must have it.
     """
 
     name: str

@@ -2,8 +2,8 @@
 
 A dictionary: fps, root_pos (metres, world), root_rot (xyzw), dof_pos (radians), local_body_pos (of
 the bodies, root at the origin and not turned, metres, float32), link_body_list (their names). 30
-fps. NumPy 1 and 2 call their inner functions differently; what is written asks for `numpy.ndarray`
-and `numpy.dtype` alone, so that TWIST's NumPy 1.23 reads it too. `read` runs nothing
+fps. NumPy 1 and 2 call their inner functions differently; the written file names only
+`numpy.ndarray` and `numpy.dtype`, so that TWIST's NumPy 1.23 reads it too. `read` runs nothing
 (`containers.safe_pickle`).
 """
 
@@ -23,12 +23,12 @@ from robojackson.robot.sampling import WXYZ, XYZW, SampledMotion, sampled
 
 FPS = 30
 _UPRIGHT = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
-"""Root at the origin, not turned."""
+"""Pose of the root in local_body_pos: at the origin, not turned."""
 _PROTOCOL = 4
 
 
 def write(reference: ReferenceMotion, model: mujoco.MjModel) -> bytes:
-    """The pickle of a reference motion.
+    """Return the pickle of a reference motion.
 
     Raises:
         UnknownName: the model has other joints than the reference motion.
@@ -51,10 +51,10 @@ def write(reference: ReferenceMotion, model: mujoco.MjModel) -> bytes:
 
 
 def read(data: bytes) -> SampledMotion:
-    """The motion of a pickle.
+    """Return the motion of a pickle.
 
     Raises:
-        BadTable: not such a file, or one that asks for anything but arrays of numbers.
+        BadTable: not such a file, or one that holds anything but arrays of numbers.
     """
     content = safe_pickle.load(data, "GMR pickle")
     try:

@@ -1,8 +1,8 @@
 """The `.pt` of GVHMR: smpl_params_global (y up), smpl_params_incam (camera: y down) and K_fullimg.
 
 Each of the two is body_pose (T, 63), global_orient (T, 3), transl (T, 3), betas (T, 10) of SMPL-X,
-metres, radians. The file does not say its frame rate; GVHMR's demo makes 30 of any video. What is
-written has the camera's part only where the motion knows its camera, and our skeleton beside it.
+metres, radians. The file has no frame rate; GVHMR's demo converts any video to 30. The camera's
+part is written only where the motion knows its camera; our skeleton is added.
 """
 
 import numpy as np
@@ -32,11 +32,11 @@ WORLD = "smpl_params_global"
 
 
 def write(sequence: SmplSequence) -> bytes:
-    """The `.pt` of a motion."""
+    """Return the `.pt` of a motion."""
     content: dict[str, object] = {WORLD: _parameters(sequence, Y_UP_TO_WORLD.T, np.zeros(3))}
     camera = sequence.camera
     known = {"rotation_w", "position_w", "focal_px", "width", "height"} <= set(camera)
-    if known and not camera.get("moved"):  # only the first frame's is kept
+    if known and not camera.get("moved"):  # only the first frame's is stored
         turn = np.array(camera["rotation_w"], float).T
         place = np.array(camera["position_w"], float)
         content["smpl_params_incam"] = _parameters(sequence, turn, place)
@@ -47,7 +47,7 @@ def write(sequence: SmplSequence) -> bytes:
 
 
 def read(data: bytes) -> ForeignMotion:
-    """The motion of a `.pt`, nothing in it executed.
+    """Return the motion of a `.pt`; nothing in it is executed.
 
     Raises:
         BadTable: not such a file.
@@ -72,7 +72,7 @@ def read(data: bytes) -> ForeignMotion:
 def _parameters(
     sequence: SmplSequence, turn: np.ndarray, origin: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Parameters in axes that are turned about a world point."""
+    """Return the parameters in axes that are turned about a world point."""
     root, pelvis = turned_root(sequence, turn)
     return {
         "body_pose": sequence.body_pose[:, :63],

@@ -20,16 +20,16 @@ METRE = 2.2
 """Metres a unit of the file."""
 WHERE = "HybrIK file"
 STRETCH = 0.5
-"""By which a rotation matrix of a file may stretch."""
+"""Largest stretch of a rotation matrix in a file."""
 SURE_SIGMA = 0.1
-"""Of a joint that counts nothing (HybrIK's weight is 1 - 10 sigma)."""
+"""Sigma of a joint that has no weight (HybrIK's weight is 1 - 10 sigma)."""
 
 
 def read(data: bytes) -> HybrikMotion:
-    """The motion of a `res.pk` or of a file of `joblib.dump`.
+    """Return the motion of a `res.pk` or of a file of `joblib.dump`.
 
     Raises:
-        BadTable: not such a file, or it asks for anything but arrays.
+        BadTable: not such a file, or it holds anything but arrays.
     """
     return _motion(safe_pickle.load_joblib(data, WHERE))
 
@@ -61,7 +61,7 @@ def _motion(content: Mapping[str, Any]) -> HybrikMotion:
 
 
 def _rotations(content: Mapping[str, Any], count: int) -> np.ndarray | None:
-    """The nearest rotations to `pred_thetas`."""
+    """Return the nearest rotations to `pred_thetas`."""
     if "pred_thetas" not in content:
         return None
     thetas = rows(content, "pred_thetas", 216, WHERE)
@@ -69,12 +69,12 @@ def _rotations(content: Mapping[str, Any], count: int) -> np.ndarray | None:
     left, size, right = np.linalg.svd(thetas.reshape(-1, 24, 3, 3))
     turned = left @ right
     if (np.linalg.det(turned) < 0.0).any() or (np.abs(size - 1.0) > STRETCH).any():
-        raise BadTable(f"{WHERE}: 'pred_thetas' holds matrices that are no rotations")
+        raise BadTable(f"{WHERE}: 'pred_thetas' holds matrices that are not rotations")
     return np.asarray(turned)
 
 
 def _confidence(content: Mapping[str, Any], count: int) -> np.ndarray:
-    """1 - 10 sigma, as HybrIK weighs its joints; else the heat map's peaks against usual ones."""
+    """Return 1 - 10 sigma, HybrIK's weight of joints; else the heat map's relative peaks."""
     if "pred_sigma" in content:
         sigma = rows(content, "pred_sigma", 29, WHERE)
         found = 1.0 - sigma / SURE_SIGMA
@@ -89,7 +89,7 @@ def _confidence(content: Mapping[str, Any], count: int) -> np.ndarray:
 
 
 def _frames(content: Mapping[str, Any], count: int) -> np.ndarray:
-    """Frame of each row by the last number in its picture's name, else one after the other."""
+    """Return the frame of each row from the last number in its picture's name, else its row."""
     names = content.get("img_path", [])
     if isinstance(names, np.ndarray):
         names = names.ravel().tolist()
@@ -103,4 +103,4 @@ def _frames(content: Mapping[str, Any], count: int) -> np.ndarray:
 
 
 IMPORT = Importer("hybrik", read, lambda file: "pred_xyz_29" in file.pickled, fps=30.0)
-"""The rate is that of most videos; the file does not say it."""
+"""The frame rate of most videos; the file does not contain one."""

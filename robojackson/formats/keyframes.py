@@ -15,7 +15,7 @@ from robojackson.robot.sampling import SampledMotion, sampled
 
 
 def write(reference: ReferenceMotion) -> bytes:
-    """The fragment; its root is `mujocoinclude`, so that a model of any name can include it."""
+    """Return the fragment; its root is `mujocoinclude`, so that any model can include it."""
     motion = sampled(reference)
     root = ElementTree.Element("mujocoinclude")
     keyframe = ElementTree.SubElement(root, "keyframe")
@@ -29,7 +29,7 @@ def write(reference: ReferenceMotion) -> bytes:
 
 
 def read(data: bytes) -> SampledMotion:
-    """The motion of a fragment with at least two keys.
+    """Return the motion of a fragment with at least two keys.
 
     Raises:
         BadTable: not such a file.

@@ -1,7 +1,7 @@
 """The Trajectory .npz of LocoMuJoCo 1.0: its info, the model's constants, and the data.
 
-Frames are the control steps themselves, `frequency` in Hz; quaternions wxyz; all bodies, the world
-among them, and all sites, the robot's keypoints among them. float64, metres, radians, world frame.
+Frames are the control steps themselves, `frequency` in Hz; quaternions wxyz; all bodies including
+the world, and all sites including the robot's keypoints. float64, metres, radians, world frame.
 """
 
 import mujoco
@@ -20,7 +20,7 @@ MODEL_ARRAYS = (
 
 
 def write(reference: ReferenceMotion, model: mujoco.MjModel) -> bytes:
-    """The .npz of a reference motion.
+    """Return the .npz of a reference motion.
 
     Raises:
         UnknownName: the model has other joints than the reference motion.
@@ -34,7 +34,7 @@ def write(reference: ReferenceMotion, model: mujoco.MjModel) -> bytes:
 
 
 def read(data: bytes) -> SampledMotion:
-    """The motion of an .npz that holds one trajectory.
+    """Return the motion of an .npz that holds one trajectory.
 
     Raises:
         BadTable: not such a file.

@@ -14,12 +14,12 @@ FPS = 30
 
 
 def write(reference: ReferenceMotion) -> bytes:
-    """The .npz of a reference motion."""
+    """Return the .npz of a reference motion."""
     return npz_archive.pack({"fps": np.array(FPS), "qpos": sampled(reference, FPS).qpos})
 
 
 def read(data: bytes) -> SampledMotion:
-    """The motion of an .npz.
+    """Return the motion of an .npz.
 
     Raises:
         BadTable: not such a file.

@@ -1,7 +1,7 @@
-"""A policy as an ONNX file, for runtimes that know nothing of us: observation in, action out.
+"""A policy as an ONNX file, for runtimes without RoboJackson: observation in, action out.
 
-Input `observation` (N, D) float32, output `action` (N, nu) float32 in -1..1. What the policy was
-trained for stands in the file's metadata as JSON.
+Input `observation` (N, D) float32, output `action` (N, nu) float32 in -1..1. The file's metadata
+holds the facts of the training as JSON.
 """
 
 import json
@@ -16,7 +16,7 @@ IR_VERSION = 8
 
 
 def write(policy: PolicyNetwork) -> bytes:
-    """The content of the file.
+    """Return the content of the file.
 
     Raises:
         MissingDependency: the onnx package is not installed.

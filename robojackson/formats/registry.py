@@ -30,7 +30,7 @@ KNOWN_TO_FAIL: Mapping[bytes, str] = {
     b"\x78": "compressed; write it again with joblib.dump and compress=0",
     b"\x1f\x8b": "compressed with gzip; unpack it first",
 }
-"""Beginnings of files that cannot be read, and what to do."""
+"""First bytes of files that cannot be read, and the remedy."""
 
 
 def robot_exporters() -> Mapping[str, RobotExporter]:
@@ -58,7 +58,7 @@ def recognise(data: bytes, where: str) -> Importer:
 
     Raises:
         UnknownName: none of them.
-        BadTable: a pickle that asks for anything but arrays, or a damaged file.
+        BadTable: a damaged file, or a pickle that holds anything but arrays.
     """
     for start, cause in KNOWN_TO_FAIL.items():
         if data.startswith(start) and (start or not data):
@@ -74,7 +74,7 @@ def recognise(data: bytes, where: str) -> Importer:
 
 @cache
 def _formats() -> tuple[Format, ...]:
-    """What all modules declare, by the names of the modules."""
+    """Return the declarations of all modules, by the names of the modules."""
     return tuple(_declarations())
 
 

@@ -27,7 +27,7 @@ HEAD = ["time_s", *PLACES, *TURNS, *(f"contact_{name}" for name in CONTACT_POINT
 
 
 def write(sequence: SmplSequence) -> bytes:
-    """The csv of a motion, eight decimals."""
+    """Return the csv of a motion, eight decimals."""
     table = np.column_stack(
         [
             np.arange(len(sequence)) / sequence.fps,
@@ -43,7 +43,7 @@ def write(sequence: SmplSequence) -> bytes:
 
 
 def read(data: bytes) -> ForeignMotion:
-    """The motion of a csv that `write` wrote; its skeleton is found again from the frames.
+    """Return the motion of a csv that `write` wrote; the skeleton is computed from the frames.
 
     Raises:
         BadTable: not such a file.

@@ -17,7 +17,7 @@ FPS = 30
 
 
 def write(reference: ReferenceMotion) -> bytes:
-    """The csv of a reference motion, nine decimals."""
+    """Return the csv of a reference motion, nine decimals."""
     rows = sampled(reference, FPS).qpos.copy()
     rows[:, 3:7] = rows[:, 3:7][:, XYZW]
     sink = io.StringIO()
@@ -26,7 +26,7 @@ def write(reference: ReferenceMotion) -> bytes:
 
 
 def read(data: bytes, fps: float = FPS) -> SampledMotion:
-    """The motion of a csv; the file does not know its frame rate.
+    """Return the motion of a csv; the file does not contain its frame rate.
 
     Raises:
         BadTable: not rows of numbers, or too few columns for a root and a hinge.

@@ -170,7 +170,7 @@ def test_a_file_that_cannot_be_read_says_what_to_do(
 def test_a_skeleton_without_legs_is_refused_by_the_files_name(tmp_path: Path) -> None:
     path = tmp_path / "motion.npz"
     path.write_bytes(amass.write(replace(person(), rest_joints=np.zeros((29, 3)))))
-    with pytest.raises(BadTable, match=r"motion.npz: the skeleton: no person's, its legs are 0 m"):
+    with pytest.raises(BadTable, match=r"motion.npz: the skeleton: not a person, its legs are 0 m"):
         import_motion(path, tmp_path / "out", None, None, "base", {})
 
 

@@ -269,5 +269,5 @@ def test_a_message_names_a_dozen_of_many_keys() -> None:
 
 def test_complex_numbers_are_no_motion() -> None:
     arrays = {"poses": np.zeros((3, 156)), "trans": np.zeros((3, 3), complex)}
-    with pytest.raises(BadTable, match="'trans' is no array of numbers"):
+    with pytest.raises(BadTable, match="'trans' is not an array of numbers"):
         amass.read(amass_file(**arrays))

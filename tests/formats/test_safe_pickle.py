@@ -193,7 +193,7 @@ def test_lists_within_lists_that_double_are_refused() -> None:
     value: Any = [0]
     for _ in range(5):
         value = [value] * 100
-    with pytest.raises(BadTable, match="too many things"):
+    with pytest.raises(BadTable, match="too many nested items"):
         safe_pickle.load(pickle.dumps({"x": value}), "file")
 
 
@@ -230,7 +230,7 @@ def test_many_tensors_of_the_same_numbers_take_little_more_memory_than_the_file(
 def test_a_dictionary_of_an_arrays_rows_is_refused() -> None:
     """`torch.load(weights_only=True)` makes a tensor of each row; 10**7 of them fill 14 GB."""
     rows = torch.ones(1).expand(10**6, 2)
-    with pytest.raises(BadTable, match="something else than pairs"):
+    with pytest.raises(BadTable, match="something other than pairs"):
         torch_archive.load(torch_file({"x": Trap(OrderedDict, rows)}), "file")
 
 

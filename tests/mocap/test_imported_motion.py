@@ -159,7 +159,7 @@ def test_matrices_that_stretch_are_no_rotations() -> None:
 
 def test_joints_without_extent_are_no_person() -> None:
     motion = read(res_pk(pred_xyz_29=np.zeros((FRAMES, 29, 3))))
-    with pytest.raises(BadTable, match="no person's, its legs are 0 m"):
+    with pytest.raises(BadTable, match="not a person, its legs are 0 m"):
         imported_motion.ground_hybrik_motion(motion, 30.0, CONFIG)
 
 

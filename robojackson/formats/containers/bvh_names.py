@@ -1,8 +1,8 @@
 """HybrIK's 29 keypoints from the joints of any BVH skeleton, by the usual names of its joints.
 
 Known: SMPL, CMU, Mixamo, LAFAN1, 3ds Max's Biped without its prefix, and plain words. A spine of
-any number of joints is divided as ours is; hands and toes go on along their limb where there is no
-end site.
+any number of joints is divided in the proportions of our spine; hands and toes are extended along
+their limb where there is no end site.
 """
 
 from collections.abc import Mapping
@@ -31,17 +31,17 @@ SIDED: Mapping[str, tuple[str, ...]] = {
     "elbow": ("elbow", "forearm", "lowarm", "lowerarm"),
     "wrist": ("wrist", "hand"),
 }
-"""Of a joint without its side, the most telling first; one joint is never used twice."""
+"""Names of a joint without its side, the most specific first; one joint is never used twice."""
 OPTIONAL = {"collar", "foot", "neck"}
 SPINE = ("spine1", "spine2", "spine3", "neck")
 _ASSIGNED_IN_TURN = ("hip", "knee", "ankle", "foot", "shoulder", "elbow", "wrist", "collar")
 
 
 def keypoints_of(tree: Tree) -> Float[np.ndarray, "T 29 3"]:
-    """The keypoints, units and axes of the file.
+    """Return the keypoints, units and axes of the file.
 
     Raises:
-        BadTable: a joint that a person needs is not found.
+        BadTable: a required joint is not found.
     """
     where = _find(tree)
     places = tree.positions()
@@ -61,17 +61,17 @@ def keypoints_of(tree: Tree) -> Float[np.ndarray, "T 29 3"]:
 
 
 def _find(tree: Tree) -> dict[str, int]:
-    """Node of every keypoint that the file has."""
+    """Return the node of every keypoint that the file has."""
     plain = {
         _normalised_name(node.name): index for index, node in reversed([*enumerate(tree.nodes)])
     }
     found: dict[str, int] = {}
-    wanted = list(NAMES.items())
+    entries = list(NAMES.items())
     for bare in _ASSIGNED_IN_TURN:
         for side in ("left", "right"):
             marked = tuple(mark + name for name in SIDED[bare] for mark in (side, side[0]))
-            wanted.append((f"{side}_{bare}", marked))
-    for name, names in wanted:
+            entries.append((f"{side}_{bare}", marked))
+    for name, names in entries:
         for candidate in names:
             if candidate in plain and plain[candidate] not in found.values():
                 found[name] = plain[candidate]
@@ -84,14 +84,14 @@ def _find(tree: Tree) -> dict[str, int]:
 
 
 def _normalised_name(name: str) -> str:
-    """leftupleg of mixamorig:LeftUpLeg and of Left_UpLeg."""
+    """Return a name in lower case without prefix and separators: mixamorig:LeftUpLeg, leftupleg."""
     return "".join(letter for letter in name.rpartition(":")[2].lower() if letter.isalnum())
 
 
 def _divide_spine(
     tree: Tree, where: Mapping[str, int], places: np.ndarray, points: np.ndarray
 ) -> None:
-    """Spine joints at our own shares of the way from the pelvis to the neck."""
+    """Fill in the spine joints at our own shares of the way from the pelvis to the neck."""
     path = [points[:, keypoint("neck")]]
     node = where.get("neck", where["head"])
     while (node := tree.nodes[node].parent) not in (-1, where["pelvis"]):
@@ -111,7 +111,7 @@ def _divide_spine(
 def _finish_side(
     tree: Tree, where: Mapping[str, int], places: np.ndarray, points: np.ndarray, side: str
 ) -> None:
-    """Collar, hand, middle finger, ball of the foot and toe of one side."""
+    """Fill in collar, hand, middle finger, ball of the foot and toe of one side."""
 
     def rest(name: str) -> float:
         return _rest(f"{side}_{name}") * metre
@@ -136,18 +136,18 @@ def _finish_side(
 
 
 def _rest(name: str) -> float:
-    """Length of our own bone, metres."""
+    """Return the length of our own bone, metres."""
     return float(np.linalg.norm(REST_OFFSETS[keypoint(name)]))
 
 
 def _metre(points: np.ndarray, side: str) -> float:
-    """Units of the file in a metre of our skeleton, by the thigh."""
+    """Return the units of the file in a metre of our skeleton, by the thigh."""
     thigh = points[:, keypoint(f"{side}_knee")] - points[:, keypoint(f"{side}_hip")]
     return float(np.median(np.linalg.norm(thigh, axis=-1))) / _rest(f"{side}_knee")
 
 
 def _tip(tree: Tree, node: int, places: np.ndarray) -> np.ndarray | None:
-    """The end site of a joint, where it is not in the joint itself."""
+    """Return the end site of a joint, where it differs from the joint itself."""
     for index, other in enumerate(tree.nodes):
         if other.parent == node and other.is_end and np.linalg.norm(other.offset) > 0.0:
             return np.asarray(places[:, index])
@@ -155,6 +155,6 @@ def _tip(tree: Tree, node: int, places: np.ndarray) -> np.ndarray | None:
 
 
 def _beyond(points: np.ndarray, start: str, end: str, length: float) -> np.ndarray:
-    """A point further along a bone."""
+    """Return a point further along a bone."""
     a, b = points[:, keypoint(start)], points[:, keypoint(end)]
     return np.asarray(b + unit(b - a) * length)

@@ -18,7 +18,7 @@ from robojackson.formats.foreign_motion import LARGEST
 WHERE = "BVH"
 MOST_NODES = 1000
 SHORTEST_S = 1e-6
-"""Of a frame."""
+"""Shortest period of a frame."""
 
 
 @dataclass
@@ -26,10 +26,10 @@ class Node:
     """One joint or end site.
 
     Attributes:
-        name: Of a joint; of an end site that of its joint and `_end`.
-        parent: Index, -1 for the root.
-        offset: From the parent, units of the file.
-        channels: In the order of the columns.
+        name: Name of a joint; of an end site that of its joint and `_end`.
+        parent: Index of the parent, -1 for the root.
+        offset: Offset from the parent, units of the file.
+        channels: Names of the channels in the order of the columns.
         first: Column of the first channel.
     """
 
@@ -41,13 +41,13 @@ class Node:
 
     @property
     def is_end(self) -> bool:
-        """An end site, which has no rotation."""
+        """Return whether the node is an end site, which has no rotation."""
         return not self.channels
 
 
 @dataclass(frozen=True)
 class Tree:
-    """A file.
+    """The nodes and frames of a file.
 
     Attributes:
         nodes: Parents before children.
@@ -60,7 +60,8 @@ class Tree:
     fps: float
 
     def rotations(self) -> Float[np.ndarray, "T N 3 3"]:
-        """Of all nodes relative to their parents; an end site turns with its parent."""
+        """Return rotations of all nodes relative to their parents; an end site turns with its
+        parent."""
         found = np.tile(np.eye(3), (len(self.frames), len(self.nodes), 1, 1))
         for index, node in enumerate(self.nodes):
             turns = [(c[0], node.first + i) for i, c in enumerate(node.channels) if c[1:] == _TURN]
@@ -71,7 +72,7 @@ class Tree:
         return found
 
     def root(self) -> Float[np.ndarray, "T 3"]:
-        """Positions of the root, units of the file."""
+        """Return the positions of the root, units of the file."""
         node = self.nodes[0]
         place = np.tile(node.offset, (len(self.frames), 1))
         for column, channel in enumerate(node.channels):
@@ -80,7 +81,7 @@ class Tree:
         return place
 
     def positions(self) -> Float[np.ndarray, "T N 3"]:
-        """Of all nodes, units of the file."""
+        """Return the positions of all nodes, units of the file."""
         local, place = self.rotations(), np.zeros((len(self.frames), len(self.nodes), 3))
         turned = local.copy()
         place[:, 0] = self.root()
@@ -95,7 +96,7 @@ _CHANNELS = {axis + kind for axis in "XYZ" for kind in (_TURN, _MOVE)}
 
 
 def parse(data: bytes) -> Tree:
-    """The tree of a file.
+    """Return the tree of a file.
 
     Raises:
         BadTable: not a BVH, truncated, or numbers that are not finite.
@@ -114,7 +115,7 @@ def parse(data: bytes) -> Tree:
         raise BadTable(f"{WHERE}: damaged ({cause})") from cause
     if width == 0 or count < 2 or table.size < count * width:
         raise BadTable(
-            f"{WHERE}: promises {count} frames (at least 2) of {width} channels, "
+            f"{WHERE}: declares {count} frames (at least 2) of {width} channels, "
             f"and has {table.size} numbers"
         )
     offsets = np.array([node.offset for node in nodes])
@@ -158,13 +159,13 @@ def _hierarchy(words: Iterator[str]) -> list[Node]:
 
 
 def _head(words: Iterator[str]) -> tuple[int, float]:
-    """Number of frames and seconds a frame."""
-    told: dict[str, str] = {}
+    """Return the number of frames and the seconds a frame."""
+    entries: dict[str, str] = {}
     for _ in range(2):
         key = next(words)
         if key == "Frame":
             key += " " + next(words)
-        told[key.rstrip(":").lower()] = next(words)
-    if set(told) != {"frames", "frame time"}:
+        entries[key.rstrip(":").lower()] = next(words)
+    if set(entries) != {"frames", "frame time"}:
         raise BadTable(f"{WHERE}: the motion has no 'Frames:' and 'Frame Time:'")
-    return int(told["frames"]), float(told["frame time"])
+    return int(entries["frames"]), float(entries["frame time"])

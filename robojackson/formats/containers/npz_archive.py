@@ -15,15 +15,16 @@ ZIP_FAILURES = (
     *(zipfile.BadZipFile, zlib.error, OSError, EOFError),
     *(ValueError, TypeError, KeyError, NotImplementedError, RuntimeError),
 )
-"""What `zipfile` raises on a damaged file."""
+"""Errors that `zipfile` raises on a damaged file."""
 MAX_LISTED = 12
-"""Names of arrays in a message."""
+"""Number of array names in a message."""
 MOST_NUMBERS = 2**25
-"""In all arrays that are read: ten minutes of AMASS at 120 frames a second have 13 million."""
+"""Largest number of values in all arrays that are read: ten minutes of AMASS at 120 frames a second
+have 13 million."""
 
 
 def pack(arrays: Mapping[str, np.ndarray]) -> bytes:
-    """An uncompressed .npz."""
+    """Return an uncompressed .npz."""
     sink = io.BytesIO()
     np.savez(sink, allow_pickle=False, **arrays)
     return sink.getvalue()
@@ -32,16 +33,16 @@ def pack(arrays: Mapping[str, np.ndarray]) -> bytes:
 def unpack(
     data: bytes, needed: Iterable[str], where: str, requested: Collection[str] | None = None
 ) -> dict[str, np.ndarray]:
-    """The arrays of an .npz.
+    """Return the arrays of an .npz.
 
     Args:
-        data: Of the file.
-        needed: Names that must be there.
-        where: For the message.
-        requested: Names that are read; None reads all. The others may hold anything.
+        data: Bytes of the file.
+        needed: Names of required arrays.
+        where: Name of the file in errors.
+        requested: Names to read; None reads all. The others may hold anything.
 
     Raises:
-        BadTable: no .npz, one that holds Python objects, or a needed array is missing.
+        BadTable: not an .npz, one that holds Python objects, or a required array is missing.
     """
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
@@ -61,7 +62,7 @@ def unpack(
 
 
 def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo, most: int) -> np.ndarray:
-    """One array of at most so many numbers; its header must promise exactly the bytes there are."""
+    """Return one array of at most `most` numbers; its header must match the number of bytes."""
     with archive.open(info) as source:
         version = npy.read_magic(source)
         read_header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
@@ -70,9 +71,7 @@ def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo, most: int) -> np.nd
         if kind.hasobject:
             raise ValueError(f"{info.filename}: holds Python objects")
         if size * kind.itemsize != there:
-            raise ValueError(
-                f"{info.filename}: {shape} of {kind} promised, {there} bytes are there"
-            )
+            raise ValueError(f"{info.filename}: {shape} of {kind} declared, {there} bytes found")
         if size > most or there > 8 * MOST_NUMBERS:
             raise ValueError(
                 f"{info.filename}: {size:,} numbers; at most {MOST_NUMBERS:,} are read"

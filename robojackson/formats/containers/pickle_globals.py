@@ -1,7 +1,8 @@
-"""The words that a pickle of arrays may use, and what stands for each of them in our reader.
+"""The globals that a pickle of arrays may name, and what replaces each of them in our reader.
 
-NumPy's types and functions become classes of our own, holding a shape and bytes; nothing of NumPy's
-or joblib's is called, and an array is made only when as many bytes are there as its shape says.
+NumPy's types and functions become classes of our own, holding a shape and bytes; no function of
+NumPy or joblib is called, and an array is created only if the file has as many bytes as its shape
+needs.
 """
 
 from collections.abc import Iterable, Mapping
@@ -13,11 +14,11 @@ import numpy as np
 from robojackson.errors import BadTable
 
 NUMERIC_KINDS = "biufUS"
-"""Kinds of dtypes that may be in a file, numbers and text: an array of objects holds anything."""
+"""Kinds of allowed dtypes, numbers and text: an array of objects could hold anything."""
 
 
 class Refused(BadTable):
-    """A file that asks for something else than arrays, numbers and text."""
+    """A file that names something other than arrays, numbers and text."""
 
 
 @dataclass
@@ -32,7 +33,7 @@ class NumberType:
 
     @property
     def dtype(self) -> np.dtype:
-        """The type, its byte order set."""
+        """Return the type, its byte order set."""
         made = np.dtype(self.name)
         if made.kind not in NUMERIC_KINDS:
             raise Refused(f"refused, it asks for an array of {made}")
@@ -41,7 +42,7 @@ class NumberType:
 
 @dataclass
 class Holder:
-    """What becomes an array when all of it has been read."""
+    """A placeholder that becomes an array when all of it has been read."""
 
     value: np.ndarray | None = None
 
@@ -61,7 +62,7 @@ class Wrapper:
 
 
 def from_bytes(data: object, kind: object, shape: Iterable[int], order: str) -> np.ndarray:
-    """An array of plain numbers; the bytes must be as many as the shape says."""
+    """Return an array of plain numbers; the shape must match the number of bytes."""
     if not isinstance(kind, NumberType):
         raise Refused("refused, it asks for an array of objects")
     if not isinstance(data, bytes | bytearray):
@@ -78,14 +79,14 @@ def _number(kind: NumberType, data: object) -> float:
 
 
 def _text_bytes(text: str, encoding: str = "latin1") -> bytes:
-    """Protocol 2 writes bytes as text in Latin-1."""
+    """Return the bytes that protocol 2 writes as text in Latin-1."""
     if encoding != "latin1":
         raise Refused(f"refused, it asks for the encoding {encoding!r}")
     return text.encode("latin1")
 
 
 def _no_bytes() -> bytes:
-    """What protocol 2 calls for bytes of length zero."""
+    """Return zero bytes, as protocol 2 writes them."""
     return b""
 
 
@@ -115,5 +116,5 @@ WORDS: Mapping[tuple[str, str], Any] = {
     **{(f"{core}.multiarray", "scalar"): _number for core in _CORES},
     **{(f"{core}.numeric", "_frombuffer"): _from_buffer for core in _CORES},
 }
-"""What a file may name, and what stands for it here."""
+"""The globals that a file may name, and their replacements."""
 JOBLIB = {**WORDS, ("joblib.numpy_pickle", "NumpyArrayWrapper"): Wrapper}

@@ -1,6 +1,6 @@
 """Pickles of arrays, read without running anything: plain ones and those of joblib.
 
-A pickle is a program; this reader knows the few words of it that make numbers, text and containers
+A pickle is a program; this reader knows the few instructions that make numbers, text and containers
 (`pickle_globals`) and calls none of the functions that a file names. Python's own unpickler in C is
 not used, because a file of 20 bytes can make it fill the memory (a memo index of 2^31).
 """
@@ -25,13 +25,13 @@ from robojackson.formats.containers.pickle_globals import (
 )
 
 DEEPEST, MOST_PARTS = 6, 1_000_000
-"""Containers within containers, and things in all, that a file may hold."""
+"""Limits of a file: depth of nested containers, and number of items."""
 BASE: Any = pickle._Unpickler
 """The unpickler that is written in Python; its memo is a dictionary."""
 
 
 class Reader(BASE):  # type: ignore[misc]
-    """An unpickler that knows `words` and nothing else."""
+    """An unpickler that knows only `words`."""
 
     dispatch: ClassVar[dict[int, Any]] = dict(BASE.dispatch)
 
@@ -45,14 +45,14 @@ class Reader(BASE):  # type: ignore[misc]
         self._source, self._words, self._persistent = source, words, persistent
 
     def find_class(self, module: str, name: str) -> Any:
-        """Our own word for a name."""
+        """Return the replacement of a global."""
         if (module, name) not in self._words:
             raise Refused(f"refused, it asks for {module}.{name}")
         word = self._words[(module, name)]
         return replace(word) if isinstance(word, NumberType) else word
 
     def persistent_load(self, key: Any) -> Any:
-        """What stands outside the pickle."""
+        """Return an item that is stored outside the pickle."""
         if self._persistent is None:
             raise Refused("refused, it asks for something outside the file")
         return self._persistent(key)
@@ -61,7 +61,7 @@ class Reader(BASE):  # type: ignore[misc]
         raise Refused("refused, it asks for an object of a class")
 
     def _build(self) -> None:
-        """Only our own stand-ins have a state."""
+        """Set the state of a replacement; no other object has one."""
         state, made = self.stack.pop(), self.stack[-1]
         if type(made) not in (NumberType, Holder, Wrapper):
             self._refuse()
@@ -70,14 +70,14 @@ class Reader(BASE):  # type: ignore[misc]
             self.stack[-1] = _following(made.state, self._source)
 
     def _new(self) -> None:
-        """Only joblib's wrapper is made without a call."""
+        """Create joblib's wrapper; no other object is created without a call."""
         arguments, made = self.stack.pop(), self.stack.pop()
         if made is not Wrapper or arguments:
             self._refuse()
         self.append(Wrapper())
 
     def _reduce(self) -> None:
-        """Call one of our own words."""
+        """Call a replacement."""
         arguments, function = self.stack.pop(), self.stack[-1]
         if not any(function is word for word in self._words.values()):
             self._refuse()
@@ -91,16 +91,16 @@ class Reader(BASE):  # type: ignore[misc]
 
 
 def load(data: bytes, where: str) -> dict[str, Any]:
-    """The dictionary of a pickle: arrays, numbers, text, lists and dictionaries of them.
+    """Return the dictionary of a pickle: arrays, numbers, text, lists and dictionaries of them.
 
     Raises:
-        BadTable: damaged, no dictionary, or it asks for anything but arrays of numbers.
+        BadTable: damaged, not a dictionary, or it holds anything but arrays of numbers.
     """
     return _read(data, WORDS, where)
 
 
 def load_joblib(data: bytes, where: str) -> dict[str, Any]:
-    """The dictionary of a file of `joblib.dump`, not compressed.
+    """Return the dictionary of a file of `joblib.dump`, not compressed.
 
     Raises:
         BadTable: as `load`.
@@ -118,7 +118,7 @@ def _read(data: bytes, words: Mapping[tuple[str, str], Any], where: str) -> dict
 
 
 def read_with(reader: Reader, where: str) -> dict[str, Any]:
-    """The dictionary that a reader makes."""
+    """Return the dictionary that a reader makes."""
     try:
         content = to_arrays(reader.load())
     except Refused as cause:
@@ -131,13 +131,13 @@ def read_with(reader: Reader, where: str) -> dict[str, Any]:
 
 
 def to_arrays(value: Any) -> Any:
-    """The same with arrays in the place of what stood for them."""
+    """Return the same value with arrays in place of their placeholders."""
     budget = [MOST_PARTS]
 
     def walk(part: Any, depth: int) -> Any:
         budget[0] -= 1
         if depth > DEEPEST or budget[0] < 0:
-            raise Refused("refused, it holds too many things within things")
+            raise Refused("refused, it holds too many nested items")
         if isinstance(part, Holder):
             return np.zeros(0) if part.value is None else part.value
         if isinstance(part, dict):
@@ -150,16 +150,16 @@ def to_arrays(value: Any) -> Any:
 
 
 def _following(state: dict[str, Any], source: io.BytesIO) -> np.ndarray:
-    """The array whose bytes follow joblib's wrapper, after its padding."""
+    """Return the array whose bytes follow joblib's wrapper, after its padding."""
     shape, kind = tuple(int(size) for size in state["shape"]), state["dtype"]
     if not isinstance(kind, NumberType):
         raise Refused("refused, it asks for an array of objects")
     if state.get("numpy_array_alignment_bytes") is not None:
         source.read(source.read(1)[0])
-    wanted = kind.dtype.itemsize
+    expected = kind.dtype.itemsize
     for size in shape:
-        wanted *= size
+        expected *= size
     rest = source.getbuffer().nbytes - source.tell()
-    if not 0 <= wanted <= rest:
-        raise EOFError(f"an array of {wanted} bytes, the file has {rest} more")
-    return from_bytes(source.read(wanted), kind, shape, str(state["order"]))
+    if not 0 <= expected <= rest:
+        raise EOFError(f"an array of {expected} bytes, the file has {rest} more")
+    return from_bytes(source.read(expected), kind, shape, str(state["order"]))

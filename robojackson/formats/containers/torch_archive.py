@@ -3,7 +3,7 @@
 Read without PyTorch: dictionaries of tensors, numbers and text, nothing executed. Members must be
 stored, as `torch.save` does, and tensors are views of them, so that reading takes no more memory
 than a few times the size of the file. `torch.load(weights_only=True)` executes no code either, but
-calls `bytearray` and `OrderedDict` with what the file says: 400 bytes fill 4 GB.
+calls `bytearray` and `OrderedDict` with arguments of the file: 400 bytes fill 4 GB.
 """
 
 import io
@@ -26,14 +26,14 @@ STORAGES: Mapping[str, str] = {
     "BoolStorage": "?",
 }  # fmt: skip
 MOST_NUMBERS = 100_000_000
-"""In one tensor; a stride of zero lets four bytes look like any number of them."""
+"""Largest number of values in one tensor; a stride of zero repeats four bytes without end."""
 
 
 def load(data: bytes, where: str) -> dict[str, Any]:
-    """The dictionary of a `.pt`, tensors as arrays.
+    """Return the dictionary of a `.pt`, tensors as arrays.
 
     Raises:
-        BadTable: no such file, damaged, or it asks for anything but tensors of numbers.
+        BadTable: no such file, damaged, or it holds anything but tensors of numbers.
     """
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
@@ -85,8 +85,8 @@ def _parameter(tensor: Any, *_: Any) -> Any:
 
 
 def _dictionary(pairs: Any = ()) -> dict[Any, Any]:
-    if not isinstance(pairs, list | tuple):  # of an array, each row would become a pair
-        raise Refused("refused, it asks for a dictionary of something else than pairs")
+    if not isinstance(pairs, list | tuple):  # each row of an array would become a pair
+        raise Refused("refused, it asks for a dictionary of something other than pairs")
     return dict(pairs)
 
 
@@ -97,7 +97,7 @@ TORCH: Mapping[tuple[str, str], Any] = {
     ("collections", "OrderedDict"): _dictionary,
     **{("torch", name): NumberType(kind) for name, kind in STORAGES.items()},
 }
-"""What a file may name, and what stands for it here."""
+"""The globals that a file may name, and their replacements."""
 
 
 def save(content: Mapping[str, object]) -> bytes:

@@ -1,1 +1,1 @@
-"""The deploy pack: a policy with all that a robot needs to run it and nothing of RoboJackson."""
+"""The deploy pack: a policy with everything that a robot needs to run it, without RoboJackson."""

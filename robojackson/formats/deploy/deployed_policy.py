@@ -1,6 +1,6 @@
-"""What a deploy pack is made from: network, motion, limits and the layout of the observation.
+"""Contents of a deploy pack: network, motion, limits and the layout of the observation.
 
-Everything is in the order of the robot's hinges, which is that of qpos. Metres, radians, seconds,
+All arrays are in the order of the robot's hinges, which is that of qpos. Metres, radians, seconds,
 newton-metres.
 """
 
@@ -29,8 +29,8 @@ class Link:
     Attributes:
         turn: Fixed rotation before the hinge.
         hinge: Index of the hinge; None where there is none.
-        axis: Of the hinge, in its body.
-        zero: Angle at which the hinge is at its zero, rad.
+        axis: Axis of the hinge, in its body.
+        zero: Angle at the zero position of the hinge, rad.
     """
 
     turn: Float[np.ndarray, "3 3"]
@@ -41,7 +41,7 @@ class Link:
 
 @dataclass(frozen=True)
 class DeployedPolicy:
-    """A policy that sees what a robot measures by itself, and how it is run.
+    """A policy that uses only measurements of the robot itself, and the settings to run it.
 
     Attributes:
         layers: (weight (in, out), bias (out,)); ReLU between them, tanh at the end. Inputs are in
@@ -50,16 +50,17 @@ class DeployedPolicy:
         model: The compiled robot.
         reference: The motion.
         lead: Offset of the targets from the reference's angles at every step, rad.
-        root, anchor: Bodies: of the free joint, and the one whose attitude the observation holds.
-        chain: From the root to the anchor.
+        root, anchor: Names of the body with the free joint, and of the one whose attitude is
+            observed.
+        chain: Links from the root to the anchor.
         bodies: Names of the bodies whose poses the policy file holds.
         default: Angles that the observation and the action are relative to, rad.
-        action_scale: Radians a unit of the action; a residual of 1 is as much.
+        action_scale: Radians per unit of the action; a residual of 1 is equally large.
         stiffness, damping: Gains of the PD law, Nm/rad and Nm s/rad.
-        torque_limit, speed_limit: Nm and rad/s.
-        fall_tilt: Between the up axes of robot and reference, from which on a robot falls, rad.
-        places: Place of every hinge in the MJCF, in which welded hinges count, too.
-        facts: What the policy was trained for.
+        torque_limit, speed_limit: Limits of every hinge, Nm and rad/s.
+        fall_tilt: Angle between the up axes of robot and reference that counts as a fall, rad.
+        places: Index of every hinge in the MJCF, in which welded hinges count, too.
+        facts: Metadata of the training.
     """
 
     layers: Layers
@@ -84,29 +85,29 @@ class DeployedPolicy:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Names of the hinges."""
+        """Return the names of the hinges."""
         return self.reference.joint_names
 
     @property
     def terms(self) -> list[tuple[str, int]]:
-        """Names and sizes of the terms of the observation."""
+        """Return names and sizes of the terms of the observation."""
         count = len(self.joints)
         return list(zip(TERMS, (2 * count, 6, 3, count, count, count), strict=True))
 
     @property
     def observation_size(self) -> int:
-        """Length of the observation."""
+        """Return the length of the observation."""
         return sum(size for _, size in self.terms)
 
     @property
     def layout_sha256(self) -> str:
-        """Digest of terms, joints and anchor, as the runner computes it."""
+        """Return the digest of terms, joints and anchor, as the runner computes it."""
         text = json.dumps([self.terms, list(self.joints), self.anchor])
         return hashlib.sha256(text.encode()).hexdigest()
 
 
 def places_in_mjcf(robot: Robot) -> tuple[int, ...]:
-    """Return the place of every hinge among those of the MJCF, which has the hinges that the
+    """Return the index of every hinge among those of the MJCF, including the hinges that the
     description welds: the motors of a robot keep their numbers when one of them is missing."""
     spec = read_spec(mjcf_path(robot.description), robot.description)
     hinge = mujoco.mjtJoint.mjJNT_HINGE

@@ -1,6 +1,6 @@
-"""The licence passport: what a policy was made from, under which licences, and what these allow.
+"""The licence passport: the inputs of a policy, their licences, and what these allow.
 
-No legal advice: it lists what is known. What nobody recorded is `unknown`, and one unknown input
+No legal advice: it lists what is known. An unrecorded licence is `unknown`, and one unknown input
 makes the whole unknown.
 """
 
@@ -20,7 +20,7 @@ from robojackson.robot.mjcf import added_folder
 Answer = Literal["yes", "notice", "share-alike", "no", "unknown"]
 RIGHTS = ("use", "change", "pass_on", "sell")
 ORDER: tuple[Answer, ...] = ("yes", "notice", "share-alike", "unknown", "no")
-"""From the freest answer to the strictest; together the strictest counts."""
+"""Answers from the freest to the strictest; the strictest one applies to the whole."""
 UNKNOWN, TEXTS = "unknown", "licences"
 ALLOWS: Mapping[str, tuple[Answer, Answer, Answer, Answer]] = {
     "own": ("yes", "yes", "yes", "yes"),
@@ -37,7 +37,8 @@ ALLOWS: Mapping[str, tuple[Answer, Answer, Answer, Answer]] = {
     "CC-BY-ND-4.0": ("yes", "no", "notice", "notice"),
     "CC-BY-NC-ND-4.0": ("notice", "no", "notice", "no"),
 }
-"""What a licence allows, for `RIGHTS`; one that is not here is unknown."""
+"""Rights that a licence grants, in the order of `RIGHTS`; a licence that is not listed is
+unknown."""
 KINDS = ("clip", "body models", "motion", "weights", "robot model", "tracker", "software")
 WORDS = {
     "yes": "yes",
@@ -54,9 +55,9 @@ class Ingredient:
 
     Attributes:
         kind: One of `KINDS`.
-        name: What it is.
+        name: Name of the input.
         licence: SPDX identifier, `own`, or `unknown`.
-        note: Where the licence is known from, or what is open.
+        note: Source of the licence, or what is open.
         sha256: Digest of the file, where it is known.
     """
 
@@ -68,7 +69,7 @@ class Ingredient:
 
     @property
     def allows(self) -> dict[str, Answer]:
-        """What the licence allows."""
+        """Return what the licence allows."""
         answers = ALLOWS.get(self.licence, (UNKNOWN,) * 4)
         return dict(zip(RIGHTS, answers, strict=True))  # type: ignore[arg-type]
 
@@ -111,8 +112,8 @@ def robot_ingredient(description: RobotDescription, sha256: str) -> Ingredient:
 
 
 def licence_texts(description: RobotDescription) -> dict[str, bytes]:
-    """Return the licence files of a robot's model by their names in a pack, as far as they are
-    here: `robots add` unpacks those of a wheel beside the model."""
+    """Return the available licence files of a robot's model by their names in a pack: `robots add`
+    unpacks those of a wheel beside the model."""
     folder = added_folder(description) / TEXTS
     files = sorted(folder.iterdir()) if description.source and folder.is_dir() else []
     package = description.mjcf.partition(":")[0]
@@ -122,7 +123,7 @@ def licence_texts(description: RobotDescription) -> dict[str, bytes]:
 
 
 def _files_of(package: str) -> list[PackagePath]:
-    """The licence files that a package was installed with."""
+    """Return the licence files that a package was installed with."""
     try:
         found = package_files(package) or []
     except PackageNotFoundError:
@@ -132,10 +133,10 @@ def _files_of(package: str) -> list[PackagePath]:
 
 def _of_package(package: str) -> str:
     try:
-        told = package_metadata(package).json
+        metadata = package_metadata(package).json
     except PackageNotFoundError:
         return UNKNOWN
-    words = str(told.get("license_expression") or told.get("license") or "").split("\n")[0]
+    words = str(metadata.get("license_expression") or metadata.get("license") or "").split("\n")[0]
     return next((one for one in ALLOWS if one == words.strip().removesuffix(" License")), UNKNOWN)
 
 
@@ -151,7 +152,7 @@ def passport_markdown(ingredients: list[Ingredient]) -> bytes:
         "# Licence passport",
         "",
         "What this policy was made from and what the licences allow. No legal advice; `unknown`",
-        "means that nobody recorded it: find out before you pass this pack on or sell it.",
+        "means that no record exists: find out before you pass this pack on or sell it.",
         "",
         "| input | what | licence | use | change | pass on | sell | known from |",
         "|---|---|---|---|---|---|---|---|",

@@ -35,10 +35,10 @@ def pack_files(
     """Return the content of every file of a pack.
 
     Args:
-        evaluation: What `robojackson evaluate` wrote, with `passport` where one was made.
+        evaluation: Content of evaluation.json, with `passport` where one was made.
 
     Raises:
-        BadConfiguration: a robot that cannot be written as one file, or whose root is not first.
+        BadConfiguration: the robot cannot be written as one file, or its root is not first.
         MissingDependency: the onnx package is not installed.
         UnknownName: the reference has other joints than the robot.
     """

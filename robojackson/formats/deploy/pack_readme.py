@@ -24,7 +24,7 @@ Nothing here has been on a real robot. All figures above are of simulations.
 
 1. Run `run.py --view` and watch the whole dance. Stop here if a row of the passport is bad.
 2. Hang the robot from a gantry with slack for the dance, feet just off the floor, 3 m free around
-   it, nobody within reach, and a second person at the emergency stop of the robot itself.
+   it, no person within reach, and a second person at the emergency stop of the robot itself.
 3. `Runner(robot=...)` drives any object with `joints` (names, in order), `read()` (attitude wxyz,
    gyroscope in the root's axes, joint angles and speeds), `drive(target, stiffness, damping)`.
    Your `drive` must keep the limits of `deploy.yaml`, as `SimulatedRobot.drive` does, and return
@@ -45,7 +45,7 @@ def pack_readme(
     """Return the content of the file.
 
     Args:
-        figures: Of the evaluation on stock physics; None where none was given.
+        figures: Figures of the evaluation on stock physics; None where none was made.
         passport: Rows of `evaluate --passport`; empty where none was made.
     """
     reference = policy.reference

@@ -6,9 +6,9 @@ exporters: `obs` (1, D) and `time_step` (1, 1) in; `actions` and the motion at t
 without state estimation, unscaled.
 
 The policy adds a residual to the reference's next angles and sees its last residual. A runner knows
-neither, only its own last action: the graph looks up which row of the motion the command is, and
-takes the residual out of the action with the angles of the row before. It does not ask `time_step`,
-which runners count differently.
+only its own last action: the graph finds the row of the motion that the command is, and subtracts
+the angles of the row before from the action. It does not use `time_step`, which runners count
+differently.
 """
 
 from typing import Any, Literal
@@ -30,7 +30,7 @@ def policy_graph(
 
     Args:
         motion: The arrays `MOTION`, a row a step, bodies as in `policy.bodies`.
-        metadata: Written into the file.
+        metadata: Metadata of the file.
 
     Raises:
         MissingDependency: the onnx package is not installed.
@@ -51,7 +51,7 @@ def policy_graph(
 
 
 class _Graph:
-    """Nodes and constants of a graph under way; everything has one row."""
+    """Nodes and constants of a graph in construction; every tensor has one row."""
 
     def __init__(self) -> None:
         try:
@@ -107,7 +107,7 @@ class _Graph:
 
 
 def _policy_nodes(graph: _Graph, policy: DeployedPolicy, motion: dict[str, np.ndarray]) -> None:
-    """From `obs` to `actions`."""
+    """Add the nodes from `obs` to `actions`."""
     terms, at = {}, 0
     for name, size in policy.terms:
         terms[name] = graph.columns("obs", range(at, at + size))
@@ -135,7 +135,7 @@ def _policy_nodes(graph: _Graph, policy: DeployedPolicy, motion: dict[str, np.nd
 
 
 def _row_of(graph: _Graph, command: str, motion: dict[str, np.ndarray]) -> str:
-    """Index (1,) of the motion's row that is nearest to the command."""
+    """Return the index (1,) of the motion's row that is nearest to the command."""
     table = np.concatenate([motion["joint_pos"], motion["joint_vel"]], axis=1)
     away = graph.add("Sub", graph.constant(table), command)
     square = graph.add("ReduceSum", graph.add("Mul", away, away), graph.integers(1), keepdims=1)
@@ -145,7 +145,8 @@ def _row_of(graph: _Graph, command: str, motion: dict[str, np.ndarray]) -> str:
 def _last_residual(
     graph: _Graph, policy: DeployedPolicy, actions: str, row: str, default: str, scale: str
 ) -> str:
-    """What the policy added one step ago; zero before the first step, where the action is zero."""
+    """Return the residual of the policy one step ago; zero before the first step, where the action
+    is zero."""
     before = graph.add("Gather", graph.constant(targets_before(policy)), row, axis=0)
     apart = graph.add("Div", graph.add("Sub", default, before), scale)
     residual = graph.add("Add", apart, actions)
@@ -157,30 +158,31 @@ def _last_residual(
 
 
 def targets_before(policy: DeployedPolicy) -> np.ndarray:
-    """Reference's targets one step before each row; where a row repeats the one before, its own."""
+    """Return the reference's targets one step before each row; in a repeated row, its own."""
     reference = policy.reference
     table = np.concatenate([reference.qpos[:, 7:], reference.qvel[:, 6:]], axis=1)
-    wanted = np.asarray(reference.qpos, float)[:, 7:] + policy.lead
-    before: np.ndarray = np.roll(wanted, 1, axis=0)
+    targets = np.asarray(reference.qpos, float)[:, 7:] + policy.lead
+    before: np.ndarray = np.roll(targets, 1, axis=0)
     if not reference.cyclic:
-        before[0] = wanted[0]
+        before[0] = targets[0]
     held = np.flatnonzero(np.all(table[1:] == table[:-1], axis=1))
-    before[held], before[held + 1] = wanted[held], wanted[held + 1]
+    before[held], before[held + 1] = targets[held], targets[held + 1]
     return before
 
 
 def _root_turn(
-    graph: _Graph, chain: tuple[Link, ...], anchor: str, measured: str, wanted: str
+    graph: _Graph, chain: tuple[Link, ...], anchor: str, measured: str, target: str
 ) -> str:
-    """First two columns (1, 6) of the reference's root in the robot's, of the anchors' and the
-    angles of the hinges between: turns of robot and reference are those of their roots times W."""
+    """Return the first two columns (1, 6) of the reference's root in the robot's, from the anchors'
+    rotations and the angles of the hinges between: rotations of the anchors are those of the roots
+    times W."""
     first, second = graph.columns(anchor, (0, 2, 4)), graph.columns(anchor, (1, 3, 5))
     if not chain:
         return graph.add("Concat", first, second, axis=1)
     third = _cross(graph, first, second)
     rows = graph.add("Concat", first, second, third, axis=0)
     between = graph.add("Transpose", rows, perm=[1, 0])
-    here, there = (_turned(graph, chain, angles) for angles in (measured, wanted))
+    here, there = (_turned(graph, chain, angles) for angles in (measured, target))
     back = graph.add("Transpose", there, perm=[1, 0])
     turn = graph.add("MatMul", graph.add("MatMul", here, between), back)
     columns = graph.add("Transpose", turn, perm=[1, 0])
@@ -189,7 +191,7 @@ def _root_turn(
 
 
 def _turned(graph: _Graph, chain: tuple[Link, ...], angles: str) -> str:
-    """Rotation of the anchor in the root (3, 3), by Rodrigues' formula hinge by hinge."""
+    """Return the rotation of the anchor in the root (3, 3), by Rodrigues' formula."""
     result = graph.constant(np.eye(3))
     for link in chain:
         result = graph.add("MatMul", result, graph.constant(link.turn))
@@ -208,7 +210,7 @@ def _turned(graph: _Graph, chain: tuple[Link, ...], angles: str) -> str:
 
 
 def _cross(graph: _Graph, first: str, second: str) -> str:
-    """Cross product of two rows (1, 3)."""
+    """Return the cross product of two rows (1, 3)."""
     ahead, back = (1, 2, 0), (2, 0, 1)
     one = graph.add("Mul", graph.columns(first, ahead), graph.columns(second, back))
     other = graph.add("Mul", graph.columns(first, back), graph.columns(second, ahead))

@@ -1,6 +1,6 @@
-"""The robot of a deploy pack as one MJCF without meshes: what collides, weighs and drives.
+"""The robot of a deploy pack as one MJCF without meshes: collision shapes, masses and motors.
 
-The physics is that of the compiled robot: gains stay outside, as in training.
+The physics is that of the compiled robot: gains are not part of it, as in training.
 """
 
 import mujoco
@@ -12,7 +12,8 @@ from robojackson.robot.model import Robot
 from robojackson.robot.physics import apply_physics, is_plane
 
 TOLERANCE = 1e-4
-"""Relative difference between a figure of the robot and of its MJCF, which has few digits."""
+"""Largest relative difference between a figure of the robot and of its MJCF, which has few
+digits."""
 FIGURES = ("body_mass", "body_inertia", "body_ipos", "body_pos", "dof_armature", "dof_damping",
            "jnt_range", "actuator_gear")  # fmt: skip
 
@@ -21,7 +22,7 @@ def robot_xml(robot: Robot) -> bytes:
     """Return the MJCF of a robot, which needs no other file.
 
     Raises:
-        BadConfiguration: it collides with meshes, or what is written is not the same robot.
+        BadConfiguration: the robot collides with meshes, or the written file is not the same robot.
     """
     description = robot.description
     spec = read_spec(mjcf_path(description), description)
@@ -39,14 +40,14 @@ def robot_xml(robot: Robot) -> bytes:
     except ValueError as error:
         raise BadConfiguration(
             f"robot {description.name!r} cannot be written as one file "
-            f"({str(error).splitlines()[0]}): a deploy pack wants collision shapes without meshes"
+            f"({str(error).splitlines()[0]}): a deploy pack needs collision shapes without meshes"
         ) from error
     _require_same(robot, again)
     return text.encode()
 
 
 def _strip_looks(spec: mujoco.MjSpec) -> None:
-    """Remove what is only seen: geoms that collide with nothing and weigh nothing, and meshes."""
+    """Remove visual parts: geoms without collision and mass, and meshes."""
     for geom in list(spec.geoms):
         weighs = geom.density and not geom.parent.explicitinertial
         collides = geom.contype or geom.conaffinity

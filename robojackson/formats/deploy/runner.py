@@ -1,6 +1,6 @@
 """Run this deploy pack in MuJoCo: python run.py [--seconds S] [--view]. Ctrl-C damps and stops.
 
-Needs numpy, onnxruntime and mujoco alone. README.md says what a robot in place of MuJoCo's needs.
+Needs numpy, onnxruntime and mujoco alone. README.md describes the interface of a real robot.
 """
 
 import argparse
@@ -23,19 +23,19 @@ class SimulatedRobot:
 
     def __init__(self, model: mujoco.MjModel, cfg: dict[str, Any]) -> None:
         self.model, self.data, self.viewer = model, mujoco.MjData(model), None
-        self.hung: Any = None  # pose of the root while it hangs
+        self.hung: Any = None  # pose of the root while hung up
         self.joints = [model.joint(i).name for i in range(1, model.njnt)]
         self.motors = np.argsort(model.actuator_trnid[:, 0])
         self.limits = {name: np.array(value) for name, value in cfg["limits"].items()}
         self.substeps = round(cfg["step_dt"] / model.opt.timestep)
 
     def read(self) -> tuple[np.ndarray, ...]:
-        """Attitude of the root (wxyz), gyroscope in its axes, joint angles and speeds."""
+        """Return the root's attitude (wxyz), the gyroscope in its axes, joint angles and speeds."""
         qpos, qvel = self.data.qpos.copy(), self.data.qvel.copy()
         return qpos[3:7], qvel[3:6], qpos[7:], qvel[6:]
 
     def drive(self, target: np.ndarray, stiffness: np.ndarray, damping: np.ndarray) -> None:
-        """One control step of the PD law, inside the limits of joints, torque and speed."""
+        """Run one control step of the PD law, within the limits of joints, torque and speed."""
         most, fastest = self.limits["torque"], self.limits["speed"]
         target = np.clip(target, self.limits["lower"], self.limits["upper"])
         for _ in range(self.substeps):
@@ -52,7 +52,7 @@ class SimulatedRobot:
 
 
 class Runner:
-    """The policy and its motion on a robot; a pack whose parts do not fit each other is refused."""
+    """The policy and its motion on a robot; refuses a pack whose parts do not fit each other."""
 
     def __init__(self, folder: Path = Path(__file__).parent, robot: Any = None) -> None:
         lines = (folder / "deploy.yaml").read_text(encoding="utf-8").splitlines()
@@ -78,9 +78,9 @@ class Runner:
         given = [hashlib.sha256(layout.encode()).hexdigest(), sum(terms.values())]
         made, size = self.session.get_modelmeta(), self.session.get_inputs()[0].shape[1]
         of_policy = [made.custom_metadata_map.get("observation_layout_sha256"), size]
-        for file, wanted in {"policy.onnx": of_policy, "deploy.yaml": cfg["layout"]}.items():
-            if wanted != given:
-                raise SystemExit(f"refused: {file} is for {wanted}, not for {given}: {terms}")
+        for file, expected in {"policy.onnx": of_policy, "deploy.yaml": cfg["layout"]}.items():
+            if expected != given:
+                raise SystemExit(f"refused: {file} is for {expected}, not for {given}: {terms}")
 
     def begin(self, row: int) -> None:
         """Start at a row of the motion, which is turned to where the robot faces."""
@@ -91,12 +91,12 @@ class Runner:
         self.row, self.action, self.tilt = row, np.zeros(len(self.default)), 0.0
 
     def observe(self, quat: Any, gyro: Any, angle: Any, rate: Any) -> dict[str, np.ndarray]:
-        """The terms of the observation, in their order."""
+        """Return the terms of the observation, in their order."""
         self.pose.qpos[:] = [0, 0, 0, *quat, *angle]
         mujoco.mj_kinematics(self.model, self.pose)
-        wanted, there = np.zeros(4), np.zeros(9)
-        mujoco.mju_mulQuat(wanted, self.turn, self.anchors[self.row])
-        mujoco.mju_quat2Mat(there, wanted)
+        target, there = np.zeros(4), np.zeros(9)
+        mujoco.mju_mulQuat(target, self.turn, self.anchors[self.row])
+        mujoco.mju_quat2Mat(there, target)
         apart = self.pose.body(self.anchor).xmat.reshape(3, 3).T @ there.reshape(3, 3)
         self.tilt = float(np.arccos(np.clip(apart[2, 2], -1, 1)))
         terms = {"command": self.command[self.row], "motion_anchor_ori_b": apart[:, :2].ravel()}
@@ -104,7 +104,7 @@ class Runner:
         return terms | {"actions": self.action}
 
     def step(self) -> str:
-        """One control step towards the next row; why the robot has to stop, else nothing."""
+        """Run one control step towards the next row; return the reason for a stop, else nothing."""
         ahead, last = self.row + 1, len(self.command) - 1
         self.row = ahead % (last + 1) if self.cfg["cyclic"] else min(ahead, last)
         terms = self.observe(*self.robot.read())
@@ -120,7 +120,7 @@ class Runner:
 
 
 def main(seconds: float, soft_start: float, view: bool) -> str:
-    """Hang, fade the gains in, move to the first pose, let go, dance, damp; say why it ended."""
+    """Hang up, fade the gains in, move to the first pose, dance, damp; return why it ended."""
     runner, stop = Runner(), list[str]()
     robot, dt = runner.robot, runner.cfg["step_dt"]
     for number in (signal.SIGINT, signal.SIGTERM):

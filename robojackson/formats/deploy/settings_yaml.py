@@ -1,5 +1,5 @@
-"""`deploy.yaml`: every number that a runner needs, one `key: JSON` a line, so that YAML and JSON
-readers both take it.
+"""`deploy.yaml`: the settings of a runner, one `key: JSON` a line, readable as YAML and as JSON by
+line.
 
 The first keys are those of Unitree's `deploy.yaml` (unitree_rl_mjlab, unitree_rl_lab), the others
 are for the pack's own runner. Radians, seconds, newton-metres, in the order of `joint_names`.
@@ -14,9 +14,9 @@ from robojackson.formats.deploy.deployed_policy import DeployedPolicy
 
 UNITREE_TERMS = ("motion_command", "motion_anchor_ori_b", "base_ang_vel", "joint_pos_rel",
                  "joint_vel_rel", "last_action")  # fmt: skip
-"""What Unitree's runner calls the terms of the observation."""
+"""Names of the observation's terms in Unitree's runner."""
 MOST_TILT = 1.0
-"""Between robot and motion, from which on the runner stops at the latest, rad."""
+"""Largest angle between robot and motion at which the runner must stop, rad."""
 HEAD = """\
 # Made by `robojackson export --to deploy`; do not edit: run.py compares it with policy.onnx.
 # Radians, seconds, newton-metres; arrays in the order of joint_names.
@@ -64,7 +64,7 @@ def _settings(policy: DeployedPolicy) -> dict[str, Any]:
 
 
 def limits(policy: DeployedPolicy) -> dict[str, list[float]]:
-    """Limits of the targets, rad, of torques and of speeds."""
+    """Return the limits of the targets, rad, of torques and of speeds."""
     low, high = policy.model.jnt_range[1:].T
     free = policy.model.jnt_limited[1:] == 0
     return {
@@ -103,7 +103,7 @@ def metadata(policy: DeployedPolicy) -> dict[str, str]:
 
 
 def _observations(policy: DeployedPolicy) -> dict[str, Any]:
-    """The terms as Unitree's runner reads them; their order is that of the observation."""
+    """Return the terms as Unitree's runner reads them; their order is that of the observation."""
     found: dict[str, Any] = {}
     for name, (_, size) in zip(UNITREE_TERMS, policy.terms, strict=True):
         params = {"command_name": "motion"} if name.startswith("motion") else {}
@@ -117,7 +117,7 @@ def _observations(policy: DeployedPolicy) -> dict[str, Any]:
 
 
 def _offsets(policy: DeployedPolicy) -> list[dict[str, Any]]:
-    """Names, sizes and offsets of the terms."""
+    """Return names, sizes and offsets of the terms."""
     found, at = [], 0
     for name, size in policy.terms:
         found.append({"name": name, "size": size, "offset": at})
