@@ -28,7 +28,7 @@ def _named(text: str) -> Path:
         BadParameter: the word is empty, as where a shell's variable is not set, or names a file.
     """
     if not text:
-        raise typer.BadParameter("no folder is named; `.` is the current one")
+        raise typer.BadParameter("the folder's name is empty; `.` is the current one")
     if Path(text).is_file():
         raise typer.BadParameter(f"{text} is a file; name a folder")
     return Path(text)

@@ -1,1 +1,1 @@
-"""The commands that run one stage, from files to files, with no Prefect in memory."""
+"""Commands that run one stage, from files to files, without importing Prefect."""

@@ -1,4 +1,4 @@
-"""`python -m robojackson.cli`: the commands of one stage, which is what child processes run."""
+"""`python -m robojackson.cli`: the commands of one stage, as child processes run them."""
 
 from robojackson.cli.start import start
 

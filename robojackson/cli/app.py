@@ -1,7 +1,7 @@
-"""The commands that run one stage, as one application; `flows.cli.commands` adds the others.
+"""Commands that run one stage, as one application; `flows.cli.commands` adds the others.
 
-Every command imports what it needs inside itself, so that one stage runs with no Prefect in memory
-and `--help` answers at once.
+Every command imports its dependencies in its body, so that one stage runs without Prefect and
+`--help` is fast.
 """
 
 import os
@@ -50,15 +50,15 @@ def score(
     verbose: Verbose = False,
     as_json: Json = False,
 ) -> CommandResult:
-    """How steady the dancer is seen (Algorithm 1): missing joints plus jitter, lowest is best.
+    """Score how steadily the dancer is tracked (Algorithm 1; lowest is best).
 
-    Exit code 1 where a video that is named cannot be read; one inside a folder is only told.
+    Exit code 1 where a video given by name cannot be read; one inside a folder is only reported.
     """
     from robojackson.cli import cards, scoring
 
     log_to_stderr()
     scored = scoring.score(video, config, overrides_from(set_, {"dancer.number": person}))
-    unread = {told["video"] for told in scored["videos"] if "error" in told}
+    unread = {entry["video"] for entry in scored["videos"] if "error" in entry}
     text = cards.shown(scored, cards.score_lines(scored), verbose)
     return CommandResult(scored, code=1 if unread & set(map(str, video)) else 0, text=text)
 
@@ -72,20 +72,21 @@ def mocap(
     person: Person = None,
     quality: Quality = None,
     people: Annotated[
-        bool, typer.Option("--people", help="Only list who is there, with a picture.")
+        bool, typer.Option("--people", help="Only list the people, with a picture.")
     ] = False,
     hypotheses: Annotated[
-        int, typer.Option(min=0, max=100, help="Also sample what hidden limbs may do: smpl_1...")
+        int, typer.Option(min=0, max=100, help="Also sample poses of hidden limbs: smpl_1...")
     ] = 0,
     film: Annotated[
-        bool, typer.Option("--video", help="Also film it: source, skeleton over source, body.")
+        bool, typer.Option("--video", help="Also render a video: source, skeleton, body.")
     ] = False,
     config: Config = "base",
     set_: Set = None,
     verbose: Verbose = False,
     as_json: Json = False,
 ) -> CommandResult:
-    """The motion of the person in a video: smpl.parquet, landmarks.parquet and a picture."""
+    """Recover the motion of the person in a video: smpl.parquet, landmarks.parquet and a
+    picture."""
     from robojackson.cli import cards, stages
     from robojackson.cli.pictures.mocap_pictures import draw_mocap
 
@@ -93,8 +94,8 @@ def mocap(
     if people:
         from robojackson.cli.pictures.people_listing import list_people
 
-        told, lines = list_people(video, out, config, overrides_from(set_))
-        return CommandResult(told, text=lines)
+        data, lines = list_people(video, out, config, overrides_from(set_))
+        return CommandResult(data, text=lines)
     brought = {"network.hybrik": yaml_text(hybrik), "network.niki": yaml_text(niki)}
     overrides = overrides_from(set_, {**brought, "dancer.number": person, "detector": quality})
     made = stages.mocap(video, out, config, overrides, hypotheses)
@@ -109,10 +110,10 @@ def retarget(
     robot: Robot = None,
     method: Annotated[
         Literal["optimise", "paper", "framefix"] | None,
-        typer.Option(help="Ours, the paper's Table I, or that with its axes corrected."),
+        typer.Option(help="Ours, the paper's Table I, or the table with corrected axes."),
     ] = None,
     video: Annotated[
-        bool, typer.Option("--video", help="Also draw it: a video, the contacts, the torques.")
+        bool, typer.Option("--video", help="Also render a video and plot contacts and torques.")
     ] = False,
     config: Config = "base",
     force: Force = False,
@@ -120,7 +121,7 @@ def retarget(
     verbose: Verbose = False,
     as_json: Json = False,
 ) -> CommandResult:
-    """The same motion for a robot: reference.parquet, scorecard.json and a picture."""
+    """Retarget a motion to a robot: reference.parquet, scorecard.json and a picture."""
     from robojackson.cli import cards, stages
     from robojackson.cli.pictures.retarget_pictures import draw_poses, draw_retargeting
 
@@ -139,11 +140,11 @@ def retarget(
 @command
 def doctor(
     report: Annotated[
-        bool, typer.Option("--report", help="A block of Markdown to paste into an issue.")
+        bool, typer.Option("--report", help="Print Markdown to paste into an issue.")
     ] = False,
     as_json: Json = False,
 ) -> CommandResult:
-    """What is installed, what is missing, and how to get it."""
+    """Show what is installed, what is missing, and how to get it."""
     from robojackson.cli.doctor import doctor_lines, examine
 
     found = examine()
@@ -162,7 +163,7 @@ def licences(
     ] = None,
     as_json: Json = False,
 ) -> CommandResult:
-    """The licences of all packages that run below us, and of the data that ships."""
+    """List the licences of all packages in use, and of the data that ships."""
     from robojackson.pipeline import licences as listing
 
     rows, data = listing.packages(), listing.data()
@@ -200,10 +201,10 @@ def _print_version(given: bool) -> None:
 
 
 def make_app() -> typer.Typer:
-    """Return an application without commands; it knows its version and completes its words."""
+    """Return an application without commands, with `--version` and shell completion."""
     app = typer.Typer(
         name="robojackson",
-        help="A video of a dance in, a robot that dances it out.",
+        help="Turn a video of a person dancing into a robot that dances it.",
         no_args_is_help=True,
         pretty_exceptions_enable=False,
         context_settings={"help_option_names": ["-h", "--help"]},
@@ -218,7 +219,7 @@ def _common(
         typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version."),
     ] = False,
 ) -> None:
-    """Options of the application itself; each ends the process when it is given."""
+    """Handle the options of the application itself; each ends the process."""
 
 
 def add_stages(app: typer.Typer) -> None:
@@ -230,7 +231,7 @@ def add_stages(app: typer.Typer) -> None:
 
 
 def run(app: typer.Typer) -> int:
-    """Run the command that the words of the process ask for; return its exit code."""
+    """Run the command in the arguments of the process; return its exit code."""
     try:
         return app(standalone_mode=False) or 0
     except USAGE_ERROR as cause:

@@ -1,6 +1,6 @@
-"""What single stages say to people: a few lines, a sentence that judges, the command to type next.
+"""Output of single stages: a few lines, a sentence with the verdict, the command to type next.
 
-Everything is made from the answer that `--json` prints; `--verbose` prints all of it.
+Everything is computed from the data that `--json` prints; `--verbose` prints all of it.
 """
 
 import math
@@ -16,7 +16,7 @@ from robojackson.retarget.scorecard_gate import BARS, failures
 Answer = Mapping[str, Any]
 FULL, EMPTY, CELLS = "█", "·", 10
 WHOLE, MOSTLY = 0.95, 0.7
-"""Shares of frames with the person from which on a motion is whole, or mostly there."""
+"""Shares of frames with the person from which a motion counts as whole, or as having gaps."""
 ROWS: tuple[tuple[str, str, str, int], ...] = (
     ("in the floor", "floor_penetration_mm", "mm", 1),
     ("in itself", "self_penetration_mm", "mm", 1),
@@ -25,7 +25,7 @@ ROWS: tuple[tuple[str, str, str, int], ...] = (
     ("fastest joint", "speed_over_limit", "of its limit", 2),
     ("beyond motors or balance", "infeasible_share", "of the steps", 2),
 )
-"""Lines of the card: words, gated figure, unit, digits."""
+"""Lines of the card: label, gated figure, unit, digits."""
 
 
 def shown(answer: Answer, card: Sequence[str], verbose: bool) -> list[str]:
@@ -35,9 +35,9 @@ def shown(answer: Answer, card: Sequence[str], verbose: bool) -> list[str]:
 
 def closing(answer: Answer) -> list[str]:
     """Return the last lines of a command: the verdict, and the command to type next."""
-    said = answer.get("verdict", {}).get("sentence", "")
+    sentence = answer.get("verdict", {}).get("sentence", "")
     following = answer.get("next", "")
-    return [*([said] if said else []), *([f"next: {following}"] if following else [])]
+    return [*([sentence] if sentence else []), *([f"next: {following}"] if following else [])]
 
 
 def command_line(*words: object) -> str:
@@ -68,7 +68,7 @@ def score_lines(answer: Answer) -> list[str]:
 
 
 def mocap_lines(answer: Answer) -> list[str]:
-    """Return what was recovered of a person, in a few lines."""
+    """Return the lines about a recovered motion."""
     feet = ", ".join(
         f"{name.replace('_', ' ')} {share:.0%}" for name, share in answer["contact_share"].items()
     )
@@ -87,7 +87,7 @@ def mocap_lines(answer: Answer) -> list[str]:
 
 
 def advice_lines(answer: Answer) -> list[str]:
-    """Return what to do better when the clip is filmed again, a line each."""
+    """Return advice for filming the clip again, a line each."""
     return [f"advice    {each['words']}" for each in answer.get("advice", ())]
 
 
@@ -100,10 +100,14 @@ def mocap_verdict(frames: int, detected: int) -> dict[str, str]:
             "sentence": "The motion is whole: the person is in view all along.",
         }
     if share >= MOSTLY:
-        told = f"The person is out of sight in {1 - share:.0%} of the frames, which are filled in."
-        return {"kind": "gaps", "sentence": told}
-    told = f"The person is seen in only {share:.0%} of the frames: choose another range or clip."
-    return {"kind": "poor", "sentence": told}
+        sentence = (
+            f"The person is out of sight in {1 - share:.0%} of the frames, which are filled in."
+        )
+        return {"kind": "gaps", "sentence": sentence}
+    sentence = (
+        f"The person is seen in only {share:.0%} of the frames: choose another range or clip."
+    )
+    return {"kind": "poor", "sentence": sentence}
 
 
 def retarget_lines(answer: Answer) -> list[str]:
@@ -124,9 +128,9 @@ def retarget_lines(answer: Answer) -> list[str]:
         value, limit = card.get(name, math.nan), BARS[name]
         if value is None or not math.isfinite(value):
             continue
-        told = f"{value:.{digits}f} {unit}"
-        rows.append(f"{words:<25} {told:<18} {bar(value, limit)} at most {limit:g}")
-    rows += [f"finding                   {told}" for told in card.get("findings", ())[:3]]
+        figure = f"{value:.{digits}f} {unit}"
+        rows.append(f"{words:<25} {figure:<18} {bar(value, limit)} at most {limit:g}")
+    rows += [f"finding                   {finding}" for finding in card.get("findings", ())[:3]]
     rows += [f"{key:<25} {answer[key]}" for key in ("reference", "picture", "video")
               if key in answer]  # fmt: skip
     return [*rows, *closing(answer)]
@@ -154,7 +158,7 @@ def bar(value: float, limit: float) -> str:
 
 
 def train_lines(answer: Answer) -> list[str]:
-    """Return how a training went, in a few lines."""
+    """Return the lines about a training."""
     return [
         f"trained   {answer['steps']:,} steps, {answer['updates']:,} updates, "
         f"{answer['episodes']:,} episodes in {answer['seconds'] / 60:.1f} min "
@@ -168,19 +172,19 @@ def train_verdict(updates: int, steps: int, survived_s: Sequence[float]) -> dict
     """Return kind and sentence about a training.
 
     Args:
-        survived_s: Of its last episodes, seconds.
+        survived_s: Lengths of its last episodes, seconds.
     """
     if updates == 0:
-        told = (
+        sentence = (
             f"Nothing was learnt: the {steps:,} steps ended before the first update. Give it more "
             "--steps or --minutes."
         )
-        return {"kind": "untrained", "sentence": told}
+        return {"kind": "untrained", "sentence": sentence}
     if not survived_s:
         return {"kind": "learning", "sentence": "No episode ended yet: train longer."}
     mean = sum(survived_s) / len(survived_s)
-    told = f"The last {len(survived_s)} episodes of the training lasted {mean:.1f} s."
-    return {"kind": "trained", "sentence": told}
+    sentence = f"The last {len(survived_s)} episodes of the training lasted {mean:.1f} s."
+    return {"kind": "trained", "sentence": sentence}
 
 
 def _figure(card: Mapping[str, Any], name: str, digits: int) -> str:

@@ -1,4 +1,4 @@
-"""Manners of the command line: the answer on stdout, the rest on stderr, one line of cause."""
+"""Input and output of commands: the answer on stdout, the rest on stderr, one line for an error."""
 
 import functools
 import json
@@ -26,25 +26,25 @@ from robojackson.files.json_types import to_json_types as to_json_types
 
 P = ParamSpec("P")
 TRACEBACK, LONGEST_CAUSE = "ROBOJACKSON_TRACEBACK", 300
-"""The variable that lets an unforeseen error show its traceback; characters of its line."""
+"""Environment variable that shows the traceback of an unexpected error; length of its line."""
 SECONDS_BETWEEN_LINES = 15.0
-"""Of progress, where every line stays."""
+"""Interval of progress lines where every line stays, seconds."""
 USAGE_ERROR: Any = typer.BadParameter.__bases__[0]
-"""What typer raises for words that it does not understand; it has no public name there."""
+"""Exception of typer for arguments that it cannot parse; it has no public name there."""
 
 APP_PACKAGES = ("prefect", "fastapi", "sqlalchemy", "yt_dlp")
-"""What the extra `app` brings: without it the commands of one stage work and the others do not."""
+"""Line that installs the extra `app`: without it only the commands of one stage work."""
 INSTALL_APP = "pip install 'robojackson[app]'"
 
 
 @dataclass(frozen=True)
 class CommandResult:
-    """What a command has to say.
+    """The result of a command.
 
     Attributes:
         data: The object that `--json` prints.
         code: Exit code.
-        text: What a person reads instead of all of `data`.
+        text: Lines for a person, in place of all of `data`.
     """
 
     data: Mapping[str, Any]
@@ -53,14 +53,14 @@ class CommandResult:
 
 
 class Interrupted(Exception):
-    """Ctrl-C where something can be said about going on; the message is that line."""
+    """Ctrl-C with a message about how to go on."""
 
 
 def command(body: Callable[P, CommandResult]) -> Callable[P, None]:
-    """A command out of a function: prints its answer, turns errors into one line and a code.
+    """Make a command of a function: print its result, turn errors into one line and an exit code.
 
     The function has a keyword `as_json`; while it runs, stdout is stderr, so that no library can
-    put a word beside the answer.
+    write beside the result.
     """
 
     @functools.wraps(body)
@@ -89,7 +89,7 @@ def command(body: Callable[P, CommandResult]) -> Callable[P, None]:
             _leave(1, _unexpected(cause))
         try:
             print_result(answer, as_json=bool(kwargs.get("as_json")))
-        except BrokenPipeError:  # whoever reads has enough
+        except BrokenPipeError:  # the reader closed the pipe
             raise
         except OSError as cause:
             sys.stdout = open(os.devnull, "w")  # noqa: SIM115 (nothing is left to be flushed)
@@ -101,7 +101,7 @@ def command(body: Callable[P, CommandResult]) -> Callable[P, None]:
 
 
 def print_result(answer: CommandResult, as_json: bool) -> None:
-    """Print an answer: one JSON object, or lines for a person."""
+    """Print a result: one JSON object, or lines for a person."""
     data = to_json_types(answer.data)
     if as_json:
         sys.stdout.write(json.dumps(data) + "\n")
@@ -112,7 +112,7 @@ def print_result(answer: CommandResult, as_json: bool) -> None:
 
 
 def lines(data: Mapping[str, object], indent: int = 0) -> Iterator[str]:
-    """A mapping for people: one line a value, numbers with four digits."""
+    """Yield a mapping as lines for a person: one line a value, numbers with four digits."""
     width = max((len(str(key)) for key in data), default=0)
     for key, value in data.items():
         head = " " * indent + str(key)
@@ -128,7 +128,7 @@ def lines(data: Mapping[str, object], indent: int = 0) -> Iterator[str]:
 
 
 def table(rows: Mapping[str, Mapping[str, object]], columns: Sequence[str]) -> list[str]:
-    """Rows by name under a head, columns aligned."""
+    """Return rows by name under a head, columns aligned."""
     cells = [["", *columns]]
     cells += [
         [name, *(_format_value(row.get(key)) for key in columns)] for name, row in rows.items()
@@ -142,7 +142,8 @@ def table(rows: Mapping[str, Mapping[str, object]], columns: Sequence[str]) -> l
 
 @contextmanager
 def ticker() -> Iterator[Callable[[str], None]]:
-    """A line on stderr that replaces itself; line after line where there is no terminal."""
+    """Yield a function that writes a line on stderr over the last one; below it without a
+    terminal."""
     live = sys.stderr.isatty()
 
     def write_line(line: str) -> None:
@@ -157,8 +158,9 @@ def ticker() -> Iterator[Callable[[str], None]]:
 
 @contextmanager
 def stages() -> Iterator[Callable[[str, int, int], None]]:
-    """Progress of several named parts: a tenth at a time; in a file or a log, when one is long."""
-    told: dict[str, int] = {}
+    """Yield a function that reports progress of named parts: in steps of a tenth; less often in
+    logs."""
+    reported: dict[str, int] = {}
     last = time.monotonic()
     every_s = 0.0 if sys.stderr.isatty() else SECONDS_BETWEEN_LINES
     with ticker() as write_line:
@@ -166,8 +168,8 @@ def stages() -> Iterator[Callable[[str, int, int], None]]:
         def advance(name: str, done: int, total: int) -> None:
             nonlocal last
             tenth, now = 10 * done // max(total, 1), time.monotonic()
-            if tenth > told.get(name, 0) and now - last >= every_s:
-                told[name], last = tenth, now
+            if tenth > reported.get(name, 0) and now - last >= every_s:
+                reported[name], last = tenth, now
                 write_line(f"{name} {tenth}0 %")
 
         yield advance
@@ -175,7 +177,7 @@ def stages() -> Iterator[Callable[[str, int, int], None]]:
 
 @contextmanager
 def stdout_is_stderr() -> Iterator[None]:
-    """Send what anybody writes to file descriptor 1, C++ included, to stderr."""
+    """Send everything written to file descriptor 1, also by C++, to stderr."""
     if sys.stdout is None:
         raise StoreError("stdout is closed: there is nowhere to write the answer")
     sys.stdout.flush()
@@ -190,7 +192,7 @@ def stdout_is_stderr() -> Iterator[None]:
 
 
 def usage_error(cause: Any) -> str:
-    """What typer does not understand of the words that were given, with the value in question."""
+    """Return typer's message about the arguments, with the value in question."""
     message = cause.format_message().rstrip(".")
     if isinstance(cause.__cause__, ValidationError):
         given = repr(cause.__cause__.errors()[0]["input"])
@@ -199,16 +201,16 @@ def usage_error(cause: Any) -> str:
 
 
 def _unexpected(cause: Exception) -> str:
-    """The line about an error that none of our own classes foresees."""
+    """Return the line about an error that none of our own classes foresees."""
     if isinstance(cause, USAGE_ERROR):
         raise cause
     if TRACEBACK in os.environ:
         raise cause
     place = traceback.extract_tb(cause.__traceback__)[-1]
-    told = " ".join(str(cause).split())[:LONGEST_CAUSE]
+    message = " ".join(str(cause).split())[:LONGEST_CAUSE]
     return (
-        f"InternalError: {type(cause).__name__}: {told} ({Path(place.filename).name}:"
-        f"{place.lineno}); the input is not what it should be, or this is our fault: "
+        f"InternalError: {type(cause).__name__}: {message} ({Path(place.filename).name}:"
+        f"{place.lineno}); the input is unexpected, or this is a bug: "
         f"{TRACEBACK}=1 shows where, `robojackson doctor --report` is for an issue"
     )
 
@@ -232,7 +234,7 @@ def _format_value(value: Any) -> str:
 
 
 def relative_path(path: Path) -> str:
-    """A path as short as it can be said from here."""
+    """Return a path as short as possible from the current folder."""
     try:
         return str(path.relative_to(Path.cwd()))
     except ValueError:

@@ -1,4 +1,5 @@
-"""What this machine has and lacks, and the line that brings what is missing. Imports no Prefect."""
+"""Report what this machine has and lacks, with the command that installs each missing thing.
+Imports no Prefect."""
 
 import ctypes
 import shutil
@@ -48,7 +49,7 @@ NEEDED_MODELS = ("lite", "full")
 
 
 def examine() -> dict[str, Any]:
-    """Versions, system libraries, pose models; `missing` and `optional` say how to get things."""
+    """Return versions, system libraries and pose models; `missing` and `optional` hold remedies."""
     packages = {name: installed(name) for name in (*REQUIRED, *OPTIONAL)}
     libraries = {name: loads(name) for name in GRAPHICS}
     models = {size: model(size) for size in MODELS}
@@ -82,18 +83,18 @@ def examine() -> dict[str, Any]:
 
 
 def doctor_lines(found: Mapping[str, Any]) -> list[str]:
-    """Return what `examine` found, for people: each thing that is missing on a line, a verdict."""
+    """Return the lines about `examine`'s findings: each missing thing on a line, a verdict."""
     advice = ("missing", "optional")
     rows = [*lines({key: value for key, value in found.items() if key not in advice})]
     rows += [f"{key:<8}  {each}" for key in advice for each in found[key]]
     count = len(found["missing"])
     if count:
-        return [*rows, f"{count} needed thing{'s are' if count > 1 else ' is'} missing."]
-    return [*rows, "All that is needed is here.", f"next: {program()} dance"]
+        return [*rows, f"{count} required item{'s are' if count > 1 else ' is'} missing."]
+    return [*rows, "Everything required is installed.", f"next: {program()} dance"]
 
 
 def unsupported(version: tuple[int, int]) -> list[str]:
-    """Return nothing, or the line that says which Python to use instead of this one."""
+    """Return nothing, or the line that names a supported Python."""
     if version in PYTHONS:
         return []
     known = ", ".join("{}.{}".format(*pair) for pair in PYTHONS)
@@ -104,7 +105,7 @@ def unsupported(version: tuple[int, int]) -> list[str]:
 
 
 def installed(name: str) -> str | None:
-    """Version of a package, None where it is not installed."""
+    """Return the version of a package, None where it is not installed."""
     try:
         return version(name)
     except PackageNotFoundError:
@@ -112,13 +113,13 @@ def installed(name: str) -> str | None:
 
 
 def opencv_builds() -> list[str]:
-    """The OpenCV packages in this environment; there should be one."""
+    """Return the OpenCV packages in this environment; there should be one."""
     names = {str(d.metadata["Name"]).lower() for d in distributions() if d.metadata["Name"]}
     return sorted(name for name in names if name.startswith("opencv"))
 
 
 def loads(name: str) -> bool:
-    """Whether the system has a shared library."""
+    """Return whether the system has a shared library."""
     try:
         ctypes.CDLL(name)
     except OSError:
@@ -127,7 +128,7 @@ def loads(name: str) -> bool:
 
 
 def model(size: str) -> str:
-    """Empty, or how to get the pose model of that size."""
+    """Return nothing, or how to get the pose model of that size."""
     from robojackson.clips.pose_detector import model_path
     from robojackson.errors import MissingDependency
 

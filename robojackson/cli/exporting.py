@@ -1,6 +1,7 @@
-"""A motion or a policy in the file format of another project, from file to file, with no Prefect.
+"""Write a motion or a policy in the file format of another project, without importing Prefect.
 
-What the file holds decides which formats fit: a robot's motion, a person's motion or a policy.
+The content of the file determines the possible formats: a robot's motion, a person's motion or a
+policy.
 """
 
 import shlex
@@ -20,7 +21,7 @@ from robojackson.retarget.scorecard_gate import BARS, scorecard_record
 
 POLICY_SUFFIX, LEAST_STRICT = ".safetensors", 0.9
 DEPLOY = "deploy"
-"""The format that is a folder: a policy with all that a robot needs to run it."""
+"""The format that is a folder: a policy with everything that a robot needs to run it."""
 
 
 @dataclass(frozen=True)
@@ -28,8 +29,8 @@ class PackInputs:
     """What goes into a deploy pack beside the policy.
 
     Attributes:
-        reference: The motion; beside the policy when None.
-        evaluation: evaluation.json; beside the policy when None.
+        reference: The motion; None takes the one beside the policy.
+        evaluation: evaluation.json; None takes the one beside the policy.
         licences: Licences of inputs by kind.
     """
 
@@ -50,7 +51,7 @@ def export(
     Raises:
         UnknownName: no such format, or none for what the file holds.
         RejectedReference: the robot's model has changed since the motion was made.
-        BadPolicy: it is no policy file of ours.
+        BadPolicy: the file is not a policy of ours.
         MissingDependency: the package that writes the format is not installed.
         StoreError: the file cannot be read, or the result not written.
     """
@@ -87,7 +88,7 @@ def export(
 def _deploy(
     source: Path, out: Path, robot: str | None, pack: PackInputs, began: float
 ) -> dict[str, Any]:
-    """Write a deploy pack; its verdict names what is missing before anybody relies on it."""
+    """Write a deploy pack; its verdict names what is missing."""
     from robojackson.api.deploy_pack import write_deploy_pack
 
     made = write_deploy_pack(
@@ -112,7 +113,7 @@ def _deploy(
 
 
 def _open_points(made: Mapping[str, Any]) -> list[str]:
-    """List what a deploy pack lacks before anybody relies on it."""
+    """Return what a deploy pack still lacks."""
     found, weakest = [], made["weakest_strict_success"]
     if weakest is None:
         found.append("no sim-to-sim passport (evaluate --passport)")
@@ -125,7 +126,7 @@ def _open_points(made: Mapping[str, Any]) -> list[str]:
 
 
 def _policy_verdict(out: Path) -> dict[str, object]:
-    sentence = "The file computes what the policy does: observations in, actions out."
+    sentence = "The file computes the policy: observations in, actions out."
     check = f"import onnxruntime as o; print(o.InferenceSession({str(out)!r}).get_inputs())"
     following = shlex.join(["python", "-c", check])
     return {"verdict": {"kind": "written", "sentence": sentence}, "next": following}
@@ -139,11 +140,12 @@ def _person_verdict(motion: SmplSequence, out: Path) -> dict[str, object]:
 
 
 def _robot_verdict(motion: ReferenceMotion, source: Path) -> dict[str, object]:
-    """Judge a robot's motion by its own score card: an export keeps what is wrong with it."""
+    """Return the verdict on a robot's motion from its own score card, which an export does not
+    change."""
     card, words = scorecard_record(motion), ("train", source, "-o", source.parent / "training")
     verdict = cards.retarget_verdict(card)
     if not set(BARS) & set(card):
-        sentence = "The motion has no score card: nothing has checked that the robot can do it."
+        sentence = "The motion has no score card: no check that the robot can do it was made."
         verdict = {"kind": "unchecked", "sentence": sentence}
     if verdict["kind"] != "feasible":
         words = ("retarget", source.parent / "smpl.parquet", "-o", source.parent)
@@ -154,17 +156,19 @@ def licences_from(declared: Sequence[str]) -> dict[str, str]:
     """Return the licences that a user declared as KIND=LICENCE.
 
     Raises:
-        BadConfiguration: one of them has no kind.
+        BadConfiguration: a declaration has no kind.
     """
     pairs = [one.partition("=") for one in declared]
     for kind, equals, licence in pairs:
         if not (kind.strip() and equals and licence.strip()):
-            raise BadConfiguration(f"--licence {kind}: wants KIND=LICENCE, as clip=CC-BY-4.0")
+            raise BadConfiguration(
+                f"--licence {kind}: expected KIND=LICENCE, such as clip=CC-BY-4.0"
+            )
     return {kind.strip(): licence.strip() for kind, _, licence in pairs}
 
 
 def names() -> list[str]:
-    """Return the formats that something can be written in, by what a file has to hold."""
+    """Return the possible formats by the kind of file."""
     kinds: dict[str, Mapping[str, object]] = {
         "a robot's motion": registry.robot_exporters(),
         "a person's motion": registry.person_exporters(),

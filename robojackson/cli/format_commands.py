@@ -12,7 +12,7 @@ from robojackson.cli.options import Config, Folder, Json, MotionRobot, Set, over
 
 
 class ExportCommand(TyperCommand):
-    """`export`, whose help lists the formats; only the help pays for finding them."""
+    """The command `export`, whose help lists the formats; only the help searches for them."""
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the help."""
@@ -48,7 +48,7 @@ def export(
     ] = None,
     as_json: Json = False,
 ) -> CommandResult:
-    """A robot's or a person's motion, or a policy, in the file format of another project."""
+    """Write a motion or a policy in another project's format."""
     from robojackson.cli import exporting
 
     log_to_stderr()
@@ -66,7 +66,7 @@ def import_(
     out: Folder,
     fps: Annotated[
         float | None,
-        typer.Option(min=1.0, max=1000.0, help="Frames a second, where the file is silent."),
+        typer.Option(min=1.0, max=1000.0, help="Frames a second, where the file has none."),
     ] = None,
     up: Annotated[
         Literal["y", "z"] | None, typer.Option(help="Axis that points up, where it is unusual.")
@@ -75,7 +75,7 @@ def import_(
     set_: Set = None,
     as_json: Json = False,
 ) -> CommandResult:
-    """A human motion of another project, put on the floor: smpl.parquet; runs nothing in a file."""
+    """Read a human motion of another project: smpl.parquet on the floor; runs nothing in a file."""
     from robojackson.cli.importing import import_motion
 
     log_to_stderr()
@@ -84,7 +84,7 @@ def import_(
 
 
 def _text(made: Mapping[str, Any]) -> list[str]:
-    """The figures of an answer, then what they are worth and what to type next."""
+    """Return the figures of an import, then the verdict and the next command."""
     from robojackson.cli.cards import closing
     from robojackson.cli.console import lines
 

@@ -1,4 +1,5 @@
-"""A human motion in the file format of another project, to our own table, with no Prefect."""
+"""Convert a human motion of another project's format to our own table, without importing
+Prefect."""
 
 import time
 from collections.abc import Mapping
@@ -27,12 +28,12 @@ def import_motion(
     config: str,
     overrides: Overrides,
 ) -> dict[str, Any]:
-    """smpl.parquet of a file of another project.
+    """Write smpl.parquet from a file of another project.
 
     Raises:
         StoreError: the file cannot be read, or the folder not written.
-        UnknownName, BadTable: nobody's file, a damaged one, or one that asks to run something.
-        BadConfiguration: a frame rate that no file of motion has, or axes that the file has not.
+        UnknownName, BadTable: the file has an unknown format, is damaged, or would run code.
+        BadConfiguration: a frame rate that no motion has, or axes that do not fit the file.
     """
     from robojackson.pipeline.pipeline_config import PipelineConfig
 
@@ -41,24 +42,24 @@ def import_motion(
     read = read_foreign(file, fps, up, settings.mocap)
     with results_in(out) as files:
         files.write("smpl.parquet", read.motion.to_bytes())
-    told = {"smpl": str(out / "smpl.parquet"), "file": str(file), "format": read.format}
+    facts = {"smpl": str(out / "smpl.parquet"), "file": str(file), "format": read.format}
     figures = _figures(read.motion)
     following = cards.command_line("retarget", out / "smpl.parquet", "-o", out)
     ends = {"verdict": import_verdict(figures), "next": following}
-    return told | {**read.figures} | figures | ends | {"seconds": time.monotonic() - began}
+    return facts | {**read.figures} | figures | ends | {"seconds": time.monotonic() - began}
 
 
 def import_verdict(figures: Mapping[str, Any]) -> dict[str, str]:
     """Return kind and sentence about an imported motion."""
     seconds, share = figures["frames"] / figures["fps"], figures["contact_share"]
-    told = f"{seconds:.1f} s, with a foot on the floor in {share:.0%} of the frames"
+    summary = f"{seconds:.1f} s, with a foot on the floor in {share:.0%} of the frames"
     if share < AIRBORNE:
-        sentence = f"The person hardly touches the floor ({told}): is --up right, or --fps?"
+        sentence = f"The person hardly touches the floor ({summary}): is --up right, or --fps?"
         return {"kind": "airborne", "sentence": sentence}
     if seconds < SHORTEST_S:
-        sentence = f"The motion is too short to judge a robot by: {told}."
+        sentence = f"The motion is too short to evaluate a robot on: {summary}."
         return {"kind": "too_short", "sentence": sentence}
-    return {"kind": "whole", "sentence": f"The motion stands on the floor: {told}."}
+    return {"kind": "whole", "sentence": f"The motion stands on the floor: {summary}."}
 
 
 def _figures(sequence: SmplSequence) -> dict[str, Any]:

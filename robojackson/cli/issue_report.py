@@ -1,7 +1,7 @@
-"""What `robojackson doctor --report` prints: this machine in Markdown, to paste into an issue.
+"""`robojackson doctor --report`: this machine in Markdown, to paste into an issue.
 
-It names no host, user, folder or secret: of an address only whether it is this machine's, of a
-folder only whether it is the usual one and how full its disk is.
+The report contains no host, user, folder or secret: of an address only whether it is this
+machine's, of a folder only whether it is the usual one and how full its disk is.
 """
 
 import importlib
@@ -20,7 +20,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 PATIENCE_S = 2.0
-"""Longest wait for the answer of a server or a program, seconds."""
+"""Longest wait for a server or a program, seconds."""
 LOCAL = ("127.0.0.1", "localhost", "::1")
 STORE, USUAL_STORE = "ROBOJACKSON_STORE", "store"
 SERVER = "PREFECT_API_URL"
@@ -31,7 +31,7 @@ def issue_report(examined: Mapping[str, Any]) -> list[str]:
     """Return the lines of the report.
 
     Args:
-        examined: What `doctor` found.
+        examined: Findings of `doctor`.
     """
     packages = {name: each or "missing" for name, each in examined["packages"].items()}
     facts = {
@@ -65,7 +65,7 @@ def cpu_model() -> str:
 
 
 def renderer() -> str:
-    """Return what draws without a screen, or why nothing does."""
+    """Return the renderer that works without a screen, or why none does."""
     try:
         backend = "egl" if sys.platform == "linux" else "cgl"
         context = importlib.import_module(f"mujoco.{backend}").GLContext(16, 16)
@@ -94,7 +94,7 @@ def ffmpeg_version() -> str:
 
 
 def server_state(environment: Mapping[str, str]) -> str:
-    """Return whether a Prefect server is named, where, and whether it answers."""
+    """Return whether a Prefect server is configured, where, and whether it answers."""
     address = environment.get(SERVER)
     if not address:
         return f"{SERVER} is not set: each command starts one of its own"
@@ -110,7 +110,7 @@ def server_state(environment: Mapping[str, str]) -> str:
 
 
 def store_state(environment: Mapping[str, str]) -> str:
-    """Return what kind of place the store is, whether it is there, and the room on its disk."""
+    """Return the kind of the store, whether it exists, and the room on its disk."""
     given = environment.get(STORE)
     if given and "://" in given and not given.startswith("file://"):
         return f"{given.partition('://')[0]}:// address"
@@ -148,7 +148,7 @@ def _memory() -> str:
 
 
 def _cell(text: str) -> str:
-    """A text in a cell of a table, without the folder of the user."""
+    """Return a text for a cell of a table, without the folder of the user."""
     plain = " ".join(text.split()).replace("|", "\\|")
     home = str(Path.home())
     return plain.replace(home, "~") if len(home) > 1 else plain

@@ -1,6 +1,6 @@
-"""The commands that teach and judge: `train`, `pretrain` and `evaluate`.
+"""The commands `train`, `pretrain` and `evaluate`.
 
-Like `robojackson.cli.app`, each imports what it needs inside itself.
+Like `robojackson.cli.app`, each command imports its dependencies in its body.
 """
 
 import os
@@ -38,7 +38,7 @@ def train(
     out: Folder,
     robot: MotionRobot = None,
     mode: Annotated[
-        Literal["track", "paper"] | None, typer.Option(help="Ours that dances, or the paper's.")
+        Literal["track", "paper"] | None, typer.Option(help="Ours, or the paper's.")
     ] = None,
     trainer: Trainer = None,
     steps: Annotated[int | None, typer.Option(min=1, help="Policy steps in all.")] = None,
@@ -58,7 +58,8 @@ def train(
     verbose: Verbose = False,
     as_json: Json = False,
 ) -> CommandResult:
-    """Teach the robot the motion: policy.safetensors and episodes.parquet; resumes by itself."""
+    """Train a policy to follow a motion: policy.safetensors, episodes.parquet; resumes by
+    itself."""
     from robojackson.cli import cards, training_process
 
     if parent:
@@ -83,7 +84,7 @@ def pretrain(
         Literal["track", "paper"], typer.Option(help="The mode whose trainings start from it.")
     ] = "track",
     reference: Annotated[
-        Path | None, typer.Option(help="Motion to imitate (track); the bundled walk by itself.")
+        Path | None, typer.Option(help="Motion to imitate (track); the bundled walk by default.")
     ] = None,
     robot: Robot = None,
     steps: Annotated[int | None, typer.Option(min=1, help="Policy steps in all.")] = None,
@@ -94,7 +95,7 @@ def pretrain(
     set_: SetTrain = None,
     as_json: Json = False,
 ) -> CommandResult:
-    """A robot that walks, for `--setup pretrain`: walker_KIND.safetensors and walker.json."""
+    """Train a robot that walks, for `--setup pretrain`: walker_KIND.safetensors and walker.json."""
     from robojackson.cli import walker_training
     from robojackson.cli.training_process import end_with
 
@@ -133,7 +134,7 @@ def evaluate(
     verbose: Verbose = False,
     as_json: Json = False,
 ) -> CommandResult:
-    """Evaluate a policy or a tracker on stock physics from many starts, beside bare baselines."""
+    """Evaluate a policy or a tracker on stock physics from many starts, beside simple baselines."""
     from robojackson.cli import cards, stages
     from robojackson.cli.training_process import end_with
 

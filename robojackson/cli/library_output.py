@@ -1,8 +1,8 @@
-"""What libraries would write to the terminal beside our lines, and how they are kept from it.
+"""Keep libraries from writing to the terminal beside our lines.
 
-What a user must know of a library's trouble is an error of ours, or a note. The variables are read
+Problems of a library that concern the user are an error of ours, or a note. The variables are read
 by native code when it is loaded, so they are set before anything is imported, and child processes
-inherit them. A user who sets one of them himself gets what he asks for.
+inherit them. A variable that the user has set is not changed.
 """
 
 import os
@@ -19,17 +19,17 @@ VARIABLES = {
 
 
 OWN_PACKAGES = ("robojackson", "flows", "tasks", "storage", "configs")
-"""Whose log is for the user; of all other packages only errors are."""
+"""Packages whose log is for the user; other packages log errors only."""
 
 
 def set_variables() -> None:
-    """Set what native code and child processes read, where the user has not."""
+    """Set variables for native code and child processes, unless the user has set them."""
     for name, value in VARIABLES.items():
         os.environ.setdefault(name, value)
 
 
 def silence_libraries() -> None:
-    """Leave only errors of other packages' loggers, and no warning of Python's."""
+    """Show only errors of other packages' loggers, and no warning of Python's."""
     import logging
 
     if sys.warnoptions:

@@ -13,7 +13,8 @@ Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print all figure
 
 
 def _named(folder: str = "") -> Callable[[str], list[str]]:
-    """What completes the names of a kind of configuration; paths are the shell's."""
+    """Return a function that completes the names of a kind of configuration; the shell completes
+    paths."""
 
     def complete(incomplete: str) -> list[str]:
         from robojackson.pipeline.yaml_loader import names
@@ -52,25 +53,27 @@ Set = Annotated[list[str] | None, _set("train.seed=3")]
 SetTrain = Annotated[list[str] | None, _set("seed=3")]
 SetFind = Annotated[list[str] | None, _set("filters.person_height_px=100")]
 SetStudy = Annotated[list[str] | None, _set("mode=track")]
-Force = Annotated[bool, typer.Option("--force", help="Go on with a motion that the gate refuses.")]
+Force = Annotated[
+    bool, typer.Option("--force", help="Continue with a motion that the gate refuses.")
+]
 
 
 def _folder(text: str) -> Path:
-    """A folder, or what may become one.
+    """Return an existing folder, or the path of one that can be created.
 
     Raises:
-        BadParameter: it is empty, as where a shell's variable is not set; it, or what it should
-            be in, is a file; no place can have this name, or none that we may see.
+        BadParameter: the text is empty, as from a shell variable that is not set; the path or a
+            parent is a file; or the path is invalid or not accessible.
     """
     if not text:
-        raise typer.BadParameter("no folder is named; `.` is the current one")
+        raise typer.BadParameter("the folder's name is empty; `.` is the current one")
     out = Path(text)
     try:
         found = next((p for p in (out, *out.parents) if p.is_file()), None)
     except OSError as cause:
-        raise typer.BadParameter(f"no folder can be there: {cause.strerror}") from cause
+        raise typer.BadParameter(f"the folder cannot exist: {cause.strerror}") from cause
     if found is not None:
-        raise typer.BadParameter(f"{found} is a file; a folder is wanted")
+        raise typer.BadParameter(f"{found} is a file; expected a folder")
     return out
 
 
@@ -84,7 +87,7 @@ Weights = Annotated[
     Path | None, typer.Option(help="Published weights that you bring (docs/official_weights.md).")
 ]
 Person = Annotated[
-    int | None, typer.Option(min=1, help="Whom to follow of several people; 1 is the largest.")
+    int | None, typer.Option(min=1, help="Number of the person to follow; 1 is the largest.")
 ]
 Quality = Annotated[
     Literal["lite", "full", "heavy", "best"] | None,
@@ -102,7 +105,7 @@ MotionRobot = Annotated[
     str | None,
     typer.Option(
         "--robot",
-        help="Name or YAML of the robot that the motion is for, where the motion does not find it.",
+        help="Name or YAML of the robot that the motion is for, where the motion does not name it.",
     ),
 ]
 Trainer = Annotated[
@@ -119,7 +122,7 @@ TrainMinutes = Annotated[
 def overrides_from(
     pairs: list[str] | None, given: Mapping[str, object] | None = None
 ) -> dict[str, object]:
-    """`--set key=value` pairs and options that were given, as one mapping."""
+    """Return `--set key=value` pairs and given options as one mapping."""
     overrides = {key: value for key, value in (given or {}).items() if value is not None}
     for pair in pairs or []:
         key, equals, value = pair.partition("=")
@@ -130,5 +133,5 @@ def overrides_from(
 
 
 def yaml_text(path: Path | str | None) -> str | None:
-    """A path or a name as a value that YAML reads as text, whatever is in it."""
+    """Return a path or a name quoted so that YAML reads it as text."""
     return None if path is None else "'" + str(path).replace("'", "''") + "'"

@@ -1,6 +1,6 @@
-"""The commands about robots: `robojackson robots`, and `add`, `new` and `check` below it.
+"""The commands about robots: `robojackson robots` with `add`, `new` and `check`.
 
-Like `robojackson.cli.app`, each imports what it needs inside itself.
+Like `robojackson.cli.app`, each command imports its dependencies in its body.
 """
 
 from pathlib import Path
@@ -11,12 +11,12 @@ import typer
 from robojackson.cli.console import CommandResult, command, log_to_stderr
 from robojackson.cli.options import Json
 
-robots = typer.Typer(help="The robots that there are, and your own: add, new, check.")
+robots = typer.Typer(help="List the robots; add, describe and check robots.")
 
 
 @command
 def show_robots(as_json: Json = False) -> CommandResult:
-    """The robots of configs/robots, and whether their models are here."""
+    """List the robots of configs/robots and whether their models are installed."""
     from robojackson.cli import robot_models
 
     found = robot_models.list_robots()
@@ -26,7 +26,7 @@ def show_robots(as_json: Json = False) -> CommandResult:
 
 @robots.callback(invoke_without_command=True)
 def listed(context: typer.Context, as_json: Json = False) -> None:
-    """The robots of configs/robots; add gets the model of one, new and check are for your own."""
+    """List the robots of configs/robots; add downloads a model, new and check are for your own."""
     if context.invoked_subcommand is None:
         show_robots(as_json=as_json)
 
@@ -42,12 +42,12 @@ def add(
     from robojackson.cli.console import lines
 
     log_to_stderr()
-    told = robot_models.add_robot(name)
+    data = robot_models.add_robot(name)
     following = cards.command_line("retarget", "smpl.parquet", "--robot", name, "-o", name)
-    sentence = f"The model of {name} is here; smpl.parquet is what `mocap` writes."
+    sentence = f"The model of {name} is installed; smpl.parquet is what `mocap` writes."
     verdict = {"kind": "here", "sentence": sentence}
     closing = {"verdict": verdict, "next": following}
-    return CommandResult(told | closing, text=[*lines(told), *cards.closing(closing)])
+    return CommandResult(data | closing, text=[*lines(data), *cards.closing(closing)])
 
 
 @robots.command()
@@ -56,18 +56,18 @@ def check(
     robot: Annotated[str, typer.Argument(help="YAML of your robot, or a name of configs/robots.")],
     picture: Annotated[
         Path | None,
-        typer.Option("-o", "--out", help="PNG for the picture; beside the YAML by itself."),
+        typer.Option("-o", "--out", help="PNG for the picture; default: beside the YAML."),
     ] = None,
     as_json: Json = False,
 ) -> CommandResult:
-    """All that is wrong with a description, its figures, and a picture of what it says.
+    """Check a robot's description: list all problems, print its figures, draw a picture.
 
     Exit code 1 where something is wrong.
     """
     from robojackson.cli.pictures.robot_sheets import check_robot, picture_of
 
-    told, lines = check_robot(robot, picture or picture_of(robot))
-    return CommandResult(told, code=0 if told["ok"] else 1, text=lines)
+    data, lines = check_robot(robot, picture or picture_of(robot))
+    return CommandResult(data, code=0 if data["ok"] else 1, text=lines)
 
 
 @robots.command()
@@ -75,13 +75,13 @@ def check(
 def new(
     model: Annotated[Path, typer.Argument(help="MJCF (or URDF) of a robot.")],
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="YAML to write; NAME.yaml by itself.")
+        Path | None, typer.Option("-o", "--out", help="YAML to write; default: NAME.yaml.")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite a file.")] = False,
     as_json: Json = False,
 ) -> CommandResult:
-    """A first YAML for a model, guessed from its names and kinematic tree, and its check."""
+    """Write a first YAML for a model, guessed from its names and kinematic tree, and check it."""
     from robojackson.cli.pictures.robot_sheets import new_robot
 
-    told, lines = new_robot(model, out, force)
-    return CommandResult(told, text=lines)
+    data, lines = new_robot(model, out, force)
+    return CommandResult(data, text=lines)

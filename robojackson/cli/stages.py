@@ -1,7 +1,7 @@
-"""One stage at a time, from files to files, with no Prefect in memory.
+"""Run one stage at a time, from files to files, without importing Prefect.
 
-Each function calls the public API, writes what it returned into a folder and returns the figures
-that the command answers with. Heavy libraries are imported inside.
+Each function calls the public API, writes its results into a folder and returns the figures of the
+command's answer. Heavy libraries are imported inside.
 """
 
 import json
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from robojackson.motion.smpl_sequence import SmplSequence
 
 LONGER_MINUTES = 20
-"""What a training is advised to take whose robot does not dance."""
+"""Options advised for the next training of a robot that does not dance."""
 Figures = dict[str, Any]
 Overrides = Mapping[str, Any]
 
@@ -32,7 +32,8 @@ Overrides = Mapping[str, Any]
 def mocap(
     video: Path, out: Path, config: str, overrides: Overrides, hypotheses: int = 0
 ) -> Figures:
-    """landmarks.parquet and smpl.parquet of a video, smpl_1.parquet... of what else it allows."""
+    """Write landmarks.parquet and smpl.parquet of a video; with hypotheses also
+    smpl_1.parquet..."""
     from robojackson.api.hypotheses import hypothesis_files, sample_hypotheses
     from robojackson.api.motions import load_weights, recover_motion
     from robojackson.api.videos import detect_landmarks, probe_video
@@ -84,7 +85,7 @@ def mocap(
 
 
 def retarget(smpl: Path, out: Path, config: str, overrides: Overrides) -> Figures:
-    """reference.parquet and scorecard.json of a motion, good or bad; `gate` tells which."""
+    """Write reference.parquet and scorecard.json of a motion, good or bad; `gate` evaluates it."""
     from robojackson.api.motions import retarget_motion
     from robojackson.api.robots import load_robot
     from robojackson.motion.smpl_sequence import SmplSequence
@@ -118,10 +119,10 @@ def retarget(smpl: Path, out: Path, config: str, overrides: Overrides) -> Figure
 
 
 def gate(scorecard: Figures, out: Path, config: str, overrides: Overrides) -> None:
-    """Refuse a motion that training cannot follow; what was written of it stays.
+    """Raise for a motion that training cannot follow; its files stay.
 
     Raises:
-        RejectedReference: the message names the figure and what would mend it.
+        RejectedReference: the message names the figure and a remedy.
     """
     from robojackson.pipeline.pipeline_config import PipelineConfig
     from robojackson.retarget.scorecard_gate import check
@@ -142,7 +143,7 @@ def evaluate(
     overrides: Overrides,
     robot: str | None = None,
 ) -> Figures:
-    """The verdict on a policy or a tracker; with a folder, also its tables and the rollout."""
+    """Evaluate a policy or a tracker; with a folder, also write its tables and the rollout."""
     from robojackson.api.evaluation import evaluate_policy
     from robojackson.api.trackers import load_tracker
     from robojackson.cli.training_words import train_longer
@@ -170,7 +171,8 @@ def evaluate(
 
 
 def is_tracker(policy: Path) -> bool:
-    """Whether a policy is given by the name of a tracker: a file of that name goes first."""
+    """Return whether a policy is given by the name of a tracker; a file of that name comes
+    first."""
     from robojackson.pipeline.tracker_descriptions import tracker_names
 
     return str(policy) in tracker_names() and not policy.is_file()
@@ -180,7 +182,7 @@ VERDICT = ("survived_s", "success", "strict_success", "skill", "site_error_m", "
 
 
 def verdict_lines(evaluation: Mapping[str, Any]) -> list[str]:
-    """The table of an evaluation: the policy, then its baselines."""
+    """Return the table of an evaluation: the policy, then its baselines."""
     short = evaluation.get("verdict", {}).get("kind") == "too_short"
     name = evaluation.get("tracker", "trained")
     rows = {name: evaluation, **evaluation.get("trackers", {}), **evaluation["baselines"]}
@@ -194,7 +196,7 @@ PASSPORT = ("strict_success", "success", "skill", "survived_s", "kept")
 
 
 def passport_lines(evaluation: Mapping[str, Any]) -> list[str]:
-    """The table of a passport; nothing where none was asked for."""
+    """Return the table of a passport; nothing where none was made."""
     rows = evaluation.get("passport", [])
     return console.table({row["case"]: row for row in rows}, PASSPORT) if rows else []
 
@@ -207,7 +209,7 @@ def _contact_share(sequence: "SmplSequence") -> dict[str, float]:
 
 
 def _floor(sequence: "SmplSequence") -> Figures:
-    """Where the floor came from and how far the lowest keypoint is from it, metres."""
+    """Return the source of the floor and the distance of the lowest keypoint from it, metres."""
     lowest = sequence.keypoints_w[:, :, 2].min(1)
     known = {key: sequence.camera[key] for key in ("gravity", "tilt_deg") if key in sequence.camera}
     return {"lowest_keypoint_m": lowest.min(), "median_m": np.median(lowest), **known}

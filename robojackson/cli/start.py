@@ -1,4 +1,4 @@
-"""Where a command starts: nothing heavy is imported before Ctrl-C is guarded."""
+"""Start a command: nothing heavy is imported before Ctrl-C is guarded."""
 
 import atexit
 import os
@@ -17,14 +17,15 @@ from robojackson.errors import BadConfiguration
 def start(command: Callable[[], int]) -> NoReturn:
     """Run a command under a supervisor and end the process with its exit code.
 
-    Where MUJOCO_GL is not set, MuJoCo imports no window library (GLFW starts a process to look for
-    its own, which Ctrl-C would end with a traceback); `report.video` brings its own context.
+    Where MUJOCO_GL is not set, MuJoCo imports no window library (GLFW starts a child process to
+    find its own library, and Ctrl-C would end it with a traceback); `report.video` creates its own
+    context.
 
     Args:
-        command: Imports what it needs inside itself; returns the exit code.
+        command: Function that imports its dependencies in its body and returns the exit code.
     """
     end = _End()
-    atexit.register(end.leave)  # the first to be registered is the last to run
+    atexit.register(end.leave)  # first registered, last run
     try:
         check_environment(os.environ)
     except BadConfiguration as cause:
@@ -49,25 +50,25 @@ def _wait_for_threads() -> None:
 
 
 NEEDS_ITS_END = "prefect"
-"""The one library whose functions at exit do what has to be done: they end its server."""
+"""The one library whose exit functions must run: they end its server."""
 
 
 class _End:
-    """Ends the process without the ends of C++ libraries: neither what they register with Python,
-    as JAX does for its backends, nor their destructors.
+    """Ends the process without the exit code of C++ libraries: neither the functions that they
+    register with Python, as JAX does for its backends, nor their destructors.
 
-    On a busy machine these abort now and then ("terminate called without an active exception": a
-    thread of theirs still runs), which makes exit code 134 of a command that has done all its work.
+    On a busy machine these abort now and then ("terminate called without an active exception": one
+    of their threads still runs), so that a finished command returns exit code 134.
 
     Attributes:
-        code: Exit code of a command that came to its end.
+        code: Exit code of a finished command.
     """
 
     def __init__(self) -> None:
         self.code: int | None = None
 
     def leave(self) -> None:
-        """Write out what is buffered and end; where it cannot be written, Python says so itself."""
+        """Flush the output streams and end; Python itself reports one that cannot be written."""
         if self.code is None:
             return
         try:

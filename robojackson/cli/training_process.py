@@ -1,7 +1,7 @@
-"""The training process: reads a reference motion, trains, keeps tables and policy in one folder.
+"""The training process: reads a reference motion, trains, writes tables and policy into one folder.
 
-A process of its own, with no Prefect in memory. It can be told to die with the process that started
-it, and it holds a lock on its folder, so that no two trainings share a checkpoint.
+A separate process without Prefect. It can be made to end with the process that started it, and it
+holds a lock on its folder, so that no two trainings share a checkpoint.
 """
 
 import json
@@ -29,13 +29,13 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 USUAL_MINUTES = 10.0
-"""What a training is advised to take that ended before its first update."""
+"""Advice for a training that ended before its first update."""
 RECENT = 100
-"""Episodes at the end of a training by which it is described."""
+"""Number of last episodes that describe a training."""
 SECTION = "train."
-"""Where a training's keys stand in a pipeline's configuration."""
+"""Section of a pipeline's configuration with a training's keys."""
 PROGRESS = "progress.json"
-"""How far a training is, in its folder."""
+"""Progress of a training, in its folder."""
 
 
 def train(
@@ -49,24 +49,24 @@ def train(
     robot: str | None = None,
     config: str | None = None,
 ) -> dict[str, Any]:
-    """Train until the budget is used up; the same call goes on after an interruption.
+    """Train until the budget is used up; the same call resumes after an interruption.
 
     Args:
-        setup: `pretrain` and the like of configs/setups, or the path of a training configuration.
+        setup: Name in configs/setups such as `pretrain`, or the path of a training configuration.
         force: Train on a motion that the gate refuses, too.
-        robot: Name or file of the one that the motion is for; None finds it.
-        config: Name or path of a pipeline's configuration; a training with no setup is what its
-            section `train` says, and its `gate` holds.
+        robot: Name or file of the motion's robot; None reads it from the motion.
+        config: Name or path of a pipeline's configuration; without a setup its section `train` and
+            its `gate` apply.
     Raises:
         BadConfiguration: a wrong key or value; a setup beside a configuration.
         Interrupted: Ctrl-C or SIGTERM, after a checkpoint was written.
-        RejectedReference: the motion's own score card says that the robot cannot follow it.
+        RejectedReference: the robot cannot follow the motion, by the motion's own score card.
     """
     from robojackson.api.policy_training import train_policy
     from robojackson.rl.checkpoint_folder import newest_checkpoint
     from robojackson.rl.training_hooks import Hooks
 
-    wanted = requested(config, setup, overrides)
+    request = requested(config, setup, overrides)
     stop = _StopRequest(out)
     with stop.listening(), console.ticker() as write_line:
         hooks = Hooks(
@@ -77,8 +77,8 @@ def train(
         )
         try:
             trained = train_policy(
-                reference, robot, config=wanted.train, setup=wanted.setup, out=out, move=move,
-                run_id=run_id, force=force or not wanted.gate, hooks=hooks,
+                reference, robot, config=request.train, setup=request.setup, out=out, move=move,
+                run_id=run_id, force=force or not request.gate, hooks=hooks,
             )  # fmt: skip
         except KeyboardInterrupt:
             there = newest_checkpoint(out)
@@ -89,11 +89,11 @@ def train(
 
 @dataclass(frozen=True)
 class Requested:
-    """What a command asks of a training.
+    """The request of a command for a training.
 
     Attributes:
-        train: Its configuration.
-        setup: Name or file that the tables know it by; None names it by what it does.
+        train: The training's configuration.
+        setup: Name or file for the tables; None derives a name from the settings.
         gate: Whether a motion that the robot cannot follow is refused.
     """
 
@@ -103,7 +103,8 @@ class Requested:
 
 
 def requested(config: str | None, setup: str | None, overrides: Mapping[str, object]) -> Requested:
-    """Return what files, `--set` and options ask of a training; the latter win.
+    """Return the training that files, `--set` and options request; later ones override earlier
+    ones.
 
     Raises:
         UnknownName: no such file.
@@ -117,8 +118,8 @@ def requested(config: str | None, setup: str | None, overrides: Mapping[str, obj
         return Requested(load(TrainConfig, setup_file(setup), overrides), setup)
     if setup is not None:
         raise BadConfiguration(
-            f"--config {config} and --setup {setup}: give one; what a setup says stands in the "
-            "section `train` of a configuration"
+            f"--config {config} and --setup {setup}: give one; a configuration has a "
+            "setup's keys in its section `train`"
         )
     given = {f"{SECTION}{key.removeprefix(SECTION)}": value for key, value in overrides.items()}
     whole = load(PipelineConfig, config, given)
@@ -126,7 +127,7 @@ def requested(config: str | None, setup: str | None, overrides: Mapping[str, obj
 
 
 def _answer(trained: "TrainedPolicy", reference: Path, policy: Path) -> dict[str, Any]:
-    """Return what the command answers of a training that has ended."""
+    """Return the command's answer about a finished training."""
     config = trained.config
     survived = [row["survived_s"] for row in trained.episodes[-RECENT:]]
     verdict = cards.train_verdict(trained.updates, trained.steps, survived)
@@ -152,7 +153,7 @@ def _answer(trained: "TrainedPolicy", reference: Path, policy: Path) -> dict[str
 
 
 def status(row: Mapping[str, float]) -> str:
-    """A progress row as one line."""
+    """Return a progress row as one line."""
     minutes, seconds = divmod(int(row["seconds_left"]), 60)
     survived, error = _number(row["survived_s"], 2), _number(100 * row["site_error_m"], 1)
     return (
@@ -163,7 +164,7 @@ def status(row: Mapping[str, float]) -> str:
 
 
 def format_reward_audit(found: Mapping[str, Mapping[str, float]]) -> str:
-    """What the reward pays to bodies that do not dance, as one line."""
+    """Return the reward of bodies that do not dance, as one line."""
     parts = []
     for reading, of in found.items():
         shares = (f"{name} {100 * of[name]:.0f} %" for name in of if name != "perfect_step")
@@ -174,7 +175,7 @@ def format_reward_audit(found: Mapping[str, Mapping[str, float]]) -> str:
 def _report_progress(
     row: Mapping[str, float], out: Path, write_line: Callable[[str], None]
 ) -> None:
-    """Say how far it is, and leave it for whoever watches the folder."""
+    """Write the progress on stderr and into the folder, where other processes read it."""
     write_line(status(row))
     finite = {k: v if math.isfinite(v) else None for k, v in row.items()}
     whole = out / f".{PROGRESS}"
@@ -184,7 +185,7 @@ def _report_progress(
 
 
 def _number(value: float, digits: int) -> str:
-    """A dash before there is a figure."""
+    """Return a number as text; a dash before there is a figure."""
     return f"{value:.{digits}f}" if math.isfinite(value) else "-"
 
 
@@ -195,10 +196,10 @@ def end_with(parent: int) -> None:
 
 
 class _StopRequest:
-    """Whether the training is to stop, and whether it has learning to save when it does.
+    """Whether the training should stop, and whether it has unsaved learning.
 
     Attributes:
-        unsaved: The flag for which the supervisor of the command waits.
+        unsaved: The flag that the supervisor of the command waits for.
     """
 
     def __init__(self, out: Path) -> None:
@@ -210,7 +211,7 @@ class _StopRequest:
 
     @contextmanager
     def listening(self) -> Iterator[None]:
-        """Receive Ctrl-C and SIGTERM inside; afterwards restore handlers and clear the flag."""
+        """Receive Ctrl-C and SIGTERM inside; restore handlers and clear the flag afterwards."""
         before = [(number, signal.signal(number, self.receive)) for number in STOPS]
         try:
             yield
@@ -220,17 +221,17 @@ class _StopRequest:
                 signal.signal(number, handler)
 
     def mark_unsaved(self) -> None:
-        """Set the flag; a training that is already to stop does not delay its end by what it has
-        only just begun to learn."""
+        """Set the flag; in a stopping training do nothing, since new learning must not delay its
+        end."""
         if not self._received:
             self.unsaved.set()
 
     def receive(self, number: int, frame: object) -> None:
-        """Handle a signal; a second one ends a training that has no supervisor to do so."""
+        """Handle a signal; without a supervisor a second signal ends the training."""
         if not self._received:
             self._received = True
             checkpoint = f", with a checkpoint in {self._out}" if self.unsaved.is_set else ""
-            # Not by the log: the signal may come while a line is being written there.
+            # Not by the log: the signal may arrive while a line is written there.
             os.write(2, f"stopping after this round of updates{checkpoint}\n".encode())
         elif not is_guarded():
             raise KeyboardInterrupt

@@ -1,4 +1,4 @@
-"""The command that goes on with a training: its folder knows the settings that it was given."""
+"""The command that continues a training, with the settings in the training's folder."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -11,16 +11,16 @@ from robojackson.rl.config.train_config import TrainConfig
 
 
 def train_longer(reference: Path, folder: Path, minutes: float) -> str:
-    """Return the command that trains on in a folder, with every setting that is not the usual one.
+    """Return the command that trains on in a folder, with every setting that is not the default.
 
-    A checkpoint refuses other settings, wherever they came from: a file, an option or `--set`.
+    A checkpoint refuses other settings, whether from a file, an option or `--set`.
     """
     words = ("train", reference, "-o", folder, "--minutes", f"{minutes:g}")
     return cards.command_line(*words, *(f"--set={each}" for each in _unusual(folder)))
 
 
 def _unusual(folder: Path) -> list[str]:
-    """The settings of a training, KEY=VALUE; none where its folder has no checkpoint."""
+    """Return the settings of a training as KEY=VALUE; none where its folder has no checkpoint."""
     checkpoint = newest_checkpoint(folder)
     if checkpoint is None:
         return []

@@ -1,8 +1,8 @@
-"""The walkers that trainings start from, made from files to files with no Prefect.
+"""Train the walkers that trainings start from, from files to files, without importing Prefect.
 
-`paper` learns Humanoid-v5's own reward from the first 45 of its observations; the file that is kept
-takes all 348, the others with weight zero. `track` imitates the bundled walk, on any robot; that of
-a robot for which none ships is kept where `start: walker` finds it.
+`paper` learns Humanoid-v5's own reward from the first 45 of its observations; the saved file takes
+all 348, the others with weight zero. `track` imitates the bundled walk, on any robot; the walker of
+a robot for which none ships is saved where `start: walker` finds it.
 """
 
 import json
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 Figures = dict[str, Any]
 WALK, STANDING = "walk.mp4", "standing.parquet"
 ROBOT, PIPELINE = "humanoid", "base"
-"""Names of the configurations that a walker is made with, besides that of its training."""
+"""Names of the configurations that make a walker, besides that of its training."""
 CURVE_POINTS = 20
 
 
@@ -42,9 +42,8 @@ def pretrain(
 ) -> Figures:
     """Train a walker: walker_<kind>.safetensors and walker.json with command, curve, evaluation.
 
-    Raises:
-        BadConfiguration: a reference motion or a robot for `paper`, whose walker follows no motion
-            and is Humanoid-v5.
+    BadConfiguration: a reference motion or a robot for `paper`, whose walker is Humanoid-v5 and
+    follows no motion.
     """
     from robojackson.rl.config.train_config import TrainConfig
     from robojackson.rl.policy import load_policy
@@ -57,7 +56,7 @@ def pretrain(
     machine = _robot(reference, robot)
     motion = reference or _reference(kind, out, machine)
     given = None if reference is not None and robot is None else robot or ROBOT
-    stands = kind == "paper"  # a motion that only stands has no score card
+    stands = kind == "paper"  # a standing motion has no score card
     trained = training_process.train(
         motion, out, f"walker-{kind}", overrides, move="walk", force=stands, robot=given
     )
@@ -87,7 +86,7 @@ def pretrain(
 
 
 def _robot(reference: Path | None, robot: str | None) -> "Robot":
-    """Return the robot that is named, else that of the motion, else the paper's."""
+    """Return the given robot, else that of the motion, else the paper's."""
     from robojackson.api.arguments import read_if_path, robot_of
     from robojackson.motion.reference_motion import ReferenceMotion
     from robojackson.robot.model import load_robot
@@ -98,7 +97,7 @@ def _robot(reference: Path | None, robot: str | None) -> "Robot":
 
 
 def _installed(made: Path, robot: "RobotDescription", kind: str) -> Figures:
-    """Keep the walker of a robot for which none ships, where `start: walker` finds it."""
+    """Save the walker of a robot for which none ships, where `start: walker` finds it."""
     from robojackson.rl.walkers import is_shipped, keep_walker
 
     if is_shipped(robot, kind):
@@ -107,7 +106,7 @@ def _installed(made: Path, robot: "RobotDescription", kind: str) -> Figures:
 
 
 def _require_fitting(kind: str, mode: str, reference: Path | None, robot: str | None) -> None:
-    """Refuse what the walker of a kind cannot be made with.
+    """Raise for settings that do not fit the kind of walker.
 
     Raises:
         BadConfiguration: another mode; a reference motion or another robot for `paper`.
@@ -126,7 +125,7 @@ def _require_fitting(kind: str, mode: str, reference: Path | None, robot: str | 
 
 
 def curve(out: Path) -> list[dict[str, float]]:
-    """Mean return and survival of the episodes in equal parts of the training."""
+    """Return mean return and survival of the episodes in equal parts of the training."""
     from robojackson.pipeline.table_schemas import EPISODE_RECORD
 
     path = out / "episodes.parquet"
@@ -148,14 +147,15 @@ def curve(out: Path) -> list[dict[str, float]]:
 
 
 def _reference(kind: str, out: Path, robot: "Robot") -> Path:
-    """The motion that a walker is trained on: none for `paper`, the bundled walk for `track`."""
+    """Return the motion that a walker is trained on: none for `paper`, the bundled walk for
+    `track`."""
     from robojackson.rl.modes.standing_motion import make_standing_motion
 
     if kind == "paper":
         with results_in(out) as files:
             files.write(STANDING, tables.encode(make_standing_motion(robot)))
         return out / STANDING
-    folder = out / Path(WALK).stem  # not among what the user may keep in `out`
+    folder = out / Path(WALK).stem  # apart from the user's files in `out`
     made = folder / "reference.parquet"
     if not made.exists():
         stages.mocap(bundled(WALK), folder, PIPELINE, {})
@@ -175,7 +175,7 @@ def _evaluate_walk(policy: Any, robot: "Robot") -> Figures:
 
 
 def _command_options(overrides: Mapping[str, object]) -> list[str]:
-    """The options of a command that override what the setup says."""
+    """Return the options of a command that override the setup."""
     options = {"steps": "--steps", "minutes": "--minutes", "seed": "--seed", "trainer": "--trainer"}
     words: list[str] = []
     for key, value in overrides.items():

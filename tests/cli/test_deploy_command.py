@@ -101,7 +101,7 @@ def test_a_declared_licence_wants_its_kind() -> None:
         "clip": "CC-BY-4.0",
         "body models": "MIT",
     }
-    with pytest.raises(BadConfiguration, match="wants KIND=LICENCE"):
+    with pytest.raises(BadConfiguration, match="expected KIND=LICENCE"):
         licences_from(["CC-BY-4.0"])
 
 

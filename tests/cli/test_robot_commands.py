@@ -143,7 +143,7 @@ def test_a_store_that_cannot_be_written_is_one_line(source, describe, tmp_path, 
 
 
 def test_a_robot_that_is_here_already_needs_nothing():
-    with pytest.raises(BadConfiguration, match="needs nothing"):
+    with pytest.raises(BadConfiguration, match="needs no download"):
         robot_models.add_robot("humanoid")
 
 
@@ -246,7 +246,7 @@ def test_new_writes_a_description_that_passes_and_keeps_a_file_that_is_there(
     assert (told["file"], told["ok"], told["left"]) == ("my_humanoid.yaml", True, [])
     assert lines[-1] == "next: robojackson robots check my_humanoid.yaml -o my_humanoid.png"
     Path("my_humanoid.yaml").write_text("mine")
-    with pytest.raises(StoreError, match="there already; --force"):
+    with pytest.raises(StoreError, match="exists; --force"):
         robot_sheets.new_robot(model, None, force=False)
     assert Path("my_humanoid.yaml").read_text() == "mine"
     robot_sheets.new_robot(model, Path("my_humanoid.yaml"), force=True)

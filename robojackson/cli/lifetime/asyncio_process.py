@@ -1,4 +1,4 @@
-"""A child process of an event loop, in a group of its own, that no way out leaves alive."""
+"""A child process of an event loop, in its own group, which is ended on every way out."""
 
 import asyncio
 import signal
@@ -13,7 +13,7 @@ from robojackson.cli.lifetime.process_group import signal_group
 async def running(
     command: Sequence[str], environment: Mapping[str, str], grace_s: float
 ) -> AsyncIterator[Process]:
-    """Start a process; end its group on the way out where it has not ended by itself.
+    """Start a process; on leaving, end its group unless it has ended.
 
     The command itself must end with its parent (`parent_death`) where this process may be killed.
 
@@ -33,7 +33,7 @@ async def running(
 
 
 async def _end(process: Process, grace_s: float) -> None:
-    """Ask the group of a process to end, wait, then kill it, and reap the process."""
+    """Send SIGTERM to the group of a process, wait, kill it, and reap the process."""
     if process.returncode is not None:
         return
     signal_group(process.pid, signal.SIGTERM)

@@ -1,6 +1,6 @@
-"""Ctrl-C and SIGTERM as the process that does the work meets them; `supervisor` enforces the end.
+"""Handle Ctrl-C and SIGTERM in the process that does the work; `supervisor` enforces the end.
 
-Only the standard library is imported here, since this precedes everything else.
+Imports only the standard library, since this runs before everything else.
 """
 
 import os
@@ -18,9 +18,9 @@ INTERRUPTED = 130
 STOPS = (signal.SIGINT, signal.SIGTERM)
 """The signals that interrupt a command."""
 SHOWN = "\u2068\u2069"
-"""Isolates around words that run from right to left: they are ours."""
+"""Unicode isolates around right-to-left words: they are ours."""
 UNSAVED = "robojackson-unsaved"
-"""Name of the memory file that a training holds open while it has learning to save."""
+"""Name of the memory file that a training holds open while it has unsaved learning."""
 
 _last_line: int | None = None
 """In the worker of a supervisor, the pipe on which the supervisor receives the last line."""
@@ -63,7 +63,7 @@ def conclude(line: str) -> None:
 
 
 def complain(line: str) -> None:
-    """Write one line of cause on stderr."""
+    """Write one line about an error on stderr."""
     sys.stderr.write(f"{as_line(line)}\n")
 
 
@@ -73,12 +73,12 @@ def as_line(text: str) -> str:
 
 
 def printable(text: str) -> str:
-    """Return a text without what steers a terminal: names of files may hold escape sequences."""
+    """Return a text without control characters: names of files may hold escape sequences."""
     return "".join(c if c.isprintable() or c in SHOWN else "?" for c in text)
 
 
 def program() -> str:
-    """Return what a person types for this program: its path where its name alone is not found.
+    """Return the command that starts this program: its path where its name alone is not found.
 
     `make dance` runs it from an environment that the person's shell has not activated.
     """
@@ -90,7 +90,7 @@ def program() -> str:
 
 
 def python() -> str:
-    """Return what a person types for Python: Debian has no `python` outside an environment."""
+    """Return the command that starts Python: Debian has no `python` outside an environment."""
     return next((name for name in ("python", "python3") if shutil.which(name)), sys.executable)
 
 
@@ -115,11 +115,11 @@ def with_option(option: str, value: str) -> str:
 def become_worker(supervisor: int, mark: str, last_line: int) -> None:
     """Prepare a fork of the supervisor for the command: its group, mark, signals and input.
 
-    A process in the background that reads from the terminal would be stopped; no command reads.
+    A background process that reads from the terminal would be stopped; no command reads.
 
     Args:
         supervisor: Process id of the supervisor, with which this process ends.
-        mark: What the processes that this one starts carry (`orphans`).
+        mark: Mark of the processes that this one starts (`orphans`).
         last_line: File descriptor on which the supervisor receives the last line.
     """
     global _last_line
@@ -136,7 +136,7 @@ def become_worker(supervisor: int, mark: str, last_line: int) -> None:
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
-    """Raise KeyboardInterrupt in the worker, which writes nothing from here on."""
+    """Raise KeyboardInterrupt in the worker, which writes nothing afterwards."""
     for stop in STOPS:
         signal.signal(stop, signal.SIG_IGN)
     _discard(1, 2)

@@ -1,9 +1,9 @@
-"""The processes that a command has started: found by a mark in their environment, and ended.
+"""Find the processes that a command has started by a mark in their environment, and end them.
 
-Prefect starts its temporary server as a child, which outlives a SIGKILL of its parent. So a tiny
+Prefect starts its temporary server as a child, which outlives a SIGKILL of its parent. So a small
 process waits at the other end of a pipe: when the pipe closes without a farewell, it ends every
-process that carries this flow's mark in its environment. Linux only; elsewhere it does nothing.
-Only the standard library is imported here.
+process with this flow's mark in its environment. Linux only; elsewhere it does nothing. Imports
+only the standard library.
 """
 
 import os
@@ -17,10 +17,10 @@ from pathlib import Path
 VARIABLE = "ROBOJACKSON_FLOW"
 FAREWELL = b"all is well"
 HALF_WRITTEN = ".part-"
-"""Beginning of the names of files that are being written: `pipeline.local_folder.TEMPORARY`; only
-the standard library is imported here."""
+"""Prefix of the names of files that are being written: `files.local_folder.TEMPORARY`, repeated
+because only the standard library is imported here."""
 KILL_S = 0.5
-"""How long killed processes may take to be gone, seconds."""
+"""Longest wait for killed processes to disappear, seconds."""
 
 
 def new_mark() -> str:
@@ -30,7 +30,8 @@ def new_mark() -> str:
 
 @contextmanager
 def none_left() -> Iterator[None]:
-    """Inside, every process that is started ends with this one, which may carry a mark already."""
+    """Make every process that is started inside end with this one, which may carry a mark
+    already."""
     import subprocess
 
     if not Path("/proc/self/environ").exists():
@@ -49,19 +50,20 @@ def none_left() -> Iterator[None]:
 
 
 def marked(mark: str) -> set[int]:
-    """Return the living processes that carry the mark, this one left out."""
+    """Return the living processes with the mark, without this one."""
     variable = f"{VARIABLE}={mark}".encode()
     pids = (int(folder.name) for folder in Path("/proc").iterdir() if folder.name.isdigit())
     return {pid for pid in pids if variable in _environment(pid)} - {os.getpid()}
 
 
 def end_all(mark: str) -> None:
-    """Ask every process that carries the mark to end."""
+    """Send SIGTERM to every process with the mark."""
     _signal(marked(mark), signal.SIGTERM)
 
 
 def kill_all(mark: str, *more: int) -> set[Path]:
-    """Kill every process that carries the mark, and these; return what they were writing."""
+    """Kill every process with the mark, and the given ones; return the files that they were
+    writing."""
     deadline = time.monotonic() + KILL_S
     doomed = {*more, *marked(mark)}
     _signal(doomed, signal.SIGSTOP)  # so that none begins another file
@@ -92,7 +94,7 @@ def _signal(pids: Iterable[int], number: signal.Signals) -> None:
 def _environment(pid: int) -> list[bytes]:
     try:
         return Path(f"/proc/{pid}/environ").read_bytes().split(b"\0")
-    except OSError:  # ended meanwhile, or another user's
+    except OSError:  # ended, or another user's
         return []
 
 

@@ -1,6 +1,6 @@
-"""The end of a child process when its parent ends, however that happens.
+"""End a child process when its parent ends, in whatever way.
 
-Only what is small of the standard library is imported here: `supervisor` precedes everything else.
+Imports only small modules of the standard library: `supervisor` runs before everything else.
 """
 
 import os
@@ -11,11 +11,12 @@ import time
 DIE_WITH_PARENT = 1
 """PR_SET_PDEATHSIG of prctl(2)."""
 WATCH_S = 2.0
-"""How often a process looks whether its parent still lives, seconds."""
+"""Interval at which a process checks that its parent still lives, seconds."""
 
 
 def end_with_parent(parent: int) -> bool:
-    """Have the kernel kill this process when its parent ends; return whether it still lives.
+    """Have the kernel kill this process when its parent ends; return whether the parent still
+    lives.
 
     The kernel's parent is the thread that started this process; `watch_parent` is for a parent that
     starts processes from threads that end before it.

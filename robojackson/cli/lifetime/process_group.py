@@ -1,6 +1,6 @@
-"""Processes in a group of their own: a signal reaches each of them, a terminal's Ctrl-C none.
+"""Processes in their own group: a signal reaches each of them, a terminal's Ctrl-C none.
 
-Only what is small of the standard library is imported here: `supervisor` precedes everything else.
+Imports only small modules of the standard library: `supervisor` runs before everything else.
 """
 
 import os
@@ -12,23 +12,23 @@ if TYPE_CHECKING:
     import subprocess
 
 SECONDS_TO_SAVE = 30.0
-"""What a training that is stopped gets to write its checkpoint before it is killed, seconds."""
+"""Time for a stopped training to write its checkpoint before it is killed, seconds."""
 
 
 def signal_group(leader: int, number: signal.Signals) -> None:
-    """Send a signal to a process group; one that has ended is left alone.
+    """Send a signal to a process group; do nothing where it has ended.
 
     Args:
         leader: Process id of the first process of the group.
     """
-    with suppress(ProcessLookupError):  # it may have ended a moment ago
+    with suppress(ProcessLookupError):  # it may just have ended
         os.killpg(leader, number)
 
 
 def end_group(
     process: "subprocess.Popen[bytes]", grace_s: float, request: signal.Signals = signal.SIGTERM
 ) -> None:
-    """End the group of a process and reap the process: a request, a wait, then SIGKILL.
+    """End the group of a process and reap the process: a first signal, a wait, then SIGKILL.
 
     Args:
         process: Started with `start_new_session=True`; nothing is sent if it was reaped before.

@@ -1,8 +1,8 @@
-"""A process that does nothing but acknowledge Ctrl-C and SIGTERM, and enforce them.
+"""Supervise a command: acknowledge Ctrl-C and SIGTERM at once, and enforce them.
 
 The command runs in a worker, forked before anything heavy is imported; its parent waits for
 signals. So the answer depends neither on the worker's interpreter lock nor on its main thread,
-which a compilation or a solver may hold for ten seconds. On the first signal the supervisor
+which a compilation or a solver may block for ten seconds. On the first signal the supervisor
 
     1. writes one line on stderr, and sends SIGINT to the worker and SIGTERM to the trainings whose
        learning no checkpoint holds yet;
@@ -10,9 +10,9 @@ which a compilation or a solver may hold for ten seconds. On the first signal th
     3. kills what is left of the worker and of the processes that it started (`orphans`), removes
        the files that they were writing, and writes how to resume. The exit code is 130.
 
-A second signal leads to step 3 at once. The worker has a process group of its own, so that a
-terminal's Ctrl-C reaches it once, through the supervisor. Linux only; elsewhere the command runs by
-itself and Python handles Ctrl-C. Only the standard library is imported.
+A second signal leads to step 3 at once. The worker has its own process group, so that a terminal's
+Ctrl-C reaches it once, through the supervisor. Linux only; elsewhere the command runs by itself and
+Python handles Ctrl-C. Imports only the standard library.
 """
 
 import fcntl
@@ -37,28 +37,29 @@ from robojackson.cli.lifetime.orphans import half_written, holding, kill_all, ma
 from robojackson.cli.lifetime.process_group import SECONDS_TO_SAVE, signal_group
 
 GRACE_S = 1.5
-"""What the worker gets to end by itself, seconds."""
+"""Time for the worker to end by itself, seconds."""
 GRACE_AFTER_SAVING_S = 1.0
-"""What it gets after the last checkpoint was saved, seconds."""
+"""Time for the worker after the last checkpoint was saved, seconds."""
 SAME_S = 0.25
-"""Two signals closer than this are one: wrappers pass on a Ctrl-C that also reaches us, seconds."""
+"""Signals closer than this count as one: wrappers forward a Ctrl-C that also reaches us,
+seconds."""
 POLL_S = 0.05
 WATCHED = {*STOPS, signal.SIGCHLD, signal.SIGTSTP, signal.SIGCONT}
 FIRST_FILE = 3
 """The first file descriptor after stdin, stdout and stderr, one of which may be closed."""
 KILLED = 128
-"""What a shell adds to the number of the signal that killed a process, for its exit code."""
+"""Offset of a shell's exit code from the number of the signal that killed a process."""
 
 
 def guarded(command: Callable[[], int]) -> int:
     """Run a command in a worker under a supervisor; return its exit code, in both processes.
 
-    A process that one of our own has started has a supervisor and runs the command by itself.
+    A process that one of our own has started has a supervisor already and runs the command itself.
     """
     if sys.platform != "linux" or is_guarded():
         return command()
     signal.pthread_sigmask(signal.SIG_BLOCK, WATCHED)
-    signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # ignored, it takes the exit code of the worker
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # if ignored, the worker's exit code is lost
     mark, supervisor = new_mark(), os.getpid()
     read, write = _pipe()
     worker = os.fork()
@@ -67,7 +68,7 @@ def guarded(command: Callable[[], int]) -> int:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, WATCHED)
         return command()
     os.close(write)
-    with suppress(OSError):  # the worker does the same; whichever comes first
+    with suppress(OSError):  # the worker does the same, in either order
         os.setpgid(worker, worker)
     code = _wait(worker, mark)
     if code == INTERRUPTED:
@@ -111,7 +112,7 @@ def _end(worker: int, mark: str) -> None:
     began = time.monotonic()
     until = began + GRACE_S
     processes = {worker, *marked(mark)}
-    files = half_written(processes)  # now: the worker may kill who writes them
+    files = half_written(processes)  # now: the worker may kill their writers
     stopped = _stop_trainings(processes, {worker})
     _write(_acknowledgement(len(stopped), SECONDS_TO_SAVE))
     os.kill(worker, signal.SIGINT)
@@ -132,7 +133,7 @@ def _end(worker: int, mark: str) -> None:
     signal_group(worker, signal.SIGKILL)  # forks of the worker carry no mark
     os.waitpid(worker, 0)
     for file in files:
-        with suppress(OSError):  # its folder, too, may be gone
+        with suppress(OSError):  # its folder may be gone, too
             file.unlink(missing_ok=True)
 
 
@@ -146,12 +147,12 @@ def _stop_trainings(processes: set[int], stopped: set[int]) -> set[int]:
 
 
 def _has_ended(worker: int) -> bool:
-    """Return whether the worker has ended; it remains to be collected."""
+    """Return whether the worker has ended; it is not reaped."""
     return os.waitid(os.P_PID, worker, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
 
 
 def _acknowledgement(saving: int, seconds: float) -> str:
-    """Return what happens now, as one line."""
+    """Return the line about the end that follows a signal."""
     if not saving:
         return "interrupted, ending ..."
     what = "the training is saving its checkpoint"
@@ -170,7 +171,7 @@ def _received(last_line: int) -> str:
 
 
 def _write(text: str) -> None:
-    """Write a line on stderr, in the place of a progress line; without one who reads, nothing."""
+    """Write a line on stderr in place of a progress line; do nothing where stderr is closed."""
     start = "\r\x1b[2K" if os.isatty(2) else ""
     with suppress(OSError, ValueError):
         if select.select([], [2], [], 0)[1]:

@@ -1,6 +1,6 @@
-"""The door for the environment: variables that would break a library are refused before it loads.
+"""Check the environment: raise for variables that would break a library, before it loads.
 
-Only the standard library is imported, since this precedes everything else.
+Imports only the standard library, since this runs before everything else.
 """
 
 import os
@@ -21,7 +21,7 @@ SECRET = re.compile(r"//[^/@]*@")
 
 
 def check_environment(given: Mapping[str, str]) -> None:
-    """Refuse variables whose values no library of ours can use.
+    """Raise for variables whose values no library of ours can use.
 
     Raises:
         BadConfiguration: the line names the variable, its value and what is allowed.
@@ -36,23 +36,24 @@ def check_environment(given: Mapping[str, str]) -> None:
 def _one_of(*allowed: str) -> Callable[[str], str]:
     def fault(value: str) -> str:
         wrong = set(value.lower().split(",")) - set(allowed)
-        return f"one of {', '.join(filter(None, allowed))} is wanted" if wrong else ""
+        return f"expected one of {', '.join(filter(None, allowed))}" if wrong else ""
 
     return fault
 
 
 def _backend(value: str) -> str:
-    """MuJoCo takes one word, not a list."""
+    """Return the fault of a graphics backend: MuJoCo takes one word, not a list."""
     return _one_of(*GRAPHICS)(value.replace(",", " "))
 
 
 def _level(value: str) -> str:
-    levels = f"one of {', '.join(LOG_LEVELS)} is wanted"
+    levels = f"expected one of {', '.join(LOG_LEVELS)}"
     return "" if value.upper() in LOG_LEVELS or value.isdigit() else levels
 
 
 def _flags(value: str) -> str:
-    """XLA ends the process for a flag that it does not know; other words it passes over."""
+    """Return the fault of XLA's flags: XLA ends the process for an unknown flag and skips other
+    words."""
     dashed = [word for word in value.split() if word.startswith("-")]
     wrong = not dashed or any(not word.startswith("--xla") for word in dashed)
     return "flags of XLA begin with --xla" if wrong else ""
@@ -61,7 +62,7 @@ def _flags(value: str) -> str:
 def _threads(value: str) -> str:
     first = value.split(",")[0].strip()
     is_right = first.isdecimal() and 0 < int(first) <= MOST_THREADS
-    return "" if is_right else "a number of threads is wanted"
+    return "" if is_right else "expected a number of threads"
 
 
 def _flag(value: str) -> str:
@@ -69,13 +70,13 @@ def _flag(value: str) -> str:
 
 
 def _address(value: str) -> str:
-    wanted = "an address such as http://127.0.0.1:4200/api is wanted"
+    fault = "expected an address such as http://127.0.0.1:4200/api"
     try:
         parts = urlsplit(value)
-        parts.port  # noqa: B018 (raises for what is no port)
+        parts.port  # noqa: B018 (raises for an invalid port)
     except ValueError:
-        return wanted
-    return "" if parts.scheme in ("http", "https") and parts.hostname else wanted
+        return fault
+    return "" if parts.scheme in ("http", "https") and parts.hostname else fault
 
 
 def _store(value: str) -> str:
@@ -83,7 +84,7 @@ def _store(value: str) -> str:
     if not colon:
         return _folder(value)
     if scheme not in STORES:
-        return f"a folder, or an address of {', '.join(STORES)} is wanted"
+        return f"expected a folder, or an address of {', '.join(STORES)}"
     if scheme == "file":
         return _folder(rest)
     return "" if rest.strip("/") else "the address names no bucket"
@@ -96,7 +97,7 @@ def _folder(value: str) -> str:
     except (OSError, ValueError, RuntimeError) as cause:
         return getattr(cause, "strerror", None) or "no folder can have this name"
     if found is not None and not found.is_dir():
-        return f"{found} is no folder"
+        return f"{found} is not a folder"
     return "" if value.isprintable() else "it holds characters that cannot be printed"
 
 
@@ -121,9 +122,10 @@ CHECKS: Mapping[str, Callable[[str], str]] = {
     "PREFECT_LOGGING_ROOT_LEVEL": _level,
     "XDG_CACHE_HOME": _folder,
 }
-"""What is wrong with the value of a variable; empty where nothing is."""
+"""Functions that return the fault of a variable's value; empty where there is none."""
 
 
 def quieten(environment: "os._Environ[str]") -> None:
-    """Set what has one right value here: matplotlib draws to files, whatever the shell says."""
+    """Set variables with one right value: matplotlib draws to files, whatever the shell's
+    setting."""
     environment["MPLBACKEND"] = "agg"

@@ -1,1 +1,1 @@
-"""What commands draw of their results, from files to files."""
+"""Pictures of the commands' results, from files to files."""

@@ -12,10 +12,10 @@ PICTURE, VIDEO = "mocap.png", "mocap.mp4"
 def draw_mocap(
     video: Path, out: Path, config: str, overrides: Mapping[str, object], film: bool
 ) -> dict[str, str]:
-    """Draw what `stages.mocap` wrote into a folder: over the source, from the front, from the side.
+    """Draw the results of `stages.mocap`: over the source, from the front, from the side.
 
     Args:
-        film: Whether a video is wanted, too.
+        film: Whether to render a video, too.
     """
     from robojackson.api.progress_bar import bar
     from robojackson.motion.landmark_track import LandmarkTrack

@@ -1,4 +1,4 @@
-"""Which video a motion was recovered from: source.json beside it, left by `robojackson mocap`."""
+"""The video that a motion was recovered from: source.json, written by `robojackson mocap`."""
 
 import hashlib
 import json
@@ -18,7 +18,7 @@ class MotionSource:
 
     Attributes:
         video: The file.
-        track: The landmarks that were found in it.
+        track: The landmarks found in it.
     """
 
     video: Path
@@ -42,7 +42,7 @@ def source_record(video: Path, landmarks: bytes, motions: Mapping[str, bytes]) -
 
 
 def source_of(smpl: Path) -> MotionSource | None:
-    """Return the clip of a motion, None where it is not known, gone, or another one by now."""
+    """Return the clip of a motion, None where it is unknown, missing, or changed."""
     try:
         facts = json.loads((smpl.parent / FILE).read_text())
         video = Path(facts["video"])

@@ -1,4 +1,4 @@
-"""Who is in a video: a list, and a picture with their numbers."""
+"""List the people in a video, with a picture of their numbers."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -14,10 +14,10 @@ PICTURE = "people.png"
 def list_people(
     video: Path, out: Path, config: str, overrides: Mapping[str, object]
 ) -> tuple[dict[str, object], list[str]]:
-    """Everybody in a video, as an answer and as lines; `--person N` follows one of them.
+    """Return everybody in a video, as data and as lines; `--person N` selects one of them.
 
     Raises:
-        NoPersonFound: nobody is there for long enough.
+        NoPersonFound: no person is visible for long enough.
     """
     from robojackson.clips.people.people_picture import draw_people
     from robojackson.clips.people.tracked_people import track_people
@@ -29,8 +29,8 @@ def list_people(
     info = probe(video, settings.video)
     with results_in(out) as files:
         with console.bar(f"people of {video.name}") as progress:
-            who = settings.dancer
-            cast = track_people(video, info, who.detection, who.identity, progress)
+            dancer = settings.dancer
+            cast = track_people(video, info, dancer.detection, dancer.identity, progress)
         if not cast.rows:
             raise NoPersonFound(f"{cast}", video)
         files.write(PICTURE, draw_people(video, cast))

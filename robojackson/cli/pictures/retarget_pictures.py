@@ -1,4 +1,4 @@
-"""Pictures of a retargeting, from files to files: a sheet of poses always, on request a video,
+"""Pictures of a retargeting, from files to files: a sheet of poses; optionally a video and plots of
 contacts, torques and feasibility.
 """
 
@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 
 
 def draw_poses(smpl: Path, out: Path) -> dict[str, str]:
-    """Draw the sheet of what `stages.retarget` wrote; nothing where there are no graphics."""
+    """Draw the sheet of the results of `stages.retarget`; nothing without graphics."""
     from robojackson.api.arguments import robot_of
     from robojackson.motion.reference_motion import ReferenceMotion
     from robojackson.motion.smpl_sequence import SmplSequence
@@ -46,7 +46,7 @@ def draw_poses(smpl: Path, out: Path) -> dict[str, str]:
 def draw_retargeting(
     smpl: Path, out: Path, config: str, overrides: Mapping[str, object]
 ) -> dict[str, str]:
-    """Draw what `stages.retarget` wrote into a folder, beside the person it was made from.
+    """Draw the results of `stages.retarget` beside the person they were made from.
 
     Raises:
         MissingDependency: no way to draw without a screen.

@@ -1,4 +1,4 @@
-"""`robojackson robots check` and `robots new`: your own robot, from its model to a description."""
+"""`robojackson robots check` and `robots new`: from a model to a robot description."""
 
 from dataclasses import fields
 from pathlib import Path
@@ -20,7 +20,7 @@ NO_LEGS = (
 
 
 def check_robot(given: str, picture: Path | None) -> tuple[Figures, list[str]]:
-    """The figures of a robot and what a person reads of them; draws it where a picture is named.
+    """Return the figures of a robot and lines about them; draw it where `picture` is given.
 
     Returns:
         Figures with `ok` and `problems`; lines.
@@ -59,20 +59,20 @@ def check_robot(given: str, picture: Path | None) -> tuple[Figures, list[str]]:
 
 
 def _verdict(given: str, problems: bool) -> Figures:
-    """`verdict` and `next` of a check."""
+    """Return `verdict` and `next` of a check."""
     if problems:
         sentence = "The description cannot be used yet."
         return {
             "verdict": {"kind": "problems", "sentence": sentence},
             "next": command_line("robots", "check", given),
         }
-    sentence = f"Nothing is wrong with {given}: look at the picture before it dances."
+    sentence = f"{given} has no problems: look at the picture before it dances."
     following = command_line("dance", "clips/hip_shake.mp4", "--robot", given)
     return {"verdict": {"kind": "whole", "sentence": sentence}, "next": following}
 
 
 def picture_of(given: str) -> Path:
-    """Where the picture of a robot goes that no other place is named for."""
+    """Return the default place of a robot's picture."""
     return Path(given).with_suffix(".png") if is_file(given) else Path(f"{given}.png")
 
 
@@ -81,7 +81,7 @@ def new_robot(model: Path, out: Path | None, force: bool) -> tuple[Figures, list
 
     Raises:
         BadConfiguration: MuJoCo cannot load the model.
-        StoreError: there is a file already and `force` is not given, or it cannot be written.
+        StoreError: the file exists and `force` is not given, or it cannot be written.
     """
     from robojackson.robot.first_description import first_description, name_of_model
 
@@ -91,12 +91,12 @@ def new_robot(model: Path, out: Path | None, force: bool) -> tuple[Figures, list
     target = out or Path(f"{name}.yaml")
     draft = first_description(model, target.parent, name)
     if target.exists() and not force:
-        raise StoreError(f"{target} is there already; --force overwrites it, -o names another")
+        raise StoreError(f"{target} exists; --force overwrites it, -o names another")
     FileTree(target.parent).write(target.name, draft.text.encode())
     answer, lines = check_robot(str(target), None)
     head = [f"wrote    {target}"]
     if draft.guessed:
-        head.append(f"guessed  {', '.join(draft.guessed)}: no name says them; look at the picture")
+        head.append(f"guessed  {', '.join(draft.guessed)}: not from a name; look at the picture")
     if draft.left:
         head.append(f"left     {', '.join(draft.left)}: comments in the file, fill them in")
     if LEG in draft.left:
@@ -109,7 +109,7 @@ def new_robot(model: Path, out: Path | None, force: bool) -> tuple[Figures, list
 
 
 def _all_of(cause: BadConfiguration) -> list[str]:
-    """Every wrong key and value of a file where the loader names the first."""
+    """Return every wrong key and value of a file, of which the loader names the first."""
     from pydantic import ValidationError
 
     found = [str(cause)]
@@ -123,7 +123,7 @@ def _all_of(cause: BadConfiguration) -> list[str]:
 
 
 def _close(key: str) -> str:
-    """The key of a description that was probably meant."""
+    """Return the key of a description that was probably meant."""
     import difflib
 
     close = difflib.get_close_matches(key, [f.name for f in fields(RobotDescription)], 1)

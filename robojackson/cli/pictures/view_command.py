@@ -1,4 +1,4 @@
-"""The command that opens what a run made, or writes it for other viewers."""
+"""The command that opens the results of a run, or converts them for other viewers."""
 
 import webbrowser
 from enum import StrEnum
@@ -15,7 +15,7 @@ PAGE = "index.html"
 
 
 class View(StrEnum):
-    """What else a run can be written as."""
+    """Other formats of a run."""
 
     GIF = "gif"
     WEBP = "webp"

@@ -1,6 +1,6 @@
-"""The commands about general trackers: `robojackson trackers`, and `add` below it.
+"""The commands about general trackers: `robojackson trackers` with `add`.
 
-Like `robojackson.cli.app`, each imports what it needs inside itself.
+Like `robojackson.cli.app`, each command imports its dependencies in its body.
 """
 
 from pathlib import Path
@@ -11,12 +11,15 @@ import typer
 from robojackson.cli.console import CommandResult, command, log_to_stderr
 from robojackson.cli.options import Json
 
-trackers = typer.Typer(help="Networks that make a robot follow any motion at once: list, add.")
+trackers = typer.Typer(
+    help="List general trackers, which follow any motion without training; add one."
+)
 
 
 @command
 def show_trackers(as_json: Json = False) -> CommandResult:
-    """The trackers of configs/trackers: robot, licence, training motions, whether it is here."""
+    """List the trackers of configs/trackers: robot, licence, training motions, whether
+    installed."""
     from robojackson.cli.trackers import tracker_files
 
     found = tracker_files.list_trackers()
@@ -25,7 +28,7 @@ def show_trackers(as_json: Json = False) -> CommandResult:
 
 @trackers.callback(invoke_without_command=True)
 def listed(context: typer.Context, as_json: Json = False) -> None:
-    """The trackers of configs/trackers; add gets the network of one."""
+    """List the trackers of configs/trackers; add downloads the network of one."""
     if context.invoked_subcommand is None:
         show_trackers(as_json=as_json)
 
@@ -39,17 +42,17 @@ def add(
     ] = None,
     as_json: Json = False,
 ) -> CommandResult:
-    """Download the network of a tracker, check its size and sha256; a cut download goes on."""
+    """Download the network of a tracker, check its size and sha256; resume a cut download."""
     from robojackson.cli import cards
     from robojackson.cli.console import lines
     from robojackson.cli.trackers import tracker_files
 
     log_to_stderr()
-    told = tracker_files.add_tracker(name, file)
+    data = tracker_files.add_tracker(name, file)
     sentence = (
-        f"The network of {name} is here; its licence: {told['licence']}. What its training motions "
-        "allow is another question: docs/trackers.md."
+        f"The network of {name} is installed; its licence: {data['licence']}. What its "
+        "training motions allow is a separate question: docs/trackers.md."
     )
     following = cards.command_line("evaluate", name, "reference.parquet")
     closing = {"verdict": {"kind": "here", "sentence": sentence}, "next": following}
-    return CommandResult(told | closing, text=[*lines(told), *cards.closing(closing)])
+    return CommandResult(data | closing, text=[*lines(data), *cards.closing(closing)])

@@ -1,4 +1,4 @@
-"""Trackers of `configs/trackers`: which there are, and getting the file of one."""
+"""List the trackers of `configs/trackers`, and install the file of one."""
 
 from pathlib import Path
 
@@ -17,12 +17,13 @@ Entry = dict[str, str | bool]
 
 
 def list_trackers() -> list[Entry]:
-    """Every tracker: its robot, its licence, what it was trained on, whether it is here."""
+    """Return every tracker: its robot, its licence, its training motions, whether it is
+    installed."""
     return [_entry(describe_tracker(name)) for name in tracker_names()]
 
 
 def tracker_lines(found: list[Entry]) -> list[str]:
-    """The same for people."""
+    """Return the list of trackers as lines."""
     lines: list[str] = []
     for entry in found:
         name = entry["tracker"]
@@ -35,40 +36,40 @@ def tracker_lines(found: list[Entry]) -> list[str]:
 
 
 def add_tracker(name: str, file: Path | None = None) -> Entry:
-    """Bring the file of a tracker into the store; the pinned one that is there is left alone.
+    """Install the file of a tracker in the store; the expected file is not downloaded again.
 
     Args:
-        file: A copy that is on this machine, instead of the web's.
+        file: A copy on this machine, instead of a download.
 
     Raises:
         UnknownName: there is no such tracker.
-        DownloadFailed: the file cannot be had, or the server gives another.
-        BadPolicy: the copy is not the pinned file.
+        DownloadFailed: the file cannot be downloaded, or the server sends another.
+        BadPolicy: the copy is not the expected file.
         StoreError: the store cannot be written.
     """
     tracker = describe_tracker(name)
     pinned, path = tracker.file, tracker_path(tracker)
-    told = {"tracker": name, "file": str(path or ""), "licence": tracker.licence}
+    entry = {"tracker": name, "file": str(path or ""), "licence": tracker.licence}
     if pinned is None or pinned.url is None or path is None:
         if file is not None:
             raise BadPolicy(f"tracker {name!r} takes no file: it ships; leave out --file")
         open_tracker(tracker)
-        return {**told, "added": False}
+        return {**entry, "added": False}
     if file is not None and not path.is_file():
         _require_pinned(name, pinned, file)
     with in_one_line(f"cannot write {path.parent}"):
         path.parent.mkdir(parents=True, exist_ok=True)
     with locked(path.parent, LOCK, A_MOMENT):
         if path.is_file() and sha256_of_file(path) == pinned.sha256:
-            return {**told, "added": False}
+            return {**entry, "added": False}
         if file is not None:
             _require_pinned(name, pinned, file)
             FileTree(path.parent).write(path.name, file)
         else:
             with in_one_line(f"cannot write {path}"):
                 download(pinned.url, path, pinned.size, pinned.sha256)
-    open_tracker(tracker)  # a file that cannot be run is reported now
-    return {**told, "added": True}
+    open_tracker(tracker)  # report a file that cannot be run now
+    return {**entry, "added": True}
 
 
 def _require_pinned(name: str, pinned: TrackerFile, file: Path) -> None:

@@ -20,10 +20,10 @@ COMMAND = (sys.executable, "-m", "robojackson")
         (["dance", "--trainer", "sbxx"], "'sbxx'"),
         (["dance", "--sed", "3"], "--sed"),
         (["train", "reference.parquet"], "--out"),
-        (["train", "reference.parquet", "-o", "there"], "there is a file; a folder is wanted"),
-        (["mocap", "clip.mp4", "-o", "there/below"], "there is a file; a folder is wanted"),
-        (["mocap", "clip.mp4", "-o", ""], "no folder is named"),
-        (["mocap", "clip.mp4", "-o", 300 * "a"], "no folder can be there: File name too long"),
+        (["train", "reference.parquet", "-o", "there"], "there is a file; expected a folder"),
+        (["mocap", "clip.mp4", "-o", "there/below"], "there is a file; expected a folder"),
+        (["mocap", "clip.mp4", "-o", ""], "the folder's name is empty"),
+        (["mocap", "clip.mp4", "-o", 300 * "a"], "the folder cannot exist: File name too long"),
     ],
 )
 def test_a_wrong_word_is_named_in_one_line(words: list[str], named: str, tmp_path: Path) -> None:

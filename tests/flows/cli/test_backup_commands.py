@@ -86,7 +86,7 @@ def test_a_server_whose_database_is_unknown_is_not_left_out_silently(
 
 REFUSED = {
     "a folder without a backup": (["restore", "empty"], 1, "BackupFailed: .*holds no backup"),
-    "a folder without a name": (["backup", ""], 2, "no folder is named"),
+    "a folder without a name": (["backup", ""], 2, "the folder's name is empty"),
     "a file": (["backup", "file"], 2, "file is a file; name a folder"),
     "no backup to keep": (
         ["backup", "out", "--keep", "0"],
