@@ -1,1 +1,1 @@
-"""What a person looks at: the side-by-side video, the plots and the page."""
+"""Reports for people: the side-by-side video, the plots and the page."""

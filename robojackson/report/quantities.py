@@ -1,4 +1,4 @@
-"""Names, units and meaning of what the page and its plots show."""
+"""Names, units and meaning of the figures on the page and in its plots."""
 
 import math
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ POLICY_TITLES: Mapping[str, tuple[str, str]] = {
     "zero_residual": ("zero residual", "the reference's angles as targets, nothing learnt"),
     "random": ("random", "random corrections to the reference's angles"),
 }
-"""What a policy of the tables is called, and what it does."""
+"""Titles and descriptions of the policies of the tables."""
 
 
 @dataclass(frozen=True)
@@ -22,9 +22,9 @@ class Quantity:
     """One line of a table.
 
     Attributes:
-        label: What it is.
-        value: With its unit, ready to read.
-        meaning: What to make of it, or empty.
+        label: Name of the figure.
+        value: Value with its unit, as text.
+        meaning: Interpretation, or empty.
     """
 
     label: str
@@ -34,7 +34,7 @@ class Quantity:
 
 @dataclass(frozen=True)
 class _Form:
-    """How a figure is written: factor, digits, unit."""
+    """The format of a figure: factor, digits, unit."""
 
     label: str
     unit: str = ""
@@ -71,13 +71,13 @@ _FORMS: Mapping[str, _Form] = {
     "keypoint_p95_mm": _Form("keypoint error, 95th percentile", "mm", 1),
     "bone_deg": _Form("bone direction error", "deg", 1),
     "limit_violations": _Form("joint limit violations", meaning="must be 0"),
-    "nan_count": _Form("values that are no numbers", meaning="must be 0"),
+    "nan_count": _Form("values that are not numbers", meaning="must be 0"),
     "floor_penetration_mm": _Form("floor penetration", "mm", 2, meaning="at most 5"),
     "self_penetration_mm": _Form("self penetration", "mm", 2),
     "planted_slip_cm_s": _Form("slip of planted feet", "cm/s", 2),
     "joint_speed_max_rad_s": _Form("fastest joint", "rad/s", 2),
     "torque_ratio_p95": _Form("torque over limit, 95th percentile", "", 2, meaning="1 is all"),
-    "torque_over_share": _Form("steps that ask too much of a motor", "%", 1, 100.0),
+    "torque_over_share": _Form("steps beyond a motor's torque", "%", 1, 100.0),
     "infeasible_share": _Form("steps that the robot cannot do", "%", 1, 100.0, "at most 10"),
     "fallen_share": _Form("steps that count as a fall", "%", 1, 100.0, "must be 0"),
     "tempo_mean": _Form("tempo beside the clip, mean", "", 2),
@@ -100,13 +100,13 @@ _FLAGS = ("cyclic",)
 
 
 def quantity(key: str, value: Any) -> Quantity:
-    """A figure by its key; one that is not known keeps its key as its label."""
+    """Return a figure by its key; an unknown key is its own label."""
     form = _FORMS.get(key, _Form(key.replace("_", " "), digits=3))
     return Quantity(form.label, format_value(key, value), form.meaning)
 
 
 def format_value(key: str, value: Any) -> str:
-    """A value with its unit; a dash where there is none."""
+    """Return a value with its unit; a dash where there is none."""
     form = _FORMS.get(key, _Form(key, digits=3))
     if key in _FLAGS or isinstance(value, bool):
         return "yes" if value else "no"
@@ -120,7 +120,7 @@ def format_value(key: str, value: Any) -> str:
 
 
 def decimal(value: float, digits: int) -> str:
-    """A number with a real minus sign, and none before a zero."""
+    """Return a number with a real minus sign, and none before a zero."""
     text = f"{value:,.{digits}f}"
     if not text.startswith("-"):
         return text
@@ -128,6 +128,6 @@ def decimal(value: float, digits: int) -> str:
 
 
 def quantities(values: Mapping[str, object], only: tuple[str, ...] = ()) -> list[Quantity]:
-    """A table of figures, in the order of `only` where it is given."""
+    """Return a table of figures, in the order of `only` where it is given."""
     keys = [key for key in only if key in values] if only else list(values)
     return [quantity(key, values[key]) for key in keys]

@@ -69,8 +69,8 @@ const Dance = (() => {
     observe() {
       const { dance, nq, nv, nu } = this, { qpos, qvel, site_xpos: sites } = this.data;
       const { row, moved } = this.at(this.step + 1), aim = row * nq, aimSpeed = row * nv;
-      const own = matrixOf(qpos, 3), wanted = matrixOf(this.qpos, aim + 3), seen = [], put = (...values) => seen.push(...values);
-      const turned = [0, 1].flatMap((k) => local(own, wanted[k], wanted[3 + k], wanted[6 + k]));
+      const own = matrixOf(qpos, 3), target = matrixOf(this.qpos, aim + 3), seen = [], put = (...values) => seen.push(...values);
+      const turned = [0, 1].flatMap((k) => local(own, target[k], target[3 + k], target[6 + k]));
       const gyro = () => { for (let k = 3; k < 6; k++) put(qvel[k] * dance.scales.gyro); };
       const speeds = (values, from) => { for (let k = 6; k < nv; k++) put(values[from + k] * dance.scales.hinge); };
       const done = () => { for (let k = 0; k < nu; k++) put(this.last[k] * 0.5); };
@@ -162,7 +162,7 @@ const Dance = (() => {
 
     #measure() {
       const { fall } = this.dance, { qpos, site_xpos: sites } = this.data, aim = this.state(this.step).qpos;
-      const up = matrixOf(qpos, 3), wanted = matrixOf(aim, 3), along = up[2] * wanted[2] + up[5] * wanted[5] + up[8] * wanted[8];
+      const up = matrixOf(qpos, 3), target = matrixOf(aim, 3), along = up[2] * target[2] + up[5] * target[5] + up[8] * target[8];
       const low = fall.relative ? Math.abs(qpos[2] - aim[2]) > fall.height : qpos[2] < fall.height;
       this.fallen ||= low || (fall.relative ? along : up[8]) < fall.cosTilt || !Number.isFinite(qpos[2]);
       const { row, moved } = this.at(this.step);

@@ -1,4 +1,4 @@
-"""What an evaluation says, ready to read: one sentence, tiles and rows of tables."""
+"""Texts of an evaluation: one sentence, tiles and rows of tables."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,16 +10,16 @@ from robojackson.rl.config.evaluate_config import TRAINED
 from robojackson.rl.evaluation.verdict import NEEDS_FULL_LENGTH
 
 Evaluation = Mapping[str, Any]
-"""An evaluation as its JSON has it."""
+"""The content of evaluation.json."""
 
 VERDICT_COLUMNS = (
     "survived_s", "success", "strict_success", "skill", "site_error_m", "limb_gain", "drift_m",
     "heading_error_deg",
 )  # fmt: skip
 NOT_TRAINED = "follows any motion, not trained on this one"
-"""What a tracker does."""
+"""Description of a tracker."""
 TOO_SHORT = "too short"
-"""In place of a figure that rollouts are too short to judge."""
+"""In place of a figure where rollouts are too short to evaluate."""
 
 
 @dataclass(frozen=True)
@@ -33,37 +33,38 @@ class Verdict:
 
 
 def dancer_of(evaluation: Evaluation) -> str:
-    """Return who dances: the trained robot, or a tracker by its name."""
+    """Return the dancer's title: the trained robot, or a tracker by its name."""
     name = evaluation.get("tracker")
     return POLICY_TITLES[TRAINED][0] if name is None else f"tracker {name}"
 
 
 def headline(evaluation: Evaluation) -> str:
-    """Return one sentence that says how well it went, beside the best of the baselines."""
+    """Return one sentence about the result, beside the best of the baselines."""
     if not evaluation:
         return ""
-    said = str(evaluation.get("verdict", {}).get("sentence", ""))
+    text = str(evaluation.get("verdict", {}).get("sentence", ""))
     if evaluation.get("success") is None:
-        return said
-    said += " " if said else ""
-    said += (
+        return text
+    text += " " if text else ""
+    text += (
         f"The {dancer_of(evaluation)} finished {format_value('success', evaluation['success'])} of "
         f"{format_value('rollouts', evaluation['rollouts'])} rollouts without a fall"
     )
     baselines = evaluation.get("baselines", {})
     if not baselines:
-        return f"{said}."
+        return f"{text}."
     name = max(baselines, key=lambda key: baselines[key]["success"])
     best = POLICY_TITLES.get(name, (name, ""))[0]
     theirs, ours = baselines[name]["success"], evaluation["success"]
     if theirs < ours:
-        return f"{said}; the best baseline ({best}) {format_value('success', theirs)}."
+        return f"{text}; the best baseline ({best}) {format_value('success', theirs)}."
     how = "as well" if theirs == ours else "better"
     figure = format_value("success", theirs)
-    return f"{said}; a baseline that learnt nothing ({best}) does {how}: {figure}."
+    return f"{text}; a baseline that learnt nothing ({best}) does {how}: {figure}."
 
 
 def tiles(evaluation: Evaluation) -> list[Quantity]:
+    """Return the headline figures of an evaluation."""
     meanings = {
         "success": "no fall in a whole rollout",
         "survived_s": "mean time before a fall",
@@ -79,7 +80,7 @@ def tiles(evaluation: Evaluation) -> list[Quantity]:
 
 
 def verdicts(evaluation: Evaluation) -> list[Verdict]:
-    """Return the figures of the trained policy and of its baselines, ready to read."""
+    """Return the figures of the trained policy and of its baselines, formatted."""
     if not evaluation:
         return []
     trackers = evaluation.get("trackers", {})
@@ -104,7 +105,7 @@ PASSPORT_COLUMNS = ("strict_success", "skill", "survived_s", "kept")
 
 
 def passport_rows(evaluation: Evaluation) -> list[Verdict]:
-    """Return the figures of the policy under other physics, ready to read."""
+    """Return the figures of the policy under other physics, formatted."""
     return [
         Verdict(
             row["case"], "", [format_value(key, row[key]) for key in PASSPORT_COLUMNS], index == 0
@@ -114,7 +115,7 @@ def passport_rows(evaluation: Evaluation) -> list[Verdict]:
 
 
 def beat_rows(report: Evaluation) -> list[Verdict]:
-    """Return how motions meet the music (`beat_report`), ready to read."""
+    """Return how motions meet the music (`beat_report`), formatted."""
     return [
         Verdict(
             TITLES[name],

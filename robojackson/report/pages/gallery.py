@@ -15,7 +15,7 @@ SORTS = {
     "skill": "skill",
     "limbGain": "limb gain",
 }
-"""Orders by their names in the page, largest first."""
+"""Sort orders by their names on the page, largest first."""
 ORDERED = ("strict_success", "survived_s", "skill", "limb_gain")
 
 
@@ -24,8 +24,8 @@ class GalleryRun:
     """A dance.
 
     Attributes:
-        dance, robot, setup, seed: What danced what.
-        finished_at: When.
+        dance, robot, setup, seed: Names and numbers of the run.
+        finished_at: Time of its end.
         summary: Figures of the evaluation.
         page, live: Addresses relative to the gallery, or empty.
         thumbnail: JPEG as base64, or empty.
@@ -43,19 +43,19 @@ class GalleryRun:
 
     @property
     def figures(self) -> list[Quantity]:
-        """The figures that are shown."""
+        """Return the figures that are shown."""
         found = {key: self.summary[key] for key in SHOWN if self.summary.get(key) is not None}
         return quantities(found)
 
     @property
     def order(self) -> dict[str, float]:
-        """What entries are sorted by."""
+        """Return the sort keys."""
         found = {key: _number(self.summary.get(key)) for key in ORDERED}
         return {"finished": self.finished_at.timestamp(), **found}
 
 
 def render_gallery(runs: Sequence[GalleryRun]) -> str:
-    """Return the gallery as HTML, one file with everything but the pages that it leads to."""
+    """Return the gallery as HTML, one file with everything except the linked pages."""
     styles, scripts = [inline.own("page.css")], [inline.own("gallery.js")]
     filters = {
         key: sorted({str(getattr(r, key)) for r in runs}) for key in ("dance", "robot", "setup")

@@ -13,34 +13,34 @@ import jinja2
 from markupsafe import Markup
 
 CONTROLS = {"LRE", "RLE", "LRO", "RLO", "PDF", "LRI", "RLI", "FSI", "PDI"}
-"""Bidirectional classes of characters that turn the order of the text around them."""
+"""Bidirectional classes of characters that reverse the order of the text around them."""
 PLAIN = "\t\n\r"
 
 
 @cache
 def asset(name: str) -> str:
-    """A text of `robojackson/assets`."""
+    """Return a text of `robojackson/assets`."""
     return (resources.files("robojackson") / "assets" / name).read_text("utf-8")
 
 
 @cache
 def compressed_asset(name: str) -> str:
-    """A file of `robojackson/assets` as base64."""
+    """Return a file of `robojackson/assets` as base64."""
     content = (resources.files("robojackson") / "assets" / name).read_bytes()
     return base64.b64encode(content).decode()
 
 
 @cache
 def own(name: str) -> str:
-    """A script, style or template of this package."""
+    """Return a script, style or template of this package."""
     return (resources.files("robojackson.report.pages") / name).read_text("utf-8")
 
 
 def policy(scripts: Sequence[str], styles: Sequence[str], wasm: bool = False) -> str:
-    """The content security policy of a page that has these and nothing else.
+    """Return the content security policy of a page with exactly these scripts and styles.
 
     Args:
-        wasm: Whether it compiles WebAssembly.
+        wasm: Whether the page compiles WebAssembly.
     """
     allowed = [_digest(script) for script in scripts] + (["'wasm-unsafe-eval'"] if wasm else [])
     return "; ".join(
@@ -57,25 +57,25 @@ def policy(scripts: Sequence[str], styles: Sequence[str], wasm: bool = False) ->
 
 
 def json_text(data: Mapping[str, object]) -> Markup:
-    """JSON that stands inside a script element."""
+    """Return JSON for the inside of a script element."""
     text = json.dumps(data, separators=(",", ":"), allow_nan=False)
     return Markup(text.replace("<", "\\u003c"))
 
 
 def zipped(content: bytes) -> str:
-    """gzip as base64; a browser's DecompressionStream opens it."""
+    """Return gzip as base64; a browser's DecompressionStream opens it."""
     return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()
 
 
 def visible(value: object) -> object:
-    """A text whose invisible and turning characters are written out."""
+    """Return a text with its invisible and bidirectional characters written out."""
     if isinstance(value, Markup) or not isinstance(value, str):
         return value
     return "".join(f"\\u{ord(c):04x}" if _is_hidden(c) else c for c in value)
 
 
 def render(template: str, styles: Sequence[str], scripts: Sequence[str], **values: object) -> str:
-    """A page from a template of this package; every value is escaped.
+    """Return a page from a template of this package; every value is escaped.
 
     Args:
         styles, scripts: Texts inside the page.

@@ -9,15 +9,15 @@ from robojackson.report.web.shown_run import RecordedRun
 SCRIPTS = ("scene.js", "dance.js", "live.js")
 STYLES = ("page.css",)
 TOLERANCE_MM = 5.0
-"""By how much a body may be elsewhere than in Python after a recorded start."""
+"""Largest difference of a body's position from Python's after a recorded start."""
 CHECKED = 4
-"""Recorded starts that a browser checks by itself as it opens the page."""
+"""Number of recorded starts that a browser checks when it opens the page."""
 PULL = 6.0
-"""Stiffness of the pointer's pull, 1/s^2: newtons a metre and kilogram."""
+"""Stiffness of the pointer's pull, 1/s^2: newtons per metre and kilogram."""
 STRONGEST = 5.0
-"""Its largest acceleration of the whole robot, m/s^2."""
+"""Largest acceleration of the whole robot by the pointer, m/s^2."""
 ROOM = 1.35
-"""Height and width of the pane beside what the dance takes."""
+"""Margin of the pane around the dance, height and width."""
 
 
 def live_page(run: RecordedRun, title: str) -> str | None:

@@ -71,8 +71,8 @@
   }
 
   const go = (picture) => {
-    const wanted = Math.min(count - 1, Math.max(0, picture));
-    video.currentTime = (wanted + 0.5) / fps;
+    const target = Math.min(count - 1, Math.max(0, picture));
+    video.currentTime = (target + 0.5) / fps;
   };
   const step = (by) => { video.pause(); go(state.picture + by); };
   const toggle = () => (video.paused ? video.play() : video.pause());

@@ -1,4 +1,4 @@
-"""From the results of the stages to the content of the page: figures, plots and versions."""
+"""Content of the page from the results of the stages: figures, plots and versions."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -36,26 +36,26 @@ LIMBS = {
 
 @dataclass(frozen=True)
 class Results:
-    """What a run made.
+    """The results of a run.
 
     Attributes:
-        title: Of the dance.
-        info: Of the source clip.
-        stability: Of the source clip, or None.
+        title: Title of the dance.
+        info: Facts of the source clip.
+        stability: Stability of the source clip, or None.
         sequence: The recovered person.
         reference: The reference motion.
-        training: trainer, seed, steps, updates, training_s, setup: what is known.
+        training: trainer, seed, steps, updates, training_s, setup, as far as known.
         episodes: Rows of EpisodeRecord.
-        evaluation: Summary of the evaluation, its baselines inside.
+        evaluation: Summary of the evaluation, including its baselines.
         evaluations: Rows of EvaluationRecord.
-        advice: What to do better when the clip is filmed again.
+        advice: Advice for filming the clip again.
         tracker_video: Name of the film of a tracker beside a trained robot, or None.
-        player: Of the page, or None.
-        film, has_sound: Its source pane (mp4), and whether that is not silent.
+        player: Player of the page, or None.
+        film, has_sound: Its source pane (mp4), and whether it has audible sound.
         live: Name of the live dance, or None.
         candidates: Clips that were scored.
-        beats: How the motions meet the music.
-        provenance: Digests of what was made, by name.
+        beats: Beats of motions and music.
+        provenance: Digests of the results, by name.
         settings: The configuration, as YAML.
     """
 
@@ -81,7 +81,7 @@ class Results:
 
 
 def page_content(results: Results, video: str | None) -> PageContent:
-    """The page of a run; `video` is the mp4's address relative to the page."""
+    """Return the page of a run; `video` is the mp4's address relative to the page."""
     return PageContent(
         title=results.title,
         source=_source(results.info),
@@ -109,7 +109,8 @@ def page_content(results: Results, video: str | None) -> PageContent:
 
 
 def limb_rows(results: Results) -> list[Verdict]:
-    """Figures of head, hands and feet: capture, retargeting, the rollout shown, the evaluation."""
+    """Return figures of head, hands and feet: capture, retargeting, the rollout shown, the
+    evaluation."""
     errors = results.player.error_m if results.player else {}
     directions = limb_directions(results.sequence, results.reference)
     rows = []
@@ -127,7 +128,7 @@ def limb_rows(results: Results) -> list[Verdict]:
 
 
 def limb_directions(sequence: SmplSequence, reference: ReferenceMotion) -> dict[str, float]:
-    """Mean angle between the limbs of the reference robot and of the dancer, degrees."""
+    """Return the mean angle between the limbs of the reference robot and of the dancer, degrees."""
     times = np.asarray(reference.source_time_s)
     frames = np.clip(np.round(times * sequence.fps).astype(int), 0, len(sequence) - 1)
     names, found = list(reference.keypoint_names), {}
@@ -146,7 +147,7 @@ def limb_directions(sequence: SmplSequence, reference: ReferenceMotion) -> dict[
 
 
 def versions(programs: Sequence[str] = PROGRAMS) -> dict[str, str]:
-    """Installed versions; a program that is not installed is left out."""
+    """Return installed versions; a program that is not installed is left out."""
     found = {}
     for name in programs:
         try:
@@ -200,11 +201,11 @@ def _plots(results: Results) -> list[Plot]:
 
 
 def _dynamics(reference: ReferenceMotion) -> list[Plot]:
-    """What the motion asks of the robot's motors and feet."""
+    """Plot the torques and forces that the motion needs."""
     made = []
     if reference.certificate is not None:
         caption = (
-            "What neither the feet's pushes nor the motors can give, in tolerances: feasible up to "
+            "Force that neither feet nor motors can supply, in tolerances: feasible up to "
             "the dashed line. Below, the tempo beside the clip."
         )
         findings = reference.certificate.findings
@@ -213,7 +214,7 @@ def _dynamics(reference: ReferenceMotion) -> list[Plot]:
         made.append(_plot("Can the robot do it?", caption, feasibility_strip(reference)))
     if reference.torque_ratio.shape[1] == len(reference.joint_names):
         figure = run_plots.torque_heat_map(reference, reference.joint_names)
-        made.append(_plot("Torques", "What each motor has to give, over its limit.", figure))
+        made.append(_plot("Torques", "Required torque of each motor, over its limit.", figure))
     return made
 
 

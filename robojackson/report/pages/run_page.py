@@ -1,8 +1,8 @@
-"""One HTML page about one run: offline, light or dark as the reader's system is.
+"""One HTML page about one run: offline, light or dark like the reader's system.
 
-The page needs nothing but itself: player, motions, source clip and plots are inside; its content
-security policy lets nothing else in. Everything that comes from a file's name or a user is escaped
-by the template engine.
+The page is self-contained: player, motions, source clip and plots are inside; its content security
+policy blocks everything else. Everything from a file's name or a user is escaped by the template
+engine.
 """
 
 import base64
@@ -38,12 +38,12 @@ SCORECARD_LINES = (
 
 @dataclass(frozen=True)
 class Plot:
-    """A picture with what it shows.
+    """A picture with a title and a caption.
 
     Attributes:
-        title: Short.
+        title: Short title.
         caption: One sentence on how to read it.
-        png: The picture.
+        png: The picture as PNG.
     """
 
     title: str
@@ -53,29 +53,29 @@ class Plot:
 
 @dataclass(frozen=True)
 class PageContent:
-    """What the page shows; every mapping may be empty, and its section is then left out.
+    """The content of the page; every mapping may be empty, and its section is then left out.
 
     Attributes:
-        title: Of the dance.
+        title: Title of the dance.
         source: Name of the file, width, height, frames, fps, duration_s.
         stability: Fields of `Stability`.
         mocap: Figures of the recovered motion.
-        scorecard: Of the reference motion.
+        scorecard: Score card of the reference motion.
         training: trainer, steps, updates, training_s, seed, ...
-        evaluation: Summary of `Evaluation`, its `baselines` inside.
+        evaluation: Summary of `Evaluation`, including its `baselines`.
         video: Address of the mp4 relative to the page, or None.
-        tracker_video: The same of a tracker's dance beside a trained one.
-        plots: In the order they are shown.
-        versions: Of programs and models.
+        tracker_video: Address of a tracker's dance beside a trained one, or None.
+        plots: Plots in the order of the page.
+        versions: Versions of programs and models.
         notes: Warnings for the reader.
-        advice: What to do better when the clip is filmed again.
+        advice: Advice for filming the clip again.
         player: The four panes, their curves and the rows of their timeline.
         film: mp4 of the source pane, at the moments of the player.
-        has_sound: Whether that has sound.
+        has_sound: Whether the film has sound.
         live: Address of the live dance relative to the page, or None.
         candidates: Clips that were scored.
-        limbs, beats: Rows of figures by limb, and of how motions meet the music.
-        provenance: Digests of what the run made.
+        limbs, beats: Rows of figures by limb, and of beats of motions and music.
+        provenance: Digests of the results.
         settings: The configuration, as YAML.
     """
 
@@ -108,8 +108,8 @@ class PageCandidate:
     """A clip that was scored.
 
     Attributes:
-        name: Of the file.
-        reason: Why it was chosen, or not.
+        name: Name of the file.
+        reason: Reason for or against its choice.
         chosen: Whether it is danced.
         thumbnail: JPEG as base64, or empty.
     """
@@ -122,7 +122,7 @@ class PageCandidate:
 
 @dataclass(frozen=True)
 class _Bar:
-    """A gated figure beside its bar; `share` is how much of the bar it takes, per cent."""
+    """A gated figure beside its bar; `share` is the filled part of the bar, per cent."""
 
     label: str
     value: str
@@ -143,7 +143,7 @@ SCRIPTS = ("scene.js", "page.js")
 
 
 def render(content: PageContent) -> str:
-    """The page as HTML."""
+    """Return the page as HTML."""
     player, styles, scripts = content.player, [inline.own("page.css")], []
     if player is not None:
         styles.append(inline.asset("uplot.min.css"))
@@ -176,7 +176,7 @@ def render(content: PageContent) -> str:
 
 
 def _player_values(content: PageContent) -> dict[str, object]:
-    """What the template shows of the player."""
+    """Return the template's values of the player."""
     player = content.player
     data = {} if player is None else player.data
     film = base64.b64encode(content.film).decode()
@@ -194,7 +194,7 @@ def _player_values(content: PageContent) -> dict[str, object]:
 
 
 def _bars(scorecard: Mapping[str, Any]) -> list[_Bar]:
-    """The gated figures of the score card with their bars; a broken bar of 0 is full."""
+    """Return the gated figures of the score card with their bars; a broken bar of 0 is full."""
     bars = []
     for key, bar in BARS.items():
         value = scorecard.get(key)

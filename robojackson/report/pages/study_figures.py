@@ -10,7 +10,7 @@ from robojackson.report.pages.study_page import FIGURES
 from robojackson.report.pages.study_table import BySeed
 
 SeedCurves = Mapping[tuple[str, str], Mapping[int, Mapping[str, np.ndarray]]]
-"""By (move, setup) and seed: `episode_return` and `episode_length` of each interval."""
+"""`episode_return` and `episode_length` of each interval, by (move, setup) and seed."""
 
 
 def curve_plots(
@@ -22,7 +22,7 @@ def curve_plots(
     """Draw the learning curves of each move that has any.
 
     Args:
-        grids: By move, ends of the intervals of its curves, control steps.
+        grids: Ends of the intervals of a move's curves, control steps.
     """
     from robojackson.report.plots.run_plots import png  # matplotlib: only when something is drawn
     from robojackson.report.plots.study_plots import Curves, learning_curves
@@ -40,8 +40,10 @@ def curve_plots(
             if (move, setup) in curves
         }
         if drawn:
-            told = "Training episodes: return, bonuses in, and length. Mean and range over seeds."
-            made.append(Plot(f"Learning {move}", told, png(learning_curves(drawn))))
+            caption = (
+                "Training episodes: return with bonuses, and length. Mean and range over seeds."
+            )
+            made.append(Plot(f"Learning {move}", caption, png(learning_curves(drawn))))
     return made
 
 
@@ -51,7 +53,7 @@ def evaluation_plots(
     moves: Sequence[str],
     setups: Sequence[str],
 ) -> list[Plot]:
-    """Draw the figures that any seed has a value of.
+    """Draw the figures for which any seed has a value.
 
     Args:
         figures: Values of the seeds, by name of the figure.
@@ -72,6 +74,6 @@ def evaluation_plots(
         }
         if any(values for found in by_move.values() for values in found.values()):
             title, _, _ = FIGURES[name]
-            told = "A dot a seed, the bar their mean; lines are policies that learnt nothing."
-            made.append(Plot(title, told, png(evaluation_plot(by_move, lines, title))))
+            caption = "A dot a seed, the bar their mean; lines are policies that learnt nothing."
+            made.append(Plot(title, caption, png(evaluation_plot(by_move, lines, title))))
     return made

@@ -1,8 +1,8 @@
-"""The page of a study: what the paper claims, Table II in numbers, curves, and what it all means.
+"""The page of a study: the paper's claims, Table II in numbers, curves, and conclusions.
 
-Table II of the paper has adjectives; here each is a mean over seeds with its 95 % interval. Beside
-the return with all bonuses in, as the paper shows it, stands what every policy is worth under one
-yardstick: curiosity off, lambda fixed, stock physics.
+Table II of the paper has adjectives; here each is a mean over seeds with its 95 % interval. The
+page shows the return with all bonuses, like the paper, and the value of every policy by one
+measure: curiosity off, lambda fixed, stock physics.
 """
 
 import base64
@@ -19,7 +19,7 @@ from robojackson.report.pages.inline import render as from_template
 from robojackson.report.pages.run_page import Plot
 
 FIGURES: Mapping[str, tuple[str, int, float]] = {
-    "final_return": ("return at the end, bonuses in", 1, 1.0),
+    "final_return": ("return at the end, with bonuses", 1, 1.0),
     "area": ("mean return while learning", 1, 1.0),
     "steps_to": ("steps to the threshold", 0, 1.0),
     "return_own": ("return by the yardstick", 1, 1.0),
@@ -36,10 +36,11 @@ BODIES = {
     "flail": "flailing body",
     "zero_residual": "zero residual",
 }
-"""Who does not dance, by the names of `robojackson.rl.evaluation.reward_audit`."""
+"""Titles of the bodies that do not dance, by the names of
+`robojackson.rl.evaluation.reward_audit`."""
 
 RewardAudits = Mapping[str, Mapping[str, float]]
-"""By setup: the share of a perfect dance's reward that each body earns, by its name."""
+"""Shares of a perfect dance's reward that each body earns, by setup and body."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ class Line:
 
     Attributes:
         move, setup: What was trained, or the name of a baseline.
-        seeds: How many.
+        seeds: Number of seeds.
         values: Estimates by name of the figure.
         baseline: Whether nothing was learnt.
     """
@@ -62,18 +63,18 @@ class Line:
 
 @dataclass(frozen=True)
 class StudyContent:
-    """What the page shows.
+    """The content of the page.
 
     Attributes:
-        title: Of the study.
-        facts: How it was done, by name.
-        claims: What the paper says, and what was found.
+        title: Title of the study.
+        facts: Method of the study, by name.
+        claims: Claims of the paper, with our findings.
         lines: The table.
         comparisons: The yardstick's differences between setups, move by move.
-        reward_audits: What the rewards pay to bodies that do not dance, by move.
-        moves: For each move a picture: frame, recovered body, robot (Figures 2-4).
+        reward_audits: Rewards of bodies that do not dance, by move.
+        moves: A picture of each move: frame, recovered body, robot (Figures 2-4).
         curves: Learning curves (Figures 5-13).
-        evaluation_plots: Pictures of the judgement.
+        evaluation_plots: Plots of the evaluation.
         notes: Warnings for the reader.
     """
 
@@ -90,7 +91,7 @@ class StudyContent:
 
 
 def render(content: StudyContent) -> str:
-    """The page as HTML, one file with everything in it."""
+    """Return the page as HTML, one file with everything in it."""
     compared, styles = content.comparisons, [own("page.css")]
     return from_template(
         "study.html",
@@ -114,13 +115,14 @@ def render(content: StudyContent) -> str:
         groups=[
             ("The moves", _encoded(content.moves)),
             ("While learning", _encoded(content.curves)),
-            ("Judged alike", _encoded(content.evaluation_plots)),
+            ("Evaluated alike", _encoded(content.evaluation_plots)),
         ],
     )
 
 
 def cell(value: Estimate | None, key: str, seeds: int) -> tuple[str, list[str]]:
-    """A mean, a dash where there is none; its interval, and of how many seeds if not of all."""
+    """Return a mean, a dash where there is none; its interval, and the number of seeds if not
+    all."""
     if value is None or math.isnan(value.mean):
         return "–", []
     _, digits, factor = FIGURES[key]
@@ -135,7 +137,7 @@ def cell(value: Estimate | None, key: str, seeds: int) -> tuple[str, list[str]]:
 
 
 def sentence(claim: Claim) -> str:
-    """What was found of a claim, in words and numbers."""
+    """Return the finding on a claim, in words and numbers."""
     if claim.effect is None:
         return f"Not measured here: {claim.treated} or {claim.control} was not trained."
     found = claim.effect.difference
@@ -144,30 +146,30 @@ def sentence(claim: Claim) -> str:
         "reversed": "The opposite holds here",
         "not shown": "Not shown here",
     }[claim.verdict]
-    told = f"{how}: {claim.treated} minus {claim.control} is {found.mean:+.3g}"
+    text = f"{how}: {claim.treated} minus {claim.control} is {found.mean:+.3g}"
     if math.isfinite(found.low):
-        told += f" [{found.low:+.3g}, {found.high:+.3g}]"
-    told += f" over {found.count} paired seed{'s' if found.count != 1 else ''}"
+        text += f" [{found.low:+.3g}, {found.high:+.3g}]"
+    text += f" over {found.count} paired seed{'s' if found.count != 1 else ''}"
     if math.isfinite(claim.effect.p):
         least = claim.effect.smallest_p
-        told += f", p = {claim.effect.p:.2g} (no smaller than {least:.2g} with so few)"
-    return f"{told}; {100 * claim.effect.improvement:.0f} % chance that one run of it is better."
+        text += f", p = {claim.effect.p:.2g} (no smaller than {least:.2g} with so few)"
+    return f"{text}; {100 * claim.effect.improvement:.0f} % chance that one run of it is better."
 
 
 def _by_reward(paid: RewardAudits) -> list[tuple[str, list[str]]]:
-    """Setups of one reward together, and its shares in per cent."""
-    told = {setup: [f"{100 * of[body]:.0f}" for body in BODIES] for setup, of in paid.items()}
-    rewards = dict.fromkeys(map(tuple, told.values()))
-    return [(", ".join(s for s in told if tuple(told[s]) == r), list(r)) for r in rewards]
+    """Return setups of one reward together, with its shares in per cent."""
+    shares = {setup: [f"{100 * of[body]:.0f}" for body in BODIES] for setup, of in paid.items()}
+    rewards = dict.fromkeys(map(tuple, shares.values()))
+    return [(", ".join(s for s in shares if tuple(shares[s]) == r), list(r)) for r in rewards]
 
 
 def _difference(found: Effect | None) -> str:
     if found is None:
         return "–"
-    told = f"{found.difference.mean:+,.1f}"
+    text = f"{found.difference.mean:+,.1f}"
     if math.isfinite(found.difference.low):
-        told += f" [{found.difference.low:+,.1f}, {found.difference.high:+,.1f}]"
-    return told
+        text += f" [{found.difference.low:+,.1f}, {found.difference.high:+,.1f}]"
+    return text
 
 
 def _encoded(plots: Sequence[Plot]) -> list[tuple[Plot, str]]:

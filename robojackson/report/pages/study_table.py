@@ -10,7 +10,7 @@ from robojackson.metrics.seed_statistics import Estimate, estimate
 from robojackson.report.pages.study_page import FIGURES, Line
 
 BySeed = Mapping[tuple[str, str], Mapping[int, float]]
-"""By (move, setup): the value of each seed."""
+"""The value of each seed, by (move, setup)."""
 
 
 def table(
@@ -24,9 +24,9 @@ def table(
 
     Args:
         figures: Values of the seeds, by name of the figure.
-        baselines: By move, policy and name of the figure.
-        moves, setups: Of the study, in the order of the lines.
-        rng: Of the bootstrap.
+        baselines: Values by move, policy and name of the figure.
+        moves, setups: Names in the order of the lines.
+        rng: Random numbers of the bootstrap.
     """
     lines = []
     for move in moves:

@@ -1,4 +1,4 @@
-"""The feasibility strip: which steps of a reference motion the robot can do, and at what tempo."""
+"""The feasibility strip: the steps of a reference motion that the robot can do, and the tempo."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -9,11 +9,11 @@ from robojackson.report.plots.run_plots import ACCENT, GOOD, INK, SECOND, figure
 
 BAD = "#b3123a"
 SHOWN_SLACK = 3.0
-"""Slack beyond this has the height of this, tolerances."""
+"""Largest slack that is drawn, tolerances."""
 
 
 def feasibility_strip(reference: ReferenceMotion) -> Figure:
-    """Slack of every step, coloured by what would mend it, over the tempo beside the clip.
+    """Draw the slack of every step, coloured by its remedy, above the tempo beside the clip.
 
     Raises:
         ValueError: the motion has no certificate.

@@ -1,6 +1,6 @@
 """A picture of a robot description: the robot at rest from front and side, and its joint ranges.
 
-Keypoints and contact balls are named beside it, with lines to where they are; degrees, metres.
+Keypoints and contact balls are labelled beside it, with lines to their places; degrees, metres.
 """
 
 from dataclasses import dataclass
@@ -20,15 +20,15 @@ from robojackson.report.video.robot_panel import REFERENCE_TINT, RobotView
 from robojackson.robot.model import Robot
 
 PIXELS = 1800
-"""Sides of what is drawn before it is cut."""
+"""Width and height of a rendering before it is cropped, pixels."""
 MARGIN = 0.08
-"""Of a robot's height, left around it."""
+"""Margin around the robot, share of its height."""
 BALL = (0.25, 0.75, 0.4)
 GROUND = "#16181d"
 VIEWS = (("front", 0.0), ("left side", 90.0))
 ROW_INCHES, LEAST_INCHES = 0.16, 5.4
 BESIDE = 0.36
-"""Room for the names on each side, of the robot's height."""
+"""Room for the names on each side, share of the robot's height."""
 RANGE_MARGIN = 0.04
 
 
@@ -37,8 +37,8 @@ class Standing:
     """A robot in its rest pose with its soles on the floor.
 
     Attributes:
-        qpos: Of it.
-        keypoints, balls: World, metres.
+        qpos: Pose of the robot.
+        keypoints, balls: Positions, world, metres.
         low, high: Corners of the box around it, world, metres.
     """
 
@@ -50,7 +50,7 @@ class Standing:
 
 
 def standing(robot: Robot) -> Standing:
-    """Put a robot on the floor."""
+    """Return a robot in its rest pose with its soles on the floor."""
     model, data = robot.model, mujoco.MjData(robot.model)
     data.qpos[:] = robot.standing
     data.qpos[:2] = 0.0
@@ -92,7 +92,7 @@ def robot_sheet(robot: Robot) -> Figure:
 def _panel(
     axes: Axes, robot: Robot, pose: Standing, picture: Picture, at: np.ndarray, azimuth: float
 ) -> None:
-    """A view, cut around the robot, with names in two columns beside it."""
+    """Draw a view, cropped around the robot, with names in two columns beside it."""
     camera = view_of(at, azimuth, PIXELS, PIXELS)
     ends = np.array(np.meshgrid(*zip(pose.low, pose.high, strict=True))).reshape(3, -1).T
     box = camera.project(ends)
@@ -131,7 +131,8 @@ def _names(
     span: tuple[float, float],
     is_left: bool,
 ) -> None:
-    """Names in a column in the order of height, evenly apart, each with a line to its place."""
+    """Draw names in a column in the order of height, evenly apart, each with a line to its
+    place."""
     ordered = sorted(marks, key=lambda mark: (float(mark[1][1]), mark[0]))
     heights = _spread([float(mark[1][1]) for mark in ordered], span)
     for (name, at, is_ball), y in zip(ordered, heights, strict=True):
@@ -144,7 +145,7 @@ def _names(
 
 
 def _spread(preferred: list[float], span: tuple[float, float]) -> list[float]:
-    """Heights as near to the preferred as they can be without two names on one another."""
+    """Return heights as near as possible to the preferred ones, without overlapping names."""
     low, high = span
     gap = min((high - low) / max(len(preferred), 1), (high - low) / 24)
     found: list[float] = []

@@ -1,7 +1,7 @@
 """Plots of one run: training, evaluation, contacts, torques and tracking, as matplotlib figures.
 
-Colours and texts are readable on white and on black: the page shows them on either. Rows are
-dictionaries with the columns of EpisodeRecord and EvaluationRecord (`pipeline.table_schemas`).
+Colours and texts are readable on white and on black: the page is either. Rows are dictionaries with
+the columns of EpisodeRecord and EvaluationRecord (`pipeline.table_schemas`).
 """
 
 import io
@@ -29,14 +29,15 @@ BASELINE_COLOURS = {
 }  # fmt: skip
 BINS = 60
 TORQUE_SHOWN = 2.0
-"""Torques beyond this many limits have the colour of this many."""
+"""Largest torque of the colour scale, as a multiple of the limit."""
 TORQUE_COLOURS = ((0.0, "#8080801a"), (0.5, ACCENT), (0.5, SECOND), (1.0, "#b3123a"))
 STATE_COLOURS = {0: (0.5, 0.5, 0.5, 0.15), 1: (0.25, 0.68, 0.42, 0.95), 2: (0.96, 0.62, 0.26, 0.95)}
-"""Air, planted, sliding."""
+"""Colours of contact states: air, planted, sliding."""
 
 
 def training_curve(episodes: Sequence[Row], dt: float) -> Figure:
-    """Length and return of the training episodes against control steps: median and quartiles."""
+    """Plot length and return of the training episodes against control steps: median and
+    quartiles."""
     figure, (top, bottom) = figure_of(7.0, 4.2, rows=2, sharex=True)
     steps = np.array([row["step"] for row in episodes], float)
     lengths = np.array([row["episode_length"] for row in episodes], float) * dt
@@ -53,8 +54,8 @@ def training_curve(episodes: Sequence[Row], dt: float) -> Figure:
 def survival_by_phase(
     rows: Sequence[Row], dt: float, dancer: str = POLICY_TITLES[TRAINED][0]
 ) -> Figure:
-    """Mean survival from each start phase: the dancer as bars, under another law of its
-    torque as a dashed line, its baselines as lines.
+    """Plot the mean survival from each start phase: the dancer as bars, under another control law
+    as a dashed line, its baselines as lines.
     """
     figure, (axes,) = figure_of(7.0, 2.8)
     for policy in dict.fromkeys(str(row["policy"]) for row in rows):
@@ -79,7 +80,7 @@ def survival_by_phase(
 
 
 def limb_gains(summary: Mapping[str, Any]) -> Figure:
-    """How far each limb end moves beside its reference; 1 is the whole amplitude."""
+    """Plot the velocity gain of each limb end beside its reference; 1 is the whole amplitude."""
     figure, (axes,) = figure_of(7.0, 2.4)
     prefix = "limb_gain_"
     gains = {k.removeprefix(prefix): float(v) for k, v in summary.items() if k.startswith(prefix)}
@@ -98,9 +99,10 @@ def limb_gains(summary: Mapping[str, Any]) -> Figure:
 
 
 def contact_strip(sequence: SmplSequence, reference: ReferenceMotion) -> Figure:
-    """When the person's heels and toes, and the robot's feet, stand, slide or are in the air.
+    """Plot when the person's heels and toes, and the robot's feet, are planted, slide or are in the
+    air.
 
-    Both on the robot's clock: a motion that was slowed down shows each moment under itself.
+    Both use the robot's clock: a motion that was slowed down shows each moment under itself.
     """
     figure, (human, robot) = figure_of(7.0, 2.8, rows=2)
     names = [name.replace("_", " ") for name in CONTACT_POINTS]
@@ -116,10 +118,10 @@ def contact_strip(sequence: SmplSequence, reference: ReferenceMotion) -> Figure:
 
 
 def torque_heat_map(reference: ReferenceMotion, motors: Sequence[str]) -> Figure:
-    """|torque| over its limit, a row a motor: blue within the limit, orange to red beyond.
+    """Plot |torque| over its limit, a row a motor: blue within the limit, orange to red beyond.
 
     Args:
-        motors: Names of the hinges that have a motor, as the columns of `torque_ratio`.
+        motors: Names of the hinges with a motor, as the columns of `torque_ratio`.
     """
     ratio = np.asarray(reference.torque_ratio).T
     figure, (axes,) = figure_of(7.0, 0.8 + 0.2 * len(motors))
@@ -142,7 +144,7 @@ def torque_heat_map(reference: ReferenceMotion, motors: Sequence[str]) -> Figure
 
 
 def png(figure: Figure, dpi: int = 160, opaque: bool = False) -> bytes:
-    """The figure as a picture, with a transparent ground unless it is to be opaque."""
+    """Return the figure as a picture, with a transparent background unless it is to be opaque."""
     buffer = io.BytesIO()
     FigureCanvasAgg(figure)
     figure.savefig(buffer, format="png", dpi=dpi, transparent=not opaque)
@@ -152,7 +154,7 @@ def png(figure: Figure, dpi: int = 160, opaque: bool = False) -> bytes:
 def figure_of(
     width: float, height: float, rows: int = 1, columns: int = 1, sharex: bool = False
 ) -> tuple[Figure, list[Axes]]:
-    """An empty figure of panels in our style; sizes in inches."""
+    """Return an empty figure of panels in our style; sizes in inches."""
     figure = Figure(figsize=(width, height), layout="constrained")
     grid = figure.subplots(rows, columns, sharex=sharex, squeeze=False)
     axes = list(grid.ravel())
@@ -169,7 +171,7 @@ def figure_of(
 
 
 def _band(axes: Axes, x: Float[np.ndarray, " N"], y: Float[np.ndarray, " N"], colour: str) -> None:
-    """Median and quartiles of y over equal shares of x."""
+    """Draw median and quartiles of y over equal shares of x."""
     if not len(x):
         return
     edges = np.linspace(x.min(), x.max() + 1e-9, min(BINS, len(x)) + 1)
@@ -198,13 +200,13 @@ def _torque_bar(figure: Figure, picture: AxesImage, cut: bool) -> None:
 
 
 def _side_colour(name: str) -> str:
-    """Left blue, right orange, the head neither."""
+    """Return blue for left, orange for right, another colour for the head."""
     if "right" in name:
         return SECOND
     return ACCENT if "left" in name else GOOD
 
 
 def legend(axes: Axes) -> None:
-    """The names of the lines, above the panel."""
+    """Draw the names of the lines above the panel."""
     axes.legend(fontsize=7, labelcolor=INK, frameon=False, ncols=5, loc="lower center",
                 bbox_to_anchor=(0.5, 1.0))  # fmt: skip

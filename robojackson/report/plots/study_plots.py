@@ -1,7 +1,7 @@
 """Figures of a study: the paper's 5-13 (return and length of training episodes against steps) and
-the judgement of every setup beside a statue.
+the evaluation of every setup beside a statue.
 
-A line is the mean over seeds, its band the lowest and the highest seed.
+A line is the mean over seeds, its band the range of the seeds.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,8 +25,8 @@ class Curves:
 
     Attributes:
         steps: Middle of each interval, control steps.
-        returns: Mean return of the episodes that ended in it, a row a seed.
-        lengths: Mean length, control steps, a row a seed.
+        returns: Mean return of the episodes that ended in the interval, a row a seed.
+        lengths: Mean length of the episodes, control steps, a row a seed.
     """
 
     steps: Float[np.ndarray, " G"]
@@ -35,7 +35,7 @@ class Curves:
 
 
 def learning_curves(curves: Mapping[str, Curves]) -> Figure:
-    """One move: return above, length below, a column a setup (Figures 5-13 of the paper)."""
+    """Plot one move: return above, length below, a column a setup (Figures 5-13 of the paper)."""
     count = max(len(curves), 1)
     figure, axes = figure_of(2.6 * count + 0.8, 4.2, rows=2, columns=count, sharex=True)
     for column, (setup, found) in enumerate(curves.items()):
@@ -58,12 +58,12 @@ def evaluation_plot(
     baselines: Mapping[str, Mapping[str, float]],
     label: str,
 ) -> Figure:
-    """A figure of every setup on every move, a dot a seed, with the baselines as lines.
+    """Plot a figure of every setup on every move, a dot a seed, with the baselines as lines.
 
     Args:
-        figures: By move and setup, the value of each seed.
-        baselines: By move and baseline, the value.
-        label: What the value is.
+        figures: Value of each seed, by move and setup.
+        baselines: Value by move and baseline.
+        label: Name of the value.
     """
     count = max(len(figures), 1)
     figure, axes = figure_of(2.4 * count + 0.8, 2.8, columns=count)

@@ -1,4 +1,4 @@
-"""A film as a picture that moves by itself, where no video can be shown: GIF or WebP."""
+"""Convert a film to an animated picture (GIF or WebP), where no video can be shown."""
 
 from pathlib import Path
 

@@ -16,14 +16,14 @@ RIGHT: Colour = (255, 150, 70)
 MIDDLE: Colour = (225, 228, 235)
 BACKDROP: Colour = (24, 27, 34)
 GRID: Colour = (62, 70, 84)
-"""The subject's left, right and middle are told apart by colour in every panel."""
+"""Colours of the subject's left, right and middle in every panel."""
 SUBPIXEL_BITS = 4
 OUTSIDE = 0.25
-"""How far outside the image a crop follows a point, image sizes."""
+"""Largest distance outside the image at which a crop follows a point, image sizes."""
 
 
 def side_colour(name: str) -> Colour:
-    """The colour of a landmark or keypoint by the side in its name."""
+    """Return the colour of a landmark or keypoint by the side in its name."""
     if "left" in name:
         return LEFT
     return RIGHT if "right" in name else MIDDLE
@@ -32,7 +32,7 @@ def side_colour(name: str) -> Colour:
 def draw_line(
     picture: Picture, start: np.ndarray, end: np.ndarray, colour: Colour, width: int
 ) -> None:
-    """A smooth line in place; NaN ends draw nothing."""
+    """Draw a smooth line in place; NaN ends draw nothing."""
     if not (np.isfinite(start).all() and np.isfinite(end).all()):
         return
     a, b = _fixed_point(start), _fixed_point(end)
@@ -40,7 +40,7 @@ def draw_line(
 
 
 def draw_dot(picture: Picture, centre: np.ndarray, colour: Colour, radius: int) -> None:
-    """A smooth dot in place; NaN draws nothing."""
+    """Draw a smooth dot in place; NaN draws nothing."""
     if np.isfinite(centre).all():
         at = _fixed_point(centre)
         size = radius << SUBPIXEL_BITS
@@ -48,7 +48,7 @@ def draw_dot(picture: Picture, centre: np.ndarray, colour: Colour, radius: int) 
 
 
 def label(picture: Picture, title: str, note: str = "") -> None:
-    """A title, and a note in grey after it, on a darkened strip at the top, in place."""
+    """Draw a title, and a note in grey after it, on a darkened strip at the top, in place."""
     strip = _strip(title, note, picture.shape[1])
     height = strip.shape[0]
     mixed = picture[:height] * 0.25 + strip * 0.75
@@ -57,19 +57,20 @@ def label(picture: Picture, title: str, note: str = "") -> None:
 
 
 def strip_height(width: int) -> int:
-    """Pixels of the strip of a title over a panel of that width."""
+    """Return the height of the title's strip over a panel of that width, pixels."""
     return 2 * _letter_height(width)
 
 
 def crop_box(
     points: Float[np.ndarray, "N 2"], size: tuple[int, int], aspect: float, margin: float = 0.15
 ) -> tuple[int, int, int, int]:
-    """A box (left, top, width, height) of the given width / height around points in an image.
+    """Return a box (left, top, width, height) of the given width / height around points in an
+    image.
 
     Args:
-        points: Pixels, NaN where nothing was seen; without any the whole image is kept.
+        points: Pixels, NaN where nothing was seen; without any point the whole image is used.
         size: Width and height of the image.
-        aspect: Width over height of the box; it may reach beyond the image.
+        aspect: Width over height of the box; the box may extend beyond the image.
         margin: Share of the person's size that is added on every side.
     """
     seen = points[np.isfinite(points).all(1)]
@@ -84,7 +85,8 @@ def crop_box(
 
 
 def cut(picture: Picture, box: tuple[int, int, int, int], size: tuple[int, int]) -> Picture:
-    """The part of a picture inside a box, scaled to (width, height); outside it is backdrop."""
+    """Return the part of a picture inside a box, scaled to (width, height); outside it is
+    backdrop."""
     left, top, width, height = box
     scale = np.array([size[0] / width, size[1] / height])
     warp = np.array([[scale[0], 0.0, -left * scale[0]], [0.0, scale[1], -top * scale[1]]])
@@ -98,7 +100,7 @@ def cut(picture: Picture, box: tuple[int, int, int, int], size: tuple[int, int])
 
 
 def side_by_side(panels: Sequence[Picture], gap: int = 2) -> Picture:
-    """Panels of one height in a row, with a thin gap."""
+    """Return panels of one height in a row, with a thin gap."""
     height = panels[0].shape[0]
     spacer = np.full((height, gap, 3), GRID, np.uint8)
     row: list[Picture] = []

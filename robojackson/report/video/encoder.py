@@ -1,4 +1,4 @@
-"""Writing pictures as a video that browsers play: H.264, or MPEG-4 where FFmpeg has no x264."""
+"""Encode pictures as a video that browsers play: H.264, or MPEG-4 where FFmpeg has no x264."""
 
 import secrets
 from collections.abc import Iterable
@@ -33,8 +33,8 @@ def write_video(
 
     Args:
         quality: Constant rate factor; lower is better and larger.
-        sound: Heard from the first picture on.
-        seekable: Whether any picture is found fast, in a file that is larger for it.
+        sound: Sound from the first picture on.
+        seekable: Whether any picture can be found fast, in a larger file.
     """
     partial = out.with_name(f"{TEMPORARY}{secrets.token_hex(8)}.mp4")
     try:

@@ -1,8 +1,8 @@
 """Panels side by side at the same moments, one picture a moment; panels are added one by one.
 
-The cameras stand where the one that filmed stood, in front (+x), follow their subject over the
-floor, and stand so far away that nobody leaves a panel in the whole film; all are equally far, so
-that sizes compare.
+The cameras have the direction of the one that filmed, in front (+x), follow their subject over the
+floor, and are so far away that no subject leaves a panel in the whole film; all are equally far, so
+that sizes can be compared.
 """
 
 from collections.abc import Callable, Iterator
@@ -29,23 +29,23 @@ from robojackson.report.video.source_panel import SourceClip
 from robojackson.report.video.timeline import Timeline
 
 Draw = Callable[[int, Framing], canvas.Picture]
-"""The picture of a moment, by its number, through a camera."""
+"""Function that draws the picture of a moment, by its index, through a camera."""
 FLOOR = np.array([1.0, 1.0, 0.0])
 SIDE_DEG = 90.0
-"""From which the left side is seen."""
+"""Direction from which the left side is visible."""
 
 
 @config_dataclass
 class VideoConfig:
-    """How the video looks.
+    """Appearance of the video.
 
     Attributes:
         fps: Pictures a second.
         panel_width, panel_height: Pixels of one panel, even.
         max_seconds: Longest video, seconds.
-        azimuth_deg: How far the cameras go around the subject; 0 is the front.
+        azimuth_deg: Rotation of the cameras around the subject; 0 is the front.
         quality: Constant rate factor of H.264; lower is better and larger.
-        music: Path of the music that is heard instead of the clip's own sound.
+        music: Path of music that replaces the clip's own sound.
         shape: All panels in a row; or dancer and robot, square, vertical (9:16) or wide (16:9),
             1080 pixels at the shorter side.
         alone: Whether such a video shows the robot without the dancer.
@@ -63,11 +63,11 @@ class VideoConfig:
 
 
 SIZES = {"square": (1080, 1080), "vertical": (1080, 1920), "wide": (1920, 1080)}
-"""Pixels of a whole picture."""
+"""Size of a whole picture, pixels."""
 
 
 def panels_of(config: VideoConfig, count: int) -> VideoConfig:
-    """The configuration with the panels' size that fills its shape."""
+    """Return the configuration with the panels' size that fills its shape."""
     if config.shape == "row":
         return config
     width, height = SIZES[config.shape]
@@ -79,9 +79,9 @@ class Film:
     """The panels of one film.
 
     Args:
-        stack: Closes what the panels hold of the graphics driver.
+        stack: Closes the resources of the graphics driver.
         when: The moments.
-        still: Whether they are far apart, so that no camera follows from one to the next.
+        still: Whether the moments are far apart, so that no camera follows from one to the next.
     """
 
     def __init__(
@@ -96,11 +96,11 @@ class Film:
     def add_source(
         self, source: Path, track: LandmarkTrack, sequence: SmplSequence | None, plain: bool
     ) -> None:
-        """The clip, and the clip with what was found in it.
+        """Add the clip with its landmarks or skeleton, and optionally the plain clip.
 
         Args:
-            sequence: What is drawn over it; None draws the landmarks.
-            plain: Whether it is also shown as it is.
+            sequence: Motion that is drawn over the clip; None draws the landmarks.
+            plain: Whether to add the plain clip, too.
         """
         clip = SourceClip(source, track, sequence, self._when.frame, *self._size)
         if plain:
@@ -112,7 +112,7 @@ class Film:
     def add_body(
         self, sequence: SmplSequence, title: str = "motion capture", turn_deg: float = 0.0
     ) -> None:
-        """The recovered skeleton, from the front or so many degrees further to its left."""
+        """Add the recovered skeleton, from the front or rotated by `turn_deg` to its left."""
         frames = np.minimum(self._when.frame, len(sequence) - 1)
         points = np.asarray(sequence.keypoints_w[frames], float)
         target, azimuth = self._followed(points[:, 0]), self._config.azimuth_deg + turn_deg
@@ -137,7 +137,7 @@ class Film:
         turn_deg: float = 0.0,
         is_rollout: bool = False,
     ) -> None:
-        """A robot at every moment; a rollout has an end."""
+        """Add a robot at every moment; a rollout has an end."""
         key = (id(model), tint)
         if key not in self._views:
             view = RobotView(model, *self._size, tint)
@@ -155,20 +155,20 @@ class Film:
         self._panels.append(draw)
 
     def moments(self) -> Iterator[list[canvas.Picture]]:
-        """The panels of each moment, in the order in which they were added."""
+        """Yield the panels of each moment, in the order in which they were added."""
         framing = fit(self._subjects, *self._size)
         for index in range(len(self._when)):
             yield [draw(index, framing) for draw in self._panels]
 
     def pictures(self) -> Iterator[canvas.Picture]:
-        """The panels of each moment in a row; one above the other in a vertical film."""
+        """Yield the panels of each moment in a row; one above the other in a vertical film."""
         if self._config.shape == "vertical":
             return map(np.concatenate, self.moments())
         gap = 2 if self._config.shape == "row" else 0
         return (canvas.side_by_side(panels, gap) for panels in self.moments())
 
     def sheet(self) -> canvas.Picture:
-        """One picture: a column a moment, a row a panel."""
+        """Return one picture: a column a moment, a row a panel."""
         columns = [np.concatenate(panels) for panels in self.moments()]
         return canvas.side_by_side(columns)
 

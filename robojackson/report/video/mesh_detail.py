@@ -1,8 +1,8 @@
 """Meshes of a drawn robot with no more triangles than a picture shows.
 
-Vertices of one cell of a grid become one (Rossignac and Borrel, 1993), and triangles that lose
-their area go. Software renderers, which draw where there is no screen, take most of their time for
-triangles smaller than a pixel: the Unitree G1 has 393,000. Metres, in a mesh's own frame.
+Vertices of one cell of a grid become one (Rossignac and Borrel, 1993), and triangles without an
+area are removed. Software renderers, which draw where there is no screen, spend most of their time
+on triangles smaller than a pixel: the Unitree G1 has 393,000. Metres, in a mesh's own frame.
 """
 
 import mujoco
@@ -29,7 +29,7 @@ def simplify(model: mujoco.MjModel, cell_m: float) -> None:
 
 
 def _merged(vertices: Float[np.ndarray, "V 3"], cell_m: float) -> Int[np.ndarray, " V"]:
-    """Return, for each vertex, the one that stands for its cell: the nearest to the cell's mean."""
+    """Return, for each vertex, the one that replaces its cell: the nearest to the cell's mean."""
     cells = np.floor(vertices / cell_m).astype(np.int64)
     _, cell = np.unique(_keys(cells - cells.min(0)), return_inverse=True)
     count = np.bincount(cell)[:, None]
@@ -40,7 +40,7 @@ def _merged(vertices: Float[np.ndarray, "V 3"], cell_m: float) -> Int[np.ndarray
 
 
 def _distinct(corners: Int[np.ndarray, "F 3"]) -> Int[np.ndarray, " K"]:
-    """Return the triangles that have an area, each once."""
+    """Return the triangles with an area, each once."""
     a, b, c = corners.T
     solid = np.flatnonzero((a != b) & (b != c) & (c != a))
     _, once = np.unique(_keys(np.sort(corners[solid], axis=1)), return_index=True)
@@ -48,7 +48,7 @@ def _distinct(corners: Int[np.ndarray, "F 3"]) -> Int[np.ndarray, " K"]:
 
 
 def _keys(numbers: Int[np.ndarray, "N 3"]) -> Int[np.ndarray, " N"]:
-    """Return one number for each three; fewer than 2^21 of each are told apart."""
+    """Return one number for each three; up to 2^21 values of each are distinguished."""
     x, y, z = numbers.astype(np.int64).T
     keys: np.ndarray = (x << 42) + (y << 21) + z
     return keys

@@ -1,8 +1,8 @@
 """The camera of a panel: level, in front of its subject, near enough to fill the panel.
 
-World: x forward, y left, z up; metres. Azimuth 0 stands on the +x side, as the camera that filmed.
-The camera follows its subject over the floor; how far it stands and how high it looks (`Framing`)
-is the same for a whole video, so that no picture of it cuts the subject.
+World: x forward, y left, z up; metres. Azimuth 0 is on the +x side, like the camera that filmed.
+The camera follows its subject over the floor; its distance and the height that it looks at
+(`Framing`) are the same for a whole video, so that no picture of it cuts the subject.
 """
 
 from collections.abc import Sequence
@@ -17,26 +17,26 @@ from robojackson.report.video.canvas import strip_height
 FOCAL = 2.2
 """Focal length over the height of the panel."""
 DISTANCE, CAMERA_HEIGHT, LOOK_AT_HEIGHT = 5.0, 1.35, 0.9
-"""Metres over the floor, where nothing is fitted."""
+"""Default distance and height, metres over the floor, where nothing is fitted."""
 PITCH = float(np.arctan2(CAMERA_HEIGHT - LOOK_AT_HEIGHT, DISTANCE))
-"""How far the camera looks down, radians."""
+"""Downward angle of the camera, radians."""
 NEAR, CLOSEST = 0.3, 1.5
 """Metres: nothing nearer than the first is drawn, no camera comes nearer than the second."""
 SMOOTHING_S = 0.5
-"""How gently a camera follows, seconds."""
+"""Time constant of a following camera, seconds."""
 ROOM = 0.035
-"""Of the panel's height, left empty at each side of the subject."""
+"""Margin on each side of the subject, share of the panel's height."""
 HEIGHTS = 256
 """Heights that are tried."""
 
 
 @dataclass(frozen=True)
 class Framing:
-    """Where a camera stands beside what it follows.
+    """Distance and height of a camera relative to its subject.
 
     Attributes:
         distance: From the camera to the point that it looks at, metres.
-        look_at_height: Of that point above the floor, metres.
+        look_at_height: Height of that point above the floor, metres.
     """
 
     distance: float = float(np.hypot(DISTANCE, CAMERA_HEIGHT - LOOK_AT_HEIGHT))
@@ -45,11 +45,11 @@ class Framing:
 
 @dataclass(frozen=True)
 class Subject:
-    """What a camera has to hold in its picture.
+    """The subject that a camera has to hold in its picture.
 
     Attributes:
-        points: Of it at all times, relative to where on the floor the camera looks, metres.
-        azimuth_deg: Of the camera.
+        points: Its points at all times, relative to the camera's target on the floor, metres.
+        azimuth_deg: Azimuth of the camera.
     """
 
     points: Float[np.ndarray, "N 3"]
@@ -61,11 +61,11 @@ class View:
     """A pinhole camera.
 
     Attributes:
-        target: Where on the floor it looks, metres.
+        target: Target on the floor, metres.
         eye: Position, world, metres.
         axes: Rows right, down, forward, world.
-        focal: Pixels.
-        centre: Of the image, pixels.
+        focal: Focal length, pixels.
+        centre: Centre of the image, pixels.
     """
 
     target: Float[np.ndarray, "2"]
@@ -75,7 +75,7 @@ class View:
     centre: tuple[float, float]
 
     def project(self, points: Float[np.ndarray, "*B 3"]) -> Float[np.ndarray, "*B 2"]:
-        """Pixels; NaN behind the camera."""
+        """Return pixels; NaN behind the camera."""
         right, down, depth = np.moveaxis((points - self.eye) @ self.axes.T, -1, 0)
         depth = np.where(depth > NEAR, depth, np.nan)
         u = self.centre[0] + self.focal * right / depth
@@ -83,7 +83,7 @@ class View:
 
 
 def smooth_camera_path(points: Float[np.ndarray, "T 3"], fps: float) -> Float[np.ndarray, "T 2"]:
-    """Where on the floor a camera looks that follows a point gently."""
+    """Return the target on the floor of a camera that follows a point smoothly."""
     result: np.ndarray = gaussian_filter1d(points[:, :2], SMOOTHING_S * fps, axis=0, mode="nearest")
     return result
 
@@ -95,7 +95,7 @@ def view_of(
     height: int,
     framing: Framing | None = None,
 ) -> View:
-    """The camera that looks at a place on the floor; azimuth 0 stands on the +x side."""
+    """Return the camera that looks at a place on the floor; azimuth 0 is on the +x side."""
     framing = framing or Framing()
     axes = _axes(azimuth_deg)
     aim = np.array([*target, framing.look_at_height])
@@ -104,13 +104,13 @@ def view_of(
 
 
 def fit(subjects: Sequence[Subject], width: int, height: int) -> Framing:
-    """The nearest camera in whose panel each of the subjects is at all times, below the title.
+    """Return the nearest camera whose panel holds each subject at all times, below the title.
 
-    Each edge of the panel asks for a distance that is linear in the height of the point looked at:
-    focal * offset <= room * (distance + depth). Of all heights that of the least distance is taken.
+    Each edge of the panel requires a distance that is linear in the height of the point looked at:
+    focal * offset <= room * (distance + depth). The height with the least distance is used.
 
     Args:
-        width, height: Of a panel, pixels.
+        width, height: Size of a panel, pixels.
     """
     known = [(each.points[np.isfinite(each.points).all(1)], each.azimuth_deg) for each in subjects]
     known = [(points, azimuth) for points, azimuth in known if len(points)]
@@ -127,7 +127,8 @@ def fit(subjects: Sequence[Subject], width: int, height: int) -> Framing:
 
 
 def _edges(axes: Float[np.ndarray, "3 3"], width: int, height: int) -> list[Float[np.ndarray, "3"]]:
-    """For each edge of a panel the distance that it asks for, per metre of a point's place."""
+    """Return for each edge of a panel the distance that it requires, per metre of a point's
+    place."""
     room = ROOM * height
     beside = width / 2 - room
     below, above = height / 2 - room, height / 2 - room - strip_height(width)
@@ -136,7 +137,7 @@ def _edges(axes: Float[np.ndarray, "3 3"], width: int, height: int) -> list[Floa
 
 
 def _axes(azimuth_deg: float) -> Float[np.ndarray, "3 3"]:
-    """Rows right, down, forward of a camera that looks down by `PITCH`."""
+    """Return the rows right, down, forward of a camera that looks down by `PITCH`."""
     angle = np.radians(azimuth_deg)
     outward = np.array([np.cos(angle), np.sin(angle), 0.0])
     forward = -np.cos(PITCH) * outward - [0.0, 0.0, np.sin(PITCH)]

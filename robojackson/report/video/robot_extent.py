@@ -1,4 +1,4 @@
-"""How much room a robot takes: corners of the boxes around its parts, world, metres."""
+"""The space that a robot takes: corners of the boxes around its parts, world, metres."""
 
 import mujoco
 import numpy as np
@@ -12,7 +12,7 @@ SIGNS = np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, -1).T
 def corners(
     model: mujoco.MjModel, data: mujoco.MjData, geoms: Int[np.ndarray, " G"]
 ) -> Float[np.ndarray, "G 8 3"]:
-    """Of the boxes around geoms, in the pose of `data`."""
+    """Return the corners of the boxes around geoms, in the pose of `data`."""
     middle, half = model.geom_aabb[geoms, None, :3], model.geom_aabb[geoms, None, 3:]
     turn = data.geom_xmat[geoms].reshape(-1, 3, 3)
     local = middle + SIGNS * half
@@ -25,7 +25,8 @@ def room_of(
     qpos: Float[np.ndarray, "N nq"],
     targets: Float[np.ndarray, "N 2"],
 ) -> Float[np.ndarray, "M 3"]:
-    """Corners of a robot and its shadows in every pose, relative to where the camera looks."""
+    """Return the corners of a robot and its shadows in every pose, relative to the camera's
+    target."""
     data, geoms = mujoco.MjData(model), shadowing(model)
     reach = SHADOW_REACH * model.geom_rbound[geoms, None, None] * SIGNS[:4, :2]
     found = []

@@ -1,7 +1,7 @@
 """The robot as MuJoCo draws it, posed by qpos, followed by a camera like the skeleton's.
 
 Without a screen this needs EGL (or OSMesa); `MUJOCO_GL` is honoured, but not needed: MuJoCo reads
-it when it is imported, which is long before anybody here knows that a picture will be wanted.
+it when it is imported, which is long before the first picture is requested.
 """
 
 import contextlib
@@ -29,8 +29,8 @@ REFERENCE_TINT: Tint = (0.55, 0.66, 0.86)
 TRAINED_TINT: Tint = (0.93, 0.62, 0.33)
 """RGB 0..1."""
 FINER = 2
-"""Pixels drawn for each that is shown, along an edge: smoother than the renderer's multisampling
-and, where it is software, twice as fast."""
+"""Drawn pixels for each pixel of the result, along an edge: smoother than the renderer's
+multisampling and, with a software renderer, twice as fast."""
 
 
 class RobotView:
@@ -63,7 +63,7 @@ class RobotView:
         azimuth_deg: float,
         framing: Framing | None = None,
     ) -> canvas.Picture:
-        """The robot in a pose, the camera looking at a place on the floor."""
+        """Return the robot in a pose, the camera looking at a place on the floor."""
         self._data.qpos[:] = qpos
         mujoco.mj_kinematics(self.model, self._data)
         mujoco.mj_comPos(self.model, self._data)
@@ -82,7 +82,7 @@ class RobotView:
         return np.ascontiguousarray(picture[::-1])
 
     def close(self) -> None:
-        """Free what the graphics driver holds."""
+        """Free the resources of the graphics driver."""
         self._gl.make_current()
         self._context.free()
         self._gl.free()
@@ -106,11 +106,11 @@ class RobotView:
 
 
 def _gl_context(width: int, height: int) -> Any:
-    """A context of the first backend that works.
+    """Return a context of the first backend that works.
 
-    PyTorch's CUDA build brings triton, whose LLVM ends the process with a segmentation fault where
-    Mesa's software renderer has brought its own before; the other way round both work. So the
-    optimizer of a later training finds triton loaded.
+    PyTorch's CUDA build imports triton, whose LLVM ends the process with a segmentation fault if
+    Mesa's software renderer has loaded its own LLVM before; the other order works. So triton is
+    imported here, before the optimizer of a later training.
     """
     with contextlib.suppress(ImportError):
         importlib.import_module("triton")

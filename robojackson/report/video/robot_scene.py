@@ -1,7 +1,7 @@
-"""The room in which a robot is drawn: the same floor, light and background for every robot.
+"""The scene in which a robot is drawn: the same floor, light and background for every robot.
 
-What a robot's own model has of floors, lights and sky differs (mjlab's G1 stands in the dark), so
-none of it is drawn. Metres; RGB 0..1.
+Floors, lights and skies of the robots' own models differ (mjlab's G1 is in the dark), so none of
+them is drawn. Metres; RGB 0..1.
 """
 
 import copy
@@ -22,18 +22,18 @@ SHADOW_REACH = 0.7
 """Radius of a part's disc over that of the ball around it."""
 FLOOR, LINE = (0.40, 0.43, 0.46), (0.55, 0.58, 0.62)
 FLOOR_REACH, LINE_REACH, LINE_CELL, LINE_WIDTH, LINE_HEIGHT = 60.0, 8, 0.5, 0.012, 0.001
-"""Metres; cells of the grid to each side."""
+"""Size of a cell, metres; number of cells to each side."""
 HEAD_AMBIENT, HEAD_DIFFUSE, KEY_DIFFUSE, KEY_SPECULAR = 0.28, 0.42, 0.42, 0.15
 KEY_DIRECTION = (-0.45, -0.35, -0.82)
-"""Where the second light shines to, world; the first is the camera's."""
+"""Direction of the second light, world; the first is the camera's."""
 DETAIL_M = 0.005
 """Smallest detail of a robot's meshes; a pixel of a panel is about as large."""
 FAR = 1.0
-"""Depth of what is not there."""
+"""Depth of empty pixels."""
 
 
 def dressed(model: mujoco.MjModel, width: int, height: int, tint: Tint) -> mujoco.MjModel:
-    """A copy of the model with our lens, the robot in one colour, and no floor."""
+    """Return a copy of the model with our lens, the robot in one colour, and no floor."""
     dressed = copy.copy(model)
     simplify(dressed, DETAIL_M)
     dressed.vis.quality.offsamples = 0
@@ -66,13 +66,13 @@ def furnish(
 
 
 def shadowing(model: mujoco.MjModel) -> np.ndarray:
-    """Numbers of a robot's geoms that are drawn."""
+    """Return the indices of a robot's visible geoms."""
     shown = mujoco.MjvOption().geomgroup[model.geom_group] > 0
     return np.flatnonzero((model.geom_bodyid > 0) & shown & (model.geom_rgba[:, 3] > 0))
 
 
 def on_backdrop(picture: Picture, depth: Float[np.ndarray, "H W"]) -> Picture:
-    """The picture with our background where nothing was drawn, in place."""
+    """Return the picture with our background where nothing was drawn, in place."""
     ours = np.full_like(picture, BACKDROP)
     return cv2.copyTo(ours, (depth >= FAR).astype(np.uint8), picture)
 

@@ -1,7 +1,7 @@
-"""The video that proves it: source, skeleton, reference robot and trained robot side by side.
+"""The video of a run: source, skeleton, reference robot and trained robot side by side.
 
-Each panel is there when it is given. All show the same moment. The cameras stand where the one that
-filmed stood, in front (+x), and follow their subject over the floor.
+A panel is shown if its input is given. All show the same moment. The cameras have the direction of
+the one that filmed, in front (+x), and follow their subject over the floor.
 """
 
 from collections.abc import Callable, Iterator
@@ -42,18 +42,18 @@ def side_by_side(
     plain: bool = False,
     title: str = TRAINED_TITLE,
 ) -> Path:
-    """Write the mp4; what is None has no panel.
+    """Write the mp4; an input of None has no panel.
 
     Args:
-        source, track: The clip and the landmarks that were found in it; both or neither.
+        source, track: The clip and its landmarks; both or neither.
         sequence: The motion of the person.
         rollout_qpos: The trained robot at the reference's control step, from its first step on;
             may be longer than a cycle, and ends where the robot fell.
         model: The robot that qpos belongs to.
         progress: Called with (pictures done, pictures in all).
-        plain: Show the source as it is, too, and the recovered skeleton over it instead of the
-            landmarks.
-        title: Over the panel of the rollout.
+        plain: Whether to show the plain source, too, and the recovered skeleton over it instead of
+            the landmarks.
+        title: Title of the rollout's panel.
     Raises:
         MissingDependency: no way to draw without a screen.
     """
@@ -94,8 +94,8 @@ def body_video(
     """Write the mp4 of a recovered motion: source, skeleton over source, body from two sides.
 
     Args:
-        source, track: The clip and the landmarks that were found in it.
-        sequence: The motion that was recovered.
+        source, track: The clip and its landmarks.
+        sequence: The recovered motion.
         progress: Called with (pictures done, pictures in all).
     """
     config = config or VideoConfig()

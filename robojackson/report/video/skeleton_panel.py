@@ -1,4 +1,4 @@
-"""The recovered 3D skeleton, seen by a level camera of our own that follows it over a grid.
+"""The recovered 3D skeleton, seen by a level camera that follows it over a grid.
 
 World: x forward, y left, z up; metres.
 """
@@ -13,14 +13,14 @@ from robojackson.report.video.panel_camera import View
 
 GRID_CELL = 0.5
 GRID_REACH = 6
-"""Metres; cells to each side."""
+"""Size of a cell, metres; cells to each side."""
 FEET = (("left_ankle", "left_foot"), ("right_ankle", "right_foot"))
 
 
 def skeleton_panel(
     sequence: SmplSequence, frame: int, view: View, width: int, height: int
 ) -> canvas.Picture:
-    """One frame: grid, shadow and bones, the far ones first."""
+    """Return one frame: grid, shadow and bones, the far ones first."""
     panel = np.full((height, width, 3), canvas.BACKDROP, np.uint8)
     _draw_grid(panel, view)
     points = sequence.keypoints_w[frame]
@@ -55,7 +55,7 @@ def _draw_bones(
 
 
 def _draw_contacts(panel: canvas.Picture, sequence: SmplSequence, frame: int, view: View) -> None:
-    """A ring of light under each foot that stands."""
+    """Draw a bright ring under each planted foot."""
     for side, names in enumerate(FEET):
         states = sequence.contact[frame, 2 * side : 2 * side + 2]
         if (states == PLANTED).any():

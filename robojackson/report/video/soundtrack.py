@@ -1,9 +1,9 @@
 """Sound at the tempo of a dance: slowed or warped with its pitch kept.
 
 Waveform similarity overlap-add (Verhelst and Roelands, 1993): every 20 ms of the result are taken
-from where the motion is in the clip, within 6 ms, at the place that continues best what was heard
-before. FFmpeg's atempo has one tempo for a whole track and drifts; here no moment is further from
-its picture than the search is wide. Seconds.
+from the motion's place in the clip, within 6 ms, where they best continue the sound before.
+FFmpeg's atempo has one tempo for a whole track and drifts; here no moment is further from its
+picture than the width of the search. Seconds.
 """
 
 from pathlib import Path
@@ -17,20 +17,20 @@ from robojackson.motion.reference_motion import ReferenceMotion
 HOP = round(0.02 * RATE)
 SEARCH = round(0.006 * RATE)
 COARSE = 4
-"""Only every so many samples are compared while searching."""
+"""Stride of the samples that are compared in the search."""
 
 
 def soundtrack(
     source: Path | None, music: str, reference: ReferenceMotion | None, seconds: float
 ) -> Sound | None:
-    """Return what is heard with a film of a motion; None where it is silent.
+    """Return the sound of a film of a motion; None where it is silent.
 
-    A cyclic motion repeats the sound of its clip as it repeats the clip; music goes on.
+    A cyclic motion repeats the sound of its clip with the clip; music continues.
 
     Args:
         source: The clip.
         music: Path of other music, or empty.
-        reference: The motion; None plays the sound as it is.
+        reference: The motion; None plays the sound unchanged.
         seconds: Length of the film.
     Raises:
         UnreadableVideo: the music cannot be read, or has no sound.
@@ -50,7 +50,7 @@ def clip_times(
     """Return the time of the clip at every time of the motion.
 
     Args:
-        goes_on: Whether the clip's time goes on in the next cycle instead of starting again.
+        goes_on: Whether the clip's time continues in the next cycle instead of starting again.
     """
     known = np.asarray(reference.source_time_s, float)
     known = np.append(known, 2 * known[-1] - known[-2])
@@ -64,10 +64,10 @@ def clip_times(
 def warped(
     samples: Float[np.ndarray, "S C"], times: Float[np.ndarray, " N"]
 ) -> Float[np.ndarray, "T C"]:
-    """Return the sound whose every `HOP` samples come from one time of it; silence where it stands.
+    """Return the sound whose every `HOP` samples come from one time of it; silence where it pauses.
 
     Args:
-        times: Of the sound, at every hop of the result.
+        times: Times of the sound, at every hop of the result.
     """
     reach = 2 * HOP
     inside = np.pad(samples, ((SEARCH + reach, 2 * SEARCH + 2 * reach), (0, 0)))
@@ -75,9 +75,9 @@ def warped(
     window = np.hanning(reach + 1)[:-1, None]
     out = np.zeros((len(times) * HOP + reach, samples.shape[1]), np.float32)
     stands = np.append(np.diff(times), 1.0) == 0
-    wanted = np.round(times * RATE).astype(int) + reach + SEARCH - HOP
+    places = np.round(times * RATE).astype(int) + reach + SEARCH - HOP
     last = -1
-    for index, place in enumerate(wanted):
+    for index, place in enumerate(places):
         place = int(np.clip(place, SEARCH, len(inside) - reach - SEARCH - 1))
         if last >= 0 and place != last + HOP:
             place += _shift(mono, place, last + HOP, reach)
@@ -88,7 +88,7 @@ def warped(
 
 
 def _shift(mono: Float[np.ndarray, " S"], place: int, continued: int, reach: int) -> int:
-    """Return by how much to move a piece so that it continues another best."""
+    """Return the offset by which a piece best continues another."""
     target = mono[continued : continued + reach : COARSE]
     near = mono[place - SEARCH : place + SEARCH + reach : COARSE]
     score = np.correlate(near, target, "valid")

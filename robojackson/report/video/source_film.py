@@ -1,4 +1,4 @@
-"""The source pane of a page as a film of its own, one picture a moment of the player."""
+"""The source pane of a page as its own film, one picture a moment of the player."""
 
 import tempfile
 from pathlib import Path
@@ -11,7 +11,7 @@ from robojackson.report.video.source_panel import SourceClip
 from robojackson.report.video.timeline import Timeline
 
 QUALITY = 24
-"""Constant rate factor: it lies inside the page."""
+"""Constant rate factor: the film is inside the page."""
 
 
 def source_film(
@@ -21,7 +21,7 @@ def source_film(
     config: VideoConfig,
     sound: Sound | None = None,
 ) -> bytes:
-    """Return an mp4 whose picture k is moment k, and in which any picture is found fast."""
+    """Return an mp4 whose picture k is moment k, with fast access to any picture."""
     size = config.panel_width, config.panel_height
     clip = SourceClip(source, track, None, when.frame, *size)
     pictures = (clip.with_landmarks(int(frame)) for frame in when.frame)

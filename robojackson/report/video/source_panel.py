@@ -1,7 +1,7 @@
-"""The source clip around the person: as it is, with what the detector found, or what was recovered.
+"""The source clip around the person: plain, with the detector's landmarks, or with the skeleton.
 
-Pixels, origin top left. The recovered skeleton is seen through the camera that the motion knows;
-where that moved, through the camera of the first frame and what the background did since.
+Pixels, origin top left. The recovered skeleton is projected by the camera of the motion; where that
+moved, by the camera of the first frame and the movement of the background since.
 """
 
 from pathlib import Path
@@ -29,7 +29,7 @@ BONES = (
     ("right_heel", "right_foot_index"), ("nose", "left_ear"), ("nose", "right_ear"),
 )  # fmt: skip
 CAMERA = {"focal_px", "width", "height", "rotation_w", "position_w"}
-"""What a motion has to know of its camera to be drawn over the source."""
+"""Camera metadata that a motion needs to be drawn over the source."""
 _FAINT = 0.5
 """A bone is left out when one of its ends is less visible than this."""
 
@@ -38,10 +38,10 @@ class SourceClip:
     """Pictures of a clip, cut around the person, for some of its frames.
 
     Args:
-        source, track: The clip and the landmarks that were found in it.
-        sequence: The motion that was recovered from them, or None.
-        frames: Of the motion, that will be shown.
-        width, height: Of a panel, pixels.
+        source, track: The clip and its landmarks.
+        sequence: The motion recovered from them, or None.
+        frames: Frames of the motion that will be shown.
+        width, height: Size of a panel, pixels.
     """
 
     def __init__(
@@ -63,21 +63,22 @@ class SourceClip:
         self._pictures = self._cut(source)
 
     def plain(self, frame: int) -> canvas.Picture:
-        """The picture nearest to the time of a frame; backdrop where the clip has none."""
+        """Return the picture nearest to the time of a frame; backdrop where the clip has none."""
         picture = self._pictures.get(self._row[frame])
         if picture is None:
             return np.full((self._size[1], self._size[0], 3), canvas.BACKDROP, np.uint8)
         return picture.copy()
 
     def with_landmarks(self, frame: int) -> canvas.Picture:
-        """The same with what the detector found."""
+        """Return the picture with the detector's landmarks."""
         panel, row = self.plain(frame), self._row[frame]
         if row in self._pictures:
             _draw_person(panel, self._inside(self._found[row]), self._track.visibility[row])
         return panel
 
     def with_skeleton(self, frame: int) -> canvas.Picture:
-        """The same with the recovered skeleton; with landmarks where its camera is not known."""
+        """Return the picture with the recovered skeleton; with landmarks if its camera is
+        unknown."""
         if self._body is None:
             return self.with_landmarks(frame)
         panel = self.plain(frame)
@@ -87,12 +88,12 @@ class SourceClip:
         return panel
 
     def _cut(self, source: Path) -> dict[int, canvas.Picture]:
-        wanted = set(self._row.values())
+        needed = set(self._row.values())
         pictures: dict[int, canvas.Picture] = {}
         for index, image in enumerate(read_frames(source)):
-            if index in wanted:
+            if index in needed:
                 pictures[index] = canvas.cut(image, self._box, self._size)
-            if index >= max(wanted):
+            if index >= max(needed):
                 break
         return pictures
 
@@ -104,7 +105,7 @@ class SourceClip:
 def skeleton_in_image(
     sequence: SmplSequence, track: LandmarkTrack
 ) -> Float[np.ndarray, "T 29 2"] | None:
-    """The recovered keypoints in the pixels of every frame; None where the camera is not known."""
+    """Return the recovered keypoints in pixels of every frame; None where the camera is unknown."""
     camera = sequence.camera
     if not set(camera) >= CAMERA:
         return None
@@ -120,7 +121,7 @@ def skeleton_in_image(
 
 
 def draw_skeleton(panel: canvas.Picture, points: Float[np.ndarray, "29 2"], width: int) -> None:
-    """Bones and joints of a projected skeleton, in place, each side in its colour."""
+    """Draw bones and joints of a projected skeleton, in place, each side in its colour."""
     for child, parent in enumerate(PARENTS):
         if parent >= 0:
             canvas.draw_line(panel, points[parent], points[child], (14, 16, 21), width + 2)

@@ -22,7 +22,7 @@ MOMENTS = (0.2, 0.5, 0.8)
 """Shares of the motion that are shown."""
 SHEET_MOMENTS = (0.05, 0.275, 0.5, 0.725, 0.95)
 SHEET = VideoConfig(panel_width=240, panel_height=330)
-"""Of sheets."""
+"""Number of moments of a sheet."""
 
 
 def still(
@@ -33,7 +33,7 @@ def still(
     model: mujoco.MjModel,
     config: VideoConfig | None = None,
 ) -> bytes:
-    """The picture as PNG, three panels a moment, in one row.
+    """Return the picture as PNG, three panels a moment, in one row.
 
     Raises:
         MissingDependency: no way to draw without a screen.
@@ -50,10 +50,10 @@ def still(
 
 
 def body_sheet(source: Path, track: LandmarkTrack, sequence: SmplSequence) -> bytes:
-    """A PNG of a recovered motion: over the source, from the front, from its left side.
+    """Return a PNG of a recovered motion: over the source, from the front, from its left side.
 
     Args:
-        source, track: The clip and the landmarks that were found in it.
+        source, track: The clip and its landmarks.
     """
     frames = np.round(np.array(SHEET_MOMENTS) * (len(sequence) - 1)).astype(int)
     with ExitStack() as stack:
@@ -71,10 +71,10 @@ def robot_poses(
     reference: ReferenceMotion,
     model: mujoco.MjModel,
 ) -> bytes:
-    """A PNG of a robot's motion: the source if known, the person, the robot from two sides.
+    """Return a PNG of a robot's motion: the source if known, the person, the robot from two sides.
 
     Args:
-        source, track: The clip and the landmarks that were found in it; both or neither.
+        source, track: The clip and its landmarks; both or neither.
     Raises:
         MissingDependency: no way to draw without a screen.
     """

@@ -1,7 +1,7 @@
-"""Which frame of the clip and which steps of the robot belong to each picture of the video.
+"""Frames of the clip and steps of the robot for each picture of the video.
 
-Time 0 is the first step of the reference motion. A cyclic reference and its source repeat; one that
-is not cyclic holds its last step. Seconds.
+Time 0 is the first step of the reference motion. A cyclic reference and its source repeat; another
+reference holds its last step. Seconds.
 """
 
 from dataclasses import dataclass
@@ -17,10 +17,10 @@ class Timeline:
     """One row a picture.
 
     Attributes:
-        time_s: Since the first step, seconds.
-        step: Of the reference motion.
-        cycle: How often the reference was completed before.
-        frame: Of the source clip.
+        time_s: Time since the first step, seconds.
+        step: Step of the reference motion.
+        cycle: Number of completed cycles of the reference.
+        frame: Frame of the source clip.
         rollout: Step of the trained robot's rollout; its last one after the end.
         ended: Whether the rollout is over.
     """
@@ -44,7 +44,7 @@ def timeline(
     fps: float,
     max_seconds: float,
 ) -> Timeline:
-    """Pictures at `fps` over the rollout or one cycle, whichever is longer, up to `max_seconds`."""
+    """Return pictures at `fps` over the longer of rollout and one cycle, up to `max_seconds`."""
     seconds = min(max(rollout_steps, len(reference)) * reference.dt, max_seconds)
     time_s = np.arange(max(1, round(seconds * fps))) / fps
     elapsed = np.floor(time_s / reference.dt + 1e-6).astype(int)
@@ -64,14 +64,14 @@ def timeline(
 def clip_timeline(
     source_fps: float, source_frames: int, fps: float, max_seconds: float
 ) -> Timeline:
-    """Pictures at `fps` over a clip, up to `max_seconds`, where there is no robot."""
+    """Return pictures at `fps` over a clip, up to `max_seconds`, without a robot."""
     seconds = min(source_frames / source_fps, max_seconds)
     time_s = np.arange(max(1, round(seconds * fps))) / fps
     return at_frames(np.round(time_s * source_fps).astype(int), source_fps, source_frames)
 
 
 def at_frames(frames: Int[np.ndarray, " N"], source_fps: float, source_frames: int) -> Timeline:
-    """Some frames of a clip, where there is no robot."""
+    """Return given frames of a clip, without a robot."""
     none = np.zeros(len(frames), int)
     return Timeline(
         time_s=frames / source_fps,
@@ -84,7 +84,7 @@ def at_frames(frames: Int[np.ndarray, " N"], source_fps: float, source_frames: i
 
 
 def reference_qpos(reference: ReferenceMotion, when: Timeline) -> Float[np.ndarray, "N nq"]:
-    """The reference's positions at each picture, moved on by the cycles before."""
+    """Return the reference's positions at each picture, moved on by the cycles before."""
     qpos = np.array(reference.qpos, dtype=float)[when.step]
     qpos[:, :3] += when.cycle[:, None] * np.asarray(reference.cycle_offset)
     result: np.ndarray = qpos

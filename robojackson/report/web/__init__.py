@@ -1,1 +1,1 @@
-"""What a browser draws and simulates: shapes, motions and sound inside one file."""
+"""Data for the browser: shapes, motions and sound inside one file."""

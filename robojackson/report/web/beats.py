@@ -1,4 +1,4 @@
-"""Beats of the music and of the dancers that a film shows: figures, table and rows of a timeline.
+"""Beats of the music and of the dancers in a film: figures, table and rows of a timeline.
 
 Seconds since the first picture of the film.
 """
@@ -17,7 +17,7 @@ from robojackson.report.video.soundtrack import clip_times
 from robojackson.report.web.player_data import Band, Span
 
 Report = dict[str, Any]
-"""Beats as `beats.json` has them."""
+"""The content of `beats.json`."""
 
 GRID_S = 0.005
 CONTROL = "control"
@@ -32,7 +32,7 @@ TITLES = {
 def music_beats_shown(
     source: Path, music: str, reference: ReferenceMotion, seconds: float
 ) -> Float[np.ndarray, " B"]:
-    """Return when the beats of a clip's sound, or of other music, are heard; none in silence.
+    """Return the times of the beats in a clip's sound, or in other music; none in silence.
 
     Raises:
         MissingDependency: librosa is not installed.

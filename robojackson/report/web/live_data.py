@@ -1,7 +1,8 @@
-"""What a browser needs to run a trained policy on a robot: model, motion, network, law, fall rule.
+"""Data that a browser needs to run a trained policy: model, motion, network, control law, fall
+rule.
 
-The model goes without the geoms that touch nothing: their masses are written into the bodies.
-Metres, radians, seconds, newton-metres.
+The model has no geoms without collision: their masses are written into the bodies. Metres, radians,
+seconds, newton-metres.
 """
 
 import mujoco
@@ -33,17 +34,18 @@ from robojackson.robot.mjcf import described_spec, mjcf_path
 from robojackson.robot.model import Robot
 
 RECORDS = 20
-"""States from which the browser's physics is compared with ours."""
+"""Number of states at which the browser's physics is compared with ours."""
 SUBSTEPS = 300
-"""Of each comparison."""
+"""Substeps of each comparison."""
 OBSERVED = ("full", "onboard")
-"""Observations that the browser computes."""
+"""Observations that the browser can compute."""
 
 
 def live_data(policy: Policy, reference: ReferenceMotion, robot: Robot) -> dict[str, object] | None:
-    """Return everything of a live dance; None where a browser cannot run it.
+    """Return the data of a live dance; None where a browser cannot run it.
 
-    That is a policy of the paper's mode or of another observation, or a robot whose meshes collide.
+    A browser cannot run a policy of the paper's mode or with another observation, or a robot whose
+    meshes collide.
     """
     if mode_of(policy) != "track":
         return None
@@ -95,7 +97,7 @@ def live_data(policy: Policy, reference: ReferenceMotion, robot: Robot) -> dict[
 
 
 def model_xml(robot: Robot) -> str:
-    """Return the robot's MJCF in one text, without what is only looked at."""
+    """Return the robot's MJCF as one text, without visual parts."""
     spec = described_spec(robot.description, mjcf_path(robot.description))
     for body in spec.bodies[1:]:
         shown = [geom for geom in body.geoms if not (geom.contype or geom.conaffinity)]
@@ -119,7 +121,7 @@ def model_xml(robot: Robot) -> str:
 
 
 def records(policy: Policy, reference: ReferenceMotion, robot: Robot) -> list[dict[str, object]]:
-    """Return noisy starts all over the motion and where the bodies are `SUBSTEPS` later."""
+    """Return noisy starts across the motion and the positions of the bodies `SUBSTEPS` later."""
     control = control_of(policy, robot)
     clip = driven_clip(robot, reference, control)
     starts, _ = starts_of(robot, clip, EvaluateConfig(phases=RECORDS, resets=1))

@@ -1,6 +1,6 @@
-"""What the player of a page shows: one clock, four panes, bands of time and curves.
+"""Data of the page's player: one clock, four panes, bands of time and curves.
 
-Every row is a picture of the timeline of the rendered video, so that all panes go by one number.
+Every row is a picture of the timeline of the rendered video, so that one index selects all panes.
 World frame, metres, radians, seconds.
 """
 
@@ -22,11 +22,11 @@ from robojackson.robot.model import Robot
 FAINT = 0.5
 """Mean confidence of the keypoints below which a stretch is marked."""
 FAR_M = 0.15
-"""Mean site error above which a stretch is marked, metres: half of what strict success allows."""
+"""Mean site error above which a stretch is marked, metres: half the limit of strict success."""
 CONTACT_CLASSES = {1: "on", 2: "slide"}
 MARGIN_M = 0.12
 LEAST_SPAN = 2
-"""Pictures that a marked stretch lasts at least, so that it can be seen."""
+"""Smallest length of a marked stretch, pictures, so that it is visible."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Span:
 
     Attributes:
         kind: Class of its colour.
-        title: What it is, in words.
+        title: Text of the band.
     """
 
     start: float
@@ -57,9 +57,9 @@ class Player:
     """Everything of the player.
 
     Attributes:
-        data: As JSON: shapes, motions and curves.
+        data: Shapes, motions and curves in JSON's types.
         bands: Rows of the timeline.
-        when: The moments of the pictures.
+        when: Times of the pictures.
         error_m: Mean site error of the rollout at every picture, by name of the site; empty without
             a rollout.
         points: Keypoints of dancer, reference and robot at every picture, metres.
@@ -119,7 +119,7 @@ def player(
 
 
 def _followed(points: np.ndarray, root: np.ndarray, fps: float) -> dict[str, object]:
-    """Where a camera looks, and how much room what it follows takes, metres."""
+    """Return the target of a camera, and the size of its subject, metres."""
     path = smooth_camera_path(root, fps)
     around = np.linalg.norm(points[..., :2] - path[:, None], axis=-1).max()
     return {

@@ -1,6 +1,7 @@
-"""A robot and a person as a browser draws them: solid parts of bodies, and a place a moment.
+"""Shapes of a robot and a person for a browser: solid parts of bodies, and their pose at each
+moment.
 
-Metres, quaternions wxyz, world frame; arrays travel as base64 of little-endian numbers.
+Metres, quaternions wxyz, world frame; arrays are base64 of little-endian numbers.
 """
 
 import base64
@@ -17,9 +18,9 @@ from robojackson.report.video.robot_scene import shadowing
 DETAIL_M = 0.009
 """Smallest detail of a mesh; a robot of 30 meshes then has some 40,000 triangles."""
 ROUGH_M = 0.018
-"""The same for shadows, and for browsers that draw on the processor."""
+"""Smallest detail for shadows, and for browsers that draw on the processor."""
 MESH_STEPS = 32767
-"""Steps of a mesh's largest coordinate."""
+"""Quantisation of a mesh's largest coordinate."""
 RADII = {
     "hip": 0.085, "spine1": 0.105, "spine2": 0.11, "spine3": 0.115, "knee": 0.072, "ankle": 0.048,
     "foot": 0.042, "neck": 0.1, "head": 0.052, "collar": 0.075, "shoulder": 0.07, "elbow": 0.043,
@@ -29,12 +30,12 @@ RADII = {
 
 
 def packed(values: np.ndarray, kind: type[np.generic] = np.float32) -> str:
-    """The array's numbers as base64."""
+    """Return an array's numbers as base64."""
     return base64.b64encode(np.ascontiguousarray(values, kind).tobytes()).decode()
 
 
 def robot_shape(model: mujoco.MjModel, detail_m: float = DETAIL_M) -> dict[str, object]:
-    """The visible geoms of a robot by body; meshes with details of a given size."""
+    """Return the visible geoms of a robot by body; meshes with details of a given size."""
     small, coarse = copy.copy(model), copy.copy(model)
     simplify(small, detail_m)
     simplify(coarse, ROUGH_M)
@@ -58,7 +59,7 @@ def robot_shape(model: mujoco.MjModel, detail_m: float = DETAIL_M) -> dict[str, 
 
 
 def _mesh(model: mujoco.MjModel, mesh: int) -> dict[str, object]:
-    """The corners that triangles use, as steps of the largest coordinate."""
+    """Return the corners that triangles use, quantised by the largest coordinate."""
     first = model.mesh_vertadr[mesh]
     faces = slice(model.mesh_faceadr[mesh], model.mesh_faceadr[mesh] + model.mesh_facenum[mesh])
     used, corners = np.unique(model.mesh_face[faces], return_inverse=True)
@@ -75,7 +76,7 @@ def _mesh(model: mujoco.MjModel, mesh: int) -> dict[str, object]:
 def body_poses(
     model: mujoco.MjModel, qpos: Float[np.ndarray, "N nq"]
 ) -> tuple[Float[np.ndarray, "N nbody 7"], Float[np.ndarray, "N nsite 3"]]:
-    """Place and turn of every body, and the places of all sites, at every moment."""
+    """Return the pose of every body and the positions of all sites, at every moment."""
     data = mujoco.MjData(model)
     poses, sites = np.zeros((len(qpos), model.nbody, 7)), np.zeros((len(qpos), model.nsite, 3))
     for index, row in enumerate(qpos):
@@ -87,7 +88,7 @@ def body_poses(
 
 
 def person_shape() -> dict[str, object]:
-    """The parts of a person between its keypoints: ends, radius and side."""
+    """Return the parts of a person between its keypoints: ends, radius and side."""
     bones = [
         {"from": parent, "to": child, "radius": RADII[bare(name)], "side": side_of(name)}
         for child, (parent, name) in enumerate(zip(PARENTS, KEYPOINT_NAMES, strict=True))
@@ -97,11 +98,11 @@ def person_shape() -> dict[str, object]:
 
 
 def bare(name: str) -> str:
-    """A name without its side."""
+    """Return a name without its side."""
     return name.removeprefix("left_").removeprefix("right_")
 
 
 def side_of(name: str) -> str:
-    """left, right or middle."""
+    """Return left, right or middle."""
     side = name.partition("_")[0]
     return side if side in ("left", "right") else "middle"

@@ -1,4 +1,4 @@
-"""A recorded run as a page shows it: player, source pane, sound and beats."""
+"""A recorded run for a page: player, source pane, sound and beats."""
 
 import base64
 import logging
@@ -29,13 +29,13 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class RecordedRun:
-    """What a pass has left.
+    """The results of a pass.
 
     Attributes:
-        robot: Who danced.
+        robot: The robot that danced.
         track, sequence, reference: Landmarks, person and target.
-        rollout_qpos: What was danced, from the first step.
-        policy: What was trained; None where a tracker danced.
+        rollout_qpos: The rollout, from the first step.
+        policy: The trained policy; None for a tracker.
     """
 
     robot: Robot
@@ -48,12 +48,12 @@ class RecordedRun:
 
 @dataclass(frozen=True)
 class ShownRun:
-    """What the page has of it.
+    """The content that a page has of a run.
 
     Attributes:
         player: The panes.
-        film, has_sound: mp4 of the source pane, and whether that is not silent.
-        beats: Beats and their figures; None where there is no music.
+        film, has_sound: mp4 of the source pane, and whether it has audible sound.
+        beats: Beats and their figures; None without music.
     """
 
     player: Player
