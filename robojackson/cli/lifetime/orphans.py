@@ -19,6 +19,8 @@ FAREWELL = b"all is well"
 HALF_WRITTEN = ".part-"
 """Beginning of the names of files that are being written: `pipeline.local_folder.TEMPORARY`; only
 the standard library is imported here."""
+GRACE_S = 35.0
+"""How long processes without a parent may take to end by themselves: a training saves, seconds."""
 KILL_S = 0.5
 """How long killed processes may take to be gone, seconds."""
 
@@ -55,9 +57,13 @@ def marked(mark: str) -> set[int]:
     return {pid for pid in pids if variable in _environment(pid)} - {os.getpid()}
 
 
-def end_all(mark: str) -> None:
-    """Ask every process that carries the mark to end."""
+def end_all(mark: str, grace_s: float = GRACE_S) -> None:
+    """Ask every process that carries the mark to end, and kill those that do not."""
+    deadline = time.monotonic() + grace_s
     _signal(marked(mark), signal.SIGTERM)
+    while marked(mark) and time.monotonic() < deadline:
+        time.sleep(KILL_S / 5)
+    kill_all(mark)
 
 
 def kill_all(mark: str, *more: int) -> set[Path]:
