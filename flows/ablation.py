@@ -24,6 +24,7 @@ from flows.runtime.tracebacks import without_tracebacks
 from flows.study.progress_table import ProgressTable
 from flows.study.study_plan import trainings_of
 from flows.video_pass.motion_stages import to_reference
+from robojackson.cli.lifetime.video_process import cores
 from robojackson.errors import RejectedReference, StudyFailed
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.robot_descriptions import describe_robot
@@ -38,7 +39,6 @@ from tasks.audit_rewards import audit_rewards
 from tasks.draw_pictures import draw_still
 from tasks.probe_video import SourceFile, probe_video
 from tasks.runtime.stage import labelled
-from tasks.runtime.worker_processes import cores
 from tasks.study_cell import Cell
 from tasks.write_study_page import write_study_page
 

@@ -18,6 +18,7 @@ from flows.runtime.launch import launch
 from flows.search.search_artifacts import publish_search
 from flows.search.search_entries import Entry, SearchResult, rows, summary
 from flows.search.search_pipeline import download_candidates, search_and_rank
+from robojackson.cli.lifetime.video_process import cores
 from robojackson.clips.web.video_candidate import VideoCandidate
 from robojackson.errors import NoPersonFound, SearchFailed
 from robojackson.pipeline.yaml_loader import build, load
@@ -25,7 +26,6 @@ from storage import candidate_catalogue
 from storage.artifact import Artifact
 from storage.leftovers import sweep
 from storage.store import Store
-from tasks.runtime.worker_processes import cores
 
 HUNTERS: ThreadPoolTaskRunner[Any] = ThreadPoolTaskRunner(max_workers=2 * cores())
 """Downloads wait for servers, assessments for their processes: more threads than cores."""

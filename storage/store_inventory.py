@@ -22,12 +22,14 @@ KINDS: dict[Kind, str] = {
     "work": "unfinished trainings, downloads and scratch files that no process holds",
     "unused": "results that no record, run or table refers to",
     "videos": "downloaded videos that only their catalogue refers to; downloaded again if needed",
-    "cache": "records of finished stages and what only they refer to; made again if needed",
+    "cache": "records of finished stages, what only they refer to, gains of feedback; made again",
     "runs": "pages and videos of finished dances, and what only they refer to",
     "kept": "tables, studies, walkers, robots, Prefect's database, what is in use: never removed",
 }
 """What each kind is, in the order in which they are listed."""
 WORK, PAGES, DOWNLOADS, WALKERS = "work", "dances", "downloads", "pretrain"
+FEEDBACK = "feedback"
+"""Where `rl.sim.feedback` keeps gains."""
 REFERRING: tuple[Kind, ...] = ("kept", "runs", "cache", "videos")
 """Kinds that refer to artifacts; the first of them that names one decides of which kind it is."""
 LOCKS = (TASK, PROCESS, HELD)
@@ -88,7 +90,7 @@ def _entries(root: Path) -> Iterator[Path]:
             yield path
         elif path.name == WORK:
             yield from _folders_with_files(path)
-        elif path.name in (stage_records.FOLDER, run_catalogue.FOLDER):
+        elif path.name in (stage_records.FOLDER, run_catalogue.FOLDER, FEEDBACK):
             yield from (file for file in sorted(path.rglob("*")) if file.is_file())
         elif path.name == PAGES or _has_artifacts(path):
             yield from sorted(path.iterdir())
@@ -113,7 +115,7 @@ def _kind_of(path: Path, named: Callable[[str], Kind | None]) -> Kind:
     top = path.parts[0]
     if top == WORK:
         return "work"
-    if top == stage_records.FOLDER:
+    if top in (stage_records.FOLDER, FEEDBACK):
         return "cache"
     if top in (PAGES, run_catalogue.FOLDER):
         return "runs"

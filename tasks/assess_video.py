@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
+from robojackson.cli.lifetime.video_process import in_video_process, probed
 from robojackson.clips.pose_detector import model_path
 from robojackson.clips.quality.assessment import Assessment, AssessmentConfig
 from robojackson.clips.quality.assessment import assess_video as measure
@@ -13,7 +14,6 @@ from storage import artifact_tables
 from storage.artifact import Artifact
 from storage.store import Store
 from tasks.runtime.stage import stage
-from tasks.runtime.worker_processes import in_worker
 
 
 def _models(parameters: Mapping[str, Any]) -> list[str]:
@@ -26,7 +26,8 @@ def assess_video(video: Artifact, config: AssessmentConfig) -> dict[str, Artifac
     (JSON)."""
     store = Store.from_environment()
     with store.local(video) as path:
-        found: Assessment = in_worker(measure, path, config)
+        frames = probed(path, config.video).frames
+        found: Assessment = in_video_process(measure, path, config, frames=frames)
     info = {key: value for key, value in asdict(found.info).items() if key != "path"}
     return {
         "landmarks": artifact_tables.save(store, "landmarks", "landmarks.parquet", found.track),

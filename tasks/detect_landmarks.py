@@ -4,6 +4,7 @@ import threading
 from collections.abc import Mapping
 from typing import Any
 
+from robojackson.cli.lifetime.video_process import in_video_process
 from robojackson.clips.people.dancer import DancerConfig
 from robojackson.clips.people.tracked_people import SCOUT
 from robojackson.clips.pose_detector import detect, model_path
@@ -16,7 +17,7 @@ from tasks.probe_video import info_of
 from tasks.runtime.stage import stage
 
 ONE_AT_A_TIME = threading.Lock()
-"""The detector uses all cores by itself, and redirects the process's stderr while it starts."""
+"""The detector uses all cores by itself."""
 
 
 def one_at_a_time() -> threading.Lock:
@@ -41,8 +42,10 @@ def detect_landmarks(
     store = Store.from_environment()
     with store.local(video) as path, one_at_a_time():
         known = info_of(store, info, path)
+        frames = known.frames
         if dancer:
-            track = landmark_pipeline.detect_landmarks(path, known, size, dancer)
+            work = landmark_pipeline.detect_landmarks
+            track = in_video_process(work, path, known, size, dancer, frames=frames)
         else:
-            track = detect(path, known, size)
+            track = in_video_process(detect, path, known, size, frames=frames)
     return artifact_tables.save(store, "landmarks", "landmarks.parquet", track)

@@ -17,7 +17,8 @@ from prefect.artifacts import create_progress_artifact, update_progress_artifact
 from prefect.context import TaskRunContext
 from prefect.logging import get_run_logger
 
-from robojackson.clips.video import VideoLimits, probe
+from robojackson.cli.lifetime.video_process import probed
+from robojackson.clips.video import VideoLimits
 from robojackson.clips.web.download_formats import FormatConfig, Purpose
 from robojackson.clips.web.untrusted_text import clean_text, in_markdown, safe_name
 from robojackson.clips.web.yt_dlp_client import Offer, WebConfig, fetch, offer
@@ -99,7 +100,7 @@ def _fetched(
 ) -> Artifact:
     path = fetch(chosen, folder, web, _Progress(video, chosen.name))
     try:
-        probe(path, limits)
+        probed(path, limits)
     except UnreadableVideo:
         path.unlink()
         raise

@@ -4,9 +4,10 @@ import json
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
+from robojackson.cli.lifetime.video_process import in_video_process, probed
 from robojackson.clips.time_range import span
 from robojackson.clips.trim import trim
-from robojackson.clips.video import VideoInfo, VideoLimits, probe
+from robojackson.clips.video import VideoInfo, VideoLimits
 from robojackson.files.local_folder import sha256_of_file
 from storage.artifact import Artifact
 from storage.store import Store
@@ -38,12 +39,13 @@ def probe_video(
     """Return `video` (the file, or its range) and `info` (size, rate and frames, JSON)."""
     store = Store.from_environment()
     if start_s is None and end_s is None:
-        return _save(store, source.path, probe(source.path, limits))
-    whole = probe(source.path, replace(limits, max_duration_s=None))
+        return _save(store, source.path, probed(source.path, limits))
+    whole = probed(source.path, replace(limits, max_duration_s=None))
     begin, end = span(whole, limits, start_s, end_s)
     with store.scratch() as folder:
-        clip = trim(source.path, begin, end, folder / f"{source.path.stem}.mp4")
-        return _save(store, clip, probe(clip, limits))
+        target = folder / f"{source.path.stem}.mp4"
+        in_video_process(trim, source.path, begin, end, target, frames=whole.frames)
+        return _save(store, target, probed(target, limits))
 
 
 def info_of(store: Store, info: Artifact, path: Path) -> VideoInfo:

@@ -81,8 +81,9 @@ def require_usable(
     source: Path, settings: "PipelineConfig", start_s: float | None, end_s: float | None
 ) -> None:
     """Raise what the flow would raise much later: no video of the source can be danced."""
+    from robojackson.cli.lifetime.video_process import probed
     from robojackson.clips.time_range import span
-    from robojackson.clips.video import list_videos, probe
+    from robojackson.clips.video import list_videos
 
     limits = settings.video
     trims = start_s is not None or end_s is not None
@@ -90,7 +91,7 @@ def require_usable(
     causes = []
     for path in list_videos(source):
         try:
-            span(probe(path, allowed), limits, start_s, end_s)
+            span(probed(path, allowed), limits, start_s, end_s)
             return
         except RoboJacksonError as cause:
             causes.append(cause)

@@ -10,7 +10,7 @@ from configs.find_config import FindConfig
 from robojackson.clips.sources import folder, is_local, page_of
 from robojackson.clips.sources import source as source_of
 from robojackson.clips.web.reachability import require_reachable
-from robojackson.clips.web.untrusted_text import clean_text, web_address
+from robojackson.clips.web.untrusted_text import clean_text
 from robojackson.errors import SearchFailed
 from robojackson.pipeline.yaml_loader import build, load
 from storage import candidate_catalogue
@@ -48,8 +48,6 @@ def require_online(dance: Dance, config: FindConfig) -> None:
     page = page_of(dance.source, dance.full_query, dance.address)
     if dance.source == "site" and not page:
         raise SearchFailed("site: no address; give one such as https://host/search?q={query}")
-    if page and not web_address(page):
-        raise SearchFailed(f"{dance.source}: {clean_text(page)} is no http address")
     if page:
         require_reachable(page, config.web.proxy)
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 from robojackson.cli import console
 from robojackson.cli.cards import command_line
+from robojackson.cli.lifetime.video_process import in_video_process, probed
 from robojackson.cli.stages import Figures, Overrides
 from robojackson.errors import RoboJacksonError, TrackTooShort, UnreadableVideo
-from robojackson.files.memory_limit import VIDEO_MEMORY, limited_memory
 from robojackson.pipeline.yaml_loader import load
 
 if TYPE_CHECKING:
@@ -35,16 +35,16 @@ def score(videos: list[Path], config: str, overrides: Overrides) -> Figures:
 
     settings = load(PipelineConfig, config, overrides)
     infos, found = _readable(videos, settings.video)
+    finder, which = (track_dancer, (settings.dancer,)) if settings.dancer.number else (detect, ())
     causes: list[RoboJacksonError] = []
     for info in infos:
         video = info.path
         try:
-            with console.bar(video.name) as progress, limited_memory(VIDEO_MEMORY):
-                if settings.dancer.number:
-                    which = settings.dancer
-                    track = track_dancer(video, info, settings.scoring_detector, which, progress)
-                else:
-                    track = detect(video, info, settings.scoring_detector, progress)
+            with console.bar(video.name) as progress:
+                track = in_video_process(
+                    finder, video, info, settings.scoring_detector, *which,
+                    frames=info.frames, progress=progress,
+                )  # fmt: skip
         except UNREADABLE as cause:
             causes.append(cause)
             found.append({"video": str(video), "error": str(cause)})
@@ -87,7 +87,7 @@ def _readable(
     Raises:
         RoboJacksonError: the first cause, when there is no video left.
     """
-    from robojackson.clips.video import list_videos, probe
+    from robojackson.clips.video import list_videos
 
     infos: list[VideoInfo] = []
     failed: list[Figures] = []
@@ -99,7 +99,7 @@ def _readable(
             if video.is_dir():
                 waiting[:0] = list_videos(video)
             else:
-                infos.append(probe(video, limits))
+                infos.append(probed(video, limits))
         except RoboJacksonError as cause:
             causes.append(cause)
             failed.append({"video": str(video), "error": str(cause)})

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robojackson.cli import cards, console
+from robojackson.cli.lifetime.video_process import in_video_process, probed
 from robojackson.errors import NoPersonFound, RejectedReference, TrackTooShort
 from robojackson.files.file_tree import results_in
 from robojackson.files.json_types import to_json_types
-from robojackson.files.memory_limit import VIDEO_MEMORY, limited_memory
 from robojackson.pipeline.yaml_loader import load
 from robojackson.rl.evaluation.verdict import NEEDS_FULL_LENGTH
 
@@ -36,21 +36,22 @@ def mocap(
     smpl_1.parquet..."""
     from robojackson.api.hypotheses import hypothesis_files, sample_hypotheses
     from robojackson.api.motions import load_weights, recover_motion
-    from robojackson.api.videos import detect_landmarks, probe_video
     from robojackson.cli.pictures import motion_source
     from robojackson.clips.quality.advice import advise
+    from robojackson.mocap.landmarks.landmark_pipeline import detect_landmarks
     from robojackson.pipeline.pipeline_config import PipelineConfig
 
     began = time.monotonic()
     settings = load(PipelineConfig, config, overrides)
     names = hypothesis_files(settings, hypotheses)
-    probe_video(video, limits=settings.video)
+    info = probed(video, settings.video)
     networks = load_weights(settings.network)
-    with results_in(out) as files, limited_memory(VIDEO_MEMORY):
-        track = detect_landmarks(
-            video, quality=settings.detector, limits=settings.video, config=settings.dancer,
-            progress=True,
-        )  # fmt: skip
+    with results_in(out) as files:
+        with console.bar(f"landmarks of {video.name}") as progress:
+            track = in_video_process(
+                detect_landmarks, video, info, settings.detector, settings.dancer,
+                frames=info.frames, progress=progress,
+            )  # fmt: skip
         try:
             sequence = recover_motion(
                 track, config=settings.mocap, networks=networks, video=video, progress=True

@@ -38,6 +38,7 @@ def start(command: Callable[[], int]) -> NoReturn:
     end.code = guarded(lambda: _run(command))
     if NEEDS_ITS_END not in sys.modules:
         _wait_for_threads()
+        _end_processes()
         end.leave()
     sys.exit(end.code)
 
@@ -47,6 +48,16 @@ def _wait_for_threads() -> None:
     for thread in threading.enumerate():
         if thread is not threading.current_thread() and not thread.daemon:
             thread.join()
+
+
+def _end_processes() -> None:
+    """End the daemons among the processes that this one has started, as Python does at its end."""
+    if "multiprocessing.process" in sys.modules:
+        from multiprocessing import active_children
+
+        for child in active_children():
+            child.kill()
+            child.join()
 
 
 NEEDS_ITS_END = "prefect"

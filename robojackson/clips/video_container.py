@@ -47,12 +47,7 @@ def opened(path: Path) -> av.container.InputContainer:
         UnreadableVideo: missing, empty, or not a video.
         TruncatedVideo: the file ends before its index.
     """
-    if path.is_dir():
-        raise UnreadableVideo("a folder, expected one video", path)
-    if not path.is_file():
-        raise UnreadableVideo("no such file", path)
-    if path.stat().st_size == 0:
-        raise UnreadableVideo("the file is empty (0 bytes)", path)
+    require_file(path)
     whitelists = {"protocol_whitelist": "file", "format_whitelist": ",".join(CONTAINERS)}
     try:
         return av.open(f"file:{path.absolute()}", container_options=whitelists)
@@ -63,6 +58,16 @@ def opened(path: Path) -> av.container.InputContainer:
             message = "cut off before its index; copy or download the file again"
             raise TruncatedVideo(message, path) from cause
         raise UnreadableVideo(_not_a_video(head), path) from cause
+
+
+def require_file(path: Path) -> None:
+    """Raise `UnreadableVideo` where there is no file that could be a video."""
+    if path.is_dir():
+        raise UnreadableVideo("a folder, expected one video", path)
+    if not path.is_file():
+        raise UnreadableVideo("no such file", path)
+    if path.stat().st_size == 0:
+        raise UnreadableVideo("the file is empty (0 bytes)", path)
 
 
 def _not_a_video(head: bytes) -> str:

@@ -39,7 +39,9 @@ def _ended(request: dict[str, object]) -> dict[str, float]:
     while True:
         ended, status, usage = os.wait4(child, os.WNOHANG)
         if ended:
-            return {"code": os.waitstatus_to_exitcode(status), "peak_kb": usage.ru_maxrss}
+            cpu_s = usage.ru_utime + usage.ru_stime
+            code = os.waitstatus_to_exitcode(status)
+            return {"code": code, "peak_kb": usage.ru_maxrss, "cpu_s": cpu_s}
         if time.monotonic() > until:
             os.killpg(child, 9)
         time.sleep(0.01)

@@ -184,13 +184,14 @@ def tables(store: Store) -> Tables:
 
 def leftovers(bench: Bench) -> list[str]:
     """Half-written files, scratch folders and the work of finished cells."""
-    return [str(path) for folder in bench.folders() for path in _left(folder)]
+    return [str(path) for folder in bench.folders() for path in leftovers_in(folder)]
 
 
-def _left(folder: Path) -> list[Path]:
+def leftovers_in(folder: Path) -> list[Path]:
+    """The same in one folder."""
     with suppress(FileNotFoundError):  # what goes away meanwhile is not left
         parts = list(folder.rglob(f"{TEMPORARY}*"))
         work = [path for path in folder.rglob("work/*") if path.name != SCRATCH]
         scratch = list(folder.rglob(f"work/{SCRATCH}/*"))
         return [*parts, *work, *scratch]
-    return _left(folder)
+    return leftovers_in(folder)

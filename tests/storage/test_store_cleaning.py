@@ -10,6 +10,7 @@ import pytest
 
 from robojackson.errors import StoreError
 from robojackson.pipeline.folder_lock import locked
+from robojackson.rl.sim import feedback
 from storage import stage_records
 from storage.artifact import Artifact
 from storage.store import Store
@@ -94,6 +95,14 @@ def test_tables_studies_walkers_and_robots_are_never_removed(store: Store) -> No
     ]
     remove(store, plan(store, ALL, 0.0))
     assert keys(store) == set(never)
+
+
+def test_gains_of_feedback_are_a_cache(store: Store) -> None:
+    gains = store.put(f"{feedback.FOLDER}/0123456789abcdef.npz", b"gains").key
+    assert [(item.kind, item.key) for item in inventory(store)] == [("cache", gains)]
+    assert not plan(store, USUAL, 0.0).going
+    assert [item.key for item in remove(store, plan(store, ("cache",), 0.0))] == [gains]
+    assert keys(store) == set()
 
 
 def test_a_result_that_a_study_names_stays(store: Store) -> None:

@@ -19,6 +19,8 @@ FAREWELL = b"all is well"
 HALF_WRITTEN = ".part-"
 """Prefix of the names of files that are being written: `files.local_folder.TEMPORARY`, repeated
 because only the standard library is imported here."""
+GRACE_S = 35.0
+"""Longest time that processes without a parent get to end by themselves (a training saves), seconds."""
 KILL_S = 0.5
 """Longest wait for killed processes to disappear, seconds."""
 
@@ -56,9 +58,13 @@ def marked(mark: str) -> set[int]:
     return {pid for pid in pids if variable in _environment(pid)} - {os.getpid()}
 
 
-def end_all(mark: str) -> None:
-    """Send SIGTERM to every process with the mark."""
+def end_all(mark: str, grace_s: float = GRACE_S) -> None:
+    """Send SIGTERM to every process with the mark; after the grace time, kill the rest."""
+    deadline = time.monotonic() + grace_s
     _signal(marked(mark), signal.SIGTERM)
+    while marked(mark) and time.monotonic() < deadline:
+        time.sleep(KILL_S / 5)
+    kill_all(mark)
 
 
 def kill_all(mark: str, *more: int) -> set[Path]:

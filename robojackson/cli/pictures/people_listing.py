@@ -5,6 +5,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from robojackson.cli import console
+from robojackson.cli.lifetime.video_process import in_video_process, probed
 from robojackson.files.file_tree import results_in
 from robojackson.pipeline.yaml_loader import load
 
@@ -21,16 +22,23 @@ def list_people(
     """
     from robojackson.clips.people.people_picture import draw_people
     from robojackson.clips.people.tracked_people import track_people
-    from robojackson.clips.video import probe
     from robojackson.errors import NoPersonFound
     from robojackson.pipeline.pipeline_config import PipelineConfig
 
     settings = load(PipelineConfig, config, overrides)
-    info = probe(video, settings.video)
+    info = probed(video, settings.video)
     with results_in(out) as files:
         with console.bar(f"people of {video.name}") as progress:
+<<<<<<< HEAD
             dancer = settings.dancer
             cast = track_people(video, info, dancer.detection, dancer.identity, progress)
+=======
+            who = settings.dancer
+            cast = in_video_process(
+                track_people, video, info, who.detection, who.identity,
+                frames=info.frames, progress=progress,
+            )  # fmt: skip
+>>>>>>> daf19fbb5402667c506af9b6ee4971c77b615d5e
         if not cast.rows:
             raise NoPersonFound(f"{cast}", video)
         files.write(PICTURE, draw_people(video, cast))

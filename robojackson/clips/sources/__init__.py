@@ -10,10 +10,10 @@ from importlib import import_module
 from pkgutil import iter_modules
 from typing import Protocol, cast
 
-from robojackson.clips.web.untrusted_text import web_address
+from robojackson.clips.web.untrusted_text import clean_text, web_address
 from robojackson.clips.web.video_candidate import VideoCandidate
 from robojackson.clips.web.yt_dlp_client import WebConfig
-from robojackson.errors import UnknownName
+from robojackson.errors import SearchFailed, UnknownName
 
 
 class Source(Protocol):
@@ -65,6 +65,10 @@ def page_of(name: str, query: str, address: str) -> str:
 
     Raises:
         UnknownName: as `source`.
+        SearchFailed: it is no address of the web.
     """
     page = getattr(source(name), "page", None)
-    return web_address(page(query, address)) if page else ""
+    named = page(query, address) if page else ""
+    if named and not web_address(named):
+        raise SearchFailed(f"{name}: {clean_text(named)} is no http address")
+    return web_address(named)

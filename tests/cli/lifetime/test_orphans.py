@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from robojackson.cli.lifetime.orphans import VARIABLE, end_all
 from tests.fixtures.commands import environment
 
 FLOW = """
@@ -43,6 +44,18 @@ def test_a_killed_flow_leaves_no_process(how: signal.Signals) -> None:
     while any(map(is_alive, started)) and time.monotonic() < until:
         time.sleep(0.05)
     assert [pid for pid in started if is_alive(pid)] == []
+
+
+def test_a_process_that_does_not_listen_is_killed() -> None:
+    deaf = (
+        "import signal, time; signal.signal(15, signal.SIG_IGN); print(flush=True); time.sleep(60)"
+    )
+    given = environment(**{VARIABLE: "deaf"})
+    with subprocess.Popen([sys.executable, "-c", deaf], env=given, stdout=subprocess.PIPE) as child:
+        assert child.stdout
+        child.stdout.readline()
+        end_all("deaf", grace_s=0.2)
+        assert child.wait(5) == -signal.SIGKILL
 
 
 def test_a_flow_that_ends_well_ends_nobody() -> None:

@@ -1,0 +1,204 @@
+"""Processes that open videos of strangers and find people in them, with limits of memory and time.
+
+A clip that fills the memory, hangs or kills its process ends that process alone. Frames stay
+inside: a function of a module and its arguments go in, what it returns (figures, a track) comes
+out. A process is kept for the next clip, because loading the pose model takes seconds. It is no
+sandbox: it may do what its user may do.
+"""
+
+import os
+import signal
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from contextlib import suppress
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from robojackson.cli.lifetime.parent_death import watch_parent
+from robojackson.errors import RoboJacksonError, UnreadableVideo
+from robojackson.files.memory_limit import VIDEO_MEMORY, limited_memory
+
+if TYPE_CHECKING:
+    from robojackson.clips.video import VideoInfo, VideoLimits
+
+R = TypeVar("R")
+Progress = Callable[[int, int], None]
+REPORT, ERROR, RESULT = "report", "error", "result"
+
+OPENING_S, FRAME_S = 300.0, 2.0
+"""Time that a video may take, and each of its frames beyond it, seconds: twenty times the usual on
+one busy core."""
+BETWEEN_REPORTS_S = 0.05
+ATTEMPTS = 2
+"""Of a clip whose process died: the machine may have been short of memory."""
+
+
+def cores() -> int:
+    """Return the cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def probed(path: Path, limits: "VideoLimits") -> "VideoInfo":
+    """Return what `clips.video.probe` finds, in a process of its own where there is a file at all.
+
+    Raises:
+        UnreadableVideo, TruncatedVideo, VideoTooLong, TrackTooShort: see there.
+    """
+    from robojackson.clips.video import probe
+    from robojackson.clips.video_container import require_file
+
+    require_file(path)
+    return in_video_process(probe, path, limits)
+
+
+def in_video_process(
+    function: Callable[..., R],
+    path: Path,
+    *args: Any,
+    frames: int = 0,
+    progress: Progress | None = None,
+) -> R:
+    """Call a function of a module with a video and more arguments in a process with limits.
+
+    Args:
+        frames: How many the function has to look at; its time grows with them.
+        progress: Is given to the function as its keyword `progress`, and called here.
+    Raises:
+        UnreadableVideo: the process took too long, too much memory, or died of it.
+        RoboJacksonError: what the function raised.
+    """
+    for _ in range(ATTEMPTS):
+        with _places:
+            reader = _free()
+            try:
+                return reader.call(function, (path, *args), OPENING_S + FRAME_S * frames, progress)
+            except EOFError:
+                how = reader.end()
+            finally:
+                if reader.is_idle:
+                    _idle.append(reader)
+    raise UnreadableVideo(
+        f"reading it killed the process ({how}); write it again (ffmpeg -i IN OUT.mp4)", path
+    )
+
+
+class _Reader:
+    """A process and the connection to it; used by one thread at a time."""
+
+    def __init__(self) -> None:
+        context = get_context("spawn")
+        self._connection, theirs = context.Pipe()
+        self._process = context.Process(target=_serve, args=(os.getpid(), theirs), daemon=True)
+        self._process.start()
+        theirs.close()
+        self.is_idle = True
+
+    def call(
+        self,
+        function: Callable[..., R],
+        args: tuple[Any, ...],
+        seconds: float,
+        progress: Progress | None,
+    ) -> R:
+        """Return what the function returns; whatever else happens, the process ends.
+
+        Raises:
+            EOFError: the process has died.
+        """
+        self.is_idle = False
+        until = time.monotonic() + seconds
+        try:
+            with suppress(BrokenPipeError, ConnectionResetError):  # the answer tells
+                self._connection.send((function, args, progress is not None))
+            while self._connection.poll(max(until - time.monotonic(), 0.0)):
+                kind, value = self._answer()
+                if kind != REPORT:
+                    break
+                if progress:
+                    progress(*value)
+            else:
+                raise UnreadableVideo(f"not read within {seconds:.0f} s; trim it", args[0])
+        except BaseException:
+            self.end()
+            raise
+        self.is_idle = True
+        if kind == ERROR:
+            raise value
+        result: R = value
+        return result
+
+    def end(self) -> str:
+        """Kill the process and return how it ended."""
+        self.is_idle = False
+        self._connection.close()
+        self._process.kill()
+        self._process.join()
+        code = self._process.exitcode or 0
+        return signal.Signals(-code).name if code < 0 else f"exit code {code}"
+
+    def _answer(self) -> tuple[str, Any]:
+        try:
+            found: tuple[str, Any] = self._connection.recv()
+        except OSError as cause:
+            raise EOFError from cause
+        return found
+
+
+_idle: list[_Reader] = []
+_places = threading.BoundedSemaphore(cores())
+
+
+def _free() -> _Reader:
+    """Return a process that waits for work, or a new one."""
+    with suppress(IndexError):  # another thread may take the last one
+        return _idle.pop()
+    return _Reader()
+
+
+def _serve(parent: int, connection: Connection) -> None:
+    """Do the work that comes until nobody is left to ask; leave Ctrl-C to the parent."""
+    os.environ["OMP_NUM_THREADS"] = "1"
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    watch_parent(parent)
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)  # what C++ writes as it dies
+    import cv2
+
+    cv2.setNumThreads(1)
+    with limited_memory(VIDEO_MEMORY), suppress(EOFError, BrokenPipeError):
+        while True:
+            function, args, reports = connection.recv()
+            more = {"progress": _Reporter(connection)} if reports else {}
+            connection.send(_outcome(function, args, more))
+
+
+def _outcome(
+    function: Callable[..., Any], args: tuple[Any, ...], more: dict[str, Any]
+) -> tuple[str, Any]:
+    try:
+        return RESULT, function(*args, **more)
+    except RoboJacksonError as error:
+        return ERROR, error
+    except MemoryError:
+        most = VIDEO_MEMORY / 2**30
+        message = f"takes more than {most:.1f} GB of memory; make it smaller (ffmpeg -vf scale)"
+        return ERROR, UnreadableVideo(message, args[0])
+    except Exception as error:
+        error.add_note(traceback.format_exc())
+        return ERROR, error
+
+
+class _Reporter:
+    """Sends how far the work is, a few times a second."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection, self._sent_s = connection, 0.0
+
+    def __call__(self, done: int, total: int) -> None:
+        now = time.monotonic()
+        if done >= total or now >= self._sent_s + BETWEEN_REPORTS_S:
+            self._sent_s = now
+            self._connection.send((REPORT, (done, total)))
