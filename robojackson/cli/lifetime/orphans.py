@@ -20,7 +20,7 @@ HALF_WRITTEN = ".part-"
 """Prefix of the names of files that are being written: `files.local_folder.TEMPORARY`, repeated
 because only the standard library is imported here."""
 GRACE_S = 35.0
-"""Longest time that processes without a parent get to end by themselves (a training saves), seconds."""
+"""Grace time of processes without a parent, in which a training saves, seconds."""
 KILL_S = 0.5
 """Longest wait for killed processes to disappear, seconds."""
 
