@@ -4,22 +4,20 @@ Metres, quaternions wxyz, world frame; arrays travel as base64 of little-endian 
 """
 
 import base64
-import copy
-
 import mujoco
 import numpy as np
 from jaxtyping import Float
 
 from robojackson.body.skeleton import KEYPOINT_NAMES, PARENTS
-from robojackson.report.video.mesh_detail import simplify
+from robojackson.geometry.surface import shaded
 from robojackson.report.video.robot_scene import shadowing
 
 DETAIL_M = 0.009
 """Smallest detail of a mesh; a robot of 30 meshes then has some 40,000 triangles."""
 ROUGH_M = 0.018
 """The same for shadows, and for browsers that draw on the processor."""
-MESH_STEPS = 32767
-"""Steps of a mesh's largest coordinate."""
+MESH_STEPS, NORMAL_STEPS = 32767, 127
+"""Steps of a mesh's largest coordinate, and of a normal's."""
 RADII = {
     "hip": 0.085, "spine1": 0.105, "spine2": 0.11, "spine3": 0.115, "knee": 0.072, "ankle": 0.048,
     "foot": 0.042, "neck": 0.1, "head": 0.052, "collar": 0.075, "shoulder": 0.07, "elbow": 0.043,
@@ -35,15 +33,12 @@ def packed(values: np.ndarray, kind: type[np.generic] = np.float32) -> str:
 
 def robot_shape(model: mujoco.MjModel, detail_m: float = DETAIL_M) -> dict[str, object]:
     """The visible geoms of a robot by body; meshes with details of a given size."""
-    small, coarse = copy.copy(model), copy.copy(model)
-    simplify(small, detail_m)
-    simplify(coarse, ROUGH_M)
     geoms, meshes = [], {}
     for geom in shadowing(model):
         kind = mujoco.mjtGeom(int(model.geom_type[geom])).name.removeprefix("mjGEOM_").lower()
         mesh = int(model.geom_dataid[geom])
         if kind == "mesh" and mesh not in meshes:
-            meshes[mesh] = {**_mesh(small, mesh), "rough": _mesh(coarse, mesh)}
+            meshes[mesh] = {**_mesh(model, mesh, detail_m), "rough": _mesh(model, mesh, ROUGH_M)}
         geoms.append(
             {
                 "body": int(model.geom_bodyid[geom]),
@@ -57,18 +52,20 @@ def robot_shape(model: mujoco.MjModel, detail_m: float = DETAIL_M) -> dict[str, 
     return {"bodies": model.nbody, "geoms": geoms, "meshes": meshes}
 
 
-def _mesh(model: mujoco.MjModel, mesh: int) -> dict[str, object]:
-    """The corners that triangles use, as steps of the largest coordinate."""
+def _mesh(model: mujoco.MjModel, mesh: int, cell_m: float) -> dict[str, object]:
+    """A mesh, its corners as steps of the largest coordinate."""
     first = model.mesh_vertadr[mesh]
     faces = slice(model.mesh_faceadr[mesh], model.mesh_faceadr[mesh] + model.mesh_facenum[mesh])
-    used, corners = np.unique(model.mesh_face[faces], return_inverse=True)
-    vertices = model.mesh_vert[first + used]
-    scale = float(np.abs(vertices).max()) / MESH_STEPS
+    vertices = model.mesh_vert[first : first + model.mesh_vertnum[mesh]]
+    surface = shaded(vertices, model.mesh_face[faces], cell_m)
+    scale = max(float(np.abs(surface.vertices).max(initial=0.0)), 1e-9) / MESH_STEPS
+    wide = len(surface.vertices) > 1 << 16
     return {
         "scale": scale,
-        "vertices": packed(np.round(vertices / scale), np.int16),
-        "faces": packed(corners, np.uint16 if len(used) <= 1 << 16 else np.uint32),
-        "wide": len(used) > 1 << 16,
+        "vertices": packed(np.round(surface.vertices / scale), np.int16),
+        "normals": packed(np.round(surface.normals * NORMAL_STEPS), np.int8),
+        "faces": packed(surface.faces, np.uint32 if wide else np.uint16),
+        "wide": wide,
     }
 
 
