@@ -4,13 +4,14 @@ Metres, quaternions wxyz, world frame; arrays travel as base64 of little-endian 
 """
 
 import base64
+
 import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from robojackson.body.skeleton import KEYPOINT_NAMES, PARENTS
+from robojackson.body.skeleton import KEYPOINT_NAMES, PARENTS, part_radius, side_of
 from robojackson.geometry.surface import shaded
-from robojackson.report.video.robot_scene import shadowing
+from robojackson.robot.body_states import drawn_geoms
 
 DETAIL_M = 0.009
 """Smallest detail of a mesh; a robot of 30 meshes then has some 40,000 triangles."""
@@ -18,12 +19,6 @@ ROUGH_M = 0.018
 """The same for shadows, and for browsers that draw on the processor."""
 MESH_STEPS, NORMAL_STEPS = 32767, 127
 """Steps of a mesh's largest coordinate, and of a normal's."""
-RADII = {
-    "hip": 0.085, "spine1": 0.105, "spine2": 0.11, "spine3": 0.115, "knee": 0.072, "ankle": 0.048,
-    "foot": 0.042, "neck": 0.1, "head": 0.052, "collar": 0.075, "shoulder": 0.07, "elbow": 0.043,
-    "wrist": 0.035, "hand": 0.032, "head_top": 0.1, "middle": 0.022, "big_toe": 0.032,
-}  # fmt: skip
-"""Radius of the part that ends at a keypoint, metres, by its name without the side."""
 
 
 def packed(values: np.ndarray, kind: type[np.generic] = np.float32) -> str:
@@ -34,7 +29,7 @@ def packed(values: np.ndarray, kind: type[np.generic] = np.float32) -> str:
 def robot_shape(model: mujoco.MjModel, detail_m: float = DETAIL_M) -> dict[str, object]:
     """The visible geoms of a robot by body; meshes with details of a given size."""
     geoms, meshes = [], {}
-    for geom in shadowing(model):
+    for geom in drawn_geoms(model):
         kind = mujoco.mjtGeom(int(model.geom_type[geom])).name.removeprefix("mjGEOM_").lower()
         mesh = int(model.geom_dataid[geom])
         if kind == "mesh" and mesh not in meshes:
@@ -86,19 +81,8 @@ def body_poses(
 def person_shape() -> dict[str, object]:
     """The parts of a person between its keypoints: ends, radius and side."""
     bones = [
-        {"from": parent, "to": child, "radius": RADII[bare(name)], "side": side_of(name)}
+        {"from": parent, "to": child, "radius": part_radius(name), "side": side_of(name)}
         for child, (parent, name) in enumerate(zip(PARENTS, KEYPOINT_NAMES, strict=True))
         if parent >= 0
     ]
     return {"points": len(KEYPOINT_NAMES), "bones": bones}
-
-
-def bare(name: str) -> str:
-    """A name without its side."""
-    return name.removeprefix("left_").removeprefix("right_")
-
-
-def side_of(name: str) -> str:
-    """left, right or middle."""
-    side = name.partition("_")[0]
-    return side if side in ("left", "right") else "middle"
