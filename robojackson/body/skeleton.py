@@ -57,6 +57,25 @@ HEEL_OFFSET = np.array([0.0, -0.08, -0.05])
 SOLE_BELOW_TOE = 0.01
 """Thickness of the foot under the big toe's point, metres."""
 
+PART_RADII: dict[str, float] = {
+    "hip": 0.085, "spine1": 0.105, "spine2": 0.11, "spine3": 0.115, "knee": 0.072, "ankle": 0.048,
+    "foot": 0.042, "neck": 0.1, "head": 0.052, "collar": 0.075, "shoulder": 0.07, "elbow": 0.043,
+    "wrist": 0.035, "hand": 0.032, "head_top": 0.1, "middle": 0.022, "big_toe": 0.032,
+}  # fmt: skip
+"""Radius of the rounded part that ends at a keypoint, metres, by its name without the side: a body
+to look at."""
+
+
+def side_of(name: str) -> str:
+    """Return left, right or middle."""
+    side = name.partition("_")[0]
+    return side if side in ("left", "right") else "middle"
+
+
+def part_radius(name: str) -> float:
+    """Return the radius of the part that ends at a keypoint, metres."""
+    return PART_RADII[name.removeprefix("left_").removeprefix("right_")]
+
 
 def keypoint(name: str) -> int:
     """Return the index of a keypoint; an unknown name raises `UnknownName` with the known ones."""

@@ -77,7 +77,7 @@ def export(
         write_motion(source, out, to, robot)
         motion = read_motion(source)
         if isinstance(motion, SmplSequence):
-            about = {"frames": len(motion), "fps": motion.fps, **_person_verdict(motion, out)}
+            about = {"frames": len(motion), "fps": motion.fps, **_person_verdict(motion, to, out)}
         else:
             about = {"robot": motion.robot, "steps": len(motion)}
             about |= _robot_verdict(motion, source)
@@ -132,11 +132,13 @@ def _policy_verdict(out: Path) -> dict[str, object]:
     return {"verdict": {"kind": "written", "sentence": sentence}, "next": following}
 
 
-def _person_verdict(motion: SmplSequence, out: Path) -> dict[str, object]:
+def _person_verdict(motion: SmplSequence, to: str, out: Path) -> dict[str, object]:
     seconds, fps = len(motion) / motion.fps, motion.fps
     sentence = f"The whole motion is in the file: {seconds:.1f} s at {fps:.4g} frames a second."
-    following = cards.command_line("import", out, "-o", out.with_suffix(""))
-    return {"verdict": {"kind": "written", "sentence": sentence}, "next": following}
+    verdict: dict[str, object] = {"verdict": {"kind": "written", "sentence": sentence}}
+    if to not in registry.importers():
+        return verdict
+    return verdict | {"next": cards.command_line("import", out, "-o", out.with_suffix(""))}
 
 
 def _robot_verdict(motion: ReferenceMotion, source: Path) -> dict[str, object]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from robojackson.errors import UnknownName
 from robojackson.motion.reference_motion import ReferenceMotion
@@ -64,6 +64,12 @@ def names(model: mujoco.MjModel, kind: str) -> list[str]:
     count = {"body": model.nbody, "joint": model.njnt, "site": model.nsite}[kind]
     accessor = getattr(model, kind)
     return [accessor(index).name for index in range(count)]
+
+
+def drawn_geoms(model: mujoco.MjModel) -> Int[np.ndarray, " G"]:
+    """Return the numbers of a robot's geoms that are drawn."""
+    shown = mujoco.MjvOption().geomgroup[model.geom_group] > 0
+    return np.flatnonzero((model.geom_bodyid > 0) & shown & (model.geom_rgba[:, 3] > 0))
 
 
 def _row(

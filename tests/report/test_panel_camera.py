@@ -46,7 +46,7 @@ IN_THE_DARK = """
 
 def edge(picture: np.ndarray) -> np.ndarray:
     """The outermost pixels below the title, (N, 3)."""
-    below = picture[canvas.strip_height(picture.shape[1]) :].astype(int)
+    below = picture[canvas.strip_height(*picture.shape[1::-1]) :].astype(int)
     return np.concatenate([below[0], below[-1], below[:, 0], below[:, -1]])
 
 
@@ -79,7 +79,7 @@ def test_every_point_is_in_the_panel_below_the_title(azimuth_deg: float, scale: 
     points = scale * np.random.default_rng(5).uniform((-1, -1, 0), (1, 1, 2), (200, 3))
     framing = fit([Subject(points, azimuth_deg)], 320, 480)
     pixels = view_of(np.zeros(2), azimuth_deg, 320, 480, framing).project(points)
-    assert (pixels > [0, canvas.strip_height(320)]).all()
+    assert (pixels > [0, canvas.strip_height(320, 480)]).all()
     assert (pixels < [320, 480]).all()
 
 
@@ -92,7 +92,7 @@ def test_no_nearer_camera_has_every_point_in_its_panel() -> None:
     for each in nearer:
         pixels = view_of(np.zeros(2), 0.0, 320, 480, each).project(points) - [160, 240]
         over = np.abs(pixels).max(0) > room
-        assert over.any() or pixels[:, 1].min() < -room[1] + canvas.strip_height(320)
+        assert over.any() or pixels[:, 1].min() < -room[1] + canvas.strip_height(320, 480)
 
 
 def test_without_a_subject_the_camera_stands_where_it_always_did() -> None:

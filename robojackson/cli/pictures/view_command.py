@@ -20,6 +20,7 @@ class View(StrEnum):
     GIF = "gif"
     WEBP = "webp"
     RERUN = "rerun"
+    GLTF = "gltf"
 
 
 @command
@@ -29,7 +30,10 @@ def view(
     out: Annotated[Path | None, typer.Option("-o", "--out", help="File to write.")] = None,
     as_json: Json = False,
 ) -> CommandResult:
-    """Open the page of a run; --to writes its video as GIF or WebP, or the run for Rerun (.rrd)."""
+    """Open the page of a run; --to writes its video as GIF or WebP, or the run for other viewers.
+
+    rerun is a recording for Rerun (.rrd); gltf is dancer, reference and robot in motion (.glb).
+    """
     if to is None:
         page = file / PAGE if file.is_dir() else file
         if not page.is_file():
@@ -39,13 +43,20 @@ def view(
         return CommandResult({"page": str(page), "opened": opened}, text=[f"{word} {page}"])
     if out is None:
         raise BadConfiguration(f"--to {to} writes a file: name it with -o FILE")
+    folder = file if file.is_dir() else file.parent
     if to is View.RERUN:
         from robojackson.api.rerun_export import write_rerun
 
-        write_rerun(file if file.is_dir() else file.parent, out)
+        write_rerun(folder, out)
+    elif to is View.GLTF:
+        from robojackson.api.gltf_export import write_gltf
+
+        write_gltf(folder, out)
     else:
+        from robojackson.api.run_folder import FILMS, one_of
         from robojackson.report.video.animation import write_animation
 
-        write_animation(file / "dance.mp4" if file.is_dir() else file, out, to.value)
+        is_film = file.is_file() and file.suffix != ".html"
+        write_animation(file if is_film else one_of(folder, FILMS), out, to.value)
     size = out.stat().st_size
     return CommandResult({"file": str(out), "bytes": size}, text=[f"{out}  {size:,} bytes"])

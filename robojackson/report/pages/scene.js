@@ -19,7 +19,7 @@ const Stage = (() => {
     const whole = new Int16Array(bytes(mesh.vertices)), geometry = new T.BufferGeometry();
     geometry.setAttribute('position', new T.BufferAttribute(Float32Array.from(whole, (steps) => steps * mesh.scale), 3));
     geometry.setIndex(new T.BufferAttribute(new (mesh.wide ? Uint32Array : Uint16Array)(bytes(mesh.faces)), 1));
-    geometry.computeVertexNormals();
+    geometry.setAttribute('normal', new T.BufferAttribute(Float32Array.from(new Int8Array(bytes(mesh.normals)), (steps) => steps / 127), 3));
     return geometry;
   }
 
@@ -69,7 +69,6 @@ const Stage = (() => {
   function robot(shape, material, shadowMaterial, simple = false) {
     const group = new T.Group(), bones = Array.from({ length: shape.bodies }, () => new T.Bone());
     const skeleton = new T.Skeleton(bones, bones.map(() => new T.Matrix4()));
-    material.flatShading = Object.keys(shape.meshes).length > 0;
     shape.rough ??= merged(shape, true); shape.fine ??= simple ? shape.rough : merged(shape, false);
     const build = (geometry, dressed) => {
       const mesh = new T.SkinnedMesh(geometry, dressed);

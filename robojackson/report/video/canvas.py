@@ -48,17 +48,17 @@ def draw_dot(picture: Picture, centre: np.ndarray, colour: Colour, radius: int) 
 
 
 def label(picture: Picture, title: str, note: str = "") -> None:
-    """Draw a title, and a note in grey after it, on a darkened strip at the top, in place."""
-    strip = _strip(title, note, picture.shape[1])
+    """A title, and a note in grey after it, on a darkened strip at the top, in place."""
+    strip = _strip(title, note, picture.shape[1], picture.shape[0])
     height = strip.shape[0]
     mixed = picture[:height] * 0.25 + strip * 0.75
     bright = strip.max(-1, keepdims=True) > 60
     picture[:height] = np.where(bright, strip, mixed).astype(np.uint8)
 
 
-def strip_height(width: int) -> int:
-    """Return the height of the title's strip over a panel of that width, pixels."""
-    return 2 * _letter_height(width)
+def strip_height(width: int, height: int) -> int:
+    """Pixels of the strip of a title over a panel of that size."""
+    return 2 * _letter_height(width, height)
 
 
 def crop_box(
@@ -111,8 +111,8 @@ def side_by_side(panels: Sequence[Picture], gap: int = 2) -> Picture:
 
 
 @lru_cache(maxsize=64)
-def _strip(title: str, note: str, width: int) -> Picture:
-    size = _letter_height(width)
+def _strip(title: str, note: str, width: int, height: int) -> Picture:
+    size = _letter_height(width, height)
     image = Image.new("RGB", (width, size * 2), (16, 18, 24))
     draw = ImageDraw.Draw(image)
     font = ImageFont.load_default(size)
@@ -122,8 +122,8 @@ def _strip(title: str, note: str, width: int) -> Picture:
     return np.array(image)
 
 
-def _letter_height(width: int) -> int:
-    return max(11, width // 22)
+def _letter_height(width: int, height: int) -> int:
+    return max(11, min(width // 22, height // 30))
 
 
 def _fixed_point(at: np.ndarray) -> tuple[int, int]:

@@ -9,6 +9,8 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
+from robojackson.geometry.surface import cells, one_number
+
 
 def simplify(model: mujoco.MjModel, cell_m: float) -> None:
     """Merge the vertices of a model's meshes, in place; for drawing only.
@@ -29,9 +31,8 @@ def simplify(model: mujoco.MjModel, cell_m: float) -> None:
 
 
 def _merged(vertices: Float[np.ndarray, "V 3"], cell_m: float) -> Int[np.ndarray, " V"]:
-    """Return, for each vertex, the one that replaces its cell: the nearest to the cell's mean."""
-    cells = np.floor(vertices / cell_m).astype(np.int64)
-    _, cell = np.unique(_keys(cells - cells.min(0)), return_inverse=True)
+    """Return, for each vertex, the one that stands for its cell: the nearest to the cell's mean."""
+    cell = cells(vertices, cell_m)
     count = np.bincount(cell)[:, None]
     mean = np.stack([np.bincount(cell, column) for column in vertices.T], 1) / count
     off = np.linalg.norm(vertices - mean[cell], axis=1)
@@ -43,12 +44,5 @@ def _distinct(corners: Int[np.ndarray, "F 3"]) -> Int[np.ndarray, " K"]:
     """Return the triangles with an area, each once."""
     a, b, c = corners.T
     solid = np.flatnonzero((a != b) & (b != c) & (c != a))
-    _, once = np.unique(_keys(np.sort(corners[solid], axis=1)), return_index=True)
+    _, once = np.unique(one_number(np.sort(corners[solid], axis=1)), return_index=True)
     return np.sort(solid[once])
-
-
-def _keys(numbers: Int[np.ndarray, "N 3"]) -> Int[np.ndarray, " N"]:
-    """Return one number for each three; up to 2^21 values of each are distinguished."""
-    x, y, z = numbers.astype(np.int64).T
-    keys: np.ndarray = (x << 42) + (y << 21) + z
-    return keys

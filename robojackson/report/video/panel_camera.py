@@ -131,7 +131,7 @@ def _edges(axes: Float[np.ndarray, "3 3"], width: int, height: int) -> list[Floa
     place."""
     room = ROOM * height
     beside = width / 2 - room
-    below, above = height / 2 - room, height / 2 - room - strip_height(width)
+    below, above = height / 2 - room, height / 2 - room - strip_height(width, height)
     sides = ((axes[0], beside), (-axes[0], beside), (axes[1], below), (-axes[1], above))
     return [FOCAL * height / max(pixels, 1.0) * outward - axes[2] for outward, pixels in sides]
 

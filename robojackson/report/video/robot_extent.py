@@ -4,7 +4,8 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
-from robojackson.report.video.robot_scene import SHADOW_REACH, shadowing
+from robojackson.report.video.robot_scene import SHADOW_REACH
+from robojackson.robot.body_states import drawn_geoms
 
 SIGNS = np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, -1).T
 
@@ -25,9 +26,8 @@ def room_of(
     qpos: Float[np.ndarray, "N nq"],
     targets: Float[np.ndarray, "N 2"],
 ) -> Float[np.ndarray, "M 3"]:
-    """Return the corners of a robot and its shadows in every pose, relative to the camera's
-    target."""
-    data, geoms = mujoco.MjData(model), shadowing(model)
+    """Corners of a robot and its shadows in every pose, relative to where the camera looks."""
+    data, geoms = mujoco.MjData(model), drawn_geoms(model)
     reach = SHADOW_REACH * model.geom_rbound[geoms, None, None] * SIGNS[:4, :2]
     found = []
     for pose, target in zip(qpos, targets, strict=True):

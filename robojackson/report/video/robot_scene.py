@@ -14,6 +14,7 @@ from jaxtyping import Float
 from robojackson.report.video.canvas import BACKDROP, Picture
 from robojackson.report.video.mesh_detail import simplify
 from robojackson.report.video.panel_camera import FOCAL
+from robojackson.robot.body_states import drawn_geoms
 
 Tint = tuple[float, float, float]
 SHADOW_ALPHA, SHADOW_HEIGHT = 0.28, 0.004
@@ -58,17 +59,11 @@ def furnish(
     """Add floor, grid and shadows to a scene that was just updated, and replace its lights."""
     _light(scene)
     _add_floor(scene, np.round(target / LINE_CELL) * LINE_CELL)
-    for geom in shadowing(model):
+    for geom in drawn_geoms(model):
         radius = SHADOW_REACH * float(model.geom_rbound[geom])
         at = [*data.geom_xpos[geom, :2], SHADOW_HEIGHT]
         size = [radius, radius, SHADOW_HEIGHT / 4]
         _add(scene, mujoco.mjtGeom.mjGEOM_ELLIPSOID, size, at, (0.0, 0.0, 0.0), SHADOW_ALPHA)
-
-
-def shadowing(model: mujoco.MjModel) -> np.ndarray:
-    """Return the indices of a robot's visible geoms."""
-    shown = mujoco.MjvOption().geomgroup[model.geom_group] > 0
-    return np.flatnonzero((model.geom_bodyid > 0) & shown & (model.geom_rgba[:, 3] > 0))
 
 
 def on_backdrop(picture: Picture, depth: Float[np.ndarray, "H W"]) -> Picture:

@@ -58,7 +58,10 @@ class SourceClip:
         self._body = None if sequence is None else skeleton_in_image(sequence, track)
         seen = [self._found, *([] if self._body is None else [self._body])]
         around = np.concatenate([points.reshape(-1, 2) for points in seen])
-        self._box = canvas.crop_box(around, (track.width, track.height), width / height)
+        strip = canvas.strip_height(width, height)
+        box = canvas.crop_box(around, (track.width, track.height), width / (height - strip))
+        over = round(box[3] * strip / (height - strip))
+        self._box = box[0], box[1] - over, box[2], box[3] + over
         self._row = {int(frame): track.nearest(frame / track.fps) for frame in frames}
         self._pictures = self._cut(source)
 

@@ -5,28 +5,21 @@ Metres, quaternions wxyz, world frame; arrays are base64 of little-endian number
 """
 
 import base64
-import copy
 
 import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from robojackson.body.skeleton import KEYPOINT_NAMES, PARENTS
-from robojackson.report.video.mesh_detail import simplify
-from robojackson.report.video.robot_scene import shadowing
+from robojackson.body.skeleton import KEYPOINT_NAMES, PARENTS, part_radius, side_of
+from robojackson.geometry.surface import shaded
+from robojackson.robot.body_states import drawn_geoms
 
 DETAIL_M = 0.009
 """Smallest detail of a mesh; a robot of 30 meshes then has some 40,000 triangles."""
 ROUGH_M = 0.018
-"""Smallest detail for shadows, and for browsers that draw on the processor."""
-MESH_STEPS = 32767
-"""Quantisation of a mesh's largest coordinate."""
-RADII = {
-    "hip": 0.085, "spine1": 0.105, "spine2": 0.11, "spine3": 0.115, "knee": 0.072, "ankle": 0.048,
-    "foot": 0.042, "neck": 0.1, "head": 0.052, "collar": 0.075, "shoulder": 0.07, "elbow": 0.043,
-    "wrist": 0.035, "hand": 0.032, "head_top": 0.1, "middle": 0.022, "big_toe": 0.032,
-}  # fmt: skip
-"""Radius of the part that ends at a keypoint, metres, by its name without the side."""
+"""The same for shadows, and for browsers that draw on the processor."""
+MESH_STEPS, NORMAL_STEPS = 32767, 127
+"""Steps of a mesh's largest coordinate, and of a normal's."""
 
 
 def packed(values: np.ndarray, kind: type[np.generic] = np.float32) -> str:
@@ -35,16 +28,13 @@ def packed(values: np.ndarray, kind: type[np.generic] = np.float32) -> str:
 
 
 def robot_shape(model: mujoco.MjModel, detail_m: float = DETAIL_M) -> dict[str, object]:
-    """Return the visible geoms of a robot by body; meshes with details of a given size."""
-    small, coarse = copy.copy(model), copy.copy(model)
-    simplify(small, detail_m)
-    simplify(coarse, ROUGH_M)
+    """The visible geoms of a robot by body; meshes with details of a given size."""
     geoms, meshes = [], {}
-    for geom in shadowing(model):
+    for geom in drawn_geoms(model):
         kind = mujoco.mjtGeom(int(model.geom_type[geom])).name.removeprefix("mjGEOM_").lower()
         mesh = int(model.geom_dataid[geom])
         if kind == "mesh" and mesh not in meshes:
-            meshes[mesh] = {**_mesh(small, mesh), "rough": _mesh(coarse, mesh)}
+            meshes[mesh] = {**_mesh(model, mesh, detail_m), "rough": _mesh(model, mesh, ROUGH_M)}
         geoms.append(
             {
                 "body": int(model.geom_bodyid[geom]),
@@ -58,18 +48,20 @@ def robot_shape(model: mujoco.MjModel, detail_m: float = DETAIL_M) -> dict[str, 
     return {"bodies": model.nbody, "geoms": geoms, "meshes": meshes}
 
 
-def _mesh(model: mujoco.MjModel, mesh: int) -> dict[str, object]:
-    """Return the corners that triangles use, quantised by the largest coordinate."""
+def _mesh(model: mujoco.MjModel, mesh: int, cell_m: float) -> dict[str, object]:
+    """A mesh, its corners as steps of the largest coordinate."""
     first = model.mesh_vertadr[mesh]
     faces = slice(model.mesh_faceadr[mesh], model.mesh_faceadr[mesh] + model.mesh_facenum[mesh])
-    used, corners = np.unique(model.mesh_face[faces], return_inverse=True)
-    vertices = model.mesh_vert[first + used]
-    scale = float(np.abs(vertices).max()) / MESH_STEPS
+    vertices = model.mesh_vert[first : first + model.mesh_vertnum[mesh]]
+    surface = shaded(vertices, model.mesh_face[faces], cell_m)
+    scale = max(float(np.abs(surface.vertices).max(initial=0.0)), 1e-9) / MESH_STEPS
+    wide = len(surface.vertices) > 1 << 16
     return {
         "scale": scale,
-        "vertices": packed(np.round(vertices / scale), np.int16),
-        "faces": packed(corners, np.uint16 if len(used) <= 1 << 16 else np.uint32),
-        "wide": len(used) > 1 << 16,
+        "vertices": packed(np.round(surface.vertices / scale), np.int16),
+        "normals": packed(np.round(surface.normals * NORMAL_STEPS), np.int8),
+        "faces": packed(surface.faces, np.uint32 if wide else np.uint16),
+        "wide": wide,
     }
 
 
@@ -90,19 +82,8 @@ def body_poses(
 def person_shape() -> dict[str, object]:
     """Return the parts of a person between its keypoints: ends, radius and side."""
     bones = [
-        {"from": parent, "to": child, "radius": RADII[bare(name)], "side": side_of(name)}
+        {"from": parent, "to": child, "radius": part_radius(name), "side": side_of(name)}
         for child, (parent, name) in enumerate(zip(PARENTS, KEYPOINT_NAMES, strict=True))
         if parent >= 0
     ]
     return {"points": len(KEYPOINT_NAMES), "bones": bones}
-
-
-def bare(name: str) -> str:
-    """Return a name without its side."""
-    return name.removeprefix("left_").removeprefix("right_")
-
-
-def side_of(name: str) -> str:
-    """Return left, right or middle."""
-    side = name.partition("_")[0]
-    return side if side in ("left", "right") else "middle"
