@@ -31,6 +31,7 @@ class FootPinningConfig:
         wobble: Spread of the path's second difference at 30 frames a second, metres.
         ramp_s: Time over which a standing foot goes over to a moving one, seconds.
         fade_s: Time over which the correction of a pinned foot fades when it leaves, seconds.
+        reach_m: A foot that a pin would move further than this does not stand there, metres.
         rounds: How often contacts, path and pins are found anew.
     """
 
@@ -40,6 +41,7 @@ class FootPinningConfig:
     wobble: float = 0.003
     ramp_s: float = 0.1
     fade_s: float = 0.2
+    reach_m: float = 0.12
     rounds: PositiveInt = 2
 
 
@@ -138,6 +140,14 @@ def pin_offsets(
             target[start:end] = off
         offsets[:, side] = faded(target, ramp)
     return offsets
+
+
+def within_reach(
+    planted: np.ndarray, pins: Float[np.ndarray, "T 2 3"], reach: float
+) -> np.ndarray:
+    """Planted points of the feet that their pins move no further than `reach` along the floor."""
+    near = np.linalg.norm(pins[..., :2], axis=-1) <= reach
+    return np.asarray(planted & np.repeat(near, 2, axis=1))
 
 
 def faded(target: Float[np.ndarray, "T N"], ramp: float) -> Float[np.ndarray, "T N"]:

@@ -48,6 +48,8 @@ class RefineConfig:
         depth_m: Spread of the detector's depth relative to the hips, metres.
         bone_m: Spread of a bone's length in one frame, metres.
         acceleration_mps2: Spread of a joint's acceleration, m/s^2.
+        leash_m: A landmark moves no further than this from where it was, seen from the hips, metres:
+            what needs more is a frame in which the terms contradict each other.
         rounds: Gauss-Newton steps.
     """
 
@@ -56,6 +58,7 @@ class RefineConfig:
     depth_m: float = 0.07
     bone_m: float = 0.03
     acceleration_mps2: float = 20.0
+    leash_m: float = 0.2
     rounds: int = 12
 
 
@@ -96,7 +99,19 @@ def refine(
     evidence = gather(placed, visibility, rest_joints, fps, config, depth_m)
     for _ in range(config.rounds):
         body = body + _step(body, evidence, config)
-    return carry_along(placed, body)
+    return carry_along(placed, leashed(placed[:, BODY], body, config.leash_m))
+
+
+def leashed(
+    start: Float[np.ndarray, "T 12 3"], body: Float[np.ndarray, "T 12 3"], leash: float
+) -> Float[np.ndarray, "T 12 3"]:
+    """The body, each landmark at most `leash` from its start seen from the hips."""
+    move = body - start
+    common = move[:, HIPS].mean(1, keepdims=True)
+    apart = np.linalg.norm(move - common, axis=-1, keepdims=True)
+    share = np.minimum(1.0, leash / np.maximum(apart, leash))
+    result: np.ndarray = start + common + share * (move - common)
+    return result
 
 
 def gather(
