@@ -40,10 +40,10 @@ class Placement:
     place: Float[np.ndarray, "2"]
     yaw: float
 
-    def near(self, other: "Placement") -> bool:
-        """Return whether a foot may stay where it is."""
+    def near(self, other: "Placement", share: float = 1.0) -> bool:
+        """Return whether a foot may stay where it is, by a share of `SAME_M` and `SAME_RAD`."""
         apart = float(np.linalg.norm(self.place - other.place))
-        return apart < SAME_M and abs(_turn(self.yaw, other.yaw)) < SAME_RAD
+        return apart < share * SAME_M and abs(_turn(self.yaw, other.yaw)) < share * SAME_RAD
 
 
 Feet = Mapping[str, Placement]
@@ -138,11 +138,18 @@ def steps_into_stand(feet: Feet, heading: float, robot: Robot, dt: float) -> Wal
     """
     if not stands_badly(feet, heading, robot):
         return None
-    goal = stand_feet(feet, heading, robot)
+    return steps_between(feet, stand_feet(feet, heading, robot), heading, robot, dt)
+
+
+def steps_between(
+    feet: Feet, goal: Feet, heading: float, robot: Robot, dt: float, share: float = 1.0
+) -> Walk:
+    """Return the steps that bring the feet from one placement to another, the body upright; a foot
+    that is near its goal (`Placement.near`, `share`) stays."""
     ahead = about_up(heading)[:2, 0]
     order = sorted(SIDES, key=lambda side: -float(feet[side].place @ ahead))
     now, body, parts, air = dict(feet), _middle(feet), [], []
-    for side in (side for side in order if not feet[side].near(goal[side])):
+    for side in (side for side in order if not feet[side].near(goal[side], share)):
         other = now[SIDES[1 - SIDES.index(side)]]
         parts.append(_shifted(now, body, other.place, heading, robot, dt))
         body, step = other.place, now | {side: goal[side]}

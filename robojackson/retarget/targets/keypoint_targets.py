@@ -92,7 +92,7 @@ def targets(
         keypoints_w=keypoints,
         weights=robot.keypoint_weights * trust,
         contact=contact,
-        heading=_trunk_frame(human),
+        heading=trunk_frame(human),
         dt=clip.dt,
         cycle_offset=None if clip.cycle_offset is None else clip.cycle_offset * scale,
         airborne=airborne,
@@ -152,7 +152,8 @@ def _head_length(robot: Robot) -> float:
     return float(np.sqrt(slope**2 - (robot.lengths["left_shoulder", "right_shoulder"] / 2) ** 2))
 
 
-def _trunk_frame(human: Mapping[str, np.ndarray]) -> Float[np.ndarray, "N 3 3"]:
+def trunk_frame(human: Mapping[str, np.ndarray]) -> Float[np.ndarray, "N 3 3"]:
+    """Return x forward, y left, z up along the trunk, from hips and shoulders by name."""
     across = _unit(human["left_shoulder"] - human["right_shoulder"])
     hips = (human["left_hip"] + human["right_hip"]) / 2
     up = (human["left_shoulder"] + human["right_shoulder"]) / 2 - hips

@@ -20,15 +20,32 @@ HINGE_NOISE, HINGE_SPEED_NOISE = 0.01, 0.5
 GYRO_NOISE, ATTITUDE_NOISE, VELOCITY_NOISE = 0.2, 0.05, 0.5
 
 
+class SeededEach:
+    """Random numbers of N robots, each from a seed of its own."""
+
+    def __init__(self, seeds: Sequence[int], purpose: int, count: int) -> None:
+        self._rngs = [np.random.default_rng([seed, purpose, count]) for seed in seeds]
+
+    def uniform(self, low: float, high: float, size: int | tuple[int, ...]) -> np.ndarray:
+        """Return what every generator gives; the first axis is that of the robots."""
+        rest = () if isinstance(size, int) else size[1:]
+        return np.array([rng.uniform(low, high, rest) for rng in self._rngs])
+
+
 class Disturbances:
     """Pushes and sensor noise of N robots.
+
+    Args:
+        seed: Of all robots together, or of every one by itself.
 
     Attributes:
         count: Control steps so far, (1,).
         push_at: Control step of each robot's next push.
     """
 
-    def __init__(self, config: RandomConfig, n: int, dt: float, seed: int) -> None:
+    def __init__(
+        self, config: RandomConfig, n: int, dt: float, seed: int | Sequence[int]
+    ) -> None:
         self._noise, self._pushes, self._dt = config.sensor_noise, config.pushes, dt
         self._seed, self._n = seed, n
         self.count = np.zeros(1, int)
@@ -66,9 +83,11 @@ class Disturbances:
             datas[int(i)].qvel[:6] += kicks[i]
         self.push_at[due] = (self.count[0] + self._waits(rng))[due]
 
-    def _waits(self, rng: np.random.Generator) -> Int[np.ndarray, " N"]:
+    def _waits(self, rng: np.random.Generator | SeededEach) -> Int[np.ndarray, " N"]:
         found: np.ndarray = np.round(rng.uniform(*PUSH_EVERY_S, self._n) / self._dt).astype(int)
         return found
 
-    def _rng(self, purpose: int) -> np.random.Generator:
+    def _rng(self, purpose: int) -> np.random.Generator | SeededEach:
+        if not isinstance(self._seed, int):
+            return SeededEach(self._seed, purpose, int(self.count[0]))
         return np.random.default_rng([self._seed, purpose, int(self.count[0])])

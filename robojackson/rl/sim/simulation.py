@@ -10,6 +10,7 @@ World frame, metres, radians, seconds, newton-metres. MuJoCo releases the interp
 """
 
 import copy
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import pairwise
@@ -115,7 +116,7 @@ class Simulation:
         n: int,
         threads: int = 1,
         random: RandomConfig | None = None,
-        seed: int = 0,
+        seed: int | Sequence[int] = 0,
         delay_s: float = 0.0,
     ) -> None:
         model, control = without_sensors(robot.model), resolved(control, robot, random)

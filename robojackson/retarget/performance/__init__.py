@@ -1,0 +1,1 @@
+"""Performances: several dances and the planned ways between them as one motion."""
