@@ -29,16 +29,11 @@ def list_people(
     info = probed(video, settings.video)
     with results_in(out) as files:
         with console.bar(f"people of {video.name}") as progress:
-<<<<<<< HEAD
             dancer = settings.dancer
-            cast = track_people(video, info, dancer.detection, dancer.identity, progress)
-=======
-            who = settings.dancer
             cast = in_video_process(
-                track_people, video, info, who.detection, who.identity,
+                track_people, video, info, dancer.detection, dancer.identity,
                 frames=info.frames, progress=progress,
             )  # fmt: skip
->>>>>>> daf19fbb5402667c506af9b6ee4971c77b615d5e
         if not cast.rows:
             raise NoPersonFound(f"{cast}", video)
         files.write(PICTURE, draw_people(video, cast))

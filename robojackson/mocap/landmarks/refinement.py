@@ -48,7 +48,7 @@ class RefineConfig:
         depth_m: Spread of the detector's depth relative to the hips, metres.
         bone_m: Spread of a bone's length in one frame, metres.
         acceleration_mps2: Spread of a joint's acceleration, m/s^2.
-        leash_m: A landmark moves no further than this from where it was, seen from the hips, metres:
+        leash_m: Largest move of a landmark from where it was, relative to the hips, metres:
             what needs more is a frame in which the terms contradict each other.
         rounds: Gauss-Newton steps.
     """

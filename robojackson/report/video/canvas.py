@@ -48,7 +48,7 @@ def draw_dot(picture: Picture, centre: np.ndarray, colour: Colour, radius: int) 
 
 
 def label(picture: Picture, title: str, note: str = "") -> None:
-    """A title, and a note in grey after it, on a darkened strip at the top, in place."""
+    """Draw a title, and a note in grey after it, on a darkened strip at the top, in place."""
     strip = _strip(title, note, picture.shape[1], picture.shape[0])
     height = strip.shape[0]
     mixed = picture[:height] * 0.25 + strip * 0.75
@@ -57,7 +57,7 @@ def label(picture: Picture, title: str, note: str = "") -> None:
 
 
 def strip_height(width: int, height: int) -> int:
-    """Pixels of the strip of a title over a panel of that size."""
+    """Return the height of the title's strip over a panel of that size, pixels."""
     return 2 * _letter_height(width, height)
 
 

@@ -37,7 +37,8 @@ def _merged(vertices: Float[np.ndarray, "V 3"], cell_m: float) -> Int[np.ndarray
     mean = np.stack([np.bincount(cell, column) for column in vertices.T], 1) / count
     off = np.linalg.norm(vertices - mean[cell], axis=1)
     order = np.lexsort((off, cell))
-    return order[np.searchsorted(cell[order], np.arange(len(count)))][cell]
+    kept: np.ndarray = order[np.searchsorted(cell[order], np.arange(len(count)))][cell]
+    return kept
 
 
 def _distinct(corners: Int[np.ndarray, "F 3"]) -> Int[np.ndarray, " K"]:

@@ -28,7 +28,7 @@ def packed(values: np.ndarray, kind: type[np.generic] = np.float32) -> str:
 
 
 def robot_shape(model: mujoco.MjModel, detail_m: float = DETAIL_M) -> dict[str, object]:
-    """The visible geoms of a robot by body; meshes with details of a given size."""
+    """Return the visible geoms of a robot by body; meshes with details of a given size."""
     geoms, meshes = [], {}
     for geom in drawn_geoms(model):
         kind = mujoco.mjtGeom(int(model.geom_type[geom])).name.removeprefix("mjGEOM_").lower()
@@ -49,7 +49,7 @@ def robot_shape(model: mujoco.MjModel, detail_m: float = DETAIL_M) -> dict[str, 
 
 
 def _mesh(model: mujoco.MjModel, mesh: int, cell_m: float) -> dict[str, object]:
-    """A mesh, its corners as steps of the largest coordinate."""
+    """Return a mesh, its corners as steps of the largest coordinate."""
     first = model.mesh_vertadr[mesh]
     faces = slice(model.mesh_faceadr[mesh], model.mesh_faceadr[mesh] + model.mesh_facenum[mesh])
     vertices = model.mesh_vert[first : first + model.mesh_vertnum[mesh]]

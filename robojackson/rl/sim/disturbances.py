@@ -43,9 +43,7 @@ class Disturbances:
         push_at: Control step of each robot's next push.
     """
 
-    def __init__(
-        self, config: RandomConfig, n: int, dt: float, seed: int | Sequence[int]
-    ) -> None:
+    def __init__(self, config: RandomConfig, n: int, dt: float, seed: int | Sequence[int]) -> None:
         self._noise, self._pushes, self._dt = config.sensor_noise, config.pushes, dt
         self._seed, self._n = seed, n
         self.count = np.zeros(1, int)
