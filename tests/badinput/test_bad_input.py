@@ -27,6 +27,7 @@ def warm() -> Iterator[Warm]:
 
 
 @pytest.mark.slow
+@pytest.mark.xdist_group("badinput")
 @pytest.mark.timeout(180)
 @pytest.mark.parametrize("case", sample(), ids=lambda case: f"{case.group}: {case.name}"[:60])
 def test_a_bad_input_is_refused_in_one_line(case: Case, warm: Warm) -> None:

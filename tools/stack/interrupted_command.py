@@ -60,15 +60,29 @@ class Running:
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
-    def wait_for(self, text: str, limit_s: float = LIMIT_S) -> None:
-        """Return when a line with the text has come.
+    def wait_for(self, text: str, more: int = 0, limit_s: float = LIMIT_S) -> None:
+        """Return when a line with the text has come, and so many lines after it.
 
         Raises:
-            TimeoutError: it has not; the message has the lines that have.
+            TimeoutError: They have not come; the message has the lines that have.
         """
         with self._changed:
-            if not self._changed.wait_for(lambda: text in self.said(), limit_s):
+            if not self._changed.wait_for(lambda: self._lines_from(text) > more, limit_s):
                 raise TimeoutError(self.said())
+
+    def wait_until_guarded(self, limit_s: float = LIMIT_S) -> None:
+        """Return when the command's supervisor waits for signals, which it blocks for that.
+
+        Raises:
+            TimeoutError: It does not.
+        """
+        status, deadline = Path(f"/proc/{self.process.pid}/status"), time.monotonic() + limit_s
+        while time.monotonic() < deadline:
+            blocked = next(line for line in status.read_text().splitlines() if "SigBlk" in line)
+            if int(blocked.split()[1], 16) & 1 << (signal.SIGINT - 1):
+                return
+            time.sleep(0.01)
+        raise TimeoutError(self.said())
 
     def said(self) -> str:
         """Return the lines so far."""
@@ -108,6 +122,11 @@ class Running:
             tuple(line for _, line in after),
             tuple(faults),
         )
+
+    def _lines_from(self, text: str) -> int:
+        """Return the number of lines from the first one with a text on."""
+        lines = [line for _, line in self._lines]
+        return next((len(lines) - i for i, line in enumerate(lines) if text in line), 0)
 
     def _read(self) -> None:
         assert self.process.stderr is not None

@@ -50,7 +50,9 @@ def live_data(policy: Policy, reference: ReferenceMotion, robot: Robot) -> dict[
     if mode_of(policy) != "track":
         return None
     control = control_of(policy, robot)
-    if control.law != "pd" or _has_colliding_meshes(robot.model):
+    if control.law != "pd" or control.feedback_path != "reference":
+        return None
+    if _has_colliding_meshes(robot.model):
         return None
     if observation_of(policy) not in OBSERVED:
         return None

@@ -20,7 +20,9 @@ from robojackson.errors import StoreError
 from robojackson.files.file_tree import FileTree
 from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
 from robojackson.rl.config.train_config import ControlConfig
+from robojackson.rl.sim import sampling
 from robojackson.rl.sim.feedforward import lead_of
+from robojackson.rl.sim.feet import Feet
 from robojackson.rl.sim.motors import actuation_facts, feedback_share, residual_scale
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.regulator import Gains, regulator, settings
@@ -30,6 +32,7 @@ from robojackson.robot.mjcf import robots_folder
 from robojackson.robot.model import Robot
 
 FOLDER = "feedback"
+ARRAYS = tuple(one.name for one in fields(Gains))
 VARIED = ("body_mass", "body_ipos", "body_inertia", "geom_friction", "dof_armature")
 """Arrays of a model that `variation` changes."""
 LARGEST = 2.0
@@ -46,14 +49,19 @@ class StepFeedback:
     qpos: Float[np.ndarray, "N nq"]
     qvel: Float[np.ndarray, "N nv"]
     limit: Float[np.ndarray, " nu"]
+    feet: Feet
+    places: Float[np.ndarray, "N F 3"]
 
     def targets(
         self, qpos: Float[np.ndarray, "N nq"], qvel: Float[np.ndarray, "N nv"]
     ) -> Float[np.ndarray, "N nu"]:
         """Return by how much the motors' targets move, rad."""
         apart = state_difference(qpos, qvel, self.qpos, self.qvel)
-        moved = (self.gain @ apart[:, :, None])[:, :, 0] + self.offset
-        result: np.ndarray = -np.clip(moved, -self.limit, self.limit)
+        moved = np.isfinite(self.places[:, 0, 0])
+        if moved.any():
+            apart[moved, :2] -= self.feet.apart(qpos[moved], self.places[moved])
+        turned = (self.gain @ apart[:, :, None])[:, :, 0] + self.offset
+        result: np.ndarray = -np.clip(turned, -self.limit, self.limit)
         return result
 
 
@@ -64,17 +72,20 @@ class Feedback:
     Attributes:
         gains: Gains and nominal states, scaled by the share of the control law.
         limit: Largest offset of each target, rad.
+        feet: The robot's feet.
     """
 
     gains: Gains
     limit: Float[np.ndarray, " nu"]
+    feet: Feet
 
     def at(self, row: Int[np.ndarray, " N"], shift: Float[np.ndarray, "N 3"]) -> StepFeedback:
         """Return it at rows of the joined motions, whose cycles have moved them by `shift`, m."""
         gains = self.gains
         qpos = gains.qpos[row]
         qpos[:, :3] += shift
-        return StepFeedback(gains.gain[row], gains.offset[row], qpos, gains.qvel[row], self.limit)
+        found = (gains.gain[row], gains.offset[row], qpos, gains.qvel[row])
+        return StepFeedback(*found, self.limit, self.feet, gains.places[row] + shift[:, None])
 
 
 def feedback_of(
@@ -86,10 +97,13 @@ def feedback_of(
         return None
     found = [_kept(robot, motion, control) for motion in references]
     joined = Gains(*(np.concatenate([getattr(one, name) for one in found])
-                     for name in ("gain", "offset", "qpos", "qvel")))  # fmt: skip
+                     for name in ARRAYS))  # fmt: skip
     action = residual_scale(robot, ControlConfig())
-    scaled = Gains(share * joined.gain, share * joined.offset, joined.qpos, joined.qvel)
-    return Feedback(scaled, LARGEST * action)
+    scaled = Gains(
+        share * joined.gain, share * joined.offset, joined.qpos, joined.qvel, joined.places
+    )
+    most = LARGEST if control.feedback_path == "reference" else sampling.LARGEST_MOVE
+    return Feedback(scaled, most * action, Feet(robot))
 
 
 def _kept(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> Gains:
@@ -114,17 +128,18 @@ def _fits(gains: Gains, robot: Robot, motion: ReferenceMotion) -> bool:
         "offset": (steps, model.nu),
         "qpos": (steps, model.nq),
         "qvel": (steps, model.nv),
+        "places": (steps, Feet(robot).count, 3),
     }
     arrays = {name: getattr(gains, name) for name in sizes}
     return all(arrays[name].shape == size for name, size in sizes.items()) and all(
-        np.isfinite(array).all() for array in arrays.values()
+        np.isfinite(array).all() for name, array in arrays.items() if name != "places"
     )
 
 
 def _keep(path: Path, gains: Gains) -> None:
     content = io.BytesIO()
     arrays = {name: getattr(gains, name).astype(np.float32) for name in ("gain", "offset")}
-    np.savez_compressed(content, qpos=gains.qpos, qvel=gains.qvel, **arrays)
+    np.savez_compressed(content, qpos=gains.qpos, qvel=gains.qvel, places=gains.places, **arrays)
     with suppress(StoreError):  # a store that takes nothing: computed again next time
         FileTree(path.parent).write(path.name, content.getvalue())
 
@@ -134,15 +149,21 @@ def regulator_of(robot: Robot, motion: ReferenceMotion, control: ControlConfig) 
     plain = replace(control, feedback=0.0)
     sim = Simulation(robot, plain, 1)
     clip = Clip(motion, lead_of(robot, motion, control))
-    return regulator(sim, clip, residual_scale(robot, ControlConfig()))
+    action = residual_scale(robot, ControlConfig())
+    feet = Feet(robot)
+    if control.feedback_path == "reference":
+        return regulator(sim, clip, action, feet.count)[0]
+    return sampling.sampled_regulator(sim, clip, action, feet)
 
 
 def _digest(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> str:
     """Return what the gains depend on, as a name."""
     law = resolved(replace(control, feedback=0.0), robot)
-    named = {name: getattr(law, name) for name in ("substeps", "feedforward")}
+    named = {name: getattr(law, name) for name in ("substeps", "feedforward", "feedback_path")}
     facts = [poses_sha256(motion), robot.sha256, named, actuation_facts(robot, ControlConfig()),
              actuation_facts(robot, control), settings(), asdict(robot.description)]  # fmt: skip
+    if control.feedback_path == "sampled":
+        facts.append(sampling.settings())
     digest = hashlib.sha256(json.dumps(facts, sort_keys=True, default=str).encode())
     model = robot.model
     for name in VARIED:  # a variation of the robot has its name and its file

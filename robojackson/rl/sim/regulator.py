@@ -50,34 +50,95 @@ class Gains:
         gain: Of every step of the reference.
         offset: Of the targets, rad.
         qpos, qvel: Nominal state.
+        places: Feet of the nominal state: it is moved along the floor to where the robot's own feet
+            stand. NaN where the nominal state stays in the world.
     """
 
     gain: Float[np.ndarray, "S nu X"]
     offset: Float[np.ndarray, "S nu"]
     qpos: Float[np.ndarray, "S nq"]
     qvel: Float[np.ndarray, "S nv"]
+    places: Float[np.ndarray, "S F 3"]
 
 
-def regulator(sim: Simulation, clip: Clip, action: Float[np.ndarray, " nu"]) -> Gains:
-    """Return the regulator of a motion.
+@dataclass(frozen=True)
+class Path:
+    """Nominal states, and the targets of the motors on the way to the next."""
+
+    qpos: Float[np.ndarray, "T nq"]
+    qvel: Float[np.ndarray, "T nv"]
+    targets: Float[np.ndarray, "T nu"]
+
+    def __len__(self) -> int:
+        return len(self.qpos)
+
+
+@dataclass(frozen=True)
+class Linear:
+    """The system along a path.
+
+    Attributes:
+        by_state, by_target: Derivatives of the next state.
+        defect: By how much the next state misses the path's, mean over the disturbances.
+    """
+
+    by_state: Float[np.ndarray, "T X X"]
+    by_target: Float[np.ndarray, "T X nu"]
+    defect: Float[np.ndarray, "T X"]
+
+
+@dataclass(frozen=True)
+class Recursion:
+    """What the Riccati recursion finds: the feedback and the cost of the rest of the motion.
+
+    The cost of a state that is x off the path is x @ value @ x + 2 slope @ x and a constant.
+    """
+
+    gain: Float[np.ndarray, "T nu X"]
+    offset: Float[np.ndarray, "T nu"]
+    value: Float[np.ndarray, "T X X"]
+    slope: Float[np.ndarray, "T X"]
+
+
+def regulator(
+    sim: Simulation, clip: Clip, action: Float[np.ndarray, " nu"], feet: int
+) -> tuple[Gains, Path, Linear]:
+    """Return the regulator of a motion, its path and the system along it.
 
     Args:
         sim: One robot under the control law, without disturbances.
         clip: One motion.
         action: Radians that a full action moves each target.
+        feet: Number of keypoints of the feet.
     """
-    steps = np.arange(clip.steps)
-    now, following = clip.at(steps), clip.at(steps + 1)
-    targets = sim.reference_angles(following)
-    qpos, qvel = _settled(sim, now.qpos, now.qvel, targets, following.qvel[:, 2]), now.qvel
-    after = np.roll(qpos, -1, 0), np.roll(qvel, -1, 0)
-    if clip.cyclic:
-        after[0][-1, :3] += following.qpos[-1, :3] - now.qpos[0, :3]
+    path = reference_path(sim, clip, clip.steps)
+    linear = linearised(sim, path, following(path, clip, clip.cyclic))
+    found = riccati(linear, action, clip.cyclic)
+    places = np.full((clip.steps, feet, 3), np.nan)
+    return Gains(found.gain, found.offset, path.qpos, path.qvel, places), path, linear
+
+
+def reference_path(sim: Simulation, clip: Clip, length: int) -> Path:
+    """Return the first steps of a motion, which may go on into its next cycles."""
+    steps = np.arange(length)
+    now, ahead = clip.at(steps), clip.at(steps + 1)
+    targets = sim.reference_angles(ahead)
+    qpos = _settled(sim, now.qpos, now.qvel, targets, ahead.qvel[:, 2])
+    return Path(qpos, np.array(now.qvel), targets)
+
+
+def following(
+    path: Path, clip: Clip, cyclic: bool
+) -> tuple[Float[np.ndarray, "T nq"], Float[np.ndarray, "T nv"]]:
+    """Return the state that follows each one of a path; the last is followed by itself, or by the
+    first, moved by a cycle."""
+    qpos, qvel = np.roll(path.qpos, -1, 0), np.roll(path.qvel, -1, 0)
+    if cyclic:
+        ends = clip.at(np.array([0, len(path)])).qpos
+        qpos[-1, :3] += ends[1, :3] - ends[0, :3]
     else:
-        after[0][-1], after[1][-1] = qpos[-1], qvel[-1]
-    by_state, by_target, defect = _linearised(sim, (qpos, qvel), targets, after)
-    gain, offset = _riccati(by_state, by_target, defect, action, clip.cyclic)
-    return Gains(gain, offset, qpos, np.array(qvel))
+        qpos[-1], qvel[-1] = path.qpos[-1], path.qvel[-1]
+    return qpos, qvel
 
 
 def advance(
@@ -116,13 +177,14 @@ def _settled(
     return result
 
 
-def _linearised(
-    sim: Simulation,
-    state: tuple[np.ndarray, np.ndarray],
-    targets: np.ndarray,
-    after: tuple[np.ndarray, np.ndarray],
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the derivatives by state and by target, and what the nominal states miss."""
+def linearised(sim: Simulation, path: Path, after: tuple[np.ndarray, np.ndarray]) -> Linear:
+    """Differentiate a robot along a path.
+
+    Args:
+        sim: One robot under the control law, without disturbances.
+        path: Nominal states and targets.
+        after: qpos and qvel that shall follow each of them.
+    """
     nv, nu = sim.model.nv, sim.model.nu
     width = np.concatenate([
         np.repeat([ROOT_STEP_M, TURN_STEP, HINGE_STEP], [3, 3, nv - 6]),
@@ -131,10 +193,10 @@ def _linearised(
     moves = np.concatenate([np.diag(width), -np.diag(width)])
     found = []
     chunk = max(1, ROWS // len(moves))
-    for first in range(0, len(targets), chunk):
+    for first in range(0, len(path), chunk):
         rows = slice(first, first + chunk)
-        begun = state_plus(state[0][rows, None], state[1][rows, None], moves[:, : 2 * nv])
-        aims = targets[rows, None] + moves[:, 2 * nv :]
+        begun = state_plus(path.qpos[rows, None], path.qvel[rows, None], moves[:, : 2 * nv])
+        aims = path.targets[rows, None] + moves[:, 2 * nv :]
         ended = advance(sim, *(np.concatenate(list(a)) for a in (*begun, aims)))
         shape = (len(aims), len(moves), -1)
         qpos, qvel = (part.reshape(shape) for part in ended)
@@ -142,34 +204,43 @@ def _linearised(
     change = np.concatenate(found)
     half = len(width)
     slope = np.swapaxes((change[:, :half] - change[:, half:]) / (2 * width[:, None]), 1, 2)
-    return slope[:, :, : 2 * nv], slope[:, :, 2 * nv :], change.mean(1)
+    return Linear(slope[:, :, : 2 * nv], slope[:, :, 2 * nv :], change.mean(1))
 
 
-def _riccati(
-    by_state: Float[np.ndarray, "S X X"],
-    by_target: Float[np.ndarray, "S X nu"],
-    defect: Float[np.ndarray, "S X"],
-    action: Float[np.ndarray, " nu"],
-    cyclic: bool,
-) -> tuple[Float[np.ndarray, "S nu X"], Float[np.ndarray, "S nu"]]:
-    """Return gains and offsets of the cost that is least over the rest of the motion."""
-    steps, size = by_state.shape[:2]
-    hinges = size // 2 - 6
-    cost = np.diag(np.concatenate([
-        np.repeat([PLACE, ATTITUDE, HINGE], [3, 3, hinges]),
-        np.repeat([VELOCITY, HINGE_SPEED], [6, hinges]),
-    ]))  # fmt: skip
-    effort = np.diag(EFFORT / action**2)
+def riccati(linear: Linear, action: Float[np.ndarray, " nu"], cyclic: bool) -> Recursion:
+    """Return the feedback whose cost is least over the rest of the motion.
+
+    Args:
+        linear: The system along a path.
+        action: Radians that a full action moves each target.
+        cyclic: Whether the path is followed by itself.
+    """
+    steps, size = linear.defect.shape
+    cost, effort = weights(action, size)
     gain, offset = np.zeros((steps, len(action), size)), np.zeros((steps, len(action)))
+    values, slopes = np.zeros((steps, size, size)), np.zeros((steps, size))
     value, slope = cost, np.zeros(size)
     order = np.tile(np.arange(steps)[::-1], LAPS if cyclic else 1)
     order = order if cyclic else np.concatenate([np.full(STILL, steps - 2), order])
     for t in order:
-        a, b, missed = by_state[t], by_target[t], defect[t]
+        a, b, missed = linear.by_state[t], linear.by_target[t], linear.defect[t]
         weighted = effort + b.T @ value @ b
         both = np.linalg.solve(weighted, b.T @ np.column_stack([value @ a, value @ missed + slope]))
         gain[t], offset[t] = both[:, :-1], both[:, -1]
         slope = (a - b @ gain[t]).T @ (slope + value @ missed)
         value = cost + a.T @ value @ (a - b @ gain[t])
         value = (value + value.T) / 2
-    return gain, offset
+        values[t], slopes[t] = value, slope
+    return Recursion(gain, offset, values, slopes)
+
+
+def weights(
+    action: Float[np.ndarray, " nu"], size: int
+) -> tuple[Float[np.ndarray, "X X"], Float[np.ndarray, "nu nu"]]:
+    """Return the weights of squared errors of the state and of squared offsets of the targets."""
+    hinges = size // 2 - 6
+    cost = np.concatenate([
+        np.repeat([PLACE, ATTITUDE, HINGE], [3, 3, hinges]),
+        np.repeat([VELOCITY, HINGE_SPEED], [6, hinges]),
+    ])  # fmt: skip
+    return np.diag(cost), np.diag(EFFORT / action**2)

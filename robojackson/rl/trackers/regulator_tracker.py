@@ -1,7 +1,8 @@
 """The linear-quadratic feedback along a reference as a tracker: it needs no network and no file.
 
-It holds motions that keep both feet near the floor, from the first second on and on any robot whose
-contacts the physics knows; steps and jumps need a policy (`docs/learning.md`, "Linear feedback").
+A motion that the feedback along it does not hold is first simulated many times, for a path beside
+it that the physics follows (`docs/learning.md`, "A sampled path"). It works on any robot whose
+contacts the physics knows; jumps need a policy.
 """
 
 from pathlib import Path
@@ -23,7 +24,8 @@ class RegulatorTracker:
     def __init__(self, description: TrackerDescription, path: Path | None = None) -> None:
         self.description = description
         self.window: tuple[int, ...] = (1,)
-        self.control, self.sees_ahead = ControlConfig(feedforward=1.0, feedback=1.0), False
+        self.control = ControlConfig(feedforward=1.0, feedback=1.0, feedback_path="sampled")
+        self.sees_ahead = False
 
     def equip(self, robot: Robot) -> Robot:
         require_robot(robot, self.description)

@@ -12,6 +12,8 @@ from tools.stack.interrupted_command import CLIP, End, Running
 
 ACKNOWLEDGED_S, ENDED_S, SAVED_S = 5.0, 10.0, 40.0
 """Generous multiples of 1 and 3 s, for a busy machine, and what a checkpoint may take."""
+LEARNT = 8
+"""Progress lines after which a training has learnt something, also on a busy machine."""
 SMALL = ("tqc.n_envs=4", "tqc.warmup=100", "tqc.batch=32", "progress_seconds=0.2")
 DANCE = ("dance", CLIP, "--config=smoke", "--set=train.steps=1000000")
 LEARN = (*DANCE, "--trainer=sb3", *(f"--set=train.{setting}" for setting in SMALL))
@@ -24,10 +26,17 @@ MOMENTS = {
 }
 
 
-def interrupted(words: tuple[str, ...], store: Path, text: str, delay_s: float, way: str) -> End:
-    """How a command ended that was interrupted some time after a line with a text."""
+def interrupted(
+    words: tuple[str, ...], store: Path, text: str, delay_s: float, way: str, more: int = 0
+) -> End:
+    """Return how a command ended that was interrupted some time after a line with a text.
+
+    Without a text: after its supervisor began. `more`: lines to wait for after that one.
+    """
     running = Running(words, store)
-    running.wait_for(text)
+    running.wait_until_guarded()
+    if text:
+        running.wait_for(text, more)
     time.sleep(delay_s)
     end = running.end(running.interrupt(*WAYS[way]))
     assert end.faults == (), running.said()
@@ -72,7 +81,7 @@ def test_a_dance_that_has_nothing_to_save_ends_at_once(moment: str, way: str, st
 def test_a_dance_that_learns_saves_its_checkpoint_and_says_so(store: Path) -> None:
     others = set(store.glob("work/*/checkpoint/run.json"))  # of the dances above, on this store
     for text in (" steps ", "resuming at"):  # the second time from the checkpoint of the first
-        end = interrupted(LEARN, store, text, 3.0, "group")
+        end = interrupted(LEARN, store, text, 3.0, "group", LEARNT)
         assert "the training is saving its checkpoint" in answer(end)[0]
         assert len(set(store.glob("work/*/checkpoint/run.json")) - others) == 1
     with sqlite3.connect(store / "prefect" / "prefect.db") as database:
@@ -128,7 +137,7 @@ def test_a_training_that_learns_saves_its_checkpoint_and_resumes(
     words = ("train", str(motion / "reference.parquet"), "-o", str(out), "--force", "--trainer=sb3")
     words += ("--steps=1000000", *(f"--set={setting}" for setting in SMALL))
     for text in (" steps ", "resuming at"):
-        end = interrupted(words, tmp_path / "store", text, 2.0, way)
+        end = interrupted(words, tmp_path / "store", text, 2.0, way, LEARNT)
         assert "the training is saving its checkpoint" in answer(end)[0]
         assert f"interrupted: the checkpoint is in {out}; resume: robojackson" in end.lines[-1]
     assert (out / "checkpoint" / "run.json").exists()

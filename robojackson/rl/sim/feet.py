@@ -1,0 +1,42 @@
+"""Where a robot's feet stand, for laws that follow a motion from wherever they do."""
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+from robojackson.robot.model import Robot
+
+LOW_M = 0.02
+"""A foot counts less by a factor of e for so much that it is above the lowest one, metres."""
+
+
+class Feet:
+    """The feet's keypoints of a robot, world frame, metres.
+
+    Attributes:
+        count: Number of keypoints.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self._model, self._data = robot.model, mujoco.MjData(robot.model)
+        self._sites = robot.keypoint_sites[np.unique(robot.contact_keypoints)]
+        self.count = len(self._sites)
+
+    def places(self, qpos: Float[np.ndarray, "N nq"]) -> Float[np.ndarray, "N F 3"]:
+        """Return the feet of robots in poses."""
+        found = np.empty((len(qpos), len(self._sites), 3))
+        for row, pose in enumerate(qpos):
+            self._data.qpos[:] = pose
+            mujoco.mj_kinematics(self._model, self._data)
+            found[row] = self._data.site_xpos[self._sites]
+        return found
+
+    def apart(
+        self, qpos: Float[np.ndarray, "N nq"], places: Float[np.ndarray, "*N F 3"]
+    ) -> Float[np.ndarray, "N 2"]:
+        """Return how far from given places the feet are that stand, in the plane of the floor."""
+        feet = self.places(qpos)
+        low = np.exp(-(feet[..., 2] - feet[..., 2].min(-1, keepdims=True)) / LOW_M)
+        off = (feet - places)[..., :2]
+        result: np.ndarray = (low[..., None] * off).sum(1) / low.sum(1, keepdims=True)
+        return result

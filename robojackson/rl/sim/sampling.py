@@ -1,0 +1,163 @@
+"""The regulator along a path beside a motion, where the motion itself cannot be held."""
+
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from robojackson.rl.sim import path_search
+from robojackson.rl.sim.feet import Feet
+from robojackson.rl.sim.path_search import LOST_RAD, WINDOW, PathSearch
+from robojackson.rl.sim.reference_clip import Clip
+from robojackson.rl.sim.regulator import (
+    Gains,
+    Linear,
+    Path,
+    advance,
+    following,
+    linearised,
+    reference_path,
+    regulator,
+    riccati,
+)
+from robojackson.rl.sim.simulation import Simulation
+from robojackson.rl.sim.tangent import state_difference
+
+PASSES, BACK_S, AGAIN_S = 12, 1.2, 0.6
+"""Searches at most; how far before a fall a path is kept; how far before that the next begins."""
+STARTS, HELD_S = 8, 10.0
+"""Where the regulator alone is tried, and for how long on a motion that repeats."""
+LARGEST_MOVE = 6.0
+"""Full actions that the feedback moves a target at most: a path is up to four off the motion."""
+CYCLES_S = 4.0
+"""A motion that repeats is simulated for so long at least; the last cycle but one is kept."""
+
+
+def sampled_regulator(
+    sim: Simulation,
+    clip: Clip,
+    action: Float[np.ndarray, " nu"],
+    feet: Feet,
+    seed: int = 0,
+    progress: Callable[[float], None] = lambda share: None,
+) -> Gains:
+    """Return the regulator along a motion, or along a path beside it where that holds it better.
+
+    Where no path to the end is found, the motion itself is the nominal path from there on.
+
+    Args:
+        sim: One robot under the control law, without disturbances.
+        clip: One motion.
+        action: Radians that a full action moves each target.
+        feet: The robot's feet.
+        seed: Of the samples.
+        progress: Called with the share of the motion that is found.
+    """
+    plain, path, linear = regulator(sim, clip, action, feet.count)
+    motion = path
+    held = _held_share(sim, clip, action, feet, plain, motion)
+    if held == 1.0:
+        return plain
+    cycles = max(3, int(np.ceil(CYCLES_S / (clip.steps * clip.dt)))) if clip.cyclic else 1
+    reference = path = reference_path(sim, clip, cycles * clip.steps)
+    search = PathSearch(sim, action, feet, reference, np.random.default_rng(seed))
+    linear, begin = _repeated(linear, cycles), 0
+    for _ in range(PASSES):
+        found, ended = search.run(path, riccati(linear, action, False), begin)
+        end = begin + len(found) - 1
+        kept = end + 1 if ended else max(begin + WINDOW, end - round(BACK_S / clip.dt))
+        path = search.joined(path, found, begin, kept)
+        linear = _with(linear, np.arange(begin, min(kept + 1, len(path))), sim, path)
+        progress(kept / len(path))
+        if ended:
+            break
+        begin = max(begin + 1, kept - round(AGAIN_S / clip.dt))
+    sampled = _gains(sim, clip, action, feet, path, linear, reference)
+    better = _held_share(sim, clip, action, feet, sampled, motion) > held
+    return sampled if better else plain
+
+
+def _held_share(
+    sim: Simulation, clip: Clip, action: np.ndarray, feet: Feet, gains: Gains, path: Path
+) -> float:
+    """Return the share of the time that a regulator keeps robots upright, over several starts.
+
+    Args:
+        path: The motion, whose targets the regulator moves.
+    """
+    last = clip.steps if clip.cyclic else clip.steps // 4
+    start = np.linspace(0, last, STARTS, endpoint=False).astype(int)
+    at, most = clip.at(start), LARGEST_MOVE * action
+    qpos, qvel, upright = at.qpos.copy(), at.qvel.copy(), np.ones(STARTS, bool)
+    steps = round(HELD_S / clip.dt) if clip.cyclic else clip.steps - 1 - int(start[-1])
+    held = np.zeros(STARTS)
+    for k in range(steps):
+        row = (start + k) % clip.steps
+        there = clip.at(start + k).qpos
+        moved = there[:, :3] - clip.at(row).qpos[:, :3]
+        nominal = gains.qpos[row]
+        nominal[:, :3] += moved
+        apart = state_difference(qpos, qvel, nominal, gains.qvel[row])
+        places = gains.places[row] + moved[:, None]
+        apart[:, :2] -= np.nan_to_num(feet.apart(qpos, places))
+        fed = np.einsum("nij,nj->ni", gains.gain[row], apart) + gains.offset[row]
+        qpos, qvel = advance(sim, qpos, qvel, path.targets[row] - np.clip(fed, -most, most))
+        tilt = state_difference(qpos, qvel, there, qvel)[:, 3:6]
+        upright &= np.less(np.linalg.norm(tilt, axis=1), LOST_RAD)
+        held += upright
+        if not upright.any():
+            break
+    return float(held.mean() / steps)
+
+
+def _repeated(linear: Linear, cycles: int) -> Linear:
+    parts = (linear.by_state, linear.by_target, linear.defect)
+    return Linear(*(np.tile(part, (cycles,) + (1,) * (part.ndim - 1)) for part in parts))
+
+
+def _with(linear: Linear, rows: Int[np.ndarray, " R"], sim: Simulation, path: Path) -> Linear:
+    """Return the system along a path that has changed at some steps, which follow each other."""
+    after = np.minimum(rows + 1, len(path) - 1)
+    part = Path(path.qpos[rows], path.qvel[rows], path.targets[rows])
+    new = linearised(sim, part, (path.qpos[after], path.qvel[after]))
+    whole = Linear(linear.by_state.copy(), linear.by_target.copy(), linear.defect.copy())
+    for name in ("by_state", "by_target", "defect"):
+        getattr(whole, name)[rows] = getattr(new, name)
+    return whole
+
+
+def _gains(
+    sim: Simulation,
+    clip: Clip,
+    action: np.ndarray,
+    feet: Feet,
+    path: Path,
+    linear: Linear,
+    reference: Path,
+) -> Gains:
+    """Return the regulator along a path; of a motion that repeats, along its last cycle but one."""
+    if clip.cyclic:
+        first = len(path) - 2 * clip.steps
+        rows = slice(first, first + clip.steps)
+        qpos = path.qpos[rows].copy()
+        qpos[:, :3] -= clip.at(np.array([first])).qpos[0, :3] - clip.at(np.array([0])).qpos[0, :3]
+        path = Path(qpos, path.qvel[rows], path.targets[rows])
+        linear = linearised(sim, path, following(path, clip, True))
+    law = riccati(linear, action, clip.cyclic)
+    lead = path.targets - reference.targets[: len(path)]
+    places = feet.places(path.qpos)
+    return Gains(law.gain, law.offset - lead, path.qpos, path.qvel, places)
+
+
+def settings() -> list[float]:
+    """Return the numbers that decide what is found."""
+    return [
+        PASSES,
+        BACK_S,
+        AGAIN_S,
+        STARTS,
+        HELD_S,
+        LARGEST_MOVE,
+        CYCLES_S,
+        *path_search.settings(),
+    ]
