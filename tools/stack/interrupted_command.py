@@ -12,7 +12,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 CLIP = str(ROOT / "clips" / "hip_shake.mp4")
-LIMIT_S = 100.0
+LIMIT_S = 300.0
 """After which a command is given up, seconds."""
 
 

@@ -89,7 +89,7 @@ def evaluate_policy(
     environment = environment_of(policy, control)
     if isinstance(environment, PaperConfig):
         reference = facing_ahead(reference)
-    clip = driven_clip(robot, reference, control, sees_ahead(policy))
+    clip = driven_clip(robot, reference, control, sees_ahead(policy), progress)
     starts, labels = starts_of(robot, clip, config)
     horizon = clip.horizon(starts.step, config.seconds)
     judge, meter = (

@@ -24,8 +24,9 @@ from robojackson.rl.sim import sampling
 from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.feet import Feet
 from robojackson.rl.sim.motors import actuation_facts, feedback_share, residual_scale
+from robojackson.rl.sim.nominal_path import Gains, Progress, no_progress
 from robojackson.rl.sim.reference_clip import Clip
-from robojackson.rl.sim.regulator import Gains, regulator, settings
+from robojackson.rl.sim.regulator import regulator, settings
 from robojackson.rl.sim.simulation import Simulation, resolved
 from robojackson.rl.sim.tangent import state_difference
 from robojackson.robot.mjcf import robots_folder
@@ -89,13 +90,20 @@ class Feedback:
 
 
 def feedback_of(
-    robot: Robot, references: Sequence[ReferenceMotion], control: ControlConfig
+    robot: Robot,
+    references: Sequence[ReferenceMotion],
+    control: ControlConfig,
+    progress: Progress = no_progress,
 ) -> Feedback | None:
-    """Return the feedback along motions; None where the control law has none."""
+    """Return the feedback along motions; None where the control law has none.
+
+    Args:
+        progress: Called with a name, the steps that are done, and all.
+    """
     share = feedback_share(robot, control)
     if not share or control.law != "pd":
         return None
-    found = [_kept(robot, motion, control) for motion in references]
+    found = [_kept(robot, motion, control, progress) for motion in references]
     joined = Gains(*(np.concatenate([getattr(one, name) for one in found])
                      for name in ARRAYS))  # fmt: skip
     action = residual_scale(robot, ControlConfig())
@@ -106,7 +114,9 @@ def feedback_of(
     return Feedback(scaled, most * action, Feet(robot))
 
 
-def _kept(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> Gains:
+def _kept(
+    robot: Robot, motion: ReferenceMotion, control: ControlConfig, progress: Progress
+) -> Gains:
     """Return the regulator of a motion, computed where it was not before."""
     path = robots_folder().parent / FOLDER / f"{_digest(robot, motion, control)}.npz"
     if path.is_file():
@@ -115,7 +125,7 @@ def _kept(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> Gain
             found = Gains(*(arrays[one.name].astype(float) for one in fields(Gains)))
             if _fits(found, robot, motion):
                 return found
-    gains = regulator_of(robot, motion, control)
+    gains = regulator_of(robot, motion, control, progress)
     _keep(path, gains)
     return gains
 
@@ -144,7 +154,12 @@ def _keep(path: Path, gains: Gains) -> None:
         FileTree(path.parent).write(path.name, content.getvalue())
 
 
-def regulator_of(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> Gains:
+def regulator_of(
+    robot: Robot,
+    motion: ReferenceMotion,
+    control: ControlConfig,
+    progress: Progress = no_progress,
+) -> Gains:
     """Compute the regulator of a motion under a control law."""
     plain = replace(control, feedback=0.0)
     sim = Simulation(robot, plain, 1)
@@ -152,8 +167,8 @@ def regulator_of(robot: Robot, motion: ReferenceMotion, control: ControlConfig) 
     action = residual_scale(robot, ControlConfig())
     feet = Feet(robot)
     if control.feedback_path == "reference":
-        return regulator(sim, clip, action, feet.count)[0]
-    return sampling.sampled_regulator(sim, clip, action, feet)
+        return regulator(sim, clip, action, feet.count, progress)[0]
+    return sampling.sampled_regulator(sim, clip, action, feet, progress=progress)
 
 
 def _digest(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> str:

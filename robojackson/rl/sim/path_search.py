@@ -16,7 +16,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from robojackson.rl.sim.feet import Feet
-from robojackson.rl.sim.regulator import Path, Recursion, advance, weights
+from robojackson.rl.sim.nominal_path import Path, Recursion
+from robojackson.rl.sim.regulator import advance, weights
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.rl.sim.tangent import state_difference
 

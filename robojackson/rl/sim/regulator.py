@@ -9,13 +9,19 @@ Riccati recursion then gives, for every step of the reference, a gain and an off
 what the reference itself gets wrong. Metres, radians, seconds.
 """
 
-from dataclasses import dataclass
-
 import mujoco
 import numpy as np
 from jaxtyping import Float
 from mujoco import rollout
 
+from robojackson.rl.sim.nominal_path import (
+    Gains,
+    Linear,
+    Path,
+    Progress,
+    Recursion,
+    no_progress,
+)
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.rl.sim.tangent import state_difference, state_plus
@@ -42,66 +48,12 @@ def settings() -> list[float]:
     return [*steps, *weights, *HEIGHTS_M.tolist()]
 
 
-@dataclass(frozen=True)
-class Gains:
-    """A regulator: targets = those of the reference - gain @ (state - nominal) - offset.
-
-    Attributes:
-        gain: Of every step of the reference.
-        offset: Of the targets, rad.
-        qpos, qvel: Nominal state.
-        places: Feet of the nominal state: it is moved along the floor to where the robot's own feet
-            stand. NaN where the nominal state stays in the world.
-    """
-
-    gain: Float[np.ndarray, "S nu X"]
-    offset: Float[np.ndarray, "S nu"]
-    qpos: Float[np.ndarray, "S nq"]
-    qvel: Float[np.ndarray, "S nv"]
-    places: Float[np.ndarray, "S F 3"]
-
-
-@dataclass(frozen=True)
-class Path:
-    """Nominal states, and the targets of the motors on the way to the next."""
-
-    qpos: Float[np.ndarray, "T nq"]
-    qvel: Float[np.ndarray, "T nv"]
-    targets: Float[np.ndarray, "T nu"]
-
-    def __len__(self) -> int:
-        return len(self.qpos)
-
-
-@dataclass(frozen=True)
-class Linear:
-    """The system along a path.
-
-    Attributes:
-        by_state, by_target: Derivatives of the next state.
-        defect: By how much the next state misses the path's, mean over the disturbances.
-    """
-
-    by_state: Float[np.ndarray, "T X X"]
-    by_target: Float[np.ndarray, "T X nu"]
-    defect: Float[np.ndarray, "T X"]
-
-
-@dataclass(frozen=True)
-class Recursion:
-    """What the Riccati recursion finds: the feedback and the cost of the rest of the motion.
-
-    The cost of a state that is x off the path is x @ value @ x + 2 slope @ x and a constant.
-    """
-
-    gain: Float[np.ndarray, "T nu X"]
-    offset: Float[np.ndarray, "T nu"]
-    value: Float[np.ndarray, "T X X"]
-    slope: Float[np.ndarray, "T X"]
-
-
 def regulator(
-    sim: Simulation, clip: Clip, action: Float[np.ndarray, " nu"], feet: int
+    sim: Simulation,
+    clip: Clip,
+    action: Float[np.ndarray, " nu"],
+    feet: int,
+    progress: Progress = no_progress,
 ) -> tuple[Gains, Path, Linear]:
     """Return the regulator of a motion, its path and the system along it.
 
@@ -110,9 +62,10 @@ def regulator(
         clip: One motion.
         action: Radians that a full action moves each target.
         feet: Number of keypoints of the feet.
+        progress: Called with a name, the steps that are done, and all.
     """
     path = reference_path(sim, clip, clip.steps)
-    linear = linearised(sim, path, following(path, clip, clip.cyclic))
+    linear = linearised(sim, path, following(path, clip, clip.cyclic), progress)
     found = riccati(linear, action, clip.cyclic)
     places = np.full((clip.steps, feet, 3), np.nan)
     return Gains(found.gain, found.offset, path.qpos, path.qvel, places), path, linear
@@ -177,13 +130,19 @@ def _settled(
     return result
 
 
-def linearised(sim: Simulation, path: Path, after: tuple[np.ndarray, np.ndarray]) -> Linear:
+def linearised(
+    sim: Simulation,
+    path: Path,
+    after: tuple[np.ndarray, np.ndarray],
+    progress: Progress = no_progress,
+) -> Linear:
     """Differentiate a robot along a path.
 
     Args:
         sim: One robot under the control law, without disturbances.
         path: Nominal states and targets.
         after: qpos and qvel that shall follow each of them.
+        progress: Called with a name, the steps that are done, and all.
     """
     nv, nu = sim.model.nv, sim.model.nu
     width = np.concatenate([
@@ -194,6 +153,7 @@ def linearised(sim: Simulation, path: Path, after: tuple[np.ndarray, np.ndarray]
     found = []
     chunk = max(1, ROWS // len(moves))
     for first in range(0, len(path), chunk):
+        progress("feedback", first, len(path))
         rows = slice(first, first + chunk)
         begun = state_plus(path.qpos[rows, None], path.qvel[rows, None], moves[:, : 2 * nv])
         aims = path.targets[rows, None] + moves[:, 2 * nv :]

@@ -1,18 +1,14 @@
 """The regulator along a path beside a motion, where the motion itself cannot be held."""
 
-from collections.abc import Callable
-
 import numpy as np
 from jaxtyping import Float, Int
 
 from robojackson.rl.sim import path_search
 from robojackson.rl.sim.feet import Feet
+from robojackson.rl.sim.nominal_path import Gains, Linear, Path, Progress, no_progress
 from robojackson.rl.sim.path_search import LOST_RAD, WINDOW, PathSearch
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.regulator import (
-    Gains,
-    Linear,
-    Path,
     advance,
     following,
     linearised,
@@ -39,7 +35,7 @@ def sampled_regulator(
     action: Float[np.ndarray, " nu"],
     feet: Feet,
     seed: int = 0,
-    progress: Callable[[float], None] = lambda share: None,
+    progress: Progress = no_progress,
 ) -> Gains:
     """Return the regulator along a motion, or along a path beside it where that holds it better.
 
@@ -51,9 +47,9 @@ def sampled_regulator(
         action: Radians that a full action moves each target.
         feet: The robot's feet.
         seed: Of the samples.
-        progress: Called with the share of the motion that is found.
+        progress: Called with a name, the steps that are done, and all.
     """
-    plain, path, linear = regulator(sim, clip, action, feet.count)
+    plain, path, linear = regulator(sim, clip, action, feet.count, progress)
     motion = path
     held = _held_share(sim, clip, action, feet, plain, motion)
     if held == 1.0:
@@ -68,7 +64,7 @@ def sampled_regulator(
         kept = end + 1 if ended else max(begin + WINDOW, end - round(BACK_S / clip.dt))
         path = search.joined(path, found, begin, kept)
         linear = _with(linear, np.arange(begin, min(kept + 1, len(path))), sim, path)
-        progress(kept / len(path))
+        progress("sampled path", kept, len(path))
         if ended:
             break
         begin = max(begin + 1, kept - round(AGAIN_S / clip.dt))

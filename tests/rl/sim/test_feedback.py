@@ -16,8 +16,8 @@ from robojackson.rl.modes.track_mode import control_of
 from robojackson.rl.policy import Policy
 from robojackson.rl.policy_facts import policy_control
 from robojackson.rl.sim import feedback, regulator
+from robojackson.rl.sim.nominal_path import Gains
 from robojackson.rl.sim.preview import driven_clip
-from robojackson.rl.sim.regulator import Gains
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.rl.sim.tangent import state_difference, state_plus
 from robojackson.robot.fall import Fall

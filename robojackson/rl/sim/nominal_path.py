@@ -1,0 +1,72 @@
+"""A path that a regulator keeps a robot on, and the system along it. Metres, radians, seconds."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+Progress = Callable[[str, int, int], None]
+"""Called with what is computed, the steps that are done, and all."""
+
+
+@dataclass(frozen=True)
+class Gains:
+    """A regulator: targets = those of the reference - gain @ (state - nominal) - offset.
+
+    Attributes:
+        gain: Of every step of the reference.
+        offset: Of the targets, rad.
+        qpos, qvel: Nominal state.
+        places: Feet of the nominal state: it is moved along the floor to where the robot's own feet
+            stand. NaN where the nominal state stays in the world.
+    """
+
+    gain: Float[np.ndarray, "S nu X"]
+    offset: Float[np.ndarray, "S nu"]
+    qpos: Float[np.ndarray, "S nq"]
+    qvel: Float[np.ndarray, "S nv"]
+    places: Float[np.ndarray, "S F 3"]
+
+
+@dataclass(frozen=True)
+class Path:
+    """Nominal states, and the targets of the motors on the way to the next."""
+
+    qpos: Float[np.ndarray, "T nq"]
+    qvel: Float[np.ndarray, "T nv"]
+    targets: Float[np.ndarray, "T nu"]
+
+    def __len__(self) -> int:
+        return len(self.qpos)
+
+
+@dataclass(frozen=True)
+class Linear:
+    """The system along a path.
+
+    Attributes:
+        by_state, by_target: Derivatives of the next state.
+        defect: By how much the next state misses the path's, mean over the disturbances.
+    """
+
+    by_state: Float[np.ndarray, "T X X"]
+    by_target: Float[np.ndarray, "T X nu"]
+    defect: Float[np.ndarray, "T X"]
+
+
+@dataclass(frozen=True)
+class Recursion:
+    """What the Riccati recursion finds: the feedback and the cost of the rest of the motion.
+
+    The cost of a state that is x off the path is x @ value @ x + 2 slope @ x and a constant.
+    """
+
+    gain: Float[np.ndarray, "T nu X"]
+    offset: Float[np.ndarray, "T nu"]
+    value: Float[np.ndarray, "T X X"]
+    slope: Float[np.ndarray, "T X"]
+
+
+def no_progress(name: str, step: int, total: int) -> None:
+    """Show nothing."""

@@ -1,0 +1,115 @@
+"""Sampled paths: what is found is what the physics does, and the regulator along it keeps to it."""
+
+import numpy as np
+import pytest
+
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.rl.config.train_config import ControlConfig
+from robojackson.rl.sim import path_search, sampling
+from robojackson.rl.sim.feet import Feet
+from robojackson.rl.sim.motors import residual_scale
+from robojackson.rl.sim.nominal_path import Gains, Linear, Path
+from robojackson.rl.sim.path_search import PathSearch
+from robojackson.rl.sim.preview import driven_clip
+from robojackson.rl.sim.reference_clip import Clip
+from robojackson.rl.sim.regulator import advance, regulator, riccati
+from robojackson.rl.sim.simulation import Simulation
+from robojackson.robot.model import Robot
+
+pytestmark = pytest.mark.medium
+LED = ControlConfig(feedforward=1.0, feedback=0.0)
+STEPS = 40
+
+
+@pytest.fixture(autouse=True)
+def _few(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(path_search, "SAMPLES", 24)
+    monkeypatch.setattr(path_search, "KEPT", 6)
+
+
+@pytest.fixture(scope="module")
+def clip(robot: Robot, sway: ReferenceMotion) -> Clip:
+    return driven_clip(robot, sway, LED)
+
+
+@pytest.fixture(scope="module")
+def sim(robot: Robot) -> Simulation:
+    return Simulation(robot, LED, 1)
+
+
+@pytest.fixture(scope="module")
+def plain(robot: Robot, sim: Simulation, clip: Clip) -> tuple[Gains, Path, Linear]:
+    return regulator(sim, clip, residual_scale(robot, ControlConfig()), Feet(robot).count)
+
+
+def searched(
+    robot: Robot, sim: Simulation, plain: tuple[Gains, Path, Linear], seed: int
+) -> tuple[Path, Path]:
+    """Return the motion's first steps as a path, and one that was found beside it."""
+    action, feet = residual_scale(robot, ControlConfig()), Feet(robot)
+    _, path, linear = plain
+    path = Path(path.qpos[:STEPS], path.qvel[:STEPS], path.targets[:STEPS])
+    law = riccati(linear, action, cyclic=True)
+    search = PathSearch(sim, action, feet, path, np.random.default_rng(seed))
+    return path, search.run(path, law, 0)[0]
+
+
+def test_the_physics_follows_the_path_that_is_found(
+    robot: Robot, sim: Simulation, plain: tuple[Gains, Path, Linear]
+) -> None:
+    path, found = searched(robot, sim, plain, 0)
+    assert len(found) > 2 * path_search.WINDOW
+    np.testing.assert_array_equal(found.qpos[0], path.qpos[0])
+    qpos, qvel = advance(sim, found.qpos[:-1], found.qvel[:-1], found.targets[:-1])
+    np.testing.assert_allclose(qpos, found.qpos[1:], atol=1e-6)
+    np.testing.assert_allclose(qvel, found.qvel[1:], atol=1e-4)
+    again = searched(robot, sim, plain, 0)[1]
+    np.testing.assert_array_equal(again.qpos, found.qpos)
+
+
+def test_a_path_is_joined_to_the_motion(
+    robot: Robot, sim: Simulation, plain: tuple[Gains, Path, Linear]
+) -> None:
+    path, found = searched(robot, sim, plain, 0)
+    feet = Feet(robot)
+    search = PathSearch(sim, np.ones(17), feet, path, np.random.default_rng(0))
+    joined = search.joined(path, found, 0, 10)
+    np.testing.assert_array_equal(joined.qpos[:10], found.qpos[:10])
+    np.testing.assert_array_equal(joined.qpos[10:], path.qpos[10:])
+
+
+def test_few_robots_go_on_from_one_parent() -> None:
+    score = np.arange(40.0)
+    rows = path_search._best(score, np.repeat([0, 1], 20))
+    assert (rows < path_search.CHILDREN).sum() <= path_search.CHILDREN
+    assert list(rows) == sorted(rows)
+
+
+def test_feet_that_stand_decide_how_far_a_robot_is_from_its_place(robot: Robot) -> None:
+    feet = Feet(robot)
+    qpos = np.tile(robot.standing, (2, 1))
+    places = feet.places(qpos)
+    qpos[1, :2] += [0.3, -0.2]
+    np.testing.assert_allclose(feet.apart(qpos, places), [[0, 0], [0.3, -0.2]], atol=1e-9)
+    qpos[1, :2] -= [0.3, -0.2]
+    qpos[1, 7:][robot.joint_names.index("left_hip_y")] -= 0.8  # one leg raised forwards
+    assert np.abs(feet.apart(qpos, places)[1]).max() < 0.02
+
+
+def test_the_regulator_that_keeps_robots_up_longer_is_taken(
+    robot: Robot,
+    sim: Simulation,
+    clip: Clip,
+    plain: tuple[Gains, Path, Linear],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    action, feet = residual_scale(robot, ControlConfig()), Feet(robot)
+    monkeypatch.setattr(sampling, "regulator", lambda *given: plain)
+    monkeypatch.setattr(sampling, "PASSES", 1)
+    for shares, anchored in (((1.0,), False), ((0.5, 0.4), False), ((0.5, 0.6), True)):
+        held = iter(shares)
+        monkeypatch.setattr(sampling, "_held_share", lambda *given, held=held: next(held))
+        found = sampling.sampled_regulator(sim, clip, action, feet)
+        assert bool(np.isfinite(found.places).all()) == anchored
+        if not anchored:
+            np.testing.assert_array_equal(found.gain, plain[0].gain)
