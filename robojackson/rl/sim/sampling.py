@@ -21,7 +21,10 @@ from robojackson.rl.sim.tangent import state_difference
 
 PASSES, BACK_S, AGAIN_S = 12, 1.2, 0.6
 """Searches at most; how far before a fall a path is kept; how far before that the next begins."""
-STARTS, HELD_S = 8, 10.0
+TRIES, TRIED_S = 6, 30.0
+"""Searches from the beginning, of which the best is taken: at most so many, and of so long a motion
+in all."""
+STARTS, HELD_S = 12, 10.0
 """Where the regulator alone is tried, and for how long on a motion that repeats."""
 LARGEST_MOVE = 6.0
 """Full actions that the feedback moves a target at most: a path is up to four off the motion."""
@@ -49,28 +52,47 @@ def sampled_regulator(
         seed: Of the samples.
         progress: Called with a name, the steps that are done, and all.
     """
-    plain, path, linear = regulator(sim, clip, action, feet.count, progress)
-    motion = path
-    held = _held_share(sim, clip, action, feet, plain, motion)
-    if held == 1.0:
-        return plain
+    best, motion, linear = regulator(sim, clip, action, feet.count, progress)
+    held = _held_share(sim, clip, action, feet, best, motion)
     cycles = max(3, int(np.ceil(CYCLES_S / (clip.steps * clip.dt)))) if clip.cyclic else 1
-    reference = path = reference_path(sim, clip, cycles * clip.steps)
-    search = PathSearch(sim, action, feet, reference, np.random.default_rng(seed))
-    linear, begin = _repeated(linear, cycles), 0
+    reference = reference_path(sim, clip, cycles * clip.steps)
+    linear = _repeated(linear, cycles)
+    tries = int(np.clip(TRIED_S / (len(reference) * clip.dt), 1, TRIES))
+    for number in range(tries):
+        if held == 1.0:
+            break
+        rng = np.random.default_rng([seed, number])
+        search = PathSearch(sim, action, feet, reference, rng)
+        path, along = _searched(search, sim, reference, linear, action, clip.dt, progress)
+        found = _gains(sim, clip, action, feet, path, along, reference)
+        share = _held_share(sim, clip, action, feet, found, motion)
+        if share > held:
+            best, held = found, share
+    return best
+
+
+def _searched(
+    search: PathSearch,
+    sim: Simulation,
+    path: Path,
+    linear: Linear,
+    action: np.ndarray,
+    dt: float,
+    progress: Progress,
+) -> tuple[Path, Linear]:
+    """Return a path that was searched from a motion's, and the system along it."""
+    begin = 0
     for _ in range(PASSES):
         found, ended = search.run(path, riccati(linear, action, False), begin)
         end = begin + len(found) - 1
-        kept = end + 1 if ended else max(begin + WINDOW, end - round(BACK_S / clip.dt))
+        kept = end + 1 if ended else max(begin + WINDOW, end - round(BACK_S / dt))
         path = search.joined(path, found, begin, kept)
         linear = _with(linear, np.arange(begin, min(kept + 1, len(path))), sim, path)
         progress("sampled path", kept, len(path))
         if ended:
             break
-        begin = max(begin + 1, kept - round(AGAIN_S / clip.dt))
-    sampled = _gains(sim, clip, action, feet, path, linear, reference)
-    better = _held_share(sim, clip, action, feet, sampled, motion) > held
-    return sampled if better else plain
+        begin = max(begin + 1, kept - round(AGAIN_S / dt))
+    return path, linear
 
 
 def _held_share(
