@@ -70,7 +70,7 @@ def test_layers_that_do_not_fit_are_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("header", "reason"), [("{", "cannot be read"), ("[1]", "a list, no object")]
+    ("header", "reason"), [("{", "cannot be read"), ("[1]", "a list, not an object")]
 )
 def test_a_header_that_is_no_object_is_refused(tmp_path: Path, header: str, reason: str) -> None:
     (tmp_path / "p.safetensors").write_bytes(a_file(np.zeros((5, 3)), header))

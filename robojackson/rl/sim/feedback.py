@@ -1,7 +1,7 @@
-"""The linear feedback that drives a robot along its reference, before anything is learnt.
+"""The linear feedback that drives a robot along its reference, without learning.
 
-`regulator` computes it once for a motion, robot and control law; it is kept beside the added
-robots, because it takes a few seconds of processor for every second of motion.
+`regulator` computes it once for a motion, robot and control law; the result is cached beside the
+added robots, because it takes a few seconds of processor time for every second of motion.
 """
 
 import hashlib
@@ -33,8 +33,8 @@ FOLDER = "feedback"
 VARIED = ("body_mass", "body_ipos", "body_inertia", "geom_friction", "dof_armature")
 """Arrays of a model that `variation` changes."""
 LARGEST = 2.0
-"""Full actions of a policy that the feedback moves a target at most: so much that a policy of a few
-minutes can still correct it."""
+"""Largest offset of a target by the feedback, in full actions of a policy: small enough that a
+policy of a few minutes can correct it."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class StepFeedback:
     def targets(
         self, qpos: Float[np.ndarray, "N nq"], qvel: Float[np.ndarray, "N nv"]
     ) -> Float[np.ndarray, "N nu"]:
-        """Return by how much the motors' targets move, rad."""
+        """Return the offsets of the motors' targets, rad."""
         apart = state_difference(qpos, qvel, self.qpos, self.qvel)
         moved = (self.gain @ apart[:, :, None])[:, :, 0] + self.offset
         result: np.ndarray = -np.clip(moved, -self.limit, self.limit)
@@ -70,7 +70,8 @@ class Feedback:
     limit: Float[np.ndarray, " nu"]
 
     def at(self, row: Int[np.ndarray, " N"], shift: Float[np.ndarray, "N 3"]) -> StepFeedback:
-        """Return it at rows of the joined motions, whose cycles have moved them by `shift`, m."""
+        """Return the feedback at rows of the joined motions, whose cycles have moved them by
+        `shift`, m."""
         gains = self.gains
         qpos = gains.qpos[row]
         qpos[:, :3] += shift
@@ -84,7 +85,7 @@ def feedback_of(
     share = feedback_share(robot, control)
     if not share or control.law != "pd":
         return None
-    found = [_kept(robot, motion, control) for motion in references]
+    found = [_cached(robot, motion, control) for motion in references]
     joined = Gains(*(np.concatenate([getattr(one, name) for one in found])
                      for name in ("gain", "offset", "qpos", "qvel")))  # fmt: skip
     action = residual_scale(robot, ControlConfig())
@@ -92,8 +93,8 @@ def feedback_of(
     return Feedback(scaled, LARGEST * action)
 
 
-def _kept(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> Gains:
-    """Return the regulator of a motion, computed where it was not before."""
+def _cached(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> Gains:
+    """Return the regulator of a motion, from the cache or computed."""
     path = robots_folder().parent / FOLDER / f"{_digest(robot, motion, control)}.npz"
     if path.is_file():
         # A damaged file is computed again.
@@ -125,7 +126,7 @@ def _keep(path: Path, gains: Gains) -> None:
     content = io.BytesIO()
     arrays = {name: getattr(gains, name).astype(np.float32) for name in ("gain", "offset")}
     np.savez_compressed(content, qpos=gains.qpos, qvel=gains.qvel, **arrays)
-    with suppress(StoreError):  # a store that takes nothing: computed again next time
+    with suppress(StoreError):  # a read-only store: computed again next time
         FileTree(path.parent).write(path.name, content.getvalue())
 
 
@@ -138,14 +139,14 @@ def regulator_of(robot: Robot, motion: ReferenceMotion, control: ControlConfig) 
 
 
 def _digest(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> str:
-    """Return what the gains depend on, as a name."""
+    """Return a digest of the gains' inputs, as a name."""
     law = resolved(replace(control, feedback=0.0), robot)
     named = {name: getattr(law, name) for name in ("substeps", "feedforward")}
     facts = [poses_sha256(motion), robot.sha256, named, actuation_facts(robot, ControlConfig()),
              actuation_facts(robot, control), settings(), asdict(robot.description)]  # fmt: skip
     digest = hashlib.sha256(json.dumps(facts, sort_keys=True, default=str).encode())
     model = robot.model
-    for name in VARIED:  # a variation of the robot has its name and its file
+    for name in VARIED:  # a varied robot has the same name and file
         digest.update(np.ascontiguousarray(getattr(model, name)).tobytes())
     digest.update(f"{model.opt.timestep} {model.opt.integrator}".encode())
     return digest.hexdigest()[:32]

@@ -1,7 +1,7 @@
 """The linear-quadratic feedback along a reference as a tracker: it needs no network and no file.
 
-It holds motions that keep both feet near the floor, from the first second on and on any robot whose
-contacts the physics knows; steps and jumps need a policy (`docs/learning.md`, "Linear feedback").
+It holds motions that keep both feet near the floor, from the first second on, on any robot; steps
+and jumps need a policy (`docs/learning.md`, "Linear feedback").
 """
 
 from pathlib import Path
@@ -26,10 +26,12 @@ class RegulatorTracker:
         self.control, self.sees_ahead = ControlConfig(feedforward=1.0, feedback=1.0), False
 
     def equip(self, robot: Robot) -> Robot:
+        """Return the robot, whose own gains the feedback uses."""
         require_robot(robot, self.description)
         return robot
 
     def follow(self, robot: Robot, n: int) -> Follower:
+        """Begin with n robots."""
         require_robot(robot, self.description)
         return _RegulatorFollower(robot)
 
@@ -41,6 +43,7 @@ class _RegulatorFollower:
         self._hinge = Motors.of(robot.model).hinge
 
     def targets(self, seen: TrackerInput) -> Float[np.ndarray, "N nu"]:
+        """Return target hinge angles of the PD law, rad, in actuator order."""
         (step,) = seen.window
         targets = step.angles(self._hinge)
         if step.feedback is not None:
