@@ -43,8 +43,8 @@ def packages() -> list[Row]:
 def licence_of(package: Distribution) -> str:
     """Return what the metadata of a package says: its expression, its field, or its classifiers."""
     facts = package.metadata
-    told = next((facts[key] for key in FIELDS if key in facts), "")
-    line = " ".join(told.split())
+    licence = next((facts[key] for key in FIELDS if key in facts), "")
+    line = " ".join(licence.split())
     if line and len(line) <= LONGEST and line.upper() != "UNKNOWN":
         return line
     named = [c.split(" :: ")[-1] for c in facts.get_all("Classifier") or () if CLASSIFIER in c]

@@ -80,7 +80,7 @@ def test_a_header_that_is_no_object_is_refused(tmp_path: Path, header: str, reas
 
 @pytest.mark.parametrize(
     ("weight", "reason"),
-    [(np.zeros(5), "no matrix"), (np.full((5, 3), np.nan), "no numbers")],
+    [(np.zeros(5), "not a matrix"), (np.full((5, 3), np.nan), "not finite")],
 )
 def test_weights_that_no_layer_can_have_are_refused(
     tmp_path: Path, weight: np.ndarray, reason: str
