@@ -89,7 +89,7 @@ def write_sbom(file: Path, rows: list[Row]) -> None:
 
 
 def _needed(package: Distribution) -> Iterator[str]:
-    """Names of the packages that a package asks for; of ours, those of every extra."""
+    """Return the names of the packages that a package requires; of ours, those of every extra."""
     for line in package.requires or ():
         wants_extra = "extra ==" in line.replace("'", '"')
         if wants_extra and package.metadata["Name"].lower() != OURS:

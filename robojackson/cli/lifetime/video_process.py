@@ -160,7 +160,7 @@ def _free() -> _Reader:
 
 
 def _serve(parent: int, connection: Connection) -> None:
-    """Do the work that comes until nobody is left to ask; leave Ctrl-C to the parent."""
+    """Handle requests until the parent closes the pipe; leave Ctrl-C to the parent."""
     os.environ["OMP_NUM_THREADS"] = "1"
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     watch_parent(parent)

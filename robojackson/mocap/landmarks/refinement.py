@@ -106,7 +106,7 @@ def refine(
 def leashed(
     start: Float[np.ndarray, "T 12 3"], body: Float[np.ndarray, "T 12 3"], leash: float
 ) -> Float[np.ndarray, "T 12 3"]:
-    """The body, each landmark at most `leash` from its start seen from the hips."""
+    """Return the body, each landmark at most `leash` from its start relative to the hips."""
     move = body - start
     common = move[:, HIPS].mean(1, keepdims=True)
     apart = np.linalg.norm(move - common, axis=-1, keepdims=True)
