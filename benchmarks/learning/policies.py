@@ -211,7 +211,7 @@ def train_and_judge(
     must("train", reference, "-o", out, *options, core=core)
     folders.rows.mkdir(parents=True, exist_ok=True)
     for seconds, path in kept.items():
-        evaluated = out / f"judged-{seconds:g}s"
+        evaluated = out / f"evaluated-{seconds:g}s"
         policy = out / "policy.safetensors"
         must("evaluate", policy, reference, "-o", evaluated, "--seconds", seconds, core=core)
         part = path.with_suffix(".part")

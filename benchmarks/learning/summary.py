@@ -16,7 +16,7 @@ LIMBS = ("left_foot", "right_foot", "left_hand", "right_hand", "head")
 GAIN, R2, EXCESS = (0.8, 1.2), 0.5, 0.15
 AUTHORS_ROBOT = {
     "survived_s": 1.63,
-    "note": "at best: 27 steps of 0.06 s in the authors' own logs; nothing else can be told of it",
+    "note": "at best: 27 steps of 0.06 s in the authors' own logs; nothing else is known of it",
 }
 BESIDE = ("statue", "mean_pose", "zero_residual", "random", "hold")
 COLUMNS = (

@@ -1,10 +1,10 @@
-"""Twenty clips that nobody can have tuned on: their seed is the sha256 of the network's weights.
+"""Twenty clips that cannot have been tuned on: their seed is the sha256 of the network's weights.
 
     python -m benchmarks.mocap.fresh MOTIONS... [-o pairs]
 
 The strata are fixed here: held-out motions (`tools/pairs/sources.py: REPORTED`), four pitches, all
 sides, three sizes of the person, 30, 15 and 10 frames a second. MOTIONS are folders with their
-files; needs `tools/requirements.txt`. Rows: raw BlazePose, our default. Frames in which nobody was
+files; needs `tools/requirements.txt`. Rows: raw BlazePose, our default. Frames without a person
 detected count for both; PA-MPJPE of twelve joints, mm.
 """
 
@@ -75,7 +75,7 @@ def measure(path: Path) -> tuple[str, float, dict[str, float], dict[str, float]]
     fps = 30.0 / stride
     track = LandmarkTrack(fps, width, height, seen[..., :3], seen[..., 3:6], seen[..., 6])
     if track.detected.sum() < 2:
-        raise NoPersonFound("nobody detected")
+        raise NoPersonFound("no person detected")
     raw = fill_gaps(track.world_landmarks, track.detected)[:, LANDMARKS]
     sequence = recover_motion(track, MocapConfig())
     ours = sequence.joints[:, [keypoint(name) for name in JOINTS]]
@@ -111,10 +111,10 @@ def main() -> None:
             continue
         totals.append((raw["pa_mpjpe_mm"], ours["pa_mpjpe_mm"]))
         cells = (raw["pa_mpjpe_mm"], ours["pa_mpjpe_mm"], ours["speed_ratio"], ours["tilt_deg"])
-        told = [
+        cells = [
             f"{value:.2f}" if index == 2 else f"{value:.0f}" for index, value in enumerate(cells)
         ]
-        table.add_row(name, f"{share:.0%}", *told, f"{ours['tilt_sd_deg']:.1f}")
+        table.add_row(name, f"{share:.0%}", *cells, f"{ours['tilt_sd_deg']:.1f}")
     means = np.mean(totals, 0)
     table.add_row("mean", "", *(f"{value:.1f}" for value in means))
     Console().print(table)

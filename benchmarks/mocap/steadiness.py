@@ -45,13 +45,13 @@ def joints(sequence: SmplSequence) -> Float[np.ndarray, "T 12 3"]:
 
 
 def apart_mm(one: Float[np.ndarray, "T 12 3"], other: Float[np.ndarray, "T 12 3"]) -> float:
-    """Mean distance after one rotation for the clip, root-relative."""
+    """Return the mean distance after one rotation for the clip, root-relative."""
     count = min(len(one), len(other))
     return 1e3 * pose_error.rr_mpjpe(one[:count], other[:count], HIPS)
 
 
 def measure(video: Path) -> dict[str, float]:
-    """All rows of one clip."""
+    """Return all rows of one clip."""
     info, config = probe(video, VideoLimits()), MocapConfig()
     track = detect_landmarks(video, info, "full", DancerConfig())
     plain = joints(recover_motion(track, config))
@@ -76,7 +76,7 @@ def measure(video: Path) -> dict[str, float]:
 
 
 def thinned(track: LandmarkTrack, stride: int) -> LandmarkTrack:
-    """Each n-th frame."""
+    """Return each n-th frame."""
     return replace(
         track,
         fps=track.fps / stride,
@@ -89,7 +89,7 @@ def thinned(track: LandmarkTrack, stride: int) -> LandmarkTrack:
 
 
 def write(path: Path, images: Iterator[np.ndarray], fps: float, quality: int) -> None:
-    """H.264 of RGB images."""
+    """Write RGB images as H.264."""
     with av.open(str(path), "w") as container:
         stream = None
         for image in images:

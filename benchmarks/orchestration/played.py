@@ -53,7 +53,7 @@ def played(seconds: float, burn: bool, began: Callable[[], None] = lambda: None)
         answer = json.dumps({**SAID, "seconds": seconds})
         return [sys.executable, "-S", "-E", "-c", f"{code}\nprint({answer!r})", MARK]
 
-    async def judged(command: list[str], name: str, work: Path, limit_s: float | None) -> bytes:
+    async def evaluated(command: list[str], name: str, work: Path, limit_s: float | None) -> bytes:
         (work / TABLE).write_bytes(tables.encode_rows(EVALUATION_RECORD, [ROLLOUTS]))
         (work / SUMMARY).write_text(json.dumps({"survived_s": 1.0, "skill": 0.0}))
         (work / ROLLOUT).write_bytes(name.encode())
@@ -61,7 +61,7 @@ def played(seconds: float, burn: bool, began: Callable[[], None] = lambda: None)
 
     with (
         patch.object(train_policy, "_command", command),
-        patch.object(evaluate_policy, "run_process", judged),
+        patch.object(evaluate_policy, "run_process", evaluated),
     ):
         yield
 

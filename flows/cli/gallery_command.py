@@ -25,7 +25,7 @@ def gallery(
     dance: Annotated[str | None, typer.Option(help="Only runs of this dance.")] = None,
     as_json: Json = False,
 ) -> CommandResult:
-    """All dances of the store on one page; thumbnails that are there already are not made again."""
+    """Show all dances of the store on one page; existing thumbnails are not made again."""
     from robojackson.report.pages.gallery import render_gallery
     from storage.run_catalogue import list_runs
     from storage.store import Store

@@ -102,7 +102,7 @@ def page_settings(
 def _reason(candidate: Candidate, best: Candidate) -> str:
     score, least = candidate.score.score_per_second, best.score.score_per_second
     if not candidate.score.detected:
-        return "nobody is seen in it"
+        return "no person is visible in it"
     if candidate is best:
         return f"danced: steadiest, {score:.2f} a second"
     return f"not danced: {score:.2f} a second, {least:.2f} is steadier"

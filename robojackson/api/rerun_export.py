@@ -1,7 +1,7 @@
 """A run as a recording of Rerun (.rrd): video, landmarks, skeleton, robot, contacts, rewards."""
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
@@ -17,6 +17,9 @@ from robojackson.rl.evaluation.reward_meter import RewardMeter
 from robojackson.rl.evaluation.rollouts import Moment
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.simulation import Simulation
+
+if TYPE_CHECKING:
+    from rerun import RecordingStream
 
 REWARD = "reward_"
 
@@ -48,7 +51,7 @@ def write_rerun(folder: Path, out: Path) -> Path:
     return out
 
 
-def _log_person(recording: Any, run: RunFolder) -> None:
+def _log_person(recording: "RecordingStream", run: RunFolder) -> None:
     """Log landmarks in the picture, skeleton in the world, contacts and errors."""
     import rerun as rr
 
@@ -70,7 +73,7 @@ def _log_person(recording: Any, run: RunFolder) -> None:
             recording.log(f"errors/{name}", rr.Scalars(1000 * float(apart[index])))
 
 
-def _log_robot(recording: Any, run: RunFolder) -> None:
+def _log_robot(recording: "RecordingStream", run: RunFolder) -> None:
     """Log the parts of the robot's bodies once, and the bodies' poses at every moment."""
     import rerun as rr
 
@@ -91,7 +94,7 @@ def _log_robot(recording: Any, run: RunFolder) -> None:
         recording.send_columns(path, [seconds], moved)
 
 
-def _log_rewards(recording: Any, run: RunFolder) -> None:
+def _log_rewards(recording: "RecordingStream", run: RunFolder) -> None:
     """Log what every control step earns by the reward of a training from scratch."""
     import rerun as rr
 

@@ -42,8 +42,9 @@ def pretrain(
 ) -> Figures:
     """Train a walker: walker_<kind>.safetensors and walker.json with command, curve, evaluation.
 
-    BadConfiguration: a reference motion or a robot for `paper`, whose walker is Humanoid-v5 and
-    follows no motion.
+    Raises:
+        BadConfiguration: a reference motion or a robot for `paper`, whose walker is Humanoid-v5
+            and follows no motion.
     """
     from robojackson.rl.config.train_config import TrainConfig
     from robojackson.rl.policy import load_policy

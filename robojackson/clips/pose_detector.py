@@ -67,8 +67,7 @@ def detect(
     progress: Callable[[int, int], None] | None = None,
     watch: Watcher | None = None,
 ) -> LandmarkTrack:
-    """Return landmarks of whom the detector takes for the most prominent, NaN rows where nobody is
-    found.
+    """Return landmarks of the most prominent person, NaN rows where no person is found.
 
     Args:
         path: Video file.
@@ -222,7 +221,7 @@ def _loads(name: str) -> bool:
 
 
 def first_person(result: Any) -> np.ndarray | None:
-    """Return the first person of MediaPipe's answer as (33, 7), None for nobody.
+    """Return the first person of MediaPipe's answer as (33, 7), None for no person.
 
     Columns: image x, y, z; world x, y, z; visibility.
     """

@@ -15,7 +15,7 @@ RATE = 44_100
 LONGEST_S = 600.0
 """More of a file is not read, seconds."""
 SILENT = 1e-4
-"""Largest amplitude of a sound that nobody hears."""
+"""Largest amplitude of an inaudible sound."""
 
 
 @dataclass(frozen=True, repr=False)

@@ -1,7 +1,7 @@
 """Video files: what they hold, their frames and ranges of them.
 
 PyAV reads the container itself, so a rotation tag is honoured and a file that ends before its index
-says so is told apart from one that never was a video. Times in seconds, sizes in upright pixels.
+says so is distinguished from one that never was a video. Times in seconds, sizes in upright pixels.
 """
 
 import json

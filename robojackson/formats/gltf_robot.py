@@ -65,7 +65,8 @@ def add_robot(
     nodes: dict[int, int] = {}
     for body in range(1, model.nbody):
         parent = int(model.body_parentid[body])
-        node = scene.node(f"{name}{titles[body]}", nodes.get(parent), **meshes.get(body, {}))
+        title, of = f"{name}{titles[body]}", meshes.get(body, {})
+        node = scene.node(title, nodes.get(parent), None, None, **of)
         scene.animate(node, clock, *frames.relative(body, parent))
         nodes[body] = node
 

@@ -145,7 +145,7 @@ def cells(vertices: Float[np.ndarray, "V 3"], cell_m: float) -> Int[np.ndarray, 
 
 
 def one_number(numbers: np.ndarray) -> Int[np.ndarray, " N"]:
-    """Return one number for each three; fewer than 2^21 of each are told apart."""
+    """Return one number for each three; up to 2^21 values of each are distinguished."""
     x, y, z = numbers.astype(np.int64).T
     keys: np.ndarray = (x << 42) + (y << 21) + z
     return keys

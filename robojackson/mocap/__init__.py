@@ -1,1 +1,1 @@
-"""mocap"""
+"""Recover the motion of the person in a video."""

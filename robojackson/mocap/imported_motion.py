@@ -1,9 +1,10 @@
 """Motions of other projects, brought to our world and onto the floor.
 
-A file with a world of its own keeps its motion: axes are changed once, and the floor put at z = 0.
-HybrIK's output has none: joints before a camera whose focal length changes with the box of every
-frame. It is placed again before one camera of fixed focal length, depth filtered, and stands up
-as our own mocap does (gravity, floor, contacts, feet held), with HybrIK's own twists.
+A file with a world frame keeps its motion: axes are changed once, and the floor moved to z = 0.
+HybrIK's output has no world frame: its joints are in front of a camera whose focal length changes
+with the box of every frame. It is placed in front of one camera of fixed focal length, the depth is
+filtered, and then gravity, floor, contacts and pinned feet are as in our own mocap, with HybrIK's
+own twists.
 """
 
 from dataclasses import replace
@@ -38,16 +39,17 @@ from robojackson.mocap.recover import MocapConfig, recover_points
 from robojackson.motion.smpl_sequence import SmplSequence
 
 FLOOR_M = 0.01
-"""A floor so near to zero is left where it is, metres."""
+"""Height of a floor that is not moved, metres."""
 CUTOFF_HZ = 6.0
 """Zero-phase low-pass of HybrIK's joints, which are found frame by frame, hertz."""
 
 
 def ground_foreign_motion(motion: ForeignMotion, fps: float) -> SmplSequence:
-    """A motion that has a world, in ours: turned once, its floor at z = 0, contacts found.
+    """Return a motion with a world frame in our world frame: axes changed once, floor at z = 0,
+    contacts found.
 
     Raises:
-        BadTable: its skeleton is no person's.
+        BadTable: its skeleton is not a person's.
     """
     require_person(motion.rest_joints, "the skeleton")
     local = np.array(motion.rotations)
@@ -61,7 +63,7 @@ def ground_foreign_motion(motion: ForeignMotion, fps: float) -> SmplSequence:
     floor = float(np.median(lowest[~flying] if (~flying).any() else lowest))
     notes = list(motion.notes)
     if abs(floor) > FLOOR_M:
-        notes.append(f"floor found at {100 * floor:.1f} cm of the file's own zero: put at zero")
+        notes.append(f"floor found at {100 * floor:.1f} cm of the file's own zero: moved to zero")
         drop = np.array([0.0, 0.0, floor])
         pose, feet = replace(pose, points=pose.points - drop), feet - drop
     if float(np.mean(pose.points[:, keypoint("neck"), 2] - pose.points[:, 0, 2])) < 0.0:
@@ -75,10 +77,10 @@ def ground_foreign_motion(motion: ForeignMotion, fps: float) -> SmplSequence:
 def ground_hybrik_motion(
     motion: HybrikMotion, fps: float, config: MocapConfig, cutoff_hz: float = CUTOFF_HZ
 ) -> SmplSequence:
-    """HybrIK's motion in the world, on the floor.
+    """Return HybrIK's motion in the world, on the floor.
 
     Raises:
-        BadTable: its joints are no person's.
+        BadTable: its joints are not a person's.
     """
     require_person(motion.points, "the joints")
     full, valid = _all_frames(motion)
@@ -96,9 +98,9 @@ def ground_hybrik_motion(
 def before_camera(
     motion: HybrikMotion, fps: float, config: MocapConfig, cutoff_hz: float = CUTOFF_HZ
 ) -> Float[np.ndarray, "T 29 3"]:
-    """Keypoints before a camera of one focal length, smoothed, metres, camera axes.
+    """Return the keypoints before a camera of one focal length, smoothed, metres, camera axes.
 
-    The place that fits the keypoints in the image best; HybrIK's own follows the box's width.
+    The position fits the keypoints in the image; HybrIK's own position depends on the box's width.
     """
     rays = _camera(motion, config).rays(motion.pixels)
     root = pinhole_camera.fit_root(motion.points, rays)
@@ -110,9 +112,9 @@ def before_camera(
 
 
 def kinematics_error_mm(motion: HybrikMotion) -> float | None:
-    """Mean distance of HybrIK's joints to those that its rotations pose in our kinematics.
+    """Return the mean distance of HybrIK's joints from those of its rotations in our kinematics.
 
-    Our skeleton takes the offsets that fit best over the clip; None where there are no rotations.
+    Our skeleton gets the offsets that fit best over the clip; None without rotations.
     """
     if motion.rotations is None:
         return None
@@ -127,7 +129,7 @@ def _camera(motion: HybrikMotion, config: MocapConfig) -> pinhole_camera.Pinhole
 
 
 def _skeleton(motion: HybrikMotion) -> Float[np.ndarray, "29 3"]:
-    """HybrIK's own skeleton where its rotations tell it, else ours with its lengths."""
+    """Return HybrIK's own skeleton from its rotations, else ours with its bone lengths."""
     if motion.rotations is not None:
         return skeleton_under(motion.rotations, motion.points)
     lengths = np.zeros(len(PARENTS))
@@ -143,7 +145,7 @@ def _skeleton(motion: HybrikMotion) -> Float[np.ndarray, "29 3"]:
 
 
 def _twists(motion: HybrikMotion, rest: np.ndarray) -> Float[np.ndarray, "T 23 2"]:
-    """About our rest bones: HybrIK's own, or what its rotations have."""
+    """Return the twists about our rest bones: HybrIK's own, or those of its rotations."""
     if motion.rotations is None:
         return motion.twist
     bones = np.stack([rest[AIM_CHILD[j]] - rest[j] for j in range(1, 24)])
@@ -151,7 +153,7 @@ def _twists(motion: HybrikMotion, rest: np.ndarray) -> Float[np.ndarray, "T 23 2
 
 
 def _all_frames(motion: HybrikMotion) -> tuple[HybrikMotion, np.ndarray]:
-    """Frames in which nobody was found between their neighbours, and which were found."""
+    """Return all frames, missing ones interpolated, and which frames have a person."""
     frames = np.arange(motion.frame[-1] + 1)
     valid = np.isin(frames, motion.frame)
     if valid.all():

@@ -1,4 +1,4 @@
-"""From a landmark track to a motion that stands on the floor (issue: HybrIK without its network).
+"""From a landmark track to a motion that stands on the floor (HybrIK without its network).
 
 landmarks -> repair -> before the camera -> 29 keypoints -> person's skeleton -> solve -> up and
 floor -> contacts -> root lock -> feet pinned -> solve -> SmplSequence in the world frame.
@@ -32,19 +32,19 @@ from robojackson.motion.smpl_sequence import SmplSequence
 
 @config_dataclass
 class MocapConfig:
-    """How landmarks become a motion.
+    """Settings of the recovery of a motion from landmarks.
 
     Attributes:
         method: HybrIK's solve, adaptive or naive.
         focal_px: Focal length of the camera, pixels; None guesses from the image size.
         cutoff_hz: Zero-phase low-pass of the landmarks, hertz.
         depth_cutoff_hz: Low-pass of the distance of the body from the camera, hertz.
-        bone_trust: Share of the clip's medians in the proportions; the others are of the rest
+        bone_trust: Share of the clip's medians in the proportions; the rest is from the rest
             skeleton.
-        temporal: Of the network that corrects the detector.
-        refine: Of the whole-clip refinement.
-        gravity: Of the direction of up.
-        grounding: Of the floor and the feet.
+        temporal: Settings of the network that corrects the detector.
+        refine: Settings of the whole-clip refinement.
+        gravity: Settings of the direction of up.
+        grounding: Settings of the floor and the feet.
     """
 
     method: analytic_solve.Method = "adaptive"
@@ -59,10 +59,10 @@ class MocapConfig:
 
 
 def recover_motion(track: LandmarkTrack, config: MocapConfig) -> SmplSequence:
-    """The motion of the person in a track.
+    """Return the motion of the person in a track.
 
     Raises:
-        TrackTooShort, NoPersonFound: nothing to recover.
+        TrackTooShort, NoPersonFound: no motion can be recovered.
     """
     track = evenly(weigh_visibility(track))
     landmarks = repair(track)
@@ -95,7 +95,7 @@ def recover_motion(track: LandmarkTrack, config: MocapConfig) -> SmplSequence:
 
 
 def camera_facts(camera: Mapping[str, object], track: LandmarkTrack) -> dict[str, object]:
-    """What is known of a camera, which is that of the first frame where it moved."""
+    """Return the camera's metadata; of a moving camera that of the first frame."""
     return {**camera, **({} if track.to_first is None else {"moved": True})}
 
 
@@ -107,15 +107,15 @@ def recover_points(
     fps: float,
     config: MocapConfig,
 ) -> SmplSequence:
-    """The motion of points before the camera, from whatever detector.
+    """Return the motion of points before the camera, from any detector.
 
     Args:
-        points: Metres, camera axes, no gaps.
-        posed: Solves them.
+        points: Points without gaps, metres, camera axes.
+        posed: Function that solves the points.
         valid: Whether the frame was detected.
         pinhole: The camera.
         fps: Frames a second.
-        config: Of the floor and the feet.
+        config: Settings of the floor and the feet.
     """
     body = posed(points)
     gravity = floor.find_up(body.pose.points, body.feet, fps, config.gravity)
@@ -135,7 +135,7 @@ def _camera(
     to_world: np.ndarray,
     origin: np.ndarray,
 ) -> dict[str, object]:
-    """What is known of the camera; point_w = rotation @ point_c + position."""
+    """Return the camera's metadata; point_w = rotation @ point_c + position."""
     return {
         "focal_px": pinhole.focal_px,
         "width": pinhole.width,
@@ -185,4 +185,4 @@ def _notes(valid: np.ndarray, camera: dict[str, object]) -> tuple[str, ...]:
 def _swaps(landmarks: Landmarks) -> tuple[str, ...]:
     if not landmarks.swapped:
         return ()
-    return (f"left and right exchanged in {landmarks.swapped} frames: put back",)
+    return (f"left and right exchanged in {landmarks.swapped} frames: corrected",)

@@ -174,8 +174,8 @@ class ReferenceMotion(TableFile):
 def _require_widths(arrays: Mapping[str, np.ndarray], facts: Facts) -> None:
     """Raise `ValueError` where a table has not a column a name, or its root is not turned."""
     joints, contacts = len(facts["joint_names"]), len(facts["contact_names"])
-    wanted = {"qpos": 7 + joints, "qvel": 6 + joints, "contact": contacts, "torque_ratio": joints}
-    for name, width in wanted.items():
+    widths = {"qpos": 7 + joints, "qvel": 6 + joints, "contact": contacts, "torque_ratio": joints}
+    for name, width in widths.items():
         if arrays[name].shape[1] != width:
             raise ValueError(f"{name} has {arrays[name].shape[1]} numbers a row, not {width}")
     for name in NAMES:

@@ -43,8 +43,8 @@ def packages() -> list[Row]:
 def licence_of(package: Distribution) -> str:
     """Return what the metadata of a package says: its expression, its field, or its classifiers."""
     facts = package.metadata
-    told = next((facts[key] for key in FIELDS if key in facts), "")
-    line = " ".join(told.split())
+    licence = next((facts[key] for key in FIELDS if key in facts), "")
+    line = " ".join(licence.split())
     if line and len(line) <= LONGEST and line.upper() != "UNKNOWN":
         return line
     named = [c.split(" :: ")[-1] for c in facts.get_all("Classifier") or () if CLASSIFIER in c]
@@ -89,7 +89,7 @@ def write_sbom(file: Path, rows: list[Row]) -> None:
 
 
 def _needed(package: Distribution) -> Iterator[str]:
-    """Names of the packages that a package asks for; of ours, those of every extra."""
+    """Return the names of the packages that a package requires; of ours, those of every extra."""
     for line in package.requires or ():
         wants_extra = "extra ==" in line.replace("'", '"')
         if wants_extra and package.metadata["Name"].lower() != OURS:

@@ -1,1 +1,1 @@
-"""Learning to dance: environments, rewards, the TQC trainers, policies and their judge."""
+"""Learning to dance: environments, rewards, the TQC trainers, policies and their evaluation."""

@@ -1,6 +1,6 @@
 """The folder of a training on disk: its checkpoint and its results, written whole or not at all.
 
-checkpoint/              all that is needed to continue
+checkpoint/              everything needed to continue
 checkpoint.old/          the one before, while the new one takes its place
 policy.safetensors       the newest policy
 networks.safetensors     the newest networks, for other trainings to start from
@@ -21,7 +21,7 @@ CHECKPOINT, OLD_CHECKPOINT = "checkpoint", "checkpoint.old"
 
 
 def newest_checkpoint(out: Path) -> Path | None:
-    """Return the last whole checkpoint: the one before when a crash came between two renames."""
+    """Return the last whole checkpoint: the previous one after a crash between two renames."""
     for name in (CHECKPOINT, OLD_CHECKPOINT):
         if (out / name / "run.json").exists():
             return out / name
@@ -33,10 +33,10 @@ def write_checkpoint(out: Path, save: Callable[[Path], None], results: Mapping[s
 
     Args:
         out: Folder of the training.
-        save: Writes the files of a checkpoint into a folder.
+        save: Function that writes the files of a checkpoint into a folder.
         results: Content of each of `RESULTS`.
     Raises:
-        StoreError: the folder takes no more; the checkpoint before is still whole.
+        StoreError: the folder cannot be written; the previous checkpoint is still whole.
     """
     fresh, final = out / "checkpoint.new", out / CHECKPOINT
     shutil.rmtree(fresh, ignore_errors=True)
@@ -52,7 +52,7 @@ def write_checkpoint(out: Path, save: Callable[[Path], None], results: Mapping[s
         for part in out.glob("*.safetensors.part"):
             part.unlink(missing_ok=True)
         raise StoreError(f"{out}: the checkpoint cannot be written ({error})") from error
-    # First, since a checkpoint whose budget is used up is not written again.
+    # First, since a checkpoint with a used-up budget is not written again.
     for name in RESULTS:
         os.replace(out / f"{name}.part", out / name)
     old = out / OLD_CHECKPOINT
@@ -68,7 +68,7 @@ def set_results_aside(out: Path) -> None:
     for name in RESULTS:
         if (out / name).is_file():
             os.replace(out / name, out / f"before-{name}")
-            log.warning("%s was here before; it is before-%s now", name, name)
+            log.warning("%s existed; it is before-%s now", name, name)
 
 
 def _to_disk(path: Path) -> None:

@@ -1,8 +1,7 @@
 """A trained policy: a small network as numpy arrays, kept in one safetensors file.
 
 The file holds the layers of the actor (ReLU between them, tanh at the end) and, as JSON in its
-header, what the policy was trained for. Reading it executes nothing and needs neither jax nor
-torch.
+header, the facts of the training. Reading it executes nothing and needs neither jax nor torch.
 """
 
 import json
@@ -22,7 +21,7 @@ from robojackson.files.foreign_file import parse_json, require_file
 
 FORMAT = "robojackson-policy-1"
 LARGEST = 1e6
-"""Of a weight."""
+"""Largest magnitude of a weight."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -31,7 +30,7 @@ class Policy:
 
     Attributes:
         layers: (weight (in, out), bias (out,)) from the observation to the action.
-        facts: What the policy was trained for: robot, control law, trainer, seed, steps.
+        facts: Facts of the training: robot, control law, trainer, seed, steps.
     """
 
     layers: tuple[tuple[np.ndarray, np.ndarray], ...]
@@ -55,7 +54,7 @@ class Policy:
         return file
 
     def act(self, observation: Float[np.ndarray, "N D"]) -> Float[np.ndarray, "N nu"]:
-        """The mean action, -1..1, of each observation."""
+        """Return the mean action, -1..1, of each observation."""
         hidden = np.asarray(observation, np.float32)
         for weight, bias in self.layers[:-1]:
             hidden = np.maximum(hidden @ weight + bias, 0.0)
@@ -69,35 +68,35 @@ class Policy:
 
     @property
     def observation_size(self) -> int:
-        """Length of the observation that the first layer takes."""
+        """Return the length of the observation."""
         result: int = self.layers[0][0].shape[0]
         return result
 
     @property
     def action_size(self) -> int:
-        """Length of the action that the last layer gives."""
+        """Return the length of the action."""
         result: int = self.layers[-1][0].shape[1]
         return result
 
     @property
     def training(self) -> dict[str, int | None]:
-        """Seed of its training and the control steps that this took, by their names in tables."""
+        """Return seed and control steps of the training, by their names in tables."""
         seed, steps = (_count(self.facts.get(name)) for name in ("seed", "steps"))
         return {"seed": seed or 0, "step": steps}
 
     @property
     def updates(self) -> int | None:
-        """Gradient updates of its training; None where the file does not say."""
+        """Return the gradient updates of the training; None where the file has no number."""
         return _count(self.facts.get("updates"))
 
     @property
     def setup(self) -> str:
-        """What the configuration of its training was called; empty where the file does not say."""
-        said = self.facts.get("setup")
-        return said if isinstance(said, str) else ""
+        """Return the name of the training's configuration; empty where the file has none."""
+        name = self.facts.get("setup")
+        return name if isinstance(name, str) else ""
 
     def to_bytes(self) -> bytes:
-        """The content of the policy's file."""
+        """Return the content of the policy's file."""
         tensors: dict[str, np.ndarray] = {}
         for i, (weight, bias) in enumerate(self.layers):
             tensors[f"layer{i}.weight"] = np.ascontiguousarray(weight, np.float32)
@@ -106,7 +105,7 @@ class Policy:
 
 
 def _count(value: object) -> int | None:
-    """A number that a table has room for; None for whatever else a file may say."""
+    """Return a number that fits a table's column; None for any other value."""
     return value if isinstance(value, int) and 0 <= value < 2**31 else None
 
 
@@ -133,9 +132,11 @@ def _facts(path: Path, text: str) -> dict[str, object]:
     try:
         facts = parse_json(text, finite=True)
     except ValueError as error:
-        raise BadPolicy(f"{path}: what it was trained for cannot be read ({error})") from error
+        raise BadPolicy(f"{path}: the facts of its training cannot be read ({error})") from error
     if not isinstance(facts, dict):
-        raise BadPolicy(f"{path}: what it was trained for is a {type(facts).__name__}, no object")
+        raise BadPolicy(
+            f"{path}: the facts of its training are a {type(facts).__name__}, not an object"
+        )
     return facts
 
 
@@ -150,11 +151,11 @@ def _layers(
     except KeyError as error:
         raise BadPolicy(f"{path} lacks tensor {error}") from error
     if any(weight.ndim != 2 for weight, _ in layers):
-        raise BadPolicy(f"{path} has a layer whose weight is no matrix")
+        raise BadPolicy(f"{path} has a layer whose weight is not a matrix")
     if any(array.dtype.kind != "f" for layer in layers for array in layer):
-        raise BadPolicy(f"{path} has weights that are no floating-point numbers")
+        raise BadPolicy(f"{path} has weights that are not floating-point numbers")
     if not all((np.abs(array) < LARGEST).all() for layer in layers for array in layer):
-        raise BadPolicy(f"{path} has weights that are no numbers, or over {LARGEST:g}")
+        raise BadPolicy(f"{path} has weights that are not finite, or over {LARGEST:g}")
     widths = [weight.shape[1] for weight, _ in layers[:-1]]
     fits = all(w == nxt.shape[0] for w, (nxt, _) in zip(widths, layers[1:], strict=True))
     if not layers or not fits or any(w.shape[1:] != b.shape for w, b in layers):

@@ -1,4 +1,4 @@
-"""What a policy's file says it was trained for, checked against the robot that it shall drive."""
+"""Facts of a policy's training, checked against the robot that it will drive."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -19,15 +19,15 @@ T = TypeVar("T")
 
 
 def mode_of(policy: Policy) -> str:
-    """`track` or `paper`."""
+    """Return `track` or `paper`."""
     return str(policy.facts.get("mode", "track"))
 
 
 def policy_control(policy: Policy, robot: Robot) -> ControlConfig:
-    """The control law that a policy was trained with.
+    """Return the control law that a policy was trained with.
 
     Raises:
-        BadPolicy: the policy was trained for another robot, or its file says no control law.
+        BadPolicy: the policy was trained for another robot, or its file has no control law.
     """
     trained_for = policy.facts.get("robot", robot.description.name)
     if trained_for != robot.description.name:
@@ -35,7 +35,7 @@ def policy_control(policy: Policy, robot: Robot) -> ControlConfig:
             f"the policy was trained for robot {trained_for!r}, not for {robot.description.name!r}"
         )
     if "control" not in policy.facts:
-        raise BadPolicy("the policy's file says nothing of its control law")
+        raise BadPolicy("the policy's file has no control law")
     sizes = observation_sizes(policy, robot)
     if policy.observation_size not in sizes:
         raise BadPolicy(
@@ -48,17 +48,17 @@ def policy_control(policy: Policy, robot: Robot) -> ControlConfig:
             f"takes {robot.model.nu}: it was trained for another robot"
         )
     control = fact(policy, "control", ControlConfig)
-    if control.feedback is None:  # trained before there was any
+    if control.feedback is None:  # trained before the feedback existed
         control = replace(control, feedback=0.0)
     _require_same_actuation(policy, robot, control)
     return control
 
 
 def _require_same_actuation(policy: Policy, robot: Robot, control: ControlConfig) -> None:
-    """Refuse a robot whose gains or action scale have changed since the policy was trained.
+    """Raise if the robot's gains or action scale have changed since the policy was trained.
 
     Raises:
-        BadPolicy: naming the first motor that differs.
+        BadPolicy: the message names the first motor that differs.
     """
     recorded = policy.facts.get("actuation")
     if mode_of(policy) != "track" or not isinstance(recorded, Mapping):
@@ -74,15 +74,15 @@ def _require_same_actuation(policy: Policy, robot: Robot, control: ControlConfig
         raise BadPolicy(
             f"the policy was trained with {name} {was} of {motors[worst]} and robot "
             f"{robot.description.name!r} has {now[worst]:g} now: restore the robot's YAML or train "
-            "anew"
+            "it again"
         )
 
 
 def fact(policy: Policy, name: str, kind: type[T]) -> T:
-    """A configuration out of a policy's file.
+    """Return a configuration from a policy's file.
 
     Raises:
-        BadPolicy: it holds what this version does not know.
+        BadPolicy: it holds values that this version does not know.
     """
     try:
         return TypeAdapter(kind).validate_python(policy.facts[name])
@@ -90,21 +90,21 @@ def fact(policy: Policy, name: str, kind: type[T]) -> T:
         first = error.errors()[0]
         where = ".".join(map(str, (name, *first["loc"])))
         raise BadPolicy(
-            f"the policy's file says {where} = {first['input']!r} ({first['msg']}): it is of "
-            "another version of RoboJackson; train it anew"
+            f"the policy's file has {where} = {first['input']!r} ({first['msg']}): it is of "
+            "another version of RoboJackson; train it again"
         ) from error
 
 
 def observation_of(policy: Policy) -> Kind:
-    """Which inputs a policy of mode `track` takes."""
+    """Return the kind of inputs of a policy of mode `track`."""
     held = policy.facts.get("environment")
-    said = held.get("observation", "full") if isinstance(held, Mapping) else "full"
+    observed = held.get("observation", "full") if isinstance(held, Mapping) else "full"
     kinds: dict[object, Kind] = {kind: kind for kind in get_args(Kind)}
-    return kinds.get(said, "full")
+    return kinds.get(observed, "full")
 
 
 def observation_sizes(policy: Policy, robot: Robot) -> tuple[int, ...]:
-    """Lengths of the observations that a policy may take."""
+    """Return the possible lengths of a policy's observations."""
     model = robot.model
     if mode_of(policy) == "paper":
         joints = model.nq - 2 + model.nv

@@ -1,4 +1,4 @@
-"""Where a training may start from: our walkers, a run of ours, or anybody's SB3 zip of TQC.
+"""The networks that a training may start from: our walkers, a run of ours, or any SB3 zip of TQC.
 
 An SB3 zip holds pickled objects beside its weights. Only `policy.pth` is read, by torch's
 weights-only reader, and the JSON beside it as text; nothing is unpickled.
@@ -33,13 +33,13 @@ HUB = re.compile(r"^[\w.-]+/[\w.-]+(?<!\.safetensors)(?<!\.zip)$")
 
 
 def pretrained(start: str, mode: str, robot: RobotDescription | None = None) -> Networks | None:
-    """The networks that a start names; None for `scratch`.
+    """Return the networks that a start names; None for `scratch`.
 
     Args:
-        robot: Whose walker `walker` is; None for the one that ships.
+        robot: Robot of the `walker`; None for the one that ships.
     Raises:
-        BadPolicy: nothing of that name, no walker for the robot, or a file that does not hold an
-            actor of TQC.
+        BadPolicy: an unknown name, no walker for the robot, or a file that does not hold an actor
+            of TQC.
         MissingDependency: the hub cannot be reached or its client is not installed.
     """
     path = start_file(start, mode, robot)
@@ -49,7 +49,7 @@ def pretrained(start: str, mode: str, robot: RobotDescription | None = None) -> 
 
 
 def start_file(start: str, mode: str, robot: RobotDescription | None = None) -> Path | None:
-    """The file of a start, fetched where it is of the hub; None for `scratch`."""
+    """Return the file of a start, downloaded if it is on the hub; None for `scratch`."""
     if start == "scratch":
         return None
     if start == "walker":
@@ -66,7 +66,7 @@ def start_file(start: str, mode: str, robot: RobotDescription | None = None) -> 
 
 
 def from_hub(repository: str) -> Path:
-    """The zip of a repository of the hub, from its cache or the network.
+    """Return the zip of a repository of the hub, from its cache or the network.
 
     Raises:
         MissingDependency: no client, no network, or no such repository.
@@ -80,7 +80,7 @@ def from_hub(repository: str) -> Path:
     name = repository.split("/")[1]
     try:
         return Path(load_from_hub(repository, f"{name[:1].lower()}{name[1:]}.zip"))
-    except Exception as error:  # the client raises what its HTTP library raises
+    except Exception as error:  # the client raises its HTTP library's errors
         raise MissingDependency(
             f"start {repository!r} cannot be fetched from the hub ({type(error).__name__}); "
             "download its zip elsewhere and give its path"
@@ -88,10 +88,10 @@ def from_hub(repository: str) -> Path:
 
 
 def from_sb3_zip(path: Path) -> Networks:
-    """The actor and critics of TQC in an SB3 zip.
+    """Return the actor and critics of TQC in an SB3 zip.
 
     Raises:
-        BadPolicy: no zip of SB3, or not of TQC with ReLU layers.
+        BadPolicy: not a zip of SB3, or not of TQC with ReLU layers.
     """
     import torch
 
@@ -105,13 +105,13 @@ def from_sb3_zip(path: Path) -> Networks:
             alpha = _alpha(archive, torch)
     except pickle.UnpicklingError as error:  # its text advises to load the file without checks
         raise BadPolicy(
-            f"{path} is no SB3 zip that can be read safely: its weights hold more than tensors and "
+            f"{path} cannot be read safely as an SB3 zip: its weights hold more than tensors and "
             "could run code; save the model again with SB3 (model.save)"
         ) from error
     except Exception as error:  # a damaged file fails in any way
         cause = str(error).partition("\n")[0]
         cause = "damaged" if "weights_only" in str(error) else cause  # the same advice
-        raise BadPolicy(f"{path} is no SB3 zip that can be read ({cause})") from error
+        raise BadPolicy(f"{path} is not a readable SB3 zip ({cause})") from error
     _require_relu(path, header)
     try:
         tensors = _renamed(state)
@@ -132,15 +132,15 @@ def _alpha(archive: zipfile.ZipFile, torch: object) -> Tensors:
 
 
 def _require_relu(path: Path, header: Mapping[str, object]) -> None:
-    """SB3 writes the policy's arguments as text beside the pickle."""
+    """Raise for other activations: SB3 writes the policy's arguments as text beside the pickle."""
     arguments = header.get("policy_kwargs")
     activation = str(arguments.get("activation_fn", "ReLU")) if isinstance(arguments, dict) else ""
     if activation and "ReLU" not in activation:
-        raise BadPolicy(f"{path} has {activation} layers; only ReLU is known")
+        raise BadPolicy(f"{path} has {activation} layers; only ReLU is supported")
 
 
 def _renamed(state: Tensors) -> Tensors:
-    """SB3's names in ours; weights turned to (in, out)."""
+    """Return SB3's weights by our names, turned to (in, out)."""
     tensors = _chain(state, "actor.latent_pi", "actor")
     head = "actor.mu" if "actor.mu.weight" in state else "actor.mu.0"
     tensors |= _layer(state, head, "mean")

@@ -27,14 +27,16 @@ class ScalarLog:
         self._writer = EventFileWriter(str(folder))
 
     def add(self, step: int, values: Mapping[str, float]) -> None:
-        """Log the finite ones of some values at a step."""
+        """Log the finite values at a step."""
         from tensorboard.compat.proto.event_pb2 import Event
         from tensorboard.compat.proto.summary_pb2 import Summary
 
-        told = [
+        scalars = [
             Summary.Value(tag=name, simple_value=value)
             for name, value in values.items()
             if math.isfinite(value)
         ]
-        self._writer.add_event(Event(wall_time=time.time(), step=step, summary=Summary(value=told)))
+        self._writer.add_event(
+            Event(wall_time=time.time(), step=step, summary=Summary(value=scalars))
+        )
         self._writer.flush()

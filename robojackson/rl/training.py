@@ -1,9 +1,9 @@
-"""Training: one function for both modes and every trainer, resumable at any moment.
+"""Training: one function for both modes and every trainer, which can resume at any moment.
 
 `out/checkpoint/` and `out/replay/` are the only state; the same call with the same configuration
 continues from it, and ends as if it had never stopped. `out/policy.safetensors` is always the
-newest whole policy. What happens during training reaches the caller as rows (episodes) and progress
-dictionaries; writing tables is the caller's affair.
+newest whole policy. During training the caller receives rows (episodes) and progress dictionaries;
+the caller writes the tables.
 """
 
 import logging
@@ -35,10 +35,10 @@ def train_policy(
     out: Path,
     hooks: Hooks | None = None,
 ) -> TrainResult:
-    """Teach the robot to follow a reference motion, or several.
+    """Train a policy to follow a reference motion, or several.
 
     Raises:
-        BadConfiguration: it has no budget.
+        BadConfiguration: the configuration has no budget.
         BadPolicy: the networks to start from do not fit.
         KeyboardInterrupt: after a checkpoint was written.
     """
@@ -68,7 +68,7 @@ def train_policy(
 
 
 def _shaped(networks: Networks, core: TrackingCore, config: TrainConfig) -> TqcConfig:
-    """TQC with the layers of the networks, which must be for the same observation and action."""
+    """Return TQC's configuration with the layers of the networks, whose sizes must fit."""
     found = (networks.observation_size, networks.action_size)
     needed = (core.observation_size, core.action_size)
     if found != needed:

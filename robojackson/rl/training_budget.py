@@ -6,10 +6,11 @@ from robojackson.rl.config.train_config import TrainConfig
 
 
 class TrainingBudget:
-    """What a training may use and what it has used; a sitting begins when this is made.
+    """Limits and use of a training's budget; a sitting begins when this object is created.
 
     Args:
-        config: Of the training: `steps`, `minutes` and `cpu_minutes`, None where unlimited.
+        config: Configuration of the training: `steps`, `minutes` and `cpu_minutes`, None if
+            unlimited.
     """
 
     def __init__(self, config: TrainConfig) -> None:
@@ -18,7 +19,7 @@ class TrainingBudget:
         self._began, self._cpu_began = time.monotonic(), time.process_time()
 
     def resume(self, steps: int, seconds: float, cpu_seconds: float) -> None:
-        """Add what the sittings before have used."""
+        """Add the use of the previous sittings."""
         self._steps_before, self._before, self._cpu_before = steps, seconds, cpu_seconds
 
     def seconds(self) -> float:

@@ -1,4 +1,4 @@
-"""What a caller of a training is told while it runs, and how it stops one."""
+"""Callbacks of a training: reports to the caller, and a way to stop."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -14,18 +14,18 @@ class BudgetSpent(Exception):
 
 @dataclass(frozen=True)
 class Hooks:
-    """What a caller of a training is told, and how it stops one.
+    """Callbacks of a training.
 
     Attributes:
         progress: Called every few seconds with steps, rate, survival and the time left.
-        sink: Called with one row for each episode that ended.
-        on_learning: Called once, when the networks first hold learning that no checkpoint does.
-        saving: Called before a checkpoint is written: the rows so far should then be safe.
-        stop: Asked between two rounds; True ends the run with a checkpoint.
-        setup: What the caller calls the configuration; the policy's file tells it.
-        audited: Called once before it begins, with what the reward pays to bodies that do not dance
+        sink: Called with one row for each finished episode.
+        on_learning: Called once, when the networks first hold learning that no checkpoint holds.
+        saving: Called before a checkpoint is written: the caller should save its rows.
+        stop: Called between two rounds; True ends the run with a checkpoint.
+        setup: Name of the configuration, written into the policy's file.
+        audited: Called once at the beginning with the rewards of bodies that do not dance
             (`evaluation.reward_audit.audit_record`).
-        rewards: Reward terms of the caller, by name, beside those of the configuration.
+        rewards: Further reward terms by name.
     """
 
     progress: Callable[[Row], None] = lambda row: None

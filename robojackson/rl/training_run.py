@@ -1,6 +1,6 @@
-"""The bookkeeping of one training run: what is learnt, budget, checkpoints, episodes, progress.
+"""The bookkeeping of one training run: task, budget, checkpoints, episodes, progress.
 
-No clock stands in the rows of episodes: a run in steps that is repeated gives the same table.
+The rows of episodes contain no clock: repeating a run in steps gives the same table.
 """
 
 import json
@@ -16,11 +16,7 @@ import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 
 from robojackson.errors import BadConfiguration, TrainingDiverged
-from robojackson.rl.checkpoint_folder import (
-    newest_checkpoint,
-    set_results_aside,
-    write_checkpoint,
-)
+from robojackson.rl.checkpoint_folder import newest_checkpoint, set_results_aside, write_checkpoint
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.policy import Policy
@@ -39,14 +35,14 @@ RECENT_FIGURES = ("survived_s", "episode_return", "site_error_m")
 NOT_OF_THE_RUN = (
     *("steps", "minutes", "cpu_minutes", "checkpoint_seconds", "progress_seconds", "tensorboard"),
 )
-"""What may differ between two sittings."""
+"""Keys that may differ between two sittings."""
 
 
 class Run:
     """The bookkeeping of one training run: budget, checkpoints, episodes, progress.
 
     Everything happens between two rounds of updates, where the state of the trainer and of the
-    environment is whole: a run that is killed and resumed ends as one that was not.
+    environment is whole: a killed and resumed run ends like an uninterrupted one.
     """
 
     def __init__(
@@ -56,16 +52,16 @@ class Run:
         self._hooks, self._replay = hooks, out / "replay"
         self._recent: deque[Row] = deque(maxlen=RECENT_EPISODES)
         self._budget, self._has_learnt = TrainingBudget(config), False
-        self._saved = self._told = time.monotonic()
-        self._board = ScalarLog(out / "tensorboard") if config.tensorboard else None
+        self._saved = self._reported = time.monotonic()
+        self._scalars = ScalarLog(out / "tensorboard") if config.tensorboard else None
         self.callback = _Callback(self)
         self._average = ActorAverage(config.tqc.actor_average)
 
     def bind(self, trainer: Trainer) -> None:
-        """Attach the trainer; continue from a checkpoint when there is one."""
+        """Attach the trainer; continue from a checkpoint if there is one."""
         self.trainer, self._saved_updates = trainer, 0
         folder = newest_checkpoint(self.out)
-        if folder is None:  # what is there without one is another training's
+        if folder is None:  # existing files without one are another training's
             shutil.rmtree(self._replay, ignore_errors=True)
             set_results_aside(self.out)
             return
@@ -85,10 +81,11 @@ class Run:
         log.info("resuming at %d steps", state["steps"])
 
     def finished(self) -> str:
-        """The budget that is used up, or an empty string."""
+        """Return the budget that is used up, or an empty string."""
         return self._budget.used_up(self.trainer.steps())
 
     def episodes(self, rows: list[Row]) -> None:
+        """Collect rows of finished episodes and report them."""
         steps, first = self.trainer.steps() + self.core.n, self.core.episode - len(rows) + 1
         for number, row in enumerate(rows, first):
             row |= {"step": steps, "episode": number}
@@ -96,12 +93,12 @@ class Run:
         self._hooks.sink(rows)
 
     def tick(self) -> None:
-        """Called between two rounds.
+        """Save, report progress, or stop; called between two rounds.
 
         Raises:
-            Enough: the budget is used up.
-            TrainingDiverged: the actor's weights are no numbers any more.
-            KeyboardInterrupt: the caller wants to stop; a checkpoint was written.
+            BudgetSpent: the budget is used up.
+            TrainingDiverged: the actor's weights are not finite.
+            KeyboardInterrupt: the caller stopped the run; a checkpoint was written.
         """
         now = time.monotonic()
         layers, updates = self.trainer.acting()
@@ -112,8 +109,8 @@ class Run:
             self._hooks.on_learning()
         try:
             started = self._budget.has_advanced(self.trainer.steps())
-            if started and now - self._told >= self.config.progress_seconds:
-                self._told = now
+            if started and now - self._reported >= self.config.progress_seconds:
+                self._reported = now
                 self._report()
             if self._hooks.stop():
                 raise KeyboardInterrupt
@@ -127,11 +124,11 @@ class Run:
             self._saved = time.monotonic()
 
     def checkpoint(self) -> None:
-        """Write the policy and everything needed to go on, whole or not at all.
+        """Write the policy and everything needed to continue, whole or not at all.
 
         Raises:
-            TrainingDiverged: weights are no numbers any more; nothing is written.
-            StoreError: the folder takes no more.
+            TrainingDiverged: weights are not finite; nothing is written.
+            StoreError: the folder cannot be written.
         """
         networks = self.trainer.networks()
         self._require_finite(networks.values())
@@ -140,6 +137,7 @@ class Run:
         self.trainer.saved()
 
     def result(self) -> TrainResult:
+        """Return the result of the run."""
         return TrainResult(
             self.out / "policy.safetensors",
             self.trainer.steps(),
@@ -149,7 +147,7 @@ class Run:
         )
 
     def _identity(self) -> dict[str, object]:
-        """The configuration without the budget: what a checkpoint must share to be continued."""
+        """Return the configuration without the budget, which a continued run must share."""
         fields = asdict(self.config)
         for free in NOT_OF_THE_RUN:
             del fields[free]
@@ -157,7 +155,7 @@ class Run:
         return result
 
     def _save(self, folder: Path) -> None:
-        """Write what is needed to go on into a folder."""
+        """Write everything needed to continue into a folder."""
         self.trainer.save(folder, self._replay)
         np.savez(folder / "environment.npz", **self.core.state())
         self._average.save(folder)
@@ -174,7 +172,7 @@ class Run:
         }
 
     def _results(self, networks: Tensors) -> dict[str, bytes]:
-        """What a run leaves beside its tables: the policy, and networks to start others from."""
+        """Return the policy, and the networks that other trainings can start from."""
         facts = self._facts()
         layers = self._average.layers(self.trainer.layers(), self.trainer.updates())
         return {
@@ -186,15 +184,15 @@ class Run:
         if all(np.isfinite(array).all() for array in arrays):
             return
         kept = newest_checkpoint(self.out)
-        where = f"{kept} is of before" if kept else "no checkpoint was written before"
+        where = f"{kept} is older" if kept else "no checkpoint exists"
         raise TrainingDiverged(
             f"{self.out}: the training diverged: after {self.trainer.steps()} steps its networks "
-            f"hold values that are no numbers ({where}); take a lower tqc.learning_rate or another "
+            f"hold values that are not finite ({where}); take a lower tqc.learning_rate or another "
             "seed, in another folder"
         )
 
     def _facts(self) -> dict[str, object]:
-        """What the policy was trained for."""
+        """Return the facts of the training."""
         config = self.config
         return {
             "robot": self.task.robot,
@@ -216,12 +214,12 @@ class Run:
 
     def _report(self) -> None:
         status = self._status()
-        if self._board is not None:
+        if self._scalars is not None:
             rewards = {
                 k for row in self._recent for k in row if k.startswith(("reward_", "train_"))
             }
             means = {key: float(np.mean([r[key] for r in self._recent])) for key in sorted(rewards)}
-            self._board.add(int(status["steps"]), status | means)
+            self._scalars.add(int(status["steps"]), status | means)
         self._hooks.progress(status)
 
     def _status(self) -> Row:
@@ -231,12 +229,12 @@ class Run:
         def mean(key: str) -> float:
             return float(np.mean([row[key] for row in recent])) if recent else float("nan")
 
-        told = {"steps": steps, "updates": self.trainer.updates(), **self._budget.progress(steps)}
-        return told | {name: mean(name) for name in RECENT_FIGURES}
+        row = {"steps": steps, "updates": self.trainer.updates(), **self._budget.progress(steps)}
+        return row | {name: mean(name) for name in RECENT_FIGURES}
 
 
 class _Callback(BaseCallback):
-    """Stable-Baselines3's hook: one call a round."""
+    """Stable-Baselines3's callback: one call a round."""
 
     def __init__(self, run: Run) -> None:
         super().__init__()

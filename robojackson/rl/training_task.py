@@ -1,4 +1,4 @@
-"""What a training run learns, and how it ended."""
+"""The task of a training run, and its result."""
 
 import hashlib
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from robojackson.robot.model import Robot
 
 @dataclass(frozen=True)
 class Task:
-    """What is being learnt: a checkpoint of another one cannot be continued.
+    """Task of a training: a checkpoint of another task cannot be continued.
 
     Attributes:
         robot: Name of the robot.
@@ -25,7 +25,7 @@ class Task:
 
     @staticmethod
     def of(reference: ReferenceMotion | Sequence[ReferenceMotion], robot: Robot) -> "Task":
-        """The task of following a reference, or several, with a robot."""
+        """Return the task of following a reference, or several, with a robot."""
         digests = [poses_sha256(motion) for motion in motions_of(reference)]
         joined = hashlib.sha256("".join(digests).encode()).hexdigest()
         found = digests[0] if len(digests) == 1 else joined
@@ -34,13 +34,13 @@ class Task:
 
 @dataclass(frozen=True)
 class TrainResult:
-    """How a training run ended.
+    """The result of a training run.
 
     Attributes:
         policy: The policy's file.
-        steps, updates: Control steps and gradient updates in all.
-        seconds: Wall time in all, resumptions included.
-        stopped: `steps` or `minutes`: the budget that ended the run.
+        steps, updates: Total control steps and gradient updates.
+        seconds: Total wall time, including resumptions.
+        stopped: Budget that ended the run, such as `steps` or `minutes`.
     """
 
     policy: Path

@@ -1,7 +1,7 @@
 """The walker of a robot: the networks that a training with `start: walker` begins from.
 
-Those that ship learnt on one robot. `robojackson pretrain --robot NAME` keeps that of any other
-beside the added robots, by the robot's name, the digest of its model and the mode.
+The shipped walkers were trained on one robot. `robojackson pretrain --robot NAME` saves that of any
+other robot beside the added robots, by the robot's name, the digest of its model and the mode.
 """
 
 from pathlib import Path
@@ -16,7 +16,7 @@ ASSETS = Path(__file__).parent.parent / "assets"
 WALKERS = {"track": "walker_track.safetensors", "paper": "walker_paper.safetensors"}
 FOLDER = "pretrain"
 DIGITS = 12
-"""Of the model's digest in the name of a walker's folder."""
+"""Number of digits of the model's digest in the name of a walker's folder."""
 
 
 def shipped_walker(mode: str) -> Path:
@@ -25,20 +25,20 @@ def shipped_walker(mode: str) -> Path:
 
 
 def is_shipped(robot: RobotDescription, mode: str) -> bool:
-    """Return whether the walker that ships for a mode learnt on this robot or on its model.
+    """Return whether the shipped walker of a mode was trained on this robot or on its model.
 
     Raises:
-        BadConfiguration: the model of the robot is not here.
+        BadConfiguration: the model of the robot is not installed.
     """
     facts = load_networks(shipped_walker(mode)).facts
     return facts.get("robot") == robot.name or facts.get("model_sha256") == _model(robot)
 
 
 def walker_file(robot: RobotDescription, mode: str) -> Path:
-    """Return the file of a robot's own walker, else of the one that ships and fits it.
+    """Return the file of a robot's own walker, else of the shipped one that fits it.
 
     Raises:
-        BadConfiguration: the model of the robot is not here.
+        BadConfiguration: the model of the robot is not installed.
         BadPolicy: there is no walker; the message names the command that trains one.
     """
     own = walkers_root() / walker_key(robot, mode)
@@ -72,14 +72,14 @@ def walker_key(robot: RobotDescription, mode: str) -> str:
     """Return the key of a robot's own walker in a store.
 
     Raises:
-        BadConfiguration: the model of the robot is not here.
+        BadConfiguration: the model of the robot is not installed.
     """
     return f"{FOLDER}/{robot.name}-{_model(robot)[:DIGITS]}/{WALKERS[mode]}"
 
 
 def walkers_root() -> Path:
-    """Return the folder whose `pretrain` holds walkers: the store, or the cache where that is no
-    folder."""
+    """Return the folder whose `pretrain` holds walkers: the store, or the cache if the store is not
+    a folder."""
     return robots_folder().parent
 
 

@@ -64,7 +64,7 @@ def require_model_files(path: Path, place: str) -> None:
             raise BadConfiguration(f"{place}: {cause}") from cause
         if file.suffix.lower() in (".xml", ".mjcf", ".urdf"):
             text = file.read_text(errors="replace")
-            numbers = (word for told in COPIES.findall(text) for word in told.split())
+            numbers = (word for found in COPIES.findall(text) for word in found.split())
             copies = [float(word) for word in numbers if re.fullmatch(r"\d+(\.\d+)?", word)]
             if np.prod(copies or [1.0]) > MOST_COPIES:
                 raise BadConfiguration(f"{place}: {file}: more than {MOST_COPIES:,} copies")

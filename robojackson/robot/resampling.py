@@ -99,7 +99,7 @@ def seam_speed(qpos: Float[np.ndarray, "S nq"], dt: float, cycle_offset: np.ndar
 
 
 def seam_shift(qpos: Float[np.ndarray, "S nq"], dt: float, cycle_offset: np.ndarray) -> float:
-    """Return how far the root's step over the seam differs from its neighbours' mean, metres."""
+    """Return the difference of the root's step over the seam from its neighbours' mean, metres."""
     return float(np.linalg.norm(_seam_miss(qpos, dt, cycle_offset)[:3]))
 
 

@@ -4,7 +4,7 @@ import ast
 from pathlib import Path
 
 LIBRARY = Path(__file__).parents[2] / "robojackson"
-MOST = 377
+MOST = 376
 """Lower it when the count has fallen; `object`, a type variable or a dataclass takes its place."""
 
 

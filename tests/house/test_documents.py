@@ -35,6 +35,17 @@ def test_the_files_of_the_recipes_are_there() -> None:
     assert [p for p in named if PLACEHOLDER not in p and not (ROOT / p).is_file()] == []
 
 
+@pytest.mark.parametrize("title", recipes())
+def test_every_name_of_a_recipe_is_in_a_file_that_it_names(title: str) -> None:
+    """A reader who follows a recipe never has to search for the module of a name."""
+    text = next(p for p in re.split(r"(?m)^## ", RECIPES) if p.startswith(title))
+    text = text.split("Tried:")[0]
+    files = set(re.findall(r"`([\w/]+\.(?:py|yaml))`", text))
+    read = "".join((ROOT / p).read_text() for p in files if PLACEHOLDER not in p)
+    names = set(re.findall(r"`([A-Za-z_]\w*)[`(]", text)) - {PLACEHOLDER}
+    assert [n for n in sorted(names) if PLACEHOLDER not in n and n not in read] == []
+
+
 def test_the_new_names_of_modules_are_those_of_files() -> None:
     table = (ROOT / "docs" / "renames.md").read_text().split("## Functions")[0]
     new = re.findall(r"(?m)^\| `[\w.]+` \| `([\w.]+)` \|$", table)

@@ -148,12 +148,12 @@ def test_numbers_that_are_not_finite_are_named(name: str) -> None:
 def test_mirrored_matrices_are_no_rotations() -> None:
     content = res_pk()
     content["pred_thetas"] = -content["pred_thetas"]
-    with pytest.raises(BadTable, match="no rotations"):
+    with pytest.raises(BadTable, match="not rotations"):
         read(content)
 
 
 def test_matrices_that_stretch_are_no_rotations() -> None:
-    with pytest.raises(BadTable, match="no rotations"):
+    with pytest.raises(BadTable, match="not rotations"):
         read(res_pk(pred_thetas=np.zeros((FRAMES, 216))))
 
 

@@ -70,7 +70,7 @@ def test_layers_that_do_not_fit_are_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("header", "reason"), [("{", "cannot be read"), ("[1]", "a list, no object")]
+    ("header", "reason"), [("{", "cannot be read"), ("[1]", "a list, not an object")]
 )
 def test_a_header_that_is_no_object_is_refused(tmp_path: Path, header: str, reason: str) -> None:
     (tmp_path / "p.safetensors").write_bytes(a_file(np.zeros((5, 3)), header))
@@ -80,7 +80,7 @@ def test_a_header_that_is_no_object_is_refused(tmp_path: Path, header: str, reas
 
 @pytest.mark.parametrize(
     ("weight", "reason"),
-    [(np.zeros(5), "no matrix"), (np.full((5, 3), np.nan), "no numbers")],
+    [(np.zeros(5), "not a matrix"), (np.full((5, 3), np.nan), "not finite")],
 )
 def test_weights_that_no_layer_can_have_are_refused(
     tmp_path: Path, weight: np.ndarray, reason: str

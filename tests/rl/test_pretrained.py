@@ -214,16 +214,16 @@ DAMAGES = {
     "critic2.norm.0.offset is missing": ("critic2.norm.0.offset", None),
     "target1.0.weight is missing": ("target1.0.weight", None),
     "actor.1.bias is missing": ("actor.1.bias", None),
-    "mean.weight is missing or no matrix": ("mean.weight", None),
-    "critic1.0.weight is missing or no matrix": ("critic1.0.weight", np.ones(3)),
-    "critic3.0.weight, which belongs to none": ("critic3.0.weight", np.ones((2, 2))),
-    r"critic1.norm.0.scale has the shape \(4,\).*ask for \(10,\)": (
+    "mean.weight is missing or not a matrix": ("mean.weight", None),
+    "critic1.0.weight is missing or not a matrix": ("critic1.0.weight", np.ones(3)),
+    "critic3.0.weight, which belongs to no layer": ("critic3.0.weight", np.ones((2, 2))),
+    r"critic1.norm.0.scale has the shape \(4,\).*need \(10,\)": (
         "critic1.norm.0.scale",
         np.ones(4),
     ),
     r"critic2.0.weight has the shape \(9, 10\)": ("critic2.0.weight", np.ones((9, 10))),
     r"log_alpha has the shape \(2,\)": ("log_alpha", np.ones(2)),
-    "log_std.bias holds values that are no numbers": ("log_std.bias", np.full(17, np.nan)),
+    "log_std.bias holds values that are not finite": ("log_std.bias", np.full(17, np.nan)),
 }
 
 

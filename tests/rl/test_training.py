@@ -224,7 +224,7 @@ def test_a_training_that_diverges_says_so_and_keeps_what_it_had(
     load = of.load
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(of, "load", spoil)
-        with pytest.raises(TrainingDiverged, match=r"160 steps.*checkpoint is of before"):
+        with pytest.raises(TrainingDiverged, match=r"160 steps.*checkpoint is older"):
             train_policy(sway, robot, brief(name), tmp_path, Hooks(sink=rows.extend))
     assert rows == []
     assert (tmp_path / "policy.safetensors").read_bytes() == kept

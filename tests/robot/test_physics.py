@@ -80,7 +80,7 @@ def test_a_limited_hinge_without_an_actuator_gets_a_motor(tmp_path: Path) -> Non
 def test_a_servo_of_a_limited_hinge_gives_way_to_a_motor(tmp_path: Path) -> None:
     """The PD law is ours; training takes torque motors alone."""
     described = machine.description(tmp_path)
-    with pytest.raises(BadConfiguration, match="no torque motor"):
+    with pytest.raises(BadConfiguration, match="not a torque motor"):
         require_trainable(load_robot(described))
     robot = load_robot(dataclasses.replace(described, torque_limits={"*": 20.0}))
     require_trainable(robot)

@@ -109,7 +109,7 @@ def _install(package: str, digest: str, packages: Path | None, folder: Path) -> 
 
 
 def _without_evaluation(text: str) -> str:
-    """MuJoCo's script with closures where it compiled strings."""
+    """Return MuJoCo's script with closures where it compiled strings."""
     for old, new in ((COMPILED, ""), (EVALUATED, INVOKER), (CALLED, CALLER)):
         if text.count(old) != 1:
             raise BuildError(f"mujoco.js has no single {old!r}")

@@ -30,7 +30,7 @@ from tools.pairs import gestures, sources
 
 FPS, SECONDS = 30.0, 8.0
 CAPTURED = ("jog", "long_walk1", "long_walk2", "long_walk3", "stealthy_walk0", "stealthy_walk1")
-"""Of DeepMimic; the near-duplicates of judged motions are not among them."""
+"""Of DeepMimic; the near-duplicates of held-out motions are not among them."""
 TAILED = 3
 """Every third invented dance begins and ends standing; captured dances do."""
 MOST_INFEASIBLE = 0.25

@@ -27,7 +27,7 @@ def collection(folder: Path, robot: Robot) -> list[ReferenceMotion]:
     """Read the motions of a folder, each followed by its mirror image.
 
     Raises:
-        ValueError: one of them is judged, or too much like one that is.
+        ValueError: one of them is held out, or too similar to one that is.
     """
     paths = sorted(folder.glob("*.parquet"))
     split = load_split()

@@ -84,7 +84,7 @@ def make_clip(
     number: int, seed: int, body: Body, studio: scenery.Studio, files: list[Path],
     cache: dict[Path, deepmimic.Motion],
 ) -> dict[str, Any]:  # fmt: skip
-    """One clip for training."""
+    """Make one clip for training."""
     rng = np.random.default_rng([seed, number])
     name, motion = choose_motion(files, cache, rng)
     stride = int(rng.choice(STRIDES, p=STRIDE_SHARES))

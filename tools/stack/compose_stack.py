@@ -151,9 +151,14 @@ class Stack:
         log = self.folder / f"{full}.log"
         if name == "postgres":
             test = self.file[name]["healthcheck"]["test"][1]
-            wanted = self.file[name]["environment"]
+            given = self.file[name]["environment"]
             return postgres.service(
-                wanted, test, self.ports[name], self.folder, log, self.configs["roles"]["content"]
+                given,
+                test,
+                self.ports[name],
+                self.folder,
+                log,
+                self.configs["roles"]["content"],
             )
         if name == "s3":
             return self._s3(log)

@@ -83,15 +83,15 @@ def _ready(settings: Mapping[str, str], check: str, roles: str, home: Path) -> s
         return f"{check} && {_database(settings)}"
     script, done, user = home / "roles.sql", home / "roles.done", settings["POSTGRES_USER"]
     script.write_text(roles)
-    told = f"psql -q -v ON_ERROR_STOP=1 -U {user} -d {settings['POSTGRES_DB']} -f {script}"
-    return f"pg_isready && {{ test -e {done} || {{ {told} && touch {done}; }}; }} && {check}"
+    command = f"psql -q -v ON_ERROR_STOP=1 -U {user} -d {settings['POSTGRES_DB']} -f {script}"
+    return f"pg_isready && {{ test -e {done} || {{ {command} && touch {done}; }}; }} && {check}"
 
 
 def _database(settings: Mapping[str, str]) -> str:
     """Return the shell that makes the database, as the image does first, and asks it."""
     user, name = settings["POSTGRES_USER"], settings["POSTGRES_DB"]
-    asked = f"psql -U {user} -d {name} -c 'select 1'"
-    return f"{{ {asked} 2>/dev/null || createdb -U {user} {name}; {asked}; }}"
+    query = f"psql -U {user} -d {name} -c 'select 1'"
+    return f"{{ {query} 2>/dev/null || createdb -U {user} {name}; {query}; }}"
 
 
 def _home(folder: Path) -> Path:

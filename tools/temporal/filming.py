@@ -1,4 +1,4 @@
-"""Cameras for motions without pictures: every window of a batch is filmed anew.
+"""Cameras for motions without pictures: every window of a batch is filmed again.
 
 All yaws, pitch of -20 to 60 degrees, rolls, lenses from wide to long, a person near or far and
 beside the middle of the image; what is seen is exact, `invented.Detector` makes it a detector's.
@@ -67,7 +67,7 @@ def film(
 
 
 def with_constants(batch: Batch) -> Batch:
-    """Add what the network is told of the clip, from what is seen in them."""
+    """Add the constants of the clip, computed from its frames."""
     pairs = [[(f"{s}_{a}", f"{s}_{b}") for s in ("left", "right")]
              for a, b in features.CHAINS.values()]  # fmt: skip
     pairs += [[(f"left_{name}", f"right_{name}")] for name in features.WIDTHS]
@@ -84,7 +84,7 @@ def with_constants(batch: Batch) -> Batch:
 
 
 def axes_along(root: np.ndarray) -> np.ndarray:
-    """`features.axes_along` of many windows."""
+    """Return `features.axes_along` of many windows."""
     forward = unit(root)
     right = unit(np.cross(np.broadcast_to(DOWN, forward.shape), forward))
     return np.stack([right, np.cross(forward, right), forward], -1)

@@ -1,4 +1,4 @@
-"""Motions without pictures: many more than can be rendered, filmed anew in every batch."""
+"""Motions without pictures: many more than can be rendered, filmed again in every batch."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,9 +1,9 @@
-"""Processes that open videos of strangers and find people in them, with limits of memory and time.
+"""Processes that open foreign videos and find people in them, with limits of memory and time.
 
 A clip that fills the memory, hangs or kills its process ends that process alone. Frames stay
-inside: a function of a module and its arguments go in, what it returns (figures, a track) comes
-out. A process is kept for the next clip, because loading the pose model takes seconds. It is no
-sandbox: it may do what its user may do.
+inside: a function of a module and its arguments go in, its result (figures, a track) comes out. A
+process is kept for the next clip, because loading the pose model takes seconds. It is not a
+sandbox: it has the rights of its user.
 """
 
 import os
@@ -11,7 +11,7 @@ import signal
 import threading
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
@@ -27,14 +27,17 @@ if TYPE_CHECKING:
 
 R = TypeVar("R")
 Progress = Callable[[int, int], None]
+Arguments = tuple[Any, ...]
+Outcome = tuple[str, Any]
+"""Kind of a message and its value."""
 REPORT, ERROR, RESULT = "report", "error", "result"
 
 OPENING_S, FRAME_S = 300.0, 2.0
-"""Time that a video may take, and each of its frames beyond it, seconds: twenty times the usual on
+"""Time limit of a video, and of each of its frames in addition, seconds: twenty times the usual on
 one busy core."""
 BETWEEN_REPORTS_S = 0.05
 ATTEMPTS = 2
-"""Of a clip whose process died: the machine may have been short of memory."""
+"""Attempts for a clip whose process died: the machine may have been short of memory."""
 
 
 def cores() -> int:
@@ -43,7 +46,7 @@ def cores() -> int:
 
 
 def probed(path: Path, limits: "VideoLimits") -> "VideoInfo":
-    """Return what `clips.video.probe` finds, in a process of its own where there is a file at all.
+    """Return the result of `clips.video.probe` from a separate process if the file exists.
 
     Raises:
         UnreadableVideo, TruncatedVideo, VideoTooLong, TrackTooShort: see there.
@@ -58,18 +61,18 @@ def probed(path: Path, limits: "VideoLimits") -> "VideoInfo":
 def in_video_process(
     function: Callable[..., R],
     path: Path,
-    *args: Any,
+    *args: object,
     frames: int = 0,
     progress: Progress | None = None,
 ) -> R:
     """Call a function of a module with a video and more arguments in a process with limits.
 
     Args:
-        frames: How many the function has to look at; its time grows with them.
-        progress: Is given to the function as its keyword `progress`, and called here.
+        frames: Number of frames that the function reads; the time limit grows with it.
+        progress: Passed to the function as its keyword `progress`, and called here.
     Raises:
         UnreadableVideo: the process took too long, too much memory, or died of it.
-        RoboJacksonError: what the function raised.
+        RoboJacksonError: the function raised it.
     """
     for _ in range(ATTEMPTS):
         with _places:
@@ -100,11 +103,11 @@ class _Reader:
     def call(
         self,
         function: Callable[..., R],
-        args: tuple[Any, ...],
+        args: Arguments,
         seconds: float,
         progress: Progress | None,
     ) -> R:
-        """Return what the function returns; whatever else happens, the process ends.
+        """Return the function's result; in any other case end the process.
 
         Raises:
             EOFError: the process has died.
@@ -112,7 +115,7 @@ class _Reader:
         self.is_idle = False
         until = time.monotonic() + seconds
         try:
-            with suppress(BrokenPipeError, ConnectionResetError):  # the answer tells
+            with suppress(BrokenPipeError, ConnectionResetError):  # the answer has the cause
                 self._connection.send((function, args, progress is not None))
             while self._connection.poll(max(until - time.monotonic(), 0.0)):
                 kind, value = self._answer()
@@ -140,9 +143,9 @@ class _Reader:
         code = self._process.exitcode or 0
         return signal.Signals(-code).name if code < 0 else f"exit code {code}"
 
-    def _answer(self) -> tuple[str, Any]:
+    def _answer(self) -> Outcome:
         try:
-            found: tuple[str, Any] = self._connection.recv()
+            found: Outcome = self._connection.recv()
         except OSError as cause:
             raise EOFError from cause
         return found
@@ -160,11 +163,11 @@ def _free() -> _Reader:
 
 
 def _serve(parent: int, connection: Connection) -> None:
-    """Do the work that comes until nobody is left to ask; leave Ctrl-C to the parent."""
+    """Handle requests until the parent closes the pipe; leave Ctrl-C to the parent."""
     os.environ["OMP_NUM_THREADS"] = "1"
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     watch_parent(parent)
-    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)  # what C++ writes as it dies
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)  # output of a dying C++ library
     import cv2
 
     cv2.setNumThreads(1)
@@ -176,8 +179,8 @@ def _serve(parent: int, connection: Connection) -> None:
 
 
 def _outcome(
-    function: Callable[..., Any], args: tuple[Any, ...], more: dict[str, Any]
-) -> tuple[str, Any]:
+    function: Callable[..., object], args: Arguments, more: Mapping[str, object]
+) -> Outcome:
     try:
         return RESULT, function(*args, **more)
     except RoboJacksonError as error:
@@ -192,7 +195,7 @@ def _outcome(
 
 
 class _Reporter:
-    """Sends how far the work is, a few times a second."""
+    """Sends the progress, a few times a second."""
 
     def __init__(self, connection: Connection) -> None:
         self._connection, self._sent_s = connection, 0.0

@@ -98,7 +98,6 @@ def displacement(
 
 
 def spread(frames: int, fps: float, per_second: float, fewest: int) -> frozenset[int]:
-    """Return the numbers of frames, evenly spread over a clip: so many a second, and at least so
-    many."""
+    """Return indices of frames, evenly spread over a clip: `per_second`, and at least `fewest`."""
     count = min(max(round(frames / fps * per_second), fewest), max(frames, 0))
     return frozenset(int((i + 0.5) * frames / count) for i in range(count))

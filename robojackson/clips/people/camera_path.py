@@ -155,7 +155,7 @@ class CameraFollower:
         return CameraPath(still if stray <= STILL else full, jumps, blind, stray)
 
     def add_frame(self, image: UInt8[np.ndarray, "H W 3"], xy: Float[np.ndarray, "33 2"]) -> None:
-        """Take the next frame, RGB, and the person in it, 0..1, NaN where nobody was found."""
+        """Add the next frame, RGB, and the person in it, 0..1, NaN where no person was found."""
         grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
         self.size = (grey.shape[1], grey.shape[0])
         step = self._followed(grey)

@@ -185,8 +185,8 @@ def checked(
     """Return the detections of a person, the known position where one is astray, NaN where neither
     exists.
 
-    While nobody saw him he may be found on the line from the place before to the place after, if no
-    other's line comes near.
+    In a gap the person may be found on the line between the known positions before and after, if no
+    other person's line comes near.
     """
     known = everybody[chosen]
     expected, tall = _course(known, time_s, size)

@@ -55,7 +55,7 @@ class People:
 
     @property
     def typical(self) -> int:
-        """People in view in at least a third of the frames that were looked at."""
+        """Number of people visible in at least a third of the examined frames."""
         return int(np.percentile(self.counts, 67, method="lower")) if self.counts else 0
 
     def _count(self, image: np.ndarray, xy: np.ndarray) -> int:

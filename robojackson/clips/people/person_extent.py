@@ -52,7 +52,7 @@ def full_body(track: LandmarkTrack, visibility: float) -> Bool[np.ndarray, " T"]
 
 
 def heights_px(track: LandmarkTrack) -> Float[np.ndarray, " T"]:
-    """Return the distance from the highest to the lowest landmark, pixels, NaN where nobody was
+    """Return the distance from the highest to the lowest landmark, pixels, NaN where no person was
     found."""
     rows = track.landmarks[..., 1] * track.height
     result: np.ndarray = rows.max(1) - rows.min(1)

@@ -116,7 +116,7 @@ class _Eyes:
         self._paint = Paint(info.frames, info.fps, config.drawing)
 
     def add_frame(self, index: int, image: np.ndarray, row: np.ndarray) -> None:
-        """Add frame number `index`, RGB, and the landmarks found in it, NaN for nobody."""
+        """Add frame number `index`, RGB, and the landmarks found in it, NaN for no person."""
         self._changes.add_frame(image)
         for eye in (self._camera, self._people, self._paint):
             eye.add_frame(index, image, row[:, :2])

@@ -24,7 +24,7 @@ class PictureQuality:
         self._step, self._seen = 1, 0
 
     def add_frame(self, image: UInt8[np.ndarray, "H W 3"], xy: Float[np.ndarray, "33 2"]) -> None:
-        """Take the next picture, RGB, and the person in it, 0..1, NaN where nobody was found."""
+        """Add the next picture, RGB, and the person in it, 0..1, NaN where no person was found."""
         if not np.isfinite(xy).all():
             return
         if self._seen % self._step == 0:

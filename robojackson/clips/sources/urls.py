@@ -47,7 +47,7 @@ def _lines(text: str) -> list[str]:
         try:
             listed = read_text(path, SearchFailed, LARGEST).splitlines()
         except (SearchFailed, OSError, ValueError) as cause:
-            told = cause.reason if isinstance(cause, SearchFailed) else "cannot be read"
-            raise SearchFailed(f"urls: {clean_text(text)}: {told}") from cause
+            reason = cause.reason if isinstance(cause, SearchFailed) else "cannot be read"
+            raise SearchFailed(f"urls: {clean_text(text)}: {reason}") from cause
         return [line.strip() for line in listed if line.strip() and line[0] != COMMENT]
     return text.split()

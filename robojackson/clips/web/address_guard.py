@@ -52,7 +52,7 @@ def public_only(allowed: bool, proxy: str | None = None) -> Iterator[None]:
 
 
 def is_public(address: str) -> bool:
-    """Whether an IP address is one of the public web; one that hides an IPv4 address as that is."""
+    """Return whether an IP address is one of the public web; an embedded IPv4 address counts."""
     found = ipaddress.ip_address(address.partition("%")[0])
     hidden = getattr(found, "ipv4_mapped", None) or getattr(found, "sixtofour", None)
     return (hidden or found).is_global and not found.is_multicast

@@ -6,8 +6,7 @@ xyzw. Arrays lie behind one another in one buffer, each on a multiple of four by
 
 import json
 import struct
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -25,6 +24,8 @@ ARRAY_BUFFER, ELEMENT_BUFFER = 34962, 34963
 XYZW = [1, 2, 3, 0]
 ROUGHNESS = 0.7
 KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
+Facts = dict[str, object]
+"""A JSON object of the file."""
 STILL_M, STILL = 1e-6, 1e-7
 """What moves or turns by less (metres; parts of a quaternion) is not animated."""
 
@@ -34,12 +35,13 @@ class GltfScene:
 
     def __init__(self, name: str) -> None:
         self._binary = bytearray()
-        self._lists: dict[str, list[dict[str, Any]]] = {
+        self._lists: dict[str, list[Facts]] = {
             key: [] for key in ("nodes", "meshes", "materials", "accessors", "bufferViews", "skins")
         }
         self._name, self._roots = name, list[int]()
-        self._channels: list[dict[str, Any]] = []
-        self._samplers: list[dict[str, Any]] = []
+        self._children: dict[int, list[int]] = {}
+        self._channels: list[Facts] = []
+        self._samplers: list[Facts] = []
 
     def material(self, name: str, rgb: Sequence[float]) -> int:
         """Add a matt colour, sRGB 0..1; return its number."""
@@ -91,7 +93,7 @@ class GltfScene:
             place, turn: Relative to the parent; metres, quaternion wxyz.
             of: Numbers of its mesh and skin.
         """
-        facts: dict[str, Any] = {"name": name, **of}
+        facts: Facts = {"name": name, **of}
         if place is not None:
             facts["translation"] = np.asarray(place, float).tolist()
         if turn is not None:
@@ -100,7 +102,9 @@ class GltfScene:
         if parent is None:
             self._roots.append(number)
         else:
-            self._lists["nodes"][parent].setdefault("children", []).append(number)
+            children = self._children.setdefault(parent, [])
+            children.append(number)
+            self._lists["nodes"][parent]["children"] = children
         return number
 
     def skin(self, name: str, joints: Sequence[int], binds: Float[np.ndarray, "J 3"]) -> int:
@@ -137,7 +141,7 @@ class GltfScene:
 
     def to_bytes(self) -> bytes:
         """Return the file."""
-        content: dict[str, Any] = {
+        content: Facts = {
             "asset": {"version": "2.0", "generator": "RoboJackson"},
             "scene": 0,
             "scenes": [{"name": self._name, "nodes": self._roots}],
@@ -170,7 +174,7 @@ class GltfScene:
         if target is not None:
             view["target"] = target
         self._binary += _padded(rows.astype(rows.dtype.newbyteorder("<")).tobytes(), b"\0")
-        facts: dict[str, Any] = {
+        facts: Facts = {
             "bufferView": self._add("bufferViews", view), "componentType": kind,
             "count": len(rows), "type": KINDS[rows.shape[1]],
         }  # fmt: skip
@@ -178,8 +182,8 @@ class GltfScene:
             facts |= {"min": rows.min(0).tolist(), "max": rows.max(0).tolist()}
         return self._add("accessors", facts)
 
-    def _add(self, key: str, facts: dict[str, Any]) -> int:
-        self._lists[key].append(facts)
+    def _add(self, key: str, facts: Mapping[str, object]) -> int:
+        self._lists[key].append(dict(facts))
         return len(self._lists[key]) - 1
 
 

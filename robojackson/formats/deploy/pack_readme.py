@@ -5,6 +5,7 @@ from typing import Any
 
 from robojackson.formats.deploy.deployed_policy import DeployedPolicy
 
+Figures = Mapping[str, Any]
 FILES = """\
 | file | what |
 |---|---|
@@ -40,7 +41,7 @@ Nothing here has been on a real robot. All figures above are of simulations.
 
 
 def pack_readme(
-    policy: DeployedPolicy, figures: Mapping[str, Any] | None, passport: Sequence[Mapping[str, Any]]
+    policy: DeployedPolicy, figures: Figures | None, passport: Sequence[Figures]
 ) -> bytes:
     """Return the content of the file.
 
@@ -76,7 +77,7 @@ def _terms(policy: DeployedPolicy) -> str:
     return "\n".join([*lines, "", tail])
 
 
-def _evaluation(figures: Mapping[str, Any] | None) -> str:
+def _evaluation(figures: Figures | None) -> str:
     if not figures:
         return "## Evaluation\n\nNone was given: `robojackson evaluate` makes one."
     rows = [("success", "%", 100.0), ("strict_success", "%", 100.0), ("skill", "", 1.0)]
@@ -88,7 +89,7 @@ def _evaluation(figures: Mapping[str, Any] | None) -> str:
     return "\n".join(lines)
 
 
-def _passport(rows: Sequence[Mapping[str, Any]]) -> str:
+def _passport(rows: Sequence[Figures]) -> str:
     if not rows:
         return (
             "## Sim-to-sim passport\n\nNone was made: `robojackson evaluate --passport` makes it."
@@ -116,5 +117,5 @@ def _passport(rows: Sequence[Mapping[str, Any]]) -> str:
     return "\n".join(lines)
 
 
-def _figure(value: Any, factor: float) -> str:
+def _figure(value: object, factor: float) -> str:
     return f"{factor * value:.3g}" if isinstance(value, int | float) else "-"

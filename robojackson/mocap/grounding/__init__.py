@@ -1,1 +1,1 @@
-"""The motion on the floor: gravity, contacts, foot pinning."""
+"""Put the motion on the floor: gravity, contacts, foot pinning."""

@@ -1,10 +1,10 @@
 """Contacts of heels and toes with the floor: AIR, PLANTED or SLIDING, by a hidden Markov model.
 
-Each of the four points has three states; a point that touches is low over the refitted floor, a
-planted one is also still in the image and, as far as a single camera sees it, along the ray: what
-walks towards the camera hardly moves in the image. All 81 joint states are weighed together,
-because of the law that binds them: outside free fall something carries the body, so that all four
-in the air is forbidden there. The likeliest path is found by dynamic programming (Viterbi 1967).
+Each of the four points has three states; a touching point is low over the refitted floor, a planted
+one is also still in the image and, as far as a single camera can measure it, along the ray: a
+person who walks towards the camera hardly moves in the image. All 81 joint states are evaluated
+together because of a constraint: outside free fall the body is supported, so that all four in the
+air is impossible there. The most probable path is found by dynamic programming (Viterbi 1967).
 Metres, seconds; floor at z = 0. Order: `motion.smpl_sequence.CONTACT_POINTS`.
 """
 
@@ -26,7 +26,7 @@ IMPOSSIBLE = -1e9
 
 @config_dataclass
 class ContactConfig:
-    """What the states look like. Tuned on dance_a, dance_b and walk.
+    """Distributions of the states. Tuned on dance_a, dance_b and walk.
 
     Attributes:
         touch_sd_m: Height of a touching point over the refitted floor, standard deviation, metres.
@@ -35,7 +35,7 @@ class ContactConfig:
         moving_sd_mps: Speed in the image of any other point, one axis, metres a second.
         still_along_sd_mps: Speed of a planted point along the ray, mostly noise, metres a second.
         moving_along_sd_mps: Speed of any other point along the ray, metres a second.
-        outlier: Share of measurements that tell nothing.
+        outlier: Share of measurements without information.
         samples_per_s: Independent measurements a second.
         change: Cost of a change of one point's state, nats.
     """
@@ -59,15 +59,16 @@ def contacts(
     config: ContactConfig,
     along: Float[np.ndarray, "T 4"] | None = None,
 ) -> Int[np.ndarray, "T 4"]:
-    """The likeliest state of every point in every frame; outside free fall one is never AIR.
+    """Return the most probable state of every point in every frame; outside free fall one is never
+    AIR.
 
     Args:
-        height: Of the points over the floor, metres.
-        speed: In the image at the person's distance (`image_speed`), m/s.
+        height: Height of the points over the floor, metres.
+        speed: Speed in the image at the person's distance (`image_speed`), m/s.
         falling: Frames of free fall.
         fps: Frames a second.
-        config: Of the model.
-        along: Speed along the ray (`ray_speed`), m/s; None where it is not known.
+        config: Settings of the model.
+        along: Speed along the ray (`ray_speed`), m/s; None where unknown.
     """
     weight = min(1.0, config.samples_per_s / fps)
     single = weight * log_likelihood(height, speed, config, along)
@@ -87,10 +88,11 @@ def log_likelihood(
     config: ContactConfig,
     along: Float[np.ndarray, "T 4"] | None = None,
 ) -> Float[np.ndarray, "T 4 3"]:
-    """Log likelihood of one frame's height and speed in each state, up to a constant.
+    """Return the log likelihood of one frame's height and speed in each state, up to a constant.
 
     Heights are half normal, image speeds Rayleigh without the factor that all states share; an
-    outlier looks like a point in the air or in motion. A raised foot is as often still as not.
+    outlier has the distribution of a point in the air or in motion. A raised foot is as often still
+    as not.
     """
     up = np.maximum(height, 0.0)
     loose = _normal(up, config.air_sd_m, 1)
@@ -108,7 +110,7 @@ def log_likelihood(
 
 
 def image_speed(points_c: Float[np.ndarray, "T 4 3"], fps: float) -> Float[np.ndarray, "T 4"]:
-    """Speed across the ray from the camera, which stands at the origin, m/s."""
+    """Return the speed across the ray from the camera at the origin, m/s."""
     if len(points_c) < 2:
         return np.zeros(points_c.shape[:2])
     velocity = np.gradient(points_c, axis=0) * fps
@@ -118,7 +120,7 @@ def image_speed(points_c: Float[np.ndarray, "T 4 3"], fps: float) -> Float[np.nd
 
 
 def ray_speed(points_c: Float[np.ndarray, "T 4 3"], fps: float) -> Float[np.ndarray, "T 4"]:
-    """Speed of the distance from the camera, which stands at the origin, m/s; not signed."""
+    """Return the speed of the distance from the camera at the origin, m/s; not signed."""
     if len(points_c) < 2:
         return np.zeros(points_c.shape[:2])
     return np.asarray(np.abs(np.gradient(np.linalg.norm(points_c, axis=-1), axis=0)) * fps)

@@ -1,4 +1,5 @@
-"""When a body flies: free fall, and jumps from the last to the first touch. World z up; metres."""
+"""Detect flight of a body: free fall, and jumps from the last to the first contact. World z up;
+metres."""
 
 import numpy as np
 from jaxtyping import Float
@@ -10,16 +11,17 @@ from robojackson.mocap.grounding.floor import GRAVITY
 FALL_CUTOFF_HZ = 6.0
 SHORTEST_FALL_S = 0.1
 FALL_SHARE = 0.35
-"""Least mean acceleration of a whole flight, of gravity."""
+"""Least mean acceleration of a whole flight, in multiples of gravity."""
 FLIGHT_EDGE_S = 0.15
-"""Smoothing hides so much of the beginning and of the end of a free fall, seconds."""
+"""Part of a free fall's beginning and end that smoothing hides, seconds."""
 FLIGHT_MARGIN_S, RISE_SHARE = 0.07, 0.45
-"""Of a jump: what the change of sign misses at either end, and the least rise of the feet, share of
-that of a body in the air for so long."""
+"""Corrections of a jump: the time that the change of sign misses at either end, and the least rise
+of the feet, as a share of that of a body in the air for as long."""
 
 
 def free_fall(height: Float[np.ndarray, " T"], fps: float) -> np.ndarray:
-    """Frames in which the pelvis falls freely: its acceleration is below -g / 2 for a while.
+    """Return the frames in which the pelvis falls freely: its acceleration is below -g / 2 for a
+    while.
 
     Args:
         height: Height of the pelvis, metres.
@@ -39,14 +41,15 @@ def free_fall(height: Float[np.ndarray, " T"], fps: float) -> np.ndarray:
 def ballistic(
     height: Float[np.ndarray, " T"], lowest: Float[np.ndarray, " T"], fps: float
 ) -> np.ndarray:
-    """Frames of jumps: the body falls freely, and the feet rise as far as its fall asks for.
+    """Return the frames of jumps: the body falls freely, and the feet rise as far as its fall
+    implies.
 
-    Push and landing accelerate upward, so that a flight lasts from one change of sign of the
+    Push-off and landing accelerate upward, so that a flight lasts from one change of sign of the
     acceleration to the next, whatever the smoothing.
 
     Args:
-        height: Of the centre of mass, metres; any level.
-        lowest: Of the lowest foot point, metres; any level.
+        height: Height of the centre of mass, metres; any level.
+        lowest: Height of the lowest foot point, metres; any level.
         fps: Frames a second.
     """
     falling = free_fall(height, fps)
@@ -73,14 +76,16 @@ def flight(
     falling: np.ndarray,
     fps: float,
 ) -> np.ndarray:
-    """Free fall and the frames around it in which the feet still rise or have not yet landed.
+    """Return free fall and the frames around it in which the feet still rise or have not yet
+    landed.
 
-    Smoothing spreads the push and the landing into the fall, so that only its middle is seen. What
-    it cannot change is the mean: a flight grows only while its mean acceleration is that of a fall.
+    Smoothing spreads the push-off and the landing into the fall, so that only its middle is
+    detected. It cannot change the mean: a flight grows only while its mean acceleration is that of
+    a fall.
 
     Args:
         lowest: Height of the lowest foot point, metres; any level.
-        height: Of the centre of mass, metres; any level.
+        height: Height of the centre of mass, metres; any level.
         falling: Frames of free fall.
         fps: Frames a second.
     """

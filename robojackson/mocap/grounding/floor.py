@@ -1,8 +1,9 @@
-"""From the camera to the world: which way is up, and where the floor is.
+"""From the camera to the world: the direction of up, and the height of the floor.
 
-A static camera sees one gravity for the whole clip. Its direction comes from balance: over a clip
-the centre of mass is, on average, above the points that carry it. The result is believed only near
-the camera's own up. World: x towards the camera, y to its right, z up, floor at z = 0; metres.
+A static camera has one direction of gravity for the whole clip. It is estimated from balance: over
+a clip the centre of mass is, on average, above the points that support it. The result is accepted
+only near the camera's own up. World: x towards the camera, y to its right, z up, floor at z = 0;
+metres.
 """
 
 import dataclasses
@@ -19,24 +20,26 @@ from robojackson.config import config_dataclass
 GRAVITY = 9.81
 CAMERA_UP = np.array([0.0, -1.0, 0.0])
 AXIS_WEIGHTS = np.array([1.0, 1.0, 0.4])
-"""Of a speed in the camera frame; in depth a single camera sees mostly noise."""
+"""Weights of a speed's axes in the camera frame; depth from a single camera is mostly noise."""
 LEAST_WEIGHT = 1e-4
 ROUNDS = 6
 
 
 @config_dataclass
 class GravityConfig:
-    """How far balance is believed. Tuned on the nine bundled clips.
+    """Weights of balance. Tuned on the nine bundled clips.
 
     Attributes:
-        support_height_m: A foot point this much above the lowest carries 1/e of its weight, metres.
-        support_speed_mps: A point this fast carries 1/e of its weight, m/s.
-        floor_sd_m: Spread of the height difference of two feet that both carry, metres.
-        roll_sd_deg, pitch_sd_deg: Spread of how people hold a camera, degrees; with the tails of a
-            Cauchy distribution, so that a camera that balance sees far off level is left there.
-        least_sd_deg: Balance is never believed more closely than this, degrees.
+        support_height_m: Height above the lowest foot point at which a point supports 1/e of its
+            weight, metres.
+        support_speed_mps: Speed at which a point supports 1/e of its weight, m/s.
+        floor_sd_m: Spread of the height difference of two supporting feet, metres.
+        roll_sd_deg, pitch_sd_deg: Spread of the angles of hand-held cameras, degrees; with the
+            tails of a Cauchy distribution, so that a camera that balance finds far off level is not
+            levelled.
+        least_sd_deg: Least standard deviation of balance, degrees.
         samples_per_s: Independent samples of balance a second.
-        max_tilt_deg: Largest believed angle between gravity and the camera's vertical, degrees.
+        max_tilt_deg: Largest accepted angle between gravity and the camera's vertical, degrees.
     """
 
     support_height_m: float = 0.1
@@ -51,10 +54,12 @@ class GravityConfig:
 
 @dataclasses.dataclass(frozen=True)
 class Gravity:
-    """Attributes:
-    up: Unit vector against gravity, camera frame.
-    source: Where it comes from.
-    tilt_deg: Angle to the camera's own up, degrees.
+    """The direction of up.
+
+    Attributes:
+        up: Unit vector against gravity, camera frame.
+        source: Source of the direction.
+        tilt_deg: Angle to the camera's own up, degrees.
     """
 
     up: Float[np.ndarray, "3"]
@@ -68,12 +73,12 @@ def find_up(
     fps: float,
     config: GravityConfig,
 ) -> Gravity:
-    """Up from balance, or the camera's own where balance says something absurd.
+    """Return up from balance, or the camera's own if balance gives an implausible direction.
 
     Up is the least eigenvector of three information matrices: the mean of the centre of mass above
-    the carrying points lies along it; feet that both carry differ across it; and the camera is held
-    about level. How much the first one counts follows from its spread over the clip: a dancer who
-    leaps tells less of gravity than one who stands.
+    the supporting points is parallel to it; feet that both support differ across it; and the camera
+    is held about level. The weight of the first follows from its spread over the clip: a leaping
+    dancer gives less information on gravity than a standing one.
 
     Args:
         points: Keypoints, camera frame.
@@ -115,7 +120,7 @@ def _refined(
 def _carrying(
     up: np.ndarray, feet: np.ndarray, fps: float, config: GravityConfig
 ) -> Float[np.ndarray, "T 4"]:
-    """Weight of each foot point: low and still ones carry."""
+    """Return the weight of each foot point: low and still ones support."""
     speed = np.linalg.norm(np.gradient(feet, axis=0) * fps * AXIS_WEIGHTS, axis=-1)
     height = feet @ up
     above = height - height.min(1, keepdims=True)
@@ -125,7 +130,7 @@ def _carrying(
 
 
 def _level_prior(up: np.ndarray, config: GravityConfig) -> Float[np.ndarray, "3"]:
-    """Information of a camera held about level; the weight of a Cauchy prior where `up` is now."""
+    """Return the information of a camera held about level: the weight of a Cauchy prior at `up`."""
     spread = np.radians([config.roll_sd_deg, config.pitch_sd_deg])
     angle = np.arctan2(up[[0, 2]], -up[1])
     roll, pitch = 1.0 / (spread**2 + angle**2)
@@ -133,7 +138,7 @@ def _level_prior(up: np.ndarray, config: GravityConfig) -> Float[np.ndarray, "3"
 
 
 def _between_feet(weight: np.ndarray, feet: np.ndarray) -> Float[np.ndarray, "3 3"]:
-    """Second moment of left minus right foot over the frames in which both carry."""
+    """Return the second moment of left minus right foot over the frames in which both support."""
     each = weight.reshape(-1, 2, 2)
     place = np.einsum("tfp,tfpi->tfi", each, feet.reshape(-1, 2, 2, 3)) / each.sum(2)[..., None]
     apart = place[:, 0] - place[:, 1]
@@ -142,14 +147,14 @@ def _between_feet(weight: np.ndarray, feet: np.ndarray) -> Float[np.ndarray, "3 
 
 
 def camera_to_world(up: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
-    """Rotation that takes `up` to z and the camera's backward direction to x."""
+    """Return the rotation that maps `up` to z and the camera's backward direction to x."""
     back = np.array([0.0, 0.0, -1.0])
     x = unit(back - (back @ up) * up)
     return np.stack([x, np.cross(up, x), up])
 
 
 def centre_of_mass(points: Float[np.ndarray, "T 29 3"]) -> Float[np.ndarray, "T 3"]:
-    """Whole-body centre from segment masses (Winter 2009, table 4.1, rounded)."""
+    """Return the whole-body centre from segment masses (Winter 2009, table 4.1, rounded)."""
 
     def middle(name: str) -> np.ndarray:
         result: np.ndarray = points[:, list(pair(name))].mean(1)
@@ -175,10 +180,10 @@ def centre_of_mass(points: Float[np.ndarray, "T 29 3"]) -> Float[np.ndarray, "T 
 def floor_height(
     lowest: Float[np.ndarray, " T"], flying: np.ndarray, fps: float, cutoff_hz: float
 ) -> Float[np.ndarray, " T"]:
-    """Height of the floor under each frame: that of the lowest foot point, smoothed.
+    """Return the height of the floor under each frame: that of the lowest foot point, smoothed.
 
-    Nobody levitates: outside flight something touches the floor in every frame. Through a flight
-    the floor goes on in a straight line.
+    Outside flight some point touches the floor in every frame. Through a flight the floor continues
+    in a straight line.
     """
     frames = np.arange(len(lowest))
     grounded = ~flying

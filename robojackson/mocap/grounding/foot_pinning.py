@@ -1,8 +1,8 @@
-"""Feet that stand do not slide: the root's path and the legs are moved until they hold still.
+"""Foot pinning: move the root's path and the legs so that planted feet do not slide.
 
 World frame, metres. First the whole body: the horizontal path of the root that fits the camera's
-track and keeps planted points still, by linear least squares over the clip. Then the legs: what is
-left is taken up by hip and knee (`leg_ik`), as an animator pins a foot.
+track and keeps planted points still, by linear least squares over the clip. Then the legs: hip and
+knee correct the remaining error (`leg_ik`), as an animator pins a foot.
 """
 
 import numpy as np
@@ -27,12 +27,12 @@ class FootPinningConfig:
     Attributes:
         track: Standard deviation of the camera's track across and along the ray, metres (y, x).
         slip: Spread of a planted point's step between two frames, metres.
-        leash_m: Shift along the ray beyond which the track pulls harder and harder, metres.
+        leash_m: Shift along the ray beyond which the track gets an increasing weight, metres.
         wobble: Spread of the path's second difference at 30 frames a second, metres.
-        ramp_s: Time over which a standing foot goes over to a moving one, seconds.
+        ramp_s: Time of the transition from a planted to a moving foot, seconds.
         fade_s: Time over which the correction of a pinned foot fades when it leaves, seconds.
-        reach_m: A foot that a pin would move further than this does not stand there, metres.
-        rounds: How often contacts, path and pins are found anew.
+        reach_m: Largest correction of a pinned foot, metres; beyond it the foot is not planted.
+        rounds: Iterations of contacts, path and pins.
     """
 
     track: tuple[float, float] = (0.02, 0.20)
@@ -52,18 +52,17 @@ def root_correction(
     fps: float,
     config: FootPinningConfig,
 ) -> Float[np.ndarray, "T 3"]:
-    """Horizontal shift of the body, so that planted points keep their place; z stays zero.
+    """Return the horizontal shift of the body that keeps planted points still; z stays zero.
 
     Minimises over the clip, (x, y) being the shift: the step of planted points over `slip`, second
-    differences over `wobble`, x over the camera's spread in depth, and y minus what x brings with
-    it along the ray over its spread across: a person who is further away than it seemed is further
-    aside too, or he would leave his place in the image. A foot that slides along the ray looks
-    planted; so where contacts would take the body further than `leash_m` from the track, the track
-    wins.
+    differences over `wobble`, x over the camera's spread in depth, and y minus x's component along
+    the ray over its spread across: a person who is further away than estimated is further aside
+    too, or he would move in the image. A foot that slides along the ray looks planted; so where
+    contacts would move the body further than `leash_m` from the track, the track dominates.
 
     Args:
         feet: Foot points, world axes.
-        planted: Which of them stand.
+        planted: Whether each of them is planted.
         slope: y over x of the ray to the body.
         fps: Frames a second.
         config: Weights.
@@ -84,7 +83,8 @@ def _shift(
     fps: float,
     config: FootPinningConfig,
 ) -> Float[np.ndarray, "T 2"]:
-    """The least squares of `root_correction`; `trust` weighs the depth of the track by frame."""
+    """Return the least squares of `root_correction`; `trust` weighs the depth of the track by
+    frame."""
     held = (planted[1:] & planted[:-1]).astype(float)
     step = np.diff(feet, axis=0)[..., :2]
     hold = held.sum(1) / config.slip**2
@@ -103,7 +103,7 @@ def _shift(
 
 
 def path_bands(hold: Float[np.ndarray, " S"], wobble: float) -> Float[np.ndarray, "3 T"]:
-    """Upper banded matrix of sum hold (ds)^2 + (dds / wobble)^2 over a path s."""
+    """Return the upper banded matrix of sum hold (ds)^2 + (dds / wobble)^2 over a path s."""
     count = len(hold) + 1
     bands = np.zeros((3, count))
     bands[2, :-1] += hold
@@ -122,10 +122,10 @@ def path_bands(hold: Float[np.ndarray, " S"], wobble: float) -> Float[np.ndarray
 def pin_offsets(
     feet: Float[np.ndarray, "T 4 3"], planted: np.ndarray, ramp: float
 ) -> Float[np.ndarray, "T 2 3"]:
-    """How far to move the left and the right foot so that it stands still while planted.
+    """Return the offsets of the left and the right foot that keep it still while planted.
 
-    In each stretch of contact the foot goes to the mean place of its planted points, the lowest of
-    them onto the floor; over `ramp` frames before and after, the correction fades.
+    In each stretch of contact the foot moves to the mean position of its planted points, the lowest
+    of them onto the floor; over `ramp` frames before and after, the correction fades.
     """
     offsets = np.zeros((len(feet), 2, 3))
     for side, points in enumerate(((0, 1), (2, 3))):
@@ -143,16 +143,16 @@ def pin_offsets(
 
 
 def within_reach(planted: np.ndarray, pins: Float[np.ndarray, "T 2 3"], reach: float) -> np.ndarray:
-    """Planted points of the feet that their pins move no further than `reach` along the floor."""
+    """Return the planted points of feet that their pins move at most `reach` along the floor."""
     near = np.linalg.norm(pins[..., :2], axis=-1) <= reach
     return np.asarray(planted & np.repeat(near, 2, axis=1))
 
 
 def faded(target: Float[np.ndarray, "T N"], ramp: float) -> Float[np.ndarray, "T N"]:
-    """Values where they are known; elsewhere those of both neighbours, falling smoothly to zero.
+    """Return values where they are known; elsewhere those of both neighbours, fading to zero.
 
     Args:
-        target: NaN where nothing is known.
+        target: Values, NaN where unknown.
         ramp: Frames over which a value fades.
     """
     known = np.flatnonzero(~np.isnan(target[:, 0]))
@@ -175,10 +175,10 @@ def faded(target: Float[np.ndarray, "T N"], ramp: float) -> Float[np.ndarray, "T
 def shared_height(
     offsets: Float[np.ndarray, "T 2 3"], planted: np.ndarray
 ) -> Float[np.ndarray, "T 3"]:
-    """The vertical offset that the standing feet have in common: the body follows it.
+    """Return the vertical offset that the planted feet have in common: the body follows it.
 
-    A leg that is nearly straight answers a centimetre at the foot with several at the knee; so only
-    the difference between the feet is left to the knees.
+    In a nearly straight leg a centimetre at the foot needs several at the knee; so the knees
+    correct only the difference between the feet.
     """
     stands = planted.reshape(-1, 2, 2).any(2).astype(float)
     count = stands.sum(1)
@@ -196,10 +196,10 @@ def tip_angles(
     fps: float,
     ramp: float,
 ) -> Float[np.ndarray, "T 2"]:
-    """How far to turn each foot about its ankle so that a toe that stands alone meets the floor.
+    """Return the pitch of each foot about its ankle that puts a toe without its heel on the floor.
 
-    The detector hardly sees a foot's pitch and sees an ankle well: so a toe in the air is the
-    fault of the pitch, up to a limit, and only the rest that of the leg. For `feet.turn_feet`.
+    The detector hardly measures a foot's pitch and measures an ankle well: so a toe in the air is
+    an error of the pitch, up to a limit, and only the rest one of the leg. For `feet.turn_feet`.
     """
     angles = np.full((len(feet), 2), np.nan)
     chains = zip(pair("ankle"), pair("big_toe"), strict=True)

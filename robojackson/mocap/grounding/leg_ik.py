@@ -1,4 +1,4 @@
-"""Legs that reach: the knee of a foot that is moved, by two-bone analytic inverse kinematics.
+"""Two-bone analytic inverse kinematics of legs: the knee of a foot that is moved.
 
 World frame, metres.
 """
@@ -15,7 +15,7 @@ TINY = 1e-9
 
 
 def lift_offsets(feet: Float[np.ndarray, "T 4 3"]) -> Float[np.ndarray, "T 2 3"]:
-    """How far to raise each foot so that neither its heel nor its toe is under the floor."""
+    """Return the lift of each foot that brings neither heel nor toe under the floor."""
     lowest = feet[..., 2].reshape(-1, 2, 2).min(2)
     result: np.ndarray = np.maximum(-lowest, 0.0)[..., None] * np.array([0.0, 0.0, 1.0])
     return result
@@ -24,7 +24,7 @@ def lift_offsets(feet: Float[np.ndarray, "T 4 3"]) -> Float[np.ndarray, "T 2 3"]
 def move_feet(
     points: Float[np.ndarray, "T 29 3"], offsets: Float[np.ndarray, "T 2 3"]
 ) -> Float[np.ndarray, "T 29 3"]:
-    """Keypoints with the feet moved and the knees bent to fit (two-bone analytic IK)."""
+    """Return keypoints with the feet moved and the knees bent to fit (two-bone analytic IK)."""
     moved = np.array(points)
     for side in range(2):
         hip, knee, ankle, foot, toe = (
@@ -44,10 +44,10 @@ def reach(
     ankle: Float[np.ndarray, "T 3"],
     goal: Float[np.ndarray, "T 3"],
 ) -> tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"]]:
-    """Knee and ankle for a goal, lengths kept, the knee in the half plane where it was.
+    """Return knee and ankle for a goal, lengths kept, the knee in its half plane.
 
     A goal out of reach is approached along its direction. The last centimetres before a straight
-    leg are eased: there the knee moves like the square root of what the foot still lacks.
+    leg are eased: there the knee moves like the square root of the foot's remaining distance.
     """
     thigh = np.linalg.norm(knee - hip, axis=-1, keepdims=True)
     shin = np.linalg.norm(ankle - knee, axis=-1, keepdims=True)
@@ -64,9 +64,9 @@ def reach(
 
 
 def _eased(distance: np.ndarray, now: np.ndarray, longest: np.ndarray) -> np.ndarray:
-    """The distance itself up to `EASE_M` before the longest, then towards it without a corner.
+    """Return the distance itself up to `EASE_M` before the longest, then a smooth approach to it.
 
-    A leg that is straighter than that already stays as it is.
+    A leg that is already straighter does not change.
     """
     longest = longest * STRAIGHT
     start = np.clip(now, longest - EASE_M, longest - TINY)

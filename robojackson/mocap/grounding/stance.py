@@ -1,6 +1,6 @@
-"""A body on the floor: where its feet touch, the root that keeps them still, and the legs to match.
+"""Put a body on the floor: contacts of its feet, the root that keeps them still, and the legs.
 
-World axes before the shift to the floor: the camera stands at the origin, z is up. Metres, seconds.
+World axes before the shift to the floor: the camera is at the origin, z is up. Metres, seconds.
 """
 
 from dataclasses import dataclass
@@ -21,15 +21,17 @@ from robojackson.motion.smpl_sequence import AIR, PLANTED, SLIDING
 
 SHORTEST_FLIGHT = 3
 LIFTS = 3
-"""A leg that is bent to lift its foot turns the foot a little, so it is looked at again."""
+"""Iterations of the feet: a leg that is bent to lift its foot turns the foot a little."""
 ABOVE = np.array([0.0, 0.0, 1.0])
 
 
 @config_dataclass
 class GroundingConfig:
-    """Attributes:
-    floor_cutoff_hz: Zero-phase low-pass of the height of the floor under the feet, hertz.
-    contact, foot_pinning: Of the feet's states and of what holds them.
+    """Settings of the floor and the feet.
+
+    Attributes:
+        floor_cutoff_hz: Zero-phase low-pass of the height of the floor under the feet, hertz.
+        contact, foot_pinning: Settings of the feet's states and of foot pinning.
     """
 
     floor_cutoff_hz: float = 3.0
@@ -47,7 +49,7 @@ class Stance:
 
 @dataclass(frozen=True)
 class _Evidence:
-    """What does not change while the body is moved."""
+    """Measurements that do not change while the body is moved."""
 
     fps: float
     speed: Float[np.ndarray, "T 4"]
@@ -65,14 +67,14 @@ class _Evidence:
         return np.where(self.jumps[:, None], AIR, found).astype(np.int8)
 
     def dropped(self, body: Body, airborne: np.ndarray) -> Body:
-        """The floor under the lowest foot point brought to z = 0."""
+        """Return the body with the floor under its lowest foot point moved to z = 0."""
         lowest = body.feet[..., 2].min(1)
         floor = ground.floor_height(lowest, airborne, self.fps, self.config.floor_cutoff_hz)
         return body.shifted(np.outer(-floor, ABOVE))
 
 
 def ground_body(body: Body, fps: float, config: GroundingConfig) -> Stance:
-    """The body on the floor, its feet level and pinned where they stand, and the contacts."""
+    """Return the body on the floor, its feet level and pinned where planted, and the contacts."""
     height = ground.centre_of_mass(body.pose.points)[:, 2]
     jumps = air.ballistic(height, body.feet[..., 2].min(1), fps)
     falling = air.free_fall(height, fps) | jumps
@@ -101,7 +103,7 @@ def ground_body(body: Body, fps: float, config: GroundingConfig) -> Stance:
 
 
 def _carried(states: np.ndarray, body: Body, fps: float) -> Int[np.ndarray, "T 4"]:
-    """States in which a flight lasts no longer than the body of the result falls."""
+    """Return states in which a flight lasts no longer than the resulting body's fall."""
     height = ground.centre_of_mass(body.pose.points)[:, 2]
     if len(height) < SHORTEST_FLIGHT:
         return states
@@ -118,8 +120,8 @@ def _carried(states: np.ndarray, body: Body, fps: float) -> Int[np.ndarray, "T 4
 def _pinned(
     body: Body, planted: np.ndarray, evidence: _Evidence, flying: np.ndarray
 ) -> tuple[Body, Float[np.ndarray, "T 2"], np.ndarray]:
-    """One round: standing feet level, the root moved, toes tipped, legs bent; share of level, and
-    the points that stand after all."""
+    """Run one round: level planted feet, move the root, tip toes, bend legs; also return the level
+    share and the points that stay planted."""
     fps, pinning = evidence.fps, evidence.config.foot_pinning
     ramp = pinning.ramp_s * fps
     flat = feet.stands_flat(body.feet, planted)

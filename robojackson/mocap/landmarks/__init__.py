@@ -1,1 +1,1 @@
-"""From detected landmarks to refined points before a camera."""
+"""From detected landmarks to refined points in front of a camera."""

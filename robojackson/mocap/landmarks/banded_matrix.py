@@ -1,11 +1,12 @@
-"""The normal matrix of a clip whose frames couple with the two before and after them."""
+"""The normal matrix of a clip whose frames are coupled with the two before and after them."""
 
 import numpy as np
 from jaxtyping import Float
 
 
 def to_bands(blocks: Float[np.ndarray, "T 36 36"]) -> np.ndarray:
-    """Upper banded storage (scipy) of a block-diagonal symmetric matrix, with two frames above."""
+    """Return the upper banded storage (scipy) of a block-diagonal symmetric matrix, with two frames
+    above."""
     size = blocks.shape[1]
     above = 2 * size
     bands = np.zeros((above + 1, len(blocks) * size))
@@ -17,7 +18,7 @@ def to_bands(blocks: Float[np.ndarray, "T 36 36"]) -> np.ndarray:
 
 
 def add_acceleration(bands: np.ndarray, stiff: Float[np.ndarray, "T-2 36"]) -> None:
-    """Add D2' W D2: it couples frames one and two apart."""
+    """Add D2' W D2, which couples frames one and two apart."""
     count, size = len(stiff) + 2, stiff.shape[1]
     second = np.diff(np.eye(3), 2, axis=0)[0]
     for first, left in enumerate(second):

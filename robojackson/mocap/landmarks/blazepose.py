@@ -1,6 +1,6 @@
 """BlazePose's 33 landmarks: their names, and the repair of gaps and of swapped sides.
 
-Left and right are the subject's. A gap is a run of frames in which nobody was found.
+Left and right are the subject's. A gap is a run of frames without a detected person.
 """
 
 from dataclasses import dataclass, replace
@@ -26,28 +26,28 @@ MIN_FRAMES = 2
 PERSON_M = 1.7
 """Diagonal of the box around a person's body landmarks, metres; for the scale of the image."""
 HIPS_BELOW = 0.06
-"""Its hips are this share of the trunk below the hip joints: 2-4 cm in the images of two bodies, of
-which one is real, under eight cameras."""
+"""Distance of its hips below the hip joints, share of the trunk: 2-4 cm in the images of two
+bodies, of which one is real, under eight cameras."""
 SWAP_PRIOR_M = 0.003
-"""What a frame with exchanged sides costs, metres of mean displacement; tuned on person_cam2."""
+"""Cost of a frame with exchanged sides, metres of mean displacement; tuned on person_cam2."""
 SWAP_FPS = 15.0
-"""At fewer frames a second a turn looks like an exchange (10 of 26 frames of a dancer at 8 were):
-there it is one only where shoulders and hips face the other way from one frame to the next."""
+"""At lower frame rates a turn looks like an exchange (10 of 26 frames of a dancer at 8 Hz): there
+an exchange also needs shoulders and hips that face the other way from one frame to the next."""
 FEWEST_FPS = 6.0
-"""At fewer yet nothing tells an exchange from a turn."""
+"""Frame rate below which an exchange cannot be distinguished from a turn."""
 FACING_PRIOR = 0.03
-"""What a frame with exchanged sides costs there, half turns."""
+"""Cost of a frame with exchanged sides at low frame rates, half turns."""
 
 
 def landmark(name: str) -> int:
-    """Index of a landmark; an unknown name raises `UnknownName` with the known ones."""
+    """Return the index of a landmark; an unknown name raises `UnknownName` with the known ones."""
     if name not in LANDMARK_NAMES:
         raise UnknownName("landmark", name, "mocap.landmarks.blazepose", LANDMARK_NAMES)
     return LANDMARK_NAMES.index(name)
 
 
 def mirror_of(name: str) -> str:
-    """The same landmark on the other side; the nose is its own."""
+    """Return the same landmark on the other side; the nose is its own counterpart."""
     swap = {"left": "right", "right": "left"}
     return "_".join(swap.get(part, part) for part in name.split("_"))
 
@@ -73,9 +73,9 @@ class Landmarks:
     Attributes:
         image: Pixels of the upright image.
         local: Metres, axes of the camera (x right, y down, z away), origin between the hips.
-        visibility: 0..1; zero where interpolated.
+        visibility: Visibility, 0..1; zero where interpolated.
         valid: Whether the frame was detected.
-        swapped: Frames in which left and right were put back.
+        swapped: Number of frames in which left and right were corrected.
     """
 
     image: Float[np.ndarray, "T 33 2"]
@@ -86,7 +86,7 @@ class Landmarks:
 
 
 def repair(track: LandmarkTrack) -> Landmarks:
-    """Fill gaps and put swapped sides back.
+    """Fill gaps and correct swapped sides.
 
     Raises:
         TrackTooShort: fewer than two frames.
@@ -105,9 +105,9 @@ def repair(track: LandmarkTrack) -> Landmarks:
 
 
 def track_landmarks(track: LandmarkTrack) -> Landmarks:
-    """The landmarks of a track with its gaps filled, sides as the detector has them.
+    """Return the landmarks of a track with its gaps filled, sides as detected.
 
-    Where the camera moved, all are in the image of the first frame.
+    If the camera moved, all are in the image of the first frame.
     """
     found = track.detected
     image = track.landmarks[..., :2] * np.array([track.width, track.height], float)
@@ -122,7 +122,7 @@ def track_landmarks(track: LandmarkTrack) -> Landmarks:
 
 
 def raise_hips(landmarks: Landmarks) -> Landmarks:
-    """Move the hips along the trunk to where the hip joints are."""
+    """Move the hips along the trunk to the hip joints."""
 
     def raised(points: np.ndarray) -> np.ndarray:
         moved = np.array(points)
@@ -134,7 +134,8 @@ def raise_hips(landmarks: Landmarks) -> Landmarks:
 
 
 def fill_gaps(values: np.ndarray, found: np.ndarray) -> np.ndarray:
-    """Linear in time inside a gap, the nearest found frame before the first and after the last."""
+    """Interpolate gaps linearly in time; use the nearest found frame before the first and after the
+    last."""
     time = np.arange(len(values))
     flat = values.reshape(len(values), -1)
     filled = [np.interp(time, time[found], column[found]) for column in flat.T]
@@ -156,11 +157,11 @@ def unswap(landmarks: Landmarks, fps: float) -> Landmarks:
 
 
 def swapped_frames(landmarks: Landmarks, fps: float) -> np.ndarray:
-    """The likeliest frames in which the detector took left for right, by dynamic programming.
+    """Return the most probable frames with left and right exchanged, by dynamic programming.
 
-    Each frame is kept or crossed; a step costs the mean displacement of the body's landmarks (image
-    at the person's scale and depth, metres) or, where frames are far apart, the turn of shoulders
-    and hips; a crossed frame a little more.
+    Each frame is kept or exchanged; a step costs the mean displacement of the body's landmarks
+    (image at the person's scale and depth, metres) or, where frames are far apart, the turn of
+    shoulders and hips; an exchanged frame costs a little more.
     """
     if fps < FEWEST_FPS:
         return np.zeros(len(landmarks.image), bool)
@@ -172,7 +173,7 @@ def swapped_frames(landmarks: Landmarks, fps: float) -> np.ndarray:
 
 
 def _steps(landmarks: Landmarks) -> tuple[np.ndarray, np.ndarray]:
-    """Displacement from frame to frame with sides as they are, and with those of one exchanged."""
+    """Return the displacement between frames with both as detected, and with one exchanged."""
     span = np.linalg.norm(np.ptp(landmarks.image[:, BODY], axis=1), axis=-1).mean()
     metres = landmarks.image * (PERSON_M / max(span, 1.0))
     features = np.concatenate([metres, landmarks.local[..., 2:]], -1)
@@ -183,7 +184,8 @@ def _steps(landmarks: Landmarks) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _turns(landmarks: Landmarks) -> tuple[np.ndarray, np.ndarray]:
-    """Turn of the line from right to left, half turns, and what it would be with one exchanged."""
+    """Return the turn of the line from right to left, half turns, as detected and with one
+    exchanged."""
     pairs = [
         landmarks.local[:, one] - landmarks.local[:, other] for one, other in (HIPS, SHOULDERS)
     ]

@@ -1,7 +1,7 @@
 """The person's skeleton: one symmetric length a bone for the whole clip.
 
-A length is the median over the clip of the mean of left and right, drawn towards the proportions of
-our rest skeleton: BlazePose's shins are 10-20 % short in every clip that has a truth. Metres.
+A length is the median over the clip of the mean of left and right, moved towards the proportions of
+our rest skeleton: BlazePose's shins are 10-20 % short in every clip with a ground truth. Metres.
 """
 
 from collections.abc import Mapping
@@ -29,11 +29,11 @@ ACROSS: Mapping[str, tuple[str, tuple[str, ...]]] = {
 
 
 def fit_skeleton(points: Float[np.ndarray, "T 33 3"], trust: float) -> Float[np.ndarray, "29 3"]:
-    """Rest joints of the person.
+    """Return the rest joints of the person.
 
     Args:
         points: Landmarks, metres, any frame.
-        trust: 0 takes the proportions of the rest skeleton at the person's size, 1 the medians.
+        trust: 0 uses the proportions of the rest skeleton at the person's size, 1 the medians.
     """
     ratios = {name: _along(points, *pairs[:2]) for name, pairs in MEASURED.items()}
     ratios |= {name: _across(points, pair[0]) for name, pair in ACROSS.items()}
@@ -58,7 +58,7 @@ def _scaled(bare: str, offset: np.ndarray, scale: Mapping[str, float]) -> np.nda
 
 
 def _along(points: np.ndarray, marks: tuple[str, str], joints: tuple[str, str]) -> float:
-    """Median measured length over the rest length."""
+    """Return the median measured length over the rest length."""
     measured = [_distance(points, f"{s}_{marks[0]}", f"{s}_{marks[1]}") for s in ("left", "right")]
     start, end = (REST_JOINTS[keypoint(f"left_{name}")] for name in joints)
     return float(np.median(np.mean(measured, 0)) / np.linalg.norm(end - start))

@@ -1,9 +1,9 @@
-"""How sure the whole-clip refinement is of each joint: covariances from its own normal matrix.
+"""Uncertainty of the whole-clip refinement for each joint: covariances from its normal matrix.
 
 At the solution the inverse of the normal matrix is the covariance of all joints in all frames
-(Laplace). It is banded, frames couple with the two before and after, so its diagonal blocks follow
-from one pass forward and one back over pairs of frames (Rybicki and Hummer 1991). A joint's
-confidence is the chance that it lies within `NEAR_M` of where it is said to be, seen from the hips.
+(Laplace). It is banded, frames are coupled with the two before and after, so its diagonal blocks
+follow from one pass forward and one back over pairs of frames (Rybicki and Hummer 1991). A joint's
+confidence is the probability that it is within `NEAR_M` of the estimate, relative to the hips.
 """
 
 import numpy as np
@@ -22,8 +22,8 @@ from robojackson.mocap.landmarks.refinement import (
 
 NEAR_M = 0.15
 REPEATED_S = 0.2
-"""The errors of frames nearer than this are one error: a variance counts so many times as the
-frames in it. Measured on the eight tuned clips: .77 of their joints are said, .84 are, near."""
+"""Correlation time of errors: a variance is multiplied by the number of frames in it. Measured on
+the eight tuned clips: the mean confidence is .77, and .84 of their joints are near."""
 HANGS_ON = {
     "pinky": "wrist", "index": "wrist", "thumb": "wrist", "heel": "ankle", "foot_index": "ankle",
 }  # fmt: skip
@@ -35,13 +35,13 @@ def certainty(
     visibility: Float[np.ndarray, "T 33"],
     config: RefineConfig,
 ) -> Float[np.ndarray, "T 33"]:
-    """Confidence 0..1 of all landmarks; those that were not refined get that of their carrier.
+    """Return the confidence 0..1 of all landmarks; unrefined ones get that of their carrier.
 
     Args:
         body: The refined landmarks, metres, camera.
-        evidence: What they were refined from.
-        visibility: Of the landmarks; face, hands and feet are no surer than they are visible.
-        config: The refinement's.
+        evidence: Measurements that they were refined from.
+        visibility: Visibility of the landmarks, an upper bound for face, hands and feet.
+        config: Settings of the refinement.
     """
     from scipy.stats import chi2
 
@@ -59,7 +59,7 @@ def certainty(
 def covariances(
     body: Float[np.ndarray, "T 12 3"], evidence: Evidence, config: RefineConfig
 ) -> Float[np.ndarray, "T 36 36"]:
-    """Covariance of the joints of each frame, given the whole clip."""
+    """Return the covariance of the joints of each frame, given the whole clip."""
     jacobian, _ = residuals(body, evidence, config)
     normal = np.einsum("tri,trj->tij", jacobian, jacobian)
     count = len(normal) + len(normal) % 2
@@ -72,7 +72,8 @@ def covariances(
 
 
 def root_relative(covariance: Float[np.ndarray, "T 36 36"]) -> Float[np.ndarray, "T 12"]:
-    """Mean variance of the three axes of each joint minus the middle of the hips, m^2."""
+    """Return the mean variance of the three axes of each joint minus the middle of the hips,
+    m^2."""
     each = np.eye(len(ORDER))
     each[:, HIPS] -= 0.5
     blocks = covariance.reshape(len(covariance), len(ORDER), 3, len(ORDER), 3)
@@ -82,7 +83,8 @@ def root_relative(covariance: Float[np.ndarray, "T 36 36"]) -> Float[np.ndarray,
 
 
 def _second_difference(stiff: Float[np.ndarray, "S 36"], count: int) -> Float[np.ndarray, "3 T 36"]:
-    """Diagonals 0, 1 and 2 of D2' W D2 over two frames more than weights, padded with zeros."""
+    """Return diagonals 0, 1 and 2 of D2' W D2 over two frames more than weights, padded with
+    zeros."""
     second = np.array([1.0, -2.0, 1.0])
     diagonals = np.zeros((3, count, SIZE))
     frames = len(stiff) + 2
@@ -94,7 +96,8 @@ def _second_difference(stiff: Float[np.ndarray, "S 36"], count: int) -> Float[np
 
 
 def _paired(blocks: np.ndarray, coupling: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Block tridiagonal form over pairs of frames: diagonal blocks, and those above them."""
+    """Return the block tridiagonal form over pairs of frames: diagonal blocks, and those above
+    them."""
     pairs, eye = len(blocks) // 2, np.eye(SIZE)
     one, two = (coupling[apart][:, None] * eye for apart in (1, 2))
     diagonal = np.zeros((pairs, 2, SIZE, 2, SIZE))
@@ -108,7 +111,7 @@ def _paired(blocks: np.ndarray, coupling: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def _diagonal_of_inverse(diagonal: np.ndarray, above: np.ndarray) -> Float[np.ndarray, "T 36 36"]:
-    """Blocks of one frame on the diagonal of the inverse of a block tridiagonal matrix."""
+    """Return blocks of one frame on the diagonal of the inverse of a block tridiagonal matrix."""
     inverse = np.empty_like(diagonal)
     gain = np.empty_like(diagonal)
     inverse[0] = np.linalg.inv(diagonal[0])

@@ -1,6 +1,6 @@
-"""All that a motion is made from: a person's landmarks at a chosen quality, the camera's path.
+"""The input of a motion: a person's landmarks at a chosen quality, and the camera's path.
 
-"best" lets the two larger pose models vote; it runs at a third of the speed of "full".
+"best" averages the two larger pose models; it runs at a third of the speed of "full".
 """
 
 from collections.abc import Callable
@@ -21,15 +21,15 @@ from robojackson.motion.landmark_track import LandmarkTrack
 
 Quality = Literal["lite", "full", "heavy", "best"]
 VOTERS: dict[str, tuple[str, ...]] = {"best": ("full", "heavy")}
-"""Pose models of the qualities that are more than one."""
+"""Pose models of the qualities with several models."""
 SHORT_SIDE = 240
-"""Pixels of the pictures in which the background is followed."""
+"""Short side of the pictures in which the background is tracked, pixels."""
 
 Progress = Callable[[int, int], None]
 
 
 def models_of(quality: str) -> tuple[str, ...]:
-    """The pose models that a quality needs."""
+    """Return the pose models of a quality."""
     return VOTERS.get(quality, (quality,))
 
 
@@ -40,13 +40,13 @@ def detect_landmarks(
     dancer: DancerConfig,
     progress: Progress | None = None,
 ) -> LandmarkTrack:
-    """Landmarks of one person, and how the camera moved meanwhile.
+    """Return landmarks of one person, and the movement of the camera.
 
     Args:
         path: Video file.
-        info: What `probe` found in it.
+        info: Result of `probe`.
         quality: lite, full, heavy or best.
-        dancer: Whom to follow.
+        dancer: Settings of the person's choice.
         progress: Called with (frames done, frames in all) once a frame and model.
     """
     models = models_of(quality)
@@ -56,21 +56,21 @@ def detect_landmarks(
         part = _part(progress, turn, len(models))
         tracks.append(track_dancer(path, info, size, dancer, part, watch))
     if len(tracks) == 1 and background.frames == len(tracks[0]) and not tracks[0].people:
-        return background.told(tracks[0])
+        return background.applied_to(tracks[0])
     return with_camera(path, fuse_tracks(tracks) if len(tracks) > 1 else tracks[0])
 
 
 def with_camera(path: Path, track: LandmarkTrack) -> LandmarkTrack:
-    """The track with the path of the camera, notes of it, and how well the person is seen."""
+    """Return the track with the path of the camera, notes on it, and the person's visibility."""
     background = Background()
     images = (image for _, image in timed_frames(path, short_side=SHORT_SIDE))
     for index, (image, row) in enumerate(zip(images, track.landmarks, strict=False)):
         background.add_frame(index, image, row)
-    return background.told(track)
+    return background.applied_to(track)
 
 
 class Background:
-    """What the pictures tell besides the landmarks, as they pass by."""
+    """Facts from the pictures besides the landmarks, collected frame by frame."""
 
     def __init__(self) -> None:
         self.frames = 0
@@ -79,14 +79,14 @@ class Background:
     def add_frame(
         self, index: int, image: UInt8[np.ndarray, "H W 3"], row: Float[np.ndarray, "33 _"]
     ) -> None:
-        """Frame number `index` in RGB, of any size, with the person's landmarks."""
+        """Add frame number `index` in RGB, of any size, with the person's landmarks."""
         self.frames = index + 1
         small, xy = shrunk(image), row[:, :2]
         self._camera.add_frame(small, xy)
         self._looks.add_frame(small, xy)
 
-    def told(self, track: LandmarkTrack) -> LandmarkTrack:
-        """The track of the same frames with all of it."""
+    def applied_to(self, track: LandmarkTrack) -> LandmarkTrack:
+        """Return the track of the same frames with all of these facts."""
         found = self._camera.path(len(track), track.width, track.height)
         return replace(
             track,
@@ -98,7 +98,7 @@ class Background:
 
 
 def shrunk(image: UInt8[np.ndarray, "H W 3"]) -> UInt8[np.ndarray, "H W 3"]:
-    """The picture with a short side of about `SHORT_SIDE`; whole factors are far less work."""
+    """Return the picture with a short side of about `SHORT_SIDE`; whole factors are much faster."""
     factor = max(min(image.shape[:2]) // SHORT_SIDE, 1)
     height, width = (side // factor for side in image.shape[:2])
     if factor > 1:
@@ -112,7 +112,7 @@ def shrunk(image: UInt8[np.ndarray, "H W 3"]) -> UInt8[np.ndarray, "H W 3"]:
 
 
 def _part(progress: Progress | None, turn: int, turns: int) -> Progress | None:
-    """Progress of one of several passes as that of all."""
+    """Return the progress of one of several passes as that of all."""
     if progress is None or turns == 1:
         return progress
     return lambda done, total: progress((turn * total + done) // turns, total)

@@ -1,9 +1,9 @@
-"""Two pose models vote: the mean of what they saw, landmark by landmark.
+"""Fuse two pose models: the mean of their landmarks.
 
 Their errors are only partly the same, so that the mean is nearer to the truth than either. Each
-track is first cleared of exchanged sides, else the mean of a left and a right leg would stand
-between them; and turned as a whole to the first one: "heavy" sees everybody lean by 5 degrees where
-"full" sees them lean by 1 (mean of the eight tuned clips).
+track is first cleared of exchanged sides, else the mean of a left and a right leg would be between
+them; and turned as a whole to the first one: "heavy" leans every person by 5 degrees where "full"
+leans them by 1 (mean of the eight tuned clips).
 """
 
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ ANKLES = [landmark("left_ankle"), landmark("right_ankle")]
 
 
 def fuse_tracks(tracks: Sequence[LandmarkTrack]) -> LandmarkTrack:
-    """One track of the same frames: the mean of those models that found the person.
+    """Return one track of the same frames: the mean of those models that found the person.
 
     Args:
         tracks: Of the same clip and frames, one a model.
@@ -34,7 +34,7 @@ def fuse_tracks(tracks: Sequence[LandmarkTrack]) -> LandmarkTrack:
     """
     first = tracks[0]
     if any((len(t), t.width, t.height, t.fps) != _shape(first) for t in tracks):
-        raise ValueError("tracks that vote must be of the same clip")
+        raise ValueError("tracks to fuse must be of the same clip")
     clean = [_unswapped(track) for track in tracks]
     return replace(
         first,
@@ -63,7 +63,8 @@ def _unswapped(track: LandmarkTrack) -> LandmarkTrack:
 
 
 def _turned(world: np.ndarray, first: LandmarkTrack) -> np.ndarray:
-    """World landmarks after the shortest rotation that gives them the mean lean of a track."""
+    """Return world landmarks after the shortest rotation that gives them the mean lean of a
+    track."""
     both = first.detected & ~np.isnan(world[:, 0, 0])
     if not both.any():
         return world
@@ -71,12 +72,12 @@ def _turned(world: np.ndarray, first: LandmarkTrack) -> np.ndarray:
 
 
 def _lean(world: np.ndarray) -> np.ndarray:
-    """From the ankles to the shoulders, mean over the clip."""
+    """Return the direction from the ankles to the shoulders, mean over the clip."""
     return np.asarray((world[:, SHOULDERS] - world[:, ANKLES]).mean((0, 1)))
 
 
 def _mean(values: Sequence[np.ndarray]) -> np.ndarray:
-    """Mean over the tracks that have a frame; NaN where none has."""
+    """Return the mean over the tracks that have a frame; NaN where none has."""
     stacked = np.stack(values)
     known = ~np.isnan(stacked)
     total = np.where(known, stacked, 0.0).sum(0)

@@ -1,9 +1,10 @@
-"""Whole-clip refinement of the twelve body landmarks: the likeliest smooth motion of a skeleton.
+"""Whole-clip refinement of the twelve body landmarks: the most probable smooth motion of a
+skeleton.
 
-Minimises over all frames at once, robustly: the distance from what was seen in the image, from the
-detector's depth relative to the hips, from the person's bone lengths, and from no acceleration.
-Gauss-Newton with reweighting; frames couple only through the acceleration, so the normal matrix is
-banded and a clip takes a fraction of a second. Camera frame, metres.
+Minimises over all frames at once, robustly: the distance from the image landmarks, from the
+detector's depth relative to the hips, from the person's bone lengths, and from zero acceleration.
+Gauss-Newton with reweighting; frames are coupled only through the acceleration, so the normal
+matrix is banded and a clip takes a fraction of a second. Camera frame, metres.
 """
 
 from dataclasses import dataclass as plain_dataclass
@@ -35,7 +36,7 @@ ORDER = [LANDMARK_NAMES[index] for index in BODY]
 HIPS = [ORDER.index("left_hip"), ORDER.index("right_hip")]
 LEAST_VISIBILITY = 0.1
 SUDDEN = 1.5
-"""Spreads of acceleration from which on it counts less than squared."""
+"""Acceleration, in spreads, above which its cost grows less than quadratically."""
 
 
 @config_dataclass
@@ -64,13 +65,13 @@ class RefineConfig:
 
 @plain_dataclass(frozen=True)
 class Evidence:
-    """What the clip says about the twelve landmarks.
+    """Measurements of a clip for the twelve landmarks.
 
     Attributes:
         rays: Image points at depth one.
         depth: The detector's depth relative to the middle of the hips, metres.
-        trust: 0..1 a landmark, from its visibility.
-        lengths: Of `BONES`, metres.
+        trust: Weight of a landmark, 0..1, from its visibility.
+        lengths: Lengths of `BONES`, metres.
         fps: Frames a second.
         depth_m: Standard deviation of `depth`, metres.
     """
@@ -91,9 +92,9 @@ def refine(
     config: RefineConfig,
     depth_m: Float[np.ndarray, "T 12"] | None = None,
 ) -> Float[np.ndarray, "T 33 3"]:
-    """Landmarks with the body refined; face, hands and feet follow what they hang on.
+    """Return landmarks with the body refined; face, hands and feet follow their carriers.
 
-    `depth_m` is how far off each depth may be; without it the configuration's one figure counts.
+    `depth_m` is the spread of each depth; without it the configuration's one figure applies.
     """
     body = placed[:, BODY]
     evidence = gather(placed, visibility, rest_joints, fps, config, depth_m)
@@ -105,7 +106,7 @@ def refine(
 def leashed(
     start: Float[np.ndarray, "T 12 3"], body: Float[np.ndarray, "T 12 3"], leash: float
 ) -> Float[np.ndarray, "T 12 3"]:
-    """The body, each landmark at most `leash` from its start seen from the hips."""
+    """Return the body, each landmark at most `leash` from its start relative to the hips."""
     move = body - start
     common = move[:, HIPS].mean(1, keepdims=True)
     apart = np.linalg.norm(move - common, axis=-1, keepdims=True)
@@ -122,7 +123,7 @@ def gather(
     config: RefineConfig,
     depth_m: Float[np.ndarray, "T 12"] | None = None,
 ) -> Evidence:
-    """What landmarks before the camera say about the body."""
+    """Return the measurements of the body in landmarks before the camera."""
     body = placed[:, BODY]
     return Evidence(
         rays=body[..., :2] / body[..., 2:],
@@ -135,7 +136,7 @@ def gather(
 
 
 def bone_lengths(rest_joints: Float[np.ndarray, "29 3"]) -> Float[np.ndarray, " B"]:
-    """Lengths of `BONES` in a rest pose, metres."""
+    """Return lengths of `BONES` in a rest pose, metres."""
     ends = np.array([[keypoint(a), keypoint(b)] for a, b in BONES])
     result: np.ndarray = np.linalg.norm(rest_joints[ends[:, 1]] - rest_joints[ends[:, 0]], axis=-1)
     return result
@@ -144,7 +145,7 @@ def bone_lengths(rest_joints: Float[np.ndarray, "29 3"]) -> Float[np.ndarray, " 
 def carry_along(
     placed: Float[np.ndarray, "T 33 3"], body: Float[np.ndarray, "T 12 3"]
 ) -> Float[np.ndarray, "T 33 3"]:
-    """All landmarks, the others moved as the body landmark that they hang on."""
+    """Return all landmarks, the others moved with their body landmark."""
     moved = np.array(placed)
     change = body - placed[:, BODY]
     shoulders = [ORDER.index("left_shoulder"), ORDER.index("right_shoulder")]
@@ -164,7 +165,7 @@ def carry_along(
 def _step(
     body: Float[np.ndarray, "T 12 3"], evidence: Evidence, config: RefineConfig
 ) -> Float[np.ndarray, "T 12 3"]:
-    """One Gauss-Newton step."""
+    """Run one Gauss-Newton step."""
     count = len(body)
     jacobian, residual = residuals(body, evidence, config)
     normal = np.einsum("tri,trj->tij", jacobian, jacobian)
@@ -184,10 +185,11 @@ def _step(
 def stiffness(
     body: Float[np.ndarray, "T 12 3"], fps: float, config: RefineConfig
 ) -> Float[np.ndarray, "T-2 36"]:
-    """Weight of the squared second difference of each coordinate, 1/m^2, pseudo-Huber.
+    """Return the weight of the squared second difference of each coordinate, 1/m^2, pseudo-Huber.
 
-    A frame says as much at any rate, so that a clip of few frames is not smoothed more: detectors
-    err alike in neighbouring frames. What truly accelerates, as a kick does, is let go.
+    A frame has the same weight at any frame rate, so that a clip of few frames is not smoothed
+    more: errors of detectors are correlated in neighbouring frames. True accelerations, such as a
+    kick, are kept.
     """
     acceleration = np.diff(body, 2, axis=0) * fps**2 / config.acceleration_mps2
     robust = (1.0 + (acceleration**2).sum(-1) / SUDDEN**2) ** -0.5
@@ -197,7 +199,7 @@ def stiffness(
 def residuals(
     body: np.ndarray, evidence: Evidence, config: RefineConfig
 ) -> tuple[Float[np.ndarray, "T R 36"], Float[np.ndarray, "T R"]]:
-    """Robustly weighted residuals of image, depth and bones, and their derivatives."""
+    """Return robustly weighted residuals of image, depth and bones, and their derivatives."""
     parts = (
         _image(body, evidence, config.image_m),
         _depth(body, evidence),
@@ -209,7 +211,7 @@ def residuals(
 
 
 def _image(body: np.ndarray, evidence: Evidence, spread: float) -> tuple[np.ndarray, np.ndarray]:
-    """(x - u z) / spread across the image at the landmark's own depth, pseudo-Huber."""
+    """Return (x - u z) / spread across the image at the landmark's own depth, pseudo-Huber."""
     count, points = body.shape[:2]
     residual = (body[..., :2] - evidence.rays * body[..., 2:]) / spread
     robust = (1.0 + (residual**2).sum(-1)) ** -0.25 * np.sqrt(evidence.trust)
@@ -225,7 +227,7 @@ def _image(body: np.ndarray, evidence: Evidence, spread: float) -> tuple[np.ndar
 
 
 def _depth(body: np.ndarray, evidence: Evidence) -> tuple[np.ndarray, np.ndarray]:
-    """Depth relative to the middle of the hips against the detector's, pseudo-Huber."""
+    """Return depth relative to the middle of the hips against the detector's, pseudo-Huber."""
     count, points = body.shape[:2]
     spread = evidence.depth_m
     relative = body[..., 2] - body[:, HIPS, 2].mean(1, keepdims=True)
@@ -239,7 +241,7 @@ def _depth(body: np.ndarray, evidence: Evidence) -> tuple[np.ndarray, np.ndarray
 
 
 def _bones(body: np.ndarray, evidence: Evidence, spread: float) -> tuple[np.ndarray, np.ndarray]:
-    """Bone lengths against the person's."""
+    """Return bone lengths against the person's."""
     starts = np.array([ORDER.index(start) for start, _ in BONES])
     ends = np.array([ORDER.index(end) for _, end in BONES])
     bone = body[:, ends] - body[:, starts]

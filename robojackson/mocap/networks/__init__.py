@@ -1,1 +1,1 @@
-"""The published networks, HybrIK and NIKI, for the user who brings their weights."""
+"""The published networks HybrIK and NIKI, for users who have their weights."""

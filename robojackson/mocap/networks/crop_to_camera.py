@@ -1,8 +1,8 @@
 """From the crop's (u, v, d) to metres before the camera.
 
-HybrIK sees every crop through a lens of 1000 pixels at 256: in the image that is a focal length
-that changes with the box. `refocus` puts the person where one fixed lens would see him. Camera
-frame: x right, y down, z forward, metres.
+HybrIK assumes for every crop a lens of 1000 pixels at 256: in the image that is a focal length that
+changes with the box. `refocus` places the person before one fixed lens. Camera frame: x right, y
+down, z forward, metres.
 """
 
 from dataclasses import dataclass
@@ -17,23 +17,23 @@ from robojackson.mocap.landmarks.pinhole_camera import Pinhole
 from robojackson.mocap.networks.person_crop import SIDE_PX
 
 FOCAL_PX = 1000.0
-"""Of the crop."""
+"""Side of the crop, pixels."""
 DEPTH_M = 2.2
-"""Metres from d = -0.5 to d = 0.5."""
+"""Depth from d = -0.5 to d = 0.5, metres."""
 DOUBT_FACTOR = 10.0
-"""A keypoint with a sigma above a tenth does not count when the scale is refined."""
+"""Largest sigma of a keypoint that is used to refine the scale."""
 LEAST_SCALE, LARGEST_SCALE = 0.05, 5.0
-"""Crops of 20 m and of 0.2 m: a refined scale outside of them is no scale."""
+"""Plausible scales: of crops between 20 m and 0.2 m."""
 TINY = 1e-9
 
 
 @dataclass(frozen=True)
 class View:
-    """Where the crops of a clip are in the image.
+    """Positions of a clip's crops in the image.
 
     Attributes:
         boxes: Centre x, centre y and side, pixels.
-        width, height: Of the image, pixels.
+        width, height: Size of the image, pixels.
     """
 
     boxes: Float[np.ndarray, "T 3"]
@@ -42,21 +42,21 @@ class View:
 
     @property
     def offset(self) -> Float[np.ndarray, "T 2"]:
-        """From the image's middle to the crop's, in sides of the crop."""
+        """Return the offset from the image's middle to the crop's, in sides of the crop."""
         middle = np.array([self.width, self.height]) / 2.0
         result: np.ndarray = (self.boxes[:, :2] - middle) / self.boxes[:, 2:]
         return result
 
     @property
     def focal_px(self) -> Float[np.ndarray, " T"]:
-        """HybrIK's focal length of each frame in pixels of the image."""
+        """Return HybrIK's focal length of each frame in pixels of the image."""
         return FOCAL_PX / SIDE_PX * self.boxes[:, 2]
 
 
 def lift(
     uvd: Float[np.ndarray, "T J 3"], scale: Float[np.ndarray, " T"], view: View
 ) -> Float[np.ndarray, "T J 3"]:
-    """Points before the camera of each frame's own focal length.
+    """Return points before the camera of each frame's own focal length.
 
     Z = 2.2 d + 1000 / (256 s);  (X, Y) = (uv + offset) 256 / 1000 Z.
     """
@@ -74,11 +74,12 @@ def refine_scale(
     rest_joints: Float[np.ndarray, "*T 29 3"],
     view: View,
 ) -> Float[np.ndarray, " T"]:
-    """The scale at which the solved person, with his own bones, falls on the seen (u, v).
+    """Return the scale at which the solved person, with his own bones, projects onto the observed
+    (u, v).
 
-    With X the solved joints about the seen pelvis, X - 256/1000 (uv) X_z = (uv) / s is linear in
-    a = 1 / s: least squares over 24 joints in x and y, weighted by max(0, 1 - 10 sigma). Frames in
-    which that says nothing keep their scale.
+    With X the solved joints about the observed pelvis, X - 256/1000 (uv) X_z = (uv) / s is linear
+    in a = 1 / s: least squares over 24 joints in x and y, weighted by max(0, 1 - 10 sigma). Frames
+    without a solution keep their scale.
     """
     points = lift(uvd, scale, view)
     local = analytic_solve.solve(points - points[:, :1], rest_joints, twist, "naive")
@@ -102,10 +103,10 @@ def refocus(
     fps: float,
     depth_cutoff_hz: float,
 ) -> Float[np.ndarray, "T J 3"]:
-    """The same shapes before one camera of fixed focal length.
+    """Return the same shapes before one camera of fixed focal length.
 
-    The pelvis goes from Z to Z f / f_frame, which is as large in the image; that depth, smoothed,
-    and the ray through the seen pelvis say where it is.
+    The pelvis moves from Z to Z f / f_frame, which keeps its size in the image; the smoothed depth
+    and the ray through the observed pelvis give its position.
     """
     root = points[:, 0]
     ray = root[:, :2] / root[:, 2:] * view.focal_px[:, None] / camera.focal_px

@@ -18,7 +18,7 @@ from robojackson.mocap.networks.residual_blocks import BasicBlock, Bottleneck, c
 WIDTHS = (48, 96, 192, 384)
 BLOCKS = 4
 MODULES = {2: 1, 3: 4, 4: 3}
-"""Stage (which has as many branches) -> modules."""
+"""Stage (equal to its number of branches) -> modules."""
 HEAD_WIDTHS = (32, 64, 128, 256)
 FEATURES = 2048
 HEATMAP_CHANNELS = 29 * 64
@@ -38,7 +38,7 @@ class Mixing(nn.Module):
         )
 
     def forward(self, images: list[Tensor]) -> list[Tensor]:
-        """Branches in, branches out, same shapes."""
+        """Return the branches after one module, same shapes."""
         images = [branch(image) for branch, image in zip(self.branches, images, strict=True)]
         mixed = []
         for paths in self.fuse_layers:
@@ -76,7 +76,7 @@ class HRNet(nn.Module):
     def forward(
         self, image: Float[Tensor, "B 3 256 256"]
     ) -> tuple[Float[Tensor, "B 1856 64 64"], Float[Tensor, "B 2048"]]:
-        """Heatmaps, depth within channels, and features."""
+        """Return heatmaps, depth within channels, and features."""
         image = functional.relu(self.bn1(self.conv1(image)))
         image = self.layer1(functional.relu(self.bn2(self.conv2(image))))
         branches = self.stage2([change(image) for change in self.transition1])
@@ -100,13 +100,13 @@ def _stage(number: int) -> nn.Sequential:
 
 
 def _opening(branches: int) -> nn.ModuleList:
-    """The branches as they are, and a new one from the smallest."""
+    """Return layers that keep the branches and add one from the smallest."""
     new = nn.Sequential(normed(3, WIDTHS[branches - 1], WIDTHS[branches], 2))
     return nn.ModuleList([*(nn.Identity() for _ in range(branches)), new])
 
 
 def _path(widths: Sequence[int], source: int, target: int) -> nn.Module:
-    """From one branch's size and width to another's."""
+    """Return layers from one branch's size and width to another's."""
     if source == target:
         return nn.Identity()
     if source > target:
@@ -119,6 +119,7 @@ def _path(widths: Sequence[int], source: int, target: int) -> nn.Module:
 
 
 def _biased(size: int, inputs: int, outputs: int, stride: int) -> nn.Sequential:
-    """As `normed`, with a bias that the batch norm makes idle and the weights have all the same."""
+    """Return layers as `normed`, with a bias that has no effect before the batch norm; the weights
+    have it."""
     layer = nn.Conv2d(inputs, outputs, size, stride, size // 2)
     return nn.Sequential(layer, nn.BatchNorm2d(outputs), nn.ReLU())

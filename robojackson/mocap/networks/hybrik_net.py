@@ -23,7 +23,7 @@ HIDDEN = 1024
 
 
 def mirror_order(count: int, first: int = 0) -> list[int]:
-    """For keypoints first..first+count-1, the place of each one's counterpart."""
+    """Return, for keypoints first..first+count-1, the index of each one's counterpart."""
     names = KEYPOINT_NAMES[first : first + count]
     return [names.index(mirror_of(name)) for name in names]
 
@@ -34,15 +34,15 @@ MIRROR_23 = mirror_order(23, first=1)
 
 @dataclass(frozen=True)
 class NetworkOutput:
-    """What the network says of a batch of crops.
+    """Output of the network for a batch of crops.
 
     Attributes:
         uvd: Keypoints, shares of the crop's side and of 2.2 m, zero in the middle.
         peak: Largest probability of each volume.
-        sigma: 0..1, the network's own doubt of a keypoint; its score is 1 - sigma.
+        sigma: Uncertainty of a keypoint, 0..1; its score is 1 - sigma.
         twist: (cos, sin) of joints 1..23, of any length.
-        betas: SMPL's shape.
-        scale: Of the weak camera: the crop is 1 / scale metres wide at the person.
+        betas: SMPL's shape coefficients.
+        scale: Scale of the weak camera: the crop is 1 / scale metres wide at the person.
     """
 
     uvd: Float[Tensor, "B 29 3"]
@@ -72,15 +72,16 @@ class HybrikNet(nn.Module):
     def run_backbone(
         self, crop: Float[Tensor, "B 3 256 256"]
     ) -> tuple[Float[Tensor, "B 29 64 64 64"], Float[Tensor, "B F"]]:
-        """Volumes (depth, height, width) before their softmax, and the heads' input."""
+        """Return volumes (depth, height, width) before their softmax, and the heads' input."""
         raise NotImplementedError
 
     def mean_scale(self, scale: Tensor, mirrored: Tensor) -> Float[Tensor, " B"]:
-        """Of the two scales of a flip test; distances average, so the mean is harmonic."""
+        """Return the mean of a flip test's scales; distances are averaged, so the mean is
+        harmonic."""
         return 2.0 / (1.0 / scale + 1.0 / mirrored)
 
     def forward(self, crop: Float[Tensor, "B 3 256 256"], flip_test: bool = False) -> NetworkOutput:
-        """What is seen in crops, or the mean of that and of what is seen in their mirror images."""
+        """Return the output for crops, or its mean with the output for their mirror images."""
         volume, features = self.run_backbone(crop)
         chance = probability(volume)
         heads = self._heads(features)
@@ -93,7 +94,7 @@ class HybrikNet(nn.Module):
         return NetworkOutput(uvd, peak, sigma, twist, betas, scale)
 
     def _heads(self, features: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """sigma, twist, betas, scale."""
+        """Return sigma, twist, betas and scale."""
         sigma = self.decsigma(features).sigmoid()
         twist = self.decphi(features).reshape(-1, 23, 2)
         scale = self.deccam(features)[:, 0] + self.init_cam[0]
@@ -117,7 +118,7 @@ class HybrikHRNet(HybrikNet):
     def run_backbone(
         self, crop: Float[Tensor, "B 3 256 256"]
     ) -> tuple[Float[Tensor, "B 29 64 64 64"], Float[Tensor, "B 2048"]]:
-        """Volumes and features."""
+        """Return volumes and features."""
         maps, features = self.preact(crop)
         return maps.reshape(-1, 29, SIDE, SIDE, SIDE), features
 
@@ -136,18 +137,18 @@ class HybrikResNet(HybrikNet):
     def run_backbone(
         self, crop: Float[Tensor, "B 3 256 256"]
     ) -> tuple[Float[Tensor, "B 29 64 64 64"], Float[Tensor, "B 1024"]]:
-        """Volumes and features."""
+        """Return volumes and features."""
         maps = self.preact(crop)
         volume = self.final_layer(self.deconv_layers(maps))
         return volume.reshape(-1, 29, SIDE, SIDE, SIDE), self.fc2(self.fc1(maps.mean((2, 3))))
 
     def mean_scale(self, scale: Tensor, mirrored: Tensor) -> Float[Tensor, " B"]:
-        """This variant's authors average the scales themselves."""
+        """Return the arithmetic mean, as this variant's authors do."""
         return (scale + mirrored) / 2.0
 
 
 def hybrik_network(weights: Weights) -> HybrikNet:
-    """The network of a file; older ResNet files have no `decsigma`, and then no doubt.
+    """Return the network of a file; older ResNet files have no `decsigma`: sigma is then zero.
 
     Raises:
         BadWeights: keys or shapes do not fit.
@@ -164,14 +165,14 @@ def hybrik_network(weights: Weights) -> HybrikNet:
 
 
 def probability(volume: Float[Tensor, "B J D H W"]) -> Float[Tensor, "B J D H W"]:
-    """One softmax over each joint's whole volume."""
+    """Return one softmax over each joint's whole volume."""
     return volume.flatten(2).softmax(2).reshape(volume.shape)
 
 
 def expectation(
     chance: Float[Tensor, "B J D H W"],
 ) -> tuple[Float[Tensor, "B J 3"], Float[Tensor, "B J"]]:
-    """Expected (u, v, d), -0.5 in the first cell, and the largest probability."""
+    """Return the expected (u, v, d), -0.5 in the first cell, and the largest probability."""
     axes = []
     for dims in ((2, 3), (2, 4), (3, 4)):
         marginal = chance.sum(dims)
@@ -181,21 +182,22 @@ def expectation(
 
 
 def flip_volume(volume: Float[Tensor, "B 29 D H W"]) -> Float[Tensor, "B 29 D H W"]:
-    """What a mirrored crop shows, put back: columns reversed, sides swapped, one column on.
+    """Return the volume of a mirrored crop in the original orientation: columns reversed, sides
+    swapped, shifted by one column.
 
-    Without that column the middle of the crop (cell 32 of 64) would come to lie in cell 31.
+    Without the shift the middle of the crop (cell 32 of 64) would be in cell 31.
     """
     flipped = volume.flip(4)[:, MIRROR_29]
     return torch.cat([flipped[..., :1], flipped[..., :-1]], 4)
 
 
 def flip_twist(twist: Float[Tensor, "B 23 2"]) -> Float[Tensor, "B 23 2"]:
-    """The twists of a mirrored person: sides swapped, turned the other way."""
+    """Return the twists of a mirrored person: sides swapped, sign reversed."""
     return twist[:, MIRROR_23] * twist.new_tensor([1.0, -1.0])
 
 
 class _Certain(nn.Module):
-    """In place of a missing head: no doubt of any keypoint."""
+    """Replacement of a missing head: sigma is zero for every keypoint."""
 
     def forward(self, features: Tensor) -> Tensor:
         return features.new_full((len(features), 29), -torch.inf)

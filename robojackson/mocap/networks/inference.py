@@ -1,7 +1,8 @@
-"""A video through the networks: boxes -> crops -> HybrIK -> one fixed lens -> NIKI -> keypoints.
+"""Run a video through the networks: boxes -> crops -> HybrIK -> one fixed lens -> NIKI ->
+keypoints.
 
-What comes out is what the world grounding needs: 29 keypoints before the camera in metres, the
-twist of every bone, and the person's rest joints.
+The result is the input of the grounding: 29 keypoints before the camera in metres, the twist of
+every bone, and the person's rest joints.
 """
 
 import logging
@@ -31,10 +32,10 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class ClipPrediction:
-    """What HybrIK's network says of a clip, one row a frame; units of `hybrik_net.NetworkOutput`.
+    """Output of HybrIK's network for a clip, one row a frame; units of `hybrik_net.NetworkOutput`.
 
     Attributes:
-        view: Where the crops are in the image.
+        view: Positions of the crops in the image.
     """
 
     uvd: Float[np.ndarray, "T 29 3"]
@@ -50,12 +51,12 @@ class Estimate:
     """The person before the camera.
 
     Attributes:
-        keypoints: Metres; x right, y down, z forward.
+        keypoints: Positions, metres; x right, y down, z forward.
         twist: (cos, sin) of joints 1..23 about the bones of `rest`.
         rest: The person's rest joints, metres.
-        betas: SMPL's shape, zero where `rest` is not SMPL's.
-        confidence: 0..1 a keypoint.
-        notes: What ran, for the user.
+        betas: SMPL's shape coefficients, zero where `rest` is not SMPL's.
+        confidence: Confidence of each keypoint, 0..1.
+        notes: Networks that ran, for the user.
     """
 
     keypoints: Float[np.ndarray, "T 29 3"]
@@ -68,13 +69,13 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Networks:
-    """What a configuration loads.
+    """Networks of a configuration.
 
     Attributes:
         hybrik: HybrIK's network.
         niki: NIKI's, or None.
         body: SMPL, or None where no file has it.
-        notes: Which files these are.
+        notes: Names of the files.
     """
 
     hybrik: HybrikNet
@@ -84,10 +85,10 @@ class Networks:
 
 
 def load_networks(config: NetworkConfig) -> Networks:
-    """The networks of the files that a user brought.
+    """Return the networks of the user's files.
 
     Raises:
-        BadWeights: a file cannot be used; the message says why.
+        BadWeights: a file cannot be used; the message has the reason.
     """
     device = device_of(config)
     first = read_weights(Path(str(config.hybrik)), "hybrik")
@@ -99,10 +100,10 @@ def load_networks(config: NetworkConfig) -> Networks:
 
 
 def device_of(config: NetworkConfig) -> torch.device:
-    """Where the networks run.
+    """Return the device of the networks.
 
     Raises:
-        BadConfiguration: no GPU where one is asked for.
+        BadConfiguration: the configuration requires a GPU and there is none.
     """
     if config.device == "cuda" and not torch.cuda.is_available():
         raise BadConfiguration("network.device is cuda, but PyTorch sees no GPU: take auto or cpu")
@@ -122,17 +123,17 @@ def estimate(
     config: NetworkConfig,
     progress: Progress | None = None,
 ) -> Estimate:
-    """The person of a clip.
+    """Return the person of a clip.
 
     Args:
         images: RGB frames, as many as there are landmarks.
-        landmarks: Where the person is in each frame's own image.
-        to_first: Takes pixels of each frame to those of the first, for a camera that moved.
+        landmarks: Landmarks of the person in each frame's own image.
+        to_first: Maps pixels of each frame to those of the first, for a camera that moved.
         camera: The fixed lens.
         fps: Frames a second.
         depth_cutoff_hz: Low-pass of the person's distance, hertz.
-        networks: What sees and refines.
-        config: How.
+        networks: Networks of the configuration.
+        config: Settings of the networks.
         progress: Called with (frames done, frames in all).
     """
     view = crop_to_camera.View(
@@ -169,7 +170,7 @@ def run_hybrik(
     config: NetworkConfig,
     progress: Progress | None = None,
 ) -> ClipPrediction:
-    """Every frame through HybrIK's network."""
+    """Return the output of HybrIK's network for every frame."""
     total, done = len(view.boxes), 0
     rows: list[tuple[np.ndarray, ...]] = []
     device = device_of(config)
@@ -193,7 +194,7 @@ def refined(
     network: niki.OneStage | niki.TwistSwing,
     config: NetworkConfig,
 ) -> Estimate:
-    """The same person with NIKI's rotations on his own bones, where HybrIK saw his pelvis."""
+    """Return the person with NIKI's rotations on his own bones, at HybrIK's pelvis."""
     count = len(found.keypoints)
     idle = niki.idle_inputs(count, config.noise, np.random.default_rng(config.seed))
     betas = np.broadcast_to(seen.betas.mean(0), (count, 10))
@@ -211,7 +212,8 @@ def _crops(images: Iterable[np.ndarray], boxes: np.ndarray, batch: int) -> Itera
 
 
 def _rest_joints(seen: ClipPrediction, body: SmplBody | None) -> Float[np.ndarray, "29 3"]:
-    """SMPL's of the clip's mean shape, or our own with the bones that the network drew."""
+    """Return SMPL's rest joints of the clip's mean shape, or our own with the network's bone
+    lengths."""
     if body is not None:
         return body.rest_joints(seen.betas.mean(0))
     raw = crop_to_camera.lift(seen.uvd, seen.scale, seen.view)
@@ -225,7 +227,7 @@ def _notes(
     if second is not None:
         notes[0] += f", refined by {second.kind} ({second.path.name})"
     if not network.knows_doubt:
-        notes.append("these weights have no scores of keypoints: all count alike")
+        notes.append("these weights have no scores of keypoints: equal weights")
     if body is None:
         notes.append("the weights hold no SMPL body: our own skeleton with measured bones")
     return tuple(notes)

@@ -1,4 +1,4 @@
-"""Which weights a user brings, and how the networks run; every command reads it without PyTorch."""
+"""Settings of a user's weights and of the networks; every command reads them without PyTorch."""
 
 from dataclasses import field
 from typing import Literal
@@ -18,14 +18,15 @@ class NetworkConfig:
     Attributes:
         hybrik: Weights of HybrIK, HRNet-W48 or ResNet-34; None runs no network at all.
         niki: Weights of NIKI, one-stage or twist-and-swing; None leaves HybrIK's result.
-        flip_test: Look at every frame and at its mirror image: twice the time, less jitter.
+        flip_test: Whether to process every frame and its mirror image: twice the time, less jitter.
         update_scale: Refine the camera's scale of each frame by HybrIK's least squares.
         noise: Standard deviation of NIKI's unused inputs, unitless; the authors draw 0.001, 0 is
             repeatable.
         seed: Seed of that noise.
-        cutoff_hz: Zero-phase low-pass of what the networks see frame by frame, hertz.
-        batch: Frames that go through the network at once.
-        device: auto takes a GPU where PyTorch sees one.
+        cutoff_hz: Zero-phase low-pass of the networks' output, which is computed frame by frame,
+            hertz.
+        batch: Number of frames in a batch of the network.
+        device: Device of PyTorch; auto uses a GPU if there is one.
     """
 
     hybrik: str | None = field(default=None, compare=False)
@@ -41,12 +42,12 @@ class NetworkConfig:
     def __post_init__(self) -> None:
         if self.niki and not self.hybrik:
             raise BadConfiguration(
-                "network.niki refines what HybrIK's network sees: give network.hybrik, too"
+                "network.niki refines the output of HybrIK's network: give network.hybrik, too"
             )
         if self.batch < 1:
             raise BadConfiguration(f"network.batch is {self.batch}: at least 1 frame")
 
     @property
     def files(self) -> tuple[str, ...]:
-        """Paths of the weights, HybrIK's first."""
+        """Return the paths of the weights, HybrIK's first."""
         return tuple(path for path in (self.hybrik, self.niki) if path)

@@ -1,6 +1,6 @@
 """The motion of a clip by the published networks, on the floor of our world.
 
-BlazePose only says where the person is; everything after the network is `mocap.recover`'s.
+BlazePose only gives the person's position; everything after the network is in `mocap.recover`.
 """
 
 from collections.abc import Callable, Iterable
@@ -29,17 +29,17 @@ def network_motion(
     config: NetworkConfig,
     progress: Progress | None = None,
 ) -> SmplSequence:
-    """The motion of the person in a track.
+    """Return the motion of the person in a track.
 
     Args:
-        track: Where the person is.
+        track: Landmarks of the person.
         images: The frames of the track, RGB.
-        networks: Loaded from the files of `config`.
-        mocap: Of the lens and of the ground.
-        config: Of the networks.
+        networks: Networks loaded from the files of `config`.
+        mocap: Settings of the lens and the floor.
+        config: Settings of the networks.
         progress: Called with (frames done, frames in all).
     Raises:
-        TrackTooShort, NoPersonFound: nothing to look at.
+        TrackTooShort, NoPersonFound: no motion can be recovered.
     """
     track = weigh_visibility(track)
     focal = mocap.focal_px or pinhole_camera.guess_focal(track.width, track.height)
@@ -59,7 +59,7 @@ def network_motion(
 
 
 def resampled(found: Estimate, track: LandmarkTrack) -> Estimate:
-    """The estimate at equal spaces of 1 / fps, as `motion.landmark_track.evenly` does it with
+    """Return the estimate resampled at 1 / fps, as `motion.landmark_track.evenly` does with
     landmarks."""
     if track.time_s is None:
         return found
@@ -81,7 +81,7 @@ def resampled(found: Estimate, track: LandmarkTrack) -> Estimate:
 def poser(
     found: Estimate, mocap: MocapConfig
 ) -> Callable[[Float[np.ndarray, "T 29 3"]], TurnedBody]:
-    """What solves keypoints in any frame with the network's twists."""
+    """Return a function that solves keypoints in any frame with the network's twists."""
 
     def posed(points: np.ndarray) -> TurnedBody:
         return pose_keypoints(points, found.twist, found.confidence, found.rest, mocap.method)
@@ -90,7 +90,7 @@ def poser(
 
 
 def steadied(found: Estimate, valid: np.ndarray, fps: float, cutoff_hz: float) -> Estimate:
-    """Frames without a person between their neighbours, and all of them low-passed."""
+    """Return the estimate with missing frames interpolated, all of them low-passed."""
     turns = found.twist / np.maximum(np.linalg.norm(found.twist, axis=-1, keepdims=True), 1e-9)
     return replace(
         found,

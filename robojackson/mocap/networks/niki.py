@@ -1,8 +1,8 @@
-"""NIKI (Li et al., CVPR 2023) in both published forms: joints with doubt in, rotations out.
+"""NIKI (Li et al., CVPR 2023) in both published forms: joints with uncertainty in, rotations out.
 
-One-stage: [29 joints from the pelvis, 29 sigma, 60 idle] <-> [24 rotations in 6D, 32 of error].
+One-stage: [29 joints from the pelvis, 29 sigma, 60 unused] <-> [24 rotations in 6D, 32 of error].
 Twist-and-swing: the same to [24 swings, 32], then [24 swings, 23 twists] <-> [24 rotations, 46].
-Every frame is a row, so that a clip of any length goes through whole. Metres, camera frame.
+Every frame is a row, so that a clip of any length is one batch. Metres, camera frame.
 """
 
 from dataclasses import dataclass
@@ -27,10 +27,10 @@ TINY = 1e-8
 
 @dataclass(frozen=True)
 class Refined:
-    """What NIKI makes of a clip.
+    """NIKI's result for a clip.
 
     Attributes:
-        rotations: Local, of SMPL's 24 joints, camera frame at the root.
+        rotations: Local rotations of SMPL's 24 joints, camera frame at the root.
         error: The error embedding, all of its entries.
     """
 
@@ -39,7 +39,7 @@ class Refined:
 
 
 class OneStage(nn.Module):
-    """The one-stage form; its `camnet` is loaded but not asked, as in the authors' demo."""
+    """The one-stage form; its `camnet` is loaded but not used, as in the authors' demo."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -53,7 +53,7 @@ class OneStage(nn.Module):
         twist: Float[Tensor, "B 46"],
         betas: Float[Tensor, "B 10"],
     ) -> tuple[Float[Tensor, "B 144"], Float[Tensor, "B 32"]]:
-        """Rotations in 6D, and the error embedding."""
+        """Return rotations in 6D, and the error embedding."""
         flow = self.regressor.get_submodule("flow")
         assert isinstance(flow, RealNvp)
         out = flow.inverse(joints)
@@ -62,7 +62,7 @@ class OneStage(nn.Module):
     def forward(
         self, rotations: Float[Tensor, "B 144"], error: Float[Tensor, "B 32"], betas: Tensor
     ) -> tuple[Float[Tensor, "B 176"], Float[Tensor, "B 0"]]:
-        """Joints, doubt and idle entries that lead to these rotations."""
+        """Return joints, sigma and unused entries of these rotations."""
         joints = self.regressor.get_submodule("flow")(torch.cat([rotations, error], 1))
         return joints, rotations[:, :0]
 
@@ -82,7 +82,7 @@ class TwistSwing(nn.Module):
         twist: Float[Tensor, "B 46"],
         betas: Float[Tensor, "B 10"],
     ) -> tuple[Float[Tensor, "B 144"], Float[Tensor, "B 78"]]:
-        """Rotations in 6D, and the error embeddings of swing and of twist."""
+        """Return rotations in 6D, and the error embeddings of swing and of twist."""
         first, second = self._flows()
         swing = first.inverse(joints, betas)
         out = second.inverse(torch.cat([swing[:, :ROTATIONS], twist], 1))
@@ -91,7 +91,7 @@ class TwistSwing(nn.Module):
     def forward(
         self, rotations: Float[Tensor, "B 144"], error: Float[Tensor, "B 78"], betas: Tensor
     ) -> tuple[Float[Tensor, "B 176"], Float[Tensor, "B 46"]]:
-        """Joints, doubt and idle entries, and the twists that lead to these rotations."""
+        """Return joints, sigma and unused entries, and the twists of these rotations."""
         first, second = self._flows()
         out = second(torch.cat([rotations, error[:, ERROR:]], 1))
         swing = torch.cat([out[:, :ROTATIONS], error[:, :ERROR]], 1)
@@ -106,7 +106,7 @@ class TwistSwing(nn.Module):
 
 
 def niki_network(weights: Weights) -> OneStage | TwistSwing:
-    """The network of a file, in double precision: 32 couplings lose half of single's digits.
+    """Return the network of a file, in double precision: 32 couplings lose half of single's digits.
 
     Raises:
         BadWeights: keys or shapes do not fit.
@@ -125,7 +125,7 @@ def refine(
     betas: Float[np.ndarray, "T 10"],
     idle: Float[np.ndarray, "T 60"],
 ) -> Refined:
-    """Rotations of every frame of a clip; joints in metres, any origin."""
+    """Return the rotations of every frame of a clip; joints in metres, any origin."""
     local = (joints - joints[:, :1]).reshape(len(joints), -1)
     turns = twist / (np.linalg.norm(twist, axis=-1, keepdims=True) + TINY)
     first = next(network.parameters())
@@ -139,12 +139,12 @@ def refine(
 def idle_inputs(
     count: int, noise: float, generator: np.random.Generator
 ) -> Float[np.ndarray, "T 60"]:
-    """What goes into the entries that mean nothing: zeros, or repeatable noise."""
+    """Return the values of unused entries: zeros, or repeatable noise."""
     return noise * generator.standard_normal((count, IDLE))
 
 
 def from_rows(six: Float[np.ndarray, "*T 6"]) -> Float[np.ndarray, "*T 3 3"]:
-    """Rotation whose first two ROWS are given (Zhou et al. 2019), made orthonormal."""
+    """Return the rotation whose first two ROWS are given (Zhou et al. 2019), made orthonormal."""
     first, second = six[..., :3], six[..., 3:]
     first = first / np.linalg.norm(first, axis=-1, keepdims=True)
     second = second - np.sum(first * second, -1, keepdims=True) * first
@@ -153,7 +153,7 @@ def from_rows(six: Float[np.ndarray, "*T 6"]) -> Float[np.ndarray, "*T 3 3"]:
 
 
 class _CameraNet(nn.Module):
-    """Joints, pixels and doubt to a camera; here only so that its weights have a place."""
+    """Joints, pixels and sigma to a camera; it exists only to load its weights."""
 
     def __init__(self) -> None:
         super().__init__()

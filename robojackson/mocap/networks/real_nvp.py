@@ -1,8 +1,8 @@
 """The invertible networks of NIKI (Li et al., CVPR 2023): affine couplings (Dinh et al. 2017).
 
-A coupling keeps the entries of its mask and changes the others by what it reads from the kept ones:
-x' = m x + (1 - m) (x exp(s(m x)) + t(m x)). Masks alternate 0 1 0 1 ... and 1 0 1 0 ....
-In NIKI `inverse` goes from joints to rotations and `forward` back.
+A coupling keeps the entries of its mask and changes the others as a function of the kept ones: x' =
+m x + (1 - m) (x exp(s(m x)) + t(m x)). Masks alternate 0 1 0 1 ... and 1 0 1 0 .... In NIKI
+`inverse` goes from joints to rotations and `forward` back.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,7 +17,7 @@ Net = Callable[[Tensor], Tensor]
 
 
 def alternating(width: int) -> Float[Tensor, "16 D"]:
-    """The published masks: even couplings keep odd entries, odd ones even entries."""
+    """Return the published masks: even couplings keep odd entries, odd ones even entries."""
     first = (torch.arange(width) % 2).float()
     return torch.stack([first, 1.0 - first] * (COUPLINGS // 2))
 
@@ -25,7 +25,7 @@ def alternating(width: int) -> Float[Tensor, "16 D"]:
 def to_rotations(
     values: Float[Tensor, "B D"], masks: Tensor, scale: Sequence[Net], shift: Sequence[Net]
 ) -> Float[Tensor, "B D"]:
-    """All couplings in order."""
+    """Apply all couplings in order."""
     for mask, s, t in zip(masks, scale, shift, strict=True):
         kept, free = values * mask, 1.0 - mask
         values = kept + free * (values * torch.exp(s(kept) * free) + t(kept) * free)
@@ -35,7 +35,7 @@ def to_rotations(
 def to_joints(
     values: Float[Tensor, "B D"], masks: Tensor, scale: Sequence[Net], shift: Sequence[Net]
 ) -> Float[Tensor, "B D"]:
-    """The couplings undone, last first."""
+    """Apply the inverse couplings, last first."""
     for mask, s, t in zip(masks.flip(0), scale[::-1], shift[::-1], strict=True):
         kept, free = values * mask, 1.0 - mask
         values = kept + free * (values - t(kept) * free) * torch.exp(-s(kept) * free)
@@ -46,8 +46,8 @@ class RealNvp(nn.Module):
     """Sixteen couplings.
 
     Args:
-        width: Entries of a vector.
-        dropout: Whether the authors trained with dropout, which shifts the numbers of the layers.
+        width: Length of a vector.
+        dropout: Whether the authors trained with dropout, which shifts the indices of the layers.
     """
 
     mask: Tensor
@@ -59,11 +59,11 @@ class RealNvp(nn.Module):
         self.s = nn.ModuleList(_layers(width, width, dropout) for _ in range(COUPLINGS))
 
     def inverse(self, values: Float[Tensor, "B D"]) -> Float[Tensor, "B D"]:
-        """Towards rotations."""
+        """Return values on the side of the rotations."""
         return to_rotations(values, self.mask, *self._nets())
 
     def forward(self, values: Float[Tensor, "B D"]) -> Float[Tensor, "B D"]:
-        """Towards joints."""
+        """Return values on the side of the joints."""
         return to_joints(values, self.mask, *self._nets())
 
     def _nets(self) -> tuple[list[Net], list[Net]]:
@@ -71,7 +71,7 @@ class RealNvp(nn.Module):
 
 
 class ShapedRealNvp(nn.Module):
-    """Sixteen couplings whose nets are also given the shape, through a mask that is zero."""
+    """Sixteen couplings whose nets also get the shape, through a mask that is zero."""
 
     jts_masks: Tensor
     shape_masks: Tensor
@@ -86,13 +86,13 @@ class ShapedRealNvp(nn.Module):
     def inverse(
         self, values: Float[Tensor, "B D"], betas: Float[Tensor, "B 10"]
     ) -> Float[Tensor, "B D"]:
-        """Towards rotations."""
+        """Return values on the side of the rotations."""
         return to_rotations(values, self.jts_masks, *self._nets(betas))
 
     def forward(
         self, values: Float[Tensor, "B D"], betas: Float[Tensor, "B 10"]
     ) -> Float[Tensor, "B D"]:
-        """Towards joints."""
+        """Return values on the side of the joints."""
         return to_joints(values, self.jts_masks, *self._nets(betas))
 
     def _nets(self, betas: Tensor) -> tuple[list[Net], list[Net]]:
@@ -117,7 +117,7 @@ def _bounded(net: Net) -> Net:
 
 
 def _layers(inputs: int, outputs: int, dropout: bool) -> nn.Sequential:
-    """Three linear layers; the identity stands where the authors' dropout stood."""
+    """Return three linear layers; identities replace the authors' dropout."""
     gap: tuple[nn.Module, ...] = (nn.Identity(),) if dropout else ()
     return nn.Sequential(
         *(nn.Linear(inputs, HIDDEN), *gap, nn.LeakyReLU()),

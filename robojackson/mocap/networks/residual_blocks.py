@@ -6,12 +6,12 @@ from torch.nn import functional
 
 
 def convolution(size: int, inputs: int, outputs: int, stride: int = 1) -> nn.Conv2d:
-    """A convolution without bias that keeps the image's size at stride one."""
+    """Return a convolution without bias that keeps the image's size at stride one."""
     return nn.Conv2d(inputs, outputs, size, stride, size // 2, bias=False)
 
 
 def normed(size: int, inputs: int, outputs: int, stride: int = 1, relu: bool = True) -> nn.Module:
-    """Convolution, batch norm and, where wanted, ReLU."""
+    """Return convolution, batch norm and optionally ReLU."""
     parts: list[nn.Module] = [
         convolution(size, inputs, outputs, stride),
         nn.BatchNorm2d(outputs),
@@ -31,7 +31,7 @@ class BasicBlock(nn.Module):
         self.downsample = _shortcut(inputs, width, stride)
 
     def forward(self, image: Float[Tensor, "B C H W"]) -> Float[Tensor, "B D h w"]:
-        """The block's output, stride pixels apart."""
+        """Return the block's output, stride pixels apart."""
         inner = functional.relu(self.bn1(self.conv1(image)))
         return functional.relu(self.bn2(self.conv2(inner)) + _short(self.downsample, image))
 
@@ -50,14 +50,14 @@ class Bottleneck(nn.Module):
         self.downsample = _shortcut(inputs, outputs, 1)
 
     def forward(self, image: Float[Tensor, "B C H W"]) -> Float[Tensor, "B D H W"]:
-        """The block's output."""
+        """Return the block's output."""
         inner = functional.relu(self.bn1(self.conv1(image)))
         inner = functional.relu(self.bn2(self.conv2(inner)))
         return functional.relu(self.bn3(self.conv3(inner)) + _short(self.downsample, image))
 
 
 def _shortcut(inputs: int, outputs: int, stride: int) -> nn.Module | None:
-    """A 1x1 convolution where the shape changes."""
+    """Return a 1x1 convolution where the shape changes."""
     if stride == 1 and inputs == outputs:
         return None
     return normed(1, inputs, outputs, stride, relu=False)

@@ -11,7 +11,7 @@ LAYERS = ((64, 3), (128, 4), (256, 6), (512, 3))
 
 
 class ResNet34(nn.Module):
-    """The trunk."""
+    """The trunk of ResNet-34."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -25,7 +25,7 @@ class ResNet34(nn.Module):
             inputs = width
 
     def forward(self, image: Float[Tensor, "B 3 256 256"]) -> Float[Tensor, "B 512 8 8"]:
-        """Feature maps."""
+        """Return the feature maps."""
         image = functional.relu(self.bn1(self.conv1(image)))
         image = functional.max_pool2d(image, 3, 2, 1)
         for number in range(1, len(LAYERS) + 1):

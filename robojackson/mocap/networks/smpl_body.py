@@ -1,7 +1,7 @@
 """SMPL's rest joints from the tables inside an official checkpoint (Loper et al. 2015).
 
 Shaped template: v = v_template + shapedirs beta; joints = J_regressor v; the five leaf points are
-single vertices. No mesh is posed here and none of the tables is kept or written. Metres.
+single vertices. No mesh is posed and no table is stored or written. Metres.
 """
 
 from collections.abc import Mapping
@@ -28,32 +28,32 @@ SHAPES: Mapping[str, tuple[int, ...]] = {
     "shapedirs": (6890, 3, 10),
     "J_regressor": (24, 6890),
 }
-"""The tables that are used; the others may be absent."""
+"""Tables that are used; the others may be absent."""
 
 
 @dataclass(frozen=True)
 class SmplBody:
-    """SMPL's rest joints as a function of shape: linear, so two small tables are all of it.
+    """SMPL's rest joints as a function of shape: linear, so two small tables suffice.
 
     Attributes:
         mean: Rest joints of beta = 0.
-        slope: Their change with each beta.
+        slope: Derivative by each beta.
     """
 
     mean: Float[np.ndarray, "29 3"]
     slope: Float[np.ndarray, "29 3 10"]
 
     def rest_joints(self, betas: Float[np.ndarray, "*T 10"]) -> Float[np.ndarray, "*T 29 3"]:
-        """T-poses of people."""
+        """Return the rest joints of shapes."""
         result: np.ndarray = self.mean + np.einsum("jcb,...b->...jc", self.slope, betas)
         return result
 
 
 def body_of(weights: Weights) -> SmplBody | None:
-    """The body inside a checkpoint; None where there is none.
+    """Return the body inside a checkpoint; None where there is none.
 
     Raises:
-        BadWeights: there is one, with other shapes than SMPL's.
+        BadWeights: its shapes differ from SMPL's.
     """
     if not weights.body:
         return None
@@ -75,7 +75,8 @@ def body_of(weights: Weights) -> SmplBody | None:
 
 
 def measured_rest(points: Float[np.ndarray, "T 29 3"]) -> Float[np.ndarray, "29 3"]:
-    """Our own T-pose with the bones of a person: medians over the clip, left and right alike."""
+    """Return our own T-pose with the bone lengths of a person: medians over the clip, equal for
+    both sides."""
     parents = list(PARENTS[1:])
     lengths = np.median(np.linalg.norm(points[:, 1:] - points[:, parents], axis=-1), 0)
     names = list(KEYPOINT_NAMES[1:])

@@ -1,6 +1,6 @@
-"""Files of weights, read so that nothing in them can run, and told apart by their keys.
+"""Read files of weights without executing their content, and recognise them by their keys.
 
-A file is a safetensors file or what `torch.save` wrote: a state dict, bare or under `model` or
+A file is a safetensors file or the output of `torch.save`: a state dict, bare or under `model` or
 `state_dict`, with or without the prefix `module.`. Pickled objects other than tensors are refused.
 """
 
@@ -27,21 +27,21 @@ SIGNS: Mapping[Kind, tuple[str, ...]] = {
 }
 """Keys by which a file is recognised."""
 BODY_PREFIXES = ("smpl.", "regressor.smpl_layer.")
-"""Where the official files keep SMPL's tables."""
+"""Place of SMPL's tables in the official files."""
 WRAPPERS = ("model", "state_dict", "model_state_dict", "net")
 MAX_LISTED = 4
-"""Keys that an error names before it only counts."""
+"""Number of keys that an error lists."""
 LARGEST = 2**32
-"""Bytes; HybrIK's largest has 0.4 GB."""
+"""Largest size, bytes; HybrIK's largest file has 0.4 GB."""
 
 
 @dataclass(frozen=True)
 class Weights:
-    """A file of weights that was recognised.
+    """A recognised file of weights.
 
     Attributes:
         path: The file.
-        kind: Which network it is.
+        kind: Name of the network.
         tensors: The network's own keys.
         body: SMPL's tables by their bare names; empty where the file has none.
     """
@@ -72,7 +72,7 @@ def read_weights(path: Path, family: Literal["hybrik", "niki"]) -> Weights:
 
 
 def recognise(keys: Iterable[str], path: Path) -> Kind:
-    """Which network a set of keys belongs to."""
+    """Return the network that a set of keys belongs to."""
     known = set(keys)
     for kind, signs in SIGNS.items():
         if known.issuperset(signs):
@@ -84,11 +84,11 @@ def recognise(keys: Iterable[str], path: Path) -> Kind:
 
 
 def install(network: nn.Module, weights: Weights) -> nn.Module:
-    """Put weights into a network, every key and shape as it expects; ready to predict.
+    """Load weights into a network whose keys and shapes must match; set it to evaluation mode.
 
     Args:
-        network: Built anywhere, also on PyTorch's `meta` device: its tensors are replaced.
-        weights: Of the same kind.
+        network: Network on any device, also on PyTorch's `meta` device: its tensors are replaced.
+        weights: Weights of the same kind.
     Raises:
         BadWeights: keys are missing or unexpected, or a tensor has another shape.
     """
@@ -100,15 +100,15 @@ def install(network: nn.Module, weights: Weights) -> nn.Module:
         for key, value in weights.tensors.items()
         if key in expected and value.shape != expected[key].shape
     ]
-    told = [
+    problems = [
         f"{len(keys)} {word} ({_listed(keys)})"
         for word, keys in (("missing", missing), ("unexpected", unexpected), ("misshapen", wrong))
         if keys
     ]
-    if told:
+    if problems:
         raise BadWeights(
             f"{weights.path}: looks like {weights.kind}, but of its {len(expected)} keys "
-            f"{'; '.join(told)}. Download the file again, or take the release that "
+            f"{'; '.join(problems)}. Download the file again, or take the release that "
             "docs/official_weights.md names"
         )
     given = {k: _cast(v, expected[k].dtype) for k, v in weights.tensors.items()}
@@ -117,7 +117,7 @@ def install(network: nn.Module, weights: Weights) -> nn.Module:
 
 
 def sha256_of(path: Path) -> str:
-    """Digest of a file's content, for cache keys and notes."""
+    """Return the digest of a file's content, for cache keys and notes."""
     if not path.is_file():
         raise BadWeights(f"{path}: no such file of weights")
     with path.open("rb") as file:
@@ -131,24 +131,24 @@ def _content(path: Path) -> Any:
             from safetensors.torch import load_file
 
             return load_file(path)
-        with warnings.catch_warnings():  # of a pickle's protocol: what is wrong is told below
+        with warnings.catch_warnings():  # of a pickle's protocol: errors are raised below
             warnings.simplefilter("ignore")
             return torch.load(path, map_location="cpu", weights_only=True)
     except pickle.UnpicklingError as cause:
         raise BadWeights(
-            f"{path}: holds more than tensors, or is no PyTorch file, and loading it could run "
+            f"{path}: holds more than tensors, or is not a PyTorch file, and loading it could run "
             "code; save only its state dict (torch.save(model.state_dict(), PATH)) or safetensors"
         ) from cause
     except Exception as cause:  # a damaged file fails in any way
         if type(cause).__module__.startswith("safetensors"):
             raise BadWeights(f"{path}: damaged safetensors ({cause}); download it again") from cause
         raise BadWeights(
-            f"{path}: cut off or damaged, or no file of weights; download it again"
+            f"{path}: cut off or damaged, or not a file of weights; download it again"
         ) from cause
 
 
 def _state_dict(content: Any, path: Path) -> dict[str, Tensor]:
-    """The tensors by key, out of the wrappers that training programs put around them."""
+    """Return the tensors by key, without the wrappers of training programs."""
     while isinstance(content, Mapping):
         inner = next((content[w] for w in WRAPPERS if isinstance(content.get(w), Mapping)), None)
         if inner is None:
@@ -160,7 +160,7 @@ def _state_dict(content: Any, path: Path) -> dict[str, Tensor]:
 
 
 def _without_prefix(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """Keys without the `module.` that parallel training puts before them."""
+    """Return the keys without the prefix `module.` of parallel training."""
     return {key.removeprefix("module."): value for key, value in state.items()}
 
 

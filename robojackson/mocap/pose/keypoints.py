@@ -1,8 +1,7 @@
-"""BlazePose landmarks to HybrIK's 29 keypoints: fixed definitions, nothing fitted to a clip.
+"""From BlazePose landmarks to HybrIK's 29 keypoints: fixed definitions, not fitted to a clip.
 
 Limb joints are landmarks. Pelvis, chest, head, hands and feet are frames built from several
-landmarks; the spine is a smooth curve between pelvis and neck. Besides its place, a joint may get
-a `side`: a direction that tells its twist. Metres, any right-handed frame.
+landmarks; the spine is a smooth curve between pelvis and neck. Metres, any right-handed frame.
 """
 
 from collections.abc import Callable
@@ -28,7 +27,7 @@ FACE = {
 }
 """A rounded adult face about the middle of the ears, metres, axes of the rest pose."""
 EARS_ABOVE_HEAD = np.array([0.0, 0.08, 0.02])
-"""Middle of the ears from the head's joint, metres: the joint is where the skull turns."""
+"""Middle of the ears from the head's joint, metres: the joint is the skull's centre of rotation."""
 
 Mark = Callable[[str], np.ndarray]
 
@@ -38,9 +37,9 @@ class Keypoints:
     """Targets of the solve.
 
     Attributes:
-        points: Metres.
+        points: Positions, metres.
         pelvis, chest, head: Rotations from the rest pose.
-        confidence: 0..1, visibility of the landmarks that a point is made of.
+        confidence: Visibility of the landmarks of a point, 0..1.
     """
 
     points: Float[np.ndarray, "T 29 3"]
@@ -55,7 +54,7 @@ def build(
     visibility: Float[np.ndarray, "T 33"],
     rest_joints: Float[np.ndarray, "29 3"] = REST_JOINTS,
 ) -> Keypoints:
-    """The 29 keypoints of every frame."""
+    """Return the 29 keypoints of every frame."""
 
     def mark(name: str) -> np.ndarray:
         return landmarks[:, landmark(name)]
@@ -71,7 +70,7 @@ def build(
 def _trunk(
     mark: Mark, points: np.ndarray, rest: np.ndarray
 ) -> tuple[Float[np.ndarray, "T 3 3"], Float[np.ndarray, "T 3 3"]]:
-    """Place pelvis, hips, spine, neck, collars and shoulders; returns pelvis and chest frames."""
+    """Place pelvis, hips, spine, neck, collars and shoulders; return pelvis and chest frames."""
     hips, shoulders = pair("hip"), pair("shoulder")
     low, high = _middle(mark, "hip"), _middle(mark, "shoulder")
     rest_low, rest_high = rest[list(hips)].mean(0), rest[list(shoulders)].mean(0)
@@ -92,7 +91,7 @@ def _trunk(
 
 
 def _spine(points: np.ndarray, rest: np.ndarray, pelvis: np.ndarray, chest: np.ndarray) -> None:
-    """Put spine2 and spine3 on the cubic Hermite curve from spine1 to neck, by rest length."""
+    """Place spine2 and spine3 on the cubic Hermite curve from spine1 to neck, by rest length."""
     names = ("spine1", "spine2", "spine3", "neck")
     chain = [keypoint(name) for name in names]
     lengths = np.linalg.norm(np.diff(rest[chain], axis=0), axis=-1)
@@ -150,7 +149,8 @@ def _middle(mark: Mark, name: str) -> np.ndarray:
 
 
 def _confidence(visibility: np.ndarray) -> Float[np.ndarray, "T 29"]:
-    """The least visible of the landmarks that make a point; the trunk by its four corners."""
+    """Return the least visibility of the landmarks of a point; of the trunk's four corners for the
+    trunk."""
     corners = [landmark(f"{s}_{n}") for s in ("left", "right") for n in ("hip", "shoulder")]
     result = np.repeat(visibility[:, corners].min(1)[:, None], 29, axis=1)
     sources = {

@@ -1,6 +1,7 @@
-"""A posed person whose twists are given, as by a network, instead of read from landmarks.
+"""A posed person whose twists are given, for example by a network, instead of computed from
+landmarks.
 
-Only the ankle of a foot that stands flat is turned by the floor. Metres, any right-handed frame.
+The floor turns only the ankle of a flat foot. Metres, any right-handed frame.
 """
 
 from dataclasses import dataclass, replace
@@ -22,7 +23,7 @@ CHEST = tuple(keypoint(name) for name in ("neck", "left_collar", "right_collar")
 
 @dataclass(frozen=True)
 class TurnedBody(Body):
-    """A `Body` that keeps its own twists when it is aimed anew.
+    """A `Body` that keeps its own twists when it is solved again.
 
     Attributes:
         turns: (cos, sin) of joints 1..23 about their rest bones.
@@ -35,7 +36,8 @@ class TurnedBody(Body):
         points: Float[np.ndarray, "T 29 3"],
         level: Float[np.ndarray, "T 2"] | None = None,
     ) -> "TurnedBody":
-        """The posture that reaches other keypoints; `level` is the share of flat soles (z up)."""
+        """Return the pose that reaches other keypoints; `level` is the share of flat soles (z
+        up)."""
         rule = _rule(self.turns, self.rest, level)
         local = analytic_solve.solve_with(points, self.rest[None], rule, self.method)
         pose = forward(local, self.rest[None], points[:, 0])
@@ -49,7 +51,7 @@ def pose_keypoints(
     rest: Float[np.ndarray, "29 3"],
     method: analytic_solve.Method,
 ) -> TurnedBody:
-    """The posture that keypoints and twists show."""
+    """Return the pose of keypoints and twists."""
     count = len(points)
     still = np.broadcast_to(np.eye(3), (count, 3, 3))
     targets = Keypoints(points, still, _chest(points, rest), still, confidence)
@@ -60,7 +62,7 @@ def pose_keypoints(
 
 
 def _chest(points: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """Rotation of the chest from the three bones that leave its last joint."""
+    """Return the rotation of the chest from the three bones of its last joint."""
     joint = keypoint("spine3")
     return kabsch(rest[list(CHEST)] - rest[joint], points[:, CHEST] - points[:, joint, None])
 
@@ -68,7 +70,7 @@ def _chest(points: np.ndarray, rest: np.ndarray) -> np.ndarray:
 def _rule(
     turns: np.ndarray, rest: np.ndarray, level: np.ndarray | None
 ) -> analytic_solve.TwistRule:
-    """The given twists; at the ankles a share of the turn that makes the sole level."""
+    """Return the rule of given twists; at the ankles a share of the turn that levels the sole."""
 
     def decide(joint: int, swung: np.ndarray) -> np.ndarray:
         given = unit(turns[:, joint - 1])

@@ -1,4 +1,4 @@
-"""A posed person who can be moved: the keypoints, and the solve that is repeated after each change.
+"""A posed person who can be moved: the keypoints, and the solve after each change.
 
 Any right-handed frame, metres.
 """
@@ -23,11 +23,11 @@ class Body:
 
     Attributes:
         marks: The 33 landmarks, for the twist cues.
-        targets: Keypoints that the solve aims at.
+        targets: Keypoints of the solve.
         rest: Rest joints of the person.
         method: HybrIK's solve.
         local: Local rotations of the solution.
-        pose: Its forward kinematics.
+        pose: Forward kinematics of the solution.
     """
 
     marks: Float[np.ndarray, "T 33 3"]
@@ -39,11 +39,11 @@ class Body:
 
     @property
     def feet(self) -> Float[np.ndarray, "T 4 3"]:
-        """Soles under heels and toes, order of `CONTACT_POINTS`."""
+        """Return the soles under heels and toes, order of `CONTACT_POINTS`."""
         return foot_points(self.pose, self.rest)
 
     def shifted(self, offset: Float[np.ndarray, "*T 3"]) -> "Body":
-        """The same posture elsewhere."""
+        """Return the same pose elsewhere."""
         step = np.broadcast_to(offset, (len(self.marks), 3))[:, None]
         return replace(
             self,
@@ -57,7 +57,8 @@ class Body:
         points: Float[np.ndarray, "T 29 3"],
         level: Float[np.ndarray, "T 2"] | None = None,
     ) -> "Body":
-        """The posture that reaches other keypoints; `level` is the share of flat soles (z up)."""
+        """Return the pose that reaches other keypoints; `level` is the share of flat soles (z
+        up)."""
         targets = replace(self.targets, points=points)
         return _solved(self.marks, targets, self.rest, self.method, level)
 
@@ -68,12 +69,12 @@ def pose_landmarks(
     rest: Float[np.ndarray, "29 3"],
     method: analytic_solve.Method,
 ) -> Body:
-    """The posture that the landmarks show."""
+    """Return the pose of the landmarks."""
     return _solved(marks, build(marks, visibility, rest), rest, method)
 
 
 def pose_sequence(sequence: SmplSequence) -> Pose:
-    """Rotations and points that the SMPL parameters of a sequence give, world frame."""
+    """Return rotations and points of the SMPL parameters of a sequence, world frame."""
     count = len(sequence)
     vectors = np.concatenate([sequence.global_orient, sequence.body_pose], 1).reshape(-1, 3)
     local = Rotation.from_rotvec(vectors).as_matrix().reshape(count, -1, 3, 3)

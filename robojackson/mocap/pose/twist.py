@@ -1,8 +1,9 @@
-"""Twist of each bone from what the landmarks show: hinge planes, palms, face and shoulder line.
+"""Twist of each bone from the landmarks: hinge planes, palms, face and shoulder line.
 
-A joint's cue is a direction in the rest pose that must come to lie, seen along the bone, on a
-measured direction: with a bent knee the shin tells how the thigh is turned. Where a cue fades (a
-straight limb) the measured prior takes over: the median twist of 763 frames of HybrIK, radians.
+A joint's cue is a direction in the rest pose that must coincide, in the projection along the bone,
+with a measured direction: with a bent knee the shin determines the twist of the thigh. Where a cue
+fades (a straight limb) a measured prior replaces it: the median twist of 763 frames of HybrIK,
+radians.
 """
 
 from collections.abc import Mapping
@@ -26,26 +27,27 @@ PRIOR_DEG: Mapping[str, float] = {
 }  # fmt: skip
 PRIOR = np.radians([PRIOR_DEG.get(name, 0.0) for name in JOINT_NAMES])
 FLEXION_DEG = (15.0, 35.0)
-"""A hinge below the first flexion tells nothing about twist, above the second everything."""
+"""Flexions of a hinge below which it gives no information on twist, and above which full
+information."""
 PALM_WEIGHT = 0.7
 FOOT_WEIGHT = 0.5
 LIMIT_DEG: Mapping[str, float] = {
     "hip": 60.0, "knee": 30.0, "ankle": 30.0, "shoulder": 110.0, "elbow": 100.0,
 }  # fmt: skip
-"""Largest turn away from the prior; a person's joints end there."""
+"""Largest twist away from the prior: the limit of a person's joints."""
 OTHER_LIMIT_DEG = 60.0
 FADE = np.radians(30.0)
-"""Within this of the opposite direction the cue's sign is not known."""
+"""Angle to the opposite direction within which the cue's sign is unknown."""
 
 
 @dataclass(frozen=True)
 class Cue:
-    """What one joint's twist is read from.
+    """Measured direction of one joint's twist.
 
     Attributes:
         rest: Direction in the rest pose.
         measured: The same direction as measured, metres or unit.
-        weight: 0..1, how much the measurement counts against the prior.
+        weight: Weight of the measurement against the prior, 0..1.
     """
 
     rest: Float[np.ndarray, "3"]
@@ -54,7 +56,7 @@ class Cue:
 
 
 def cues(keypoints: Keypoints, landmarks: Float[np.ndarray, "T 33 3"]) -> dict[str, Cue]:
-    """The cue of every joint that has one."""
+    """Return the cue of every joint that has one."""
     always = np.ones(len(landmarks))
     found = {
         name: Cue(LEFT, _between(keypoints.pelvis, keypoints.chest, share), always)
@@ -68,7 +70,7 @@ def cues(keypoints: Keypoints, landmarks: Float[np.ndarray, "T 33 3"]) -> dict[s
 
 
 def level_cues(found: Mapping[str, Cue], level: Float[np.ndarray, "T 2"]) -> dict[str, Cue]:
-    """Cues of the ankles of which the given share comes from a level floor; world frame."""
+    """Return cues of the ankles of which the given share comes from a level floor; world frame."""
     above = np.array([0.0, 0.0, 1.0])
     changed = {}
     for side, name in enumerate(("left_ankle", "right_ankle")):
@@ -79,7 +81,7 @@ def level_cues(found: Mapping[str, Cue], level: Float[np.ndarray, "T 2"]) -> dic
 
 
 def rule(found: Mapping[str, Cue], rest_joints: Float[np.ndarray, "29 3"]) -> TwistRule:
-    """The twist rule of `analytic_solve.solve_with` that follows the cues."""
+    """Return the twist rule of `analytic_solve.solve_with` that follows the cues."""
 
     def decide(joint: int, swung: np.ndarray) -> np.ndarray:
         name = JOINT_NAMES[joint]
@@ -94,7 +96,7 @@ def rule(found: Mapping[str, Cue], rest_joints: Float[np.ndarray, "29 3"]) -> Tw
 
 
 def prior() -> Float[np.ndarray, "23 2"]:
-    """(cos, sin) of the prior twist of joints 1..23."""
+    """Return (cos, sin) of the prior twist of joints 1..23."""
     return np.stack([np.cos(PRIOR[1:]), np.sin(PRIOR[1:])], -1)
 
 
@@ -119,7 +121,7 @@ def _limb_cues(points: np.ndarray, landmarks: np.ndarray, side: str) -> dict[str
 
 
 def _bent(upper: np.ndarray, lower: np.ndarray) -> Float[np.ndarray, " T"]:
-    """0 for a straight hinge, 1 for a bent one, smooth between the two flexions."""
+    """Return 0 for a straight hinge, 1 for a bent one, smooth between the two flexions."""
     cosine = np.sum(unit(upper) * unit(lower), -1)
     flexion = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
     start, full = FLEXION_DEG
@@ -129,12 +131,12 @@ def _bent(upper: np.ndarray, lower: np.ndarray) -> Float[np.ndarray, " T"]:
 
 
 def _between(first: np.ndarray, second: np.ndarray, share: float) -> Float[np.ndarray, "T 3"]:
-    """The left direction of a frame part of the way from one frame to another."""
+    """Return the left direction of a frame part of the way from one frame to another."""
     return unit((1.0 - share) * apply(first, LEFT) + share * apply(second, LEFT))
 
 
 def cue_angle(cue: Cue, bone: np.ndarray, swung: np.ndarray) -> Float[np.ndarray, " T"]:
-    """Signed turn about the bone that brings the rest direction onto the measured one."""
+    """Return the signed turn about the bone from the rest direction to the measured one."""
     axis = unit(bone)
     measured = apply(np.swapaxes(swung, -1, -2), cue.measured)
     flat = cue.rest - (cue.rest @ axis) * axis
@@ -145,7 +147,8 @@ def cue_angle(cue: Cue, bone: np.ndarray, swung: np.ndarray) -> Float[np.ndarray
 
 
 def _blend(name: str, prior_angle: float, angle: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """The prior plus the weighted, limited difference; a cue that points backwards fades out."""
+    """Return the prior plus the weighted, limited difference; a cue that points backwards fades
+    out."""
     bare = name.removeprefix("left_").removeprefix("right_")
     limit = np.radians(LIMIT_DEG.get(bare, OTHER_LIMIT_DEG))
     difference = (angle - prior_angle + np.pi) % (2.0 * np.pi) - np.pi

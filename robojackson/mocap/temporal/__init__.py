@@ -1,1 +1,1 @@
-"""Our own NIKI through time: what the detector gets wrong in depth, and how sure that is."""
+"""Our own NIKI through time: corrections of the detector's depth, and their uncertainty."""

@@ -19,14 +19,14 @@ Weights = Mapping[str, np.ndarray]
 
 
 def mask_of(layer: int) -> Float[np.ndarray, " D"]:
-    """Which coordinates a layer leaves alone: every other joint, then the rest."""
+    """Return the coordinates that a layer does not change: every other joint, then the rest."""
     return ((np.arange(SIZE) // 3 + layer) % 2).astype(float)
 
 
 def to_embedding(
     error: Float[np.ndarray, "*T D"], features: Float[np.ndarray, "*T C"], weights: Weights
 ) -> Float[np.ndarray, "*T D"]:
-    """From error over spread to z."""
+    """Return z from error over spread."""
     condition = _condition(features, weights)
     x = np.asarray(error, float)
     for layer in range(LAYERS):
@@ -39,7 +39,7 @@ def to_embedding(
 def to_error(
     embedding: Float[np.ndarray, "*T D"], features: Float[np.ndarray, "*T C"], weights: Weights
 ) -> Float[np.ndarray, "*T D"]:
-    """From z to error over spread: the exact inverse."""
+    """Return error over spread from z: the exact inverse."""
     condition = _condition(features, weights)
     x = np.asarray(embedding, float)
     for layer in reversed(range(LAYERS)):
@@ -50,7 +50,7 @@ def to_error(
 
 
 def sample(count: int, weights: Weights, rng: np.random.Generator) -> Float[np.ndarray, "T D"]:
-    """A stationary AR(1) course of z."""
+    """Return a stationary AR(1) sample of z."""
     memory = 1.0 / (1.0 + np.exp(-weights["flow.memory"].astype(float)))
     fresh = rng.normal(size=(count, SIZE))
     z = np.empty_like(fresh)
@@ -70,7 +70,7 @@ def _condition(features: np.ndarray, weights: Weights) -> np.ndarray:
 def _nets(
     x: np.ndarray, condition: np.ndarray, layer: int, weights: Weights
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Log scale, at most 1.5 either way, and shift."""
+    """Return log scale, within +-1.5, and shift."""
     name = f"flow.couplings.{layer}"
     joined = np.concatenate([x, condition], -1)
     hidden = np.maximum(joined @ weights[f"{name}.0.weight"].T + weights[f"{name}.0.bias"], 0.0)

@@ -1,8 +1,8 @@
-"""What the network sees of a clip, and what its answer means: axes along the ray to the person.
+"""Input and output of the temporal network: axes along the ray to the person.
 
-In each frame the axes are those of a camera that looks straight at the middle of the hips (x right,
-y down, z away), the origin is there, metres of the detector. `flat` is the image brought to the
-person's distance: what an orthographic camera would see if depth did nothing.
+In each frame the axes are those of a camera that points at the middle of the hips (x right, y down,
+z away), the origin is there, metres of the detector. `flat` is the image scaled to the person's
+distance: an orthographic image without the effect of depth.
 """
 
 from collections.abc import Mapping
@@ -17,22 +17,22 @@ from robojackson.mocap.landmarks.pinhole_camera import DOWN, METRES_PER_METRE
 
 HIPS = (landmark("left_hip"), landmark("right_hip"))
 FPS = 30.0
-"""Frames a second that the network works at."""
+"""Frame rate of the network, hertz."""
 CHAINS: Mapping[str, tuple[str, str]] = {
     "thigh": ("hip", "knee"), "shin": ("knee", "ankle"), "upper_arm": ("shoulder", "elbow"),
     "forearm": ("elbow", "wrist"), "flank": ("shoulder", "hip"),
 }  # fmt: skip
 WIDTHS = ("hip", "shoulder")
 LONGEST = 95.0
-"""Percentile of a bone's length in the image that stands for its true length."""
+"""Percentile of a bone's length in the image that estimates its true length."""
 INPUT_LANDMARKS = np.array(
     [landmark("nose"), landmark("left_ear"), landmark("right_ear"), *BODY]
     + [landmark(f"{s}_{n}") for n in ("index", "pinky", "heel", "foot_index")
        for s in ("left", "right")]
 )  # fmt: skip
-"""The landmarks that the network reads."""
+"""Landmarks in the network's input."""
 COUNT = len(INPUT_LANDMARKS) * 6 + 2 * (len(CHAINS) + len(WIDTHS)) + 1
-"""Numbers a frame."""
+"""Length of the input, numbers a frame."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +41,8 @@ class ClipView:
 
     Attributes:
         flat: Image landmarks at the person's distance from the middle of the hips, metres.
-        local: The detector's landmarks, its metres made ours.
-        visibility: 0..1.
+        local: The detector's landmarks, scaled to our metres.
+        visibility: Visibility of the landmarks, 0..1.
         axes: Rotations from these axes to the camera's.
         root: The middle of the hips before the camera, metres.
     """
@@ -59,7 +59,7 @@ def view_clip(
     local: Float[np.ndarray, "T 33 3"],
     visibility: Float[np.ndarray, "T 33"],
 ) -> ClipView:
-    """From landmarks that the camera stage has placed, and the detector's own."""
+    """Return the view from landmarks that the camera stage has placed, and the detector's own."""
     rays = placed / placed[..., 2:]
     root = placed[:, HIPS].mean(1)
     axes = axes_along(root)
@@ -69,14 +69,14 @@ def view_clip(
 
 
 def axes_along(ray: Float[np.ndarray, "T 3"]) -> Float[np.ndarray, "T 3 3"]:
-    """Rotations whose z is along the rays, x level."""
+    """Return rotations whose z is along the rays, x level."""
     forward = unit(ray)
     right = unit(np.cross(DOWN, forward))
     return np.stack([right, np.cross(forward, right), forward], -1)
 
 
 def numbers(sight: ClipView) -> Float[np.ndarray, "T F"]:
-    """The network's input."""
+    """Return the network's input."""
     count = len(sight.flat)
     return np.concatenate(
         [
@@ -90,12 +90,13 @@ def numbers(sight: ClipView) -> Float[np.ndarray, "T F"]:
 
 
 def constants(sight: ClipView) -> Float[np.ndarray, " C"]:
-    """What is one for the whole clip: proportions of the person, and how near he is."""
+    """Return the constants of a clip: proportions of the person, and his distance."""
     return np.concatenate([proportions(sight), [1.0 / max(sight.root[:, 2].mean(), 0.5)]])
 
 
 def proportions(sight: ClipView) -> Float[np.ndarray, " P"]:
-    """Bones of the clip: longest in the image, which depth cannot shorten, and the detector's."""
+    """Return bones of the clip: longest in the image, which depth cannot shorten, and the
+    detector's."""
     pairs = [[(f"{s}_{a}", f"{s}_{b}") for s in ("left", "right")] for a, b in CHAINS.values()]
     pairs += [[(f"left_{name}", f"right_{name}")] for name in WIDTHS]
     in_image, in_space = [], []
@@ -109,26 +110,26 @@ def proportions(sight: ClipView) -> Float[np.ndarray, " P"]:
 
 
 def base(sight: ClipView) -> Float[np.ndarray, "T 12 3"]:
-    """The body as the detector has it: depth of its own, the image at that depth."""
+    """Return the body of the detector: its own depth, the image at that depth."""
     depth = sight.local[:, BODY, 2]
     return np.concatenate([at_depth(sight, depth), depth[..., None]], -1)
 
 
 def at_depth(sight: ClipView, depth: Float[np.ndarray, "T 12"]) -> Float[np.ndarray, "T 12 2"]:
-    """Where the body is across the image if it is that far behind the hips."""
+    """Return the body across the image at the given depth behind the hips."""
     distance = np.linalg.norm(sight.root, axis=-1)[:, None]
     result: np.ndarray = sight.flat[:, BODY] * ((distance + depth) / distance)[..., None]
     return result
 
 
 def to_camera(sight: ClipView, points: Float[np.ndarray, "T N 3"]) -> Float[np.ndarray, "T N 3"]:
-    """From the axes along the ray to the camera's."""
+    """Return points in the camera's axes from those along the ray."""
     result: np.ndarray = apply(sight.axes[:, None], points) + sight.root[:, None]
     return result
 
 
 def mirror(sight: ClipView) -> ClipView:
-    """The clip in a mirror: left becomes right, x changes its sign."""
+    """Return the mirrored clip: left becomes right, x changes its sign."""
     flip = np.array([-1.0, 1.0, 1.0])
     return ClipView(
         flat=sight.flat[:, MIRROR] * flip[:2],
@@ -140,18 +141,19 @@ def mirror(sight: ClipView) -> ClipView:
 
 
 def mirror_body(values: Float[np.ndarray, "T 12 *D"]) -> Float[np.ndarray, "T 12 *D"]:
-    """Left and right of the twelve exchanged."""
+    """Return values with left and right of the twelve exchanged."""
     order = [list(BODY).index(MIRROR[index]) for index in BODY]
     return values[:, order]
 
 
 def time_grid(count: int, fps: float) -> Float[np.ndarray, " S"]:
-    """Where the network's frames lie in the clip's, as fractions of frames."""
+    """Return the network's frames as fractional frames of the clip."""
     return np.arange(0.0, count - 1 + 1e-6, fps / FPS) if count > 1 else np.zeros(1)
 
 
 def resample(values: np.ndarray, places: Float[np.ndarray, " S"]) -> np.ndarray:
-    """Linear in time along axis 0 at fractions of frames; held beyond the ends."""
+    """Return values interpolated in time along axis 0 at fractional frames; held beyond the
+    ends."""
     places = np.clip(places, 0.0, len(values) - 1.0)
     low = np.minimum(np.floor(places).astype(int), max(len(values) - 2, 0))
     part = (places - low).reshape(-1, *[1] * (values.ndim - 1))
@@ -161,4 +163,4 @@ def resample(values: np.ndarray, places: Float[np.ndarray, " S"]) -> np.ndarray:
 
 
 NAMES: tuple[str, ...] = tuple(LANDMARK_NAMES[index] for index in BODY)
-"""Of the twelve."""
+"""Mirror order of the twelve landmarks."""

@@ -1,7 +1,7 @@
-"""Step 3 of the embedded default: the detector's body, corrected by the temporal network.
+"""Step 3 of the default pipeline: the temporal network corrects the detector's body.
 
-Runs with numpy alone (torch only trains). The clip is brought to 30 Hz, seen plain and in a mirror,
-and the mean of both answers is brought back to the clip's own frames.
+Runs with numpy alone (torch only trains). The clip is resampled to 30 Hz, processed plain and
+mirrored, and the mean of both results is resampled to the clip's own frames.
 """
 
 from dataclasses import dataclass as plain_dataclass
@@ -21,21 +21,21 @@ from robojackson.mocap.temporal.temporal_network import load, run
 
 WEIGHTS = Path(__file__).parents[2] / "assets" / "temporal.safetensors"
 HIDDEN_BELOW = 0.35
-"""A limb whose landmarks are less visible than this counts as hidden."""
+"""Visibility of landmarks below which their limb counts as hidden."""
 
 
 @config_dataclass
 class TemporalConfig:
-    """How the temporal network is used.
+    """Settings of the temporal network.
 
     Attributes:
         enabled: Whether to correct the detector at all.
-        weights: Weights file; None is the one that comes with the package.
-        detector_m: Spread of the detector's own depth, metres: what was seen stays the nearer to it
-            the less sure the network is, a hidden joint has nothing else to go by; 0 leaves all
-            that was seen to the detector.
+        weights: Weights file; None is the shipped one.
+        detector_m: Spread of the detector's own depth, metres: the less sure the network is, the
+            nearer visible joints stay to the detector; hidden joints follow the network alone; 0
+            leaves all visible joints to the detector.
         depth_floor_m: Least spread of a corrected depth, metres.
-        hypothesis: 0 is the likeliest motion; n > 0 the n-th sample of what hidden limbs may do.
+        hypothesis: 0 is the most probable motion; n > 0 the n-th sample of poses of hidden limbs.
         seed: Seed of the samples.
     """
 
@@ -48,24 +48,24 @@ class TemporalConfig:
 
     @property
     def file(self) -> Path:
-        """Where the weights are."""
+        """Return the path of the weights."""
         return Path(self.weights) if self.weights else WEIGHTS
 
 
 @plain_dataclass(frozen=True)
 class Lifted:
-    """What the network makes of a clip.
+    """Result of the network for a clip.
 
     Attributes:
         points: All landmarks before the camera, metres.
-        spread: Of the twelve across the image and in depth, metres: mean absolute error.
+        spread: Spread of the twelve across the image and in depth, metres: mean absolute error.
     """
 
     points: Float[np.ndarray, "T 33 3"]
     spread: Float[np.ndarray, "T 12 2"]
 
     def depth_sd(self, least_m: float) -> Float[np.ndarray, "T 12"]:
-        """Standard deviation of the depths, metres."""
+        """Return the standard deviation of the depths, metres."""
         return depth_sd(self.spread, least_m)
 
 
@@ -76,16 +76,16 @@ def lift(
     fps: float,
     config: TemporalConfig,
 ) -> Lifted:
-    """The landmarks with the body corrected; face, hands and feet follow what they hang on.
+    """Return the landmarks with the body corrected; face, hands and feet follow their carriers.
 
     Args:
         placed: Landmarks before the camera (`pinhole_camera.place`), metres.
-        local: The detector's own, metres.
-        visibility: 0..1.
+        local: The detector's own landmarks, metres.
+        visibility: Visibility of the landmarks, 0..1.
         fps: Frames a second.
-        config: Of the network.
+        config: Settings of the network.
     Raises:
-        BadWeights: the weights file is none of this network's.
+        BadWeights: the weights file is not of this network.
     """
     weights = load(config.file)
     sight = features.view_clip(placed, local, visibility)
@@ -106,19 +106,22 @@ def lift(
 def believed(
     spread: Float[np.ndarray, "T 12 2"], config: TemporalConfig
 ) -> Float[np.ndarray, "T 12"]:
-    """Share of the correction: the weight of the network's depth beside the detector's."""
+    """Return the share of the correction: the weight of the network's depth against the
+    detector's."""
     detector = config.detector_m**2
     network = depth_sd(spread, config.depth_floor_m) ** 2
     return np.asarray(detector / (detector + network))
 
 
 def depth_sd(spread: Float[np.ndarray, "T 12 2"], least_m: float) -> Float[np.ndarray, "T 12"]:
-    """Standard deviation of the depths, metres: 1.25 times a mean absolute error (Gauss)."""
+    """Return the standard deviation of the depths, metres: 1.25 times a mean absolute error
+    (Gauss)."""
     return np.maximum(1.25 * spread[..., 1], least_m)
 
 
 def corrected(sight: ClipView, change: Float[np.ndarray, "T 12 3"]) -> Float[np.ndarray, "T 12 3"]:
-    """The body along the rays: depth of detector and correction, the image at that depth."""
+    """Return the body along the rays: depth of detector plus correction, the image at that
+    depth."""
     depth = sight.local[:, BODY, 2] + change[..., 2]
     across = features.at_depth(sight, depth) + change[..., :2]
     return np.concatenate([across, depth[..., None]], -1)
@@ -127,10 +130,10 @@ def corrected(sight: ClipView, change: Float[np.ndarray, "T 12 3"]) -> Float[np.
 def correct(
     sight: ClipView, weights: error_flow.Weights
 ) -> tuple[np.ndarray, Float[np.ndarray, "T 12 2"], np.ndarray]:
-    """Correction (T, 12, 3), spread, and the features of the plain view.
+    """Return correction (T, 12, 3), spread, and the features of the plain view.
 
-    Where plain and mirrored view do not agree, the network is out of what it knows: their distance
-    adds to the spread.
+    Where plain and mirrored result differ, the network is outside its training data: their distance
+    is added to the spread.
     """
     plain, spread, hidden = run(sight, weights)
     other, other_spread, _ = run(features.mirror(sight), weights)
@@ -138,8 +141,8 @@ def correct(
     again = features.mirror_body(other) * flip
     apart = np.abs(plain - again) / 2.0
     apart = np.stack([apart[..., :2].mean(-1), apart[..., 2]], -1)
-    said = np.sqrt(spread * features.mirror_body(other_spread))
-    return (plain + again) / 2.0, np.hypot(said, apart), hidden
+    own_spread = np.sqrt(spread * features.mirror_body(other_spread))
+    return (plain + again) / 2.0, np.hypot(own_spread, apart), hidden
 
 
 def imagine(
@@ -149,7 +152,7 @@ def imagine(
     weights: error_flow.Weights,
     rng: np.random.Generator,
 ) -> Float[np.ndarray, "T 12 3"]:
-    """Another course of the joints that are not seen, from a sampled embedding."""
+    """Return another sample of the joints that are not visible, from a sampled embedding."""
     z = error_flow.sample(len(hidden), weights, rng)
     error = error_flow.to_error(z, hidden, weights) - error_flow.to_error(
         np.zeros_like(z), hidden, weights
@@ -159,12 +162,13 @@ def imagine(
 
 
 def unseen(visibility: Float[np.ndarray, "T 33"]) -> Float[np.ndarray, "T 12"]:
-    """1 for a joint that nobody saw, 0 from `HIDDEN_BELOW` on."""
+    """Return 1 for an invisible joint, 0 from `HIDDEN_BELOW` on."""
     return np.clip((HIDDEN_BELOW - visibility[:, BODY]) / HIDDEN_BELOW, 0.0, 1.0)
 
 
 def at(sight: ClipView, places: Float[np.ndarray, " S"]) -> ClipView:
-    """The sight at other moments; the axes are not blended, nobody needs them there."""
+    """Return the view at other moments; the axes are not interpolated, since they are not used
+    there."""
     nearest = np.round(places).astype(int)
     return replace(
         sight,

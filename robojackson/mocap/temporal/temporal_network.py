@@ -1,8 +1,8 @@
 """The temporal network: dilated convolutions over 81 frames at 30 Hz.
 
-It gives for each of the twelve joints a correction of the detector's place (metres along the ray
-axes) and its spread across the image and in depth. Numpy; `tools/temporal/net.py` is its twin in
-torch, which is trained.
+It returns for each of the twelve joints a correction of the detector's position (metres along the
+ray axes) and its spread across the image and in depth. Numpy; `tools/temporal/net.py` is its
+equivalent in torch, for training.
 """
 
 from functools import cache
@@ -18,11 +18,11 @@ from robojackson.mocap.temporal.features import ClipView
 
 DILATIONS = (1, 3, 9, 27)
 LOG_SPREAD, SPREAD_RANGE = -3.0, 3.0
-"""Middle of the logarithm of the spread, metres, and how far it may go either way."""
+"""Middle of the logarithm of the spread, metres, and its largest change in either direction."""
 
 
 def run(sight: ClipView, weights: Weights) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """One pass: correction, spread, features."""
+    """Run one pass: correction, spread, features."""
     x = (features.numbers(sight) - weights["mean"]) * weights["scale"]
     h = x @ weights["enter.weight"].T + weights["enter.bias"]
     for block, dilation in enumerate(DILATIONS):
@@ -34,7 +34,7 @@ def run(sight: ClipView, weights: Weights) -> tuple[np.ndarray, np.ndarray, np.n
 
 @cache
 def load(path: Path) -> Weights:
-    """The arrays of a weights file, in single precision.
+    """Return the arrays of a weights file, in single precision.
 
     Raises:
         BadWeights: not safetensors, or arrays that are missing.
@@ -46,11 +46,11 @@ def load(path: Path) -> Weights:
         arrays = {name: value.astype(np.float32) for name, value in load_file(path).items()}
     except (SafetensorError, OSError) as error:
         raise BadWeights(f"{path}: not a weights file of the temporal network ({error})") from None
-    wanted = {"mean", "scale", "enter.weight", "leave.weight", "flow.memory", "flow.read.weight"}
-    if missing := sorted(wanted - set(arrays)):
+    required = {"mean", "scale", "enter.weight", "leave.weight", "flow.memory", "flow.read.weight"}
+    if missing := sorted(required - set(arrays)):
         raise BadWeights(
             f"{path}: not a weights file of the temporal network: {', '.join(missing)} missing; "
-            "leave temporal.weights empty for the one that comes with RoboJackson"
+            "leave temporal.weights empty for the shipped one"
         )
     if arrays["mean"].shape != (features.COUNT,):
         raise BadWeights(
@@ -61,7 +61,7 @@ def load(path: Path) -> Weights:
 
 
 def _block(h: np.ndarray, name: str, dilation: int, weights: Weights) -> np.ndarray:
-    """Normalise, three frames so far apart, mix; the ends are held."""
+    """Normalise, convolve three frames at the dilation, mix; the ends are held."""
     centred = h - h.mean(-1, keepdims=True)
     normal = centred / np.sqrt((centred**2).mean(-1, keepdims=True) + 1e-5)
     normal = normal * weights[f"{name}.norm.weight"] + weights[f"{name}.norm.bias"]

@@ -58,7 +58,7 @@ class TailConfig:
     stand_s: float = Field(default=3.0, ge=0)
     steps: bool = True
 
-    def wanted(self, robot: Robot) -> bool:
+    def applies_to(self, robot: Robot) -> bool:
         """Return whether a robot's motions get tails."""
         by_reference = robot.description.fall.frame == "reference"
         return self.use == "yes" or (self.use == "auto" and by_reference)
@@ -87,7 +87,7 @@ class Tailed:
 
 def with_tails(aims: Targets, robot: Robot, config: TailConfig) -> Tailed:
     """Put a stand before and after the targets of a clip; a cycle has no ends and gets none."""
-    if aims.cycle_offset is not None or not config.wanted(robot):
+    if aims.cycle_offset is not None or not config.applies_to(robot):
         return Tailed(aims, slice(0, len(aims)))
     before = _tail(_reversed(aims), robot, config, config.lead_s)
     after = _tail(aims, robot, config, config.stand_s)

@@ -1,1 +1,1 @@
-"""Every number of training and evaluation."""
+"""Configuration of training and evaluation."""

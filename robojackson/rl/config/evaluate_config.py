@@ -5,13 +5,13 @@ from pydantic import Field
 from robojackson.config import config_dataclass
 
 TRAINED, VARIANTS = "trained", ("hold", "regulator")
-"""What tables call the trained policy, the same under another law of its torque, and the feedback
-that its control law has, without the policy."""
+"""Names in tables: the trained policy, the same under another control law, and the feedback of its
+control law without the policy."""
 
 
 @config_dataclass
 class EvaluateConfig:
-    """How a policy is judged on stock physics.
+    """Settings of an evaluation on stock physics.
 
     Attributes:
         seconds: Length of a rollout on a cyclic clip, s; others run to their end.
@@ -24,7 +24,7 @@ class EvaluateConfig:
         strict_error: Largest mean site error of a strict success, m; the robot's when null.
         kneel_height: A knee lower than this is kneeling, m; the robot's when null.
         fast: Reference speed from which a limb's gain is measured, m/s.
-        passport: Whether the policy is also judged under other physics, delays, noise and pushes.
+        passport: Whether to evaluate the policy also under other physics, delays, noise and pushes.
         max_lag: Longest lag tried for a limb's gain, s.
         threads: Threads that step the simulations.
     """

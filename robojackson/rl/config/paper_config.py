@@ -1,9 +1,8 @@
 """The paper's environment as data: every weight of its reward, its rules, and the presets.
 
-`paper` is the reward as the paper writes it. `released` is what the authors' released code adds
-up: Humanoid-v5's own reward of each of four repeats beside it, 3.0 x 1.5 for standing upright, a
-ramp to 10 instead of 1, and a motion cut to 100 frames of 30 a second. `walker` is Humanoid-v5
-alone.
+`paper` is the reward as the paper writes it. `released` is the sum of the authors' released code:
+Humanoid-v5's own reward of each of four repeats beside it, 3.0 x 1.5 for standing upright, a ramp
+to 10 instead of 1, and a motion cut to 100 frames of 30 a second. `walker` is Humanoid-v5 alone.
 """
 
 from typing import Any, Literal
@@ -16,7 +15,7 @@ from robojackson.rl.config.presets import with_preset
 
 Curiosity = Literal["off", "formula", "algorithm", "released"]
 BETA: dict[Curiosity, float] = {"off": 0.0, "formula": 0.1, "algorithm": 0.05, "released": 0.01}
-"""The three weights that the paper's formula, its Algorithm 2 and the released code give."""
+"""The three weights of the paper's formula, its Algorithm 2 and the released code."""
 NEVER = 1e9
 
 PRESETS: dict[str, dict[str, Any]] = {
@@ -60,8 +59,8 @@ POINT_WEIGHTS = {
     "left_hand": 2.0,
     "right_hand": 2.0,
 }
-"""Keypoints and bodies; lwaist stands for the spine, torso for the neck, a foot for an ankle and a
-hand for a wrist."""
+"""Keypoints and bodies; lwaist replaces the spine, torso the neck, a foot an ankle and a hand a
+wrist."""
 
 
 @config_dataclass
@@ -69,9 +68,9 @@ class PaperConfig:
     """The paper's task on stock Humanoid-v5: torques, 348 observations, no phase.
 
     Attributes:
-        preset: Where the numbers come from that are not given.
+        preset: Source of the numbers that are not given.
         imitation: Weight of the imitation term; lambda ramps it.
-        relative: The points are compared relative to the pelvis (`root`) or where they are
+        relative: Whether the points are compared relative to the pelvis (`root`) or in the world
             (`world`); the table of episodes has both distances.
         weights: Weights of the squared distances, by keypoint or body.
         lambda_min: Least lambda = max(min, max * min(1, episode / ramp)), unitless.
@@ -80,18 +79,17 @@ class PaperConfig:
         upright: Weight of max(0, z . g), the torso's axis against gravity.
         balance: Weight of 1 / (1 + |COM_xy - pelvis_xy|), distances in metres, unitless.
         own: Weight of Humanoid-v5's own reward, summed over the repeats, unitless.
-        curiosity: Which weight the sum of absolute speeds gets.
+        curiosity: Weight of the sum of absolute speeds.
         curiosity_of: Speeds of the `hinges`, or angular speeds of all `bodies`, rad/s.
-        fall_penalty: Reward that is taken off once at a fall, unitless.
+        fall_penalty: Reward that is subtracted once at a fall, unitless.
         fall_height: Torso lower than this is a fall, m.
         fall_tilt: Torso tilted more than this is a fall, rad.
         highest: Torso higher than this ends the episode too, m.
         early_fall: Policy steps below which a fall counts as early.
         repeats: Control steps for which an action is held.
-        seconds: A cyclic clip is danced for that long, and no other for longer, s.
+        seconds: Length of a cyclic clip's episode, and the limit of any other, s.
         observe: Humanoid-v5's 348 numbers (`stock`), or only the first 45 of them, positions and
-            velocities (`joints`), which learn faster; `network_arrays.widened` makes up for the
-            rest.
+            velocities (`joints`), which train faster; `network_arrays.widened` supplies the rest.
         reset_noise: Uniform noise on the state of the stock reset, SI units.
         threads: Threads that step the simulations.
     """

@@ -1,7 +1,7 @@
-"""Named presets of a configuration: numbers that belong together, as data.
+"""Named presets of a configuration: sets of numbers, as data.
 
-A preset's numbers are defaults: whatever is written beside its name counts. Since a configuration
-that was built holds every number, `dataclasses.replace` does not change over to another preset.
+A preset's numbers are defaults: values beside its name override them. Since a built configuration
+holds every number, `dataclasses.replace` does not switch to another preset.
 """
 
 from collections.abc import Mapping
@@ -13,15 +13,15 @@ Presets = Mapping[str, Mapping[str, Any]]
 
 
 def with_preset(given: Any, presets: Presets, usual: str) -> Any:
-    """What a frozen pydantic dataclass gets, with the numbers of its preset where it says nothing.
+    """Return the arguments of a frozen pydantic dataclass, with the preset's numbers as defaults.
 
-    An unknown preset passes, for the type of the field to refuse it.
+    An unknown preset passes; the type of the field refuses it.
     """
     if isinstance(given, ArgsKwargs):
-        said = dict(given.kwargs or {})
-        return ArgsKwargs(given.args, _filled(said, presets, usual))
+        named = dict(given.kwargs or {})
+        return ArgsKwargs(given.args, _filled(named, presets, usual))
     return _filled(dict(given), presets, usual) if isinstance(given, Mapping) else given
 
 
-def _filled(said: dict[str, Any], presets: Presets, usual: str) -> dict[str, Any]:
-    return {**presets.get(str(said.get("preset", usual)), {}), **said}
+def _filled(named: dict[str, Any], presets: Presets, usual: str) -> dict[str, Any]:
+    return {**presets.get(str(named.get("preset", usual)), {}), **named}

@@ -10,7 +10,7 @@ from robojackson.rl.config.presets import with_preset
 
 PRESETS: dict[str, dict[str, Any]] = {
     "dance": {},
-    # The paper names TQC and 50,000 steps; where it is silent, sb3-contrib's defaults, its update
+    # The paper names TQC and 50,000 steps; the rest is sb3-contrib's defaults, its update
     # after every step as 32 after 32.
     "paper": {
         "n_envs": 1,
@@ -47,11 +47,11 @@ PRESETS: dict[str, dict[str, Any]] = {
         "log_std_init": -2.0,
     },
 }
-"""`dance` is how we teach tracking: the defaults below."""
+"""`dance` is our configuration for tracking: the defaults below."""
 
 
 NORM_EPSILON = 1e-6
-"""Of layer normalisation: flax's."""
+"""Epsilon of layer normalisation: flax's."""
 
 
 @config_dataclass
@@ -59,7 +59,7 @@ class TqcConfig:
     """TQC and how often it learns.
 
     Attributes:
-        preset: Where the numbers come from that are not given.
+        preset: Source of the numbers that are not given.
         n_envs: Simulations stepped together.
         steps_per_round: Policy steps of every simulation between two rounds of updates.
         updates_per_round: Gradient updates a round.
@@ -79,7 +79,7 @@ class TqcConfig:
         layer_norm: Layer normalisation between the critics' layers.
         gsde: State-dependent exploration; `sbx` has none and explores with plain noise.
         log_std_init: Logarithm of the first exploration noise; `sb3` uses it with gSDE only.
-        target_entropy: Entropy that exploration keeps, multiples of minus the number of actions.
+        target_entropy: Target entropy of the exploration, multiples of minus the number of actions.
         actor_average: Weight of the past in the running mean of the actor that becomes the
             policy, a round of updates; 0 is the last actor.
     """
@@ -114,7 +114,7 @@ class TqcConfig:
 
     @model_validator(mode="after")
     def _learns(self) -> "TqcConfig":
-        """Refuse numbers with which a training runs to its end and has learnt nothing."""
+        """Raise for numbers with which a training would finish without learning."""
         if self.top_quantiles_to_drop >= self.quantiles:
             raise ConflictingValues(
                 f"top_quantiles_to_drop, {self.top_quantiles_to_drop}, must leave some of the "

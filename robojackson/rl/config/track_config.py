@@ -1,4 +1,4 @@
-"""Every number of the tracking environment, with its unit."""
+"""Configuration of the tracking environment, every number with its unit."""
 
 from dataclasses import fields
 from typing import Literal
@@ -21,11 +21,11 @@ class ControlConfig:
             when null.
         damping: Derivative gain, multiples of the proportional one, seconds; the robot's when
             null.
-        feedforward: Share of the torques that the reference asks for by which the targets lead its
-            joint angles, unitless; 0 follows the angles alone; the robot's when null.
+        feedforward: Share of the reference's torques by which the targets lead its joint angles,
+            unitless; 0 follows the angles alone; the robot's when null.
         feedback: Share of the linear-quadratic feedback along the reference by which the targets
             move, unitless; 0 leaves balance to the policy alone; when null the robot's, or 0 where
-            the policy does not see all.
+            the policy does not see the full state.
         feedback_path: What the feedback keeps the robot on: the `reference`, or a path beside it
             that simulations with `sampled` offsets have found, wherever the feet stand.
         residual: Largest offset that the policy adds to the reference's joint angles, rad; the
@@ -56,7 +56,7 @@ class ResetConfig:
         joint_speed_noise: Standard deviation added to hinge speeds, rad/s.
         root_speed_noise: Standard deviation added to the root's velocities, m/s and rad/s.
         stand_share: Share of episodes that begin in the default stand instead.
-        settled_share: Share that begin in a state which the robot itself reached earlier.
+        settled_share: Share that begin in a state which the robot itself reached before.
         failure_share: Share of start phases drawn where episodes fail, the rest uniform.
     """
 
@@ -96,10 +96,11 @@ class RewardConfig:
         drift: Weight of the root position, unitless.
         drift_width: Width for it, m.
         action_rate: Penalty on the mean squared change of the action, unitless.
-        fine: Share of every term that is paid by a narrower bell: the wide one shows the way from
-            afar, the narrow one still pays for the last centimetre.
+        fine: Share of every term that is paid by a narrower bell: the wide one guides from afar,
+            the narrow one still pays for the last centimetre.
         narrow: Width of the narrower bell, in widths of the wide one.
-        curiosity: As the paper's; scaled so that a perfect step earns the same share of it.
+        curiosity: Curiosity bonus of the paper, scaled so that a perfect step earns the same share
+            of it.
     """
 
     joints: float = 0.20
@@ -135,14 +136,15 @@ class RewardConfig:
 
     @property
     def perfect(self) -> float:
-        """What a step earns that equals the reference."""
+        """Return the reward of a step that equals the reference."""
         result: float = sum(getattr(self, name) for name in self.terms())
         return result
 
 
 @config_dataclass
 class TerminationConfig:
-    """When an episode ends early. The fall rule is the robot's; the others are for training only.
+    """Conditions that end an episode early. The fall rule is the robot's; the others are for
+    training only.
 
     Attributes:
         fall_height: Height of the robot's fall rule, m; the robot's own when null.
@@ -163,7 +165,7 @@ class TerminationConfig:
 
 @config_dataclass
 class RandomConfig:
-    """Physics that differ a little from robot to robot while training; zero is the stock robot.
+    """Ranges of physics in training; zero is the stock robot.
 
     Attributes:
         friction: Half-width of a uniform factor on the friction of all geoms, unitless.
@@ -171,9 +173,9 @@ class RandomConfig:
         mass: Half-width of a uniform factor on mass and inertia of all bodies, unitless.
         com: Half-width of a uniform shift of the root body's centre of mass, each axis, m.
         delay: Largest delay of an action, uniform, at most a control step, s.
-        sensor_noise: Noise of what the policy sees, multiples of mjlab's, unitless.
+        sensor_noise: Noise of the policy's inputs, multiples of mjlab's, unitless.
         pushes: Pushes every 1 to 3 s, multiples of mjlab's, unitless.
-        integrators: Robot i gets the i-th, over and over; none named, all have the robot's own.
+        integrators: Robot i gets the i-th, repeatedly; with no names, all have the robot's own.
     """
 
     friction: float = Field(default=0.0, ge=0, lt=1)
@@ -191,9 +193,9 @@ class TrackConfig:
     """The tracking environment.
 
     Attributes:
-        observation: What the policy sees: `full`, all that a simulation knows, or `onboard`, what a
-            real robot measures by itself (the critics see all), or `preview`, that and the
-            reference ahead.
+        observation: Inputs of the policy: `full`, everything that a simulation knows; `onboard`,
+            the measurements of a real robot (the critics see everything); or `preview`, these and
+            the reference ahead.
         episode_seconds: Time limit of a training episode, s; its end is bootstrapped.
         threads: Threads that step the simulations.
     """

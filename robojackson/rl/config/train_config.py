@@ -1,4 +1,5 @@
-"""Every number of training and evaluation, with its unit. A setup file holds only what differs."""
+"""Configuration of training and evaluation, every number with its unit. A setup file holds only
+differences."""
 
 from collections.abc import Mapping
 from dataclasses import field, replace
@@ -40,15 +41,15 @@ class TrainConfig:
     """One training run. It ends at the first of its budgets that is reached.
 
     Attributes:
-        mode: `track`, the method that dances, or `paper`, the paper's own.
+        mode: `track`, our method, or `paper`, the paper's own.
         trainer: `sbx` (JAX, fast) or `sb3` (sb3-contrib, the reference).
         seed: Seed of networks, environments and replay.
         steps: Policy steps over all simulations, rounded up to a round of updates.
         minutes: Wall time, minutes.
-        cpu_minutes: Time of the processor, all threads together, minutes.
-        start: Where the networks come from: `scratch`, our `walker` of the mode, a
-            networks.safetensors, an SB3 zip, or a repository of the hub (`owner/name`).
-        start_critics: Whether the critics come from there, too.
+        cpu_minutes: Processor time, all threads together, minutes.
+        start: Source of the networks: `scratch`, our `walker` of the mode, a networks.safetensors,
+            an SB3 zip, or a repository of the hub (`owner/name`).
+        start_critics: Whether the critics come from the same source.
         curiosity: Which of the paper's three weights the curiosity bonus gets.
         checkpoint_seconds: Time between two checkpoints, s.
         progress_seconds: Time between two progress rows, s.
@@ -74,23 +75,23 @@ class TrainConfig:
     @model_validator(mode="before")
     @classmethod
     def _tqc_of_mode(cls, given: Any) -> Any:
-        """Paper mode learns with the paper's TQC unless another preset is named."""
-        said: Any = given.kwargs if isinstance(given, ArgsKwargs) else given
-        if not isinstance(said, Mapping) or said.get("mode") != "paper":
+        """Set the paper's TQC in paper mode unless another preset is named."""
+        keys: Any = given.kwargs if isinstance(given, ArgsKwargs) else given
+        if not isinstance(keys, Mapping) or keys.get("mode") != "paper":
             return given
-        tqc = said.get("tqc", {})
+        tqc = keys.get("tqc", {})
         if not isinstance(tqc, Mapping) or "preset" in tqc:
             return given
-        said = {**said, "tqc": {"preset": "paper", **tqc}}
-        return ArgsKwargs(given.args, said) if isinstance(given, ArgsKwargs) else said
+        keys = {**keys, "tqc": {"preset": "paper", **tqc}}
+        return ArgsKwargs(given.args, keys) if isinstance(given, ArgsKwargs) else keys
 
     @model_validator(mode="after")
     def _one_curiosity(self) -> "TrainConfig":
         inner = {"paper": self.paper.curiosity, "track.reward": self.track.reward.curiosity}
-        for name, said in inner.items():
-            if said not in ("off", self.curiosity):
+        for name, weight in inner.items():
+            if weight not in ("off", self.curiosity):
                 raise ConflictingValues(
-                    f"{name}.curiosity: say curiosity={said} instead, for either mode",
+                    f"{name}.curiosity: set curiosity={weight} instead, for either mode",
                     f"{name}.curiosity",
                 )
         return self
@@ -109,12 +110,12 @@ class TrainConfig:
 
     @property
     def has_budget(self) -> bool:
-        """Whether anything ends it."""
+        """Return whether the training has a budget."""
         return any(b is not None for b in (self.steps, self.minutes, self.cpu_minutes))
 
     @property
     def environment(self) -> TrackConfig | PaperConfig:
-        """The environment of the mode, with the curiosity of the setup."""
+        """Return the environment of the mode, with the curiosity of the setup."""
         if self.mode == "paper":
             return replace(self.paper, curiosity=self.curiosity)
         reward = replace(self.track.reward, curiosity=self.curiosity)

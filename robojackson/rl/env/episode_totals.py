@@ -18,7 +18,7 @@ class EpisodeTotals:
         terms: dict[str, Float[np.ndarray, " N"]],
         errors: dict[str, Float[np.ndarray, " N"]],
     ) -> None:
-        """Count one step of every environment; errors are averaged, the others are summed."""
+        """Add one step of every environment; errors are averaged, the others are summed."""
         self._means = tuple(errors)
         rows = {"episode_return": reward, **errors}
         rows |= {f"reward_{name}": value for name, value in terms.items()}
@@ -30,7 +30,7 @@ class EpisodeTotals:
     def close(
         self, done: Int[np.ndarray, " I"], age: Int[np.ndarray, " N"], repeats: int = 1
     ) -> list[dict[str, float]]:
-        """Rows of the episodes that ended after `age` control steps; their totals start anew."""
+        """Return rows of the episodes that ended after `age` control steps; reset their totals."""
         rows = []
         for i in done:
             row = {name: float(total[i]) for name, total in self._sums.items()}
@@ -41,16 +41,16 @@ class EpisodeTotals:
         return rows
 
     def clear(self, which: Int[np.ndarray, " I"]) -> None:
-        """Forget the running totals of some environments."""
+        """Reset the running totals of some environments."""
         for total in self._sums.values():
             total[which] = 0.0
 
     def state(self) -> dict[str, np.ndarray]:
-        """The running totals, as arrays."""
+        """Return the running totals as arrays."""
         return {f"sum_{name}": total.copy() for name, total in self._sums.items()}
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
-        """Go on from what `state` gave."""
+        """Restore the totals from `state`."""
         for name, total in state.items():
             if name.startswith("sum_"):
                 self._sums[name.removeprefix("sum_")] = np.array(total)

@@ -1,8 +1,9 @@
 """The environment: N robots that follow one reference motion, as array code, in either mode.
 
-A `Mode` says what differs (`track_mode`, `paper_mode`): what an action does, what is seen, what a
-step is worth, how an episode begins. Episodes end by a fall, by getting lost, at the end of a clip
-that is not cyclic, or by the time limit; only the last is a truncation and is bootstrapped.
+A `Mode` defines the differences (`track_mode`, `paper_mode`): the effect of an action, the
+observation, the reward, the start of an episode. Episodes end by a fall, by leaving the track, at
+the end of a clip that is not cyclic, or by the time limit; only the last is a truncation and is
+bootstrapped.
 """
 
 from collections.abc import Mapping, Sequence
@@ -30,14 +31,14 @@ PHYSICS = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 
 @dataclass
 class StepResult:
-    """What one step of all robots brought; arrays have N rows.
+    """Result of one step of all robots; arrays have N rows.
 
     Attributes:
-        observation: After resets.
-        final_observation: Before resets (differs where done).
-        reward, terms: Their sum and its parts.
-        terminated: Ends by failure or with the clip.
-        truncated: Ends by the time limit.
+        observation: Observations after resets.
+        final_observation: Observations before resets (differ where done).
+        reward, terms: Reward and its parts.
+        terminated: Episodes that end by failure or with the clip.
+        truncated: Episodes that end by the time limit.
         episodes: One summary row for each episode that ended.
     """
 
@@ -54,7 +55,7 @@ class TrackingCore:
     """N robots that follow one reference motion or several.
 
     Attributes:
-        episode: Episodes that ended so far; the paper's curriculum goes by it.
+        episode: Number of finished episodes; the paper's curriculum depends on it.
         step_index: Step of the reference that each robot is at.
     """
 
@@ -86,19 +87,19 @@ class TrackingCore:
         self.action_size = robot.model.nu
 
     def reseed(self, seed: int) -> None:
-        """Restart the random numbers and forget what was learnt of starts: the next `reset` and all
-        that follows are then determined."""
+        """Restart the random numbers and reset the learnt starts, which determines the next `reset`
+        and everything after it."""
         self.rng = np.random.default_rng(seed)
         self.mode.forget()
 
     def reset(self) -> Float[np.ndarray, "N D"]:
-        """Begin N new episodes; those that were under way leave no row."""
+        """Start N new episodes; unfinished ones leave no row."""
         self._totals.clear(np.arange(self.n))
         self._begin(np.arange(self.n))
         return self._observe()
 
     def step(self, action: Float[np.ndarray, "N nu"]) -> StepResult:
-        """One action of all robots; those whose episode ended begin a new one."""
+        """Apply one action of all robots; finished episodes are followed by new ones."""
         action = np.clip(np.asarray(action, float), -1, 1)
         before = self.sim.points.copy()
         self._act(action)
@@ -116,7 +117,7 @@ class TrackingCore:
         return result
 
     def state(self) -> dict[str, Any]:
-        """Everything that the next step depends on, as arrays."""
+        """Return everything that the next step depends on, as arrays."""
         size = mujoco.mj_stateSize(self.sim.model, PHYSICS)
         physics = np.zeros((self.n, size))
         for row, data in zip(physics, self.sim.datas, strict=True):
@@ -129,7 +130,7 @@ class TrackingCore:
         return {**own, **seen, **counted, **self._totals.state(), **self.mode.state()}
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Go on from what `state` gave."""
+        """Restore the environment from `state`."""
         for row, data in zip(state["physics"], self.sim.datas, strict=True):
             mujoco.mj_setState(self.sim.model, data, row, PHYSICS)
         for name in ("step_index", "_start", "_age", "_last"):
@@ -153,15 +154,15 @@ class TrackingCore:
             self.mode.after(command)
 
     def _end(self, score: Score, done: np.ndarray, late: np.ndarray) -> list[dict[str, float]]:
-        """Rows of the episodes that ended, after which their robots begin anew."""
+        """Return rows of the finished episodes and start new ones."""
         which = np.flatnonzero(done)
-        told = self.mode.ended(self._start[which], score.failed[which], self._age[which])
+        columns = self.mode.ended(self._start[which], score.failed[which], self._age[which])
         reached = np.flatnonzero(late)
         self.mode.record_finished(reached, self.step_index[reached])
         rows = self._totals.close(which, self._age, self.mode.repeats)
         self.episode += len(which)
         self._begin(which)
-        return [row | told for row in rows]
+        return [row | columns for row in rows]
 
     def _observe(self) -> np.ndarray:
         return self.mode.observe(self.clip.at(self.step_index + 1), self._last)
@@ -175,14 +176,14 @@ class TrackingCore:
 
 
 OBSERVED = ("qpos", "qvel", "points", "com", "broken", "previous", "count", "push_at")
-"""What a simulation shows of its copies."""
+"""Arrays of a simulation's copies."""
 
 
 def _require_keypoints(reference: ReferenceMotion, robot: Robot) -> None:
-    """Refuse a motion of other keypoints than the robot's.
+    """Raise for a motion whose keypoints differ from the robot's.
 
     Raises:
-        UnknownName: with those that differ.
+        UnknownName: the message has those that differ.
     """
     names = robot.keypoint_names
     if names != reference.keypoint_names:
@@ -198,7 +199,7 @@ def mode_of(
     seed: int,
     rewards: Mapping[str, RewardFunction] = MappingProxyType({}),
 ) -> Mode:
-    """The mode that a configuration belongs to.
+    """Return the mode of a configuration.
 
     Raises:
         BadConfiguration: a user's reward terms for the paper's mode, whose reward is the paper's,

@@ -1,6 +1,6 @@
 """The tracking environment behind Stable-Baselines3's VecEnv and Gymnasium's Env.
 
-Both are thin: all physics, rewards and resets are `TrackingCore`'s.
+Both are thin: physics, rewards and resets are in `TrackingCore`.
 """
 
 from collections.abc import Callable
@@ -30,7 +30,7 @@ class TrackingVecEnv(VecEnv):
     """N robots in one process for Stable-Baselines3.
 
     Args:
-        on_episodes: Called with the summary rows of episodes as they end.
+        on_episodes: Called with the summary rows of finished episodes.
     """
 
     def __init__(
@@ -45,15 +45,18 @@ class TrackingVecEnv(VecEnv):
         super().__init__(core.n, *_spaces(core))
 
     def reset(self) -> np.ndarray:
+        """Start new episodes; return their observations."""
         if self._seeds[0] is not None:
             self.core.reseed(self._seeds[0])
         self._reset_seeds()
         return self.core.reset()
 
     def step_async(self, actions: np.ndarray) -> None:
+        """Store the actions of the next `step_wait`."""
         self._action = actions
 
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
+        """Step all robots; return observations, rewards, ends and infos."""
         result = self.core.step(self._action)
         done = result.terminated | result.truncated
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
@@ -72,20 +75,25 @@ class TrackingVecEnv(VecEnv):
         return result.observation, result.reward.astype(np.float32), done, infos
 
     def close(self) -> None:
+        """Stop the threads of the simulation."""
         self.core.close()
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """Return an attribute once for each robot."""
         return [getattr(self, attr_name)] * len(list(self._get_indices(indices)))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Set an attribute of this environment."""
         setattr(self, attr_name, value)
 
     def env_method(
         self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any
     ) -> list[Any]:
+        """Raise, since the robots have no methods of their own."""
         raise NotImplementedError(f"the robots share one core; call core.{method_name} instead")
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
+        """Return False for each robot."""
         return [False] * len(list(self._get_indices(indices)))
 
 
@@ -102,6 +110,7 @@ class TrackingEnv(gym.Env[np.ndarray, np.ndarray]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
+        """Start a new episode; return its observation and an empty info."""
         super().reset(seed=seed)
         if seed is not None:
             self.core.close()
@@ -109,6 +118,7 @@ class TrackingEnv(gym.Env[np.ndarray, np.ndarray]):
         return self.core.reset()[0], {}
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+        """Step the robot; return observation, reward, ends and info."""
         result = self.core.step(action[None])
         info = {"reward_terms": {name: float(term[0]) for name, term in result.terms.items()}}
         return (
@@ -120,4 +130,5 @@ class TrackingEnv(gym.Env[np.ndarray, np.ndarray]):
         )
 
     def close(self) -> None:
+        """Stop the threads of the simulation."""
         self.core.close()

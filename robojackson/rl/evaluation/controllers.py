@@ -1,4 +1,4 @@
-"""Who drives a robot when a policy is judged: the policy, and those that do not dance beside it."""
+"""Controllers of an evaluation: the policy, and baselines that do not dance."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -22,12 +22,12 @@ from robojackson.rl.trackers.tracker import Tracker
 from robojackson.robot.model import Robot
 
 Evaluated = Policy | Tracker
-"""Who may be evaluated: a policy that was trained on a motion, or a tracker of any."""
+"""A policy trained on a motion, or a tracker of any motion."""
 Command = Callable[[Simulation, ClipStep, np.ndarray, np.ndarray], np.ndarray]
 
 
 def equipped(policy: Evaluated, robot: Robot) -> Robot:
-    """The robot with the gains of a tracker; itself for a policy.
+    """Return the robot with the gains of a tracker; the robot itself for a policy.
 
     Raises:
         BadPolicy: the tracker is for another robot.
@@ -36,10 +36,10 @@ def equipped(policy: Evaluated, robot: Robot) -> Robot:
 
 
 def control_of(policy: Evaluated, robot: Robot) -> ControlConfig:
-    """The control law that a policy or a tracker was trained with.
+    """Return the control law that a policy or a tracker was trained with.
 
     Raises:
-        BadPolicy: the policy was trained for another robot, or its file says no control law.
+        BadPolicy: the policy was trained for another robot, or its file has no control law.
     """
     return policy_control(policy, robot) if isinstance(policy, Policy) else policy.control
 
@@ -47,7 +47,7 @@ def control_of(policy: Evaluated, robot: Robot) -> ControlConfig:
 def drivers(
     policy: Evaluated, reference: ReferenceMotion, robot: Robot, seed: int
 ) -> dict[str, Driver]:
-    """The policy, its variants and the baselines by name; each baseline follows the PD law."""
+    """Return the policy, its variants and the baselines by name; each baseline uses the PD law."""
     control = control_of(policy, robot)
     found = {TRAINED: trained_driver(policy, robot, reference)}
     if control.law == "pd" and isinstance(policy, Policy):
@@ -59,7 +59,7 @@ def drivers(
 
 
 def trained_driver(policy: Evaluated, robot: Robot, reference: ReferenceMotion) -> Driver:
-    """The policy as it was trained, or the tracker.
+    """Return the driver of a trained policy, or of a tracker.
 
     Raises:
         BadPolicy: it was trained for another robot.
@@ -120,12 +120,12 @@ def _baselines(
 def _follow(
     sim: Simulation, following: ClipStep, start: np.ndarray, last: np.ndarray
 ) -> np.ndarray:
-    """The control law without a policy."""
+    """Return the command of the control law without a policy."""
     return sim.reference_angles(following)
 
 
 def sees_ahead(policy: Evaluated) -> bool:
-    """Whether a policy takes a preview of the reference."""
+    """Return whether a policy takes a preview of the reference."""
     if not isinstance(policy, Policy):
         return policy.sees_ahead
     return observation_of(policy) == "preview"

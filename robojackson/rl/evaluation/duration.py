@@ -1,4 +1,4 @@
-"""How long things take on this machine: what a training gets of a budget, and what it needs."""
+"""Estimates of time on this machine: for an evaluation, and for a training."""
 
 import time
 
@@ -10,24 +10,24 @@ from robojackson.rl.config.evaluate_config import EvaluateConfig
 from robojackson.robot.model import Robot
 
 LASTING, FALLING = 2, 4
-"""Bodies that are judged: the trained one and a variant of it, and those that do not dance."""
+"""Number of evaluated bodies: the trained one, a variant of it, and those that do not dance."""
 FALLING_SHARE = 0.3
-"""Of a rollout, after which the bodies that do not dance lie on the floor."""
+"""Time after which the bodies that do not dance lie on the floor, seconds."""
 PASSPORT_CASES = 20
 TIMED_STEPS = 400
 AROUND_A_STEP = 1.6
-"""Time of a simulated step with control and scoring, in times of MuJoCo's alone."""
+"""Time of a simulated step with control and scoring, in multiples of MuJoCo's alone."""
 CYCLIC_MINUTES, WALKING_MINUTES, OTHER_MINUTES = 10.0, 20.0, 40.0
-"""What the bundled hip_shake, walk and dance_b took until they danced, minutes of one core
+"""Training times of the bundled hip_shake, walk and dance_b, minutes of one core
 (docs/benchmarks.md)."""
 MEASURED_S = 4.0
 """Length of these motions, seconds; longer ones take proportionally longer."""
 WALKS_M = 0.2
-"""Path of a cycle from which on a robot walks rather than dances on the spot, metres."""
+"""Path of a cycle above which a motion counts as walking, metres."""
 
 
 def seconds_to_evaluate(robot: Robot, reference: ReferenceMotion, config: EvaluateConfig) -> float:
-    """Return about how long an evaluation takes here, seconds; measured by a short simulation."""
+    """Return the approximate time of an evaluation, seconds; measured by a short simulation."""
     length = config.seconds if reference.cyclic else len(reference) * reference.dt
     starts = config.phases * config.resets + 1
     rollouts = (LASTING + FALLING_SHARE * FALLING) * starts
@@ -52,9 +52,9 @@ def seconds_a_step(robot: Robot) -> float:
 
 
 def minutes_needed(reference: ReferenceMotion) -> float:
-    """Return about how long a training takes until a robot dances this, minutes of one core.
+    """Return the approximate training time until a robot dances this, minutes of one core.
 
-    By kind and length of the motion, from what the bundled ones took; no promise.
+    Estimated by kind and length of the motion from the bundled ones; not guaranteed.
     """
     seconds = len(reference) * reference.dt
     usual = OTHER_MINUTES

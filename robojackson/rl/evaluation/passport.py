@@ -1,7 +1,7 @@
-"""The passport of a policy: how well it dances under other physics than it was trained with.
+"""The passport of a policy: its evaluation under physics that differ from those of the training.
 
 Each case changes one thing: friction, masses, gains, delay, sensors, pushes, time step, integrator.
-24 phases without a second reset and the default stand; the same judgement as an evaluation.
+24 phases without a second reset and the default stand; evaluated as in an evaluation.
 """
 
 from collections.abc import Callable, Iterator
@@ -24,11 +24,11 @@ from robojackson.robot.physics import substeps_of
 ROBUST = RandomConfig(
     friction=0.5, gains=0.2, mass=0.1, com=0.02, delay=0.02, sensor_noise=1.0, pushes=1.0
 )
-"""What `train --robust` draws from."""
+"""Ranges that `train --robust` draws from."""
 ROBUST_FIELDS = ("friction", "gains", "mass", "com", "delay", "sensor_noise", "pushes")
 NOMINAL = "nominal"
 LEAST_SHARE = 0.9
-"""Of the nominal strict success that a robust policy keeps in every case."""
+"""Share of the nominal strict success that a robust policy keeps in every case."""
 FIGURES = ("strict_success", "success", "skill", "survived_s", "site_error_m")
 TIMESTEPS_S = (0.0015, 0.002, 0.004, 0.005)
 INTEGRATORS = ("Euler", "implicitfast", "RK4")
@@ -36,13 +36,13 @@ DELAYS_S = (0.01, 0.02)
 
 
 def robust_settings() -> dict[str, Any]:
-    """The same as overrides of a training's configuration."""
+    """Return these ranges as overrides of a training's configuration."""
     return {f"track.random.{name}": getattr(ROBUST, name) for name in ROBUST_FIELDS}
 
 
 @dataclass(frozen=True)
 class Case:
-    """One line of a passport: a name and what is different."""
+    """One row of a passport: a name and its changes."""
 
     name: str
     variation: Variation = field(default_factory=Variation)
@@ -50,7 +50,7 @@ class Case:
 
 
 def cases(robot: Robot, seed: int) -> list[Case]:
-    """All lines for a robot, the nominal one first."""
+    """Yield all cases of a robot, the nominal one first."""
     return [Case(NOMINAL), *_bodies(), *_stepping(robot), *_signals(robot, seed)]
 
 
@@ -124,7 +124,7 @@ def _evaluate_case(
     config: EvaluateConfig,
     case: Case,
 ) -> dict[str, float]:
-    """Means over the rollouts of a case; the driver's gains are the varied robot's."""
+    """Return means over the rollouts of a case; the driver's gains are the varied robot's."""
     other = varied(robot, case.variation)
     driver = replace(driver, control=replace(driver.control, substeps=other.substeps))
     starts, labels = starts_of(robot, clip, config)
@@ -133,7 +133,7 @@ def _evaluate_case(
         other, clip, driver, starts, horizon, config.threads, Fall.of(robot),
         conditions=case.conditions,
     )  # fmt: skip
-    judge = RolloutScorer(robot, reference, config)
-    rows = [judge.row("trained", label, done, i) for i, label in enumerate(labels)]
+    scorer = RolloutScorer(robot, reference, config)
+    rows = [scorer.row("trained", label, done, i) for i, label in enumerate(labels)]
     figures = summarise(rows)
     return {name: figures[name] for name in FIGURES}

@@ -1,10 +1,10 @@
-"""How a policy is judged: many starts on stock physics, beside baselines that do not dance.
+"""Evaluate a policy: many starts on stock physics, beside baselines that do not dance.
 
-24 phases x 3 noisy resets and the default stand, deterministic policy, one horizon each. Success
-is the paper's: no fall (torso below 0.7 m or tilted over 60 degrees). Strict success also forbids
-kneeling and a mean site error above 0.30 m at any step. Skill is told against the best frozen pose
+24 phases x 3 noisy resets and the default stand, deterministic policy, one horizon each. Success is
+the paper's: no fall (torso below 0.7 m or tilted over 60 degrees). Strict success also forbids
+kneeling and a mean site error above 0.30 m at any step. Skill is relative to the best frozen pose
 over 14 sites with hands and head; a fall counts 0. The velocity score (`metrics.dance_score`) is
-told along the heading: the only figure that sees a robot jump from place to place.
+measured along the heading: the only figure that detects a robot jumping from place to place.
 """
 
 import logging
@@ -48,19 +48,19 @@ from robojackson.robot.model import Robot
 log = logging.getLogger(__name__)
 
 STATUE_SHARE = 0.9
-"""Of a run's own return, above which what a statue earns raises a flag."""
+"""Share of a run's own return above which a statue's return raises a flag."""
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """The verdict on a policy.
+    """The result of an evaluation.
 
     Attributes:
         summary: Means over the policy's rollouts, and those of the baselines by name; `verdict`:
             kind and sentence. Success and skill are None where that is `too_short`.
         rows: One row a rollout, of the policy and of every baseline.
-        rollout_qpos: The policy's rollout from the clip's first step (phase 0, reset 0, whether it
-            falls or not), for the video; row s is the state at the reference's step s.
+        rollout_qpos: The policy's rollout from the clip's first step (phase 0, reset 0, with or
+            without a fall), for the video; row s is the state at the reference's step s.
     """
 
     summary: dict[str, object]
@@ -75,7 +75,7 @@ def evaluate_policy(
     config: EvaluateConfig,
     progress: Callable[[str, int, int], None] = lambda name, step, total: None,
 ) -> Evaluation:
-    """Judge a policy or a tracker and its baselines on one reference motion.
+    """Evaluate a policy or a tracker and its baselines on one reference motion.
 
     The baselines beside a tracker have the tracker's gains.
 
@@ -92,7 +92,7 @@ def evaluate_policy(
     clip = driven_clip(robot, reference, control, sees_ahead(policy), progress)
     starts, labels = starts_of(robot, clip, config)
     horizon = clip.horizon(starts.step, config.seconds)
-    judge, meter = (
+    scorer, meter = (
         RolloutScorer(robot, reference, config),
         RewardMeter(robot, reference, clip, environment),
     )
@@ -106,9 +106,9 @@ def evaluate_policy(
         done = roll_out(
             robot, clip, driver, starts, horizon, config.threads, fall, meter, tick, whole
         )
-        judged = [judge.row(name, label, done, i) for i, label in enumerate(labels)]
-        rows += judged
-        summaries[name] = summarise(judged)
+        evaluated = [scorer.row(name, label, done, i) for i, label in enumerate(labels)]
+        rows += evaluated
+        summaries[name] = summarise(evaluated)
         if name == TRAINED:
             qpos = _recorded_rollout(done, starts)
     own = summaries.pop(TRAINED)
@@ -122,16 +122,16 @@ def evaluate_policy(
     if verdict.kind == "too_short":
         shown = without_short_figures(own)
         baselines = {name: without_short_figures(found) for name, found in summaries.items()}
-    told: dict[str, object] = {"variants": variants, "baselines": baselines, "reward": reward}
+    facts: dict[str, object] = {"variants": variants, "baselines": baselines, "reward": reward}
     if not isinstance(policy, Policy):
-        told["tracker"] = policy.description.name
+        facts["tracker"] = policy.description.name
     if config.passport:
-        told["passport"] = passport(policy, reference, robot, config, progress)
-    return Evaluation({**shown, **told, "verdict": verdict.as_facts()}, rows, qpos)
+        facts["passport"] = passport(policy, reference, robot, config, progress)
+    return Evaluation({**shown, **facts, "verdict": verdict.as_facts()}, rows, qpos)
 
 
 def environment_of(policy: Evaluated, control: ControlConfig) -> TrackConfig | PaperConfig:
-    """The environment whose reward a policy is measured with: its own, without curiosity."""
+    """Return the environment of the policy's own reward, without curiosity."""
     if not isinstance(policy, Policy):
         return TrackConfig(control=control)
     held = policy.facts.get("environment")
@@ -149,22 +149,20 @@ def reward_report(
     own: Mapping[str, float],
     steps: float,
 ) -> dict[str, object]:
-    """Shortcuts made visible: what every term gave, and what bodies get that do not dance.
+    """Return the mean of every reward term, and the rewards of bodies that do not dance.
 
-    `flagged` says that a statue carried along would earn over 90 % of the policy's return.
+    `flagged` is true if a statue carried along would earn over 90 % of the policy's return.
     """
-    asked = audit_both_readings(robot, reference, environment)
+    audits = audit_both_readings(robot, reference, environment)
     reading = environment.relative if isinstance(environment, PaperConfig) else "track"
-    nothing = RewardAudit(
-        float("nan"), {"statue": float("nan")}
-    )  # a reward that asks for no motion
-    known = asked.get(reading, nothing)
+    nothing = RewardAudit(float("nan"), {"statue": float("nan")})  # a reward without a motion
+    known = audits.get(reading, nothing)
     statue = known.statue * steps
     terms = {k.removeprefix("reward_"): v for k, v in own.items() if k.startswith("reward_")}
     total = sum(abs(value) for value in terms.values()) or 1.0
     return {
         "of_terms": {name: value / total for name, value in terms.items()},
-        "audit": audit_record(asked),
+        "audit": audit_record(audits),
         "perfect_return": known.perfect * steps,
         "statue_return": statue,
         "own_return": own["return_own"],
@@ -173,17 +171,17 @@ def reward_report(
 
 
 def _warn_about_other_motion(policy: Evaluated, reference: ReferenceMotion) -> None:
-    """A policy may be judged on another motion than it learnt, but not without a word."""
+    """Warn about an evaluation on another motion than the training's."""
     if not isinstance(policy, Policy):
         return
     learnt = policy.facts.get("reference_sha256")
     if learnt is not None and learnt != poses_sha256(reference):
         log.warning(
-            "the policy was trained on another reference motion than the one it is judged on"
+            "the policy was trained on another reference motion than the one it is evaluated on"
         )
 
 
 def _recorded_rollout(rollouts: Rollouts, starts: Starts) -> np.ndarray:
-    """The rollout from the clip's first step, its start first, with its fall if it falls."""
+    """Return the rollout from the clip's first step, its start first, including a fall."""
     steps = min(int(rollouts.length[0]) + 1, len(rollouts.qpos))
     return np.concatenate([starts.qpos[:1], rollouts.qpos[:steps, 0]])

@@ -1,8 +1,8 @@
-"""What a reward can ask for: the share of a perfect dance that bodies earn who do not dance.
+"""Audit of a reward: the share of a perfect dance's reward that bodies earn without dancing.
 
 Kinematic: the statue, the mean pose and the flailing body are carried along with the reference's
-root, so that they never fall; what they earn is what the reward cannot tell from dancing. The
-replay without a policy is simulated and does fall.
+root, so that they never fall; the reward cannot distinguish their share from dancing. The replay
+without a policy is simulated and does fall.
 """
 
 from dataclasses import dataclass, replace
@@ -28,7 +28,7 @@ from robojackson.robot.model import Robot
 
 MOST_STEPS = 400
 FLAIL_RAD, FLAIL_HZ = 0.35, 2.0
-"""Every hinge swings so: 2.8 rad/s on average, as fast as random torques move them."""
+"""Swing of every hinge: 2.8 rad/s on average, as fast as random torques move them."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class RewardAudit:
     """Shares of a perfect dance.
 
     Attributes:
-        perfect: What a perfect dance earns a control step.
+        perfect: Reward of a perfect dance, per control step.
         of: Share that each body earns, by name.
     """
 
@@ -45,14 +45,14 @@ class RewardAudit:
 
     @property
     def statue(self) -> float:
-        """What a statue earns a control step."""
+        """Return the reward of a statue, per control step."""
         return self.perfect * self.of["statue"]
 
 
 def audit_reward(
     robot: Robot, reference: ReferenceMotion, environment: TrackConfig | PaperConfig
 ) -> RewardAudit:
-    """What the reward of an environment pays to bodies that do not dance."""
+    """Return the rewards that an environment pays to bodies that do not dance."""
     if isinstance(environment, TrackConfig):
         motion, law = reference, control_of(environment)
         clip = driven_clip(robot, motion, law)
@@ -73,8 +73,8 @@ def audit_reward(
 def audit_both_readings(
     robot: Robot, reference: ReferenceMotion, environment: TrackConfig | PaperConfig
 ) -> dict[str, RewardAudit]:
-    """The paper leaves open whether points are compared relative to the root: one answer for each;
-    our own reward has one. None where the reward asks for no motion at all."""
+    """Return one audit for each reading of the paper, which leaves open whether points are compared
+    relative to the root; our own reward has one reading. Empty for a reward without a motion."""
     if isinstance(environment, TrackConfig):
         return {"track": audit_reward(robot, reference, environment)}
     if not environment.imitation:
@@ -85,15 +85,15 @@ def audit_both_readings(
     }
 
 
-def audit_record(asked: dict[str, RewardAudit]) -> dict[str, dict[str, float]]:
-    """As figures for a table or JSON."""
-    return {name: {"perfect_step": s.perfect, **s.of} for name, s in asked.items()}
+def audit_record(audits: dict[str, RewardAudit]) -> dict[str, dict[str, float]]:
+    """Return figures for a table or JSON."""
+    return {name: {"perfect_step": s.perfect, **s.of} for name, s in audits.items()}
 
 
 def bodies(
     motion: ReferenceMotion,
 ) -> dict[str, tuple[Float[np.ndarray, "S nq"], Float[np.ndarray, "S nv"]]]:
-    """The perfect dancer and those that do not dance, carried along with its root."""
+    """Return the perfect dancer and the bodies that do not dance, carried along with its root."""
     qpos, qvel = (np.asarray(a, float)[:MOST_STEPS] for a in (motion.qpos, motion.qvel))
 
     def carried(hinges: np.ndarray, speeds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -117,7 +117,7 @@ def bodies(
 def _earned(
     robot: Robot, clip: Clip, meter: RewardMeter, qpos: np.ndarray, qvel: np.ndarray
 ) -> Float[np.ndarray, " S"]:
-    """What states earn that are put where the reference is."""
+    """Return the reward of states that are placed at the reference."""
     n = len(qpos)
     sim = Simulation(robot, ControlConfig(), n)
     sim.place(np.arange(n), qpos, qvel)
@@ -129,7 +129,7 @@ def _earned(
 
 
 def _replayed(robot: Robot, clip: Clip, law: ControlConfig, meter: RewardMeter) -> float:
-    """What the reference earns under the control law without a policy, up to the fall."""
+    """Return the reward of the reference under the control law without a policy, up to the fall."""
     driver = Driver(
         law,
         lambda sim, following, start, last: sim.reference_angles(following),

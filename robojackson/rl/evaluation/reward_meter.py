@@ -1,8 +1,8 @@
-"""What every step would earn, whoever drives: the yardstick that all runs are measured with.
+"""Rewards of every step by one yardstick, for any controller and setup.
 
 Setups are trained with their own reward but measured with the same: curiosity off, lambda fixed at
 its largest value, Humanoid-v5's own reward left out. `reward_*` are the terms of the policy's mode,
-`return_own` their sum, `return_paper` what the paper's reward would have paid.
+`return_own` their sum, `return_paper` the paper's reward.
 """
 
 from dataclasses import replace
@@ -21,10 +21,10 @@ from robojackson.robot.model import Robot
 
 
 class RewardMeter:
-    """Reads the rewards of a moment.
+    """Computes the rewards of a moment.
 
     Args:
-        environment: Whose reward is the policy's own.
+        environment: Environment of the policy's own reward.
     """
 
     def __init__(
@@ -35,15 +35,15 @@ class RewardMeter:
         environment: TrackConfig | PaperConfig,
     ) -> None:
         self._clip = clip
-        asked = [PaperConfig()]
+        configs = [PaperConfig()]
         if isinstance(environment, PaperConfig):
-            asked = [PaperConfig(relative=environment.relative), environment]
-        self._papers = [(config, PaperPoints(robot, reference, config)) for config in asked]
+            configs = [PaperConfig(relative=environment.relative), environment]
+        self._papers = [(config, PaperPoints(robot, reference, config)) for config in configs]
         self._track = None if isinstance(environment, PaperConfig) else environment.reward
         self._which = tracked_points(robot.keypoint_names)
 
     def __call__(self, moment: Moment) -> Reading:
-        """Terms, errors and returns of every robot at one control step."""
+        """Return terms, errors and returns of every robot at one control step."""
         read = [self._paper_reward(moment, *paper) for paper in self._papers]
         (_, paper), (apart, own) = read[0], read[-1]
         if self._track is not None:
@@ -58,7 +58,7 @@ class RewardMeter:
     def _paper_reward(
         self, moment: Moment, config: PaperConfig, points: PaperPoints
     ) -> tuple[Miss, Reading]:
-        """Distances and terms of a reward of the paper's kind, lambda at its largest."""
+        """Return distances and terms of a reward of the paper's kind, lambda at its largest."""
         state = points.of(moment.sim)
         apart = miss(state, *points.targets(self._clip, moment.at.step), points.weights)
         return apart, paper_terms(state, apart, moment.fell, config.lambda_max, config)
@@ -71,7 +71,7 @@ class RewardMeter:
 
 
 def without_curiosity(environment: TrackConfig | PaperConfig) -> TrackConfig | PaperConfig:
-    """The same environment without the bonus for curiosity."""
+    """Return the same environment without the bonus for curiosity."""
     if isinstance(environment, PaperConfig):
         return replace(environment, curiosity="off")
     return replace(environment, reward=replace(environment.reward, curiosity="off"))

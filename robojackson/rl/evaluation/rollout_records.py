@@ -1,4 +1,5 @@
-"""From one rollout to one row of the evaluation table (definitions in `metrics.rollout_score`)."""
+"""Convert one rollout to one row of the evaluation table (definitions in
+`metrics.rollout_score`)."""
 
 import mujoco
 import numpy as np
@@ -22,13 +23,13 @@ from robojackson.robot.model import KEYPOINTS, Robot
 
 LIMB_ENDS = (*FEET, *EXTREMITIES)
 SITES = len(KEYPOINTS)
-"""Keypoints that position errors are means over: the toes that some robots have come after them."""
+"""Number of keypoints in mean position errors: the toes of some robots come after them."""
 LEAST_MOVING_SHARE = 0.05
-"""Of the frames, below which no gain of a limb is told."""
+"""Least share of the frames for a limb's gain."""
 LEAST_SPREAD_RAD = 0.02
-"""Of a hinge of the reference, below which no usage is told, radians."""
+"""Least spread of a reference's hinge for a usage, radians."""
 LEAST_TRAVEL_M = 0.5
-"""Of the reference, below which no travel ratio is told, metres."""
+"""Least path of a reference for a travel ratio, metres."""
 
 
 class RolloutScorer:
@@ -41,13 +42,13 @@ class RolloutScorer:
         self._strict = StrictEvaluator(robot, reference, config)
         self._limbs = {name: names.index(name) for name in LIMB_ENDS}
         self._model, self._joints = robot.model, robot.joint_names
-        asked, slowed = (reference.scorecard.get(key, 1.0) for key in ("tempo", "tempo_mean"))
-        self._tempo = float(asked * slowed)
+        requested, slowed = (reference.scorecard.get(key, 1.0) for key in ("tempo", "tempo_mean"))
+        self._tempo = float(requested * slowed)
 
     def row(
         self, policy: str, label: tuple[int, int], rollouts: Rollouts, i: int
     ) -> dict[str, object]:
-        """Figures of one rollout; errors are means up to its end or its fall."""
+        """Return figures of one rollout; errors are means up to its end or its fall."""
         length, fell = int(rollouts.length[i]), bool(rollouts.fell[i])
         span = slice(0, max(length, 1))
         here = heading_frame(rollouts.points[span, i], rollouts.qpos[span, i, 3:7], self._pelvis)
@@ -84,7 +85,8 @@ class RolloutScorer:
         return row | self._usage(rollouts, i, span)
 
     def _velocity_score(self, rollouts: Rollouts, i: int, span: slice) -> float:
-        """Along the heading, path included; a robot that falls has not danced: at most 0."""
+        """Return the velocity score along the heading, path included; at most 0 for a robot that
+        falls."""
         score = heading_score(
             rollouts.points[span, i],
             rollouts.qpos[span, i, 3:7],
@@ -96,7 +98,7 @@ class RolloutScorer:
         return 0.0 if np.isnan(score) else min(score, 0.0)
 
     def _means(self, rollouts: Rollouts) -> dict[str, np.ndarray]:
-        """Returns and their terms summed over the rollout, errors as means."""
+        """Return returns and their terms summed over the rollout, errors as means."""
         steps = np.maximum(np.minimum(rollouts.length + 1, rollouts.horizon), 1)
         return {
             name: total / steps if name.startswith("error_") else total
@@ -104,23 +106,23 @@ class RolloutScorer:
         }
 
     def _usage(self, rollouts: Rollouts, i: int, span: slice) -> dict[str, float]:
-        """Every hinge's spread over the rollout, as a multiple of the reference's."""
+        """Return every hinge's spread over the rollout, as a multiple of the reference's."""
         own = rollouts.qpos[span, i, 7:].std(0)
-        wanted = rollouts.target_qpos[span, i, 7:].std(0)
-        moves = wanted > LEAST_SPREAD_RAD
-        ratio = np.where(moves, own / np.where(moves, wanted, 1.0), np.nan)
+        target = rollouts.target_qpos[span, i, 7:].std(0)
+        moves = target > LEAST_SPREAD_RAD
+        ratio = np.where(moves, own / np.where(moves, target, 1.0), np.nan)
         return {f"usage_{name}": float(r) for name, r in zip(self._joints, ratio, strict=True)}
 
     def _whereabouts(self, rollouts: Rollouts, i: int, span: slice) -> dict[str, float]:
-        """What the pelvis-heading frame does not see: where the robot went and which way."""
+        """Return position and heading, which the pelvis-heading frame does not show."""
         end = span.stop - 1
         went = rollouts.points[[0, end], i, self._pelvis, :2]
-        wanted = rollouts.target[[0, end], i, self._pelvis, :2]
+        target = rollouts.target[[0, end], i, self._pelvis, :2]
         turn = heading(rollouts.qpos[end, i, 3:7]) - heading(rollouts.target_qpos[end, i, 3:7])
-        path = float(np.linalg.norm(wanted[1] - wanted[0]))
-        forward = float((went[1] - went[0]) @ (wanted[1] - wanted[0]))
+        path = float(np.linalg.norm(target[1] - target[0]))
+        forward = float((went[1] - went[0]) @ (target[1] - target[0]))
         return {
-            "drift_m": float(np.linalg.norm(went[1] - wanted[1])),
+            "drift_m": float(np.linalg.norm(went[1] - target[1])),
             "heading_error_deg": float(np.degrees(np.abs(wrapped(turn)))),
             "travel_ratio": forward / path**2 if path > LEAST_TRAVEL_M else float("nan"),
         }
@@ -139,7 +141,7 @@ class RolloutScorer:
 
 
 def _position_errors(rollouts: Rollouts, i: int, span: slice) -> dict[str, float]:
-    """Position errors up to the fall, and to the horizon where robots went on after their fall."""
+    """Return position errors up to the fall, and to the horizon if robots continued after it."""
     figures: dict[str, float] = {}
     whole = slice(0, int(rollouts.horizon[i]))
     for name, part in {"mpjpe_l_alive_m": span, "mpjpe_l_m": whole}.items():

@@ -17,12 +17,12 @@ Reading = dict[str, Float[np.ndarray, " N"]]
 
 @dataclass(frozen=True)
 class Driver:
-    """How robots are driven.
+    """The control of robots in a rollout.
 
     Attributes:
         control: The law of control.
-        command: (simulation, next step of the reference, start steps, last action) -> what
-            `Simulation.step` gets.
+        command: (simulation, next step of the reference, start steps, last action) -> command of
+            `Simulation.step`.
         repeats: Control steps for which a command is held.
     """
 
@@ -33,12 +33,12 @@ class Driver:
 
 @dataclass(frozen=True)
 class Conditions:
-    """What disturbs the robots of a rollout.
+    """Disturbances of a rollout.
 
     Attributes:
         random: Sensor noise, pushes and ranges of physics.
-        delay_s: By which actions come late, s.
-        seed: Of the random numbers.
+        delay_s: Delay of actions, s.
+        seed: Seed of the random numbers.
     """
 
     random: RandomConfig = field(default_factory=RandomConfig)
@@ -57,7 +57,7 @@ class Starts:
 
 @dataclass(frozen=True)
 class Moment:
-    """What a meter sees after every control step.
+    """Input of a meter after every control step.
 
     Attributes:
         sim: The simulation.
@@ -76,18 +76,18 @@ class Moment:
 
 @dataclass(frozen=True)
 class Rollouts:
-    """What N robots did; after its fall a robot's rows repeat the last state, unless `whole`.
+    """Records of N robots; after its fall a robot's rows repeat the last state, unless `whole`.
 
     Attributes:
-        whole: Whether robots that fell were simulated on to their horizon.
+        whole: Whether fallen robots were simulated on to their horizon.
         length: Steps each survived, at most H.
         fell: Whether each fell before the horizon.
-        horizon: Steps that each was asked for.
+        horizon: Requested steps of each.
         qpos: States after every step.
         points: Keypoint sites, world, metres.
         target: The reference's sites at the same steps, world, metres.
         target_qpos: The reference's state.
-        totals: Sums of what the meter read, up to the end or the fall, which counts itself.
+        totals: Sums of the meter's readings, up to the end or the fall, which is included.
     """
 
     length: Int[np.ndarray, " N"]
@@ -114,8 +114,8 @@ def roll_out(
     whole: bool = False,
     conditions: Conditions | None = None,
 ) -> Rollouts:
-    """Drive a robot from every start, each to its own horizon or its fall; to its horizon in any
-    case when `whole`."""
+    """Drive a robot from every start, each to its own horizon or its fall; with `whole` always to
+    its horizon."""
     n, steps = len(starts.step), int(horizon.max())
     met = conditions or Conditions()
     sim = Simulation(robot, driver.control, n, threads, met.random, met.seed, met.delay_s)
@@ -143,7 +143,7 @@ def roll_out(
         if not ((alive | whole) & (t + 1 < horizon)).any():
             break
     sim.close()
-    qpos, points, wanted, target_qpos = (np.stack(column) for column in zip(*record, strict=True))
+    qpos, points, targets, target_qpos = (np.stack(column) for column in zip(*record, strict=True))
     return Rollouts(
-        length, length < horizon, horizon, qpos, points, wanted, target_qpos, totals, whole
+        length, length < horizon, horizon, qpos, points, targets, target_qpos, totals, whole
     )

@@ -1,4 +1,4 @@
-"""Where the rollouts of an evaluation start, and the means over them."""
+"""Starts of the rollouts of an evaluation, and means over them."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from robojackson.rl.sim.reference_clip import Clip
 from robojackson.robot.model import Robot
 
 MEANT = ("limb_", "excess_", "usage_", "reward_", "return_", "error_")
-"""Beginnings of further columns that are averaged over the rollouts."""
+"""Prefixes of further columns that are averaged over the rollouts."""
 STAND = -1
 """`phase` of the row that starts in the default stand."""
 
@@ -17,7 +17,7 @@ STAND = -1
 def starts_of(
     robot: Robot, clip: Clip, config: EvaluateConfig
 ) -> tuple[Starts, list[tuple[int, int]]]:
-    """Evenly spread phases with noisy resets, then the default stand at the first step.
+    """Return evenly spread phases with noisy resets, then the default stand at the first step.
 
     A clip that is not cyclic is started in its first quarter, so that most of it is always danced.
     """
@@ -37,7 +37,7 @@ def starts_of(
 
 
 def summarise(rows: list[dict[str, object]]) -> dict[str, float]:
-    """Means over rollouts; limb gains only over those in which the limb had to move."""
+    """Return means over rollouts; limb gains only over those in which the limb had to move."""
     keys = ("survived_s", "success", "strict_success", "skill", "site_error_m", "clip_fraction",
             "velocity_score", "drift_m", "heading_error_deg", "travel_ratio", "mpjpe_l_m",
             "mpjpe_g_m", "mpjpe_l_alive_m", "mpjpe_g_alive_m", "acceleration_ratio")  # fmt: skip

@@ -1,6 +1,6 @@
-"""Strict success: what a robot that did not fall must also not do at any step of its rollout.
+"""Strict success: further conditions on every step of a rollout without a fall.
 
-The rule stands in the robot's description (`robot.description.StrictRule`). World frame, metres.
+The rule is part of the robot's description (`robot.description.StrictRule`). World frame, metres.
 """
 
 from dataclasses import dataclass
@@ -18,14 +18,14 @@ from robojackson.robot.model import Robot
 HANDS = ("left_hand", "right_hand")
 KNEES = ("left_knee", "right_knee")
 FLOOR_M = 0.005
-"""A body nearer to the floor than this is on it."""
+"""Height below which a body counts as on the floor."""
 AROUND_S = 0.1
-"""A body may touch the floor this much before or after the reference does, seconds."""
+"""Tolerance of a contact before or after the reference's, seconds."""
 
 
 @dataclass(frozen=True)
 class StrictFindings:
-    """What a rollout did that strict success forbids.
+    """Violations of strict success in a rollout.
 
     Attributes:
         sites: The mean site error was too large at some step.
@@ -43,7 +43,7 @@ class StrictFindings:
 
     @property
     def any(self) -> bool:
-        """Whether strict success is forfeited."""
+        """Return whether strict success is violated."""
         return self.sites or self.ends or self.kneels or self.floor
 
 
@@ -68,26 +68,26 @@ class StrictEvaluator:
     def findings(
         self, rollouts: Rollouts, i: int, span: slice, start: int, error: Float[np.ndarray, " T"]
     ) -> StrictFindings:
-        """Judge one rollout up to its end or its fall.
+        """Return the violations of one rollout up to its end or its fall.
 
         Args:
             start: Step of the clip at which it began.
-            error: Its mean site error at every step, m.
+            error: Mean site error at every step, m.
         """
-        points, wanted = rollouts.points[span, i, :, 2], rollouts.target[span, i, :, 2]
+        points, target = rollouts.points[span, i, :, 2], rollouts.target[span, i, :, 2]
         low = self._knee_height
-        knees, asked = points[:, self._knees], wanted[:, self._knees]
-        off = np.abs(points - wanted)[:, self._ends].max()
+        knees, required = points[:, self._knees], target[:, self._knees]
+        off = np.abs(points - target)[:, self._ends].max()
         return StrictFindings(
             sites=float(error.max()) > self._sites,
             ends=self._end_height is not None and float(off) > self._end_height,
-            kneels=low is not None and bool(((knees < low) & (asked >= low)).any()),
+            kneels=low is not None and bool(((knees < low) & (required >= low)).any()),
             floor=self._touches(rollouts.qpos[span, i], start),
             worst_end_m=float(off),
         )
 
     def _touches(self, qpos: Float[np.ndarray, "T nq"], start: int) -> bool:
-        """Whether a body is on the floor that the reference does not hold there."""
+        """Return whether a body is on the floor where the reference's is not."""
         if self._held is None:
             return False
         step = start + 1 + np.arange(len(qpos))
@@ -96,7 +96,7 @@ class StrictEvaluator:
         return bool((self._on_floor(qpos) & ~self._held[step]).any())
 
     def _on_floor(self, qpos: Float[np.ndarray, "T nq"]) -> Bool[np.ndarray, "T B"]:
-        """Bodies other than the feet's that are on the floor."""
+        """Return the bodies other than the feet's that are on the floor."""
         found = np.zeros((len(qpos), self._count), bool)
         if self._detector is not None:
             touches = self._detector.touches(qpos)
@@ -109,7 +109,7 @@ class StrictEvaluator:
 def _widened(
     held: Bool[np.ndarray, "S B"], steps: Int[np.ndarray, ""] | int, cyclic: bool
 ) -> Bool[np.ndarray, "S B"]:
-    """The same, true some steps before and after, too."""
+    """Return the same, true for some steps before and after, too."""
     padded = np.pad(held, ((int(steps), int(steps)), (0, 0)), mode="wrap" if cyclic else "edge")
     shifted = [padded[k : k + len(held)] for k in range(2 * int(steps) + 1)]
     result: np.ndarray = np.any(shifted, axis=0)

@@ -1,4 +1,4 @@
-"""A tracker as the driver of an evaluation: it gets a window of the reference, and a memory."""
+"""A tracker as the driver of an evaluation, with a window of the reference and a memory."""
 
 import numpy as np
 

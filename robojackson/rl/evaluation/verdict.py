@@ -1,4 +1,4 @@
-"""What an evaluation says, as a kind with figures; the sentence is made from them last."""
+"""The verdict of an evaluation: a kind with figures, from which the sentence is made."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -6,16 +6,17 @@ from typing import Any, Literal
 
 Kind = Literal["too_short", "untrained", "falls", "learning", "partly", "dances"]
 SHORTEST_S = 2.0
-"""Rollouts shorter than this say nothing: a body that does nothing does not fall that fast."""
+"""Rollouts shorter than this are not evaluated: a body that does nothing does not fall that
+fast."""
 EASY = 0.5
-"""Strict success of a body that does not dance, from which on success says nothing."""
+"""Strict success of a body that does not dance above which an evaluation is meaningless."""
 DANCES = 0.95
-"""Strict success of a robot that dances."""
+"""Least strict success of a robot that dances."""
 PARTLY = 0.5
 NO_BETTER = 1.25
-"""Times the survival of the best baseline up to which a robot is no better."""
+"""Factor on the best baseline's survival up to which a robot counts as no better."""
 NEEDS_FULL_LENGTH = ("success", "strict_success", "skill")
-"""Figures that are empty where the rollouts are too short to judge."""
+"""Figures that are empty where the rollouts are too short to evaluate."""
 TITLES = {
     "statue": "a statue",
     "mean_pose": "the mean pose",
@@ -26,17 +27,17 @@ TITLES = {
 
 @dataclass(frozen=True)
 class Verdict:
-    """What is to be said of a policy.
+    """The verdict on a policy.
 
     Attributes:
-        kind: In one word.
+        kind: Name of the verdict.
         seconds: Length of a rollout, seconds.
-        survived_s: Of the policy, mean, seconds.
-        strict_success: Of the policy, 0..1.
-        skill: Of the policy; 1 is perfect.
+        survived_s: Mean survival of the policy, seconds.
+        strict_success: Strict success of the policy, 0..1.
+        skill: Skill of the policy; 1 is perfect.
         baseline: The body that does not dance and comes nearest.
-        baseline_s: Its survival, mean, seconds.
-        baseline_success: Its strict success, 0..1.
+        baseline_s: Mean survival of the baseline, seconds.
+        baseline_success: Strict success of the baseline, 0..1.
     """
 
     kind: Kind
@@ -56,7 +57,7 @@ class Verdict:
             why = f"rollouts last {self.seconds:.1f} s"
             if self.baseline_success >= EASY:
                 why += f", and {other} succeeds in {self.baseline_success:.0%} of them"
-            return f"Too short to judge: {why}."
+            return f"Too short to evaluate: {why}."
         if self.kind == "untrained":
             return "The robot has learnt nothing: the training ended before its first update."
         if self.kind == "dances":
@@ -77,7 +78,7 @@ class Verdict:
         )
 
     def as_facts(self) -> dict[str, Any]:
-        """Return kind and sentence, as they stand in evaluation.json."""
+        """Return kind and sentence for evaluation.json."""
         return {"kind": self.kind, "sentence": self.sentence, "seconds": self.seconds}
 
 
@@ -93,7 +94,7 @@ def verdict_on(
         own: Means over its rollouts: survived_s, strict_success, skill.
         baselines: The same of bodies that do not dance, by name.
         seconds: Length of a rollout that does not end early, seconds.
-        updates: Gradient updates of its training; None where nobody knows.
+        updates: Gradient updates of its training; None where unknown.
     """
     survived = {name: found["survived_s"] for name, found in baselines.items()}
     success = {name: found["strict_success"] for name, found in baselines.items()}
@@ -122,5 +123,5 @@ def _kind(
 
 
 def without_short_figures(figures: Mapping[str, Any]) -> dict[str, Any]:
-    """Return figures with those empty that say nothing in rollouts that are too short."""
+    """Return figures without those that are meaningless in rollouts that are too short."""
     return {**figures, **{name: None for name in NEEDS_FULL_LENGTH if name in figures}}

@@ -1,4 +1,4 @@
-"""How far a walker walks: Humanoid-v5 as gymnasium makes it, deterministic, whole episodes."""
+"""Evaluation of a walker: Humanoid-v5 as gymnasium makes it, deterministic, whole episodes."""
 
 from dataclasses import dataclass
 
@@ -18,8 +18,8 @@ class Walk:
     Attributes:
         episode_return: Sum of Humanoid-v5's reward.
         episode_length: Control steps, at most 1,000.
-        distance_m: Of the root, ahead.
-        episodes: How many.
+        distance_m: Distance of the root ahead, metres.
+        episodes: Number of episodes.
     """
 
     episode_return: float
@@ -29,7 +29,7 @@ class Walk:
 
 
 def walk(policy: Policy, robot: Robot, episodes: int = 10, seed: int = 0) -> Walk:
-    """Let a policy of 348 observations (or of the first 45 of them) walk till it falls."""
+    """Run a policy of 348 observations (or of the first 45 of them) until the robot falls."""
     config = PaperConfig(preset="walker")
     core = TrackingCore(robot, make_standing_motion(robot), config, episodes, seed)
     seen = core.reset()

@@ -1,7 +1,7 @@
-"""What differs between the two ways of learning a motion, `track` and `paper`.
+"""Interface of the two ways to learn a motion, `track` and `paper`.
 
-The environment is one class, `tracking_core.TrackingCore`; a mode tells it how an action becomes a
-command, what the policy sees, what a step is worth and how an episode begins.
+The environment is one class, `tracking_core.TrackingCore`; a mode defines the command of an action,
+the observation, the reward of a step and the start of an episode.
 """
 
 from dataclasses import dataclass, field
@@ -16,11 +16,11 @@ from robojackson.rl.sim.simulation import Simulation
 
 @dataclass(frozen=True)
 class Score:
-    """What one step was worth; arrays have N rows.
+    """Score of one step; arrays have N rows.
 
     Attributes:
         terms: Parts of the reward.
-        failed: Ends by a fall or by getting lost.
+        failed: Episodes that end by a fall or by leaving the track.
         site_error: Mean distance of the sites relative to the pelvis, m.
         errors: Further errors for the table of episodes, by name.
     """
@@ -33,7 +33,7 @@ class Score:
 
 @dataclass(frozen=True)
 class EpisodeStart:
-    """States in which episodes begin, and the clip step that each belongs to."""
+    """States in which episodes start, and the clip step of each."""
 
     step: Int[np.ndarray, " I"]
     qpos: Float[np.ndarray, "I nq"]
@@ -45,11 +45,11 @@ class Mode(Protocol):
 
     Attributes:
         sim: The simulation, under the control law of the mode.
-        clip: The motion, as the mode compares with it.
+        clip: The motion that the mode compares with.
         repeats: Control steps an action.
         limit: Control steps of an episode.
         observation_size: Length of an observation.
-        actor_size: Length of what the policy sees of it: its beginning.
+        actor_size: Length of the policy's part of it, at its beginning.
     """
 
     sim: Simulation
@@ -60,40 +60,40 @@ class Mode(Protocol):
     actor_size: int
 
     def command(self, following: ClipStep, action: np.ndarray) -> np.ndarray:
-        """What the simulation is told, for actions -1..1 and the reference's next step."""
+        """Return the simulation's command for actions -1..1 and the reference's next step."""
 
     def observe(self, following: ClipStep, action: np.ndarray) -> Float[np.ndarray, "N D"]:
-        """What the policies see, with the next step of the reference and their last action."""
+        """Return the observations, with the next step of the reference and the last action."""
 
     def after(self, command: np.ndarray) -> None:
-        """Called after every control step of the simulation."""
+        """Count a control step of the simulation; called after each."""
 
     def score(self, at: ClipStep, before: np.ndarray, change: np.ndarray, episode: int) -> Score:
-        """What the last action was worth.
+        """Return the score of the last action.
 
         Args:
             at: The reference now.
             before: The sites one action ago, world, m.
             change: Mean squared change of the action.
-            episode: Number of episodes that ended before.
+            episode: Number of finished episodes.
         """
 
     def begin(self, count: int, rng: np.random.Generator) -> EpisodeStart:
-        """States for new episodes."""
+        """Return states for new episodes."""
 
     def ended(
         self, start: Int[np.ndarray, " I"], failed: np.ndarray, age: Int[np.ndarray, " I"]
     ) -> dict[str, float]:
-        """Learn from episodes that ended; columns for their rows."""
+        """Learn from finished episodes; return columns for their rows."""
 
     def record_finished(self, indices: Int[np.ndarray, " I"], step: Int[np.ndarray, " I"]) -> None:
         """Learn from the states of episodes that reached the time limit."""
 
     def forget(self) -> None:
-        """Forget what was learnt from episodes."""
+        """Reset everything learnt from episodes."""
 
     def state(self) -> dict[str, Any]:
-        """Arrays that a resumed run needs."""
+        """Return the arrays that a resumed run needs."""
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Go on from what `state` gave."""
+        """Restore the mode from `state`."""

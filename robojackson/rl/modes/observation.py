@@ -1,13 +1,13 @@
-"""What the policy sees: the robot in its own frame, the next reference step, and the difference.
+"""Observation of a policy: the robot in its own frame, the next reference step, the difference.
 
-Metres, radians, seconds, scaled by fixed constants to about one and clipped to +-10. Vectors are
-in the frame of the root body, so a policy knows nothing of where north is, except through the
-difference to its reference.
+Metres, radians, seconds, scaled by fixed constants to about one and clipped to +-10. Vectors are in
+the frame of the root body, so a policy does not know its heading, except through the difference to
+its reference.
 
-`full` is all that a simulation knows. `onboard` is what a robot measures by itself: gyroscope,
+`full` is everything that a simulation knows. `onboard` is the robot's own measurements: gyroscope,
 attitude and joints (the inputs of mjlab's tracking task without state estimation): 9 + 5 numbers a
-hinge, 154 on the Unitree G1. `preview` is that and the reference ahead (`sim.preview`), for
-policies that follow more than one motion. While it learns, the rest follows for the critics alone.
+hinge, 154 on the Unitree G1. `preview` is these and the reference ahead (`sim.preview`), for
+policies that follow more than one motion. In training, the rest follows for the critics alone.
 """
 
 from typing import Literal
@@ -23,15 +23,15 @@ from robojackson.robot.model import Robot
 SPEED_SCALE, HINGE_SPEED_SCALE, POINT_SCALE, ROOT_SCALE, CLIP = 0.3, 0.1, 2.0, 3.0, 10.0
 USUAL_HEIGHT_M = 1.2
 Kind = Literal["full", "onboard", "preview"]
-"""Which inputs the policy gets."""
+"""Kinds of the policy's inputs."""
 
 
 class Observer:
     """Builds the observation of N robots.
 
     Attributes:
-        size: Length of the observation while learning.
-        actor_size: Length of what the policy takes of it: its beginning.
+        size: Length of the observation in training.
+        actor_size: Length of the policy's part of it, at its beginning.
     """
 
     def __init__(self, robot: Robot, kind: Kind) -> None:
@@ -53,15 +53,15 @@ class Observer:
         target: ClipStep,
         last_action: Float[np.ndarray, "N nu"],
     ) -> Float[np.ndarray, "N D"]:
-        """Observation of N robots whose next reference step is `target`, float32.
+        """Return the observation of N robots whose next reference step is `target`, float32.
 
         Args:
             points: Keypoint sites, world, m.
-            last_action: -1..1.
+            last_action: Last action, -1..1.
         """
-        turned, wanted = quat_to_matrix(np.stack([qpos[:, 3:7], target.qpos[:, 3:7]]))
+        turned, target_turn = quat_to_matrix(np.stack([qpos[:, 3:7], target.qpos[:, 3:7]]))
         to_body = np.swapaxes(turned, 1, 2)
-        turn = to_body @ wanted
+        turn = to_body @ target_turn
 
         def local(vector: np.ndarray) -> np.ndarray:
             found: np.ndarray = np.einsum("nij,nj->ni", to_body, vector)

@@ -1,8 +1,8 @@
-"""The paper's way: torques and 348 observations of stock Humanoid-v5, its reward, its curriculum.
+"""The paper's mode: torques and 348 observations of stock Humanoid-v5, its reward, its curriculum.
 
-The policy sees no phase and no reference. An episode begins in Humanoid-v5's own reset, which
+The policy sees neither phase nor reference. An episode starts with Humanoid-v5's own reset, which
 stands at the origin and faces +x; the motion is turned so that its first step does the same. It
-ends by a fall, at the end of the motion, or when a cyclic one was danced for `PaperConfig.seconds`.
+ends by a fall, at the end of the motion, or for a cyclic one after `PaperConfig.seconds`.
 """
 
 from collections.abc import Sequence
@@ -32,7 +32,7 @@ from robojackson.robot.model import Robot
 
 PELVIS = "pelvis"
 SPINE = ("lwaist", "torso")
-"""Bodies of Humanoid-v5 among the points; another robot may do without."""
+"""Bodies of Humanoid-v5 among the points; other robots may lack them."""
 
 
 class PaperMode:
@@ -58,11 +58,13 @@ class PaperMode:
         self._early = 0
 
     def command(self, following: ClipStep, action: np.ndarray) -> np.ndarray:
+        """Return the torques of the actions."""
         self._com = self.sim.com.copy()
         result: np.ndarray = self._control * action
         return result
 
     def observe(self, following: ClipStep, action: np.ndarray) -> Float[np.ndarray, "N D"]:
+        """Return Humanoid-v5's observation."""
         return stock_observation(self.sim)[:, : self.observation_size]
 
     def after(self, command: np.ndarray) -> None:
@@ -71,6 +73,7 @@ class PaperMode:
             self._own += own_reward(self.sim, self._com, command)
 
     def score(self, at: ClipStep, before: np.ndarray, change: np.ndarray, episode: int) -> Score:
+        """Return the score of the last action by the paper's reward."""
         config = self._config
         state = self.points.of(self.sim)
         apart = miss(state, *self.points.targets(self.clip, at.step), self.points.weights)
@@ -83,6 +86,7 @@ class PaperMode:
         return Score(terms, fell, self._site_error(at), errors)
 
     def begin(self, count: int, rng: np.random.Generator) -> EpisodeStart:
+        """Return Humanoid-v5's reset states."""
         noise, model = self._config.reset_noise, self.sim.model
         qpos = self._stand + rng.uniform(-noise, noise, (count, model.nq))
         qpos[:, 3:7] /= np.linalg.norm(qpos[:, 3:7], axis=-1, keepdims=True)
@@ -92,20 +96,24 @@ class PaperMode:
     def ended(
         self, start: Int[np.ndarray, " I"], failed: np.ndarray, age: Int[np.ndarray, " I"]
     ) -> dict[str, float]:
+        """Return columns for the rows of finished episodes."""
         actions = age / self.repeats
         self._early += int(np.sum(failed & (actions < self._config.early_fall)))
         return {"train_early_falls": float(self._early)}
 
     def record_finished(self, indices: Int[np.ndarray, " I"], step: Int[np.ndarray, " I"]) -> None:
-        """The paper learns nothing from them."""
+        """Do nothing: the paper does not learn from them."""
 
     def forget(self) -> None:
+        """Reset the count of early falls."""
         self._early = 0
 
     def state(self) -> dict[str, Any]:
+        """Return the arrays that a resumed run needs."""
         return {"early": np.array(self._early)}
 
     def restore(self, state: dict[str, Any]) -> None:
+        """Restore the mode from `state`."""
         self._early = int(state["early"])
 
     def _site_error(self, at: ClipStep) -> Float[np.ndarray, " N"]:
@@ -137,14 +145,14 @@ class PaperPoints:
         self._order = _columns(weights, found)
         pelvis = robot.description.sites[PELVIS][0]
         self._pelvis = bodies.index(pelvis)
-        told = list(reference.body_names)
+        names = list(reference.body_names)
         self._reference = self._named(
-            reference.keypoints_w, reference.body_pos_w[:, [told.index(name) for name in bodies]]
+            reference.keypoints_w, reference.body_pos_w[:, [names.index(name) for name in bodies]]
         )
-        self._root = np.asarray(reference.body_pos_w, float)[:, told.index(pelvis)]
+        self._root = np.asarray(reference.body_pos_w, float)[:, names.index(pelvis)]
 
     def of(self, sim: Simulation) -> PaperState:
-        """What the reward looks at, of every robot of a simulation."""
+        """Return the state of every robot of a simulation that the reward uses."""
         bodies = bodies_now(sim)[:, 1:]
         _, x, y, _ = sim.qpos[:, 3:7].T
         return PaperState(
@@ -160,7 +168,7 @@ class PaperPoints:
     def targets(
         self, clip: Clip, step: Int[np.ndarray, " N"]
     ) -> tuple[Float[np.ndarray, "N P 3"], Float[np.ndarray, "N 3"]]:
-        """The reference's points and its pelvis at each robot's step, world."""
+        """Return the reference's points and its pelvis at each robot's step, world."""
         return clip.gather(self._reference, step), clip.gather(self._root[:, None], step)[:, 0]
 
     def _named(self, sites: np.ndarray, bodies: np.ndarray) -> Float[np.ndarray, "N P 3"]:
@@ -169,7 +177,7 @@ class PaperPoints:
 
 
 def facing_ahead(reference: ReferenceMotion) -> ReferenceMotion:
-    """The motion moved and turned so that it begins above the origin, facing +x."""
+    """Return the motion moved and turned so that it starts above the origin, facing +x."""
     yaw = float(heading(reference.qpos[0, 3:7]))
     turn = np.array([np.cos(yaw / 2), 0.0, 0.0, -np.sin(yaw / 2)])
     c, s = np.cos(yaw), np.sin(yaw)

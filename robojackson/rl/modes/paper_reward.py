@@ -3,8 +3,8 @@
     r = -lambda sum_j w_j |p_j - p_ref_j|^2 / sum_j w_j  +  3.0 max(0, z . g)
         + 2.0 / (1 + |COM_xy - pelvis_xy|)  +  beta sum_i |q'_i|  -  200 at a fall
 
-Distances in metres, speeds in rad/s. The paper does not say whether the points are compared in the
-world or relative to the root; the choice decides what is asked for, so both are computed.
+Distances in metres, speeds in rad/s. The paper does not define whether the points are compared in
+the world or relative to the root; this changes the task, so both are computed.
 """
 
 from dataclasses import dataclass
@@ -17,15 +17,15 @@ from robojackson.rl.config.paper_config import BETA, PaperConfig
 
 @dataclass(frozen=True)
 class PaperState:
-    """What the reward looks at, for N robots.
+    """State of N robots that the reward uses.
 
     Attributes:
         points: The named points, world, metres.
-        root: Their pelvis body, world, metres.
+        root: Positions of the pelvis body, world, metres.
         com: Centres of mass, world, metres.
         upright: z . g, the torso's axis against gravity.
-        height: Of the torso, metres.
-        hinge_speed: rad/s.
+        height: Height of the torso, metres.
+        hinge_speed: Speeds of the hinges, rad/s.
         spin: Sum over bodies of their angular speeds, rad/s.
     """
 
@@ -47,7 +47,7 @@ class Miss:
 
 
 def ramp(episode: int, config: PaperConfig) -> float:
-    """lambda of an episode: max(lambda_min, lambda_max * min(1, episode / 1000))."""
+    """Return lambda of an episode: max(lambda_min, lambda_max * min(1, episode / 1000))."""
     share = min(1.0, episode / config.ramp_episodes)
     return max(config.lambda_min, config.lambda_max * share)
 
@@ -58,7 +58,7 @@ def miss(
     target_root: Float[np.ndarray, "N 3"],
     weights: Float[np.ndarray, " P"],
 ) -> Miss:
-    """How far the points are from where the reference has them."""
+    """Return the distances of the points from the reference's."""
     apart = state.points - target
     carried = apart - (state.root - target_root)[:, None]
 
@@ -70,7 +70,7 @@ def miss(
 
 
 def has_fallen(state: PaperState, config: PaperConfig) -> Bool[np.ndarray, " N"]:
-    """The paper's fall rule: the torso below 0.7 m or tilted over 60 degrees."""
+    """Return whether robots have fallen: the torso below 0.7 m or tilted over 60 degrees."""
     tilted = state.upright < np.cos(min(config.fall_tilt, np.pi)) - 1e-12
     result: np.ndarray = (
         (state.height < config.fall_height) | tilted | (state.height > config.highest)
@@ -85,7 +85,7 @@ def paper_terms(
     lambda_: float,
     config: PaperConfig,
 ) -> dict[str, Float[np.ndarray, " N"]]:
-    """Named terms whose sum is the reward, but for Humanoid-v5's own."""
+    """Return named terms whose sum is the reward without Humanoid-v5's own."""
     chosen = apart.root if config.relative == "root" else apart.world
     offset = np.linalg.norm(state.com[:, :2] - state.root[:, :2], axis=-1)
     terms = {
@@ -100,7 +100,8 @@ def paper_terms(
 
 
 def speed(state: PaperState, config: PaperConfig) -> Float[np.ndarray, " N"]:
-    """What curiosity pays for: the sum of absolute hinge speeds, or of angular body speeds."""
+    """Return the speed that curiosity rewards: summed absolute hinge speeds, or angular body
+    speeds."""
     if config.curiosity_of == "bodies":
         return state.spin
     result: np.ndarray = np.abs(state.hinge_speed).sum(-1)

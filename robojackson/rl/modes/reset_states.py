@@ -1,7 +1,7 @@
-"""Where episodes begin: a phase of the clip, a state reached before, or the default stand.
+"""Starts of episodes: a phase of the clip, a state reached before, or the default stand.
 
 Phases are drawn more often where episodes end early (as in BeyondMimic's adaptive sampling): the
-clip is cut into bins and each keeps a moving average of its failures.
+clip is divided into bins, each with a moving average of its failures.
 """
 
 import mujoco
@@ -15,8 +15,8 @@ from robojackson.robot.model import Robot
 
 BIN_SECONDS, MOST_BINS = 0.25, 250
 FORGET, FORGET_OF_MANY = 0.02, 0.1
-"""Share by which an episode's end moves the average of its bin; with several motions each bin is
-seen less often."""
+"""Share by which an episode's end changes the average of its bin; with several motions each bin is
+visited less often."""
 EVEN = 0.5
 SETTLED_STATES = 4096
 
@@ -33,7 +33,7 @@ class StartPhases:
         self._share = failure_share
 
     def draw(self, count: int, rng: np.random.Generator) -> Int[np.ndarray, " count"]:
-        """Start steps, a share of them where failures are frequent."""
+        """Return start steps, a share of them where failures are frequent."""
         uniform = rng.integers(self._last, size=count)
         weight = self.failures + 1e-3
         bins = rng.choice(self._bins, size=count, p=weight / weight.sum())
@@ -42,20 +42,20 @@ class StartPhases:
         return self._steps[np.where(rng.random(count) < self._share, weak, uniform)]
 
     def forget(self) -> None:
-        """Take every phase for equally hard."""
+        """Reset all phases to equal difficulty."""
         self.failures[:] = EVEN
 
     def record(self, start: Int[np.ndarray, " I"], failed: np.ndarray) -> None:
-        """Learn from ended episodes: the step each began at and whether it fell or got lost."""
+        """Learn from finished episodes: the start step of each and whether it failed."""
         bins = self._clip.row(start) * self._bins // self._last
         for index, bad in zip(bins, failed, strict=True):
             self.failures[index] += self._forget * (float(bad) - self.failures[index])
 
 
 class SettledStates:
-    """A ring of states in which the robot danced when the time limit came: it got there by itself.
+    """A ring buffer of states that the robot reached by itself, from dances up to the time limit.
 
-    The root's place over the floor is kept relative to its reference, with the drift that it had.
+    The root's place over the floor is stored relative to its reference, including the drift.
     """
 
     def __init__(self, nq: int, nv: int) -> None:
@@ -68,7 +68,7 @@ class SettledStates:
         return min(self._count, SETTLED_STATES)
 
     def add(self, qpos: np.ndarray, qvel: np.ndarray, step: int) -> None:
-        """Keep one state whose root is relative to the reference at that step of the clip."""
+        """Store one state whose root is relative to the reference at that step of the clip."""
         slot = self._count % SETTLED_STATES
         self._qpos[slot], self._qvel[slot], self._step[slot] = qpos, qvel, step
         self._count += 1
@@ -78,20 +78,20 @@ class SettledStates:
         self._count = 0
 
     def state(self) -> dict[str, np.ndarray]:
-        """Everything, as arrays."""
+        """Return the buffer as arrays."""
         kept = len(self)
         named = {"qpos": self._qpos, "qvel": self._qvel, "step": self._step}
         held = {f"settled_{name}": array[:kept].copy() for name, array in named.items()}
         return held | {"settled_count": np.array(self._count)}
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
-        """Go on from what `state` gave."""
+        """Restore the buffer from `state`."""
         kept = len(state["settled_step"])
         self._qpos[:kept], self._qvel[:kept] = state["settled_qpos"], state["settled_qvel"]
         self._step[:kept], self._count = state["settled_step"], int(state["settled_count"])
 
     def draw(self, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, int]:
-        """One of the kept states: qpos, qvel and the clip step that it belongs to."""
+        """Return a random stored state: qpos, qvel and its clip step."""
         slot = int(rng.integers(len(self)))
         return self._qpos[slot].copy(), self._qvel[slot].copy(), int(self._step[slot])
 
@@ -102,7 +102,7 @@ def noisy(
     config: ResetConfig,
     rng: np.random.Generator,
 ) -> tuple[Float[np.ndarray, "I nq"], Float[np.ndarray, "I nv"]]:
-    """The states with Gaussian noise on hinges and velocities."""
+    """Return the states with Gaussian noise on hinges and velocities."""
     qpos, qvel = qpos.copy(), qvel.copy()
     qpos[:, 7:] += rng.normal(0, config.joint_noise, qpos[:, 7:].shape)
     qvel[:, 6:] += rng.normal(0, config.joint_speed_noise, qvel[:, 6:].shape)
@@ -111,7 +111,7 @@ def noisy(
 
 
 def default_standing_pose(robot: Robot) -> Float[np.ndarray, " nq"]:
-    """The robot's stand with its lowest solid geom on the floor, facing +x at the origin."""
+    """Return the robot's stand with its lowest solid geom on the floor, facing +x at the origin."""
     model = robot.model
     data = mujoco.MjData(model)
     data.qpos[7:] = robot.stand
@@ -126,7 +126,7 @@ def default_standing_pose(robot: Robot) -> Float[np.ndarray, " nq"]:
 
 
 def standing_pose_at(stand: Float[np.ndarray, " nq"], root: Float[np.ndarray, " 7"]) -> np.ndarray:
-    """The default stand moved to a root pose's place over the floor and its heading."""
+    """Return the default stand moved to a root pose's place over the floor and its heading."""
     qpos = stand.copy()
     yaw = float(heading(root[3:7]))
     qpos[:2] = root[:2]
@@ -135,7 +135,7 @@ def standing_pose_at(stand: Float[np.ndarray, " nq"], root: Float[np.ndarray, " 
 
 
 def _reach_down(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> float:
-    """How far a sphere, capsule, box or mesh extends below its centre, metres."""
+    """Return the extent of a sphere, capsule, box or mesh below its centre, metres."""
     kind, size = model.geom_type[geom], model.geom_size[geom]
     up = data.geom_xmat[geom].reshape(3, 3)[2]
     if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:

@@ -20,7 +20,7 @@ from robojackson.rl.sim.reference_clip import ClipStep
 RewardFunction = Callable[["RewardState"], Float[np.ndarray, " N"]]
 """A reward term of a user: one number a robot."""
 BELLS = RewardConfig.terms()
-"""Terms of the reward that pay for a small error: each has the same name in `TrackingErrors`."""
+"""Terms of the reward for small errors: each has the same name in `TrackingErrors`."""
 PELVIS = "pelvis"
 FEET = ("left_foot", "right_foot")
 SOLES = (*FEET, "left_toe", "right_toe")
@@ -29,12 +29,12 @@ EXTREMITIES = ("left_hand", "right_hand", "head")
 
 @dataclass(frozen=True)
 class TrackedPoints:
-    """Which of the points are special: indices, bound by name.
+    """Indices of special points, bound by name.
 
     Attributes:
-        pelvis: What the others are compared relative to.
+        pelvis: Reference point of the others.
         hands: Hands and head.
-        limbs: Feet, hands and head: the ends that must not flail.
+        limbs: Feet, hands and head: the limb ends.
         feet: Feet, and toes where the robot has them.
     """
 
@@ -45,7 +45,7 @@ class TrackedPoints:
 
 
 def tracked_points(names: tuple[str, ...]) -> TrackedPoints:
-    """The special ones of a robot's keypoints."""
+    """Return the special points of a robot's keypoints."""
     return TrackedPoints(
         pelvis=names.index(PELVIS),
         hands=tuple(names.index(name) for name in EXTREMITIES),
@@ -56,7 +56,7 @@ def tracked_points(names: tuple[str, ...]) -> TrackedPoints:
 
 @dataclass(frozen=True)
 class TrackingErrors:
-    """How far each of N robots is from its reference.
+    """Errors of N robots relative to their references.
 
     Attributes:
         joints: Root mean square over hinges, rad.
@@ -94,12 +94,12 @@ def tracking_errors(
     target: ClipStep,
     which: TrackedPoints,
 ) -> TrackingErrors:
-    """Compare states with their reference; `moved` is the velocity of the points, m/s."""
+    """Return the errors of states; `moved` is the velocity of the points, m/s."""
     relative = points - points[:, which.pelvis, None]
-    wanted = target.points - target.points[:, which.pelvis, None]
-    squared = _squares(relative - wanted)
+    aim = target.points - target.points[:, which.pelvis, None]
+    squared = _squares(relative - aim)
     hurry = _squares((moved - target.moved).take(which.limbs, 1))
-    lifted = (relative - wanted).take(which.feet, 1)
+    lifted = (relative - aim).take(which.feet, 1)
     lifted[..., 2] = (points - target.points).take(which.feet, 1)[..., 2]
     place, speed = qpos - target.qpos, qvel - target.qvel
     return TrackingErrors(
@@ -119,7 +119,7 @@ def tracking_errors(
 
 @dataclass(frozen=True)
 class RewardState:
-    """What a reward term of a user sees: N robots after a control step. World frame; read-only.
+    """Input of a user's reward term: N robots after a control step. World frame; read-only.
 
     Attributes:
         qpos: MuJoCo positions; root at 0:3 (m), its quaternion wxyz at 3:7, hinges (rad).
@@ -127,7 +127,7 @@ class RewardState:
         points: Keypoint sites, m, in the order of `Robot.keypoint_names`.
         moved: Their velocities, m/s.
         target: The reference at the same step.
-        errors: How far each robot is from it.
+        errors: Errors of each robot.
         action_change: Mean squared change of the action, -1..1.
     """
 
@@ -143,10 +143,10 @@ class RewardState:
 def own_terms(
     functions: Mapping[str, RewardFunction], state: RewardState
 ) -> dict[str, Float[np.ndarray, " N"]]:
-    """The reward terms of a user's functions, by their names.
+    """Return the reward terms of a user's functions, by their names.
 
     Raises:
-        BadConfiguration: one returns anything but one finite number a robot.
+        BadConfiguration: a function returns anything but one finite number a robot.
     """
     count = len(state.qpos)
     terms = {}
@@ -156,7 +156,7 @@ def own_terms(
             raise BadConfiguration(
                 f"reward {name!r} returned {value.dtype} of shape {value.shape}"
                 f"{'' if np.isfinite(value).all() else ' with NaN or infinity'}; "
-                f"one finite number for each of {count} robots is wanted"
+                f"expected one finite number for each of {count} robots"
             )
         terms[name] = value
     return terms
@@ -165,7 +165,7 @@ def own_terms(
 def reward_terms(
     errors: TrackingErrors, action_change: Float[np.ndarray, " N"], config: RewardConfig
 ) -> dict[str, Float[np.ndarray, " N"]]:
-    """Named terms whose sum is the reward; `action_change` is the mean squared change."""
+    """Return named terms whose sum is the reward; `action_change` is the mean squared change."""
     error = np.array([getattr(errors, name) for name in BELLS])
     width = np.array([[getattr(config, f"{name}_width")] for name in BELLS])
     weight = np.array([[getattr(config, name)] for name in BELLS])
@@ -176,18 +176,19 @@ def reward_terms(
 
 
 def _squares(vectors: Float[np.ndarray, "*B D"]) -> Float[np.ndarray, "*B"]:
-    """Squared lengths. Here and below `np.add.reduce`: `np.sum` and `np.mean` cost several times
-    as much for the few numbers of a control step."""
+    """Return squared lengths. Here and below `np.add.reduce`: `np.sum` and `np.mean` cost several
+    times as much for the few numbers of a control step."""
     return np.asarray(np.add.reduce(vectors**2, -1))
 
 
 def _mean(values: Float[np.ndarray, "*B K"]) -> Float[np.ndarray, "*B"]:
-    """Mean over the last axis."""
+    """Return the mean over the last axis."""
     return np.asarray(np.add.reduce(values, -1) / values.shape[-1])
 
 
 def is_off_track(errors: TrackingErrors, config: TerminationConfig) -> Bool[np.ndarray, " N"]:
-    """Early termination of training: too far from the reference to learn from."""
+    """Return whether robots are too far from the reference to learn from; it ends a training
+    episode."""
     result: np.ndarray = (
         (errors.orientation > config.orientation)
         | (np.abs(errors.height) > config.height)

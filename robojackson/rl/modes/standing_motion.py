@@ -1,4 +1,4 @@
-"""A reference motion that only stands: for tasks that ask for no motion, such as plain walking."""
+"""A reference motion that only stands: for tasks without a motion, such as plain walking."""
 
 import mujoco
 import numpy as np
@@ -11,7 +11,7 @@ STEPS = 20
 
 
 def make_standing_motion(robot: Robot) -> ReferenceMotion:
-    """The default stand, held, cyclic."""
+    """Return the default stand, held, cyclic."""
     model, dt = robot.model, robot.description.control_dt
     data = mujoco.MjData(model)
     data.qpos[:] = default_standing_pose(robot)

@@ -1,8 +1,8 @@
-"""The method that dances: residuals on PD targets, local tracking reward, starts all over the clip.
+"""The tracking mode: residuals on PD targets, local tracking reward, starts all over the clip.
 
 Action: residual joint angles in actuator order, -1..1, times `Simulation.residual` radians, added
 to the reference's next hinge angles and followed by the PD law of `Simulation`. Observation:
-`observation.Observer`. Reward: `rewards.reward_terms`. Episodes start as `reset_states` says.
+`observation.Observer`. Reward: `rewards.reward_terms`. Starts of episodes: `reset_states`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -44,7 +44,7 @@ from robojackson.robot.model import Robot
 
 SETTLED_STATES_NEEDED = 32
 PERFECT_OF_THE_PAPER = 5.0
-"""What a perfect step earns by the paper's reward; by ours, `RewardConfig.perfect`."""
+"""Reward of a perfect step by the paper; ours is `RewardConfig.perfect`."""
 
 
 class TrackMode:
@@ -78,17 +78,20 @@ class TrackMode:
         self.actor_size = self._observer.actor_size
 
     def command(self, following: ClipStep, action: np.ndarray) -> np.ndarray:
+        """Return the motors' targets of the actions."""
         result: np.ndarray = self.sim.reference_angles(following) + self.sim.residual * action
         return result
 
     def observe(self, following: ClipStep, action: np.ndarray) -> Float[np.ndarray, "N D"]:
+        """Return the observations."""
         sim = self.sim
         return self._observer.observe(*sim.sensed(), sim.points, following, action)
 
     def after(self, command: np.ndarray) -> None:
-        """Nothing is counted within a step."""
+        """Do nothing: no quantity is counted within a step."""
 
     def score(self, at: ClipStep, before: np.ndarray, change: np.ndarray, episode: int) -> Score:
+        """Return the score of the last action by the tracking reward."""
         sim, rules = self.sim, self._config.termination
         moved = (sim.points - before) / self.clip.dt
         errors, terms = evaluate_step(sim, moved, at, change, self._which, self._config.reward)
@@ -100,6 +103,7 @@ class TrackMode:
         return Score(terms, failed, errors.site_mean)
 
     def begin(self, count: int, rng: np.random.Generator) -> EpisodeStart:
+        """Return states for new episodes: a phase, a state reached before, or the stand."""
         reset = self._config.reset
         phase = self.starts.draw(count, rng)
         at = self.clip.at(phase)
@@ -117,11 +121,12 @@ class TrackMode:
     def ended(
         self, start: Int[np.ndarray, " I"], failed: np.ndarray, age: Int[np.ndarray, " I"]
     ) -> dict[str, float]:
+        """Learn from finished episodes; return columns for their rows."""
         self.starts.record(start, failed)
         return {}
 
     def record_finished(self, indices: Int[np.ndarray, " I"], step: Int[np.ndarray, " I"]) -> None:
-        """Keep the last states of episodes that reached the time limit of a cyclic motion."""
+        """Store the last states of episodes that reached the time limit of a cyclic motion."""
         for i, at in zip(indices, step, strict=True):
             now = np.array([at])
             if self.clip.repeats(now)[0]:
@@ -130,20 +135,23 @@ class TrackMode:
                 self._settled.add(qpos, self.sim.qvel[i], int(self.clip.folded(now)[0]))
 
     def forget(self) -> None:
+        """Reset everything learnt from episodes."""
         self.starts.forget()
         self._settled.forget()
 
     def state(self) -> dict[str, Any]:
+        """Return the arrays that a resumed run needs."""
         return {"failures": self.starts.failures, **self._settled.state()}
 
     def restore(self, state: dict[str, Any]) -> None:
+        """Restore the mode from `state`."""
         self.starts.failures = np.array(state["failures"])
         self._settled.restore(state)
 
 
 def control_of(config: TrackConfig) -> ControlConfig:
-    """The control law of a training: feedback of all that a simulation knows is for policies that
-    see as much."""
+    """Return the control law of a training: feedback of the full state is only for policies that
+    see it."""
     if config.observation == "full" or config.control.feedback is not None:
         return config.control
     return replace(config.control, feedback=0.0)
@@ -157,7 +165,7 @@ def evaluate_step(
     which: TrackedPoints,
     reward: RewardConfig,
 ) -> tuple[TrackingErrors, dict[str, Float[np.ndarray, " N"]]]:
-    """Errors of every robot and the terms of its reward, the bonus for curiosity with them.
+    """Return errors of every robot and the terms of its reward, including the bonus for curiosity.
 
     Args:
         moved: Velocity of the points, m/s.

@@ -1,7 +1,7 @@
-"""What disturbs a simulated robot while it trains or is tested: pushes and sensor noise.
+"""Disturbances of a simulated robot in training or evaluation: pushes and sensor noise.
 
-Random numbers follow from the seed and the count of control steps, so that a training that is
-resumed goes on with the same. World frame, metres, radians, seconds. The sizes are those of mjlab's
+Random numbers follow from the seed and the count of control steps, so that a resumed training
+continues with the same ones. World frame, metres, radians, seconds. The sizes are those of mjlab's
 tracking task (`tracking_env_cfg`): uniform between plus and minus the numbers below.
 """
 
@@ -52,7 +52,7 @@ class Disturbances:
     def sense(
         self, qpos: Float[np.ndarray, "N nq"], qvel: Float[np.ndarray, "N nv"]
     ) -> tuple[Float[np.ndarray, "N nq"], Float[np.ndarray, "N nv"]]:
-        """The states as noisy sensors tell them; the same whenever asked in a control step."""
+        """Return the states as noisy sensors measure them; constant within a control step."""
         if not self._noise:
             return qpos, qvel
         rng = self._rng(1)
@@ -68,7 +68,7 @@ class Disturbances:
         return qpos, qvel
 
     def after_step(self, datas: Sequence[mujoco.MjData], active: Bool[np.ndarray, " N"]) -> None:
-        """Count a control step and push the robots that are due."""
+        """Count a control step and push the robots whose push is due."""
         self.count += 1
         if not self._pushes:
             return

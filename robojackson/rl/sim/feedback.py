@@ -1,7 +1,7 @@
-"""The linear feedback that drives a robot along its reference, before anything is learnt.
+"""The linear feedback that drives a robot along its reference, without learning.
 
-`regulator` computes it once for a motion, robot and control law; it is kept beside the added
-robots, because it takes a few seconds of processor for every second of motion.
+`regulator` computes it once for a motion, robot and control law; the result is cached beside the
+added robots, because it takes a few seconds of processor time for every second of motion.
 """
 
 import hashlib
@@ -37,8 +37,8 @@ ARRAYS = tuple(one.name for one in fields(Gains))
 VARIED = ("body_mass", "body_ipos", "body_inertia", "geom_friction", "dof_armature")
 """Arrays of a model that `variation` changes."""
 LARGEST = 2.0
-"""Full actions of a policy that the feedback moves a target at most: so much that a policy of a few
-minutes can still correct it."""
+"""Largest offset of a target by the feedback, in full actions of a policy: small enough that a
+policy of a few minutes can correct it."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class StepFeedback:
     def targets(
         self, qpos: Float[np.ndarray, "N nq"], qvel: Float[np.ndarray, "N nv"]
     ) -> Float[np.ndarray, "N nu"]:
-        """Return by how much the motors' targets move, rad."""
+        """Return the offsets of the motors' targets, rad."""
         apart = state_difference(qpos, qvel, self.qpos, self.qvel)
         moved = np.isfinite(self.places[:, 0, 0])
         if moved.any():
@@ -81,7 +81,8 @@ class Feedback:
     feet: Feet
 
     def at(self, row: Int[np.ndarray, " N"], shift: Float[np.ndarray, "N 3"]) -> StepFeedback:
-        """Return it at rows of the joined motions, whose cycles have moved them by `shift`, m."""
+        """Return the feedback at rows of the joined motions, whose cycles have moved them by
+        `shift`, m."""
         gains = self.gains
         qpos = gains.qpos[row]
         qpos[:, :3] += shift
@@ -103,7 +104,7 @@ def feedback_of(
     share = feedback_share(robot, control)
     if not share or control.law != "pd":
         return None
-    found = [_kept(robot, motion, control, progress) for motion in references]
+    found = [_cached(robot, motion, control, progress) for motion in references]
     joined = Gains(*(np.concatenate([getattr(one, name) for one in found])
                      for name in ARRAYS))  # fmt: skip
     action = residual_scale(robot, ControlConfig())
@@ -114,10 +115,10 @@ def feedback_of(
     return Feedback(scaled, most * action, Feet(robot))
 
 
-def _kept(
+def _cached(
     robot: Robot, motion: ReferenceMotion, control: ControlConfig, progress: Progress
 ) -> Gains:
-    """Return the regulator of a motion, computed where it was not before."""
+    """Return the regulator of a motion, from the cache or computed."""
     path = robots_folder().parent / FOLDER / f"{_digest(robot, motion, control)}.npz"
     if path.is_file():
         # A damaged file is computed again.
@@ -150,7 +151,7 @@ def _keep(path: Path, gains: Gains) -> None:
     content = io.BytesIO()
     arrays = {name: getattr(gains, name).astype(np.float32) for name in ("gain", "offset")}
     np.savez_compressed(content, qpos=gains.qpos, qvel=gains.qvel, places=gains.places, **arrays)
-    with suppress(StoreError):  # a store that takes nothing: computed again next time
+    with suppress(StoreError):  # a read-only store: computed again next time
         FileTree(path.parent).write(path.name, content.getvalue())
 
 
@@ -172,7 +173,7 @@ def regulator_of(
 
 
 def _digest(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> str:
-    """Return what the gains depend on, as a name."""
+    """Return a digest of the gains' inputs, as a name."""
     law = resolved(replace(control, feedback=0.0), robot)
     named = {name: getattr(law, name) for name in ("substeps", "feedforward", "feedback_path")}
     facts = [poses_sha256(motion), robot.sha256, named, actuation_facts(robot, ControlConfig()),
@@ -181,7 +182,7 @@ def _digest(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> st
         facts.append(sampling.settings())
     digest = hashlib.sha256(json.dumps(facts, sort_keys=True, default=str).encode())
     model = robot.model
-    for name in VARIED:  # a variation of the robot has its name and its file
+    for name in VARIED:  # a varied robot has the same name and file
         digest.update(np.ascontiguousarray(getattr(model, name)).tobytes())
     digest.update(f"{model.opt.timestep} {model.opt.integrator}".encode())
     return digest.hexdigest()[:32]

@@ -1,8 +1,8 @@
-"""Feed-forward: targets that lead the reference by what its own torques bend a PD law.
+"""Feed-forward: offsets of the targets that make a PD law produce the reference's torques.
 
-A PD law holds a torque tau at a speed v only with its target at q + (tau + kd v) / kp. With soft
-gains that is as much as a policy may add; `retarget.feasibility` knows the torque. Radians,
-newton-metres; actuator order.
+A PD law produces a torque tau at a speed v only with its target at q + (tau + kd v) / kp. With soft
+gains this offset is as large as a policy's range; `retarget.feasibility` computes the torque.
+Radians, newton-metres; actuator order.
 """
 
 import numpy as np
@@ -19,7 +19,8 @@ from robojackson.robot.model import Robot
 def lead_of(
     robot: Robot, reference: ReferenceMotion, control: ControlConfig
 ) -> Float[np.ndarray, "S nu"] | None:
-    """Offsets of the motors' targets at every step of the reference; None without feed-forward."""
+    """Return offsets of the motors' targets at every step of the reference; None without
+    feed-forward."""
     share = feedforward_share(robot, control)
     if not share:
         return None

@@ -1,4 +1,4 @@
-"""Motors of a robot: which hinge each one drives, how strongly, and how far a policy may move it.
+"""Motors of a robot: the hinge of each, its torque limit, and the range of a policy's action.
 
 Radians, newton-metres; actuator order.
 """
@@ -15,7 +15,7 @@ from robojackson.robot.model import Robot
 
 @dataclass(frozen=True)
 class Motors:
-    """Actuators of the robot: which hinge each one drives and how strongly.
+    """Actuators of the robot: the hinge of each, and its torque.
 
     Attributes:
         hinge: Index of the driven hinge among `qpos[7:]`, one an actuator.
@@ -29,7 +29,7 @@ class Motors:
 
     @staticmethod
     def of(model: mujoco.MjModel) -> "Motors":
-        """Read the motors of a model whose first joint is free and whose others are hinges."""
+        """Return the motors of a model whose first joint is free and whose others are hinges."""
         gear = model.actuator_gear[:, 0].copy()
         return Motors(
             hinge=model.jnt_qposadr[model.actuator_trnid[:, 0]] - 7,
@@ -41,8 +41,8 @@ class Motors:
 def gains(
     robot: Robot, control: ControlConfig
 ) -> tuple[Float[np.ndarray, " nu"], Float[np.ndarray, " nu"]]:
-    """Gains of the PD law, Nm/rad and Nm s/rad: the robot's own, unless the configuration names
-    multiples of the torque limit."""
+    """Return gains of the PD law, Nm/rad and Nm s/rad: the robot's own, unless the configuration
+    has multiples of the torque limit."""
     motors, own = Motors.of(robot.model), robot.actuation
     kp = own.stiffness[motors.hinge]
     if control.stiffness is not None:
@@ -54,8 +54,8 @@ def gains(
 
 
 def residual_scale(robot: Robot, control: ControlConfig) -> Float[np.ndarray, " nu"]:
-    """Radians that a full action moves each motor's target: the robot's action scale, unless the
-    configuration names another for all hinges or for the arms."""
+    """Return the radians that a full action moves each motor's target: the robot's action scale,
+    unless the configuration has another for all hinges or for the arms."""
     model = robot.model
     arms = _moved_by(robot, ("left_hand", "right_hand")) - _moved_by(robot, ("head",))
     legs = _moved_by(robot, ("left_foot", "right_foot"))
@@ -71,28 +71,28 @@ def residual_scale(robot: Robot, control: ControlConfig) -> Float[np.ndarray, " 
 
 
 def feedforward_share(robot: Robot, control: ControlConfig) -> float:
-    """Share of the reference's torques by which the targets lead: the robot's own, unless the
-    configuration names one."""
+    """Return the share of the reference's torques by which the targets lead: the robot's own,
+    unless the configuration has one."""
     named = control.feedforward
     return robot.description.feedforward if named is None else named
 
 
 def feedback_share(robot: Robot, control: ControlConfig) -> float:
-    """Share of the linear feedback along the reference that the targets get: the robot's own,
-    unless the configuration names one."""
+    """Return the share of the linear feedback along the reference that the targets get: the robot's
+    own, unless the configuration has one."""
     named = control.feedback
     return robot.description.feedback if named is None else named
 
 
 def actuation_facts(robot: Robot, control: ControlConfig) -> dict[str, list[float]]:
-    """What a policy's actions mean, in the robot's order of motors, for the policy's file."""
+    """Return the scales of a policy's actions, in the robot's order of motors, for its file."""
     kp, kd = gains(robot, control)
     found = {"stiffness": kp, "damping": kd, "action_scale": residual_scale(robot, control)}
     return {name: values.tolist() for name, values in found.items()}
 
 
 def _moved_by(robot: Robot, keypoints: tuple[str, ...]) -> set[int]:
-    """Joints between the root and the bodies that carry the keypoints."""
+    """Return the joints between the root and the bodies that carry the keypoints."""
     model, found = robot.model, set()
     for name in keypoints:
         body = model.site_bodyid[robot.keypoint_sites[robot.keypoint_names.index(name)]]

@@ -1,9 +1,9 @@
-"""What a policy sees of the reference ahead: a general tracker needs it in place of a phase.
+"""The preview: the reference ahead as a policy sees it; it replaces the phase of a general tracker.
 
 For every step and every time ahead, in the heading frame of the reference's root at that step: the
-root's displacement (m), its turn (sine, cosine) and height (m), where up is in its own frame, and
-the hinges' offsets from the stand (rad). Nothing of it depends on the robot's state, so it is
-computed once.
+root's displacement (m), its turn (sine, cosine) and height (m), the up axis in its own frame, and
+the hinges' offsets from the stand (rad). It does not depend on the robot's state, so it is computed
+once.
 """
 
 from collections.abc import Sequence
@@ -22,17 +22,17 @@ from robojackson.robot.model import Robot
 
 AHEAD_S = (0.1, 0.2, 0.4, 0.7)
 ROOT_NUMBERS = 9
-"""Of the root, a time ahead: displacement 3, turn 2, height 1, up 3."""
+"""Numbers of the root, for a time ahead: displacement 3, turn 2, height 1, up 3."""
 DISTANCE_SCALE = 3.0
 
 
 def preview_size(hinges: int) -> int:
-    """Return the numbers a step of a robot with so many hinges."""
+    """Return the length of a preview of a robot with `hinges` hinges."""
     return len(AHEAD_S) * (ROOT_NUMBERS + hinges)
 
 
 def preview_of(reference: ReferenceMotion, robot: Robot) -> Float[np.ndarray, "S P"]:
-    """Return what is seen ahead of every step of a reference motion."""
+    """Return the preview of every step of a reference motion."""
     clip, now = Clip(reference), np.arange(len(reference))
     here = clip.at(now)
     yaw = np.asarray(heading(here.qpos[:, 3:7]))

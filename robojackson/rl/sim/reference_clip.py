@@ -1,8 +1,8 @@
-"""Reference motions as arrays that a thousand environments can read at their own step.
+"""Reference motions as arrays that a thousand environments can read, each at its own step.
 
-A cyclic motion goes on for ever: step s is step s mod S of cycle s // S, moved by that many cycle
-offsets. A motion that is not cyclic holds its last step. Step s of the m-th motion of several is
-`m * STRIDE + s`. Frames and units as in `ReferenceMotion`.
+A cyclic motion continues for ever: step s is step s mod S of cycle s // S, moved by that many cycle
+offsets. A motion that is not cyclic holds its last step. Step s of the m-th motion of several is `m
+* STRIDE + s`. Frames and units as in `ReferenceMotion`.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,23 +17,23 @@ from robojackson.motion.reference_motion import ReferenceMotion, motions_of
 
 LEAST_STEPS = 8
 STRIDE = 1_000_000
-"""Steps by which the motions of a clip are told apart; no episode is as long."""
+"""Distance in steps between the motions of a clip; no episode is as long."""
 
 
 class StepLaw(Protocol):
-    """What moves the targets of N robots at one step of their references."""
+    """Offsets of the targets of N robots at one step of their references."""
 
     def targets(
         self, qpos: Float[np.ndarray, "N nq"], qvel: Float[np.ndarray, "N nv"]
     ) -> Float[np.ndarray, "N nu"]:
-        """Return by how much the motors' targets move, rad."""
+        """Return the offsets of the motors' targets, rad."""
 
 
 class Law(Protocol):
     """A feedback along the joined motions of a clip (`feedback.Feedback`)."""
 
     def at(self, row: Int[np.ndarray, " N"], shift: Float[np.ndarray, "N 3"]) -> StepLaw:
-        """Return it at rows whose cycles have moved them by `shift`, m."""
+        """Return the feedback at rows whose cycles have moved them by `shift`, m."""
 
 
 @dataclass(frozen=True)
@@ -42,11 +42,11 @@ class ClipStep:
 
     Attributes:
         moved: Velocities of the points, m/s.
-        phase: 0..1 of the motion.
+        phase: Phase of the motion, 0..1.
         lead: Offset of the motors' targets from the reference's angles, rad; None without one.
-        preview: What the policy sees of the steps ahead (`preview.preview_of`); None without one.
-        feedback: How the targets move on the way to this step, given qpos and qvel now, rad; None
-            without one.
+        preview: Preview of the steps ahead (`preview.preview_of`); None without one.
+        feedback: Function of qpos and qvel that returns the offsets of the targets on the way to
+            this step, rad; None without one.
     """
 
     step: Int[np.ndarray, " N"]
@@ -63,7 +63,7 @@ class ClipStep:
         """Return the motors' targets that follow the step, with its lead and without feedback.
 
         Args:
-            hinge: Index among the hinges of each motor's.
+            hinge: Index of each motor's hinge.
         """
         angles: np.ndarray = self.qpos[:, 7:][:, hinge]
         return angles if self.lead is None else angles + self.lead
@@ -76,16 +76,16 @@ class Clip:
         references: One motion or several, of one robot and control step.
         lead: Offset of the motors' targets from the reference's angles at every step, rad; the
             steps of all motions, one after the other.
-        preview: What the policy sees of the steps ahead, of the same steps.
+        preview: Preview of the steps ahead, of the same steps.
         law: Feedback along the same steps.
 
     Attributes:
-        steps: Of all motions together.
+        steps: Number of steps of all motions together.
         cyclic: Whether every motion repeats.
         dt: Seconds a step.
 
     Raises:
-        TrackTooShort, RejectedReference: too few steps, or values that are no numbers.
+        TrackTooShort, RejectedReference: too few steps, or values that are not finite.
     """
 
     def __init__(
@@ -112,31 +112,32 @@ class Clip:
         self._last: ClipStep | None = None
 
     def starts(self) -> Int[np.ndarray, " R"]:
-        """Steps from which a motion can be followed: all, but the end of one that ends."""
+        """Return the steps from which a motion can be followed: all but the end of one that
+        ends."""
         usable = np.where(self._cyclic, self._length, np.maximum(1, self._length - 1))
         return np.concatenate([m * STRIDE + np.arange(count) for m, count in enumerate(usable)])
 
     def row(self, step: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
-        """Rows of the joined steps of all motions, without the end of those that end."""
+        """Return rows of the joined steps of all motions, without the end of those that end."""
         usable = np.where(self._cyclic, self._length, np.maximum(1, self._length - 1))
         motion, index = np.divmod(step, STRIDE)
         result: np.ndarray = (np.cumsum(usable) - usable)[motion] + index % usable[motion]
         return result
 
     def folded(self, step: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
-        """The same steps within the first cycle of their motions."""
+        """Return the same steps within the first cycle of their motions."""
         motion, index = np.divmod(step, STRIDE)
         result: np.ndarray = motion * STRIDE + index % self._length[motion]
         return result
 
     def repeats(self, step: Int[np.ndarray, " N"]) -> np.ndarray:
-        """Whether the motion of each step is cyclic."""
+        """Return whether the motion of each step is cyclic."""
         result: np.ndarray = self._cyclic[step // STRIDE]
         return result
 
     def at(self, step: Int[np.ndarray, " N"]) -> ClipStep:
-        """The reference at each environment's step; read-only: what is asked for twice in a row, as
-        the end of one control step and the beginning of the next are, is computed once."""
+        """Return the reference at each environment's step; read-only. Two calls in a row, such as
+        the end of one control step and the beginning of the next, are computed once."""
         if self._last is None or not np.array_equal(self._last.step, step):
             self._last = self._read(np.array(step))
         return self._last
@@ -156,7 +157,7 @@ class Clip:
     def _feedback(
         self, step: np.ndarray
     ) -> Callable[[np.ndarray, np.ndarray], Float[np.ndarray, "N nu"]] | None:
-        """The feedback on the way to each step."""
+        """Return the feedback on the way to each step."""
         law = self._law
         if law is None:
             return None
@@ -170,12 +171,12 @@ class Clip:
     def gather(
         self, values: Float[np.ndarray, "S P 3"], step: Int[np.ndarray, " N"]
     ) -> Float[np.ndarray, "N P 3"]:
-        """Other points of the clip's steps, world, at each environment's step."""
+        """Return other points of the clip's steps, world, at each environment's step."""
         row, shift, _ = self._split(step)
         return np.asarray(values[row] + shift[:, None])
 
     def ended(self, step: Int[np.ndarray, " N"]) -> np.ndarray:
-        """Whether a motion that is not cyclic has been danced to its end."""
+        """Return whether a motion that is not cyclic has been danced to its end."""
         if self.cyclic:
             return np.zeros(len(step), bool)
         motion, index = np.divmod(step, STRIDE)
@@ -183,7 +184,8 @@ class Clip:
         return result
 
     def horizon(self, start: Int[np.ndarray, " N"], seconds: float) -> Int[np.ndarray, " N"]:
-        """Steps of rollouts: the given time when cyclic, else from each start to the clip's end."""
+        """Return steps of rollouts: the given time if cyclic, else from each start to the clip's
+        end."""
         if self.cyclic:
             return np.full(len(start), max(1, round(seconds / self.dt)))
         return self.steps - 1 - start
@@ -191,7 +193,7 @@ class Clip:
     def _split(
         self, step: np.ndarray
     ) -> tuple[Int[np.ndarray, " N"], Float[np.ndarray, "N 3"], Float[np.ndarray, " N"]]:
-        """Rows of the joined arrays, how far the cycles have moved them, and the phase."""
+        """Return rows of the joined arrays, the displacement by the cycles, and the phase."""
         motion, index = np.divmod(step, STRIDE)
         length = self._length[motion]
         cycle = np.where(self._cyclic[motion], index // length, 0)
@@ -201,21 +203,21 @@ class Clip:
 
 
 def _require_usable(motion: ReferenceMotion) -> None:
-    """Refuse a motion that no robot can follow.
+    """Raise for a motion that no robot can follow.
 
     Raises:
-        TrackTooShort, RejectedReference: too few steps, or values that are no numbers.
+        TrackTooShort, RejectedReference: too few steps, or values that are not finite.
     """
     if len(motion) < LEAST_STEPS:
         raise TrackTooShort(
             f"the reference motion has {len(motion)} steps, {LEAST_STEPS} are the least"
         )
     if not np.isfinite(motion.qpos).all() or not np.isfinite(motion.qvel).all():
-        raise RejectedReference("the reference motion holds values that are no numbers")
+        raise RejectedReference("the reference motion holds values that are not finite")
 
 
 def _velocities(motion: ReferenceMotion) -> Float[np.ndarray, "S K 3"]:
-    """Backward differences, as a simulation that is read once a step sees them."""
+    """Return backward differences, like those of a simulation that is read once a step."""
     points = np.asarray(motion.keypoints_w, float)
     before = np.roll(points, 1, axis=0)
     before[0] = points[-1] - motion.cycle_offset if motion.cyclic else points[0]

@@ -3,10 +3,10 @@
 The robot with its PD law is one discrete system: state (root position, root orientation, hinges and
 their velocities, in MuJoCo's tangent space), input (targets of the motors), one control step. It is
 differentiated along the reference with steps as large as the errors that the feedback shall correct
-(`STEPS`): differences that span a contact's opening and closing say what happens on average, those
-of 1e-6 what happens at one side of it, and a regulator made of these falls at the first step. The
+(`STEPS`): differences that span a contact's opening and closing give the average effect, those of
+1e-6 the effect at one side of it, and a regulator from the latter falls at the first step. The
 Riccati recursion then gives, for every step of the reference, a gain and an offset that corrects
-what the reference itself gets wrong. Metres, radians, seconds.
+the reference's own errors. Metres, radians, seconds.
 """
 
 import mujoco
@@ -36,13 +36,13 @@ EFFORT = 0.45
 LAPS, STILL = 3, 200
 """Backward passes over a motion that repeats; steps of the stand after one that ends."""
 HEIGHTS_M = np.linspace(-0.006, 0.002, 9)
-"""By which the root may be moved so that the soles press as the reference asks."""
+"""Largest displacement of the root that gives the soles the reference's pressure, metres."""
 ROWS = 3200
-"""States that are simulated at once."""
+"""Number of states that are simulated at once."""
 
 
 def settings() -> list[float]:
-    """Return the numbers above: a regulator made with others is another one."""
+    """Return the numbers above: other numbers make another regulator."""
     steps = [ROOT_STEP_M, TURN_STEP, HINGE_STEP, VELOCITY_STEP, SPIN_STEP, HINGE_SPEED_STEP]
     weights = [TARGET_STEP, PLACE, ATTITUDE, HINGE, VELOCITY, HINGE_SPEED, EFFORT, LAPS, STILL]
     return [*steps, *weights, *HEIGHTS_M.tolist()]
@@ -119,7 +119,7 @@ def _settled(
     targets: np.ndarray,
     rise: Float[np.ndarray, " S"],
 ) -> Float[np.ndarray, "S nq"]:
-    """Return the states at the height from which the root moves up and down as it shall."""
+    """Return the states at the height from which the root moves vertically like the reference."""
     missed = []
     for height in HEIGHTS_M:
         moved = qpos.copy()

@@ -1,8 +1,7 @@
-"""A few copies of a robot stepped together, with the law of control as array code between them.
+"""A few copies of a robot stepped together, with the control law as array code between them.
 
-Few, so that the cache of the processor still holds a robot when its next substep comes: a bare loop
-over 8 robots at a time is 5 % faster than one over 32. Radians, seconds, newton-metres; actuator
-order.
+Few, so that the processor's cache still holds a robot at its next substep: a bare loop over 8
+robots at a time is 5 % faster than one over 32. Radians, seconds, newton-metres; actuator order.
 """
 
 from collections.abc import Sequence
@@ -16,18 +15,18 @@ from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.sim.motors import Motors
 
 SIZE = 8
-"""Robots of a batch."""
+"""Number of robots in a batch."""
 
 
 @dataclass(frozen=True)
 class Views:
-    """MuJoCo's own memory of every copy as lists of arrays, made once: asking for it costs more
-    than reading it.
+    """MuJoCo's own memory of every copy as lists of arrays, created once: creating the view costs
+    more than reading it.
 
     Attributes:
         qpos, qvel: The whole state.
         sites: Positions of all sites, world, m.
-        warnings: How often each kind was raised.
+        warnings: Counts of each kind of warning.
     """
 
     qpos: list[np.ndarray]
@@ -37,7 +36,7 @@ class Views:
 
     @staticmethod
     def of(datas: Sequence[mujoco.MjData]) -> "Views":
-        """Views of the copies' memory."""
+        """Return views of the copies' memory."""
         return Views(
             qpos=[data.qpos for data in datas],
             qvel=[data.qvel for data in datas],
@@ -51,7 +50,7 @@ class Batch:
 
     Args:
         kp, kd: Gains of the PD law, N m/rad and N m s/rad, one row for all robots or one each.
-        delay: Substeps by which the targets of each robot come late; none when None.
+        delay: Delay of each robot's targets, substeps; none when None.
     """
 
     def __init__(
@@ -83,18 +82,18 @@ class Batch:
         com: Float[np.ndarray, "B 3"],
         before: Float[np.ndarray, "B nu"],
     ) -> None:
-        """One control step of the robots that are active; law `torque` writes their `com`.
+        """Run one control step of the active robots; law `torque` writes their `com`.
 
         Args:
-            before: Targets of the control step before, which a delayed robot still follows.
+            before: Targets of the previous control step, which a delayed robot still follows.
         """
         live = [(*self._robots[i], i) for i in np.flatnonzero(active)]
         step = mujoco.mj_step
         for substep in range(self._substeps):
             if substep == 0 or self._law == "pd":
-                told = self.controls(self._followed(targets, before, substep))
+                controls = self.controls(self._followed(targets, before, substep))
             for model, data, ctrl, i in live:
-                ctrl[:] = told[i]
+                ctrl[:] = controls[i]
                 step(model, data)
         for model, data, _, i in live:
             if self._law == "torque":
@@ -103,13 +102,13 @@ class Batch:
             mujoco.mj_kinematics(model, data)
 
     def _followed(self, targets: np.ndarray, before: np.ndarray, substep: int) -> np.ndarray:
-        """The targets that have reached the motors of each robot."""
+        """Return the targets that have reached the motors of each robot."""
         if self._delay is None:
             return targets
         return np.where(substep < self._delay, before, targets)
 
     def controls(self, targets: Float[np.ndarray, "B nu"]) -> Float[np.ndarray, "B nu"]:
-        """What is written to `ctrl`, from the states as they are; overwritten by the next call."""
+        """Return the values of `ctrl` for the current states; overwritten by the next call."""
         if self._law == "torque":
             return targets
         motors, (torque, braking) = self._motors, self._driven
@@ -126,5 +125,5 @@ class Batch:
 
 
 def centre_of_mass(model: mujoco.MjModel, data: mujoco.MjData) -> Float[np.ndarray, "3"]:
-    """Of the whole robot, from the poses that MuJoCo computed last, metres, world."""
+    """Return the centre of mass of the whole robot, from MuJoCo's last poses, metres, world."""
     return np.asarray(model.body_mass @ data.xipos / model.body_mass.sum())

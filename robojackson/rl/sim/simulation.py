@@ -1,9 +1,9 @@
-"""Many copies of one stock robot, stepped in threads, with the law of control outside the model.
+"""Many copies of one stock robot, stepped in threads, with the control law outside the model.
 
-Stock physics: the model as gymnasium ships it. The torque of the PD law is
-computed once a substep from the state at its beginning, clipped to the stock limit and written to
-`ctrl`; a servo inside the model would be evaluated within the stages of RK4, which is another
-robot. The law `torque` does what `Humanoid-v5.step` does, to the bit.
+Stock physics: the model as gymnasium ships it. The torque of the PD law is computed once a substep
+from the state at its beginning, clipped to the stock limit and written to `ctrl`; a servo inside
+the model would be evaluated within the stages of RK4, which is another robot. The law `torque` is
+bitwise equal to `Humanoid-v5.step`.
 
 World frame, metres, radians, seconds, newton-metres. MuJoCo releases the interpreter lock in
 `mj_step`, so two threads keep two cores busy.
@@ -43,14 +43,14 @@ BAD_STATE = [
         mujoco.mjtWarning.mjWARN_BADQACC,
     )
 ]
-"""Warnings at which MuJoCo resets a state by itself."""
+"""Warnings at which MuJoCo itself resets a state."""
 
 
 def resolved(
     control: ControlConfig, robot: Robot, random: RandomConfig | None = None
 ) -> ControlConfig:
-    """The law of control with the robot's substeps, feed-forward, feedback and action factor where
-    it names none."""
+    """Return the control law with the robot's substeps, feed-forward, feedback and action factor as
+    defaults."""
     pushed = random is not None and random.pushes > 0
     usual = robot.description.robust_action_factor if pushed else 1.0
     return replace(
@@ -63,12 +63,12 @@ def resolved(
 
 
 def control_step(robot: Robot, control: ControlConfig) -> float:
-    """Seconds a control step."""
+    """Return the length of a control step, seconds."""
     return float((control.substeps or robot.substeps) * robot.model.opt.timestep)
 
 
 def require_same_clock(simulation_dt: float, reference_dt: float) -> None:
-    """Refuse a reference motion for another control rate.
+    """Raise for a reference motion with another control rate.
 
     Raises:
         BadPolicy: the control step of the policy or the robot is not the reference's.
@@ -76,12 +76,12 @@ def require_same_clock(simulation_dt: float, reference_dt: float) -> None:
     if abs(simulation_dt - reference_dt) > 1e-9:
         raise BadPolicy(
             f"the control step is {1e3 * simulation_dt:g} ms and the reference motion's "
-            f"{1e3 * reference_dt:g} ms: retarget for this robot, or mend track.control.substeps"
+            f"{1e3 * reference_dt:g} ms: retarget for this robot, or correct track.control.substeps"
         )
 
 
 def without_sensors(model: mujoco.MjModel) -> mujoco.MjModel:
-    """Return the model with its sensors off: `mj_step` moves it the same, to the bit, and faster.
+    """Return the model without sensors: `mj_step` moves it identically, to the bit, and faster.
 
     An accelerometer alone needs the accelerations and forces of all bodies in every substep.
     """
@@ -98,15 +98,15 @@ class Simulation:
     Attributes:
         control: The law of control.
         residual: Radians that a full action moves each motor's target.
-        actuation: Nominal gains and action scale, as a policy's file keeps them.
+        actuation: Nominal gains and action scale, as written into a policy's file.
         qpos, qvel: State of every copy after the last `step` or `place`.
-        previous: Targets of the control step before.
-        count, push_at: What the disturbances count by (`Disturbances`).
-        broken: Copies whose state blew up since they were placed, so that MuJoCo reset them.
+        previous: Targets of the previous control step.
+        count, push_at: Counters of the disturbances (`Disturbances`).
+        broken: Copies whose state diverged since they were placed, so that MuJoCo reset them.
         points: Positions of the keypoint sites, world, in step with `qpos`.
         com: Centres of mass as `Humanoid-v5` sees them, one substep behind; law `torque` only.
         datas: MuJoCo's own state of every copy.
-        chunks: Of every thread, its batches: first copy, past the last, and the batch.
+        chunks: Batches of every thread: first copy, past the last, and the batch.
     """
 
     def __init__(
@@ -157,7 +157,7 @@ class Simulation:
         qpos: Float[np.ndarray, "I nq"],
         qvel: Float[np.ndarray, "I nv"],
     ) -> None:
-        """Put some copies into a state, forgetting their past (contacts, warm start, time)."""
+        """Put copies into a state and clear their past (contacts, warm start, time)."""
         for row, i in enumerate(indices):
             data = self.datas[i]
             mujoco.mj_resetData(self.model, data)
@@ -170,10 +170,10 @@ class Simulation:
     def step(
         self, targets: Float[np.ndarray, "N nu"], active: Bool[np.ndarray, " N"] | None = None
     ) -> None:
-        """One control step towards target hinge angles, rad, in actuator order; controls, shares
-        of the gear, where the law is `torque`.
+        """Run one control step towards target hinge angles, rad, in actuator order; for the law
+        `torque` towards controls, shares of the gear.
 
-        Copies that are not `active` stay as they are; None steps all of them.
+        Copies that are not `active` do not change; None steps all of them.
         """
         rows = np.ones(self.n, bool) if active is None else active
         if self._pool is None:
@@ -189,11 +189,11 @@ class Simulation:
         self._gather_all()
 
     def sensed(self) -> tuple[Float[np.ndarray, "N nq"], Float[np.ndarray, "N nv"]]:
-        """qpos and qvel as the sensors tell them."""
+        """Return qpos and qvel as the sensors measure them."""
         return self._disturbances.sense(self.qpos, self.qvel)
 
     def reference_angles(self, step: ClipStep) -> Float[np.ndarray, "N nu"]:
-        """Target hinge angles that follow a reference step with nothing learnt, rad."""
+        """Return the target hinge angles of a reference step without a policy, rad."""
         angles = step.angles(self.motors.hinge)
         if step.feedback is not None and self.control.feedback:
             angles = angles + step.feedback(*self.sensed())
@@ -205,7 +205,7 @@ class Simulation:
             self._pool.shutdown()
 
     def _batches(self, lo: int, hi: int) -> list[tuple[int, int, Batch]]:
-        """The copies of one thread, a batch at a time."""
+        """Return the copies of one thread, a batch at a time."""
         found = []
         for first in range(lo, hi, SIZE):
             past = min(first + SIZE, hi)
@@ -230,7 +230,7 @@ class Simulation:
             self.points[i] = data.site_xpos[self._sites]
 
     def _gather_all(self) -> None:
-        """The same for all copies, at the price of few calls."""
+        """Gather the state of all copies with few calls."""
         views, n = self._views, self.n
         np.concatenate(views.qpos, out=self.qpos.reshape(-1))
         np.concatenate(views.qvel, out=self.qvel.reshape(-1))

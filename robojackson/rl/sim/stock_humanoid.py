@@ -1,8 +1,8 @@
-"""What Gymnasium's Humanoid-v5 shows and pays, for every copy of a simulation.
+"""Observation and reward of Gymnasium's Humanoid-v5, for every copy of a simulation.
 
 The observation has 348 numbers for the humanoid: positions without the root's place over the floor,
-velocities, inertias, body velocities, actuator forces and contact forces, with the same one-substep
-lag as there. Metres, radians, seconds, newtons.
+velocities, inertias, body velocities, actuator forces and contact forces, with the original's lag
+of one substep. Metres, radians, seconds, newtons.
 """
 
 import numpy as np
@@ -16,7 +16,7 @@ HEALTHY_HEIGHT = (1.0, 2.0)
 
 
 def stock_observation(sim: Simulation) -> Float[np.ndarray, "N D"]:
-    """The observation of Humanoid-v5 for every copy, float32."""
+    """Return the observation of Humanoid-v5 for every copy, float32."""
     rows = [
         np.concatenate(
             (
@@ -34,18 +34,19 @@ def stock_observation(sim: Simulation) -> Float[np.ndarray, "N D"]:
 
 
 def stock_observation_size(nq: int, nv: int, bodies: int) -> int:
-    """Length of it for a robot with that many positions, velocities and bodies (world included)."""
+    """Return its length for a robot with given positions, velocities and bodies (world
+    included)."""
     return nq - 2 + nv + 22 * (bodies - 1) + nv - 6
 
 
 def own_reward(
     sim: Simulation, before: Float[np.ndarray, "N 3"], control: Float[np.ndarray, "N nu"]
 ) -> Float[np.ndarray, " N"]:
-    """Humanoid-v5's reward of the last control step.
+    """Return Humanoid-v5's reward of the last control step.
 
     Args:
         before: `sim.com` before the step.
-        control: What was written to `ctrl`.
+        control: Controls that were written to `ctrl`.
     """
     low, high = HEALTHY_HEIGHT
     forward = FORWARD * (sim.com[:, 0] - before[:, 0]) / sim.dt
@@ -57,19 +58,19 @@ def own_reward(
 
 
 def bodies_now(sim: Simulation) -> Float[np.ndarray, "N nbody 3"]:
-    """Origins of all bodies, the world's first, metres, world."""
+    """Return the origins of all bodies, the world's first, metres, world."""
     return np.array([data.xpos for data in sim.datas])
 
 
 def mass_centres_now(sim: Simulation) -> Float[np.ndarray, "N 3"]:
-    """Centres of mass in step with `qpos`, metres, world."""
+    """Return centres of mass at the current `qpos`, metres, world."""
     mass = sim.model.body_mass / sim.model.body_mass.sum()
     result: np.ndarray = np.einsum("b,nbx->nx", mass, np.array([data.xipos for data in sim.datas]))
     return result
 
 
 def spin_now(sim: Simulation) -> Float[np.ndarray, " N"]:
-    """Sum over bodies of their angular speeds, rad/s."""
+    """Return the sum over bodies of their angular speeds, rad/s."""
     spins = np.array([data.cvel[1:, :3] for data in sim.datas])
     result: np.ndarray = np.linalg.norm(spins, axis=-1).sum(-1)
     return result

@@ -33,7 +33,7 @@ def state_difference(
     from_qpos: Float[np.ndarray, "*B nq"],
     from_qvel: Float[np.ndarray, "*B nv"],
 ) -> Float[np.ndarray, "*B X"]:
-    """Return the tangent vectors that lead from some states to others; the arguments broadcast."""
+    """Return the tangent vectors from some states to others; the arguments broadcast."""
     turn = _vector(quat_multiply(quat_conjugate(from_qpos[..., 3:7]), qpos[..., 3:7]))
     place, hinges = qpos[..., :3] - from_qpos[..., :3], qpos[..., 7:] - from_qpos[..., 7:]
     return np.concatenate([place, turn, hinges, qvel - from_qvel], -1)

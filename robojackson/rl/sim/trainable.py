@@ -1,4 +1,4 @@
-"""What training needs of a robot: torque motors, and a stand that its fall rule allows."""
+"""Requirements of training on a robot: torque motors, and a stand within its fall rule."""
 
 import mujoco
 import numpy as np
@@ -9,7 +9,7 @@ from robojackson.robot.model import Robot
 
 
 def require_trainable(robot: Robot) -> None:
-    """Refuse a robot that a training cannot move, or that the fall rule calls fallen as it stands.
+    """Raise for a robot without usable motors, or whose stand counts as a fall.
 
     Raises:
         BadConfiguration: it has no torque motors with a range, or it is too small.
@@ -25,7 +25,7 @@ def require_trainable(robot: Robot) -> None:
         reason = "neither its MJCF nor torque_limits of its YAML give it motors"
     elif not motors.all():
         name = model.actuator(int(np.argmin(motors))).name
-        reason = f"actuator {name!r} is no torque motor with a control range"
+        reason = f"actuator {name!r} is not a torque motor with a control range"
     elif not fall.relative and height < fall.height:
         reason = (
             f"it stands with its root {height:.2f} m above the floor, and less than "

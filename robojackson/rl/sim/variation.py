@@ -1,4 +1,4 @@
-"""Robots whose physics differs: at random for each copy of a training, or by given numbers.
+"""Robots with other physics: random for each copy of a training, or given.
 
 Metres, seconds; factors are of the stock robot's values.
 """
@@ -19,7 +19,7 @@ from robojackson.robot.physics import integrator_of, substeps_of
 
 @dataclass(frozen=True)
 class Variation:
-    """Another physics than the stock robot's.
+    """Physics that differ from the stock robot's.
 
     Attributes:
         friction: Factor on the friction of all geoms.
@@ -27,7 +27,7 @@ class Variation:
         com: Shift of the root body's centre of mass, m.
         gains: Factor on both gains of the PD law.
         timestep: Seconds a physics step; the robot's when None.
-        integrator: The robot's when None.
+        integrator: Integrator; the robot's when None.
     """
 
     friction: float = 1.0
@@ -39,10 +39,10 @@ class Variation:
 
 
 def varied(robot: Robot, variation: Variation) -> Robot:
-    """The robot with another physics.
+    """Return the robot with other physics.
 
     Raises:
-        BadConfiguration: its control step is no whole number of such physics steps.
+        BadConfiguration: the physics step does not divide the control step.
     """
     model = copy.copy(robot.model)
     _vary(model, robot, variation)
@@ -58,7 +58,7 @@ def varied(robot: Robot, variation: Variation) -> Robot:
 def varied_models(
     robot: Robot, random: RandomConfig, n: int, rng: np.random.Generator
 ) -> list[mujoco.MjModel]:
-    """A model of its own for each of n copies, drawn from the ranges of a training."""
+    """Return a separate model for each of n copies, drawn from the ranges of a training."""
     friction, mass = (1 + width * rng.uniform(-1, 1, n) for width in (random.friction, random.mass))
     com: Float[np.ndarray, "N 3"] = random.com * rng.uniform(-1, 1, (n, 3))
     models = []
@@ -89,4 +89,4 @@ def _vary(model: mujoco.MjModel, robot: Robot, variation: Variation) -> None:
     model.body_inertia[:] *= variation.mass
     model.body_ipos[model.body(robot.description.root_body).id] += variation.com
     data = mujoco.MjData(model)
-    mujoco.mj_setConst(model, data)  # what follows from masses
+    mujoco.mj_setConst(model, data)  # constants derived from masses

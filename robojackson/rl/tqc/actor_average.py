@@ -1,7 +1,7 @@
-"""The running mean of the actor: what becomes the policy (Polyak averaging).
+"""The running mean of the actor, which becomes the policy (Polyak averaging).
 
-The actor of the last round is one draw around what was learnt; its mean over the last rounds tracks
-the reference more closely at no cost (Polyak & Juditsky, 1992).
+The actor of the last round is one noisy sample; the mean over the last rounds tracks the reference
+more closely at no cost (Polyak & Juditsky, 1992).
 """
 
 from copy import deepcopy
@@ -24,10 +24,10 @@ class ActorAverage:
         self._mean: Layers = ()
 
     def add(self, layers: Layers, updates: int) -> None:
-        """Take in the actor of a round, once; a young mean weighs all rounds alike.
+        """Add the actor of a round, once; a young mean weighs all rounds equally.
 
         Args:
-            updates: Gradient updates so far: what tells rounds apart.
+            updates: Gradient updates so far, which identify a round.
         """
         if not self._past or updates <= self._seen:
             return
@@ -41,13 +41,13 @@ class ActorAverage:
                 kept += np.float32(fresh) * (array - kept)
 
     def layers(self, newest: Layers, updates: int) -> Layers:
-        """The mean with the newest actor in it, which stays out of the mean that goes on."""
+        """Return the mean including the newest actor, without changing the stored mean."""
         whole = deepcopy(self)
         whole.add(newest, updates)
         return whole._mean if whole._count else newest
 
     def save(self, folder: Path) -> None:
-        """Part of a checkpoint."""
+        """Write the mean into a checkpoint."""
         arrays = {
             f"{i}{k}": a
             for i, pair in enumerate(self._mean)
@@ -57,7 +57,7 @@ class ActorAverage:
         np.savez(folder / "average.npz", **counts, **arrays)  # type: ignore[arg-type]
 
     def load(self, folder: Path) -> None:
-        """Go on from what `save` wrote."""
+        """Read the mean from a checkpoint."""
         with np.load(folder / "average.npz", allow_pickle=False) as arrays:
             self._count = int(arrays["count"])
             self._seen = int(arrays["seen"])

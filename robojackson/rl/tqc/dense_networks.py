@@ -1,10 +1,10 @@
 """Actor and critics of sbx as plain functions of their parameters, gradients laid out for a CPU.
 
-The same numbers as flax computes but for the rounding. XLA takes longer over a product whose left
-side is transposed: three times as long where the other side is narrow, a third longer where the
-rows lie a multiple of the cache's sets apart. So the slope of a narrow kernel is computed the other
-way round, and that of a wide one from a transposed copy. The actor's loss asks a critic for its
-slope by the action alone: an observation is no input of that product.
+Equal to flax's results except for rounding. XLA takes longer over a product whose left side is
+transposed: three times as long if the other side is narrow, a third longer if the rows are a
+multiple of the cache's sets apart. So the gradient of a narrow kernel is computed transposed, and
+that of a wide one from a transposed copy. The actor's loss needs a critic's gradient by the action
+alone: an observation is not an input of that product.
 """
 
 from collections.abc import Callable
@@ -19,7 +19,7 @@ from sbx.common.distributions import TanhTransformedDistribution
 from robojackson.rl.config.tqc_config import NORM_EPSILON
 
 NARROW = 128
-"""Outputs of a kernel below which its slope is computed transposed."""
+"""Outputs of a kernel below which its gradient is computed transposed."""
 LOG_STD_RANGE = (-20.0, 2.0)
 Parameters = Any
 
@@ -28,7 +28,7 @@ Parameters = Any
 def dense(
     x: Float[Array, "B I"], kernel: Float[Array, "I O"], bias: Float[Array, " O"]
 ) -> Float[Array, "B O"]:
-    """A layer without its activation."""
+    """Return the output of a layer without its activation."""
     return x @ kernel + bias
 
 
@@ -38,7 +38,7 @@ def _forward(x: Array, kernel: Array, bias: Array) -> tuple[Array, tuple[Array, 
 
 def _backward(kept: tuple[Array, Array], slope: Array) -> tuple[Array, Array, Array]:
     x, kernel = kept
-    # Or XLA turns the product round again.
+    # Otherwise XLA transposes the product again.
     as_it_stands: Callable[[Array], Array] = jax.lax.optimization_barrier
     if slope.shape[1] < NARROW:
         by_kernel = as_it_stands(slope.T @ x).T
@@ -55,14 +55,14 @@ dense.defvjp(_forward, _backward)
 def quantiles(
     params: Parameters, observations: Float[Array, "B O"], actions: Float[Array, "B A"]
 ) -> Float[Array, "B Q"]:
-    """A critic's quantiles."""
+    """Return a critic's quantiles."""
     return _rest(params, dense(jnp.concatenate([observations, actions], 1), *_layer(params, 0)))
 
 
 def quantiles_of_actions(
     params: Parameters, observations: Float[Array, "B O"], actions: Float[Array, "B A"]
 ) -> Float[Array, "B Q"]:
-    """The same where only the slope by the action is asked for."""
+    """Return a critic's quantiles where only the gradient by the action is needed."""
     kernel, bias = _layer(params, 0)
     seen = observations @ kernel[: observations.shape[1]]
     return _rest(params, seen + dense(actions, kernel[observations.shape[1] :], bias))
@@ -71,10 +71,10 @@ def quantiles_of_actions(
 def actions_of(
     params: Parameters, observations: Float[Array, "B O"], seen: int | None = None
 ) -> Any:
-    """The actor's distribution over actions: a Gaussian squashed by tanh.
+    """Return the actor's distribution over actions: a Gaussian squashed by tanh.
 
     Args:
-        seen: Inputs at the beginning that the actor sees; all of them when None.
+        seen: Number of first inputs that the actor sees; all of them when None.
     """
     hidden, last = observations[:, :seen], len(params["params"]) - 2
     for i in range(last):
@@ -90,7 +90,7 @@ def actions_of(
 
 
 def dense_count(params: Parameters) -> int:
-    """Dense layers among a network's layers."""
+    """Return the number of dense layers among a network's layers."""
     return sum(name.startswith("Dense_") for name in params["params"])
 
 
@@ -100,7 +100,7 @@ def _layer(params: Parameters, i: int) -> tuple[Array, Array]:
 
 
 def _rest(params: Parameters, first: Array) -> Array:
-    """What follows a critic's first layer."""
+    """Return the output of the layers after a critic's first."""
     value, normal = first, "LayerNorm_0" in params["params"]
     for i in range(1, dense_count(params)):
         value = _normal(params, i - 1, value) if normal else value
@@ -109,7 +109,7 @@ def _rest(params: Parameters, first: Array) -> Array:
 
 
 def _normal(params: Parameters, i: int, value: Array) -> Array:
-    """Layer normalisation (Ba et al. 2016)."""
+    """Return a value after layer normalisation (Ba et al. 2016)."""
     layer = params["params"][f"LayerNorm_{i}"]
     centred = value - value.mean(1, keepdims=True)
     spread = jnp.square(centred).mean(1, keepdims=True)

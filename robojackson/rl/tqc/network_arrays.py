@@ -1,4 +1,5 @@
-"""Actor and critics of a TQC run as named arrays, the same names for every trainer, in safetensors.
+"""Actor and critics of a TQC run as named arrays, with equal names for every trainer, in
+safetensors.
 
 `actor.0.weight` (in, out), `actor.0.bias`, ..., `mean.*`, `log_std.*`, `critic1.0.weight`, ...,
 `target1.0.weight`, ..., `log_alpha`; with layer normalisation
@@ -31,8 +32,8 @@ class Networks:
     """Weights to start from.
 
     Attributes:
-        tensors: By name; critics and log_std may be missing.
-        facts: Where they come from.
+        tensors: Arrays by name; critics and log_std may be missing.
+        facts: Facts about their source.
     """
 
     tensors: Mapping[str, np.ndarray]
@@ -40,32 +41,32 @@ class Networks:
 
     @property
     def observation_size(self) -> int:
-        """Length of the observation that the actor takes."""
+        """Return the length of the observation that the actor takes."""
         first = "actor.0.weight" if "actor.0.weight" in self.tensors else "mean.weight"
         return int(self.tensors[first].shape[0])
 
     @property
     def action_size(self) -> int:
-        """Length of the action."""
+        """Return the length of the action."""
         return int(self.tensors["mean.weight"].shape[1])
 
     @property
     def has_critics(self) -> bool:
-        """Whether both critics are there."""
+        """Return whether both critics exist."""
         return all(f"{critic}.0.weight" in self.tensors for critic in CRITICS)
 
     def widths(self, part: str) -> tuple[int, ...]:
-        """Units of every layer of a part."""
+        """Return the units of every layer of a part."""
         names = (f"{part}.{i}.weight" for i in count())
         return tuple(self.tensors[n].shape[1] for n in takewhile(self.tensors.__contains__, names))
 
     @property
     def layer_norm(self) -> bool:
-        """Whether the critics' layers are normalised."""
+        """Return whether the critics' layers are normalised."""
         return f"{CRITICS[0]}.norm.0.scale" in self.tensors
 
     def to_bytes(self) -> bytes:
-        """The content of the file."""
+        """Return the content of the file."""
         arrays = {n: np.array(t, np.float32, order="C") for n, t in self.tensors.items()}
         return save(arrays, {FORMAT: json.dumps(dict(self.facts), sort_keys=True)})
 
@@ -92,32 +93,32 @@ def load_networks(path: Path) -> Networks:
 
 
 def require_complete(networks: Networks, path: Path) -> Networks:
-    """The networks, if every array is there, measures what its neighbours ask for and is finite.
+    """Return the networks if all arrays exist, fit each other and are finite.
 
     Raises:
-        BadPolicy: with the first array that does not.
+        BadPolicy: the message has the first wrong array.
     """
     tensors = networks.tensors
     weights = {"mean.weight", *(name for name in tensors if name.endswith(".weight"))}
     if flat := sorted(n for n in weights if n not in tensors or tensors[n].ndim != 2):
-        raise BadPolicy(f"{path} is not whole: {flat[0]} is missing or no matrix")
+        raise BadPolicy(f"{path} is not whole: {flat[0]} is missing or not a matrix")
     needed = _shapes(networks)
     if missing := sorted(needed.keys() - tensors.keys()):
         raise BadPolicy(f"{path} is not whole: {missing[0]} is missing")
     if foreign := sorted(tensors.keys() - needed.keys()):
-        raise BadPolicy(f"{path} holds {foreign[0]}, which belongs to none of its layers")
+        raise BadPolicy(f"{path} holds {foreign[0]}, which belongs to no layer")
     for name, array in tensors.items():
         if array.shape != needed[name]:
             raise BadPolicy(
-                f"{path}: {name} has the shape {array.shape}, its layers ask for {needed[name]}"
+                f"{path}: {name} has the shape {array.shape}, its layers need {needed[name]}"
             )
         if not np.isfinite(array).all():
-            raise BadPolicy(f"{path}: {name} holds values that are no numbers")
+            raise BadPolicy(f"{path}: {name} holds values that are not finite")
     return networks
 
 
 def _shapes(networks: Networks) -> dict[str, tuple[int, ...]]:
-    """Name and shape of every array that networks with such layers have."""
+    """Return name and shape of every array of networks with such layers."""
     tensors, seen, acts = networks.tensors, networks.observation_size, networks.action_size
     actor = (seen, *_units(tensors, "actor"))
     shapes = _chain("actor", actor) | _layer("mean", actor[-1], acts)
@@ -133,7 +134,7 @@ def _shapes(networks: Networks) -> dict[str, tuple[int, ...]]:
 
 
 def _units(tensors: Mapping[str, np.ndarray], part: str) -> tuple[int, ...]:
-    """Units of every layer of which there is anything."""
+    """Return the units of every layer of a part."""
     found = {m[1] for name in tensors if (m := re.fullmatch(rf"{part}\.(\d+)\.\w+", name))}
     biases = (tensors.get(f"{part}.{i}.bias", np.empty(0)) for i in range(len(found)))
     return tuple(bias.size for bias in biases)
@@ -151,10 +152,10 @@ def _layer(name: str, taken: int, given: int) -> dict[str, tuple[int, ...]]:
 
 
 def fitted(config: TqcConfig, networks: Networks, critics: bool) -> TqcConfig:
-    """The configuration with the layers that the networks have.
+    """Return the configuration with the networks' layers.
 
     Raises:
-        BadPolicy: the critics have no more quantiles than are dropped.
+        BadPolicy: the critics do not have more quantiles than are dropped.
     """
     shaped = replace(config, actor=networks.widths("actor"))
     if not (critics and networks.has_critics):
@@ -171,7 +172,7 @@ def fitted(config: TqcConfig, networks: Networks, critics: bool) -> TqcConfig:
 
 
 def chosen(networks: Networks, critics: bool) -> Networks:
-    """The networks, or the actor alone."""
+    """Return the networks, or the actor alone."""
     if critics and networks.has_critics:
         return networks
     kept = {
@@ -181,7 +182,8 @@ def chosen(networks: Networks, critics: bool) -> Networks:
 
 
 def widened(networks: Networks, observation_size: int) -> Networks:
-    """The same networks for a longer observation that begins with theirs: new inputs weigh zero."""
+    """Return the same networks for an observation that is longer; the new inputs have weight
+    zero."""
     old = networks.observation_size
     gap = np.zeros((observation_size - old, 1), np.float32)
     tensors = dict(networks.tensors)

@@ -1,4 +1,5 @@
-"""What both trainers share: the arguments of TQC, the loop, the counters, replay and randomness."""
+"""Common parts of both trainers: the arguments of TQC, the loop, counters, replay and
+randomness."""
 
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ FOREVER = 10**12
 
 
 def arguments(config: TqcConfig, seed: int, env: VecEnv) -> dict[str, Any]:
-    """Our configuration in the words of Stable-Baselines3, for either TQC."""
+    """Return our configuration as arguments of Stable-Baselines3, for either TQC."""
     return {
         "policy": "MlpPolicy",
         "learning_rate": config.learning_rate,
@@ -42,14 +43,14 @@ def arguments(config: TqcConfig, seed: int, env: VecEnv) -> dict[str, Any]:
 
 
 def is_warming_up(model: OffPolicyAlgorithm, warmup: int) -> bool:
-    """Whether the replay buffer holds too little to learn from."""
+    """Return whether the replay buffer holds too little to learn from."""
     return buffer_of(model).size() * model.n_envs < warmup
 
 
 class OffPolicyTrainer:
     """The part of the `Trainer` protocol that does not depend on how networks are computed.
 
-    The model has an attribute `warmup`: transitions that it waits for before it learns.
+    The model has an attribute `warmup`: number of transitions before it learns.
     """
 
     model: Any
@@ -61,24 +62,28 @@ class OffPolicyTrainer:
         model.set_logger(Logger(folder=None, output_formats=[]))
 
     def learn(self, callback: BaseCallback) -> None:
+        """Learn until the callback stops it."""
         self.model.learn(
             FOREVER, callback=callback, log_interval=FOREVER, reset_num_timesteps=False
         )
 
     def steps(self) -> int:
+        """Return the control steps so far."""
         result: int = self.model.num_timesteps
         return result
 
     def updates(self) -> int:
+        """Return the gradient updates so far."""
         result: int = self.model._n_updates
         return result
 
     def saved(self) -> None:
+        """Remove replay files that are no longer needed."""
         assert self._files is not None
         self._files.prune(buffer_of(self.model), self._rows())
 
     def _act_at_once(self) -> None:
-        """No random actions: what was learnt elsewhere fills the replay buffer."""
+        """Use no random actions: the loaded policy fills the replay buffer."""
         self.model.learning_starts = 0
 
     def _rows(self) -> int:

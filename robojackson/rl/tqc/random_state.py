@@ -19,7 +19,7 @@ def save_random(path: Path, generators: dict[str, np.random.Generator]) -> None:
 
 
 def load_random(path: Path, generators: dict[str, np.random.Generator]) -> None:
-    """Put generators back into what `save_random` wrote."""
+    """Restore generators from `save_random`'s file."""
     saved = json.loads(path.read_text())
     for name, generator in generators.items():
         generator.bit_generator.state = saved["generators"][name]

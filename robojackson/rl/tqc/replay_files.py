@@ -1,8 +1,8 @@
 """The replay buffer of Stable-Baselines3 on disk: every transition is written once.
 
-A checkpoint adds one file with the transitions since the last one, so it costs what is new and not
-what is kept. A crash while it is written leaves the files of the checkpoint before untouched; files
-that the buffer has wrapped past are removed after the next checkpoint. Nothing is pickled.
+A checkpoint adds one file with the transitions since the last one, so its cost depends on the new
+transitions alone. A crash during the write leaves the files of the previous checkpoint unchanged;
+files that the buffer has overwritten are removed after the next checkpoint. Nothing is pickled.
 """
 
 import os
@@ -16,7 +16,7 @@ ARRAYS = ("observations", "next_observations", "actions", "rewards", "dones", "t
 
 
 def buffer_of(model: OffPolicyAlgorithm) -> ReplayBuffer:
-    """The replay buffer of an algorithm that has been set up."""
+    """Return the replay buffer of an algorithm that has been set up."""
     if model.replay_buffer is None:
         raise RuntimeError("the algorithm has no replay buffer yet")
     return model.replay_buffer
@@ -29,7 +29,8 @@ class ReplayFiles:
         self._folder, self._kept = folder, 0
 
     def save(self, buffer: ReplayBuffer, rows: int) -> None:
-        """Write the rows since the last call; `rows` were added to the buffer in all."""
+        """Write the rows since the last call; `rows` is the total number of rows added to the
+        buffer."""
         first = max(self._kept, rows - buffer.buffer_size)
         if first < rows:
             self._folder.mkdir(exist_ok=True)
@@ -43,7 +44,7 @@ class ReplayFiles:
         self._kept = rows
 
     def load(self, buffer: ReplayBuffer, rows: int) -> None:
-        """Fill the buffer as it was when it had got `rows`; later files are removed."""
+        """Restore the buffer to its state after `rows` rows; remove later files."""
         for path, first, last in self._files():
             if last > rows:
                 path.unlink()
@@ -56,7 +57,7 @@ class ReplayFiles:
         self._kept = rows
 
     def prune(self, buffer: ReplayBuffer, rows: int) -> None:
-        """Remove the files that hold nothing the buffer still has."""
+        """Remove the files whose rows the buffer has overwritten."""
         for path, _, last in self._files():
             if last <= rows - buffer.buffer_size:
                 path.unlink()

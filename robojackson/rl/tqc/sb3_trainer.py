@@ -1,4 +1,4 @@
-"""TQC of sb3-contrib (torch): the reference that the fast trainer is compared with."""
+"""TQC of sb3-contrib (torch): the reference implementation of the fast trainer."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -43,7 +43,7 @@ class OnboardPolicy(TQCPolicy):
     seen: int | None = None
 
     def make_actor(self, features_extractor: Any = None) -> Actor:
-        """The actor; the inputs that it does not see are zero to it."""
+        """Create the actor; its unseen inputs are zero."""
         actor = super().make_actor(features_extractor)
         if self.seen is not None:
             actor.features_extractor = Beginning(self.observation_space, self.seen)
@@ -51,16 +51,16 @@ class OnboardPolicy(TQCPolicy):
 
 
 class NormalisedPolicy(OnboardPolicy):
-    """The same with normalised critics."""
+    """TQC's policy with normalised critics."""
 
     def make_critic(self, features_extractor: Any = None) -> Critic:
-        """Critics, or their targets."""
+        """Create critics, or their targets."""
         given = self._update_features_extractor(self.critic_kwargs, features_extractor)
         return NormalisedCritic(**given).to(self.device)
 
 
 class Beginning(BaseFeaturesExtractor):
-    """Observations of which all but the beginning is zero."""
+    """Observations with zeros after the first inputs."""
 
     def __init__(self, space: gymnasium.Space[Any], seen: int) -> None:
         size = int(np.prod(space.shape or 1))
@@ -68,7 +68,7 @@ class Beginning(BaseFeaturesExtractor):
         self._seen = torch.arange(size) < seen
 
     def forward(self, observations: torch.Tensor) -> torch.Tensor:
-        """The observation with zeros."""
+        """Return the observation with zeros."""
         return torch.where(self._seen, observations, 0.0)
 
 
@@ -83,12 +83,12 @@ class WarmupTQC(TQC):
     random: torch.Tensor | None = None
 
     def collect_rollouts(self, *args: Any, **named: Any) -> RolloutReturn:
-        """A round of steps."""
+        """Collect a round of steps."""
         self.random = torch.get_rng_state()
         return super().collect_rollouts(*args, **named)
 
     def train(self, gradient_steps: int, batch_size: int = 64) -> None:
-        """A round of updates, unless the buffer has still to be filled."""
+        """Run a round of updates, unless the buffer is still being filled."""
         if not is_warming_up(self, self.warmup):
             super().train(gradient_steps, batch_size)
 
@@ -101,7 +101,7 @@ class Sb3Trainer(OffPolicyTrainer):
         given = arguments(config, seed, env)
         if config.gsde:
             given["use_sde"] = True
-            given["policy_kwargs"] |= {"clip_mean": 0.0}  # the policy file knows no clipped mean
+            given["policy_kwargs"] |= {"clip_mean": 0.0}  # a policy file has no clipped mean
         kind = NormalisedPolicy if config.layer_norm else OnboardPolicy
         given["policy"] = type(kind.__name__, (kind,), {"seen": seen})
         model = WarmupTQC(env=env, device="cpu", **given)
@@ -109,6 +109,7 @@ class Sb3Trainer(OffPolicyTrainer):
         super().__init__(model, generators={})
 
     def layers(self) -> Layers:
+        """Return the actor's layers."""
         actor = self.model.actor
         modules = [*actor.latent_pi.children(), actor.mu]
         linear = [m for m in modules if isinstance(m, torch.nn.Linear)]
@@ -118,15 +119,18 @@ class Sb3Trainer(OffPolicyTrainer):
         return of_seen(layers, self._seen)
 
     def acting(self) -> tuple[Layers, int]:
+        """Return the acting actor's layers and its gradient updates."""
         return self.layers(), self.updates()
 
     def networks(self) -> Tensors:
+        """Return actor and critics by name."""
         tensors: Tensors = {}
         for name, parameter in self._named().items():
             tensors[name] = parameter.detach().numpy().T.copy()
         return tensors | {"log_alpha": self.model.log_ent_coef.detach().numpy().reshape(()).copy()}
 
     def start_from(self, tensors: Mapping[str, np.ndarray]) -> None:
+        """Load named arrays into the networks."""
         with torch.no_grad():
             for name, parameter in self._named().items():
                 if name in tensors:
@@ -136,6 +140,7 @@ class Sb3Trainer(OffPolicyTrainer):
         self._act_at_once()
 
     def save(self, folder: Path, replay: Path) -> None:
+        """Write networks, optimizers, random state and new transitions."""
         state = {name: part.state_dict() for name, part in self._parts().items()}
         random = torch.get_rng_state() if self.model.random is None else self.model.random
         state |= {"log_ent_coef": self.model.log_ent_coef.detach(), "random": random}
@@ -143,6 +148,7 @@ class Sb3Trainer(OffPolicyTrainer):
         self._save_rest(folder, replay)
 
     def load(self, folder: Path, replay: Path, steps: int, updates: int) -> None:
+        """Continue from what `save` wrote."""
         state = torch.load(folder / "networks.pt", weights_only=True)
         for name, part in self._parts().items():
             part.load_state_dict(state[name])
@@ -151,7 +157,7 @@ class Sb3Trainer(OffPolicyTrainer):
         self._load_rest(folder, replay, steps, updates)
 
     def _named(self) -> dict[str, torch.Tensor]:
-        """The parameters by our names; matrices are transposed there."""
+        """Return the parameters by our names; matrices are transposed there."""
         policy = self.model.policy
         chains = {"actor": policy.actor.latent_pi}
         chains |= {c: policy.critic.q_networks[i] for i, c in enumerate(CRITICS)}
@@ -177,6 +183,6 @@ class Sb3Trainer(OffPolicyTrainer):
 
 
 def _numbered(prefix: str, chain: torch.nn.Module, kind: type[Any]) -> dict[str, Any]:
-    """The layers of a kind in the order in which they are passed."""
+    """Return the layers of a kind in the order of the forward pass."""
     found = [module for module in chain.modules() if isinstance(module, kind)]
     return {f"{prefix}{i}": module for i, module in enumerate(found)}

@@ -1,8 +1,7 @@
 """TQC in JAX (SBX), with learning and acting at the same time.
 
-SBX dispatches a round of updates to XLA, which computes in its own thread; meanwhile the
-simulations step with the actor of the round before, as numpy arrays. Acting lags by one round and
-the result is still determined by the seed.
+XLA computes a round of updates in its own thread; meanwhile the simulations step with the actor of
+the previous round (numpy arrays). Acting lags by one round; the seed still determines the result.
 """
 
 import os
@@ -53,7 +52,7 @@ class OverlappedTQC(TQC):
         episode_start: Any = None,
         deterministic: bool = False,
     ) -> tuple[np.ndarray, Any]:
-        """Sample actions from the actor of the round before."""
+        """Sample actions from the actor of the previous round."""
         hidden = observation[:, : self.seen]
         for weight, bias in self._acting[:-2]:
             hidden = np.maximum(hidden @ weight[: hidden.shape[1]] + bias, 0.0)
@@ -66,7 +65,7 @@ class OverlappedTQC(TQC):
         return np.tanh(mean), state
 
     def train(self, gradient_steps: int, batch_size: int) -> None:
-        """Wait for the round before, take its actor, and dispatch the next round."""
+        """Wait for the previous round, take its actor, and dispatch the next round."""
         if is_warming_up(self, self.warmup):
             return
         self._acting = dense_layers(self.policy.actor_state.params)
@@ -101,7 +100,7 @@ class OverlappedTQC(TQC):
 
 
 def dense_layers(params: Any) -> Layers:
-    """Dense layers in their order as numpy arrays; an actor's last two are mean and log std."""
+    """Return dense layers in order as numpy arrays; an actor's last two are mean and log std."""
     tree = jax.device_get(params)["params"]
     names = [f"Dense_{i}" for i in range(dense_count(params))]
     return tuple((np.asarray(tree[n]["kernel"]), np.asarray(tree[n]["bias"])) for n in names)
@@ -123,20 +122,24 @@ class SbxTrainer(OffPolicyTrainer):
         super().__init__(model, {"noise": model.noise})
 
     def learn(self, callback: BaseCallback) -> None:
+        """Learn until the callback stops it; wait for the last round."""
         try:
             super().learn(callback)
         finally:  # a round that XLA still computes when Python ends would crash it
             jax.block_until_ready(self._state())  # type: ignore[no-untyped-call]
 
     def layers(self) -> Layers:
+        """Return the actor's layers."""
         layers = dense_layers(self.model.policy.actor_state.params)
         return of_seen(layers[:-1], self.model.seen)
 
     def acting(self) -> tuple[Layers, int]:
+        """Return the acting actor's layers and its gradient updates."""
         layers = of_seen(self.model._acting[:-1], self.model.seen)
         return layers, max(0, self.updates() - self.model.gradient_steps)
 
     def networks(self) -> Tensors:
+        """Return actor and critics by name."""
         policy = self.model.policy
         tensors = _tensors(policy.actor_state.params, "actor")
         for name, params in self._critics().items():
@@ -145,6 +148,7 @@ class SbxTrainer(OffPolicyTrainer):
         return tensors | {"log_alpha": np.array(jax.device_get(alpha)).reshape(())}
 
     def start_from(self, tensors: Mapping[str, np.ndarray]) -> None:
+        """Load named arrays into the networks."""
         policy = self.model.policy
         policy.actor_state = policy.actor_state.replace(
             params=_filled(policy.actor_state.params, tensors, "actor")
@@ -162,21 +166,21 @@ class SbxTrainer(OffPolicyTrainer):
         self._act_at_once()
 
     def save(self, folder: Path, replay: Path) -> None:
+        """Write networks, optimizers, random state and new transitions."""
         state = flax.serialization.to_bytes(self._state())
         (folder / "networks.msgpack").write_bytes(state)
         self._save_rest(folder, replay)
 
     def load(self, folder: Path, replay: Path, steps: int, updates: int) -> None:
+        """Continue from what `save` wrote."""
         saved = (folder / "networks.msgpack").read_bytes()
         state = flax.serialization.from_bytes(self._state(), saved)
         policy = self.model.policy
         policy.actor_state, policy.qf1_state = state["actor"], state["critic1"]
         policy.qf2_state, self.model.ent_coef_state = state["critic2"], state["entropy"]
         self.model.key = jax.numpy.asarray(state["key"])
-        acting = state["acting"]
-        self.model._acting = tuple(
-            (acting[f"{i}w"], acting[f"{i}b"]) for i in range(len(acting) // 2)
-        )
+        parts = state["acting"]
+        self.model._acting = tuple((parts[f"{i}w"], parts[f"{i}b"]) for i in range(len(parts) // 2))
         self._load_rest(folder, replay, steps, updates)
 
     def _critics(self) -> dict[str, Any]:
@@ -187,7 +191,7 @@ class SbxTrainer(OffPolicyTrainer):
 
     def _state(self) -> dict[str, Any]:
         policy = self.model.policy
-        return {  # everything that a round of updates computes
+        return {  # all results of a round of updates
             "actor": policy.actor_state,
             "critic1": policy.qf1_state,
             "critic2": policy.qf2_state,
@@ -202,12 +206,12 @@ class SbxTrainer(OffPolicyTrainer):
 
 
 def _strong(leaf: Any) -> jax.Array:
-    """An array of a type that stays: a weak one would have the updates compiled again and again."""
+    """Return an array of a fixed type: a weak one would recompile the updates again and again."""
     return jax.numpy.asarray(np.asarray(leaf))
 
 
 def _places(params: Any, part: str) -> dict[str, tuple[str, str]]:
-    """Module and leaf of flax's tree in which each of our tensors of a part stands."""
+    """Return module and leaf of flax's tree for each of our tensors of a part."""
     dense = dense_count(params)
     heads = {dense - 2: "mean", dense - 1: "log_std"} if part == "actor" else {}
     places: dict[str, tuple[str, str]] = {}
@@ -221,14 +225,14 @@ def _places(params: Any, part: str) -> dict[str, tuple[str, str]]:
 
 
 def _tensors(params: Any, part: str) -> Tensors:
-    """The parameters of a part by our names."""
+    """Return the parameters of a part by our names."""
     tree = jax.device_get(params)["params"]
     places = _places(params, part).items()
     return {name: np.array(tree[module][leaf]) for name, (module, leaf) in places}
 
 
 def _filled(params: Any, tensors: Mapping[str, np.ndarray], part: str) -> Any:
-    """The parameters with named arrays in the places where there are any."""
+    """Return the parameters with named arrays in their places."""
     tree = jax.tree_util.tree_map(lambda leaf: leaf, params)
     for name, (module, leaf) in _places(params, part).items():
         if name in tensors:
@@ -237,7 +241,7 @@ def _filled(params: Any, tensors: Mapping[str, np.ndarray], part: str) -> Any:
 
 
 def _raise_noise(model: OverlappedTQC, log_std: float) -> None:
-    """Begin with another exploration noise: the bias of the head that tells it."""
+    """Start with another exploration noise: set the bias of the log std's head."""
     state = model.policy.actor_state
     head = f"Dense_{len(state.params['params']) - 1}"
     tree = jax.tree_util.tree_map(lambda leaf: leaf, state.params)

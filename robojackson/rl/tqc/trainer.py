@@ -1,4 +1,4 @@
-"""What a trainer is: an algorithm that learns on the environment and hands out its actor."""
+"""Interface of a trainer: an algorithm that learns on the environment and returns its actor."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,7 +15,8 @@ Layers = tuple[tuple[np.ndarray, np.ndarray], ...]
 
 
 def of_seen(layers: Layers, seen: int | None) -> Layers:
-    """The layers for the inputs that the actor sees: the first of them; all when None."""
+    """Return the layers for the actor's inputs, which are the first of the observation; all when
+    None."""
     (weight, bias), *rest = layers
     return ((weight[:seen], bias), *rest)
 
@@ -24,32 +25,32 @@ class Trainer(Protocol):
     """A learning algorithm bound to an environment."""
 
     def learn(self, callback: "BaseCallback") -> None:
-        """Learn until the callback says stop."""
+        """Learn until the callback stops it."""
 
     def layers(self) -> Layers:
-        """The actor's layers, (weight (in, out), bias) each, the mean's head last."""
+        """Return the actor's layers, (weight (in, out), bias) each, the mean's head last."""
 
     def acting(self) -> tuple[Layers, int]:
-        """The same of the actor that the simulations follow now, without waiting for updates, and
-        the gradient updates that it has had."""
+        """Return the layers of the actor that the simulations follow now, without waiting for
+        updates, and its gradient updates."""
 
     def steps(self) -> int:
-        """Control steps so far, over all simulations and resumptions."""
+        """Return the control steps so far, over all simulations and resumptions."""
 
     def updates(self) -> int:
-        """Gradient updates so far."""
+        """Return the gradient updates so far."""
 
     def networks(self) -> Tensors:
-        """Actor and critics by name (`networks`)."""
+        """Return actor and critics by name (`networks`)."""
 
     def start_from(self, tensors: Mapping[str, np.ndarray]) -> None:
-        """Put named arrays in the place of the networks; act by them from the first step on."""
+        """Load named arrays into the networks; act by them from the first step on."""
 
     def save(self, folder: Path, replay: Path) -> None:
         """Write networks, optimizers, random state, and what is new in the replay buffer."""
 
     def saved(self) -> None:
-        """Called when what `save` wrote is the checkpoint: what is older may go."""
+        """Remove older files; called when `save`'s files are the checkpoint."""
 
     def load(self, folder: Path, replay: Path, steps: int, updates: int) -> None:
         """Continue from what `save` wrote."""

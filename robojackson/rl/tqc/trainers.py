@@ -1,6 +1,6 @@
 """The trainers by name: `sbx_trainer` (JAX, fast) and `sb3_trainer` (torch, the reference).
 
-Configuration, tables and the policy file are the same. Importing this module imports neither.
+Configuration, tables and the policy file are equal. Importing this module imports neither.
 """
 
 from typing import TYPE_CHECKING
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 def make_trainer(
     name: str, env: "VecEnv", config: TqcConfig, seed: int, seen: int | None = None
 ) -> Trainer:
-    """Build the named trainer.
+    """Return the named trainer.
 
     Args:
-        seen: Inputs at the beginning of an observation that the actor sees; all when None. The
+        seen: Number of first inputs of an observation that the actor sees; all when None. The
             critics see all.
 
     Raises:
-        MissingDependency: JAX is not installed; the message says how to get it.
+        MissingDependency: JAX is not installed; the message has the remedy.
     """
     if name == "sb3":
         from robojackson.rl.tqc.sb3_trainer import Sb3Trainer

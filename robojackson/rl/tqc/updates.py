@@ -1,8 +1,8 @@
 """The updates of TQC (Kuznetsov et al., 2020, eq. 10-14) in JAX, laid out for a CPU.
 
-The same numbers as in sbx but for the rounding, with two thirds of its time beside the matrix
-products left out (`quantile_loss`), faster products (`dense_networks`), and no branch that copies
-all networks.
+Equal to sbx's results except for rounding, with two thirds of its time beside the matrix products
+removed (`quantile_loss`), faster products (`dense_networks`), and no branch that copies all
+networks.
 """
 
 from functools import partial
@@ -19,12 +19,12 @@ from robojackson.rl.tqc.quantile_loss import lowest, quantile_huber
 
 
 class LearnerState(NamedTuple):
-    """All that updates change; states are sbx's.
+    """Everything that updates change; states are sbx's.
 
     Attributes:
-        critics: Both, each with its target.
-        entropy: Of the entropy coefficient.
-        key: Random.
+        critics: Both critics, each with its target.
+        entropy: Entropy coefficient.
+        key: Random key.
     """
 
     actor: Any
@@ -44,14 +44,14 @@ def round_of_updates(
     delay: int,
     seen: int | None = None,
 ) -> LearnerState:
-    """`count` updates of the critics, each from its part of the samples, and after every `delay` of
-    them one of the actor and the entropy coefficient.
+    """Run `count` updates of the critics, each on its part of the samples, and after every `delay`
+    of them one of the actor and the entropy coefficient.
 
     Args:
         tau: Share of the critics that their targets take over with every update.
-        kept: Lowest target quantiles that are left, of both critics together.
+        kept: Number of lowest target quantiles that are used, of both critics together.
         delay: Divides `count`.
-        seen: Inputs at the beginning of an observation that the actor sees; all when None.
+        seen: Number of first inputs of an observation that the actor sees; all when None.
     """
     size = len(samples.rewards) // count
 
@@ -70,7 +70,7 @@ def round_of_updates(
 def _critics(
     learnt: LearnerState, batch: Samples, kept: int, tau: float, seen: int | None
 ) -> LearnerState:
-    """One update of both critics and their targets."""
+    """Run one update of both critics and their targets."""
     key, noise, _, _ = jax.random.split(learnt.key, 4)
     key, _, _ = jax.random.split(key, 3)
     now, then = jnp.asarray(batch.observations), jnp.asarray(batch.next_observations)
@@ -82,14 +82,14 @@ def _critics(
     future = jnp.concatenate(values, axis=1).T
     lowest_ones = lowest(future, kept)
     soft = future - alpha * chosen.log_prob(following)
-    wanted = batch.rewards + (1 - batch.dones) * batch.discounts * soft
+    targets = batch.rewards + (1 - batch.dones) * batch.discounts * soft
     states = []
     for critic in learnt.critics:
         current, pull = jax.vjp(
             lambda params: dense_networks.quantiles(params, now, actions),
             critic.params,
         )
-        _, slope = quantile_huber(current.T, wanted, lowest_ones, kept)
+        _, slope = quantile_huber(current.T, targets, lowest_ones, kept)
         states.append(critic.apply_gradients(grads=pull(slope.T)[0]))
     return learnt._replace(critics=TQC.soft_update(tau, *states), key=key)
 
@@ -100,7 +100,7 @@ def _actor(
     target_entropy: float,
     seen: int | None,
 ) -> LearnerState:
-    """One update of the actor and the entropy coefficient."""
+    """Run one update of the actor and the entropy coefficient."""
     key, _, _, noise = jax.random.split(learnt.key, 4)
     alpha = learnt.entropy.apply_fn({"params": learnt.entropy.params})
 

@@ -1,1 +1,2 @@
-"""General trackers: networks that make a robot follow any reference motion, untrained on it."""
+"""General trackers: networks that make a robot follow any reference motion without training on
+it."""

@@ -1,7 +1,7 @@
-"""A tracker's numbers bound to the hinges of its robot.
+"""A tracker's settings bound to the hinges of its robot.
 
 Effort limits, friction and masses stay the robot's: only the gains of the PD law are the tracker's,
-as its network was trained with them, and the physics step where these gains need a shorter one.
+as in its network's training, and the physics step if these gains need a shorter one.
 """
 
 from dataclasses import dataclass, replace
@@ -25,8 +25,8 @@ class Layout:
     """Hinges of a tracker in terms of its robot's; radians.
 
     Attributes:
-        order: Of every hinge of the tracker, its index in `qpos[7:]`.
-        motors: Of every motor, the tracker's hinge that it drives.
+        order: Index in `qpos[7:]` of every hinge of the tracker.
+        motors: The tracker's hinge of every motor.
         default: Angles that an action of 0 holds, in the tracker's order.
         measured: Whether the tracker gets a hinge's speed, in the tracker's order.
     """
@@ -42,7 +42,7 @@ def equip(robot: Robot, tracker: TrackerDescription) -> Robot:
 
     Raises:
         BadPolicy: the tracker is for another robot or another control step.
-        UnknownName: it names a hinge that the robot has not.
+        UnknownName: the tracker has a hinge that the robot lacks.
         BadConfiguration: a hinge without a gain, or a step that does not divide the control step.
     """
     require_robot(robot, tracker)
@@ -56,8 +56,8 @@ def layout_of(robot: Robot, tracker: TrackerDescription) -> Layout:
 
     Raises:
         BadPolicy: the tracker is for another robot or another control step.
-        UnknownName: it names a hinge that the robot has not.
-        BadConfiguration: a hinge of the robot that it does not drive.
+        UnknownName: the tracker has a hinge that the robot lacks.
+        BadConfiguration: the tracker does not drive a hinge of the robot.
     """
     require_robot(robot, tracker)
     own, joints = robot.joint_names, tracker.joints
@@ -80,7 +80,7 @@ def layout_of(robot: Robot, tracker: TrackerDescription) -> Layout:
 
 
 def require_robot(robot: Robot, tracker: TrackerDescription) -> None:
-    """Refuse another robot than the tracker's.
+    """Raise for another robot than the tracker's.
 
     Raises:
         BadPolicy: the tracker is for another robot or another control step.

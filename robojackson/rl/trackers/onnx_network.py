@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 INSTALL = "pip install 'robojackson[trackers]'"
 QUIET = 4
-"""Of onnxruntime's log only what is fatal: its errors are raised anyway."""
+"""Log level of onnxruntime: fatal messages only, since its errors are raised anyway."""
 
 
 class OnnxNetwork:
@@ -25,7 +25,7 @@ class OnnxNetwork:
 
     Raises:
         MissingDependency: onnxruntime is not installed.
-        BadPolicy: the file is damaged, no ONNX, or of other sizes.
+        BadPolicy: the file is damaged, not ONNX, or has other sizes.
     """
 
     def __init__(self, path: Path, inputs: int, outputs: int) -> None:
@@ -43,7 +43,7 @@ class OnnxNetwork:
         """Evaluate the network for N inputs at once.
 
         Raises:
-            BadPolicy: it cannot be run with a batch.
+            BadPolicy: the network cannot be run with a batch.
         """
         try:
             (result,) = self._session.run(None, {self._input: values.astype(np.float32)})
@@ -53,10 +53,10 @@ class OnnxNetwork:
 
 
 def require_runtime() -> None:
-    """Raise the line that brings onnxruntime, where it is missing.
+    """Raise an error with the installation command if onnxruntime is missing.
 
     Raises:
-        MissingDependency: it is not installed.
+        MissingDependency: onnxruntime is not installed.
     """
     if find_spec("onnxruntime") is None:
         raise MissingDependency(f"onnxruntime is not installed: {INSTALL}")
@@ -80,7 +80,8 @@ def _session(path: Path) -> "InferenceSession":
 
 
 def _width(value: "NodeArg") -> int | None:
-    """Length of a row of an input or output, None where it is no matrix or says none."""
+    """Return the length of a row of an input or output, None if it is not a matrix or has no
+    size."""
     return value.shape[1] if len(value.shape) == 2 and isinstance(value.shape[1], int) else None
 
 

@@ -21,22 +21,24 @@ class PolicyTracker:
     """A policy that was trained with `track.observation: preview` (`Tracker` protocol).
 
     Raises:
-        BadPolicy: the file is damaged, or its policy sees no reference ahead.
+        BadPolicy: the file is damaged, or its policy does not see the reference ahead.
     """
 
     def __init__(self, description: TrackerDescription, path: Path) -> None:
         self.description, self.policy = description, load_policy(path)
         if observation_of(self.policy) != "preview":
-            raise BadPolicy(f"{path}: a policy of one motion, not a tracker: it sees nothing ahead")
+            raise BadPolicy(f"{path}: a policy of one motion: it does not see the reference ahead")
         self.window: tuple[int, ...] = (1,)
         self.control, self.sees_ahead = fact(self.policy, "control", ControlConfig), True
 
     def equip(self, robot: Robot) -> Robot:
+        """Return the robot; a policy of ours was trained with its gains."""
         require_robot(robot, self.description)
         policy_control(self.policy, robot)
         return robot
 
     def follow(self, robot: Robot, n: int) -> Follower:
+        """Begin with n robots."""
         require_robot(robot, self.description)
         return _PolicyFollower(self.policy, self.control, robot, n)
 
@@ -51,6 +53,7 @@ class _PolicyFollower:
         self._action: Float[np.ndarray, "N nu"] = np.zeros((n, robot.model.nu))
 
     def targets(self, seen: TrackerInput) -> Float[np.ndarray, "N nu"]:
+        """Return target hinge angles of the PD law, rad, in actuator order."""
         (step,) = seen.window
         observed = self._observer.observe(seen.qpos, seen.qvel, seen.points, step, self._action)
         self._action = self._policy.act(observed[:, : self._observer.actor_size])

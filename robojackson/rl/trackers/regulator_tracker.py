@@ -28,10 +28,12 @@ class RegulatorTracker:
         self.sees_ahead = False
 
     def equip(self, robot: Robot) -> Robot:
+        """Return the robot, whose own gains the feedback uses."""
         require_robot(robot, self.description)
         return robot
 
     def follow(self, robot: Robot, n: int) -> Follower:
+        """Begin with n robots."""
         require_robot(robot, self.description)
         return _RegulatorFollower(robot)
 
@@ -43,6 +45,7 @@ class _RegulatorFollower:
         self._hinge = Motors.of(robot.model).hinge
 
     def targets(self, seen: TrackerInput) -> Float[np.ndarray, "N nu"]:
+        """Return target hinge angles of the PD law, rad, in actuator order."""
         (step,) = seen.window
         targets = step.angles(self._hinge)
         if step.feedback is not None:

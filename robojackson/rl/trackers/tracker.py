@@ -1,7 +1,7 @@
-"""What a tracker is: a policy for one robot that follows any reference motion.
+"""Interface of a tracker: a policy for one robot that follows any reference motion.
 
-A tracker keeps no state. `follow` begins with a number of robots, all at once, and what it returns
-remembers their past (the last actions, a history of observations) until they have danced.
+A tracker has no state. `follow` begins with a number of robots, all at once; its result stores
+their past (the last actions, a history of observations) for the length of a dance.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from robojackson.robot.model import Robot
 
 @dataclass(frozen=True)
 class TrackerInput:
-    """What N robots see before a control step.
+    """Input of N robots before a control step.
 
     Attributes:
         qpos, qvel: State, as the sensors measure it.
@@ -33,7 +33,7 @@ class TrackerInput:
 
 
 class Follower(Protocol):
-    """N robots that follow; remembers what the network needs of their past."""
+    """N robots that follow; stores the past that the network needs."""
 
     def targets(self, seen: TrackerInput) -> Float[np.ndarray, "N nu"]:
         """Return target hinge angles of the PD law, rad, in actuator order; once a control step."""
@@ -43,9 +43,9 @@ class Tracker(Protocol):
     """A network with the layout of its inputs and outputs.
 
     Attributes:
-        description: What is known of it.
-        window: Steps of the reference that it sees, counted from the present one; 1 is the next.
-        control: The law of control that follows its targets.
+        description: Description of the network.
+        window: Steps of the reference in its input, relative to the present one; 1 is the next.
+        control: The control law that follows its targets.
         sees_ahead: Whether a step of the window carries a preview (`sim.preview`).
     """
 
@@ -55,7 +55,7 @@ class Tracker(Protocol):
     sees_ahead: bool
 
     def equip(self, robot: Robot) -> Robot:
-        """Return the robot with the gains that the network was trained with.
+        """Return the robot with the gains of the network's training.
 
         Raises:
             BadPolicy: the tracker is for another robot.

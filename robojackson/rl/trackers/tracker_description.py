@@ -1,4 +1,4 @@
-"""What `configs/trackers/<name>.yaml` holds: where a network comes from, how it drives its robot.
+"""Content of `configs/trackers/<name>.yaml`: source of a network, and how it drives its robot.
 
 Names of hinges are bound to a robot by `equipment.equip`. Metres, radians, seconds.
 """
@@ -19,8 +19,8 @@ class TrackerFile:
 
     Attributes:
         url: Address of the file, of one commit; null for one that ships with RoboJackson.
-        name: What it is called in the store, or among the assets.
-        size: Bytes.
+        name: Name of the file in the store, or among the assets.
+        size: Size, bytes.
         sha256: Digest of its content; another file is refused.
     """
 
@@ -40,22 +40,23 @@ class TrackerDescription:
         network: Layout of its observation and action: `twist2`; `policy`, a policy file of ours; or
             `regulator`, linear-quadratic feedback without a network. The last two take gains and
             scales from their file or robot: nothing is given from `action_scale` on.
-        file: Where the network comes from; null for `regulator`, which has none.
-        fallback: Whether it is taken by itself only where no other tracker of its robot is here.
-        homepage: Where its authors describe it.
-        licence: Under which its authors publish the file.
-        trained_on: Motions that its authors name.
+        file: Source of the network; null for `regulator`, which has none.
+        fallback: Whether to select it by default only if no other tracker of its robot is
+            installed.
+        homepage: Address of its authors' description.
+        licence: Licence of the file.
+        trained_on: Training motions by its authors.
         control_dt: Seconds a control step.
         timestep: Seconds a physics step, where the PD law with these gains is not stable at the
             robot's own; the robot's when null.
         action_scale: Radians that an action of 1 moves a hinge's target from the default pose.
-        action_limit: Largest action that counts, unitless.
+        action_limit: Largest magnitude of an action, unitless.
         joints: Hinges in the order of observation and action.
-        default_pose: Hinge, or pattern with `*`, -> angle that an action of 0 holds, radians; zero
-            where it is not named. Here and below the last pattern that matches counts.
+        default_pose: Hinge, or pattern with `*`, -> angle that an action of 0 holds, radians;
+            default zero. Here and below the last matching pattern applies.
         stiffness: Hinge -> proportional gain of the PD law that it was trained with, Nm/rad.
         damping: Hinge -> derivative gain, Nm s/rad.
-        unmeasured_speeds: Hinges, or patterns, whose speeds it gets as zero.
+        unmeasured_speeds: Hinges, or patterns, whose speeds are zero in its input.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""The file of a tracker in the store, and the tracker that it makes."""
+"""The file of a tracker in the store, and the tracker that it contains."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -16,13 +16,13 @@ NETWORKS: Mapping[str, Callable[[TrackerDescription, Path], Tracker]] = {
     "twist2": Twist2Tracker,
     "policy": PolicyTracker,
 }
-"""Of files, by `TrackerDescription.network`."""
+"""Classes by `TrackerDescription.network`."""
 ASSETS = Path(__file__).parent.parent.parent / "assets"
 
 
 def tracker_path(description: TrackerDescription) -> Path | None:
-    """Return where the file of a tracker ships, or where `robojackson trackers add` puts it; None
-    for one without a file."""
+    """Return the path of a shipped tracker's file, or of `robojackson trackers add`'s; None for one
+    without a file."""
     if description.file is None:
         return None
     if description.file.url is None:
@@ -31,7 +31,7 @@ def tracker_path(description: TrackerDescription) -> Path | None:
 
 
 def is_present(description: TrackerDescription) -> bool:
-    """Whether the file of a tracker is here; whether it is the pinned one is not checked."""
+    """Return whether the file of a tracker exists; its digest is not checked."""
     path = tracker_path(description)
     return path is None or path.is_file()
 
@@ -40,10 +40,10 @@ def require_file(description: TrackerDescription, file: Path | None = None) -> P
     """Return the file of a tracker; None for one without a file.
 
     Args:
-        file: Where it is, if not in the store.
+        file: Path of the file, if not in the store.
 
     Raises:
-        BadPolicy: it is not here, or is not the one that was pinned.
+        BadPolicy: the file is missing, or is not the expected one.
     """
     path, name = file or tracker_path(description), description.name
     if description.file is None or path is None:
@@ -52,7 +52,7 @@ def require_file(description: TrackerDescription, file: Path | None = None) -> P
     if description.file.url is None:
         how = "install RoboJackson again"
     if not path.is_file():
-        raise BadPolicy(f"tracker {name!r} is not here ({path}); {how}")
+        raise BadPolicy(f"tracker {name!r} is not installed ({path}); {how}")
     if sha256_of_file(path) != description.file.sha256:
         raise BadPolicy(f"tracker {name!r}: {path} has been altered; {how}")
     return path
@@ -62,11 +62,11 @@ def open_tracker(description: TrackerDescription, file: Path | None = None) -> T
     """Load the network of a tracker.
 
     Args:
-        file: The pinned file where it is not in the store.
+        file: The expected file, if not in the store.
 
     Raises:
-        BadPolicy: its file is not here, altered, or no network of its kind.
-        MissingDependency: what runs it is not installed.
+        BadPolicy: the file is missing, altered, or not a network of its kind.
+        MissingDependency: the package that runs it is not installed.
     """
     path = require_file(description, file)
     if path is None:

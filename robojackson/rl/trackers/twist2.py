@@ -1,16 +1,16 @@
 """The tracker of TWIST2 (Ze et al., 2025): a network for the Unitree G1 at 50 Hz.
 
 Observation, 1,432 numbers: the present frame (127), the ten frames before it, oldest first (1,270),
-and the target again (35). A frame is the target and what the robot measures by itself. Radians,
-metres, seconds; roll and pitch are those of roll-pitch-yaw angles.
+and the target again (35). A frame is the target and the robot's own measurements. Radians, metres,
+seconds; roll and pitch are those of roll-pitch-yaw angles.
 
     target (35): of the reference's next step: root velocity x, y in the root's frame; root height;
         roll, pitch; yaw rate in the root's frame; joint angles
     frame (127): target; angular velocity in the root's frame * .25; roll, pitch; joint angles minus
         the default pose; joint speeds * .05, some of them zero; the last action
 
-Action: clipped, scaled, added to the default pose. Upstream's deployment begins with an empty
-history and its training with one of copies of the first frame; here it is copies.
+Action: clipped, scaled, added to the default pose. Upstream's deployment starts with an empty
+history and its training with copies of the first frame; this one with copies.
 """
 
 from pathlib import Path
@@ -28,15 +28,15 @@ from robojackson.rl.trackers.tracker_description import TrackerDescription
 from robojackson.robot.model import Robot
 
 GYRO_SCALE, SPEED_SCALE = 0.25, 0.05
-"""Of angular velocities and of joint speeds in the observation."""
+"""Scales of angular velocities and of joint speeds in the observation."""
 CONTROL = ControlConfig(feedforward=0.0, feedback=0.0)
-"""The targets are the network's own: nothing leads them."""
+"""The targets are the network's own: no lead is added."""
 HISTORY = 10
-"""Frames before the present one that the network sees."""
+"""Number of previous frames in the network's input."""
 
 
 def observation_size(joints: int) -> int:
-    """Return the length of the observation of a robot with so many joints."""
+    """Return the length of the observation of a robot with `joints` joints."""
     target = 6 + joints
     return (HISTORY + 1) * (target + 5 + 3 * joints) + target
 
@@ -57,9 +57,11 @@ class Twist2Tracker:
         self._network = OnnxNetwork(path, observation_size(joints), joints)
 
     def equip(self, robot: Robot) -> Robot:
+        """Return the robot with the gains of the network's training."""
         return equip(robot, self.description)
 
     def follow(self, robot: Robot, n: int) -> Follower:
+        """Begin with n robots, whose histories hold copies of the first frame."""
         layout = layout_of(robot, self.description)
         return _Twist2Follower(self.description, self._network, layout, n)
 
@@ -76,6 +78,7 @@ class _Twist2Follower:
         self._history: Float[np.ndarray, "N H F"] | None = None
 
     def targets(self, seen: TrackerInput) -> Float[np.ndarray, "N nu"]:
+        """Return target hinge angles of the PD law, rad, in actuator order."""
         (step,) = seen.window
         target = target_of(step, self._layout)
         frame = frame_of(target, seen.qpos, seen.qvel, self._action, self._layout)
@@ -90,7 +93,7 @@ class _Twist2Follower:
 
 
 def target_of(step: ClipStep, layout: Layout) -> Float[np.ndarray, "N 35"]:
-    """Return what the network sees of a step of the reference."""
+    """Return the network's input for a step of the reference."""
     to_body = np.swapaxes(quat_to_matrix(step.qpos[:, 3:7]), 1, 2)
     velocity = np.einsum("nij,nj->ni", to_body, step.qvel[:, :3])
     parts = [velocity[:, :2], step.qpos[:, 2:3], _roll_pitch(to_body), step.qvel[:, 5:6]]
@@ -104,10 +107,10 @@ def frame_of(
     action: Float[np.ndarray, "N J"],
     layout: Layout,
 ) -> Float[np.ndarray, "N 127"]:
-    """Return the target and what the robots measure.
+    """Return the target and the robots' measurements.
 
     Args:
-        action: The network's last output, as it came.
+        action: The network's last output, unchanged.
     """
     to_body = np.swapaxes(quat_to_matrix(qpos[:, 3:7]), 1, 2)
     angles = qpos[:, 7:][:, layout.order] - layout.default
@@ -117,7 +120,7 @@ def frame_of(
 
 
 def _roll_pitch(to_body: Float[np.ndarray, "N 3 3"]) -> Float[np.ndarray, "N 2"]:
-    """Return roll and pitch from where up is in the root's frame."""
+    """Return roll and pitch from the up axis in the root's frame."""
     up = to_body[:, :, 2]
     pitch = np.arcsin(np.clip(-up[:, 0], -1.0, 1.0))
     return np.stack([np.arctan2(up[:, 1], up[:, 2]), pitch], 1)

@@ -68,7 +68,7 @@ def test_pictures_that_pass_by_tell_what_a_second_look_tells(hip_shake: Landmark
     rows = hip_shake.landmarks
     for index, ((_, image), row) in enumerate(zip(timed_frames(CLIP), rows, strict=True)):
         background.add_frame(index, image, row)
-    once = background.told(hip_shake)
+    once = background.applied_to(hip_shake)
     twice = landmark_pipeline.with_camera(CLIP, hip_shake)
     assert once.to_first is None
     assert twice.to_first is None

@@ -87,8 +87,8 @@ def test_a_cycle_gets_none(robot: Robot, aims: Targets) -> None:
 
 def test_by_itself_a_robot_that_is_evaluated_beside_the_reference_gets_them(robot: Robot) -> None:
     other = load_robot(replace(robot.description, fall=FallRule(frame="reference", height=0.25)))
-    assert TailConfig().wanted(other)
-    assert not TailConfig().wanted(robot)
+    assert TailConfig().applies_to(other)
+    assert not TailConfig().applies_to(robot)
 
 
 def test_a_retargeted_motion_stands_at_its_end(robot: Robot) -> None:

@@ -42,7 +42,7 @@ def test_a_fall_is_told_beside_the_statue() -> None:
 
 def test_no_success_is_told_of_what_is_too_short() -> None:
     told = verdict_on(figures(0.5, 1.0), {"statue": figures(0.5, 1.0)}, 0.5)
-    assert told.sentence.startswith("Too short to judge: rollouts last 0.5 s, and a statue")
+    assert told.sentence.startswith("Too short to evaluate: rollouts last 0.5 s, and a statue")
     left = without_short_figures({"success": 1.0, "skill": 0.9, "survived_s": 0.5})
     assert left == {"success": None, "skill": None, "survived_s": 0.5}
     assert set(left) - {"survived_s"} <= set(NEEDS_FULL_LENGTH)

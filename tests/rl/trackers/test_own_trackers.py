@@ -86,5 +86,5 @@ def test_a_policy_of_many_motions_is_a_tracker(motion: ReferenceMotion, tmp_path
 
 def test_a_policy_of_one_motion_is_none(motion: ReferenceMotion, tmp_path: Path) -> None:
     path = random_policy(stock(), motion, "onboard").save(tmp_path / "one.safetensors")
-    with pytest.raises(BadPolicy, match="sees nothing ahead"):
+    with pytest.raises(BadPolicy, match="does not see the reference ahead"):
         PolicyTracker(REGULATOR, path)
