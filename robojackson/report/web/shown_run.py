@@ -14,6 +14,7 @@ from robojackson.errors import MissingDependency
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
+from robojackson.report.video.canvas import Picture
 from robojackson.report.video.film import VideoConfig
 from robojackson.report.video.soundtrack import soundtrack
 from robojackson.report.video.source_film import source_film
@@ -96,7 +97,18 @@ def _beats(
 
 def thumbnail(clip: Path) -> str:
     """Return a small picture of the first frame of a clip, JPEG as base64."""
-    picture = next(iter(read_frames(clip)))
+    return _small(next(iter(read_frames(clip))))
+
+
+def small_picture(png: bytes) -> str:
+    """Return a picture small, JPEG as base64."""
+    picture = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
+    if picture is None:
+        raise ValueError("small_picture: not a picture")
+    return _small(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB))
+
+
+def _small(picture: Picture) -> str:
     scale = THUMBNAIL_PX / min(picture.shape[:2])
     small = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     options = [cv2.IMWRITE_JPEG_QUALITY, THUMBNAIL_QUALITY]
