@@ -20,7 +20,7 @@ from robojackson.report.video.soundtrack import soundtrack
 from robojackson.report.video.source_film import source_film
 from robojackson.report.web.beats import beat_bands, beat_report, music_beats_shown
 from robojackson.report.web.player_data import Player, player
-from robojackson.rl.policy import Policy
+from robojackson.rl.evaluation.controllers import Evaluated
 from robojackson.robot.model import Robot
 
 THUMBNAIL_PX, THUMBNAIL_QUALITY = 168, 70
@@ -36,7 +36,7 @@ class RecordedRun:
         robot: The robot that danced.
         track, sequence, reference: Landmarks, person and target.
         rollout_qpos: The rollout, from the first step.
-        policy: The trained policy; None for a tracker.
+        policy: The policy or the tracker that danced; None where it is not known.
     """
 
     robot: Robot
@@ -44,7 +44,7 @@ class RecordedRun:
     sequence: SmplSequence
     reference: ReferenceMotion
     rollout_qpos: Float[np.ndarray, "S nq"] | None
-    policy: Policy | None
+    policy: Evaluated | None
 
 
 @dataclass(frozen=True)
