@@ -36,11 +36,11 @@ const Stage = (() => {
   }
 
   /* All parts of a robot as one geometry whose corners each follow one body: one call draws it. */
-  function merged(shape, rough) {
+  function merged(shape, level) {
     const corners = [], normals = [], follows = [], index = [];
     const pose = new T.Matrix4(), one = new T.Vector3(1, 1, 1), turn = new T.Quaternion();
     for (const geom of shape.geoms) {
-      const mesh = shape.meshes[geom.mesh], part = geometryOf(geom, rough ? mesh?.rough : mesh);
+      const mesh = shape.meshes[geom.mesh], part = geometryOf(geom, level ? mesh?.[level] : mesh);
       turn.set(geom.quat[1], geom.quat[2], geom.quat[3], geom.quat[0]);
       part.applyMatrix4(pose.compose(new T.Vector3(...geom.pos), turn, one));
       const first = corners.length / 3;
@@ -69,7 +69,7 @@ const Stage = (() => {
   function robot(shape, material, shadowMaterial, simple = false) {
     const group = new T.Group(), bones = Array.from({ length: shape.bodies }, () => new T.Bone());
     const skeleton = new T.Skeleton(bones, bones.map(() => new T.Matrix4()));
-    shape.rough ??= merged(shape, true); shape.fine ??= simple ? shape.rough : merged(shape, false);
+    shape.shadow ??= merged(shape, 'shadow'); shape.fine ??= merged(shape, simple ? 'rough' : '');
     const build = (geometry, dressed) => {
       const mesh = new T.SkinnedMesh(geometry, dressed);
       mesh.bindMode = 'detached'; mesh.frustumCulled = false; mesh.bind(skeleton, new T.Matrix4());
@@ -78,7 +78,7 @@ const Stage = (() => {
     };
     group.add(...bones);
     const mesh = build(shape.fine, material);
-    if (shadowMaterial) asShadow(build(shape.rough, shadowMaterial));
+    if (shadowMaterial) asShadow(build(shape.shadow, shadowMaterial));
     const pose = (values, at = 0) => {
       for (const bone of bones) {
         bone.position.set(values[at], values[at + 1], values[at + 2]);
