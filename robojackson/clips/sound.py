@@ -42,7 +42,7 @@ def read_sound(path: Path) -> Sound | None:
         TruncatedVideo: it ends before its index.
     """
     parts: list[np.ndarray] = []
-    with opened(path) as container:
+    with opened(path, sounds=True) as container:
         if not container.streams.audio:
             return None
         pictures = container.streams.video

@@ -4,10 +4,18 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
 
+import av
 import numpy as np
 import pytest
 
-from robojackson.clips.sound import RATE, Sound, music_beats, read_sound, require_sound
+from robojackson.clips.sound import (
+    RATE,
+    Sound,
+    encode_sound,
+    music_beats,
+    read_sound,
+    require_sound,
+)
 from robojackson.clips.trim import trim
 from robojackson.clips.video import timed_frames
 from robojackson.errors import UnreadableVideo
@@ -140,6 +148,25 @@ def test_other_music_is_heard_in_place_of_the_clips_own(tmp_path: Path) -> None:
     found = soundtrack(clip, str(every), None, 4.0)
     assert found is not None
     assert onsets(found.samples) == pytest.approx(np.arange(0.4, 3.9, 0.8), abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "codec"),
+    [("wav", "pcm_s16le"), ("mp3", "libmp3lame"), ("flac", "flac"),
+     ("m4a", "aac")],
+)  # fmt: skip
+def test_music_is_read_from_the_usual_files(suffix: str, codec: str, tmp_path: Path) -> None:
+    file = tmp_path / f"music.{suffix}"
+    with av.open(str(file), "w") as container:
+        stream = container.add_stream(codec, rate=RATE, layout="stereo")
+        encode_sound(container, stream, Sound(clicks(3.0)))
+    assert onsets(require_sound(file).samples) == pytest.approx(np.arange(0.25, 2.9, 0.5), abs=0.06)
+
+
+def test_a_playlist_is_no_music(tmp_path: Path) -> None:
+    (tmp_path / "list.m3u8").write_text("#EXTM3U\nfile:///etc/passwd\n")
+    with pytest.raises(UnreadableVideo, match="names other files"):
+        require_sound(tmp_path / "list.m3u8")
 
 
 def test_music_without_sound_is_refused(tmp_path: Path) -> None:
