@@ -10,6 +10,7 @@
 #   make bench-mocap  the first of the two alone, writes benchmarks/results/mocap.json and .md
 #   make bench-retarget  our solver beside the paper's mapping and mink (pip install -e '.[bench]')
 #   make bench-learning  speed beside sb3-contrib and bare MuJoCo, policies evaluated (hours; resumable)
+#   make bench-pages  how fast pages and live dances are in chromium (ARGS="PAGE...")
 #   make bench-orchestration  what Prefect costs around the work (PostgreSQL and a server are started)
 #   make badinput  every case of the corpus of bad inputs through the real command, and a table
 #   make chaos    20 studies whose processes, services, disk and wires are cut at random moments
@@ -30,7 +31,7 @@ WORKERS ?= auto
 PYTEST := $(PY) -m pytest -q -n $(WORKERS) --dist loadgroup
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: badinput dance test test-fast test-stack test-browser coverage bench bench-learning bench-mocap bench-retarget chaos bench-orchestration deploy lint doctor docs wheel clean setup
+.PHONY: badinput dance test test-fast test-stack test-browser coverage bench bench-learning bench-mocap bench-retarget chaos bench-orchestration bench-pages deploy lint doctor docs wheel clean setup
 .DEFAULT_GOAL := dance
 
 setup:
@@ -66,6 +67,9 @@ bench: setup
 
 bench-learning: setup
 	@$(PY) -m benchmarks.learning.learning_suite $(ARGS)
+
+bench-pages: setup
+	@$(PY) -m benchmarks.report.page_speed $(ARGS)
 
 bench-orchestration: setup
 	@$(PY) -m benchmarks.orchestration.orchestration_suite $(ARGS)

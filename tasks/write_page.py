@@ -14,12 +14,15 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.rollout import Rollout
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.pipeline.table_schemas import EPISODE_RECORD, EVALUATION_RECORD
+from robojackson.pipeline.tracker_descriptions import describe_tracker
 from robojackson.report.pages.evaluation_text import beat_rows
 from robojackson.report.pages.live_page import live_page
 from robojackson.report.pages.run_page import PageCandidate
 from robojackson.report.video.film import VideoConfig
 from robojackson.report.web.shown_run import RecordedRun, ShownRun, shown_run, thumbnail
+from robojackson.rl.evaluation.controllers import Evaluated
 from robojackson.rl.policy import load_policy
+from robojackson.rl.trackers.tracker_file import open_tracker
 from robojackson.robot.model import Robot, RobotDescription, load_robot
 from storage import artifact_tables
 from storage.artifact import Artifact
@@ -37,6 +40,8 @@ TEMPLATES = (
     "page.html", "page.css", "figures.html", "scene.js", "page.js", "live.html", "live.js",
     "dance.js",
 )  # fmt: skip
+IN_BROWSERS = ("regulator", "policy")
+"""Kinds of trackers that a live page can run."""
 LEFT_OUT = ("video", "info")
 """Artifacts that stay where they are: the user has the video already."""
 
@@ -142,18 +147,26 @@ def _written(
 
 def recorded_run(store: Store, made: Mapping[str, Artifact], robot: Robot) -> RecordedRun:
     """Read what a pass has left."""
-    policy = None
-    if "policy" in made:
-        with store.local(made["policy"]) as path:
-            policy = load_policy(path)
     return RecordedRun(
         robot=robot,
         track=artifact_tables.read(LandmarkTrack, store, made["landmarks"]),
         sequence=artifact_tables.read(SmplSequence, store, made["smpl"]),
         reference=artifact_tables.read(ReferenceMotion, store, made["reference"]),
         rollout_qpos=artifact_tables.read(Rollout, store, made["rollout"]).qpos,
-        policy=policy,
+        policy=_dancer(store, made),
     )
+
+
+def _dancer(store: Store, made: Mapping[str, Artifact]) -> Evaluated | None:
+    """Return the policy, or the tracker where it needs no network of another project."""
+    if "policy" in made:
+        with store.local(made["policy"]) as path:
+            return load_policy(path)
+    name = _json(store, made["evaluation"]).get("tracker")
+    description = None if name is None else describe_tracker(name)
+    if description is None or description.network not in IN_BROWSERS:
+        return None
+    return open_tracker(description)
 
 
 def _results(

@@ -5,6 +5,7 @@ others.
 """
 
 import json
+import warnings
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
@@ -19,7 +20,8 @@ from robojackson.metrics import ablation_statistics
 from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.report.pages import study_page, study_table
 from robojackson.report.pages.run_page import Plot
-from robojackson.report.pages.study_figures import curve_plots, evaluation_plots
+from robojackson.report.pages.study_figures import SeedCurves, curve_plots, evaluation_plots
+from robojackson.report.web.shown_run import small_picture
 from robojackson.rl.evaluation.verdict import NEEDS_FULL_LENGTH
 from robojackson.rl.pretrained import pretrained
 from storage import study_tables
@@ -111,6 +113,8 @@ def report(
         comparisons=compared,
         reward_audits=reward_audits or {},
         moves=[_picture(name, moves[name], png) for name, png in (pictures or {}).items()],
+        thumbnails={name: small_picture(png) for name, png in (pictures or {}).items()},
+        learning=_learning(curves),
         curves=curve_plots(curves, grids_of(study), study.moves, study.setups),
         evaluation_plots=evaluation_plots(evaluated, baselines, study.moves, study.setups),
         notes=notes,
@@ -190,6 +194,17 @@ def _steps_of(start: str, study: Study) -> str:
         networks = None
     steps = networks.facts.get("steps") if networks else None
     return f"{steps:,}" if isinstance(steps, int) else "an unknown number of"
+
+
+def _learning(curves: SeedCurves) -> dict[tuple[str, str], list[float]]:
+    """Return the mean return of each interval over the seeds; NaN where no episode ended."""
+    found = {}
+    for key, seeds in curves.items():
+        returns = np.array([seed["episode_return"] for seed in seeds.values()], float)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # an interval without any episode
+            found[key] = np.nanmean(returns, 0).tolist()
+    return found
 
 
 def _picture(name: str, move: Move, png: bytes) -> Plot:

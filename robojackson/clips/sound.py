@@ -1,10 +1,14 @@
 """The sound of a clip, and its beats. Seconds since the first picture of the clip."""
 
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 
 import av
 import numpy as np
+from av.audio.frame import AudioFrame
+from av.audio.stream import AudioStream
+from av.container import OutputContainer
 from jaxtyping import Float
 
 from robojackson.clips.video_container import opened
@@ -38,7 +42,7 @@ def read_sound(path: Path) -> Sound | None:
         TruncatedVideo: it ends before its index.
     """
     parts: list[np.ndarray] = []
-    with opened(path) as container:
+    with opened(path, sounds=True) as container:
         if not container.streams.audio:
             return None
         pictures = container.streams.video
@@ -71,6 +75,15 @@ def require_sound(path: Path) -> Sound:
     if sound is None:
         raise UnreadableVideo("the file holds no sound that can be heard", path)
     return sound
+
+
+def encode_sound(container: OutputContainer, stream: AudioStream, sound: Sound) -> None:
+    """Write a sound into a stream of `RATE` and two channels; it begins with the first picture."""
+    samples = np.ascontiguousarray(sound.samples.T, np.float32)
+    frame = AudioFrame.from_ndarray(samples, format="fltp", layout="stereo")
+    frame.sample_rate, frame.pts, frame.time_base = RATE, 0, Fraction(1, RATE)
+    container.mux(stream.encode(frame))
+    container.mux(stream.encode(None))
 
 
 def music_beats(sound: Sound) -> Float[np.ndarray, " B"]:

@@ -9,6 +9,7 @@ import av
 import numpy as np
 from av.video.frame import VideoFrame
 
+from robojackson.clips.sound import RATE, Sound, encode_sound, read_sound
 from robojackson.clips.video import VideoLimits, probe, timed_frames
 from robojackson.errors import TrackTooShort
 from robojackson.files.local_folder import TEMPORARY
@@ -20,7 +21,7 @@ CLOCK = 90_000
 
 
 def trim(path: Path, start_s: float, end_s: float, out: Path) -> Path:
-    """Re-encode a range of a video (H.264, upright, same times); `out` is whole or absent.
+    """Re-encode a range of a video (H.264, upright, same times) with its sound; whole or absent.
 
     A copy of packets would start at the key frame before `start_s`; a re-encoding starts where it
     was set to.
@@ -28,16 +29,16 @@ def trim(path: Path, start_s: float, end_s: float, out: Path) -> Path:
     Raises:
         TrackTooShort: the range holds no frame.
     """
-    info = probe(path, ANY)
+    info, sound = probe(path, ANY), read_sound(path)
     written = out.with_name(f"{TEMPORARY}{secrets.token_hex(8)}.mp4")
     try:
         frames = timed_frames(path, start_s, end_s)
         rate = Fraction(info.fps).limit_denominator(1001)
-        times = _encode(frames, rate, info.uneven, written)
+        times = _encode(frames, rate, info.uneven, written, sound)
         if not times:
             raise TrackTooShort(f"no frame between {start_s:g} s and {end_s:g} s", path)
         if not info.uneven and uneven(np.array(times), info.fps):  # damaged frames are left out
-            _encode(timed_frames(path, start_s, end_s), rate, True, written)
+            _encode(timed_frames(path, start_s, end_s), rate, True, written, sound)
         written.replace(out)
     finally:
         written.unlink(missing_ok=True)
@@ -45,7 +46,11 @@ def trim(path: Path, start_s: float, end_s: float, out: Path) -> Path:
 
 
 def _encode(
-    frames: Iterator[tuple[float, np.ndarray]], rate: Fraction, timed: bool, out: Path
+    frames: Iterator[tuple[float, np.ndarray]],
+    rate: Fraction,
+    timed: bool,
+    out: Path,
+    sound: Sound | None,
 ) -> list[float]:
     """Write images as H.264, at their times or at an even rate; returns their times since the first
     of them, seconds."""
@@ -56,6 +61,7 @@ def _encode(
         stream.pix_fmt = "yuv420p"
         if timed:
             stream.time_base = stream.codec_context.time_base = Fraction(1, CLOCK)
+        heard = sound and container.add_stream("aac", rate=RATE, layout="stereo")
         for time_s, image in frames:
             even = image[: image.shape[0] // 2 * 2, : image.shape[1] // 2 * 2]
             if not times:
@@ -71,4 +77,7 @@ def _encode(
             container.mux(stream.encode(picture))
         if times:
             container.mux(stream.encode(None))
+        if times and sound and heard:
+            first, last = round(start_s * RATE), round((start_s + times[-1] + 1 / rate) * RATE)
+            encode_sound(container, heard, Sound(sound.samples[first:last]))
     return times

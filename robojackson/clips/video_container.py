@@ -23,6 +23,8 @@ CONTAINERS = (
     *("h264", "hevc", "m4v", "mpegvideo", "mjpeg", "ivf", "obu", "apng", "yuv4mpegpipe"),
 )
 """FFmpeg's names; none of them opens another file."""
+SOUNDS = ("wav", "mp3", "flac", "aac", "aiff", "w64", "caf")
+"""The same of music alone."""
 LISTS = {
     b"#EXTM3U": "an HLS playlist",
     b"ffconcat": "a script of FFmpeg's concat",
@@ -40,15 +42,18 @@ RATE_TOLERANCE = 0.002
 """A declared rate that differs from the timestamps by more is ignored."""
 
 
-def opened(path: Path) -> av.container.InputContainer:
+def opened(path: Path, sounds: bool = False) -> av.container.InputContainer:
     """Return an open container.
 
+    Args:
+        sounds: Whether files of music alone are read as well.
     Raises:
         UnreadableVideo: missing, empty, or not a video.
         TruncatedVideo: the file ends before its index.
     """
     require_file(path)
-    whitelists = {"protocol_whitelist": "file", "format_whitelist": ",".join(CONTAINERS)}
+    formats = ",".join((*CONTAINERS, *SOUNDS) if sounds else CONTAINERS)
+    whitelists = {"protocol_whitelist": "file", "format_whitelist": formats}
     try:
         return av.open(f"file:{path.absolute()}", container_options=whitelists)
     except (av.FFmpegError, UnicodeError) as cause:
@@ -57,7 +62,7 @@ def opened(path: Path) -> av.container.InputContainer:
         if ISO_MEDIA_MARK in head[:32]:
             message = "cut off before its index; copy or download the file again"
             raise TruncatedVideo(message, path) from cause
-        raise UnreadableVideo(_not_a_video(head), path) from cause
+        raise UnreadableVideo(_unreadable(head, sounds), path) from cause
 
 
 def require_file(path: Path) -> None:
@@ -70,12 +75,12 @@ def require_file(path: Path) -> None:
         raise UnreadableVideo("the file is empty (0 bytes)", path)
 
 
-def _not_a_video(head: bytes) -> str:
+def _unreadable(head: bytes, sounds: bool) -> str:
     text = head.removeprefix(b"\xef\xbb\xbf").lstrip()
     for start, kind in LISTS.items():
         if text.startswith(start) or (start in text and text.startswith(b"<?xml")):
             return f"{kind}, which names other files; give the video itself"
-    return "not a video that FFmpeg can read"
+    return f"not a video {'or sound ' if sounds else ''}that FFmpeg can read"
 
 
 def video_stream(container: av.container.InputContainer, path: Path) -> VideoStream:

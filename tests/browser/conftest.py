@@ -168,7 +168,8 @@ def opened(browser: "Browser") -> Iterator[Callable[..., Opened]]:
         found.page.on("pageerror", lambda error: found.complaints.append(str(error)))
         found.page.on("console", lambda message: _note(found, message.type, message.text))
         found.page.goto(file.as_uri())
-        found.page.wait_for_selector("[data-ready=yes]")
+        if found.page.query_selector("#player-data, #dance-data"):
+            found.page.wait_for_selector("[data-ready=yes]")
         return found
 
     yield open_file

@@ -1,14 +1,28 @@
 """Sound: read from a clip, slowed with its pitch and at its pictures, and its beats."""
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
+import av
 import numpy as np
 import pytest
 
-from robojackson.clips.sound import RATE, Sound, music_beats, read_sound
+from robojackson.clips.sound import (
+    RATE,
+    Sound,
+    encode_sound,
+    music_beats,
+    read_sound,
+    require_sound,
+)
+from robojackson.clips.trim import trim
+from robojackson.clips.video import timed_frames
+from robojackson.errors import UnreadableVideo
 from robojackson.metrics.beat_alignment import alignment, half_a_beat, motion_beats
+from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.report.video.encoder import write_video
-from robojackson.report.video.soundtrack import HOP, warped
+from robojackson.report.video.soundtrack import HOP, clip_times, soundtrack, warped
 
 BEAT_S, FPS = 0.5, 30
 
@@ -70,6 +84,95 @@ def test_sound_and_picture_of_a_written_film_are_in_step(tmp_path: Path) -> None
     heard, said = onsets(found.samples), onsets(sound.samples)
     assert len(heard) == len(said)
     assert np.abs(heard - said).max() < 0.02
+
+
+def clip_of(samples: np.ndarray, seconds: float, folder: Path) -> Path:
+    """A clip whose picture flashes while a click begins."""
+    starts = onsets(samples)
+    pictures = [
+        np.full((64, 64, 3), 250 if (np.abs(starts - k / FPS) < 0.5 / FPS).any() else 10, np.uint8)
+        for k in range(round(seconds * FPS))
+    ]
+    return write_video(pictures, FPS, folder / "clip.mp4", sound=Sound(samples))
+
+
+def flashes(film: Path) -> np.ndarray:
+    """Times of the pictures that flash, seconds."""
+    bright = np.array([frame.mean() > 120 for _, frame in timed_frames(film, 0.0, 1e3)])
+    times = np.array([time for time, _ in timed_frames(film, 0.0, 1e3)])
+    return times[bright]
+
+
+def test_a_trimmed_clip_keeps_its_sound_in_step(tmp_path: Path) -> None:
+    film = trim(clip_of(clicks(6.0), 6.0, tmp_path), 2.1, 5.0, tmp_path / "part.mp4")
+    found = read_sound(film)
+    assert found is not None
+    heard = onsets(found.samples)
+    assert heard == pytest.approx(np.arange(2.25, 5.0, BEAT_S) - 2.1, abs=0.02)
+    assert flashes(film) == pytest.approx(heard, abs=0.02 + 0.5 / FPS)
+
+
+def test_trimming_a_silent_clip_leaves_it_silent(tmp_path: Path) -> None:
+    pictures = [np.full((64, 64, 3), 10, np.uint8)] * (2 * FPS)
+    clip = write_video(pictures, FPS, tmp_path / "clip.mp4")
+    assert read_sound(trim(clip, 0.5, 1.5, tmp_path / "part.mp4")) is None
+
+
+@pytest.mark.parametrize("tempo", [1.0, 0.78])
+def test_sound_and_picture_of_a_slowed_dance_are_in_step(tempo: float, tmp_path: Path) -> None:
+    """A motion at a tempo of the clip: its film's pictures flash when its sound clicks."""
+    clip = clip_of(clicks(6.0), 6.0, tmp_path)
+    steps, dt = round(5.0 / tempo / 0.015), 0.015
+    motion = SimpleNamespace(dt=dt, cyclic=False, source_time_s=np.arange(steps) * dt * tempo)
+    seconds = steps * dt
+    sound = soundtrack(clip, "", cast(ReferenceMotion, motion), seconds)
+    assert sound is not None
+    shown = clip_times(cast(ReferenceMotion, motion), np.arange(0, seconds, 1 / FPS))
+    source = [frame for _, frame in timed_frames(clip, 0.0, 1e3)]
+    pictures = [source[min(round(t * FPS), len(source) - 1)] for t in shown]
+    film = write_video(pictures, FPS, tmp_path / "film.mp4", sound=sound)
+    heard = onsets(require_sound(film).samples)
+    said = np.arange(0.25, 5.0, BEAT_S) / tempo
+    assert heard[: len(said)] == pytest.approx(said, abs=0.02)
+    first = flashes(film)
+    first = first[np.insert(np.diff(first) > 2 / FPS, 0, True)]
+    assert first[: len(said)] == pytest.approx(heard[: len(said)], abs=0.02 + 1 / FPS)
+
+
+def test_other_music_is_heard_in_place_of_the_clips_own(tmp_path: Path) -> None:
+    clip = clip_of(clicks(4.0), 4.0, tmp_path)
+    every = write_video(
+        [np.zeros((64, 64, 3), np.uint8)] * FPS, FPS, tmp_path / "music.mp4",
+        sound=Sound(clicks(8.0, 0.8, 0.4)),
+    )  # fmt: skip
+    found = soundtrack(clip, str(every), None, 4.0)
+    assert found is not None
+    assert onsets(found.samples) == pytest.approx(np.arange(0.4, 3.9, 0.8), abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "codec"),
+    [("wav", "pcm_s16le"), ("mp3", "libmp3lame"), ("flac", "flac"),
+     ("m4a", "aac")],
+)  # fmt: skip
+def test_music_is_read_from_the_usual_files(suffix: str, codec: str, tmp_path: Path) -> None:
+    file = tmp_path / f"music.{suffix}"
+    with av.open(str(file), "w") as container:
+        stream = container.add_stream(codec, rate=RATE, layout="stereo")
+        encode_sound(container, stream, Sound(clicks(3.0)))
+    assert onsets(require_sound(file).samples) == pytest.approx(np.arange(0.25, 2.9, 0.5), abs=0.06)
+
+
+def test_a_playlist_is_no_music(tmp_path: Path) -> None:
+    (tmp_path / "list.m3u8").write_text("#EXTM3U\nfile:///etc/passwd\n")
+    with pytest.raises(UnreadableVideo, match="names other files"):
+        require_sound(tmp_path / "list.m3u8")
+
+
+def test_music_without_sound_is_refused(tmp_path: Path) -> None:
+    silent = write_video([np.zeros((64, 64, 3), np.uint8)] * FPS, FPS, tmp_path / "silent.mp4")
+    with pytest.raises(UnreadableVideo, match="no sound that can be heard"):
+        soundtrack(None, str(silent), None, 2.0)
 
 
 def test_a_film_without_sound_is_silent(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -126,6 +127,16 @@ def test_the_page_stands_alone_and_says_how_few_seeds_there_are(folder: Path) ->
     assert "no difference can have a p below 0.12" in page
     assert "http" not in page.replace("http-equiv", "")
     assert page.count("data:image/png;base64,") == 2 + 4
+
+
+@pytest.mark.medium
+def test_the_table_draws_how_each_setup_learnt_on_one_scale_a_move(folder: Path) -> None:
+    page = (folder / "index.html").read_text()
+    curves = re.findall(r'<polyline points="([^"]*)"', page)
+    assert len(curves) == len(STUDY.moves) * len(STUDY.setups)
+    heights = [[float(point.split(",")[1]) for point in curve.split()] for curve in curves[:2]]
+    assert min(heights[0]) > min(heights[1]) == pytest.approx(1.0, abs=0.1)
+    assert "return while learning: from 0 to 3" in page
 
 
 @pytest.mark.medium

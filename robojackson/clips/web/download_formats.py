@@ -1,7 +1,8 @@
 """Choose the format to download: a small one to score, a good one to dance.
 
-Robots do not listen, so a format without sound is as good as one with it, and nothing is ever
-merged. The short side of the image counts: shorts stand upright.
+Nothing is ever merged: of images of one size the one with sound is danced, and where a site has
+sound and image only apart, the dance is silent. The short side of the image counts: shorts stand
+upright.
 """
 
 from collections.abc import Mapping, Sequence
@@ -60,11 +61,12 @@ def _cost(format_: Format) -> tuple[int, bool, float]:
     return short_side(format_), format_.get("protocol") not in DIRECT_PROTOCOLS, _bytes(format_)
 
 
-def _quality(format_: Format) -> tuple[int, bool, float]:
-    """Return a sort key, best greatest: larger image, one file rather than pieces, more frames,
-    more bits."""
+def _quality(format_: Format) -> tuple[int, bool, bool, float]:
+    """Return a sort key, best greatest: larger image, with sound, one file rather than pieces, more
+    frames, more bits."""
     rate = float(format_.get("fps") or 0) + 1e-6 * float(format_.get("tbr") or 0)
-    return short_side(format_), format_.get("protocol") in DIRECT_PROTOCOLS, rate
+    heard = format_.get("acodec") not in (None, "none")
+    return short_side(format_), heard, format_.get("protocol") in DIRECT_PROTOCOLS, rate
 
 
 def _bytes(format_: Format) -> float:

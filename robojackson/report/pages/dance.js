@@ -34,6 +34,7 @@ const Dance = (() => {
       const { nq, nv, nu } = this.model;
       Object.assign(this, { nq, nv, nu });
       for (const name of ['qpos', 'qvel', 'points', 'lead']) this[name] = dance[name] && doubles(dance[name]);
+      this.preview = dance.preview && new Float32Array(bytes(dance.preview));
       this.steps = this.qpos.length / nq;
       if (dance.feedback) {
         const { gain, offset, qpos, qvel } = dance.feedback;
@@ -74,12 +75,14 @@ const Dance = (() => {
       const gyro = () => { for (let k = 3; k < 6; k++) put(qvel[k] * dance.scales.gyro); };
       const speeds = (values, from) => { for (let k = 6; k < nv; k++) put(values[from + k] * dance.scales.hinge); };
       const done = () => { for (let k = 0; k < nu; k++) put(this.last[k] * 0.5); };
-      if (dance.observation === 'onboard') {
+      if (dance.observation !== 'full') {
         gyro(); put(...turned);
         for (let k = 7; k < nq; k++) put(qpos[k] - dance.rest[k - 7]);
         speeds(qvel, 0);
         for (let k = 7; k < nq; k++) put(this.qpos[aim + k] - dance.rest[k - 7]);
         speeds(this.qvel, aimSpeed); done();
+        const ahead = this.preview ? this.preview.length / this.steps : 0;
+        for (let k = 0; k < ahead; k++) put(this.preview[row * ahead + k]);
       } else {
         const angle = (2 * Math.PI * row) / this.steps;
         put(qpos[2] - dance.scales.height, own[6], own[7], own[8], ...local(own, qvel[0], qvel[1], qvel[2]));
@@ -139,7 +142,7 @@ const Dance = (() => {
     /* One control step, as `Simulation.step`; false where the robot has fallen. */
     advance() {
       const { mujoco, model, data, dance, nu } = this, { row } = this.at(this.mode === 'statue' ? this.first : this.step + 1);
-      const action = this.mode === 'policy' ? this.act(this.observe()) : new Float32Array(nu);
+      const action = this.mode === 'policy' && this.layers.length ? this.act(this.observe()) : new Float32Array(nu);
       const moves = this.feedback && this.mode === 'policy' ? this.correct() : new Float64Array(nu);
       for (let k = 0; k < nu; k++) {
         const lead = this.lead && this.mode !== 'statue' ? this.lead[row * nu + k] : 0;

@@ -49,11 +49,10 @@
   }
   $('orbit').addEventListener('pointerdown', (event) => {
     aimAt(event);
-    robot.mesh.computeBoundingSphere(); robot.mesh.computeBoundingBox?.();
-    const [hit] = ray.intersectObject(robot.mesh);
+    const [hit] = ray.intersectObjects(robot.parts);
     if (!hit) return;
     event.stopPropagation(); event.preventDefault();
-    held.body = robot.bodyOf(hit.face);
+    held.body = hit.object.userData.body;
     const { xpos, xmat } = dancer.data, b = held.body, off = hit.point.toArray().map((value, k) => value - xpos[3 * b + k]);
     held.point.set(...[0, 1, 2].map((c) => [0, 1, 2].reduce((sum, r) => sum + xmat[9 * b + 3 * r + c] * off[r], 0)));
     held.plane.setFromNormalAndCoplanarPoint(pane.camera.getWorldDirection(new T.Vector3()), hit.point);

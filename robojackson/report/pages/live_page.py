@@ -5,6 +5,7 @@ import numpy as np
 from robojackson.report.pages import inline
 from robojackson.report.web.live_data import live_data
 from robojackson.report.web.shown_run import RecordedRun
+from robojackson.rl.policy import Policy
 
 SCRIPTS = ("scene.js", "dance.js", "live.js")
 STYLES = ("page.css",)
@@ -22,9 +23,14 @@ ROOM = 1.35
 
 def live_page(run: RecordedRun, title: str) -> str | None:
     """Return the page; None where a browser cannot run the policy or the robot (`live_data`)."""
-    data = None if run.policy is None else live_data(run.policy, run.reference, run.robot)
+    if run.policy is None:
+        return None
+    data = live_data(run.policy, run.reference, run.robot)
     if data is None:
         return None
+    dancer = "trained policy"
+    if not isinstance(run.policy, Policy):
+        dancer = f"tracker {run.policy.description.name}"
     points, mass = np.asarray(run.reference.keypoints_w), float(run.robot.model.body_mass.sum())
     data |= {
         "height": ROOM * float(points[..., 2].max()),
@@ -46,4 +52,5 @@ def live_page(run: RecordedRun, title: str) -> str | None:
         title=title,
         data=inline.json_text(data),
         steps=len(run.reference),
+        dancer=dancer,
     )

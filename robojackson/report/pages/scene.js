@@ -35,28 +35,26 @@ const Stage = (() => {
     }
   }
 
-  /* All parts of a robot as one geometry whose corners each follow one body: one call draws it. */
-  function merged(shape, rough) {
-    const corners = [], normals = [], follows = [], index = [];
-    const pose = new T.Matrix4(), one = new T.Vector3(1, 1, 1), turn = new T.Quaternion();
+  /* The geoms of each body of a robot as one geometry. */
+  function partsOf(shape, level) {
+    const bodies = new Map(), pose = new T.Matrix4(), one = new T.Vector3(1, 1, 1), turn = new T.Quaternion();
     for (const geom of shape.geoms) {
-      const mesh = shape.meshes[geom.mesh], part = geometryOf(geom, rough ? mesh?.rough : mesh);
+      const mesh = shape.meshes[geom.mesh], part = geometryOf(geom, level ? mesh?.[level] : mesh);
       turn.set(geom.quat[1], geom.quat[2], geom.quat[3], geom.quat[0]);
       part.applyMatrix4(pose.compose(new T.Vector3(...geom.pos), turn, one));
-      const first = corners.length / 3;
+      if (!bodies.has(geom.body)) bodies.set(geom.body, { corners: [], normals: [], index: [] });
+      const { corners, normals, index } = bodies.get(geom.body), first = corners.length / 3;
       for (const corner of part.index.array) index.push(first + corner);
       for (const value of part.attributes.position.array) corners.push(value);
       for (const value of part.attributes.normal.array) normals.push(value);
-      for (let i = 0; i < part.attributes.position.count; i++) follows.push(geom.body, 0, 0, 0);
     }
-    const geometry = new T.BufferGeometry(), weights = new Float32Array(follows.length);
-    for (let i = 0; i < weights.length; i += 4) weights[i] = 1;
-    geometry.setAttribute('position', new T.BufferAttribute(Float32Array.from(corners), 3));
-    geometry.setAttribute('normal', new T.BufferAttribute(Float32Array.from(normals), 3));
-    geometry.setAttribute('skinIndex', new T.BufferAttribute(Uint16Array.from(follows), 4));
-    geometry.setAttribute('skinWeight', new T.BufferAttribute(weights, 4));
-    geometry.setIndex(index);
-    return geometry;
+    return [...bodies].map(([body, { corners, normals, index }]) => {
+      const geometry = new T.BufferGeometry();
+      geometry.setAttribute('position', new T.BufferAttribute(Float32Array.from(corners), 3));
+      geometry.setAttribute('normal', new T.BufferAttribute(Float32Array.from(normals), 3));
+      geometry.setIndex(index);
+      return { body, geometry };
+    });
   }
 
   const flatten = new T.Matrix4().set(1, 0, -0.32, 0, 0, 1, -0.22, 0, 0, 0, 0, 0.003, 0, 0, 0, 1);
@@ -67,26 +65,23 @@ const Stage = (() => {
 
   /* A robot; `pose` takes a row of x y z qw qx qy qz a body from an offset. */
   function robot(shape, material, shadowMaterial, simple = false) {
-    const group = new T.Group(), bones = Array.from({ length: shape.bodies }, () => new T.Bone());
-    const skeleton = new T.Skeleton(bones, bones.map(() => new T.Matrix4()));
-    shape.rough ??= merged(shape, true); shape.fine ??= simple ? shape.rough : merged(shape, false);
-    const build = (geometry, dressed) => {
-      const mesh = new T.SkinnedMesh(geometry, dressed);
-      mesh.bindMode = 'detached'; mesh.frustumCulled = false; mesh.bind(skeleton, new T.Matrix4());
-      group.add(mesh);
+    const group = new T.Group(), below = asShadow(new T.Group());
+    shape.shadow ??= partsOf(shape, 'shadow'); shape.fine ??= partsOf(shape, simple ? 'rough' : '');
+    const build = (parts, dressed, into) => parts.map(({ body, geometry }) => {
+      const mesh = new T.Mesh(geometry, dressed);
+      mesh.frustumCulled = false; mesh.userData.body = body; into.add(mesh);
       return mesh;
-    };
-    group.add(...bones);
-    const mesh = build(shape.fine, material);
-    if (shadowMaterial) asShadow(build(shape.rough, shadowMaterial));
-    const pose = (values, at = 0) => {
-      for (const bone of bones) {
-        bone.position.set(values[at], values[at + 1], values[at + 2]);
-        bone.quaternion.set(values[at + 4], values[at + 5], values[at + 6], values[at + 3]);
-        at += 7;
+    });
+    const parts = build(shape.fine, material, group), all = [...parts];
+    if (shadowMaterial) { group.add(below); all.push(...build(shape.shadow, shadowMaterial, below)); }
+    const pose = (values, from = 0) => {
+      for (const { position, quaternion, userData } of all) {
+        const at = from + 7 * userData.body;
+        position.set(values[at], values[at + 1], values[at + 2]);
+        quaternion.set(values[at + 4], values[at + 5], values[at + 6], values[at + 3]);
       }
     };
-    return { group, mesh, pose, bodyOf: (face) => shape.fine.attributes.skinIndex.getX(face.a) };
+    return { group, parts, pose };
   }
 
   /* A person of rounded parts between points; `pose` takes rows of x y z from an offset. */

@@ -62,6 +62,18 @@ class Line:
 
 
 @dataclass(frozen=True)
+class Sparkline:
+    """A curve in a table: corners of a polyline, and what it shows in words."""
+
+    points: str
+    title: str
+
+
+SPARK_WIDTH, SPARK_HEIGHT = 96, 36
+"""Of the drawing; study.html has the same."""
+
+
+@dataclass(frozen=True)
 class StudyContent:
     """The content of the page.
 
@@ -73,6 +85,8 @@ class StudyContent:
         comparisons: The yardstick's differences between setups, move by move.
         reward_audits: Rewards of bodies that do not dance, by move.
         moves: A picture of each move: frame, recovered body, robot (Figures 2-4).
+        thumbnails: The same small, JPEG as base64, by move.
+        learning: Mean return of the episodes of each interval of training, by (move, setup).
         curves: Learning curves (Figures 5-13).
         evaluation_plots: Plots of the evaluation.
         notes: Warnings for the reader.
@@ -85,6 +99,8 @@ class StudyContent:
     comparisons: Sequence[Comparison] = ()
     reward_audits: Mapping[str, RewardAudits] = field(default_factory=dict)
     moves: Sequence[Plot] = ()
+    thumbnails: Mapping[str, str] = field(default_factory=dict)
+    learning: Mapping[tuple[str, str], Sequence[float]] = field(default_factory=dict)
     curves: Sequence[Plot] = ()
     evaluation_plots: Sequence[Plot] = ()
     notes: Sequence[str] = ()
@@ -93,6 +109,7 @@ class StudyContent:
 def render(content: StudyContent) -> str:
     """Return the page as HTML, one file with everything in it."""
     compared, styles = content.comparisons, [own("page.css")]
+    drawn = sparklines(content.learning)
     return from_template(
         "study.html",
         styles,
@@ -103,7 +120,14 @@ def render(content: StudyContent) -> str:
         moves=[
             (
                 move,
-                [(line, [cell(line.values.get(k), k, line.seeds) for k in FIGURES]) for line in of],
+                [
+                    (
+                        line,
+                        drawn.get((line.move, line.setup)),
+                        [cell(line.values.get(k), k, line.seeds) for k in FIGURES],
+                    )
+                    for line in of
+                ],
             )
             for move, of in groupby(content.lines, lambda line: line.move)
         ],
@@ -118,6 +142,26 @@ def render(content: StudyContent) -> str:
             ("Evaluated alike", _encoded(content.evaluation_plots)),
         ],
     )
+
+
+def sparklines(
+    learning: Mapping[tuple[str, str], Sequence[float]],
+) -> dict[tuple[str, str], Sparkline]:
+    """Draw curves; those of one move have one scale, so that they compare."""
+    found = {}
+    for (move, setup), values in learning.items():
+        known = [v for (m, _), of in learning.items() if m == move for v in of if math.isfinite(v)]
+        shown = [(at, value) for at, value in enumerate(values) if math.isfinite(value)]
+        if not shown or len(values) < 2:
+            continue
+        low, span = min(known), max(max(known) - min(known), 1e-9)
+        across, down = SPARK_WIDTH / (len(values) - 1), SPARK_HEIGHT - 2
+        points = " ".join(
+            f"{at * across:.1f},{1 + down * (1 - (v - low) / span):.1f}" for at, v in shown
+        )
+        first, last = (f"{shown[end][1]:,.0f}" for end in (0, -1))
+        found[move, setup] = Sparkline(points, f"return while learning: from {first} to {last}")
+    return found
 
 
 def cell(value: Estimate | None, key: str, seeds: int) -> tuple[str, list[str]]:

@@ -7,14 +7,10 @@ from pathlib import Path
 from typing import cast
 
 import av
-import numpy as np
-from av.audio.frame import AudioFrame
-from av.audio.stream import AudioStream
-from av.container import OutputContainer
 from av.video.frame import VideoFrame
 from av.video.stream import VideoStream
 
-from robojackson.clips.sound import RATE, Sound
+from robojackson.clips.sound import RATE, Sound, encode_sound
 from robojackson.files.local_folder import TEMPORARY
 from robojackson.report.video.canvas import Picture
 
@@ -69,12 +65,4 @@ def _encode(
             container.mux(stream.encode(VideoFrame.from_ndarray(picture, format="rgb24")))
         container.mux(stream.encode(None))
         if sound and heard:
-            _encode_sound(container, heard, sound)
-
-
-def _encode_sound(container: OutputContainer, stream: AudioStream, sound: Sound) -> None:
-    samples = np.ascontiguousarray(sound.samples.T, np.float32)
-    frame = AudioFrame.from_ndarray(samples, format="fltp", layout="stereo")
-    frame.sample_rate, frame.pts, frame.time_base = RATE, 0, Fraction(1, RATE)
-    container.mux(stream.encode(frame))
-    container.mux(stream.encode(None))
+            encode_sound(container, heard, sound)

@@ -11,7 +11,7 @@ import numpy as np
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.report.web.shapes import packed, robot_shape
 from robojackson.rl.config.train_config import ControlConfig, EvaluateConfig
-from robojackson.rl.evaluation.controllers import control_of, trained_driver
+from robojackson.rl.evaluation.controllers import Evaluated, control_of, sees_ahead, trained_driver
 from robojackson.rl.evaluation.rollouts import Starts
 from robojackson.rl.evaluation.starts import starts_of
 from robojackson.rl.modes.observation import (
@@ -27,8 +27,10 @@ from robojackson.rl.policy_facts import mode_of, observation_of
 from robojackson.rl.sim.feedback import feedback_of
 from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.motors import Motors, gains, residual_scale
-from robojackson.rl.sim.preview import driven_clip
+from robojackson.rl.sim.preview import driven_clip, preview_of
 from robojackson.rl.sim.simulation import Simulation
+from robojackson.rl.trackers.policy_tracker import PolicyTracker
+from robojackson.rl.trackers.regulator_tracker import RegulatorTracker
 from robojackson.robot.fall import Fall
 from robojackson.robot.mjcf import described_spec, mjcf_path
 from robojackson.robot.model import Robot
@@ -37,25 +39,22 @@ RECORDS = 20
 """Number of states at which the browser's physics is compared with ours."""
 SUBSTEPS = 300
 """Substeps of each comparison."""
-OBSERVED = ("full", "onboard")
-"""Observations that the browser can compute."""
 
 
-def live_data(policy: Policy, reference: ReferenceMotion, robot: Robot) -> dict[str, object] | None:
+def live_data(
+    policy: Evaluated, reference: ReferenceMotion, robot: Robot
+) -> dict[str, object] | None:
     """Return the data of a live dance; None where a browser cannot run it.
 
-    A browser cannot run a policy of the paper's mode or with another observation, or a robot whose
-    meshes collide.
+    A browser cannot run a policy of the paper's mode, a tracker whose network is a file of another
+    project, or a robot whose meshes collide.
     """
-    if mode_of(policy) != "track":
+    if not runs_in_a_browser(policy):
         return None
-    control = control_of(policy, robot)
-    if control.law != "pd" or control.feedback_path != "reference":
+    control, network = control_of(policy, robot), _network(policy)
+    if control.law != "pd" or _has_colliding_meshes(robot.model):
         return None
-    if _has_colliding_meshes(robot.model):
-        return None
-    if observation_of(policy) not in OBSERVED:
-        return None
+    seen = None if network is None else observation_of(network)
     motors, (kp, kd) = Motors.of(robot.model), gains(robot, control)
     lead, fall = lead_of(robot, reference, control), Fall.of(robot)
     names = [robot.model.site(int(site)).name for site in robot.keypoint_sites]
@@ -71,11 +70,12 @@ def live_data(policy: Policy, reference: ReferenceMotion, robot: Robot) -> dict[
         "cyclic": bool(reference.cyclic),
         "offset": np.asarray(reference.cycle_offset, float).tolist(),
         "sites": names,
-        "observation": observation_of(policy),
+        "observation": seen,
+        "preview": packed(preview_of(reference, robot)) if sees_ahead(policy) else None,
         "rest": robot.standing[7:].tolist(),
         "layers": [
             {"weight": packed(weight), "bias": packed(bias), "inputs": len(weight)}
-            for weight, bias in policy.layers
+            for weight, bias in (network.layers if network else ())
         ],
         "scales": {
             "gyro": SPEED_SCALE, "hinge": HINGE_SPEED_SCALE, "point": POINT_SCALE,
@@ -96,6 +96,22 @@ def live_data(policy: Policy, reference: ReferenceMotion, robot: Robot) -> dict[
         "shape": robot_shape(robot.model),
         "records": records(policy, reference, robot),
     }  # fmt: skip
+
+
+def runs_in_a_browser(policy: Evaluated) -> bool:
+    """Whether its network is a plain one of ours, or it has none."""
+    if isinstance(policy, Policy):
+        return mode_of(policy) == "track"
+    return isinstance(policy, PolicyTracker | RegulatorTracker)
+
+
+def _network(policy: Evaluated) -> Policy | None:
+    """Return the network; None of feedback alone."""
+    return (
+        policy.policy
+        if isinstance(policy, PolicyTracker)
+        else (policy if isinstance(policy, Policy) else None)
+    )
 
 
 def model_xml(robot: Robot) -> str:
@@ -122,10 +138,10 @@ def model_xml(robot: Robot) -> str:
     return str(spec.to_xml())
 
 
-def records(policy: Policy, reference: ReferenceMotion, robot: Robot) -> list[dict[str, object]]:
+def records(policy: Evaluated, reference: ReferenceMotion, robot: Robot) -> list[dict[str, object]]:
     """Return noisy starts across the motion and the positions of the bodies `SUBSTEPS` later."""
     control = control_of(policy, robot)
-    clip = driven_clip(robot, reference, control)
+    clip = driven_clip(robot, reference, control, sees_ahead(policy))
     starts, _ = starts_of(robot, clip, EvaluateConfig(phases=RECORDS, resets=1))
     starts = Starts(starts.step[:RECORDS], starts.qpos[:RECORDS], starts.qvel[:RECORDS])
     driver, count = trained_driver(policy, robot, reference), len(starts.step)

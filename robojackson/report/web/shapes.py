@@ -16,8 +16,8 @@ from robojackson.robot.body_states import drawn_geoms
 
 DETAIL_M = 0.009
 """Smallest detail of a mesh; a robot of 30 meshes then has some 40,000 triangles."""
-ROUGH_M = 0.018
-"""The same for shadows, and for browsers that draw on the processor."""
+ROUGH_M, SHADOW_M = 0.018, 0.04
+"""The same for browsers that draw on the processor, and for shadows."""
 MESH_STEPS, NORMAL_STEPS = 32767, 127
 """Steps of a mesh's largest coordinate, and of a normal's."""
 
@@ -34,7 +34,9 @@ def robot_shape(model: mujoco.MjModel, detail_m: float = DETAIL_M) -> dict[str, 
         kind = mujoco.mjtGeom(int(model.geom_type[geom])).name.removeprefix("mjGEOM_").lower()
         mesh = int(model.geom_dataid[geom])
         if kind == "mesh" and mesh not in meshes:
-            meshes[mesh] = {**_mesh(model, mesh, detail_m), "rough": _mesh(model, mesh, ROUGH_M)}
+            levels = {"rough": ROUGH_M, "shadow": SHADOW_M}
+            coarse = {name: _mesh(model, mesh, cell_m) for name, cell_m in levels.items()}
+            meshes[mesh] = _mesh(model, mesh, detail_m) | coarse
         geoms.append(
             {
                 "body": int(model.geom_bodyid[geom]),

@@ -14,12 +14,13 @@ from robojackson.errors import MissingDependency
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
+from robojackson.report.video.canvas import Picture
 from robojackson.report.video.film import VideoConfig
 from robojackson.report.video.soundtrack import soundtrack
 from robojackson.report.video.source_film import source_film
 from robojackson.report.web.beats import beat_bands, beat_report, music_beats_shown
 from robojackson.report.web.player_data import Player, player
-from robojackson.rl.policy import Policy
+from robojackson.rl.evaluation.controllers import Evaluated
 from robojackson.robot.model import Robot
 
 THUMBNAIL_PX, THUMBNAIL_QUALITY = 168, 70
@@ -35,7 +36,7 @@ class RecordedRun:
         robot: The robot that danced.
         track, sequence, reference: Landmarks, person and target.
         rollout_qpos: The rollout, from the first step.
-        policy: The trained policy; None for a tracker.
+        policy: The policy or the tracker that danced; None where it is not known.
     """
 
     robot: Robot
@@ -43,7 +44,7 @@ class RecordedRun:
     sequence: SmplSequence
     reference: ReferenceMotion
     rollout_qpos: Float[np.ndarray, "S nq"] | None
-    policy: Policy | None
+    policy: Evaluated | None
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,18 @@ def _beats(
 
 def thumbnail(clip: Path) -> str:
     """Return a small picture of the first frame of a clip, JPEG as base64."""
-    picture = next(iter(read_frames(clip)))
+    return _small(next(iter(read_frames(clip))))
+
+
+def small_picture(png: bytes) -> str:
+    """Return a picture small, JPEG as base64."""
+    picture = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
+    if picture is None:
+        raise ValueError("small_picture: not a picture")
+    return _small(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB))
+
+
+def _small(picture: Picture) -> str:
     scale = THUMBNAIL_PX / min(picture.shape[:2])
     small = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     options = [cv2.IMWRITE_JPEG_QUALITY, THUMBNAIL_QUALITY]

@@ -69,3 +69,11 @@ def test_sound_alone_is_nothing() -> None:
 
 def test_a_locked_format_is_not_taken() -> None:
     assert choose([form("x", 720, 1280, has_drm=True)], "dance", CONFIG) is None
+
+
+def test_of_two_images_of_one_size_the_one_with_sound_is_danced() -> None:
+    silent = form("silent", 720, 1280, acodec="none", protocol="https", fps=60)
+    heard = form("heard", 720, 1280, acodec="mp4a", protocol="m3u8_native", fps=30)
+    assert choose([heard, silent], "dance", CONFIG) == heard
+    larger = form("larger", 1080, 1920, acodec="none")
+    assert choose([heard, larger], "dance", CONFIG) == larger
