@@ -18,7 +18,13 @@ from robojackson.rl.evaluation.controllers import control_of, sees_ahead, traine
 from robojackson.rl.evaluation.rollouts import Moment, Starts, roll_out
 from robojackson.rl.modes.observation import Observer
 from robojackson.rl.policy import Policy
+from robojackson.rl.sim import sampling
+from robojackson.rl.sim.feet import Feet
+from robojackson.rl.sim.nominal_path import Gains, Progress
 from robojackson.rl.sim.preview import driven_clip
+from robojackson.rl.sim.reference_clip import Clip
+from robojackson.rl.sim.regulator import regulator
+from robojackson.rl.sim.simulation import Simulation
 from robojackson.robot.fall import Fall
 from tests.browser.conftest import made_policy
 
@@ -42,6 +48,14 @@ def steadied(policy: Policy) -> Policy:
     control = {**policy.facts["control"], "feedforward": 1.0, "feedback": 1.0}  # type: ignore[dict-item]
     (first, (weight, bias)) = policy.layers
     return Policy((first, (SMALL * weight, bias)), {**policy.facts, "control": control})
+
+
+def anchored(
+    sim: Simulation, clip: Clip, action: np.ndarray, feet: Feet, progress: Progress
+) -> Gains:
+    """A regulator whose nominal states stand where the robot's feet do."""
+    gains = regulator(sim, clip, action, feet.count, progress)[0]
+    return replace(gains, places=feet.places(gains.qpos))
 
 
 def seeing_ahead(policy: Policy, run: RecordedRun) -> Policy:
@@ -115,3 +129,25 @@ def test_a_policy_that_sees_ahead_does_the_same_as_in_python(
     assert np.median(found["deviations"]) <= 0.1
     ours = in_python(replace(run, policy=policy), data, np.zeros((RECORDS, 2)))
     assert found["found"][:, 0].mean() == pytest.approx(ours[:, 0].mean(), abs=2.0)
+
+
+def test_feedback_from_where_the_feet_stand_is_the_same_as_in_python(
+    shaking: RecordedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROBOJACKSON_STORE", str(tmp_path / "store"))
+    monkeypatch.setattr(sampling, "sampled_regulator", anchored)
+    policy = steadied(made_policy(shaking.robot))
+    control = {**policy.facts["control"], "feedback_path": "sampled"}  # type: ignore[dict-item]
+    policy = Policy(policy.layers, {**policy.facts, "control": control})
+    data = live_data(policy, shaking.reference, shaking.robot)
+    assert data is not None
+    fed = data["feedback"]
+    assert isinstance(fed, dict)
+    assert fed["places"]
+    found = in_node(data, np.zeros((RECORDS, 2)), tmp_path)
+    assert np.median(found["deviations"]) <= 0.1
+    ours = in_python(replace(shaking, policy=policy), data, np.zeros((RECORDS, 2)))
+    assert found["found"][:, 0].mean() == pytest.approx(ours[:, 0].mean(), abs=2.0)
+    del fed["places"]
+    without = in_node(data, np.zeros((RECORDS, 2)), tmp_path)
+    assert np.median(without["deviations"]) > np.median(found["deviations"])

@@ -39,6 +39,7 @@ const Dance = (() => {
       if (dance.feedback) {
         const { gain, offset, qpos, qvel } = dance.feedback;
         this.feedback = { gain: halves(gain), offset: doubles(offset), qpos: doubles(qpos), qvel: doubles(qvel), apart: new Float64Array(2 * nv) };
+        if (dance.feedback.places) this.feedback.places = doubles(dance.feedback.places);
       }
       this.layers = dance.layers.map(({ weight, bias, inputs }) => ({ inputs, weight: new Float32Array(bytes(weight)), bias: new Float32Array(bytes(bias)) }));
       this.sites = dance.sites.map((name) => mujoco.mj_name2id(this.model, mujoco.mjtObj.mjOBJ_SITE.value, name));
@@ -124,6 +125,7 @@ const Dance = (() => {
       const { nq, nv, nu, feedback } = this, { qpos, qvel } = this.data, { row, moved } = this.at(this.step), { apart, gain } = feedback;
       const from = row * nq, own = feedback.qpos;
       for (let k = 0; k < 3; k++) apart[k] = qpos[k] - own[from + k] - moved[k];
+      if (feedback.places) this.aside(row, moved).forEach((by, k) => { apart[k] -= by; });
       const [w, x, y, z] = [3, 4, 5, 6].map((k) => qpos[k]), [a, b, c, d] = [3, 4, 5, 6].map((k) => own[from + k]);
       let turn = [a * w + b * x + c * y + d * z, a * x - b * w - c * z + d * y, a * y + b * z - c * w - d * x, a * z - b * y + c * x - d * w];
       if (turn[0] < 0) turn = turn.map((value) => -value);
@@ -137,6 +139,14 @@ const Dance = (() => {
         const most = this.dance.feedback.limit[k];
         return -Math.min(most, Math.max(-most, sum));
       });
+    }
+
+    /* How far the feet that stand are from their places in the plane of the floor, as `feet.Feet`. */
+    aside(row, moved) {
+      const { feet } = this.dance.feedback, { places } = this.feedback, at = this.data.site_xpos;
+      const sites = feet.map((foot) => this.sites[foot]), floor = Math.min(...sites.map((site) => at[3 * site + 2]));
+      const low = sites.map((site) => Math.exp((floor - at[3 * site + 2]) / this.dance.feedback.low)), all = low.reduce((a, b) => a + b);
+      return [0, 1].map((k) => sites.reduce((sum, site, i) => sum + low[i] * (at[3 * site + k] - places[3 * (row * feet.length + i) + k] - moved[k]), 0) / all);
     }
 
     /* One control step, as `Simulation.step`; false where the robot has fallen. */

@@ -26,6 +26,7 @@ from robojackson.rl.policy import Policy
 from robojackson.rl.policy_facts import mode_of, observation_of
 from robojackson.rl.sim.feedback import feedback_of
 from robojackson.rl.sim.feedforward import lead_of
+from robojackson.rl.sim.feet import LOW_M
 from robojackson.rl.sim.motors import Motors, gains, residual_scale
 from robojackson.rl.sim.preview import driven_clip, preview_of
 from robojackson.rl.sim.simulation import Simulation
@@ -174,11 +175,15 @@ def _feedback(
     found = feedback_of(robot, [reference], control)
     if found is None:
         return None
-    gains = found.gains
+    gains, feet = found.gains, np.unique(robot.contact_keypoints)
+    anchored = bool(np.isfinite(gains.places).all())
     return {
         "gain": packed(gains.gain, np.float16),
         **{name: packed(getattr(gains, name), np.float64) for name in ("offset", "qpos", "qvel")},
         "limit": found.limit.tolist(),
+        "places": packed(gains.places, np.float64) if anchored else None,
+        "feet": feet.tolist(),
+        "low": LOW_M,
     }
 
 
