@@ -98,6 +98,7 @@ def cases() -> Iterator[Case]:
         "study a device": (("ablation", "/dev/zero"), nothing),
         "study damaged": (("ablation", "s.yaml"), writes("s.yaml", "moves: {")),
         "study unknown key": (("ablation", "s.yaml"), writes("s.yaml", "evil: 1")),
+        "clean of no store": (("clean",), nothing),
         "clean negative": (("clean", "--older-than", "-1"), nothing),
         "clean unknown": (("clean", "--kind", "evil"), nothing),
         "port 0": (("server", "--port", "0"), nothing),
