@@ -51,15 +51,12 @@ def _wait_for_threads() -> None:
 
 
 def _end_processes() -> None:
-    """End the daemons among the processes that this one has started, as Python does at its end."""
-    if "multiprocessing.process" in sys.modules:
-        from multiprocessing import active_children
-
-        for child in active_children():
-            child.kill()
-            child.join()
+    """End the processes that this one has for videos, as Python does at its end."""
+    if VIDEOS in sys.modules:
+        sys.modules[VIDEOS].end_idle()
 
 
+VIDEOS = "robojackson.cli.lifetime.video_process"
 NEEDS_ITS_END = "prefect"
 """The one library whose exit functions must run: they end its server."""
 

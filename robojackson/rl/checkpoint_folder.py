@@ -51,8 +51,9 @@ def write_checkpoint(out: Path, save: Callable[[Path], None], results: Mapping[s
         shutil.rmtree(fresh, ignore_errors=True)
         for part in out.glob("*.safetensors.part"):
             part.unlink(missing_ok=True)
-        raise StoreError(f"{out}: the checkpoint cannot be written ({error})") from error
-    # First, since a checkpoint with a used-up budget is not written again.
+        reason = error.strerror or f"No space left on device: {error}"  # NumPy's has no number
+        raise StoreError(f"{out}: the checkpoint cannot be written ({reason})") from error
+    # First, since a checkpoint whose budget is used up is not written again.
     for name in RESULTS:
         os.replace(out / f"{name}.part", out / name)
     old = out / OLD_CHECKPOINT

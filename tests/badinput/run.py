@@ -66,7 +66,7 @@ def run(case: Case, made: Path, runner: "Warm") -> Outcome:
         except Exception as cause:
             return Outcome(case, 70, 0.0, 0.0, 0.0, "", (f"cannot be made: {cause!r:.100}",))
         before = _listed(here)
-        words = [str(made / w[1:]) if w.startswith("@") else w for w in case.words]
+        words = [str(made / w[2:]) if w.startswith("@/") else w for w in case.words]
         began = time.monotonic()
         code, cpu_s, peak_mb, out, err = runner(
             words, here, _environment(case, here, outside), outside, case.group == "environment"

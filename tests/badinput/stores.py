@@ -34,6 +34,8 @@ SQL: Mapping[str, str] = {
     "division of text": "SELECT 'a'::INTEGER",
     "shell": ".shell touch planted",
 }
+BOTH = ("endless rows", "a file")
+"""Of both commands; the others share their limits."""
 ADDRESSES = (
     "ftp://127.0.0.1/x.mp4", "file:///etc/passwd", "javascript:alert(1)", "data:video/mp4;base64,AA",
     "gopher://127.0.0.1/", "http://", "http://[::1", "//127.0.0.1/x", "http:127.0.0.1",
@@ -56,9 +58,7 @@ def _fake(content: str) -> Maker:
 
 def cases() -> Iterator[Case]:
     for name, sql in SQL.items():
-        for command in (
-            ("metrics", "catalogue") if "endless" in name or "file" in name else ("metrics",)
-        ):
+        for command in ("metrics", "catalogue") if name in BOTH else ("metrics",):
             yield Case("question", f"{command}: {name}", (command, "--sql", sql))
     for address in ADDRESSES:
         yield Case("address", f"urls {address}", ("find", "x", "--source", "urls", "--address", "l.txt"),
@@ -98,6 +98,7 @@ def cases() -> Iterator[Case]:
         "study a device": (("ablation", "/dev/zero"), nothing),
         "study damaged": (("ablation", "s.yaml"), writes("s.yaml", "moves: {")),
         "study unknown key": (("ablation", "s.yaml"), writes("s.yaml", "evil: 1")),
+        "clean of no store": (("clean",), nothing),
         "clean negative": (("clean", "--older-than", "-1"), nothing),
         "clean unknown": (("clean", "--kind", "evil"), nothing),
         "port 0": (("server", "--port", "0"), nothing),

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.badinput.base import base
+from tests.badinput.base import MADE, base
 from tests.badinput.case import Case
 from tests.badinput.corpus import corpus
 from tests.badinput.run import Warm, run
@@ -33,6 +33,12 @@ def warm() -> Iterator[Warm]:
 def test_a_bad_input_is_refused_in_one_line(case: Case, warm: Warm) -> None:
     outcome = run(case, base(), warm)
     assert not outcome.faults, f"{outcome.faults}: {outcome.line}"
+
+
+def test_the_files_that_cases_name_are_those_that_are_made() -> None:
+    named = {w[2:] for case in corpus() for w in case.words if w.startswith("@/")}
+    made = {*(name for name, _ in MADE), "networks.safetensors", "aist.pkl"}
+    assert named <= made
 
 
 def test_the_corpus_is_large_and_covers_every_entry() -> None:

@@ -112,7 +112,6 @@ LIGHT: Mapping[str, tuple[tuple[str, ...], Maker]] = {
     "catalogue": (("catalogue",), nothing),
     "version": (("--version",), nothing),
     "help": (("mocap", "--help"), nothing),
-    "clean of nothing": (("clean",), nothing),
 }  # fmt: skip
 
 

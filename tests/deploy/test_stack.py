@@ -1,6 +1,8 @@
 """The whole stack as processes: the ablation by `prefect deployment run`, then again from cache."""
 
+import base64
 import json
+import os
 import re
 import subprocess
 import sys
@@ -9,6 +11,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
+import s3fs
 
 from tests.chaos.trial import STUDY
 from tools.stack.compose_stack import QUICK, Stack, running
@@ -167,3 +170,47 @@ def test_the_nightly_refresh_is_planned_by_the_server(stack: Stack) -> None:
 def test_the_server_refuses_strangers(stack: Stack) -> None:
     run = prefect(stack, "deployment", "ls", PREFECT_API_AUTH_STRING="robojackson:wrong")
     assert run.returncode != 0
+
+
+@pytest.mark.ci
+def test_no_secret_is_in_logs_results_pages_or_the_database(stack: Stack) -> None:
+    """After what the tests above have run: studies that ended well, failed, and were refused."""
+    given = {
+        **stack.given,
+        "HEADER": base64.b64encode(stack.given["PREFECT_AUTH"].encode()).decode(),
+    }
+    secrets = {name: value.rpartition(":")[2] for name, value in given.items()}
+    places = {path.name: path.read_bytes() for path in stack.folder.glob("*.log")}
+    assert {"prefect-server.log", "flow-worker.log", "trainer.log"} <= set(places)
+    places |= {"database": dumped(stack), **kept(stack)}
+    homes = (stack.folder / "home").rglob("*")
+    places |= {str(path): path.read_bytes() for path in homes if path.is_file()}
+    found = [
+        (n, p) for n, secret in secrets.items() for p in places if secret.encode() in places[p]
+    ]
+    assert found == []
+
+
+def dumped(stack: Stack) -> bytes:
+    """Everything that Prefect's server keeps: runs, logs, artifacts, blocks, variables."""
+    access = {"PGPASSWORD": stack.given["POSTGRES_BACKUP_PASSWORD"]}
+    access["PGPORT"] = str(stack.ports["postgres"])
+    words = ["pg_dump", "-h", "127.0.0.1", "-U", "backup", "prefect"]
+    text = subprocess.run(
+        words, env={**os.environ, **access}, capture_output=True, check=True
+    ).stdout
+    assert b"flow_run" in text
+    return text
+
+
+def kept(stack: Stack) -> dict[str, bytes]:
+    """The result store: tables, pages, records."""
+    own = stack.client()
+    url = f"http://127.0.0.1:{stack.ports['s3']}"
+    system = s3fs.S3FileSystem(
+        key=own["AWS_ACCESS_KEY_ID"], secret=own["AWS_SECRET_ACCESS_KEY"], skip_instance_cache=True,
+        client_kwargs={"endpoint_url": url, "region_name": "us-east-1"},
+    )  # fmt: skip
+    files = system.find(own["ROBOJACKSON_STORE"].removeprefix("s3://"))
+    assert files
+    return {name: system.cat_file(name) for name in files}

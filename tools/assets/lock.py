@@ -16,8 +16,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 PYTHONS = ("3.11", "3.12", "3.13")
 EXTRAS = ("app", "fast", "s3", "onnx", "trackers")
-APART = re.compile(r"^(torch|triton|nvidia-|tfp-nightly)")
-"""Packages that come with torch, from where it comes."""
+APART = re.compile(r"^(torch|triton|nvidia-|tfp-nightly|opencv-(contrib-)?python==)")
+"""Packages that come with torch, from where it comes; those that would hide the headless OpenCV."""
 HEAD = "# Made by `python -m tools.assets.lock`; torch is apart.\n"
 
 

@@ -6,14 +6,17 @@ process is kept for the next clip, because loading the pose model takes seconds.
 sandbox: it has the rights of its user.
 """
 
+import atexit
 import os
 import signal
+import socket
+import subprocess
+import sys
 import threading
 import time
 import traceback
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -93,11 +96,16 @@ class _Reader:
     """A process and the connection to it; used by one thread at a time."""
 
     def __init__(self) -> None:
-        context = get_context("spawn")
-        self._connection, theirs = context.Pipe()
-        self._process = context.Process(target=_serve, args=(os.getpid(), theirs), daemon=True)
-        self._process.start()
-        theirs.close()
+        ours, theirs = socket.socketpair()
+        with theirs:
+            # Not by multiprocessing, whose daemons, such as Dask's workers, may start no process.
+            command = [sys.executable, "-P", "-m", __name__, str(theirs.fileno()), str(os.getpid())]
+            path = os.pathsep.join(folder for folder in sys.path if folder)
+            self._process = subprocess.Popen(
+                command, pass_fds=[theirs.fileno()], env={**os.environ, "PYTHONPATH": path},
+                stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            )  # fmt: skip
+        self._connection = Connection(ours.detach())
         self.is_idle = True
 
     def call(
@@ -139,8 +147,7 @@ class _Reader:
         self.is_idle = False
         self._connection.close()
         self._process.kill()
-        self._process.join()
-        code = self._process.exitcode or 0
+        code = self._process.wait()
         return signal.Signals(-code).name if code < 0 else f"exit code {code}"
 
     def _answer(self) -> Outcome:
@@ -162,12 +169,18 @@ def _free() -> _Reader:
     return _Reader()
 
 
+@atexit.register
+def end_idle() -> None:
+    """End the processes that wait for work."""
+    while _idle:
+        _idle.pop().end()
+
+
 def _serve(parent: int, connection: Connection) -> None:
     """Handle requests until the parent closes the pipe; leave Ctrl-C to the parent."""
     os.environ["OMP_NUM_THREADS"] = "1"
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     watch_parent(parent)
-    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)  # output of a dying C++ library
     import cv2
 
     cv2.setNumThreads(1)
@@ -205,3 +218,7 @@ class _Reporter:
         if done >= total or now >= self._sent_s + BETWEEN_REPORTS_S:
             self._sent_s = now
             self._connection.send((REPORT, (done, total)))
+
+
+if __name__ == "__main__":
+    _serve(int(sys.argv[2]), Connection(int(sys.argv[1])))

@@ -1,5 +1,6 @@
 """TQC of sb3-contrib (torch): the reference implementation of the fast trainer."""
 
+import io
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -144,7 +145,9 @@ class Sb3Trainer(OffPolicyTrainer):
         state = {name: part.state_dict() for name, part in self._parts().items()}
         random = torch.get_rng_state() if self.model.random is None else self.model.random
         state |= {"log_ent_coef": self.model.log_ent_coef.detach(), "random": random}
-        torch.save(state, folder / "networks.pt")
+        content = io.BytesIO()  # torch's own writer hides that a disk is full
+        torch.save(state, content)
+        (folder / "networks.pt").write_bytes(content.getvalue())
         self._save_rest(folder, replay)
 
     def load(self, folder: Path, replay: Path, steps: int, updates: int) -> None:

@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -104,6 +105,13 @@ def test_a_video_that_takes_too_long_is_refused(monkeypatch: pytest.MonkeyPatch)
 def test_what_a_process_writes_on_stderr_stays_there(capfd: pytest.CaptureFixture[str]) -> None:
     in_video_process(speak, Path())
     assert not capfd.readouterr().err
+
+
+@pytest.mark.medium
+def test_a_daemon_of_multiprocessing_can_have_one() -> None:
+    """As a worker of Dask is."""
+    with get_context("spawn").Pool(1) as pool:
+        assert pool.apply(in_video_process, (divide, Path(), 6, 2)) == 3
 
 
 @pytest.mark.slow
