@@ -2,10 +2,11 @@
 
 The programme is planned once (`retarget.performance`); where on the floor a robot follows it is the
 robot's own matter. Every part begins where the robot is and faces, and where a push carries it off,
-the rest of the part goes on from there. Trackers see everything in the frame of the programme.
+the rest of the part goes on from there. A robot that is about to fall stops dancing, stands, and
+goes on with the next part. Trackers see everything in the frame of the programme.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,11 +21,13 @@ from robojackson.retarget.performance.programme import Part, Programme
 from robojackson.rl.config.train_config import RandomConfig
 from robojackson.rl.evaluation.rollout_records import SITES
 from robojackson.rl.sim.preview import driven_clip
-from robojackson.rl.sim.reference_clip import ClipStep
 from robojackson.rl.sim.simulation import Simulation, require_same_clock
 from robojackson.rl.trackers.tracker import Tracker, TrackerInput
-from robojackson.robot.fall import Fall
+from robojackson.robot.fall import Fall, up_axis
 from robojackson.robot.model import Robot
+
+LONGEST = 2.0
+"""Of the programme's length, after which a robot that keeps giving parts up has failed."""
 
 
 @config_dataclass
@@ -37,6 +40,8 @@ class PerformanceConfig:
         pushes: Pushes every 1 to 3 s, multiples of mjlab's, unitless; those of the passport are 1.
         carried_m, turned_rad: From the programme, beyond which a robot follows it from where it is
             on.
+        lost_rad: Tilt away from the programme's, from which a robot gives the part up and stands.
+        calm_rad: Tilt away from the stand, below which for `calm_s` it goes on with the next part.
         threads: Threads that step the simulations.
     """
 
@@ -45,76 +50,103 @@ class PerformanceConfig:
     pushes: float = Field(default=1.0, ge=0, le=10)
     carried_m: float = Field(default=0.3, gt=0)
     turned_rad: float = Field(default=0.5, gt=0)
+    lost_rad: float = Field(default=0.4, gt=0)
+    calm_rad: float = Field(default=0.15, gt=0)
+    calm_s: float = Field(default=1.0, gt=0)
     threads: int = Field(default=2, ge=1)
 
 
 @dataclass(frozen=True)
 class Performance:
-    """What N robots did with a programme of S steps.
+    """What N robots did with a programme, T control steps long.
 
     Attributes:
         programme: What they were to do.
-        length: Steps that each stayed up, at most S - 1.
-        qpos: Their states after every step, world; after a fall they repeat.
+        length: Steps that each was up, at most T.
+        fell: Whether each fell.
+        step: Step of the programme that each was to be at after every step.
+        waits: Whether each had given its part up and stood.
+        qpos: Their states, world; after the end of a run they repeat.
         points, target: Keypoints and those of the programme, in its frame, m.
         roots, target_roots: Places of the roots likewise, m.
-        moved: Where on the floor each follows the programme at every step: m and rad.
         carried: How often each went on from another place within a part.
+        given_up: Names of the parts that each gave up.
     """
 
     programme: Programme
     length: Int[np.ndarray, " N"]
-    qpos: Float[np.ndarray, "S N nq"]
-    points: Float[np.ndarray, "S N K 3"]
-    target: Float[np.ndarray, "S K 3"]
-    roots: Float[np.ndarray, "S N 3"]
-    target_roots: Float[np.ndarray, "S 3"]
+    fell: Bool[np.ndarray, " N"]
+    step: Int[np.ndarray, "T N"]
+    waits: Bool[np.ndarray, "T N"]
+    qpos: Float[np.ndarray, "T N nq"]
+    points: Float[np.ndarray, "T N K 3"]
+    roots: Float[np.ndarray, "T N 3"]
     carried: Int[np.ndarray, " N"]
-
-    @property
-    def finished(self) -> Bool[np.ndarray, " N"]:
-        """Whether each was up at the end."""
-        result: np.ndarray = self.length == len(self.qpos)
-        return result
+    given_up: tuple[tuple[str, ...], ...]
 
     def runs(self, seed: int) -> list[dict[str, object]]:
         """Return a row a run, the first with this seed."""
-        parts, dt = self.programme.parts, self.programme.motion.dt
-        rows: list[dict[str, object]] = []
-        for i, length in enumerate(self.length):
-            fell = not self.finished[i]
-            where = next((part.name for part in parts if length < part.end), parts[-1].name)
-            rows.append({
-                "seed": seed + i,
-                "finished": not fell,
-                "survived_s": float(length * dt),
-                "fell_in": where if fell else "",
-                "carried": int(self.carried[i]),
-                "mpjpe_l_m": self._error(i, slice(0, max(1, int(length)))),
-                "walked_m": float(np.linalg.norm(self.qpos[-1, i, :2] - self.qpos[0, i, :2])),
-            })  # fmt: skip
-        return rows
+        return [self._run(i, seed + i) for i in range(len(self.length))]
+
+    def _run(self, i: int, seed: int) -> dict[str, object]:
+        parts, length = self.programme.parts, max(1, int(self.length[i]))
+        dances = [part for part in parts if part.is_dance]
+        danced = sum(int(self._shown(i, part).sum()) for part in dances)
+        whole = sum(part.danced[1] - part.danced[0] for part in dances)
+        last = self.step[length - 1, i]
+        where = next(part.name for part in parts if last < part.end)
+        return {
+            "seed": seed,
+            "finished": not self.fell[i],
+            "survived_s": length * self.programme.motion.dt,
+            "fell_in": where if self.fell[i] else "",
+            "given_up": " ".join(self.given_up[i]),
+            "danced_share": danced / whole,
+            "carried": int(self.carried[i]),
+            "mpjpe_l_m": self._error(i, ~self.waits[:length, i]),
+            "away_m": float(np.linalg.norm(self.qpos[length - 1, i, :2] - self.qpos[0, i, :2])),
+        }
 
     def parts(self) -> list[dict[str, object]]:
-        """Return a row a part: who was up at its end, and how near those were that were."""
+        """Return a row a part: how many did it to its end, and how near they were."""
         return [self._part(part) for part in self.programme.parts]
 
     def _part(self, part: Part) -> dict[str, object]:
-        rows = slice(part.start, min(part.end, len(self.qpos)))
-        began, up = self.length >= part.start, self.length >= rows.stop
-        errors = [self._error(int(i), rows) for i in np.flatnonzero(up)]
+        began, whole, errors = 0, 0, []
+        for i in range(len(self.length)):
+            rows = self._within(i, part)
+            began += bool(rows.any())
+            if rows.any() and (self.step[: self.length[i], i] >= part.end - 1).any():
+                whole += not (self.waits[: len(rows), i] & self._steps_of(i, part)).any()
+                errors.append(self._error(i, rows))
         return {
             "part": part.name,
             "seconds": (part.end - part.start) * self.programme.motion.dt,
             "infeasible_share": part.infeasible_share,
-            "began": int(began.sum()),
-            "stayed_up": int(up.sum()),
+            "began": began,
+            "whole": whole,
             "mpjpe_l_m": float(np.mean(errors)) if errors else None,
         }
 
-    def _error(self, i: int, rows: slice) -> float:
-        own = (self.points[rows, i, :SITES], self.target[rows, :SITES])
-        return mpjpe(*own, self.roots[rows, i], self.target_roots[rows])
+    def _steps_of(self, i: int, part: Part) -> Bool[np.ndarray, " L"]:
+        step = self.step[: self.length[i], i]
+        result: np.ndarray = (step >= part.start) & (step < part.end)
+        return result
+
+    def _within(self, i: int, part: Part) -> Bool[np.ndarray, " L"]:
+        """Return when a run was in a part and had not given it up."""
+        return np.asarray(self._steps_of(i, part) & ~self.waits[: self.length[i], i])
+
+    def _shown(self, i: int, part: Part) -> Bool[np.ndarray, " L"]:
+        step = self.step[: self.length[i], i]
+        shows = (step >= part.danced[0]) & (step < part.danced[1])
+        return np.asarray(shows & self._within(i, part))
+
+    def _error(self, i: int, when: Bool[np.ndarray, " L"]) -> float:
+        motion, rows = self.programme.motion, np.flatnonzero(when)
+        at = self.step[rows, i]
+        own = (self.points[rows, i, :SITES], np.asarray(motion.keypoints_w)[at, :SITES])
+        return mpjpe(*own, self.roots[rows, i], motion.qpos[at, :3])
 
 
 def perform(
@@ -137,63 +169,88 @@ def perform(
     require_same_clock(sim.dt, motion.dt)
     starts = np.repeat(np.asarray(motion.qpos[:1], float), n, 0)
     sim.place(np.arange(n), starts, np.zeros((n, robot.model.nv)))
-    follower, fall, stage = tracker.follow(robot, n), Fall.of(robot), _Stage(n, config)
-    begins = {part.start for part in programme.parts}
-    alive, length, record = np.ones(n, bool), np.zeros(n, int), []
-    for t in range(len(motion) - 1):
-        now, window = clip.at(np.full(n, t)), _window(clip.at, t, n, tracker.window)
-        stage.follow(sim, now, everyone=t in begins)
-        own = stage.placed.inverse()
+    follower, fall, stage = tracker.follow(robot, n), Fall.of(robot), _Stage(n, config, programme)
+    up, length, fell = np.ones(n, bool), np.zeros(n, int), np.zeros(n, bool)
+    record: list[tuple[np.ndarray, ...]] = []
+    total = len(motion) - 1
+    while up.any() and len(record) < LONGEST * total:
+        stage.place(sim.qpos, clip.at(stage.step).qpos)
+        own, window = stage.placed.inverse(), tuple(clip.at(stage.ahead(k)) for k in tracker.window)
         qpos, qvel = sim.sensed()
         seen = TrackerInput(own.qpos(qpos), own.qvel(qvel), own.points(sim.points), window)
-        sim.step(follower.targets(seen), alive)
-        following = clip.at(np.full(n, t + 1))
-        there = own.qpos(sim.qpos)
-        alive = alive & ~fall.has_fallen(there, following.qpos) & ~sim.broken
-        length += alive
-        record.append((sim.qpos.copy(), own.points(sim.points), there[:, :3]))
-        progress(t + 1, len(motion) - 1)
-        if not alive.any():
-            break
+        sim.step(follower.targets(seen), up)
+        stage.advance()
+        following, there = clip.at(stage.step).qpos, own.qpos(sim.qpos)
+        down = up & (fall.has_fallen(there, following) | sim.broken)
+        fell |= down
+        up = up & ~down
+        length += up
+        arrays = stage.step, stage.waits, sim.qpos, own.points(sim.points), there[:, :3]
+        record.append(tuple(array.copy() for array in arrays))
+        up = up & (stage.waits | (stage.step < total))
+        stage.watch(there, following, up)
+        progress(min(int(stage.step.max()), total), total)
     sim.close()
-    states, points, roots = (np.stack(column) for column in zip(*record, strict=True))
-    after = slice(1, len(states) + 1)
-    target, target_roots = np.asarray(motion.keypoints_w)[after], motion.qpos[after, :3]
-    return Performance(
-        programme, length, states, points, target, roots, target_roots, stage.carried
-    )
+    fell |= up  # one that never comes to rest again
+    columns = [np.stack(column) for column in zip(*record, strict=True)]
+    given_up = tuple(map(tuple, stage.given_up))
+    return Performance(programme, length, fell, *columns, stage.carried, given_up)
 
 
 class _Stage:
-    """Where on the floor each robot follows the programme.
+    """Where in the programme each robot is, and where on the floor it follows it.
 
     Attributes:
+        step: Of the programme, where each is to be now.
+        waits: Whether each has given its part up and stands until it is calm.
         placed: From the programme's frame into the world.
         carried: How often each was carried off within a part.
+        given_up: Parts that each gave up.
     """
 
-    def __init__(self, n: int, config: PerformanceConfig) -> None:
-        self._config = config
+    def __init__(self, n: int, config: PerformanceConfig, programme: Programme) -> None:
+        self._config, self._parts = config, programme.parts
+        self._starts = np.array([part.start for part in programme.parts])
+        self._last = len(programme.motion) - 1
+        self._calm, self._needed = np.zeros(n, int), round(config.calm_s / programme.motion.dt)
+        self.step, self.waits = np.zeros(n, int), np.zeros(n, bool)
         self.placed, self.carried = FloorMove.none(n), np.zeros(n, int)
+        self.given_up: list[list[str]] = [[] for _ in range(n)]
 
-    def follow(self, sim: Simulation, now: ClipStep, everyone: bool) -> None:
-        """Place the programme under the robots, all of them or those that were carried off."""
-        there = self.placed.qpos(now.qpos)
-        apart = np.linalg.norm(sim.qpos[:, :2] - there[:, :2], axis=-1)
-        turned = np.abs(wrapped(heading(sim.qpos[:, 3:7]) - heading(there[:, 3:7])))
-        off = (apart > self._config.carried_m) | (turned > self._config.turned_rad)
-        which = off | everyone
-        if not which.any():
-            return
-        if not everyone:
-            self.carried += off
-        new, old = FloorMove.onto(now.qpos, sim.qpos), self.placed
+    def ahead(self, k: int) -> Int[np.ndarray, " N"]:
+        """Return the steps k further on; a robot that waits stays where it is."""
+        return np.where(self.waits, self.step, np.minimum(self.step + k, self._last))
+
+    def advance(self) -> None:
+        """One control step is over."""
+        self.step = self.ahead(1)
+
+    def place(self, qpos: Float[np.ndarray, "N nq"], now: Float[np.ndarray, "N nq"]) -> None:
+        """Put the programme under the robots that begin a part or were carried off.
+
+        Args:
+            now: The programme's states at their steps.
+        """
+        there, config = self.placed.qpos(now), self._config
+        apart = np.linalg.norm(qpos[:, :2] - there[:, :2], axis=-1)
+        turned = np.abs(wrapped(heading(qpos[:, 3:7]) - heading(there[:, 3:7])))
+        begins = np.isin(self.step, self._starts) | self.waits
+        off = ((apart > config.carried_m) | (turned > config.turned_rad)) & ~begins
+        self.carried += off
+        new, old, which = FloorMove.onto(now, qpos), self.placed, begins | off
         self.placed = FloorMove(
             np.where(which, new.turn, old.turn), np.where(which[:, None], new.shift, old.shift)
         )
 
-
-def _window(
-    at: Callable[[np.ndarray], ClipStep], t: int, n: int, ahead: Sequence[int]
-) -> tuple[ClipStep, ...]:
-    return tuple(at(np.full(n, t + k)) for k in ahead)
+    def watch(
+        self, qpos: Float[np.ndarray, "N nq"], now: Float[np.ndarray, "N nq"], up: np.ndarray
+    ) -> None:
+        """Give a part up where a robot is about to fall; go on where one has come to rest."""
+        along = np.sum(up_axis(qpos[:, 3:7]) * up_axis(now[:, 3:7]), -1)
+        tilt = np.arccos(np.clip(along, -1.0, 1.0))
+        self._calm = np.where(self.waits & (tilt < self._config.calm_rad), self._calm + 1, 0)
+        self.waits = self.waits & (self._calm < self._needed)
+        for i in np.flatnonzero(up & ~self.waits & (tilt > self._config.lost_rad)):
+            part = next(part for part in self._parts if self.step[i] < part.end)
+            self.waits[i], self.step[i] = True, part.end - 1
+            self.given_up[i].append(part.name)
