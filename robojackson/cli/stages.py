@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robojackson.cli import cards, console
-from robojackson.cli.lifetime.video_process import in_video_process, probed
-from robojackson.errors import NoPersonFound, RejectedReference, TrackTooShort
+from robojackson.errors import BadConfiguration, NoPersonFound, RejectedReference, TrackTooShort
 from robojackson.files.file_tree import results_in
 from robojackson.files.json_types import to_json_types
 from robojackson.pipeline.yaml_loader import load
@@ -30,10 +29,17 @@ Overrides = Mapping[str, Any]
 
 
 def mocap(
-    video: Path, out: Path, config: str, overrides: Overrides, hypotheses: int = 0
+    video: Path,
+    out: Path,
+    config: str,
+    overrides: Overrides,
+    hypotheses: int = 0,
+    second: Path | None = None,
 ) -> Figures:
-    """Write landmarks.parquet and smpl.parquet of a video; with hypotheses also
-    smpl_1.parquet..."""
+    """landmarks.parquet and smpl.parquet of a video, smpl_1.parquet... of what else it allows.
+
+    With a second video of the same dance, the motion is of both; files beside it are of the first.
+    """
     from robojackson.api.hypotheses import hypothesis_files, sample_hypotheses
     from robojackson.api.motions import load_weights, recover_motion
     from robojackson.cli.pictures import motion_source
@@ -44,7 +50,10 @@ def mocap(
     began = time.monotonic()
     settings = load(PipelineConfig, config, overrides)
     names = hypothesis_files(settings, hypotheses)
-    info = probed(video, settings.video)
+    for path in (video, second) if second else (video,):
+        probe_video(path, limits=settings.video)
+    if hypotheses and second:
+        raise BadConfiguration("--hypotheses is for one camera: leave the second video away")
     networks = load_weights(settings.network)
     with results_in(out) as files:
         with console.bar(f"landmarks of {video.name}") as progress:
@@ -54,8 +63,9 @@ def mocap(
             )  # fmt: skip
         try:
             sequence = recover_motion(
-                track, config=settings.mocap, networks=networks, video=video, progress=True
-            )
+                track, second=second, quality=settings.detector, config=settings.mocap,
+                networks=networks, video=video, progress=True,
+            )  # fmt: skip
         except (NoPersonFound, TrackTooShort) as cause:
             raise type(cause)(cause.reason, video) from cause
         motions = {"smpl.parquet": sequence.to_bytes()}

@@ -143,7 +143,7 @@ def pin_offsets(
 
 
 def within_reach(planted: np.ndarray, pins: Float[np.ndarray, "T 2 3"], reach: float) -> np.ndarray:
-    """Return the planted points of feet that their pins move at most `reach` along the floor."""
+    """Planted points of the feet that their pins move no further than `reach` along the floor."""
     near = np.linalg.norm(pins[..., :2], axis=-1) <= reach
     return np.asarray(planted & np.repeat(near, 2, axis=1))
 

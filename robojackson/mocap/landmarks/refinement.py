@@ -12,6 +12,7 @@ from dataclasses import dataclass as plain_dataclass
 import numpy as np
 from jaxtyping import Float
 from scipy.linalg import solveh_banded
+from scipy.ndimage import median_filter
 
 from robojackson.body.forward_kinematics import unit
 from robojackson.body.skeleton import keypoint
@@ -36,7 +37,8 @@ ORDER = [LANDMARK_NAMES[index] for index in BODY]
 HIPS = [ORDER.index("left_hip"), ORDER.index("right_hip")]
 LEAST_VISIBILITY = 0.1
 SUDDEN = 1.5
-"""Acceleration, in spreads, above which its cost grows less than quadratically."""
+"""Spreads of acceleration from which on it counts less than squared."""
+AROUND_S = 0.15
 
 
 @config_dataclass
@@ -49,8 +51,8 @@ class RefineConfig:
         depth_m: Spread of the detector's depth relative to the hips, metres.
         bone_m: Spread of a bone's length in one frame, metres.
         acceleration_mps2: Spread of a joint's acceleration, m/s^2.
-        leash_m: Largest move of a landmark from where it was, relative to the hips, metres:
-            what needs more is a frame in which the terms contradict each other.
+        leash_m: A landmark moves no further than this from where it was, seen from the hips: what
+            needs more is a frame in which the terms contradict each other; metres.
         rounds: Gauss-Newton steps.
     """
 
@@ -59,7 +61,7 @@ class RefineConfig:
     depth_m: float = 0.07
     bone_m: float = 0.03
     acceleration_mps2: float = 20.0
-    leash_m: float = 0.2
+    leash_m: float = 0.12
     rounds: int = 12
 
 
@@ -100,19 +102,24 @@ def refine(
     evidence = gather(placed, visibility, rest_joints, fps, config, depth_m)
     for _ in range(config.rounds):
         body = body + _step(body, evidence, config)
-    return carry_along(placed, leashed(placed[:, BODY], body, config.leash_m))
+    return carry_along(placed, leashed(placed[:, BODY], body, fps, config.leash_m))
 
 
 def leashed(
-    start: Float[np.ndarray, "T 12 3"], body: Float[np.ndarray, "T 12 3"], leash: float
+    start: Float[np.ndarray, "T 12 3"], body: Float[np.ndarray, "T 12 3"], fps: float, leash: float
 ) -> Float[np.ndarray, "T 12 3"]:
-    """Return the body, each landmark at most `leash` from its start relative to the hips."""
-    move = body - start
-    common = move[:, HIPS].mean(1, keepdims=True)
-    apart = np.linalg.norm(move - common, axis=-1, keepdims=True)
-    share = np.minimum(1.0, leash / np.maximum(apart, leash))
-    result: np.ndarray = start + common + share * (move - common)
+    """The body, each landmark seen from the hips at most `leash` from where it started, in the
+    median of `AROUND_S`: a frame that is an outlier may still be put right."""
+    middle = median_filter(_from_hips(start), (max(round(AROUND_S * fps), 1) | 1, 1, 1))
+    here = _from_hips(body)
+    move = here - middle
+    apart = np.linalg.norm(move, axis=-1, keepdims=True)
+    result: np.ndarray = body - move * (1.0 - np.minimum(1.0, leash / np.maximum(apart, leash)))
     return result
+
+
+def _from_hips(body: Float[np.ndarray, "T 12 3"]) -> Float[np.ndarray, "T 12 3"]:
+    return np.asarray(body - body[:, HIPS].mean(1, keepdims=True))
 
 
 def gather(
