@@ -21,6 +21,7 @@ from robojackson.rl.evaluation.verdict import NEEDS_FULL_LENGTH
 
 if TYPE_CHECKING:
     from robojackson.motion.smpl_sequence import SmplSequence
+    from robojackson.pipeline.pipeline_config import PipelineConfig
 
 LONGER_MINUTES = 20
 """Options advised for the next training of a robot that does not dance."""
@@ -42,6 +43,7 @@ def mocap(
     """
     from robojackson.api.hypotheses import hypothesis_files, sample_hypotheses
     from robojackson.api.motions import load_weights, recover_motion
+    from robojackson.api.videos import detect_landmarks
     from robojackson.cli.pictures import motion_source
     from robojackson.clips.quality.advice import advise
     from robojackson.mocap.landmarks.landmark_pipeline import detect_landmarks
@@ -50,10 +52,7 @@ def mocap(
     began = time.monotonic()
     settings = load(PipelineConfig, config, overrides)
     names = hypothesis_files(settings, hypotheses)
-    for path in (video, second) if second else (video,):
-        probe_video(path, limits=settings.video)
-    if hypotheses and second:
-        raise BadConfiguration("--hypotheses is for one camera: leave the second video away")
+    _check_videos(video, second, settings, hypotheses)
     networks = load_weights(settings.network)
     with results_in(out) as files:
         with console.bar(f"landmarks of {video.name}") as progress:
@@ -93,6 +92,18 @@ def mocap(
         "next": cards.command_line("retarget", out / "smpl.parquet", "-o", out),
         "seconds": time.monotonic() - began,
     }
+
+
+def _check_videos(
+    video: Path, second: Path | None, settings: "PipelineConfig", hypotheses: int
+) -> None:
+    """Refuse videos that cannot be read, and hypotheses of two cameras."""
+    from robojackson.api.videos import probe_video
+
+    for path in (video, second) if second else (video,):
+        probe_video(path, limits=settings.video)
+    if hypotheses and second:
+        raise BadConfiguration("--hypotheses is for one camera: leave the second video away")
 
 
 def retarget(smpl: Path, out: Path, config: str, overrides: Overrides) -> Figures:

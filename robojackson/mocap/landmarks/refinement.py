@@ -12,13 +12,13 @@ from dataclasses import dataclass as plain_dataclass
 import numpy as np
 from jaxtyping import Float
 from scipy.linalg import solveh_banded
-from scipy.ndimage import median_filter
 
 from robojackson.body.forward_kinematics import unit
 from robojackson.body.skeleton import keypoint
 from robojackson.config import config_dataclass
 from robojackson.mocap.landmarks.banded_matrix import add_acceleration, to_bands
 from robojackson.mocap.landmarks.blazepose import BODY, LANDMARK_NAMES, landmark
+from robojackson.mocap.landmarks.leash import leashed
 
 SHAPE = (len(BODY), 3)
 SIZE = SHAPE[0] * SHAPE[1]
@@ -38,7 +38,6 @@ HIPS = [ORDER.index("left_hip"), ORDER.index("right_hip")]
 LEAST_VISIBILITY = 0.1
 SUDDEN = 1.5
 """Spreads of acceleration from which on it counts less than squared."""
-AROUND_S = 0.15
 
 
 @config_dataclass
@@ -103,23 +102,6 @@ def refine(
     for _ in range(config.rounds):
         body = body + _step(body, evidence, config)
     return carry_along(placed, leashed(placed[:, BODY], body, fps, config.leash_m))
-
-
-def leashed(
-    start: Float[np.ndarray, "T 12 3"], body: Float[np.ndarray, "T 12 3"], fps: float, leash: float
-) -> Float[np.ndarray, "T 12 3"]:
-    """The body, each landmark seen from the hips at most `leash` from where it started, in the
-    median of `AROUND_S`: a frame that is an outlier may still be put right."""
-    middle = median_filter(_from_hips(start), (max(round(AROUND_S * fps), 1) | 1, 1, 1))
-    here = _from_hips(body)
-    move = here - middle
-    apart = np.linalg.norm(move, axis=-1, keepdims=True)
-    result: np.ndarray = body - move * (1.0 - np.minimum(1.0, leash / np.maximum(apart, leash)))
-    return result
-
-
-def _from_hips(body: Float[np.ndarray, "T 12 3"]) -> Float[np.ndarray, "T 12 3"]:
-    return np.asarray(body - body[:, HIPS].mean(1, keepdims=True))
 
 
 def gather(

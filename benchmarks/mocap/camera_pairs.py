@@ -1,6 +1,6 @@
 """Two cameras instead of one: all pairs of the four real cameras.
 
-    python -m benchmarks.mocap.two_cameras
+    python -m benchmarks.mocap.camera_pairs
 
 PA-MPJPE of twelve joints, mm, of the better and the worse camera alone and of both; by how much the
 found offset of the clips is wrong (they were started together), and the rays' miss.
