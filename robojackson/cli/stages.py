@@ -37,10 +37,7 @@ def mocap(
     hypotheses: int = 0,
     second: Path | None = None,
 ) -> Figures:
-    """landmarks.parquet and smpl.parquet of a video, smpl_1.parquet... of what else it allows.
-
-    With a second video of the same dance, the motion is of both; files beside it are of the first.
-    """
+    """landmarks.parquet and smpl.parquet of a video or two, smpl_1... of what else it allows."""
     from robojackson.api.hypotheses import hypothesis_files, sample_hypotheses
     from robojackson.api.motions import load_weights, recover_motion
     from robojackson.api.videos import detect_landmarks
@@ -71,10 +68,10 @@ def mocap(
         for name, other in sample_hypotheses(track, settings, hypotheses):
             motions[name] = other.to_bytes()
         landmarks = track.to_bytes()
-        source = motion_source.source_record(video, landmarks, motions)
-        for name, content in {**motions, "landmarks.parquet": landmarks}.items():
+        record = motion_source.source_record(video, landmarks, motions)
+        made = {**motions, "landmarks.parquet": landmarks, motion_source.FILE: record}
+        for name, content in made.items():
             files.write(name, content)
-        files.write(motion_source.FILE, source)
     return {
         "video": str(video),
         "smpl": str(out / "smpl.parquet"),
