@@ -30,13 +30,22 @@ def recover_with_second(
         second: The other clip, or its landmarks.
         config, quality, person, progress: See `recover_motion`.
     """
-    from robojackson.mocap.views.timing import sound_offset
     from robojackson.mocap.views.two_cameras import recover_together
 
     if isinstance(second, LandmarkTrack) or Path(second).suffix == TABLE:
         return recover_together(track, read_if_path(LandmarkTrack, second), config)
     other = detect_landmarks(second, quality=quality, person=person, progress=progress)
-    one = read_sound(Path(video)) if video is not None else None
-    two = read_sound(Path(second)) if one is not None else None
-    heard_s = sound_offset(one, two) if one is not None and two is not None else None
+    heard_s = None if video is None else heard_offset(Path(video), Path(second))
     return recover_together(track, other, config, heard_s)
+
+
+def heard_offset(video: Path, second: Path) -> float | None:
+    """Return when a second clip began in the first by their sounds; None where those do not tell.
+
+    Raises:
+        UnreadableVideo, TruncatedVideo: a file cannot be read.
+    """
+    from robojackson.mocap.views.timing import sound_offset
+
+    one, two = read_sound(video), read_sound(second)
+    return sound_offset(one, two) if one is not None and two is not None else None

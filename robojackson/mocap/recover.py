@@ -77,7 +77,7 @@ class View:
     depth_m: Float[np.ndarray, "T 12"] | None
 
     def in_image(self) -> Float[np.ndarray, "T 33 3"]:
-        """The points at their depths on the rays of the detected landmarks."""
+        """Return the points at their depths on the rays of the detected landmarks."""
         depth = self.points[..., 2:]
         return np.concatenate([self.pinhole.rays(self.landmarks.image) * depth, depth], -1)
 

@@ -117,7 +117,7 @@ def _by_motion(one: View, two: View) -> list[Offset]:
 
 
 def _calibrated(one: View, two: View, began_s: float) -> _Calibrated | None:
-    """The second camera if its clip began then; None where too few frames are common."""
+    """Fit the second camera if its clip began then; None where too few frames are common."""
     pair = _together(one, two, began_s)
     seen = (pair.both > 0.0).any(1)
     if seen.sum() < LEAST_FRAMES:
@@ -145,7 +145,7 @@ def _why(found: list[_Calibrated]) -> str:
 
 
 def _together(one: View, two: View, began: float) -> _Pair:
-    """The second camera's landmarks at the moments of the first one's frames."""
+    """Return both cameras' landmarks at the moments of the first one's frames."""
     times = np.arange(len(one.points)) / one.track.fps
     places = (times - began) * two.track.fps
     inside = (places >= 0.0) & (places <= len(two.points) - 1)
