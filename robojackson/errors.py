@@ -55,6 +55,10 @@ class NoPersonFound(RoboJacksonError):
     """The pose detector found no person in the clip."""
 
 
+class ViewsDisagree(RoboJacksonError):
+    """Two clips that cannot be put together: they do not show the same motion."""
+
+
 class UnknownName(RoboJacksonError):
     """A body, joint, site, robot, preset or column that does not exist."""
 

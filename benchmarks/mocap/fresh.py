@@ -114,7 +114,7 @@ def main() -> None:
         cells = [
             f"{value:.2f}" if index == 2 else f"{value:.0f}" for index, value in enumerate(cells)
         ]
-        table.add_row(name, f"{share:.0%}", *cells, f"{ours['tilt_sd_deg']:.1f}")
+        table.add_row(name, f"{share:.0%}", *cells)
     means = np.mean(totals, 0)
     table.add_row("mean", "", *(f"{value:.1f}" for value in means))
     Console().print(table)

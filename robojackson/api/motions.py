@@ -15,6 +15,7 @@ from robojackson.api.arguments import (
 )
 from robojackson.api.foreign_files import Up, format_of, holds_a_person, read_foreign
 from robojackson.api.robots import load_robot
+from robojackson.api.second_camera import recover_with_second
 from robojackson.api.videos import detect_landmarks
 from robojackson.clips.video import read_frames
 from robojackson.errors import BadConfiguration, BadTable, StoreError
@@ -56,6 +57,7 @@ class LoadedNetworks:
 def recover_motion(
     source: FilePath | LandmarkTrack,
     *,
+    second: FilePath | LandmarkTrack | None = None,
     quality: Quality = "full",
     person: int | None = None,
     config: MocapConfig | None = None,
@@ -67,6 +69,7 @@ def recover_motion(
 
     Args:
         source: A video, a landmarks.parquet, or the landmarks themselves.
+        second: The same dance from another camera, likewise; neither camera may move.
         quality: Pose model for a video; see `detect_landmarks`.
         person: Whom to follow in a video; see `detect_landmarks`.
         config: How landmarks become a motion.
@@ -83,7 +86,8 @@ def recover_motion(
         UnreadableVideo, TruncatedVideo, VideoTooLong: see `probe_video`.
         NoPersonFound, TrackTooShort: no person is detected for long enough.
         BadWeights: a file of weights cannot be used.
-        BadConfiguration: HybrIK without a video.
+        BadConfiguration: HybrIK without a video, or with two.
+        ViewsDisagree: the two clips do not show the same dance.
     """
     motion = config or MocapConfig()
     if isinstance(source, LandmarkTrack) or Path(source).suffix == TABLE:
@@ -92,6 +96,10 @@ def recover_motion(
         video = video or source
         track = detect_landmarks(source, quality=quality, person=person, progress=progress)
     loaded = load_weights(networks) if isinstance(networks, NetworkConfig) else networks
+    if second is not None:
+        if loaded is not None:
+            raise BadConfiguration("HybrIK looks at one camera: leave the second clip away")
+        return recover_with_second(track, video, second, motion, quality, person, progress)
     if loaded is None:
         return recover.recover_motion(track, motion)
     if video is None:

@@ -67,6 +67,10 @@ def score(
 def mocap(
     video: Annotated[Path, typer.Argument(help="A video of one person.")],
     out: Folder,
+    second: Annotated[
+        Path | None,
+        typer.Argument(help="The same dance from another camera; neither may move."),
+    ] = None,
     hybrik: Weights = None,
     niki: Weights = None,
     person: Person = None,
@@ -98,7 +102,7 @@ def mocap(
         return CommandResult(data, text=lines)
     brought = {"network.hybrik": yaml_text(hybrik), "network.niki": yaml_text(niki)}
     overrides = overrides_from(set_, {**brought, "dancer.number": person, "detector": quality})
-    made = stages.mocap(video, out, config, overrides, hypotheses)
+    made = stages.mocap(video, out, config, overrides, hypotheses, second)
     made |= draw_mocap(video, out, config, overrides, film)
     return CommandResult(made, text=cards.shown(made, cards.mocap_lines(made), verbose))
 

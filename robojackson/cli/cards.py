@@ -79,11 +79,20 @@ def mocap_lines(answer: Answer) -> list[str]:
         f"planted   {feet} of the time",
         f"floor     lowest point {100 * answer['floor']['lowest_keypoint_m']:.1f} cm above it",
     ]
+    rows += _reprojection_lines(answer)
     rows += [f"note      {note}" for note in answer["notes"]]
     rows += advice_lines(answer)
     rows += [f"motion    {answer['smpl']}"]
     rows += [f"{key:<9} {answer[key]}" for key in ("picture", "film") if key in answer]
     return [*rows, *closing(answer)]
+
+
+def _reprojection_lines(answer: Answer) -> list[str]:
+    if (found := answer.get("reprojection")) is None:
+        return []
+    weak = ", ".join(f"{start:.1f}-{end:.1f} s" for start, end in found["weak_s"])
+    told = f"overlay   {100 * found['median_m']:.0f} cm off the landmarks (median)"
+    return [told + (f"; weak: {weak}" if weak else "")]
 
 
 def advice_lines(answer: Answer) -> list[str]:

@@ -14,14 +14,17 @@ import numpy as np
 
 from robojackson.cli import cards, console
 from robojackson.cli.lifetime.video_process import in_video_process, probed
-from robojackson.errors import NoPersonFound, RejectedReference, TrackTooShort
+from robojackson.errors import BadConfiguration, NoPersonFound, RejectedReference, TrackTooShort
 from robojackson.files.file_tree import results_in
 from robojackson.files.json_types import to_json_types
 from robojackson.pipeline.yaml_loader import load
 from robojackson.rl.evaluation.verdict import NEEDS_FULL_LENGTH
 
 if TYPE_CHECKING:
+    from robojackson.api.motions import LoadedNetworks
+    from robojackson.motion.landmark_track import LandmarkTrack
     from robojackson.motion.smpl_sequence import SmplSequence
+    from robojackson.pipeline.pipeline_config import PipelineConfig
 
 LONGER_MINUTES = 20
 """Options advised for the next training of a robot that does not dance."""
@@ -30,42 +33,37 @@ Overrides = Mapping[str, Any]
 
 
 def mocap(
-    video: Path, out: Path, config: str, overrides: Overrides, hypotheses: int = 0
+    video: Path,
+    out: Path,
+    config: str,
+    overrides: Overrides,
+    hypotheses: int = 0,
+    second: Path | None = None,
 ) -> Figures:
-    """Write landmarks.parquet and smpl.parquet of a video; with hypotheses also
-    smpl_1.parquet..."""
+    """Write landmarks.parquet and smpl.parquet of a video or two, and smpl_1... of hypotheses."""
     from robojackson.api.hypotheses import hypothesis_files, sample_hypotheses
-    from robojackson.api.motions import load_weights, recover_motion
+    from robojackson.api.motions import load_weights
     from robojackson.cli.pictures import motion_source
     from robojackson.clips.quality.advice import advise
-    from robojackson.mocap.landmarks.landmark_pipeline import detect_landmarks
     from robojackson.pipeline.pipeline_config import PipelineConfig
 
     began = time.monotonic()
     settings = load(PipelineConfig, config, overrides)
     names = hypothesis_files(settings, hypotheses)
-    info = probed(video, settings.video)
+    if second and (names or settings.network.hybrik):
+        raise BadConfiguration("two cameras go without --hypotheses and --hybrik: leave them away")
     networks = load_weights(settings.network)
     with results_in(out) as files:
-        with console.bar(f"landmarks of {video.name}") as progress:
-            track = in_video_process(
-                detect_landmarks, video, info, settings.detector, settings.dancer,
-                frames=info.frames, progress=progress,
-            )  # fmt: skip
-        try:
-            sequence = recover_motion(
-                track, config=settings.mocap, networks=networks, video=video, progress=True
-            )
-        except (NoPersonFound, TrackTooShort) as cause:
-            raise type(cause)(cause.reason, video) from cause
+        track = _track_of(video, settings)
+        sequence = _motion_of(track, video, second, settings, networks)
         motions = {"smpl.parquet": sequence.to_bytes()}
         for name, other in sample_hypotheses(track, settings, hypotheses):
             motions[name] = other.to_bytes()
         landmarks = track.to_bytes()
-        source = motion_source.source_record(video, landmarks, motions)
-        for name, content in {**motions, "landmarks.parquet": landmarks}.items():
+        record = motion_source.source_record(video, landmarks, motions)
+        made = {**motions, "landmarks.parquet": landmarks, motion_source.FILE: record}
+        for name, content in made.items():
             files.write(name, content)
-        files.write(motion_source.FILE, source)
     return {
         "video": str(video),
         "smpl": str(out / "smpl.parquet"),
@@ -83,6 +81,42 @@ def mocap(
         "next": cards.command_line("retarget", out / "smpl.parquet", "-o", out),
         "seconds": time.monotonic() - began,
     }
+
+
+def _track_of(video: Path, settings: "PipelineConfig") -> "LandmarkTrack":
+    """Return the landmarks of a video, found in a process of its own."""
+    from robojackson.mocap.landmarks.landmark_pipeline import detect_landmarks
+
+    info = probed(video, settings.video)
+    with console.bar(f"landmarks of {video.name}") as progress:
+        return in_video_process(
+            detect_landmarks, video, info, settings.detector, settings.dancer,
+            frames=info.frames, progress=progress,
+        )  # fmt: skip
+
+
+def _motion_of(
+    track: "LandmarkTrack",
+    video: Path,
+    second: Path | None,
+    settings: "PipelineConfig",
+    networks: "LoadedNetworks | None",
+) -> "SmplSequence":
+    """Return the motion of a track, or of it and what a second camera sees."""
+    from robojackson.api.motions import recover_motion
+    from robojackson.api.second_camera import heard_offset
+    from robojackson.mocap.views.two_cameras import recover_together
+
+    try:
+        if second is None:
+            return recover_motion(
+                track, config=settings.mocap, networks=networks, video=video, progress=True
+            )
+        other = _track_of(second, settings)
+        heard_s = in_video_process(heard_offset, video, second)
+        return recover_together(track, other, settings.mocap, heard_s)
+    except (NoPersonFound, TrackTooShort) as cause:
+        raise type(cause)(cause.reason, video) from cause
 
 
 def retarget(smpl: Path, out: Path, config: str, overrides: Overrides) -> Figures:

@@ -5,7 +5,7 @@ floor -> contacts -> root lock -> feet pinned -> solve -> SmplSequence in the wo
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -58,36 +58,72 @@ class MocapConfig:
     grounding: GroundingConfig = Field(default_factory=GroundingConfig)
 
 
+@dataclass(frozen=True)
+class View:
+    """The person before one camera.
+
+    Attributes:
+        track: What was detected, at even frames.
+        landmarks: The same, repaired.
+        pinhole: The camera.
+        points: Landmarks in the camera frame, metres.
+        depth_m: Standard deviation of the depths of the body, metres; None where nothing tells.
+    """
+
+    track: LandmarkTrack
+    landmarks: Landmarks
+    pinhole: pinhole_camera.Pinhole
+    points: Float[np.ndarray, "T 33 3"]
+    depth_m: Float[np.ndarray, "T 12"] | None
+
+    def in_image(self) -> Float[np.ndarray, "T 33 3"]:
+        """Return the points at their depths on the rays of the detected landmarks."""
+        depth = self.points[..., 2:]
+        return np.concatenate([self.pinhole.rays(self.landmarks.image) * depth, depth], -1)
+
+
 def recover_motion(track: LandmarkTrack, config: MocapConfig) -> SmplSequence:
     """Return the motion of the person in a track.
 
     Raises:
         TrackTooShort, NoPersonFound: no motion can be recovered.
     """
+    return finish_motion(view_track(track, config), config)
+
+
+def view_track(track: LandmarkTrack, config: MocapConfig) -> View:
+    """Repair a track and lift it before the camera, corrected by the temporal network.
+
+    Raises:
+        TrackTooShort, NoPersonFound: nothing to recover.
+    """
     track = evenly(weigh_visibility(track))
     landmarks = repair(track)
-    pinhole = pinhole_camera.Pinhole(
-        config.focal_px or pinhole_camera.guess_focal(track.width, track.height),
-        track.width,
-        track.height,
-    )
+    focal_px = config.focal_px or pinhole_camera.guess_focal(track.width, track.height)
+    pinhole = pinhole_camera.Pinhole(focal_px, track.width, track.height)
     seen = pinhole_camera.place(landmarks, pinhole, track.fps, config.depth_cutoff_hz)
     depth_m = None
     if config.temporal.enabled:
         found = lift(seen, landmarks.local, landmarks.visibility, track.fps, config.temporal)
         seen, depth_m = found.points, found.depth_sd(config.temporal.depth_floor_m)
+    return View(track, landmarks, pinhole, seen, depth_m)
+
+
+def finish_motion(view: View, config: MocapConfig) -> SmplSequence:
+    """Refine the points of a view, solve them and stand the body on the floor."""
+    track, landmarks, seen = view.track, view.landmarks, view.points
     rest = fit_skeleton(seen, config.bone_trust)
     sure = landmarks.visibility
     if config.refine.enabled:
-        evidence = gather(seen, landmarks.visibility, rest, track.fps, config.refine, depth_m)
-        seen = refine(seen, landmarks.visibility, rest, track.fps, config.refine, depth_m)
-        sure = certainty(seen[:, BODY], evidence, landmarks.visibility, config.refine)
+        evidence = gather(seen, sure, rest, track.fps, config.refine, view.depth_m)
+        seen = refine(seen, sure, rest, track.fps, config.refine, view.depth_m)
+        sure = certainty(seen[:, BODY], evidence, sure, config.refine)
     seen = lowpass(seen, track.fps, config.cutoff_hz)
 
     def posed(marks: np.ndarray) -> Body:
         return pose_landmarks(marks, sure, rest, config.method)
 
-    sequence = recover_points(seen, posed, landmarks.valid, pinhole, track.fps, config)
+    sequence = recover_points(seen, posed, landmarks.valid, view.pinhole, track.fps, config)
     notes = (*track.notes, *sequence.notes, *_swaps(landmarks))
     return replace(
         sequence, person=track.person, notes=notes, camera=camera_facts(sequence.camera, track)

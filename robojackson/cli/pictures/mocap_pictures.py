@@ -11,8 +11,9 @@ PICTURE, VIDEO = "mocap.png", "mocap.mp4"
 
 def draw_mocap(
     video: Path, out: Path, config: str, overrides: Mapping[str, object], film: bool
-) -> dict[str, str]:
-    """Draw the results of `stages.mocap`: over the source, from the front, from the side.
+) -> dict[str, object]:
+    """Draw what `stages.mocap` wrote into a folder: over the source, from the front, from the side;
+    and return how far the body lies off the source.
 
     Args:
         film: Whether to render a video, too.
@@ -21,13 +22,14 @@ def draw_mocap(
     from robojackson.motion.landmark_track import LandmarkTrack
     from robojackson.motion.smpl_sequence import SmplSequence
     from robojackson.pipeline.pipeline_config import PipelineConfig
+    from robojackson.report.video.reprojection import reprojection_record
     from robojackson.report.video.side_by_side import body_video
     from robojackson.report.video.still_picture import body_sheet
 
     track = LandmarkTrack.load(out / "landmarks.parquet")
     sequence = SmplSequence.load(out / "smpl.parquet")
     FileTree(out).write(PICTURE, body_sheet(video, track, sequence))
-    drawn = {"picture": str(out / PICTURE)}
+    drawn = {"picture": str(out / PICTURE), **reprojection_record(sequence, track)}
     if film:
         settings = load(PipelineConfig, config, overrides)
         with bar(VIDEO) as progress:

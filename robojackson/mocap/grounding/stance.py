@@ -87,9 +87,9 @@ def ground_body(body: Body, fps: float, config: GroundingConfig) -> Stance:
     planted = pinned = evidence.states(body) == PLANTED
     share = np.zeros((len(falling), 2))
     for _ in range(config.foot_pinning.rounds):
-        body, share, planted = _pinned(body, planted, evidence, flying)
+        body, share, near = _pinned(body, planted, evidence, flying)
         states = evidence.states(body)
-        pinned, planted = planted, planted | (states == PLANTED)
+        pinned, planted = planted & near, planted | (states == PLANTED)
         airborne = (states == AIR).all(1)
         flying = jumps | air.flight(body.feet[..., 2].min(1), height, airborne, fps)
     body = evidence.dropped(body, flying)
@@ -120,8 +120,8 @@ def _carried(states: np.ndarray, body: Body, fps: float) -> Int[np.ndarray, "T 4
 def _pinned(
     body: Body, planted: np.ndarray, evidence: _Evidence, flying: np.ndarray
 ) -> tuple[Body, Float[np.ndarray, "T 2"], np.ndarray]:
-    """Run one round: level planted feet, move the root, tip toes, bend legs; also return the level
-    share and the points that stay planted."""
+    """One round: standing feet level, the root moved, toes tipped, legs bent; share of level, and
+    the points that their pins reach."""
     fps, pinning = evidence.fps, evidence.config.foot_pinning
     ramp = pinning.ramp_s * fps
     flat = feet.stands_flat(body.feet, planted)
@@ -133,9 +133,8 @@ def _pinned(
     tips = foot_pinning.tip_angles(body.pose.points, body.feet, planted, fps, ramp)
     body = body.aimed(feet.turn_feet(body.pose.points, tips), share)
     pins = foot_pinning.pin_offsets(body.feet, planted, pinning.fade_s * fps)
-    planted = foot_pinning.within_reach(planted, pins, pinning.reach_m)
-    pins = foot_pinning.pin_offsets(body.feet, planted, pinning.fade_s * fps)
     shared = foot_pinning.shared_height(pins, planted)
     settled = lowpass(shared, fps, evidence.config.floor_cutoff_hz)
-    body, pins = body.shifted(settled), pins - settled[:, None]
-    return body.aimed(leg_ik.move_feet(body.pose.points, pins), share), share, planted
+    body = body.shifted(settled)
+    pins, near = foot_pinning.within_reach(pins - settled[:, None], pinning.reach_m)
+    return body.aimed(leg_ik.move_feet(body.pose.points, pins), share), share, near

@@ -18,6 +18,7 @@ from robojackson.body.skeleton import keypoint
 from robojackson.config import config_dataclass
 from robojackson.mocap.landmarks.banded_matrix import add_acceleration, to_bands
 from robojackson.mocap.landmarks.blazepose import BODY, LANDMARK_NAMES, landmark
+from robojackson.mocap.landmarks.leash import leashed
 
 SHAPE = (len(BODY), 3)
 SIZE = SHAPE[0] * SHAPE[1]
@@ -36,7 +37,7 @@ ORDER = [LANDMARK_NAMES[index] for index in BODY]
 HIPS = [ORDER.index("left_hip"), ORDER.index("right_hip")]
 LEAST_VISIBILITY = 0.1
 SUDDEN = 1.5
-"""Acceleration, in spreads, above which its cost grows less than quadratically."""
+"""Spreads of acceleration from which on it counts less than squared."""
 
 
 @config_dataclass
@@ -49,8 +50,8 @@ class RefineConfig:
         depth_m: Spread of the detector's depth relative to the hips, metres.
         bone_m: Spread of a bone's length in one frame, metres.
         acceleration_mps2: Spread of a joint's acceleration, m/s^2.
-        leash_m: Largest move of a landmark from where it was, relative to the hips, metres:
-            what needs more is a frame in which the terms contradict each other.
+        leash_m: A landmark moves no further than this from where it was, seen from the hips: what
+            needs more is a frame in which the terms contradict each other; metres.
         rounds: Gauss-Newton steps.
     """
 
@@ -59,7 +60,7 @@ class RefineConfig:
     depth_m: float = 0.07
     bone_m: float = 0.03
     acceleration_mps2: float = 20.0
-    leash_m: float = 0.2
+    leash_m: float = 0.12
     rounds: int = 12
 
 
@@ -100,19 +101,7 @@ def refine(
     evidence = gather(placed, visibility, rest_joints, fps, config, depth_m)
     for _ in range(config.rounds):
         body = body + _step(body, evidence, config)
-    return carry_along(placed, leashed(placed[:, BODY], body, config.leash_m))
-
-
-def leashed(
-    start: Float[np.ndarray, "T 12 3"], body: Float[np.ndarray, "T 12 3"], leash: float
-) -> Float[np.ndarray, "T 12 3"]:
-    """Return the body, each landmark at most `leash` from its start relative to the hips."""
-    move = body - start
-    common = move[:, HIPS].mean(1, keepdims=True)
-    apart = np.linalg.norm(move - common, axis=-1, keepdims=True)
-    share = np.minimum(1.0, leash / np.maximum(apart, leash))
-    result: np.ndarray = start + common + share * (move - common)
-    return result
+    return carry_along(placed, leashed(placed[:, BODY], body, fps, config.leash_m))
 
 
 def gather(

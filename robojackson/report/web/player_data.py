@@ -15,6 +15,7 @@ from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import AIR, SmplSequence
 from robojackson.report.video.panel_camera import smooth_camera_path
+from robojackson.report.video.reprojection import weak_frames
 from robojackson.report.video.timeline import Timeline, reference_qpos, timeline
 from robojackson.report.web.shapes import body_poses, packed, person_shape, robot_shape
 from robojackson.robot.model import Robot
@@ -114,7 +115,7 @@ def player(
         data["error"] = packed(1000 * apart.mean(1))
         data["ended"] = int(np.argmax(when.ended)) if when.ended.any() else len(when)
     bands = _contact_bands(sequence, reference, when)
-    bands.append(Band("look here", attention(sequence, reference, when, errors)))
+    bands.append(Band("look here", attention(sequence, reference, when, errors, track)))
     return Player(data, [band for band in bands if band.spans], when, errors, moved)
 
 
@@ -168,11 +169,14 @@ def attention(
     reference: ReferenceMotion,
     when: Timeline,
     errors: dict[str, Float[np.ndarray, " N"]],
+    track: LandmarkTrack,
 ) -> list[Span]:
     """Return the bad stretches, by cause."""
     frames = np.minimum(when.frame, len(sequence) - 1)
     marks: dict[str, Bool[np.ndarray, " N"]] = {
         "body filled in": ~np.asarray(sequence.valid)[frames],
+        "body off the picture": weak_frames(sequence, track)[frames]
+        & np.asarray(sequence.valid)[frames],
         "body uncertain": np.asarray(sequence.confidence)[frames].mean(1) < FAINT,
     }
     if reference.certificate is not None:

@@ -1,0 +1,134 @@
+"""Laws of two cameras: they are synchronised and found by the dancer, and see depth together."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from robojackson.clips.sound import RATE, Sound
+from robojackson.errors import ViewsDisagree
+from robojackson.mocap.landmarks.blazepose import BODY, HIPS
+from robojackson.mocap.recover import MocapConfig, view_track
+from robojackson.mocap.views.relative_camera import calibrate, sampson, triangulate
+from robojackson.mocap.views.timing import FPS, find_offsets, rates, sound_offset
+from robojackson.mocap.views.two_cameras import recover_together
+from robojackson.motion.landmark_track import LandmarkTrack
+
+TURN = Rotation.from_euler("y", 70.0, degrees=True).as_matrix()
+FLAT = 0.4
+"""What both made cameras leave of depth."""
+
+
+@pytest.fixture(scope="module")
+def dancer(hip_shake: LandmarkTrack) -> np.ndarray:
+    """A body that swings its limbs more than the recorded one, camera frame, metres."""
+    points = view_track(hip_shake, MocapConfig()).points
+    time = np.arange(len(points)) / hip_shake.fps
+    away = points - points[:, HIPS].mean(1, keepdims=True)
+    lean = Rotation.from_euler(
+        "yx", np.stack([0.5 * np.sin(3.1 * time), 0.2 * np.sin(5 * time)], 1)
+    )
+    stretch = 1.0 + 0.2 * np.sin(4.3 * time + 1.0)[:, None, None]
+    turned = np.einsum("tij,tnj->tni", lean.as_matrix(), away * stretch)
+    result: np.ndarray = turned + points[:, HIPS].mean(1, keepdims=True)
+    return result
+
+
+def second_frame(points: np.ndarray) -> np.ndarray:
+    """The points before a camera that stands 70 degrees aside."""
+    middle = points.mean((0, 1))
+    result: np.ndarray = (points - middle) @ TURN.T + middle
+    return result
+
+
+def filmed(points: np.ndarray, like: LandmarkTrack) -> LandmarkTrack:
+    """What a detector that flattens depth sees."""
+    focal = view_track(like, MocapConfig()).pinhole.focal_px
+    image = points[..., :2] / points[..., 2:] * focal / [like.width, like.height] + 0.5
+    local = (points - points[:, HIPS].mean(1, keepdims=True)) * [1.0, 1.0, FLAT]
+    count = len(points)
+    return replace(
+        like,
+        landmarks=np.concatenate([image, np.zeros((count, 33, 1))], -1),
+        world_landmarks=local,
+        visibility=np.ones((count, 33)),
+        time_s=None,
+    )
+
+
+def off(joints: np.ndarray, truth: np.ndarray) -> float:
+    from robojackson.metrics.pose_error import pa_mpjpe
+
+    return pa_mpjpe(joints, truth)
+
+
+@pytest.mark.medium
+def test_the_offset_of_the_same_motion_is_found_from_another_side(
+    dancer: np.ndarray, hip_shake: LandmarkTrack
+) -> None:
+    times = np.arange(len(dancer)) / hip_shake.fps
+    one, two = rates(dancer, times), rates(second_frame(dancer)[20:], times[:-20])
+    assert find_offsets(one, two)[0].seconds == pytest.approx(20 / hip_shake.fps, abs=0.5 / FPS)
+
+
+def test_the_offset_of_the_same_sound_is_found() -> None:
+    rng = np.random.default_rng(0)
+    noise = (
+        rng.normal(size=(6 * RATE, 2)) * np.repeat(rng.uniform(0.0, 0.2, 60), RATE // 10)[:, None]
+    )
+    late = round(1.3 * RATE)
+    found = sound_offset(Sound(noise), Sound(0.3 * noise[late:]))
+    assert found == pytest.approx(1.3, abs=0.01)
+
+
+def test_sounds_of_different_places_tell_no_offset() -> None:
+    rng = np.random.default_rng(1)
+    one, two = (Sound(0.1 * rng.normal(size=(3 * RATE, 2))) for _ in range(2))
+    assert sound_offset(one, two) is None
+
+
+def test_points_are_where_their_rays_meet() -> None:
+    rng = np.random.default_rng(2)
+    points = rng.normal(size=(40, 12, 3)) * 0.5 + [0.0, 0.0, 4.0]
+    other = second_frame(points)
+    camera = calibrate(points, other, np.ones((40, 12)), 30.0)
+    rays = tuple(
+        p[..., :2] / p[..., 2:] / f for p, f in zip((points, other), camera.focal, strict=True)
+    )
+    assert np.abs(sampson(camera, rays[0], rays[1])).max() < 1e-3
+    assert np.linalg.norm(triangulate(camera, (rays[0], rays[1])) - points, axis=-1).max() < 0.05
+
+
+@pytest.mark.medium
+def test_two_flat_views_make_a_deep_one(dancer: np.ndarray, hip_shake: LandmarkTrack) -> None:
+    from robojackson.mocap.views import two_cameras
+
+    plain = replace(MocapConfig(), temporal=replace(MocapConfig().temporal, enabled=False))
+    first, second = filmed(dancer, hip_shake), filmed(second_frame(dancer)[15:], hip_shake)
+    seen = {}
+
+    def keep(view, config):  # type: ignore[no-untyped-def]
+        seen["points"] = view.points
+        return finish(view, config)
+
+    finish, two_cameras.finish_motion = two_cameras.finish_motion, keep
+    try:
+        motion = recover_together(first, second, plain)
+    finally:
+        two_cameras.finish_motion = finish
+    alone = view_track(first, plain).points
+    errors = [off(points[15:, BODY], dancer[15:, BODY]) for points in (alone, seen["points"])]
+    assert errors[1] < 0.35 * errors[0]
+    assert "two cameras" in motion.notes[-1]
+    assert len(motion) == len(first)
+
+
+@pytest.mark.medium
+def test_clips_of_different_motions_are_refused(
+    dancer: np.ndarray, hip_shake: LandmarkTrack
+) -> None:
+    rng = np.random.default_rng(3)
+    other = second_frame(dancer)[rng.permutation(len(dancer))]
+    with pytest.raises(ViewsDisagree, match="same dance"):
+        recover_together(filmed(dancer, hip_shake), filmed(other, hip_shake), MocapConfig())

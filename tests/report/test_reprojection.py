@@ -1,0 +1,79 @@
+"""Laws of the overlay: a body on its landmarks is off by nothing, one beside them by as much."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from robojackson.body.skeleton import REST_JOINTS, keypoint
+from robojackson.mocap.landmarks.blazepose import BODY, LANDMARK_NAMES, MIRROR
+from robojackson.motion.landmark_track import LandmarkTrack
+from robojackson.motion.smpl_sequence import SmplSequence
+from robojackson.report.video.reprojection import (
+    reprojection_error,
+    reprojection_record,
+    weak_frames,
+)
+
+FRAMES, FOCAL, WIDTH, HEIGHT = 12, 900.0, 640, 480
+CAMERA = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+PLACE = np.array([4.0, 0.0, 1.0])
+
+
+@pytest.fixture
+def clip() -> tuple[SmplSequence, LandmarkTrack]:
+    points = np.repeat((REST_JOINTS[:, [2, 0, 1]] + [0.0, 0.0, 0.9])[None], FRAMES, axis=0)
+    sequence = SmplSequence(
+        fps=30.0,
+        global_orient=np.zeros((FRAMES, 3)),
+        body_pose=np.zeros((FRAMES, 69)),
+        transl=np.zeros((FRAMES, 3)),
+        joints=points[:, :24],
+        keypoints_w=points,
+        confidence=np.ones((FRAMES, 29)),
+        contact=np.zeros((FRAMES, 4), np.int8),
+        valid=np.ones(FRAMES, bool),
+        betas=np.zeros(10),
+        rest_joints=REST_JOINTS,
+        camera={
+            "focal_px": FOCAL, "width": WIDTH, "height": HEIGHT,
+            "rotation_w": CAMERA.tolist(), "position_w": PLACE.tolist(),
+        },
+    )  # fmt: skip
+    seen = (points - PLACE) @ CAMERA
+    pixels = seen[..., :2] / seen[..., 2:] * FOCAL + [WIDTH / 2, HEIGHT / 2]
+    landmarks = np.full((FRAMES, 33, 3), 0.5)
+    names = [LANDMARK_NAMES[index] for index in BODY]
+    landmarks[:, BODY, :2] = pixels[:, [keypoint(name) for name in names]] / [WIDTH, HEIGHT]
+    track = LandmarkTrack(
+        30.0, WIDTH, HEIGHT, landmarks, np.zeros((FRAMES, 33, 3)), np.ones((FRAMES, 33))
+    )
+    return sequence, track
+
+
+def test_a_body_on_its_landmarks_has_no_error(clip: tuple[SmplSequence, LandmarkTrack]) -> None:
+    error = reprojection_error(*clip)
+    assert error is not None
+    assert np.allclose(error, 0.0, atol=1e-9)
+
+
+def test_exchanged_sides_are_no_error(clip: tuple[SmplSequence, LandmarkTrack]) -> None:
+    error = reprojection_error(clip[0], replace(clip[1], landmarks=clip[1].landmarks[:, MIRROR]))
+    assert error is not None
+    assert np.allclose(error, 0.0, atol=1e-9)
+
+
+def test_a_body_beside_its_landmarks_is_off_by_as_much(
+    clip: tuple[SmplSequence, LandmarkTrack],
+) -> None:
+    sequence, track = clip
+    moved = np.array(track.landmarks)
+    moved[4:7, :, 0] += 0.3 * FOCAL / 4.0 / WIDTH
+    track = replace(track, landmarks=moved)
+    error = reprojection_error(sequence, track)
+    assert error is not None
+    assert np.allclose(error[4:7], 0.3, atol=0.02)
+    assert np.flatnonzero(weak_frames(sequence, track)).tolist() == [4, 5, 6]
+    found = reprojection_record(sequence, track)["reprojection"]
+    assert isinstance(found, dict)
+    assert found["weak_s"] == [[pytest.approx(4 / 30), pytest.approx(7 / 30)]]
