@@ -192,9 +192,10 @@ def perform(
         progress(min(int(stage.step.max()), total), total)
     sim.close()
     fell |= up  # one that never comes to rest again
-    columns = [np.stack(column) for column in zip(*record, strict=True)]
+    step, waits, own_qpos, points, roots = (np.stack(one) for one in zip(*record, strict=True))
     given_up = tuple(map(tuple, stage.given_up))
-    return Performance(programme, length, fell, *columns, stage.carried, given_up)
+    figures = (step, waits, own_qpos, points, roots, stage.carried, given_up)
+    return Performance(programme, length, fell, *figures)
 
 
 class _Stage:
