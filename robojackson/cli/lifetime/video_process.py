@@ -15,11 +15,11 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar, cast
 
 from robojackson.cli.lifetime.parent_death import watch_parent
 from robojackson.errors import RoboJacksonError, UnreadableVideo
@@ -61,7 +61,7 @@ def probed(path: Path, limits: "VideoLimits") -> "VideoInfo":
 def in_video_process(
     function: Callable[..., R],
     path: Path,
-    *args: Any,
+    *args: object,
     frames: int = 0,
     progress: Progress | None = None,
 ) -> R:
@@ -108,7 +108,7 @@ class _Reader:
     def call(
         self,
         function: Callable[..., R],
-        args: tuple[Any, ...],
+        args: tuple[object, ...],
         seconds: float,
         progress: Progress | None,
     ) -> R:
@@ -127,7 +127,7 @@ class _Reader:
                 if kind != REPORT:
                     break
                 if progress:
-                    progress(*value)
+                    progress(*cast(tuple[int, int], value))
             else:
                 raise UnreadableVideo(f"not read within {seconds:.0f} s; trim it", args[0])
         except BaseException:
@@ -135,9 +135,8 @@ class _Reader:
             raise
         self.is_idle = True
         if kind == ERROR:
-            raise value
-        result: R = value
-        return result
+            raise cast(BaseException, value)
+        return cast(R, value)
 
     def end(self) -> str:
         """Kill the process and return how it ended."""
@@ -147,9 +146,9 @@ class _Reader:
         code = self._process.wait()
         return signal.Signals(-code).name if code < 0 else f"exit code {code}"
 
-    def _answer(self) -> tuple[str, Any]:
+    def _answer(self) -> tuple[str, object]:
         try:
-            found: tuple[str, Any] = self._connection.recv()
+            found: tuple[str, object] = self._connection.recv()
         except OSError as cause:
             raise EOFError from cause
         return found
@@ -189,8 +188,8 @@ def _serve(parent: int, connection: Connection) -> None:
 
 
 def _outcome(
-    function: Callable[..., Any], args: tuple[Any, ...], more: dict[str, Any]
-) -> tuple[str, Any]:
+    function: Callable[..., object], args: tuple[object, ...], more: Mapping[str, Progress]
+) -> tuple[str, object]:
     try:
         return RESULT, function(*args, **more)
     except RoboJacksonError as error:
