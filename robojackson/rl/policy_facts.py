@@ -19,8 +19,15 @@ T = TypeVar("T")
 
 
 def mode_of(policy: Policy) -> str:
-    """`track` or `paper`."""
-    return str(policy.facts.get("mode", "track"))
+    """`track` or `paper`.
+
+    Raises:
+        BadPolicy: the file names another.
+    """
+    mode = str(policy.facts.get("mode", "track"))
+    if mode not in ("track", "paper"):
+        raise BadPolicy(f"the policy's file says mode {mode[:40]!r}; known: paper, track")
+    return mode
 
 
 def policy_control(policy: Policy, robot: Robot) -> ControlConfig:
