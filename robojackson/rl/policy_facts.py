@@ -103,11 +103,22 @@ def fact(policy: Policy, name: str, kind: type[T]) -> T:
 
 
 def observation_of(policy: Policy) -> Kind:
-    """Which inputs a policy of mode `track` takes."""
-    held = policy.facts.get("environment")
-    said = held.get("observation", "full") if isinstance(held, Mapping) else "full"
+    """Which inputs a policy of mode `track` takes.
+
+    Raises:
+        BadPolicy: the file names others, or what it says of its environment is no object.
+    """
+    held = policy.facts.get("environment", {})
+    if not isinstance(held, Mapping):
+        kind = type(held).__name__
+        raise BadPolicy(f"the policy's file says environment is a {kind}, no object")
     kinds: dict[object, Kind] = {kind: kind for kind in get_args(Kind)}
-    return kinds.get(said, "full")
+    said = str(held.get("observation", "full"))
+    if said not in kinds:
+        raise BadPolicy(
+            f"the policy's file says observation {said[:40]!r}; known: {', '.join(get_args(Kind))}"
+        )
+    return kinds[said]
 
 
 def observation_sizes(policy: Policy, robot: Robot) -> tuple[int, ...]:
