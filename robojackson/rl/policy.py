@@ -150,6 +150,8 @@ def _layers(
         )
     except KeyError as error:
         raise BadPolicy(f"{path} lacks tensor {error}") from error
+    if len(tensors) > 2 * count:
+        raise BadPolicy(f"{path} has a tensor that belongs to no layer: {_extra(tensors, count)!r}")
     if any(weight.ndim != 2 for weight, _ in layers):
         raise BadPolicy(f"{path} has a layer whose weight is not a matrix")
     if any(array.dtype.kind != "f" for layer in layers for array in layer):
@@ -161,3 +163,9 @@ def _layers(
     if not layers or not fits or any(w.shape[1:] != b.shape for w, b in layers):
         raise BadPolicy(f"{path} has layers that do not fit each other")
     return layers
+
+
+def _extra(tensors: Mapping[str, np.ndarray], count: int) -> str:
+    """Return a name that is none of a layer's."""
+    known = {f"layer{i}.{part}" for i in range(count) for part in ("weight", "bias")}
+    return min(set(tensors) - known)

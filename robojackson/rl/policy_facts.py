@@ -19,8 +19,15 @@ T = TypeVar("T")
 
 
 def mode_of(policy: Policy) -> str:
-    """Return `track` or `paper`."""
-    return str(policy.facts.get("mode", "track"))
+    """Return `track` or `paper`.
+
+    Raises:
+        BadPolicy: The file has another mode.
+    """
+    mode = str(policy.facts.get("mode", "track"))
+    if mode not in ("track", "paper"):
+        raise BadPolicy(f"the policy's file has mode {mode[:40]!r}; known: paper, track")
+    return mode
 
 
 def policy_control(policy: Policy, robot: Robot) -> ControlConfig:
@@ -96,11 +103,22 @@ def fact(policy: Policy, name: str, kind: type[T]) -> T:
 
 
 def observation_of(policy: Policy) -> Kind:
-    """Return the kind of inputs of a policy of mode `track`."""
-    held = policy.facts.get("environment")
-    observed = held.get("observation", "full") if isinstance(held, Mapping) else "full"
+    """Return the kind of inputs of a policy of mode `track`.
+
+    Raises:
+        BadPolicy: The file has another kind, or its environment is not an object.
+    """
+    held = policy.facts.get("environment", {})
+    if not isinstance(held, Mapping):
+        kind = type(held).__name__
+        raise BadPolicy(f"the policy's file has an environment that is a {kind}, not an object")
     kinds: dict[object, Kind] = {kind: kind for kind in get_args(Kind)}
-    return kinds.get(observed, "full")
+    said = str(held.get("observation", "full"))
+    if said not in kinds:
+        raise BadPolicy(
+            f"the policy's file has observation {said[:40]!r}; known: {', '.join(get_args(Kind))}"
+        )
+    return kinds[said]
 
 
 def observation_sizes(policy: Policy, robot: Robot) -> tuple[int, ...]:

@@ -19,7 +19,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar, cast
 
 from robojackson.cli.lifetime.parent_death import watch_parent
 from robojackson.errors import RoboJacksonError, UnreadableVideo
@@ -130,7 +130,7 @@ class _Reader:
                 if kind != REPORT:
                     break
                 if progress:
-                    progress(*value)
+                    progress(*cast(tuple[int, int], value))
             else:
                 raise UnreadableVideo(f"not read within {seconds:.0f} s; trim it", args[0])
         except BaseException:
@@ -138,9 +138,8 @@ class _Reader:
             raise
         self.is_idle = True
         if kind == ERROR:
-            raise value
-        result: R = value
-        return result
+            raise cast(BaseException, value)
+        return cast(R, value)
 
     def end(self) -> str:
         """Kill the process and return how it ended."""
