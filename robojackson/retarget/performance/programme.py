@@ -1,4 +1,4 @@
-"""Plan a performance: stand, dance, next dance, stand, as one motion with a certificate.
+"""The programme of a performance: stand, dance, next dance, stand; one motion, certified.
 
 Every dance begins where the one before has left the robot, facing as it does. Metres, seconds.
 """

@@ -40,7 +40,8 @@ class PerformanceConfig:
         pushes: Pushes every 1 to 3 s, multiples of mjlab's, unitless; those of the passport are 1.
         carried_m, turned_rad: From the programme, beyond which a robot follows it from where it is
             on.
-        lost_rad: Tilt away from the programme's, from which a robot gives the part up and stands.
+        lost_rad: Tilt away from the programme's, from which a robot gives a way up and stands.
+        lost_dancing_rad: The same of a dance.
         calm_rad: Tilt away from the stand, below which for `calm_s` it goes on with the next part.
         threads: Threads that step the simulations.
     """
@@ -50,7 +51,8 @@ class PerformanceConfig:
     pushes: float = Field(default=1.0, ge=0, le=10)
     carried_m: float = Field(default=0.3, gt=0)
     turned_rad: float = Field(default=0.5, gt=0)
-    lost_rad: float = Field(default=0.4, gt=0)
+    lost_rad: float = Field(default=0.3, gt=0)
+    lost_dancing_rad: float = Field(default=0.45, gt=0)
     calm_rad: float = Field(default=0.15, gt=0)
     calm_s: float = Field(default=1.0, gt=0)
     threads: int = Field(default=2, ge=1)
@@ -121,6 +123,7 @@ class Performance:
                 errors.append(self._error(i, rows))
         return {
             "part": part.name,
+            "is_dance": part.is_dance,
             "seconds": (part.end - part.start) * self.programme.motion.dt,
             "infeasible_share": part.infeasible_share,
             "began": began,
@@ -211,6 +214,9 @@ class _Stage:
     def __init__(self, n: int, config: PerformanceConfig, programme: Programme) -> None:
         self._config, self._parts = config, programme.parts
         self._starts = np.array([part.start for part in programme.parts])
+        self._lost = np.full(len(programme.motion), config.lost_rad)
+        for first, past in (part.danced for part in programme.parts):
+            self._lost[first:past] = config.lost_dancing_rad
         self._last = len(programme.motion) - 1
         self._calm, self._needed = np.zeros(n, int), round(config.calm_s / programme.motion.dt)
         self.step, self.waits = np.zeros(n, int), np.zeros(n, bool)
@@ -250,7 +256,7 @@ class _Stage:
         tilt = np.arccos(np.clip(along, -1.0, 1.0))
         self._calm = np.where(self.waits & (tilt < self._config.calm_rad), self._calm + 1, 0)
         self.waits = self.waits & (self._calm < self._needed)
-        for i in np.flatnonzero(up & ~self.waits & (tilt > self._config.lost_rad)):
+        for i in np.flatnonzero(up & ~self.waits & (tilt > self._lost[self.step])):
             part = next(part for part in self._parts if self.step[i] < part.end)
             self.waits[i], self.step[i] = True, part.end - 1
             self.given_up[i].append(part.name)
