@@ -40,8 +40,9 @@ class PerformanceConfig:
         pushes: Pushes every 1 to 3 s, multiples of mjlab's, unitless; those of the passport are 1.
         carried_m, turned_rad: From the programme, beyond which a robot follows it from where it is
             on.
-        lost_rad: Tilt away from the programme's, from which a robot gives a way up and stands.
-        lost_dancing_rad: The same of a dance.
+        lost_rad: Tilt away from the programme's, from which a robot gives a way, or the end of a
+            dance, up and stands.
+        lost_dancing_rad: The same of a dance and what leads into it.
         calm_rad: Tilt away from the stand, below which for `calm_s` it goes on with the next part.
         threads: Threads that step the simulations.
     """
@@ -215,8 +216,8 @@ class _Stage:
         self._config, self._parts = config, programme.parts
         self._starts = np.array([part.start for part in programme.parts])
         self._lost = np.full(len(programme.motion), config.lost_rad)
-        for first, past in (part.danced for part in programme.parts):
-            self._lost[first:past] = config.lost_dancing_rad
+        for part in (part for part in programme.parts if part.is_dance):
+            self._lost[part.start : part.danced[1]] = config.lost_dancing_rad
         self._last = len(programme.motion) - 1
         self._calm, self._needed = np.zeros(n, int), round(config.calm_s / programme.motion.dt)
         self.step, self.waits = np.zeros(n, int), np.zeros(n, bool)
