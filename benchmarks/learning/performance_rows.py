@@ -1,4 +1,4 @@
-"""Performances: stand, hip_shake, dance_b, walk, stand, pushed, 40 runs of every tracker that is here.
+"""Performances: stand, hip_shake, dance_b, walk, stand, pushed, 40 runs of every tracker here.
 
     python -m benchmarks.learning.performance_rows [--runs 40] [--trackers NAME ...]
 

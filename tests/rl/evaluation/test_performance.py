@@ -89,11 +89,11 @@ def test_a_robot_that_leans_gives_the_part_up_and_goes_on_when_it_is_calm() -> N
     stage.watch(qpos_of(0.4), upright, np.ones(1, bool))
     assert not stage.waits[0], "a dance may lean"
     stage.watch(qpos_of(0.6), upright, np.ones(1, bool))
-    assert stage.waits[0] and stage.step[0] == 39
+    assert (bool(stage.waits[0]), int(stage.step[0])) == (True, 39)
     assert stage.given_up == [["dance"]]
     stage.advance()
     stage.watch(qpos_of(0.6), upright, np.ones(1, bool))
-    assert stage.waits[0] and stage.step[0] == 39
+    assert (bool(stage.waits[0]), int(stage.step[0])) == (True, 39)
     for _ in range(2):
         stage.advance()
         stage.watch(upright, upright, np.ones(1, bool))
