@@ -57,7 +57,7 @@ def perform(
         try:
             render_video(
                 out / FILM, done.followed, rollout=done.rollout, robot=robot, config=video,
-                progress=True,
+                title=f"tracker {done.summary['tracker']}", progress=True,
             )  # fmt: skip
             shown = FILM
         except MissingDependency as cause:
