@@ -4,7 +4,6 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -24,7 +23,7 @@ from robojackson.pipeline.tracker_descriptions import require_tracker
 from robojackson.retarget.performance.programme import Programme, ProgrammeConfig, plan
 from robojackson.retarget.retarget_config import RetargetConfig
 from robojackson.rl.evaluation import performance
-from robojackson.rl.evaluation.performance import PerformanceConfig
+from robojackson.rl.evaluation.performance import PartRow, PerformanceConfig, RunRow, Summary
 from robojackson.rl.trackers.tracker import Tracker
 from robojackson.robot.model import Robot
 
@@ -46,9 +45,9 @@ class Performance:
     """
 
     programme: Programme
-    summary: dict[str, Any]
-    parts: list[dict[str, Any]]
-    runs: list[dict[str, Any]]
+    summary: Summary
+    parts: list[PartRow]
+    runs: list[RunRow]
     rollout: Rollout
     followed: ReferenceMotion = field(repr=False)
 
@@ -113,15 +112,17 @@ def perform(
     with counter(progress, "performance") as count:
         done = performance.perform(who, planned, machine, how, count or (lambda step, total: None))
     runs = done.runs(how.seed)
-    summary = {
-        "robot": machine.description.name,
-        "tracker": who.description.name,
-        "pushes": how.pushes,
-        "runs": len(runs),
-        "finished": sum(bool(row["finished"]) for row in runs),
-        "uninterrupted": sum(bool(row["finished"]) and not row["given_up"] for row in runs),
-        **{name: float(np.mean([row[name] for row in runs])) for name in MEANS},
-    }
+    summary = Summary(
+        robot=machine.description.name,
+        tracker=who.description.name,
+        pushes=how.pushes,
+        runs=len(runs),
+        finished=sum(row["finished"] for row in runs),
+        uninterrupted=sum(row["finished"] and not row["given_up"] for row in runs),
+        survived_s=float(np.mean([row["survived_s"] for row in runs])),
+        danced_share=float(np.mean([row["danced_share"] for row in runs])),
+        mpjpe_l_m=float(np.mean([row["mpjpe_l_m"] for row in runs])),
+    )
     length, motion = max(1, int(done.length[0])), planned.motion
     shown = done.step[:length, 0]
     followed = replace(
@@ -132,7 +133,6 @@ def perform(
     return Performance(planned, summary, done.parts(), runs, rollout, followed)
 
 
-MEANS = ("survived_s", "danced_share", "mpjpe_l_m")
 BESIDE = ("qvel", "body_pos_w", "keypoints_w", "contact", "torque_ratio", "source_time_s")
 """What a motion holds a row a step, beside its poses."""
 

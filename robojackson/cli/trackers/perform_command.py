@@ -52,5 +52,5 @@ def perform(
         PerformanceConfig(runs=runs, seed=seed, pushes=pushes), ProgrammeConfig(dance_s=seconds),
         config, overrides_from(set_, {}), film,
     )  # fmt: skip
-    card = [*performance_files.table(answer), *cards.closing(answer)]
-    return CommandResult(answer, text=cards.shown(answer, card, verbose))
+    text = cards.shown(answer, performance_files.card(answer), verbose)
+    return CommandResult(answer, text=text)

@@ -1,13 +1,13 @@
 """The page of a performance: its film, its parts and its runs."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from robojackson.files.file_tree import FileTree
 from robojackson.report.pages import inline
 from robojackson.report.pages.evaluation_text import Verdict
 from robojackson.report.quantities import Quantity, format_value
+from robojackson.rl.evaluation.performance import PartRow, RunRow, Summary
 
 PART_COLUMNS = ("part", "length", "runs that began", "danced whole", "infeasible", "error")
 RUN_COLUMNS = ("seed", "up for", "given up", "danced", "carried off", "away", "error")
@@ -16,9 +16,9 @@ RUN_COLUMNS = ("seed", "up for", "given up", "danced", "carried off", "away", "e
 def performance_page(
     out: Path,
     title: str,
-    summary: Mapping[str, Any],
-    parts: Sequence[Mapping[str, Any]],
-    runs: Sequence[Mapping[str, Any]],
+    summary: Summary,
+    parts: Sequence[PartRow],
+    runs: Sequence[RunRow],
     film: str | None,
 ) -> None:
     """Write the page as one file.
@@ -50,13 +50,13 @@ def _head(names: Sequence[str]) -> list[Quantity]:
     return [Quantity("", ""), *(Quantity(name, "") for name in names[1:])]
 
 
-def _part(number: int, row: Mapping[str, Any]) -> Verdict:
+def _part(number: int, row: PartRow) -> Verdict:
     shares = (f"{row['began']}", f"{row['whole']}", f"{100 * row['infeasible_share']:.0f} %")
     values = (f"{row['seconds']:.1f} s", *shares, _millimetres(row["mpjpe_l_m"]))
-    return Verdict(f"{number} {row['part']}", "", values, bool(row["is_dance"]))
+    return Verdict(f"{number} {row['part']}", "", values, row["is_dance"])
 
 
-def _run(row: Mapping[str, Any]) -> Verdict:
+def _run(row: RunRow) -> Verdict:
     fell = f"fell in {row['fell_in']}" if row["fell_in"] else "stood at the end"
     values = (
         format_value("survived_s", row["survived_s"]),
@@ -66,7 +66,7 @@ def _run(row: Mapping[str, Any]) -> Verdict:
         f"{row['away_m']:.1f} m",
         _millimetres(row["mpjpe_l_m"]),
     )
-    return Verdict(f"{row['seed']}", fell, values, bool(row["finished"]))
+    return Verdict(f"{row['seed']}", fell, values, row["finished"])
 
 
 def _millimetres(value: float | None) -> str:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from pydantic import Field
+from typing_extensions import TypedDict
 
 from robojackson.config import config_dataclass
 from robojackson.geometry.rotations import heading, wrapped
@@ -59,6 +60,46 @@ class PerformanceConfig:
     threads: int = Field(default=2, ge=1)
 
 
+class RunRow(TypedDict):
+    """What became of a run; metres, seconds."""
+
+    seed: int
+    finished: bool
+    survived_s: float
+    fell_in: str
+    given_up: str
+    danced_share: float
+    carried: int
+    mpjpe_l_m: float
+    away_m: float
+
+
+class PartRow(TypedDict):
+    """How many runs did a part, and how near they were; metres, seconds."""
+
+    part: str
+    is_dance: bool
+    seconds: float
+    infeasible_share: float
+    began: int
+    whole: int
+    mpjpe_l_m: float | None
+
+
+class Summary(TypedDict):
+    """Counts and means over all runs; metres, seconds."""
+
+    robot: str
+    tracker: str
+    pushes: float
+    runs: int
+    finished: int
+    uninterrupted: int
+    survived_s: float
+    danced_share: float
+    mpjpe_l_m: float
+
+
 @dataclass(frozen=True)
 class Performance:
     """What N robots did with a programme, T control steps long.
@@ -87,11 +128,11 @@ class Performance:
     carried: Int[np.ndarray, " N"]
     given_up: tuple[tuple[str, ...], ...]
 
-    def runs(self, seed: int) -> list[dict[str, object]]:
+    def runs(self, seed: int) -> list[RunRow]:
         """Return a row a run, the first with this seed."""
         return [self._run(i, seed + i) for i in range(len(self.length))]
 
-    def _run(self, i: int, seed: int) -> dict[str, object]:
+    def _run(self, i: int, seed: int) -> RunRow:
         parts, length = self.programme.parts, max(1, int(self.length[i]))
         dances = [part for part in parts if part.is_dance]
         danced = sum(int(self._shown(i, part).sum()) for part in dances)
@@ -100,7 +141,7 @@ class Performance:
         where = next(part.name for part in parts if last < part.end)
         return {
             "seed": seed,
-            "finished": not self.fell[i],
+            "finished": not bool(self.fell[i]),
             "survived_s": length * self.programme.motion.dt,
             "fell_in": where if self.fell[i] else "",
             "given_up": " ".join(self.given_up[i]),
@@ -110,11 +151,11 @@ class Performance:
             "away_m": float(np.linalg.norm(self.qpos[length - 1, i, :2] - self.qpos[0, i, :2])),
         }
 
-    def parts(self) -> list[dict[str, object]]:
+    def parts(self) -> list[PartRow]:
         """Return a row a part: how many did it to its end, and how near they were."""
         return [self._part(part) for part in self.programme.parts]
 
-    def _part(self, part: Part) -> dict[str, object]:
+    def _part(self, part: Part) -> PartRow:
         began, whole, errors = 0, 0, []
         for i in range(len(self.length)):
             rows = self._within(i, part)
