@@ -11,6 +11,7 @@
 #   make bench-retarget  our solver beside the paper's mapping and mink (pip install -e '.[bench]')
 #   make bench-learning  speed beside sb3-contrib and bare MuJoCo, policies evaluated (hours; resumable)
 #   make bench-pages  how fast pages and live dances are in chromium (ARGS="PAGE...")
+#   make bench-league  the G1's dancers beside each other, and performances (ARGS="--holosoma FOLDER")
 #   make bench-orchestration  what Prefect costs around the work (PostgreSQL and a server are started)
 #   make badinput  every case of the corpus of bad inputs through the real command, and a table
 #   make chaos    20 studies whose processes, services, disk and wires are cut at random moments
@@ -31,7 +32,7 @@ WORKERS ?= auto
 PYTEST := $(PY) -m pytest -q -n $(WORKERS) --dist loadgroup
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: badinput dance test test-fast test-stack test-browser coverage bench bench-learning bench-mocap bench-retarget chaos bench-orchestration bench-pages deploy lint doctor docs wheel clean setup
+.PHONY: badinput dance test test-fast test-stack test-browser coverage bench bench-league bench-learning bench-mocap bench-retarget chaos bench-orchestration bench-pages deploy lint doctor docs wheel clean setup
 .DEFAULT_GOAL := dance
 
 setup:
@@ -70,6 +71,11 @@ bench-learning: setup
 
 bench-pages: setup
 	@$(PY) -m benchmarks.report.page_speed $(ARGS)
+
+bench-league: setup
+	@$(PY) -m benchmarks.learning.tracker_rows
+	@$(PY) -m benchmarks.learning.performance_rows
+	@$(PY) -m benchmarks.learning.league $(ARGS)
 
 bench-orchestration: setup
 	@$(PY) -m benchmarks.orchestration.orchestration_suite $(ARGS)

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from robojackson.api.motions import recover_motion as recover_motion
     from robojackson.api.motions import retarget_motion as retarget_motion
     from robojackson.api.motions import write_motion as write_motion
+    from robojackson.api.performances import Performance as Performance
+    from robojackson.api.performances import perform as perform
     from robojackson.api.policy_training import train_policy as train_policy
     from robojackson.api.robots import load_robot as load_robot
     from robojackson.api.trackers import load_tracker as load_tracker
@@ -45,6 +47,7 @@ _MODULES = {
     "api.evaluation": ("PolicyEvaluation", "evaluate_policy", "render_video"),
     "api.motions": ("read_motion", "recover_motion", "retarget_motion", "write_motion"),
     "api.robots": ("load_robot",),
+    "api.performances": ("Performance", "perform"),
     "api.policy_training": ("train_policy",),
     "api.trackers": ("load_tracker",),
     "api.trained_policy": ("TrainedPolicy",),

@@ -32,7 +32,7 @@ from robojackson.motion.rollout import Rollout
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.pipeline.run_names import motion_name, run_labels
 from robojackson.pipeline.table_schemas import EVALUATION_RECORD
-from robojackson.report.video.side_by_side import VideoConfig, side_by_side
+from robojackson.report.video.side_by_side import TRAINED_TITLE, VideoConfig, side_by_side
 from robojackson.rl.config.evaluate_config import EvaluateConfig
 from robojackson.rl.evaluation import policy_evaluation
 from robojackson.rl.policy import Policy, load_policy
@@ -147,6 +147,7 @@ def render_video(
     robot: RobotLike | None = None,
     config: VideoConfig | None = None,
     plain: bool = False,
+    title: str = TRAINED_TITLE,
     progress: Progress = False,
 ) -> VideoInfo:
     """Write an mp4 of the reference robot beside the other given motions, at the same moment.
@@ -161,6 +162,7 @@ def render_video(
         robot: The one that the motion was made for; None finds it by name.
         config: Size, rate, length and camera.
         plain: Show the source without marks, too, and `motion` over it instead of the landmarks.
+        title: Over the panel of the rollout.
         progress: True shows a bar; a function is called with (pictures done, pictures in all).
 
     Returns:
@@ -185,5 +187,6 @@ def render_video(
         side_by_side(
             source, track, person, target, qpos, path,
             model=machine.model, config=config, progress=count, plain=plain,
+            title=title,
         )  # fmt: skip
     return video_files.probe(path, video_files.VideoLimits(max_duration_s=None, min_frames=1))

@@ -1,6 +1,9 @@
 """Inputs of a policy, as far as the files beside it show, for the licence passport."""
 
 import hashlib
+import json
+import re
+from contextlib import suppress
 from pathlib import Path
 
 from robojackson.formats.deploy.licence_passport import UNKNOWN, Ingredient, robot_ingredient
@@ -8,7 +11,11 @@ from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.rl.policy import Policy
 from robojackson.robot.model import Robot
 
-LANDMARKS, PERSON = "landmarks.parquet", "smpl.parquet"
+LANDMARKS, PERSON, SOURCE = "landmarks.parquet", "smpl.parquet", "source.json"
+SPDX = re.compile(r"^\W*SPDX-License-Identifier:\s*([\w.+ ()-]{1,60})", re.MULTILINE)
+"""The line of a REUSE sidecar that names the licence."""
+LONGEST = 60
+"""Characters of a licence's name."""
 NETWORK_NOTE = "pose by the network"
 """Beginning of the note of a motion that a user's networks recovered."""
 
@@ -23,9 +30,8 @@ def policy_ingredients(
         reference: The motion's file, beside or above which its landmarks lie if it is of a video.
     """
     digest = hashlib.sha256(reference.read_bytes()).hexdigest()
-    note = "no file records it: declare it with --licence clip=LICENCE"
     return [
-        Ingredient("clip", "the video or recording that is danced", UNKNOWN, note),
+        clip_ingredient(reference),
         *_body_models(reference),
         Ingredient("motion", "reference motion", "own", "made here, from the clip", digest),
         Ingredient("weights", "the policy", "own", "trained here", _sha256(path)),
@@ -34,6 +40,37 @@ def policy_ingredients(
         *_tracker(policy),
         Ingredient("software", "run.py and the texts of the pack", "Apache-2.0", "RoboJackson"),
     ]
+
+
+def clip_ingredient(reference: Path) -> Ingredient:
+    """Return the clip of a motion, with the licence that a file beside the clip states: REUSE's
+    `CLIP.license`, or the `.info.json` of a download."""
+    name, note = "the video or recording that is danced", "declare it with --licence clip=LICENCE"
+    for folder in (reference.parent, reference.parent.parent):
+        with suppress(OSError, ValueError, KeyError, TypeError):
+            clip = Path(json.loads((folder / SOURCE).read_text())["video"])
+            licence, where = stated_licence(clip)
+            if licence:
+                return Ingredient("clip", clip.name, licence, f"stated by {where}")
+            return Ingredient("clip", clip.name, UNKNOWN, f"not stated beside it: {note}")
+    return Ingredient("clip", name, UNKNOWN, f"not stated: {note}")
+
+
+def stated_licence(clip: Path) -> tuple[str, str]:
+    """Return the licence that a sidecar of a clip states and the sidecar's name; empty texts where
+    none does."""
+    beside = clip.with_name(clip.name + ".license")
+    with suppress(OSError, UnicodeDecodeError):
+        found = SPDX.search(beside.read_text("utf-8"))
+        if found:
+            return found[1].strip(), beside.name
+    info = clip.with_suffix(".info.json")
+    with suppress(OSError, ValueError):
+        told = json.loads(info.read_text("utf-8"))
+        licence = told.get("license") if isinstance(told, dict) else None
+        if isinstance(licence, str) and licence.strip():
+            return " ".join(licence.split())[:LONGEST], info.name
+    return "", ""
 
 
 def _body_models(reference: Path) -> list[Ingredient]:

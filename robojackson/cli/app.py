@@ -38,6 +38,7 @@ from robojackson.cli.options import (
 )
 from robojackson.cli.pictures.view_command import view
 from robojackson.cli.robot_commands import robots
+from robojackson.cli.trackers.perform_command import perform
 from robojackson.cli.trackers.tracker_commands import trackers
 
 
@@ -188,6 +189,7 @@ STAGES: dict[str, Callable[..., None]] = {
     "train": train,
     "pretrain": pretrain,
     "evaluate": evaluate,
+    "perform": perform,
     "view": view,
     "doctor": doctor,
     "licences": licences,

@@ -4,7 +4,7 @@ Every dance begins where the one before has left the robot, facing as it does. M
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
@@ -61,10 +61,6 @@ class Part:
     def is_dance(self) -> bool:
         """Whether it shows a dance."""
         return self.danced[1] > self.danced[0]
-
-    def record(self, dt: float) -> dict[str, float | str]:
-        """Return it as figures, seconds."""
-        return {**asdict(self), "seconds": (self.end - self.start) * dt}
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from pydantic import Field
+from typing_extensions import TypedDict
 
 from robojackson.config import config_dataclass
 from robojackson.geometry.rotations import heading, wrapped
@@ -40,7 +41,9 @@ class PerformanceConfig:
         pushes: Pushes every 1 to 3 s, multiples of mjlab's, unitless; those of the passport are 1.
         carried_m, turned_rad: From the programme, beyond which a robot follows it from where it is
             on.
-        lost_rad: Tilt away from the programme's, from which a robot gives the part up and stands.
+        lost_rad: Tilt away from the programme's, from which a robot gives a way, or the end of a
+            dance, up and stands.
+        lost_dancing_rad: The same of a dance and what leads into it.
         calm_rad: Tilt away from the stand, below which for `calm_s` it goes on with the next part.
         threads: Threads that step the simulations.
     """
@@ -50,10 +53,51 @@ class PerformanceConfig:
     pushes: float = Field(default=1.0, ge=0, le=10)
     carried_m: float = Field(default=0.3, gt=0)
     turned_rad: float = Field(default=0.5, gt=0)
-    lost_rad: float = Field(default=0.4, gt=0)
+    lost_rad: float = Field(default=0.3, gt=0)
+    lost_dancing_rad: float = Field(default=0.45, gt=0)
     calm_rad: float = Field(default=0.15, gt=0)
     calm_s: float = Field(default=1.0, gt=0)
     threads: int = Field(default=2, ge=1)
+
+
+class RunRow(TypedDict):
+    """What became of a run; metres, seconds."""
+
+    seed: int
+    finished: bool
+    survived_s: float
+    fell_in: str
+    given_up: str
+    danced_share: float
+    carried: int
+    mpjpe_l_m: float
+    away_m: float
+
+
+class PartRow(TypedDict):
+    """How many runs did a part, and how near they were; metres, seconds."""
+
+    part: str
+    is_dance: bool
+    seconds: float
+    infeasible_share: float
+    began: int
+    whole: int
+    mpjpe_l_m: float | None
+
+
+class Summary(TypedDict):
+    """Counts and means over all runs; metres, seconds."""
+
+    robot: str
+    tracker: str
+    pushes: float
+    runs: int
+    finished: int
+    uninterrupted: int
+    survived_s: float
+    danced_share: float
+    mpjpe_l_m: float
 
 
 @dataclass(frozen=True)
@@ -84,11 +128,11 @@ class Performance:
     carried: Int[np.ndarray, " N"]
     given_up: tuple[tuple[str, ...], ...]
 
-    def runs(self, seed: int) -> list[dict[str, object]]:
+    def runs(self, seed: int) -> list[RunRow]:
         """Return a row a run, the first with this seed."""
         return [self._run(i, seed + i) for i in range(len(self.length))]
 
-    def _run(self, i: int, seed: int) -> dict[str, object]:
+    def _run(self, i: int, seed: int) -> RunRow:
         parts, length = self.programme.parts, max(1, int(self.length[i]))
         dances = [part for part in parts if part.is_dance]
         danced = sum(int(self._shown(i, part).sum()) for part in dances)
@@ -97,7 +141,7 @@ class Performance:
         where = next(part.name for part in parts if last < part.end)
         return {
             "seed": seed,
-            "finished": not self.fell[i],
+            "finished": not bool(self.fell[i]),
             "survived_s": length * self.programme.motion.dt,
             "fell_in": where if self.fell[i] else "",
             "given_up": " ".join(self.given_up[i]),
@@ -107,11 +151,11 @@ class Performance:
             "away_m": float(np.linalg.norm(self.qpos[length - 1, i, :2] - self.qpos[0, i, :2])),
         }
 
-    def parts(self) -> list[dict[str, object]]:
+    def parts(self) -> list[PartRow]:
         """Return a row a part: how many did it to its end, and how near they were."""
         return [self._part(part) for part in self.programme.parts]
 
-    def _part(self, part: Part) -> dict[str, object]:
+    def _part(self, part: Part) -> PartRow:
         began, whole, errors = 0, 0, []
         for i in range(len(self.length)):
             rows = self._within(i, part)
@@ -121,6 +165,7 @@ class Performance:
                 errors.append(self._error(i, rows))
         return {
             "part": part.name,
+            "is_dance": part.is_dance,
             "seconds": (part.end - part.start) * self.programme.motion.dt,
             "infeasible_share": part.infeasible_share,
             "began": began,
@@ -212,6 +257,9 @@ class _Stage:
     def __init__(self, n: int, config: PerformanceConfig, programme: Programme) -> None:
         self._config, self._parts = config, programme.parts
         self._starts = np.array([part.start for part in programme.parts])
+        self._lost = np.full(len(programme.motion), config.lost_rad)
+        for part in (part for part in programme.parts if part.is_dance):
+            self._lost[part.start : part.danced[1]] = config.lost_dancing_rad
         self._last = len(programme.motion) - 1
         self._calm, self._needed = np.zeros(n, int), round(config.calm_s / programme.motion.dt)
         self.step, self.waits = np.zeros(n, int), np.zeros(n, bool)
@@ -251,7 +299,7 @@ class _Stage:
         tilt = np.arccos(np.clip(along, -1.0, 1.0))
         self._calm = np.where(self.waits & (tilt < self._config.calm_rad), self._calm + 1, 0)
         self.waits = self.waits & (self._calm < self._needed)
-        for i in np.flatnonzero(up & ~self.waits & (tilt > self._config.lost_rad)):
+        for i in np.flatnonzero(up & ~self.waits & (tilt > self._lost[self.step])):
             part = next(part for part in self._parts if self.step[i] < part.end)
             self.waits[i], self.step[i] = True, part.end - 1
             self.given_up[i].append(part.name)

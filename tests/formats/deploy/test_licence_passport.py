@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from robojackson.api.policy_ingredients import policy_ingredients
+from robojackson.api.policy_ingredients import clip_ingredient, policy_ingredients
 from robojackson.errors import BadConfiguration
 from robojackson.formats.deploy.licence_passport import (
     KINDS,
@@ -110,3 +110,27 @@ def test_networks_of_a_users_own_that_recovered_the_motion_are_unknown(
     note = "pose by the network HybrIK (theirs.pth)"
     replace(person, notes=(note,)).save(tmp_path / "smpl.parquet")
     assert ingredients(pack, tmp_path)[note] == "unknown"
+
+
+@pytest.mark.parametrize(
+    ("sidecar", "text", "licence"),
+    [
+        ("dance.mp4.license", "# note\nSPDX-License-Identifier: CC-BY-4.0\n", "CC-BY-4.0"),
+        ("dance.mp4.license", "no such line", "unknown"),
+        ("dance.info.json", '{"license": "CC0-1.0"}', "CC0-1.0"),
+        ("dance.info.json", '{"license": null}', "unknown"),
+        ("dance.info.json", "[", "unknown"),
+    ],
+)
+def test_the_clips_licence_is_what_a_file_beside_it_states(
+    tmp_path: Path, sidecar: str, text: str, licence: str
+) -> None:
+    (tmp_path / "source.json").write_text(json.dumps({"video": str(tmp_path / "dance.mp4")}))
+    (tmp_path / sidecar).write_text(text)
+    found = clip_ingredient(tmp_path / "run" / "reference.parquet")
+    assert (found.name, found.licence) == ("dance.mp4", licence)
+    assert ("not stated" in found.note) == (licence == "unknown")
+
+
+def test_a_motion_without_a_video_has_a_clip_that_is_not_stated(tmp_path: Path) -> None:
+    assert "not stated" in clip_ingredient(tmp_path / "reference.parquet").note

@@ -102,3 +102,14 @@ def test_a_resumed_environment_goes_on_with_the_same_disturbances(
     for action in actions[60:]:
         seen, again = first.step(action).observation, second.step(action).observation
         np.testing.assert_array_equal(seen, again)
+
+
+def test_robots_with_seeds_of_their_own_are_pushed_as_each_would_be_alone(robot: Robot) -> None:
+    pushes = RandomConfig(pushes=1.0)
+    both = Simulation(robot, ControlConfig(), 2, random=pushes, seed=(3, 8))
+    waits = [
+        Simulation(robot, ControlConfig(), 1, random=pushes, seed=(seed,)).push_at[0]
+        for seed in (3, 8)
+    ]
+    np.testing.assert_array_equal(both.push_at, waits)
+    assert waits[0] != waits[1]

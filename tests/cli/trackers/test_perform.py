@@ -1,0 +1,57 @@
+"""`robojackson perform`: tables and a page of several dances, danced by a tracker."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robojackson.cli.trackers.tracker_files import add_tracker
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.rollout import Rollout
+from tests.fixtures.commands import robojackson
+from tests.fixtures.robots import robot_motion
+from tests.fixtures.stand_in_tracker import NAME, stand_in, write_yaml
+
+
+@pytest.fixture
+def dance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A motion of the humanoid named `<b>`, and the stand-in in the store."""
+    monkeypatch.setenv("ROBOJACKSON_STORE", str(tmp_path / "store"))
+    monkeypatch.setenv("ROBOJACKSON_CONFIGS", str(tmp_path / "configs"))
+    file, description = stand_in(tmp_path)
+    write_yaml(description, tmp_path / "configs")
+    add_tracker(NAME, file)
+    path = tmp_path / "<b>.parquet"
+    path.write_bytes(robot_motion("hip_shake").to_bytes())
+    return path
+
+
+@pytest.mark.slow
+def test_a_performance_leaves_its_tables_and_a_page(dance: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    said = robojackson(
+        *("perform", dance, "-o", out, "--robot", "humanoid", "--tracker", NAME, "--runs", 2),
+        *("--seconds", 1, "--no-film", "--json"),
+    )
+    assert said.code == 0, said.err
+    answer = json.loads(said.out)
+    assert (answer["tracker"], answer["runs"], answer["film"]) == (NAME, 2, None)
+    assert [row["seed"] for row in answer["rows"]] == [0, 1]
+    assert answer["finished"] == sum(row["finished"] for row in answer["rows"])
+    assert [row["part"] for row in answer["parts"]] == ["stand", "way", "<b>", "way", "stand"]
+    programme = ReferenceMotion.load(out / "programme.parquet")
+    rollout = Rollout.load(out / "rollout.parquet")
+    assert 0 < len(rollout.qpos) <= 2 * len(programme)
+    assert np.isfinite(rollout.qpos).all()
+    page = (out / "index.html").read_text()
+    assert "&lt;b&gt;" in page
+    assert "<b>.parquet" not in page
+
+
+@pytest.mark.slow
+def test_a_robot_that_nobody_knows_is_one_line(dance: Path, tmp_path: Path) -> None:
+    words = ("perform", dance, "-o", tmp_path / "out", "--robot", "nobody")
+    said = robojackson(*words, "--tracker", NAME)
+    assert said.code != 0
+    assert len(said.err.strip().splitlines()) == 1

@@ -1,0 +1,115 @@
+"""Robots that perform: a run depends on its own seed alone, a lost robot stands and goes on."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.retarget.performance.programme import Part, Programme
+from robojackson.rl.config.train_config import ControlConfig
+from robojackson.rl.evaluation.performance import PerformanceConfig, _Stage, perform
+from robojackson.rl.sim.motors import Motors
+from robojackson.rl.trackers.tracker import TrackerInput
+from robojackson.rl.trackers.tracker_description import TrackerDescription
+from robojackson.robot.model import Robot
+from tests.fixtures.robots import robot_motion
+
+STEPS = 60
+CONFIG = PerformanceConfig(threads=1, calm_s=0.03)
+
+
+class Replay:
+    """A tracker that gives the next step's angles."""
+
+    window: tuple[int, ...] = (1,)
+    control, sees_ahead = ControlConfig(feedforward=0.0, feedback=0.0), False
+    description = TrackerDescription(
+        name="replay", robot="humanoid", network="regulator", licence="ours",
+        trained_on="nothing", homepage="http://127.0.0.1:9/", control_dt=0.015,
+    )  # fmt: skip
+
+    def equip(self, robot: Robot) -> Robot:
+        return robot
+
+    def follow(self, robot: Robot, n: int) -> "Replay":
+        self._hinge = Motors.of(robot.model).hinge
+        return self
+
+    def targets(self, seen: TrackerInput) -> np.ndarray:
+        return seen.window[0].qpos[:, 7:][:, self._hinge]
+
+
+def programme() -> Programme:
+    """Three parts of the hip-shake's beginning, the middle one a dance."""
+    motion = robot_motion("hip_shake")
+    rows = {
+        name: np.asarray(getattr(motion, name))[:STEPS]
+        for name in ("qpos", "qvel", "body_pos_w", "keypoints_w", "contact", "torque_ratio",
+                     "source_time_s")
+    }  # fmt: skip
+    short: ReferenceMotion = replace(motion, cyclic=False, certificate=None, **rows)
+    bounds = ((0, 20, "stand"), (20, 40, "dance"), (40, STEPS, "stand"))
+    parts = tuple(
+        Part(name, a, b, (a, b) if name == "dance" else (a, a), 0.0) for a, b, name in bounds
+    )
+    return Programme(short, parts)
+
+
+def qpos_of(tilt: float) -> np.ndarray:
+    """One robot, turned about its left axis."""
+    return np.array([[0.0, 0.0, 1.2, np.cos(tilt / 2), 0.0, np.sin(tilt / 2), 0.0]])
+
+
+@pytest.mark.medium
+def test_a_run_is_that_of_its_seed_whoever_runs_beside_it(robot: Robot) -> None:
+    pushed = replace(CONFIG, runs=3, seed=5, pushes=4.0)
+    together = perform(Replay(), programme(), robot, pushed)
+    alone = perform(Replay(), programme(), robot, replace(pushed, runs=1, seed=7))
+    rows = int(alone.length[0])
+    assert together.length[2] == rows
+    np.testing.assert_array_equal(together.qpos[:rows, 2], alone.qpos[:rows, 0])
+
+
+@pytest.mark.medium
+def test_who_is_not_pushed_and_does_not_fall_finishes_and_has_danced_all(robot: Robot) -> None:
+    done = perform(Replay(), programme(), robot, replace(CONFIG, runs=1, pushes=0.0))
+    (row,) = done.runs(0)
+    assert (row["finished"], row["fell_in"], row["given_up"]) == (True, "", "")
+    assert row["danced_share"] == 1.0
+    assert [part["whole"] for part in done.parts()] == [1, 1, 1]
+    assert 0.0 < float(row["mpjpe_l_m"]) < 0.1  # type: ignore[arg-type]
+
+
+def test_a_robot_that_leans_gives_the_part_up_and_goes_on_when_it_is_calm() -> None:
+    stage = _Stage(1, CONFIG, programme())
+    upright = qpos_of(0.0)
+    for _ in range(25):
+        stage.advance()
+    stage.watch(qpos_of(0.4), upright, np.ones(1, bool))
+    assert not stage.waits[0], "a dance may lean"
+    stage.watch(qpos_of(0.6), upright, np.ones(1, bool))
+    assert (bool(stage.waits[0]), int(stage.step[0])) == (True, 39)
+    assert stage.given_up == [["dance"]]
+    stage.advance()
+    stage.watch(qpos_of(0.6), upright, np.ones(1, bool))
+    assert (bool(stage.waits[0]), int(stage.step[0])) == (True, 39)
+    for _ in range(2):
+        stage.advance()
+        stage.watch(upright, upright, np.ones(1, bool))
+    assert not stage.waits[0]
+    stage.advance()
+    assert stage.step[0] == 40
+
+
+def test_the_programme_is_put_under_a_robot_that_was_carried_off() -> None:
+    stage = _Stage(1, CONFIG, programme())
+    for _ in range(25):
+        stage.advance()
+    near, far, now = qpos_of(0.0), qpos_of(0.0), qpos_of(0.0)
+    near[0, 0], far[0, :2] = 0.1, (0.3, 0.4)
+    stage.place(near, now)
+    np.testing.assert_array_equal(stage.placed.shift, [[0.0, 0.0]])
+    stage.place(far, now)
+    np.testing.assert_allclose(stage.placed.qpos(now)[:, :2], far[:, :2])
+    assert stage.carried[0] == 1
