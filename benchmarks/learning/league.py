@@ -169,7 +169,7 @@ def judged(tracker: Tracker, owner: Any, kind: str) -> tuple[Row, Row]:
     replay = found.summary["baselines"]["zero_residual"]  # type: ignore[index]
     return tuple(  # type: ignore[return-value]
         {**{name: figures[name] for name in FIGURES}, "cpu_s": spent,
-         "feet_excess_m_s": sum(figures[name] for name in FEET) / 2}
+         "feet_excess_m_s": sum(float(figures[name]) for name in FEET) / 2}
         for figures in (found.summary, replay)
     )  # fmt: skip
 
