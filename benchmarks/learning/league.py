@@ -11,7 +11,7 @@ run here, on ten seconds of their own motion, where FOLDER holds the unpacked wh
 import argparse
 import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -167,11 +167,13 @@ def judged(tracker: Tracker, owner: Any, kind: str) -> tuple[Row, Row]:
     found = evaluate_policy(tracker, motion, robot, EVALUATION)
     spent = time.process_time() - began
     replay = found.summary["baselines"]["zero_residual"]  # type: ignore[index]
-    return tuple(  # type: ignore[return-value]
-        {**{name: figures[name] for name in FIGURES}, "cpu_s": spent,
-         "feet_excess_m_s": sum(float(figures[name]) for name in FEET) / 2}
-        for figures in (found.summary, replay)
-    )  # fmt: skip
+    return _row(found.summary, spent), _row(replay, spent)
+
+
+def _row(figures: Mapping[str, Any], spent: float) -> Row:
+    """Return the figures of the league, and the processor time that they took."""
+    feet = sum(float(figures[name]) for name in FEET) / 2
+    return {**{name: figures[name] for name in FIGURES}, "cpu_s": spent, "feet_excess_m_s": feet}
 
 
 def save(rows: list[Row], path: Path) -> None:
