@@ -46,7 +46,7 @@ class PageSpeed:
         interactive_s, interactive_cpu_s: Until it can be used, by the clock and by processor.
         pictures_a_second: While it plays, by the clock.
         picture_cpu_ms: Processor time of drawing all panes once.
-        load: Processes that wanted a core meanwhile, and cores: how far to trust the clock.
+        load: Runnable processes during the measurement, and cores: reliability of the clock.
     """
 
     file: str

@@ -91,8 +91,8 @@ def _reprojection_lines(answer: Answer) -> list[str]:
     if (found := answer.get("reprojection")) is None:
         return []
     weak = ", ".join(f"{start:.1f}-{end:.1f} s" for start, end in found["weak_s"])
-    told = f"overlay   {100 * found['median_m']:.0f} cm off the landmarks (median)"
-    return [told + (f"; weak: {weak}" if weak else "")]
+    line = f"overlay   {100 * found['median_m']:.0f} cm off the landmarks (median)"
+    return [line + (f"; weak: {weak}" if weak else "")]
 
 
 def advice_lines(answer: Answer) -> list[str]:

@@ -102,7 +102,7 @@ def slow(rng: np.random.Generator, shape: tuple[int, int, int], seconds: float) 
 
 
 def _reverse(depth: np.ndarray, rng: np.random.Generator) -> None:
-    """One limb bends towards the camera instead of away for a while, or the other way, in place."""
+    """Bend one limb towards the camera instead of away for a while, or vice versa, in place."""
     limb = LIMBS[rng.integers(len(LIMBS))]
     start = int(rng.integers(0, len(depth)))
     span = slice(start, start + int(FPS * rng.uniform(*REVERSED_S)))

@@ -32,7 +32,7 @@ class FootPinningConfig:
         ramp_s: Time of the transition from a planted to a moving foot, seconds.
         fade_s: Time over which the correction of a pinned foot fades when it leaves, seconds.
         reach_m: A pin moves a foot no further: one that needs more does not stand; metres.
-        rounds: How often contacts, path and pins are found anew.
+        rounds: Iterations of contacts, path and pins.
     """
 
     track: tuple[float, float] = (0.02, 0.20)

@@ -1,4 +1,4 @@
-"""A bound on what the refinement may do: no landmark goes far from where it was seen. Metres."""
+"""A bound on the refinement: the largest distance of a landmark from its detection. Metres."""
 
 import numpy as np
 from jaxtyping import Float
@@ -8,13 +8,13 @@ from robojackson.mocap.landmarks.blazepose import BODY, HIPS
 
 IN_BODY = [BODY.tolist().index(hip) for hip in HIPS]
 AROUND_S = 0.15
-"""Where a landmark was is the median of so long, seconds: an outlier may still be put right."""
+"""Window of the median of a detection, seconds: an outlier can still be corrected."""
 
 
 def leashed(
     start: Float[np.ndarray, "T 12 3"], body: Float[np.ndarray, "T 12 3"], fps: float, leash: float
 ) -> Float[np.ndarray, "T 12 3"]:
-    """Return the body, each landmark seen from the hips at most `leash` from where it was."""
+    """Return the body, each landmark relative to the hips at most `leash` from its detection."""
     window = max(round(AROUND_S * fps), 1) | 1
     move = _from_hips(body) - median_filter(_from_hips(start), (window, 1, 1))
     apart = np.linalg.norm(move, axis=-1, keepdims=True)

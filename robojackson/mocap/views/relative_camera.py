@@ -1,10 +1,10 @@
-"""The pose of a second camera, calibrated by the person that both see.
+"""The pose of a second camera, calibrated by the person that both cameras see.
 
-Each camera's own body, in metres, gives a first guess: the rotation and shift that lay one on the
-other. Then the images decide: the rays of a joint meet (Sampson's distance to the epipolar line)
-and bones keep their lengths, in eight unknowns of pose and focal lengths, and one of time. The
-distance between the cameras makes the person as large as the first camera alone sees him.
-x_2 = R x_1 + t; metres, seconds.
+The bodies of the two cameras, in metres, give the initial rotation and shift. Then the images
+refine them: the rays of a joint meet (Sampson's distance to the epipolar line) and bones keep their
+lengths, in eight unknowns of pose and focal lengths, and one of time. The distance between the
+cameras is scaled so that the person is as large as in the first camera alone. x_2 = R x_1 + t;
+metres, seconds.
 """
 
 from dataclasses import dataclass
@@ -25,15 +25,17 @@ RAY_SD = 0.006
 BONE_SD = 0.1
 """Error of a triangulated bone's length, share of its length."""
 REPEATED = 5.0
-"""Square root of how many joints and frames err alike."""
+"""Square root of the number of joints and frames with correlated errors."""
 
 
 @dataclass(frozen=True)
 class RelativeCamera:
-    """Attributes:
-    rotation, shift: x_2 = rotation @ x_1 + shift.
-    focal: Focal lengths over the guessed ones.
-    late_s: How much later than assumed the second clip shows a moment.
+    """The second camera relative to the first.
+
+    Attributes:
+        rotation, shift: x_2 = rotation @ x_1 + shift.
+        focal: Focal lengths over the guessed ones.
+        late_s: How much later than assumed the second clip shows a moment.
     """
 
     rotation: Float[np.ndarray, "3 3"]
@@ -56,7 +58,7 @@ def calibrate(
 
     Args:
         one, two: Body before each camera with its guessed focal length, metres.
-        trust: How well both see each joint, 0..1.
+        trust: Least visibility of each joint in both cameras, 0..1.
         fps: Frames a second.
     """
     rotation, shift = first_guess(one, two, trust)
@@ -114,9 +116,11 @@ def sampson(
 
 @dataclass(frozen=True)
 class DepthPrior:
-    """Attributes:
-    depths: Of each point before each camera, metres.
-    weight: One over their spreads, 1/m.
+    """Depths of single cameras.
+
+    Attributes:
+        depths: Of each point before each camera, metres.
+        weight: One over their spreads, 1/m.
     """
 
     depths: tuple[np.ndarray, np.ndarray]

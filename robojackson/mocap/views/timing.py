@@ -1,7 +1,8 @@
-"""When one clip began, in the time of another: by the sound, or by how the person moves.
+"""Start of one clip in the time of another, from the sound or from the person's motion.
 
-The distances between joints change alike for every camera: their rates of change, from each clip's
-own landmarks, are correlated at every offset. Of sounds the rises of loudness are. Seconds.
+The distances between joints change equally for every camera: their rates of change, from each
+clip's own landmarks, are correlated at every offset. Sounds are correlated by the rises of their
+loudness. Seconds.
 """
 
 from dataclasses import dataclass
@@ -20,9 +21,10 @@ SMOOTH_HZ = 4.0
 CANDIDATES = 4
 SOUND_FPS = 210.0
 CLEAR = 1.5
-"""How much more than at any other offset two sounds must agree, else the motion decides."""
+"""Factor by which two sounds must agree better than at any other offset; otherwise the motion is
+used."""
 SHORTEST_S = 1.0
-"""Least time that both clips must have in common."""
+"""Least overlap of both clips, seconds."""
 POINTS = [
     landmark(f"{side}_{name}")
     for name in ("wrist", "elbow", "shoulder", "hip", "knee", "ankle")
@@ -32,11 +34,11 @@ POINTS = [
 
 @dataclass(frozen=True)
 class Offset:
-    """When a second clip began.
+    """Start of a second clip.
 
     Attributes:
         seconds: Time of its first frame in the first clip.
-        correlation: Of both motions at that offset, -1..1.
+        correlation: Correlation of both motions at that offset, -1..1.
     """
 
     seconds: float
@@ -46,7 +48,8 @@ class Offset:
 def rates(
     local: Float[np.ndarray, "T 33 3"], times: Float[np.ndarray, " T"]
 ) -> Float[np.ndarray, "S P"]:
-    """Rates of change of the distances between joints on a grid of `FPS`, metres a second."""
+    """Return the rates of change of the distances between joints on a grid of `FPS`, metres a
+    second."""
     pairs = np.array(list(combinations(POINTS, 2)))
     apart = np.linalg.norm(local[:, pairs[:, 0]] - local[:, pairs[:, 1]], axis=-1)
     grid = np.arange(times[0], times[-1], 1.0 / FPS)
@@ -55,8 +58,8 @@ def rates(
 
 
 def find_offsets(first: Float[np.ndarray, "S P"], second: Float[np.ndarray, "R P"]) -> list[Offset]:
-    """Return the offsets at which two courses of `rates` agree best, the best first, to a part of
-    a frame."""
+    """Return the offsets of best agreement of two courses of `rates`, the best first, to sub-frame
+    accuracy."""
     least = min(round(SHORTEST_S * FPS), len(first), len(second))
     shifts = np.arange(least - len(second), len(first) - least + 1)
     found = np.array([_agreement(first, second, int(shift)) for shift in shifts])
@@ -80,7 +83,8 @@ def sound_offset(first: Sound, second: Sound) -> float | None:
 
 
 def _rises(sound: Sound) -> Float[np.ndarray, " S"]:
-    """Increase of the logarithm of the loudness, `SOUND_FPS` values a second, mean zero."""
+    """Return the increase of the logarithm of the loudness, `SOUND_FPS` values a second, mean
+    zero."""
     hop = RATE // int(SOUND_FPS)
     count = len(sound.samples) // hop
     power = (sound.samples[: count * hop].mean(1) ** 2).reshape(count, hop).mean(1)
@@ -89,7 +93,8 @@ def _rises(sound: Sound) -> Float[np.ndarray, " S"]:
 
 
 def _part(values: np.ndarray, peak: int) -> float:
-    """Where between frames the parabola through a peak and its neighbours is highest."""
+    """Return the sub-frame position of the vertex of the parabola through a peak and its
+    neighbours."""
     if not 0 < peak < len(values) - 1:
         return 0.0
     before, here, after = values[peak - 1 : peak + 2]
@@ -97,7 +102,7 @@ def _part(values: np.ndarray, peak: int) -> float:
 
 
 def _agreement(first: np.ndarray, second: np.ndarray, shift: int) -> float:
-    """Correlation of the frames that both have if the second begins at frame `shift`."""
+    """Return the correlation of the common frames if the second clip begins at frame `shift`."""
     start, end = max(shift, 0), min(len(first), len(second) + shift)
     one, two = first[start:end], second[start - shift : end - shift]
     size = np.sqrt((one**2).sum() * (two**2).sum())

@@ -1,5 +1,5 @@
-"""The motion that two cameras see: their clips synchronised, the cameras calibrated, the landmarks
-triangulated. Where one of them sees nothing, the other goes on alone.
+"""The motion of two cameras: synchronise the clips, calibrate the cameras, triangulate the
+landmarks. Where one of them has no person, the other one is used alone.
 
 Neither camera may move. The result is in the frames of the first clip. Metres, seconds.
 """
@@ -26,10 +26,10 @@ from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.smpl_sequence import SmplSequence
 
 LARGEST_MISS_M = 0.017
-"""Of rays to the same joint, median: more, and the clips show something else. Eight pairs of real
-clips that belong together miss by 7 to 16 mm, eight that do not by 18 to 113."""
+"""Largest median distance between rays to the same joint: above it the clips differ. Eight pairs of
+real clips of the same dance miss by 7 to 16 mm, eight pairs of different ones by 18 to 113."""
 LEAST_FRAMES = 10
-"""That both cameras see the person in."""
+"""Least number of frames in which both cameras see the person."""
 SEEN_BY_BOTH = 0.3
 """Least visibility in both images of a joint that counts as triangulated."""
 DEPTH_SD_M, TRIANGULATED_SD_M = 0.1, 0.03
@@ -43,7 +43,7 @@ class _Pair:
     """The same moments before both cameras.
 
     Attributes:
-        points: Landmarks before each camera, metres.
+        visibility: Visibility, 0..1, zero where a camera has no frame.
         visibility: 0..1, zero where a camera has no frame.
     """
 
@@ -52,13 +52,13 @@ class _Pair:
 
     @property
     def rays(self) -> tuple[np.ndarray, np.ndarray]:
-        """Image points at depth one."""
+        """Return the image points at depth one."""
         one, two = (p[..., :2] / p[..., 2:] for p in self.points)
         return one, two
 
     @property
     def both(self) -> np.ndarray:
-        """How well the worse camera sees each landmark."""
+        """Return the visibility of each landmark in the worse camera."""
         return np.asarray(np.minimum(*self.visibility))
 
 
@@ -69,10 +69,10 @@ def recover_together(
 
     Args:
         first, second: The same person in both clips.
-        config: How landmarks become a motion.
-        heard_s: When the second clip began in the first, by the sound; None goes by the motion.
+        config: Settings of the recovery.
+        heard_s: Start of the second clip in the first, from the sound; None uses the motion.
     Raises:
-        TrackTooShort, NoPersonFound: nothing to recover.
+        TrackTooShort, NoPersonFound: no motion can be recovered.
         ViewsDisagree: the clips do not show the same motion, or a camera moved.
     """
     if first.to_first is not None or second.to_first is not None:
@@ -103,7 +103,7 @@ def recover_together(
 
 @dataclass(frozen=True)
 class _Calibrated:
-    """A camera, the moments it was fitted to, and by how much the rays miss, median, metres."""
+    """A camera, the moments it was fitted to, and the median distance of the rays, metres."""
 
     camera: RelativeCamera
     pair: _Pair
@@ -157,8 +157,8 @@ def _together(one: View, two: View, began: float) -> _Pair:
 
 
 def _fused(camera: RelativeCamera, pair: _Pair) -> Float[np.ndarray, "T 33 3"]:
-    """Landmarks in the first camera's frame: where the rays meet, and the cameras' own depths
-    relative to the hips."""
+    """Return landmarks in the first camera's frame: where the rays meet, with the cameras' own
+    depths relative to the hips."""
     one, two = (ray / f for ray, f in zip(pair.rays, camera.focal, strict=True))
     sure = tuple(np.clip(v, FAINTEST, 1.0) * (v > 0.0) for v in pair.visibility)
     alone = np.concatenate([one, np.ones((*one.shape[:-1], 1))], -1)

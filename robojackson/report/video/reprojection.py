@@ -1,4 +1,4 @@
-"""How far the recovered body lies off the picture: at the person's distance, metres."""
+"""Distance of the recovered body from the picture: at the person's distance, metres."""
 
 import numpy as np
 from jaxtyping import Float
@@ -11,7 +11,7 @@ from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.report.video.source_panel import skeleton_in_image
 
 OFF_M = 0.15
-"""Mean distance from which on a frame counts as badly recovered: the width of a head."""
+"""Mean distance above which a frame counts as badly recovered: the width of a head."""
 SEEN = 0.5
 KEYPOINTS = [keypoint(LANDMARK_NAMES[index]) for index in BODY]
 
@@ -21,8 +21,8 @@ def reprojection_error(
 ) -> Float[np.ndarray, " T"] | None:
     """Return the mean distance of the twelve joints from the landmarks in each frame of a motion.
 
-    Only landmarks that are seen count; NaN where none is. Sides count as the detector has them or
-    exchanged, whichever is nearer. None where the camera is not known.
+    Only visible landmarks count; NaN where there is none. Sides count as detected or exchanged,
+    whichever is nearer. None where the camera is unknown.
     """
     drawn = skeleton_in_image(sequence, track)
     if drawn is None:
@@ -44,7 +44,7 @@ def reprojection_error(
 
 
 def weak_frames(sequence: SmplSequence, track: LandmarkTrack) -> np.ndarray:
-    """Return the frames that nobody was seen in, or whose body lies off the picture."""
+    """Return the frames without a detected person, or whose body is far off the picture."""
     error = reprojection_error(sequence, track)
     off = np.zeros(len(sequence), bool) if error is None else np.nan_to_num(error) > OFF_M
     return np.asarray(off | ~np.asarray(sequence.valid, bool))

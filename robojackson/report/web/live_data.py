@@ -100,7 +100,7 @@ def live_data(
 
 
 def runs_in_a_browser(policy: Evaluated) -> bool:
-    """Whether its network is a plain one of ours, or it has none."""
+    """Return whether a policy's network is one of ours without extras, or it has none."""
     if isinstance(policy, Policy):
         return mode_of(policy) == "track"
     return isinstance(policy, PolicyTracker | RegulatorTracker)

@@ -1,9 +1,8 @@
 """A performance: many robots dance one programme from its first stand to its last, and are pushed.
 
-The programme is planned once (`retarget.performance`); where on the floor a robot follows it is the
-robot's own matter. Every part begins where the robot is and faces, and where a push carries it off,
-the rest of the part goes on from there. A robot that is about to fall stops dancing, stands, and
-goes on with the next part. Trackers see everything in the frame of the programme.
+The programme is planned once (`retarget.performance`). Every part begins at the robot's place and
+heading, and after a push the rest of the part continues from there. A robot that is about to fall
+stands, and continues with the next part. Trackers see everything in the frame of the programme.
 """
 
 from collections.abc import Callable
@@ -28,16 +27,16 @@ from robojackson.robot.fall import Fall, up_axis
 from robojackson.robot.model import Robot
 
 LONGEST = 2.0
-"""Of the programme's length, after which a robot that keeps giving parts up has failed."""
+"""Multiple of the programme's length after which a robot that keeps giving up parts has failed."""
 
 
 @config_dataclass
 class PerformanceConfig:
-    """How a performance is run.
+    """Settings of a performance.
 
     Attributes:
-        runs: Runs; they differ in when and how the robot is pushed.
-        seed: Of the first run; those after it have the seeds after it.
+        runs: Number of runs; they differ in the times and directions of pushes.
+        seed: Seed of the first run; the others have the following ones.
         pushes: Pushes every 1 to 3 s, multiples of mjlab's, unitless; those of the passport are 1.
         carried_m, turned_rad: From the programme, beyond which a robot follows it from where it is
             on.
@@ -102,18 +101,18 @@ class Summary(TypedDict):
 
 @dataclass(frozen=True)
 class Performance:
-    """What N robots did with a programme, T control steps long.
+    """Records of N robots in a programme, T control steps long.
 
     Attributes:
-        programme: What they were to do.
-        length: Steps that each was up, at most T.
+        programme: The programme.
+        length: Number of steps that each was up, at most T.
         fell: Whether each fell.
-        step: Step of the programme that each was to be at after every step.
-        waits: Whether each had given its part up and stood.
+        step: Step of the programme of each after every step.
+        waits: Whether each had given up its part and stood.
         qpos: Their states, world; after the end of a run they repeat.
         points, target: Keypoints and those of the programme, in its frame, m.
-        roots, target_roots: Places of the roots likewise, m.
-        carried: How often each went on from another place within a part.
+        roots, target_roots: Positions of the roots and their targets, m.
+        carried: Number of times that each continued from another place within a part.
         given_up: Names of the parts that each gave up.
     """
 
@@ -208,8 +207,7 @@ def perform(
     """
     robot, motion, n = tracker.equip(robot), programme.motion, config.runs
     clip = driven_clip(robot, motion, tracker.control, tracker.sees_ahead)
-    seeds = range(config.seed, config.seed + n)
-    pushes = RandomConfig(pushes=config.pushes)
+    seeds, pushes = range(config.seed, config.seed + n), RandomConfig(pushes=config.pushes)
     sim = Simulation(robot, tracker.control, n, config.threads, pushes, seeds)
     require_same_clock(sim.dt, motion.dt)
     starts = np.repeat(np.asarray(motion.qpos[:1], float), n, 0)
@@ -244,13 +242,13 @@ def perform(
 
 
 class _Stage:
-    """Where in the programme each robot is, and where on the floor it follows it.
+    """Step of the programme of each robot, and its place on the floor.
 
     Attributes:
-        step: Of the programme, where each is to be now.
-        waits: Whether each has given its part up and stands until it is calm.
-        placed: From the programme's frame into the world.
-        carried: How often each was carried off within a part.
+        step: Current step of the programme of each.
+        waits: Whether each has given up its part and stands until it is calm.
+        placed: Transforms from the programme's frame into the world.
+        carried: Number of times that each was carried off within a part.
         given_up: Parts that each gave up.
     """
 
@@ -271,15 +269,12 @@ class _Stage:
         return np.where(self.waits, self.step, np.minimum(self.step + k, self._last))
 
     def advance(self) -> None:
-        """One control step is over."""
+        """Advance by one control step."""
         self.step = self.ahead(1)
 
     def place(self, qpos: Float[np.ndarray, "N nq"], now: Float[np.ndarray, "N nq"]) -> None:
-        """Put the programme under the robots that begin a part or were carried off.
-
-        Args:
-            now: The programme's states at their steps.
-        """
+        """Put the programme, whose states are `now`, under robots that start a part or were carried
+        off."""
         there, config = self.placed.qpos(now), self._config
         apart = np.linalg.norm(qpos[:, :2] - there[:, :2], axis=-1)
         turned = np.abs(wrapped(heading(qpos[:, 3:7]) - heading(there[:, 3:7])))
@@ -294,7 +289,7 @@ class _Stage:
     def watch(
         self, qpos: Float[np.ndarray, "N nq"], now: Float[np.ndarray, "N nq"], up: np.ndarray
     ) -> None:
-        """Give a part up where a robot is about to fall; go on where one has come to rest."""
+        """Give up a part where a robot is about to fall; continue where one is at rest."""
         along = np.sum(up_axis(qpos[:, 3:7]) * up_axis(now[:, 3:7]), -1)
         tilt = np.arccos(np.clip(along, -1.0, 1.0))
         self._calm = np.where(self.waits & (tilt < self._config.calm_rad), self._calm + 1, 0)

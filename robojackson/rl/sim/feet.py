@@ -1,4 +1,4 @@
-"""Where a robot's feet stand, for laws that follow a motion from wherever they do."""
+"""Positions of a robot's supporting feet, for control laws that follow a motion from there."""
 
 import mujoco
 import numpy as np
@@ -7,7 +7,7 @@ from jaxtyping import Float
 from robojackson.robot.model import Robot
 
 LOW_M = 0.02
-"""A foot counts less by a factor of e for so much that it is above the lowest one, metres."""
+"""Height above the lowest foot that reduces a foot's weight by a factor of e, metres."""
 
 
 class Feet:
@@ -34,7 +34,8 @@ class Feet:
     def apart(
         self, qpos: Float[np.ndarray, "N nq"], places: Float[np.ndarray, "*N F 3"]
     ) -> Float[np.ndarray, "N 2"]:
-        """Return how far from given places the feet are that stand, in the plane of the floor."""
+        """Return the distance of the supporting feet from given places, in the plane of the
+        floor."""
         feet = self.places(qpos)
         low = np.exp(-(feet[..., 2] - feet[..., 2].min(-1, keepdims=True)) / LOW_M)
         off = (feet - places)[..., :2]

@@ -1,4 +1,4 @@
-"""A path that a regulator keeps a robot on, and the system along it. Metres, radians, seconds."""
+"""A path for a regulator, and the system along it. Metres, radians, seconds."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 Progress = Callable[[str, int, int], None]
-"""Called with what is computed, the steps that are done, and all."""
+"""Called with the name of the computation, finished steps, and all."""
 
 
 @dataclass(frozen=True)
@@ -15,11 +15,11 @@ class Gains:
     """A regulator: targets = those of the reference - gain @ (state - nominal) - offset.
 
     Attributes:
-        gain: Of every step of the reference.
-        offset: Of the targets, rad.
+        gain: Gain at every step of the reference.
+        offset: Offset of the targets, rad.
         qpos, qvel: Nominal state.
-        places: Feet of the nominal state: it is moved along the floor to where the robot's own feet
-            stand. NaN where the nominal state stays in the world.
+        places: Feet of the nominal state, which is moved along the floor to the robot's own feet.
+            NaN where the nominal state stays in the world.
     """
 
     gain: Float[np.ndarray, "S nu X"]
@@ -47,7 +47,7 @@ class Linear:
 
     Attributes:
         by_state, by_target: Derivatives of the next state.
-        defect: By how much the next state misses the path's, mean over the disturbances.
+        defect: Difference of the next state from the path's, mean over the disturbances.
     """
 
     by_state: Float[np.ndarray, "T X X"]
@@ -57,7 +57,7 @@ class Linear:
 
 @dataclass(frozen=True)
 class Recursion:
-    """What the Riccati recursion finds: the feedback and the cost of the rest of the motion.
+    """Result of the Riccati recursion: the feedback and the cost of the rest of the motion.
 
     The cost of a state that is x off the path is x @ value @ x + 2 slope @ x and a constant.
     """
@@ -69,4 +69,4 @@ class Recursion:
 
 
 def no_progress(name: str, step: int, total: int) -> None:
-    """Show nothing."""
+    """Do nothing."""

@@ -1,13 +1,13 @@
-"""A path beside a reference motion that the physics follows, found by sampling.
+"""Search by sampling for a physically feasible path near a reference motion.
 
-A regulator along a motion that the physics cannot follow to the letter (feet that slide, a balance
-that is a little off) falls where the motion asks too much. So the motion is simulated first: many
-robots follow it under the regulator with random offsets of their targets, a window of a few control
-steps at a time; those of least cost go on (SAMCON: Liu, Yin, van de Panne, Shao and Xu, SIGGRAPH
-2010; Liu, Yin and Guo, 2015). Cost: that of the regulator, whose value function says what the state
-at the end of the window will cost later. Where all robots fall, the path that was found is made the
-nominal one up to shortly before, and the search goes on from there. The place of the feet decides
-where the motion is in the world: who slid aside dances on where he is. Metres, radians, seconds.
+A regulator along a motion that is not exactly feasible (sliding feet, a small error of balance)
+falls where the motion needs too much. So the motion is simulated first: many robots follow it under
+the regulator with random offsets of their targets, a window of a few control steps at a time; those
+of least cost continue (SAMCON: Liu, Yin, van de Panne, Shao and Xu, SIGGRAPH 2010; Liu, Yin and
+Guo, 2015). Cost: that of the regulator, whose value function gives the later cost of the state at
+the end of the window. Where all robots fall, the found path becomes the nominal one up to shortly
+before, and the search continues from there. The position of the feet determines the place of the
+motion in the world: a robot that slid aside dances on from there. Metres, radians, seconds.
 """
 
 from dataclasses import dataclass
@@ -22,11 +22,12 @@ from robojackson.rl.sim.simulation import Simulation
 from robojackson.rl.sim.tangent import state_difference
 
 WINDOW, SAMPLES, KEPT, CHILDREN = 8, 320, 32, 8
-"""Control steps a window, robots in it, those that go on, and at most so many from one of them."""
+"""Control steps a window, robots in it, survivors, and the largest number of survivors from one
+parent."""
 OFFSET_SCALES, OFFSET_SHARES = (0.15, 0.4, 1.0), (0.15, 0.4, 1.0)
-"""Of a window's offsets, drawn for each robot: spread, full actions; share of the motors."""
+"""Random offsets of a window: spread, full actions; share of the motors."""
 LARGEST_OFFSET, LARGEST_FEEDBACK = 4.0, 2.0
-"""Full actions."""
+"""Largest offset, full actions."""
 GOES_ON, ALONG = 0.4, 0.4
 """Shares of robots whose offset adds to that before, and whose offset is that of another state."""
 ELSEWHERE = np.array([0.03, 0.03, 0.01, 0.06, 0.06, 0.06])
@@ -53,7 +54,7 @@ class _Beam:
 
 @dataclass(frozen=True)
 class _Window:
-    """What the robots that go on have done: whose child each is, and every step."""
+    """Steps of the surviving robots, and the parent of each."""
 
     parent: Int[np.ndarray, " M"]
     states: list[tuple[np.ndarray, np.ndarray, np.ndarray]]
@@ -84,7 +85,7 @@ class PathSearch:
         self._own = np.zeros((len(reference), 2))
 
     def run(self, path: Path, law: Recursion, begin: int) -> tuple[Path, bool]:
-        """Return a simulated path from a step of another on, and whether it comes to the end."""
+        """Return a simulated path from a step of another on, and whether it reaches the end."""
         rows = np.zeros(KEPT, int)
         none = np.zeros((1, len(self._action)))
         first = _Beam(path.qpos[[begin]], path.qvel[[begin]], none, np.zeros((1, 2)), np.zeros(1))
@@ -103,7 +104,7 @@ class PathSearch:
         return _traced(first, windows, path.targets[min(t, len(path) - 1)]), upright
 
     def joined(self, path: Path, found: Path, begin: int, kept: int) -> Path:
-        """Return a path with what was found up to a step; after it the reference."""
+        """Return a path with the found one up to a step, followed by the reference."""
         parts = []
         for name in ("qpos", "qvel", "targets"):
             array = getattr(self._reference, name).copy()
@@ -143,13 +144,13 @@ class PathSearch:
         return now.of(rows), _Window(parent[rows], chosen)
 
     def _apart(self, beam: _Beam, path: Path, t: int) -> Float[np.ndarray, "N X"]:
-        """Return how far robots are off a path that is moved to where they stand."""
+        """Return the distance of robots from a path that is moved to their feet."""
         apart = state_difference(beam.qpos, beam.qvel, path.qpos[t], path.qvel[t])
         apart[:, :2] -= beam.shift - self._own[t]
         return apart
 
     def _offsets(self, beam: _Beam, gain: Float[np.ndarray, "nu X"]) -> Float[np.ndarray, "N nu"]:
-        """Draw the offsets of a window; the first robots go without."""
+        """Draw the offsets of a window; the first robots have none."""
         rng, (n, motors) = self._rng, beam.offset.shape
         scale = rng.choice(OFFSET_SCALES, (n, 1))
         moved = rng.random((n, motors)) < rng.choice(OFFSET_SHARES, (n, 1))
@@ -169,7 +170,7 @@ class PathSearch:
 
 
 def _best(score: Float[np.ndarray, " N"], parent: Int[np.ndarray, " N"]) -> Int[np.ndarray, " M"]:
-    """Return the robots that go on, best first, few of them from the same parent."""
+    """Return the surviving robots, best first, few of them from the same parent."""
     found, children = [], np.zeros(len(score), int)
     for row in np.argsort(score):
         if children[parent[row]] < CHILDREN:
@@ -190,7 +191,7 @@ def _traced(first: _Beam, windows: list[_Window], last: Float[np.ndarray, " nu"]
 
 
 def settings() -> list[float]:
-    """Return the numbers of the search: with others it finds another path."""
+    """Return the numbers of the search: other numbers give another path."""
     counts = [WINDOW, SAMPLES, KEPT, CHILDREN, *OFFSET_SCALES, *OFFSET_SHARES, LARGEST_OFFSET]
     costs = [LARGEST_FEEDBACK, GOES_ON, ALONG, *ELSEWHERE.tolist(), ELSEWHERE_SPEED]
     return [*counts, *costs, OFFSET_COST, PLACE_COST, LOST_RAD]
