@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 
 R = TypeVar("R")
 Progress = Callable[[int, int], None]
-Arguments = tuple[Any, ...]
-Outcome = tuple[str, Any]
+Arguments = tuple[object, ...]
+Outcome = tuple[str, object]
 """Kind of a message and its value."""
 REPORT, ERROR, RESULT = "report", "error", "result"
 
