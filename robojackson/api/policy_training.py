@@ -22,7 +22,7 @@ from robojackson.files.file_tree import results_in, without_empty_folders
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.pipeline.episode_log import EpisodeLog
 from robojackson.pipeline.folder_lock import locked
-from robojackson.pipeline.run_names import motion_name, run_labels
+from robojackson.pipeline.run_names import motion_name, require_run_id, run_labels
 from robojackson.pipeline.yaml_loader import load
 from robojackson.retarget.scorecard_gate import check, scorecard_record
 from robojackson.rl import training
@@ -114,7 +114,7 @@ def _labels(config: TrainConfig, move: str, setup: str | None, run_id: str) -> d
     """Return the labels of the run's rows."""
     usual = SETUPS[config.start != "scratch", config.curiosity != "off"]
     labels = run_labels(move, Path(setup).stem if setup else usual, config.seed)
-    return labels | ({"run_id": run_id} if run_id else {})
+    return labels | ({"run_id": require_run_id(run_id)} if run_id else {})
 
 
 def _trained(

@@ -6,6 +6,8 @@ import unicodedata
 from os import PathLike
 from pathlib import Path
 
+from robojackson.errors import BadConfiguration
+
 NAME_LENGTH = 60
 
 
@@ -29,6 +31,19 @@ def run_labels(move: str, setup: str, seed: int | None) -> dict[str, object]:
     """Return the columns by which episodes and evaluations of a run are joined."""
     move, setup = run_name(move), run_name(setup)
     return {"run_id": f"{move}-{setup}-s{seed}", "move": move, "setup": setup, "seed": seed}
+
+
+def require_run_id(run_id: str) -> str:
+    """Return a run id that is given; it names rows of tables and may name files.
+
+    Raises:
+        BadConfiguration: it has other letters than `run_name`.
+    """
+    if not re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,199}", run_id):
+        raise BadConfiguration(
+            f"run id {run_id[:60]!r}: ASCII letters, digits and _.- alone, as {run_name(run_id)}"
+        )
+    return run_id
 
 
 def motion_name(reference: str | PathLike[str]) -> str:

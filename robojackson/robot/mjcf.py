@@ -105,8 +105,8 @@ def compiled(description: RobotDescription, path: Path) -> mujoco.MjModel:
             model = spec.compile()
     except FAULTS as error:
         raise _unreadable(description, error) from error
-    require_sound(model, where(description, "mjcf"))
     model.actuator_gear[:] *= description.gear_scale
+    require_sound(model, where(description, "mjcf"))
     return model
 
 
