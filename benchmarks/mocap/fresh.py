@@ -111,10 +111,10 @@ def main() -> None:
             continue
         totals.append((raw["pa_mpjpe_mm"], ours["pa_mpjpe_mm"]))
         cells = (raw["pa_mpjpe_mm"], ours["pa_mpjpe_mm"], ours["speed_ratio"], ours["tilt_deg"])
-        cells = [
+        shown = [
             f"{value:.2f}" if index == 2 else f"{value:.0f}" for index, value in enumerate(cells)
         ]
-        table.add_row(name, f"{share:.0%}", *cells)
+        table.add_row(name, f"{share:.0%}", *shown)
     means = np.mean(totals, 0)
     table.add_row("mean", "", *(f"{value:.1f}" for value in means))
     Console().print(table)
