@@ -110,9 +110,11 @@ def main() -> None:
             table.add_row(MOTIONS[number % 10], "0 %", str(error))
             continue
         totals.append((raw["pa_mpjpe_mm"], ours["pa_mpjpe_mm"]))
-        errors = f"{raw['pa_mpjpe_mm']:.0f}", f"{ours['pa_mpjpe_mm']:.0f}"
-        others = f"{ours['speed_ratio']:.2f}", f"{ours['tilt_deg']:.0f}"
-        table.add_row(name, f"{share:.0%}", *errors, *others)
+        cells = (raw["pa_mpjpe_mm"], ours["pa_mpjpe_mm"], ours["speed_ratio"], ours["tilt_deg"])
+        shown = [
+            f"{value:.2f}" if index == 2 else f"{value:.0f}" for index, value in enumerate(cells)
+        ]
+        table.add_row(name, f"{share:.0%}", *shown)
     means = np.mean(totals, 0)
     table.add_row("mean", "", *(f"{value:.1f}" for value in means))
     Console().print(table)

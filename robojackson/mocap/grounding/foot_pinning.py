@@ -31,7 +31,7 @@ class FootPinningConfig:
         wobble: Spread of the path's second difference at 30 frames a second, metres.
         ramp_s: Time of the transition from a planted to a moving foot, seconds.
         fade_s: Time over which the correction of a pinned foot fades when it leaves, seconds.
-        reach_m: A pin moves a foot no further: one that needs more does not stand; metres.
+        reach_m: Largest correction of a pinned foot, metres; the rest of its slide stays.
         rounds: Iterations of contacts, path and pins.
     """
 
@@ -41,7 +41,7 @@ class FootPinningConfig:
     wobble: float = 0.003
     ramp_s: float = 0.1
     fade_s: float = 0.2
-    reach_m: float = 0.05
+    reach_m: float = 0.09
     rounds: PositiveInt = 2
 
 
@@ -142,13 +142,10 @@ def pin_offsets(
     return offsets
 
 
-def within_reach(
-    pins: Float[np.ndarray, "T 2 3"], reach: float
-) -> tuple[Float[np.ndarray, "T 2 3"], np.ndarray]:
-    """Pins no longer than `reach`, and which foot points (T, 4) are within it."""
-    apart = np.linalg.norm(pins, axis=-1)
-    share = np.minimum(1.0, reach / np.maximum(apart, reach))[..., None]
-    return pins * share, np.repeat(apart <= reach, 2, axis=1)
+def within_reach(pins: Float[np.ndarray, "T 2 3"], reach: float) -> Float[np.ndarray, "T 2 3"]:
+    """Return the pins, none longer than `reach`."""
+    longer = np.linalg.norm(pins, axis=-1, keepdims=True)
+    return np.asarray(pins * np.minimum(1.0, reach / np.maximum(longer, reach)))
 
 
 def faded(target: Float[np.ndarray, "T N"], ramp: float) -> Float[np.ndarray, "T N"]:

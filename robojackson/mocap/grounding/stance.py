@@ -87,9 +87,9 @@ def ground_body(body: Body, fps: float, config: GroundingConfig) -> Stance:
     planted = pinned = evidence.states(body) == PLANTED
     share = np.zeros((len(falling), 2))
     for _ in range(config.foot_pinning.rounds):
-        body, share, near = _pinned(body, planted, evidence, flying)
+        body, share = _pinned(body, planted, evidence, flying)
         states = evidence.states(body)
-        pinned, planted = planted & near, planted | (states == PLANTED)
+        pinned, planted = planted, planted | (states == PLANTED)
         airborne = (states == AIR).all(1)
         flying = jumps | air.flight(body.feet[..., 2].min(1), height, airborne, fps)
     body = evidence.dropped(body, flying)
@@ -119,9 +119,9 @@ def _carried(states: np.ndarray, body: Body, fps: float) -> Int[np.ndarray, "T 4
 
 def _pinned(
     body: Body, planted: np.ndarray, evidence: _Evidence, flying: np.ndarray
-) -> tuple[Body, Float[np.ndarray, "T 2"], np.ndarray]:
-    """One round: standing feet level, the root moved, toes tipped, legs bent; share of level, and
-    the points that their pins reach."""
+) -> tuple[Body, Float[np.ndarray, "T 2"]]:
+    """Run one round: level planted feet, move the root, tip toes, bend legs; also return the level
+    share."""
     fps, pinning = evidence.fps, evidence.config.foot_pinning
     ramp = pinning.ramp_s * fps
     flat = feet.stands_flat(body.feet, planted)
@@ -136,5 +136,5 @@ def _pinned(
     shared = foot_pinning.shared_height(pins, planted)
     settled = lowpass(shared, fps, evidence.config.floor_cutoff_hz)
     body = body.shifted(settled)
-    pins, near = foot_pinning.within_reach(pins - settled[:, None], pinning.reach_m)
-    return body.aimed(leg_ik.move_feet(body.pose.points, pins), share), share, near
+    pins = foot_pinning.within_reach(pins - settled[:, None], pinning.reach_m)
+    return body.aimed(leg_ik.move_feet(body.pose.points, pins), share), share
