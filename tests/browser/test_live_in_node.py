@@ -18,13 +18,13 @@ from robojackson.rl.evaluation.controllers import control_of, sees_ahead, traine
 from robojackson.rl.evaluation.rollouts import Moment, Starts, roll_out
 from robojackson.rl.modes.observation import Observer
 from robojackson.rl.policy import Policy
-from robojackson.rl.sim import sampling
-from robojackson.rl.sim.feet import Feet
+from robojackson.rl.sim import sampled_regulator
 from robojackson.rl.sim.nominal_path import Gains, Progress
 from robojackson.rl.sim.preview import driven_clip
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.regulator import regulator
 from robojackson.rl.sim.simulation import Simulation
+from robojackson.rl.sim.standing_feet import Feet
 from robojackson.robot.fall import Fall
 from tests.browser.conftest import made_policy
 
@@ -135,7 +135,7 @@ def test_feedback_from_where_the_feet_stand_is_the_same_as_in_python(
     shaking: RecordedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("ROBOJACKSON_STORE", str(tmp_path / "store"))
-    monkeypatch.setattr(sampling, "sampled_regulator", anchored)
+    monkeypatch.setattr(sampled_regulator, "sampled_regulator", anchored)
     policy = steadied(made_policy(shaking.robot))
     control = {**policy.facts["control"], "feedback_path": "sampled"}  # type: ignore[dict-item]
     policy = Policy(policy.layers, {**policy.facts, "control": control})

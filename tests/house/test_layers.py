@@ -23,7 +23,7 @@ COMMANDS = (
     *("robojackson/cli/format_commands.py", "robojackson/cli/learning_commands.py"),
     *("robojackson/cli/robot_commands.py", "flows/cli/clean_command.py"),
     *("robojackson/cli/trackers/tracker_commands.py", "flows/cli/gallery_command.py"),
-    "robojackson/cli/pictures/view_command.py",
+    *("robojackson/cli/pictures/view_command.py", "robojackson/cli/trackers/perform_command.py"),
 )
 """Modules that define commands."""
 LIGHT = {

@@ -141,7 +141,7 @@ const Dance = (() => {
       });
     }
 
-    /* How far the feet that stand are from their places in the plane of the floor, as `feet.Feet`. */
+    /* How far the feet that stand are from their places in the plane of the floor, as `standing_feet.Feet`. */
     aside(row, moved) {
       const { feet } = this.dance.feedback, { places } = this.feedback, at = this.data.site_xpos;
       const sites = feet.map((foot) => this.sites[foot]), floor = Math.min(...sites.map((site) => at[3 * site + 2]));

@@ -26,10 +26,10 @@ from robojackson.rl.policy import Policy
 from robojackson.rl.policy_facts import mode_of, observation_of
 from robojackson.rl.sim.feedback import feedback_of
 from robojackson.rl.sim.feedforward import lead_of
-from robojackson.rl.sim.feet import LOW_M
 from robojackson.rl.sim.motors import Motors, gains, residual_scale
 from robojackson.rl.sim.preview import driven_clip, preview_of
 from robojackson.rl.sim.simulation import Simulation
+from robojackson.rl.sim.standing_feet import LOW_M
 from robojackson.rl.trackers.policy_tracker import PolicyTracker
 from robojackson.rl.trackers.regulator_tracker import RegulatorTracker
 from robojackson.robot.fall import Fall

@@ -20,14 +20,14 @@ from robojackson.errors import StoreError
 from robojackson.files.file_tree import FileTree
 from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
 from robojackson.rl.config.train_config import ControlConfig
-from robojackson.rl.sim import sampling
+from robojackson.rl.sim import sampled_regulator
 from robojackson.rl.sim.feedforward import lead_of
-from robojackson.rl.sim.feet import Feet
 from robojackson.rl.sim.motors import actuation_facts, feedback_share, residual_scale
 from robojackson.rl.sim.nominal_path import Gains, Progress, no_progress
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.regulator import regulator, settings
 from robojackson.rl.sim.simulation import Simulation, resolved
+from robojackson.rl.sim.standing_feet import Feet
 from robojackson.rl.sim.tangent import state_difference
 from robojackson.robot.mjcf import robots_folder
 from robojackson.robot.model import Robot
@@ -111,7 +111,7 @@ def feedback_of(
     scaled = Gains(
         share * joined.gain, share * joined.offset, joined.qpos, joined.qvel, joined.places
     )
-    most = LARGEST if control.feedback_path == "reference" else sampling.LARGEST_MOVE
+    most = LARGEST if control.feedback_path == "reference" else sampled_regulator.LARGEST_MOVE
     return Feedback(scaled, most * action, Feet(robot))
 
 
@@ -169,7 +169,7 @@ def regulator_of(
     feet = Feet(robot)
     if control.feedback_path == "reference":
         return regulator(sim, clip, action, feet.count, progress)[0]
-    return sampling.sampled_regulator(sim, clip, action, feet, progress=progress)
+    return sampled_regulator.sampled_regulator(sim, clip, action, feet, progress=progress)
 
 
 def _digest(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> str:
@@ -179,7 +179,7 @@ def _digest(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> st
     facts = [poses_sha256(motion), robot.sha256, named, actuation_facts(robot, ControlConfig()),
              actuation_facts(robot, control), settings(), asdict(robot.description)]  # fmt: skip
     if control.feedback_path == "sampled":
-        facts.append(sampling.settings())
+        facts.append(sampled_regulator.settings())
     digest = hashlib.sha256(json.dumps(facts, sort_keys=True, default=str).encode())
     model = robot.model
     for name in VARIED:  # a varied robot has the same name and file

@@ -5,8 +5,7 @@ import pytest
 
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import ControlConfig
-from robojackson.rl.sim import path_search, sampling
-from robojackson.rl.sim.feet import Feet
+from robojackson.rl.sim import path_search, sampled_regulator
 from robojackson.rl.sim.motors import residual_scale
 from robojackson.rl.sim.nominal_path import Gains, Linear, Path
 from robojackson.rl.sim.path_search import PathSearch
@@ -14,6 +13,7 @@ from robojackson.rl.sim.preview import driven_clip
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.regulator import advance, regulator, riccati
 from robojackson.rl.sim.simulation import Simulation
+from robojackson.rl.sim.standing_feet import Feet
 from robojackson.robot.model import Robot
 
 pytestmark = pytest.mark.medium
@@ -104,12 +104,12 @@ def test_the_regulator_that_keeps_robots_up_longer_is_taken(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     action, feet = residual_scale(robot, ControlConfig()), Feet(robot)
-    monkeypatch.setattr(sampling, "regulator", lambda *given: plain)
-    monkeypatch.setattr(sampling, "PASSES", 1)
+    monkeypatch.setattr(sampled_regulator, "regulator", lambda *given: plain)
+    monkeypatch.setattr(sampled_regulator, "PASSES", 1)
     for shares, anchored in (((1.0,), False), ((0.5, 0.4), False), ((0.5, 0.6), True)):
         held = iter(shares)
-        monkeypatch.setattr(sampling, "_held_share", lambda *given, held=held: next(held))
-        found = sampling.sampled_regulator(sim, clip, action, feet)
+        monkeypatch.setattr(sampled_regulator, "_held_share", lambda *given, held=held: next(held))
+        found = sampled_regulator.sampled_regulator(sim, clip, action, feet)
         assert bool(np.isfinite(found.places).all()) == anchored
         if not anchored:
             np.testing.assert_array_equal(found.gain, plain[0].gain)

@@ -4,7 +4,6 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from robojackson.rl.sim import path_search
-from robojackson.rl.sim.feet import Feet
 from robojackson.rl.sim.nominal_path import Gains, Linear, Path, Progress, no_progress
 from robojackson.rl.sim.path_search import LOST_RAD, WINDOW, PathSearch
 from robojackson.rl.sim.reference_clip import Clip
@@ -17,6 +16,7 @@ from robojackson.rl.sim.regulator import (
     riccati,
 )
 from robojackson.rl.sim.simulation import Simulation
+from robojackson.rl.sim.standing_feet import Feet
 from robojackson.rl.sim.tangent import state_difference
 
 PASSES, BACK_S, AGAIN_S = 12, 1.2, 0.6
