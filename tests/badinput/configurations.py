@@ -1,4 +1,4 @@
-"""Configurations: files that are none, values that no key takes, and keys that nobody knows."""
+"""Configurations: files that are none, values that no key takes, and keys that no one knows."""
 
 from collections.abc import Iterator, Mapping
 

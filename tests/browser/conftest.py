@@ -47,7 +47,7 @@ ARGUMENTS = [
 
 @dataclass
 class Opened:
-    """A page with what it asked for and complained about."""
+    """A page with its requests and messages."""
 
     page: "Page"
     requests: list[str] = field(default_factory=list)
@@ -81,7 +81,7 @@ def standing_reference(robot: Robot) -> ReferenceMotion:
 
 
 def made_policy(robot: Robot) -> Policy:
-    """A network that nobody trained: small random corrections of the reference's angles."""
+    """A network that no one trained: small random corrections of the reference's angles."""
     from dataclasses import asdict
 
     from robojackson.rl.modes.observation import Observer

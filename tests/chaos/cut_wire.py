@@ -1,4 +1,4 @@
-"""A wire that can be cut: forwards a port to another one, and for a time to nobody."""
+"""A wire that can be cut: forwards a port to another one, and for a time to no one."""
 
 import socket
 import threading
@@ -17,7 +17,7 @@ class Proxy:
         port: Where it listens.
         target: Where it forwards to.
         intact: Whether it forwards now.
-        refused: Connections that were asked for while it was cut.
+        refused: Connections that were requested while it was cut.
     """
 
     def __init__(self, target: int) -> None:

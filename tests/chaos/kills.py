@@ -70,7 +70,7 @@ class Dance:
         kills: Those before its end.
         code: Exit code of the last run.
         equal: Whether tables and networks are those of the undisturbed run.
-        left: Processes and files that nobody owns.
+        left: Processes and files that no one owns.
     """
 
     kills: list[Kill] = field(default_factory=list)

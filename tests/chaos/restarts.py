@@ -9,7 +9,7 @@ SECONDS_DOWN = 3.0
 
 
 class Restarts:
-    """Starts services that have ended, from a thread, until it is told to stop.
+    """Starts services that have ended, from a thread, until it has to stop.
 
     Attributes:
         count: How often one was started again, by name.

@@ -79,7 +79,7 @@ class Cluster:
         return _patiently(lambda: _create(DEPLOYMENT, {**study, "executor": "work-pool"}))
 
     def state(self, run: Any) -> str | None:
-        """Its final state, `DEAD` if its process is gone, None while it runs or nobody answers."""
+        """Its final state, `DEAD` if its process is gone, None while it runs or no one answers."""
         with suppress(Exception):
             kind = _state(run)
             if kind in ("COMPLETED", "FAILED", "CRASHED", "CANCELLED"):

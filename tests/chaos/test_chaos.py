@@ -51,7 +51,7 @@ def test_a_wire_forwards(wire: Proxy) -> None:
     assert said(wire) == b"hello"
 
 
-def test_a_cut_wire_answers_nobody(wire: Proxy) -> None:
+def test_a_cut_wire_answers_no_one(wire: Proxy) -> None:
     wire.cut()
     with pytest.raises((URLError, ConnectionError)):
         said(wire)

@@ -1,4 +1,4 @@
-"""The processes of a service are told from those that it has started."""
+"""The processes of a service are distinguished from those that it has started."""
 
 import os
 import subprocess

@@ -66,7 +66,7 @@ class Trial:
         first, again: How the disturbed run and the one after it ended.
         runs: How many runs came after it: two if a machine had kept something.
         equal: Whether the tables are those of an undisturbed run, byte for byte.
-        left: Processes and files that nobody owns.
+        left: Processes and files that no one owns.
         seconds: All of it.
     """
 
@@ -87,7 +87,7 @@ class Trial:
 
 
 def undisturbed(bench: Bench) -> tuple[Tables, float]:
-    """The tables of a run that nobody disturbs, and what it took, seconds.
+    """The tables of a run that no one disturbs, and what it took, seconds.
 
     Raises:
         RuntimeError: it did not end well.
@@ -102,7 +102,7 @@ def undisturbed(bench: Bench) -> tuple[Tables, float]:
 
 
 def disturb(bench: Bench, trial: Trial, rng: random.Random, expected: Tables) -> None:
-    """Fill in what a trial shows; a run that was over too early is begun anew, and hit earlier."""
+    """Fill in what a trial shows; a run that was over too early is begun again, and hit earlier."""
     began = time.monotonic()
     for _ in range(TRIES):
         wipe(bench.store)

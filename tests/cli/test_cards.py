@@ -22,7 +22,7 @@ CARD = dict.fromkeys(BARS, 0.0) | {"tempo_mean": 0.78, "keypoint_leaned_mm": 6.8
 RETARGETED = {"robot": "humanoid", "steps": 266, "dt": 0.015, "cyclic": True, "reference": "r"}
 
 
-def test_the_steadiest_video_is_marked_and_what_cannot_be_read_is_told() -> None:
+def test_the_steadiest_video_is_marked_and_what_cannot_be_read_is_reported() -> None:
     lines = cards.score_lines(SCORED)
     assert [line.split()[1] for line in lines if line.startswith("►")] == ["steady.mp4"]
     assert "lower is steadier" in "\n".join(lines)

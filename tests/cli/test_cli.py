@@ -27,7 +27,7 @@ def invoke(*words: object) -> tuple[int, str, str]:
 
 
 def write_video(path: Path, frames: int) -> Path:
-    """Grey frames with nobody in them."""
+    """Grey frames with no one in them."""
     with av.open(str(path), "w") as container:
         stream = container.add_stream("libx264", rate=10)
         stream.width, stream.height, stream.pix_fmt = 64, 64, "yuv420p"
@@ -165,7 +165,7 @@ def test_a_video_that_breaks_off_while_it_is_looked_at_loses_no_other_score(
         (">&-", "stdout is closed: there is nowhere to write the answer"),
     ],
 )
-def test_an_answer_that_nobody_gets_is_one_line(where: str, reason: str) -> None:
+def test_an_answer_that_no_one_gets_is_one_line(where: str, reason: str) -> None:
     command = f"{shlex.quote(sys.executable)} -m robojackson robots --json {where}"
     done = subprocess.run(
         command, shell=True, cwd=ROOT, capture_output=True, text=True, check=False
@@ -255,7 +255,7 @@ def test_a_flow_refuses_simple_mistakes_before_prefect_starts(
     assert not (tmp_path / "store").exists()
 
 
-def test_a_full_store_is_told_before_any_work(monkeypatch, tmp_path: Path) -> None:
+def test_a_full_store_is_reported_before_any_work(monkeypatch, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("ROBOJACKSON_STORE", str(tmp_path / "file" / "store"))
     code, _, err = invoke("dance", ROOT / "clips" / "hip_shake.mp4")

@@ -102,7 +102,7 @@ def test_a_reference_of_another_model_is_refused(tmp_path: Path) -> None:
         export(path, "csv", tmp_path / "motion.csv")
 
 
-def test_a_missing_reference_is_told(tmp_path: Path) -> None:
+def test_a_missing_reference_is_reported(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="no such file"):
         export(tmp_path / "reference.parquet", "csv", tmp_path / "motion.csv")
 

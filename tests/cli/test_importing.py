@@ -80,7 +80,7 @@ def test_a_format_for_robots_does_not_fit_a_person(to: str, smpl: Path, tmp_path
         export(smpl, to, tmp_path / "motion")
 
 
-def test_what_is_no_table_is_told(tmp_path: Path) -> None:
+def test_what_is_no_table_is_reported(tmp_path: Path) -> None:
     (tmp_path / "x.parquet").write_bytes(b"no table")
     with pytest.raises(BadTable, match="not a Parquet file"):
         export(tmp_path / "x.parquet", "bvh", tmp_path / "motion.bvh")
@@ -104,7 +104,7 @@ def test_a_file_without_a_rate_needs_one(tmp_path: Path) -> None:
     assert import_motion(path, tmp_path / "out", 25.0, None, "base", {})["fps"] == 25.0
 
 
-def test_another_rate_than_the_files_is_told(smpl: Path, tmp_path: Path) -> None:
+def test_another_rate_than_the_files_is_reported(smpl: Path, tmp_path: Path) -> None:
     export(smpl, "bvh", tmp_path / "motion.bvh")
     told = import_motion(tmp_path / "motion.bvh", tmp_path, 60.0, None, "base", {})
     assert told["fps"] == 60.0
@@ -142,7 +142,7 @@ def test_a_wicked_file_runs_nothing_and_makes_nothing(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "content", [b"hello", bytes(100), pickle.dumps({"joints": 1}), b"\xff\xd8\xff\xe0"]
 )
-def test_nobodys_file_lists_what_is_read(content: bytes, tmp_path: Path) -> None:
+def test_no_ones_file_lists_what_is_read(content: bytes, tmp_path: Path) -> None:
     (tmp_path / "file").write_bytes(content)
     with pytest.raises(UnknownName, match="Known: aist, amass, bvh, csv, gvhmr, hybrik"):
         import_motion(tmp_path / "file", tmp_path / "out", None, None, "base", {})
@@ -174,7 +174,7 @@ def test_a_skeleton_without_legs_is_refused_by_the_files_name(tmp_path: Path) ->
         import_motion(path, tmp_path / "out", None, None, "base", {})
 
 
-def test_a_folder_in_the_place_of_a_file_is_told(tmp_path: Path) -> None:
+def test_a_folder_in_the_place_of_a_file_is_reported(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="a folder, not a file"):
         import_motion(tmp_path, tmp_path / "out", None, None, "base", {})
 
@@ -186,7 +186,7 @@ def test_a_motion_is_not_written_over_itself(smpl: Path) -> None:
     assert smpl.read_bytes() == before
 
 
-def test_a_missing_file_is_told(tmp_path: Path) -> None:
+def test_a_missing_file_is_reported(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="no such file"):
         import_motion(tmp_path / "res.pk", tmp_path / "out", None, None, "base", {})
 

@@ -127,7 +127,7 @@ def test_offline_is_one_line(source, describe, tmp_path: Path, monkeypatch):
         robot_models.add_robot("machine")
 
 
-def test_a_full_disk_is_told_before_the_download(source, describe, monkeypatch):
+def test_a_full_disk_is_reported_before_the_download(source, describe, monkeypatch):
     describe(source)
     monkeypatch.setattr(robot_models, "_ROOM_MB", 10**9)
     with pytest.raises(StoreError, match="make room"):
@@ -197,7 +197,7 @@ def broken(folder: Path, old: str, new: str) -> Path:
 
 
 @pytest.mark.medium
-def test_a_good_description_is_told_and_drawn(tmp_path: Path):
+def test_a_good_description_is_reported_and_drawn(tmp_path: Path):
     told, lines = robot_sheets.check_robot(str(own_robot(tmp_path)), tmp_path / "mine.png")
     assert (told["ok"], told["problems"], told["hinges"], told["motors"]) == (True, [], 17, 17)
     assert told["height_m"] == pytest.approx(1.56, abs=0.02)
@@ -219,7 +219,7 @@ def test_a_good_description_is_told_and_drawn(tmp_path: Path):
         ("root_body:", "root_bodi:", "unknown key 'root_bodi'. Did you mean 'root_body'?"),
     ],
 )
-def test_a_broken_description_is_told_in_a_line_that_names_the_file(
+def test_a_broken_description_is_reported_in_a_line_that_names_the_file(
     tmp_path: Path, old, new, cause
 ):
     path = broken(tmp_path, old, new)
@@ -230,7 +230,7 @@ def test_a_broken_description_is_told_in_a_line_that_names_the_file(
     assert told["verdict"]["kind"] == "problems"
 
 
-def test_wrong_keys_are_told_all_at_once(tmp_path: Path):
+def test_wrong_keys_are_reported_all_at_once(tmp_path: Path):
     path = broken(tmp_path, "root_body: torso", "root_bodi: torso\nspeed: 3")
     told, _ = robot_sheets.check_robot(str(path), None)
     assert all(any(key in line for line in told["problems"]) for key in ("root_bodi", "speed"))

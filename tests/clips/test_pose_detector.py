@@ -1,4 +1,4 @@
-"""The detector on real files: a person is found, an empty room is not, what lacks is told."""
+"""The detector on real files: a person is found, an empty room is not, what lacks is reported."""
 
 from pathlib import Path
 

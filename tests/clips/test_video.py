@@ -1,4 +1,4 @@
-"""Laws of reading videos: what is there is told, what is broken gets one clear line."""
+"""Laws of reading videos: what is there is reported, what is broken gets one clear line."""
 
 from pathlib import Path
 

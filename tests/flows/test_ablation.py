@@ -41,7 +41,7 @@ EPISODES = "metrics/episodes/study=played/{}.parquet"
 
 
 class Played:
-    """An executor of cells that takes a moment, and fails where it is told to."""
+    """An executor of cells that takes a moment, and fails where it has to."""
 
     def __init__(self, fails: str = "") -> None:
         self.fails, self.now, self.most = fails, 0, 0

@@ -153,7 +153,7 @@ def test_names_with_a_prefix_are_known() -> None:
     assert shin == pytest.approx(0.41, abs=2e-3)
 
 
-def test_an_unknown_unit_is_scaled_to_a_person_and_told() -> None:
+def test_an_unknown_unit_is_scaled_to_a_person_and_reported() -> None:
     motion = bvh.read(stick(3.0))
     assert "unknown unit" in " ".join(motion.notes)
     ankle, hip = keypoint("left_ankle"), keypoint("left_hip")
@@ -183,6 +183,6 @@ def test_a_skeleton_without_legs_is_refused_with_its_joints() -> None:
         lambda text: "HIERARCHY\nROOT a\n{" + "JOINT b {" * 5000,
     ],
 )
-def test_a_damaged_file_is_told(damage: object) -> None:
+def test_a_damaged_file_is_reported(damage: object) -> None:
     with pytest.raises(BadTable, match="BVH"):
         bvh_tree.parse(damage(stick().decode()).encode())  # type: ignore[operator]

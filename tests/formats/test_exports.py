@@ -114,7 +114,7 @@ def test_another_robots_model_is_refused(
 
 @pytest.mark.parametrize("name", READERS)
 @pytest.mark.parametrize("data", [b"", b"\x80\x04N.", b"1,2\n3,4\n", b"PK\x03\x04rubbish"])
-def test_a_file_of_another_kind_is_told(name: str, data: bytes) -> None:
+def test_a_file_of_another_kind_is_reported(name: str, data: bytes) -> None:
     with pytest.raises(BadTable):
         READERS[name](data)
 
@@ -174,7 +174,7 @@ def test_beyondmimic_velocities_are_the_change_of_the_positions(
     np.testing.assert_allclose(found["body_lin_vel_w"][1:-1], moved, atol=0.02)
 
 
-def test_beyondmimic_turns_are_told_in_the_axes_of_the_world(
+def test_beyondmimic_turns_are_reported_in_the_axes_of_the_world(
     swaying: ReferenceMotion, model: mujoco.MjModel
 ) -> None:
     turns = arrays(beyondmimic.write(swaying, model))["body_ang_vel_w"][:, 0]

@@ -77,7 +77,7 @@ def test_gmrs_own_files_are_read(protocol: int) -> None:
 
 
 @pytest.mark.parametrize("cut", [1, 40, 200])
-def test_a_pickle_that_is_cut_off_is_told(cut: int) -> None:
+def test_a_pickle_that_is_cut_off_is_reported(cut: int) -> None:
     with pytest.raises(BadTable):
         gmr.read(pickle.dumps(motion())[:-cut])
 

@@ -245,7 +245,7 @@ def test_a_shape_that_is_none_is_left_out(betas: Any) -> None:
 
 @pytest.mark.parametrize("module", [amass, bvh, gvhmr, smpl_csv])
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.9])
-def test_a_file_that_is_cut_off_is_told(module: Any, share: float) -> None:
+def test_a_file_that_is_cut_off_is_reported(module: Any, share: float) -> None:
     data = module.write(person())
     with pytest.raises(BadTable):
         module.read(data[: int(share * len(data))])

@@ -50,7 +50,7 @@ def test_hinge_velocities_are_the_derivative(swaying: ReferenceMotion, cyclic: b
     np.testing.assert_allclose(found[:, 6:], wanted, atol=0.01)
 
 
-def test_the_roots_turn_is_told_in_its_own_axes(swaying: ReferenceMotion) -> None:
+def test_the_roots_turn_is_reported_in_its_own_axes(swaying: ReferenceMotion) -> None:
     """A turn about the vertical, seen by a root that leans about its own x axis."""
     found = sampled(swaying, 50).qvel[:, 3:6]
     rate = yaw_rate(np.arange(len(found)) / 50)

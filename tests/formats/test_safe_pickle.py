@@ -155,7 +155,7 @@ def test_a_file_that_calls_something_is_refused(reader: str, kind: str, tmp_path
 
 @pytest.mark.parametrize("reader", READERS)
 @pytest.mark.parametrize("share", [0.0, 0.2, 0.6, 0.98])
-def test_a_file_that_is_cut_off_is_told(reader: str, share: float) -> None:
+def test_a_file_that_is_cut_off_is_reported(reader: str, share: float) -> None:
     read, write = READERS[reader]
     value = torch.ones(50) if reader == "torch" else np.ones(50)
     data = write({"x": value})
@@ -164,7 +164,7 @@ def test_a_file_that_is_cut_off_is_told(reader: str, share: float) -> None:
 
 
 @pytest.mark.parametrize("reader", READERS)
-def test_what_is_no_dictionary_is_told(reader: str) -> None:
+def test_what_is_no_dictionary_is_reported(reader: str) -> None:
     read, write = READERS[reader]
     with pytest.raises(BadTable, match="holds a list, not a dictionary"):
         read(write([1, 2]), "file")
@@ -178,7 +178,7 @@ OWN_CLASS = b"(cos\nsystem\nX\x02\x00\x00\x00lso."
 
 
 @pytest.mark.parametrize("words", [BUILD_ON_CLASS, NESTED, EXTENSION, OWN_CLASS])
-def test_a_wicked_program_is_told(words: bytes) -> None:
+def test_a_wicked_program_is_reported(words: bytes) -> None:
     with pytest.raises(BadTable):
         safe_pickle.load(b"\x80\x02" + words, "file")
 
@@ -197,7 +197,7 @@ def test_lists_within_lists_that_double_are_refused() -> None:
         safe_pickle.load(pickle.dumps({"x": value}), "file")
 
 
-def test_joblibs_array_that_promises_too_much_is_told() -> None:
+def test_joblibs_array_that_promises_too_much_is_reported() -> None:
     data = joblib_file({"x": np.zeros((7, 3))})
     swollen = data.replace(pickle.dumps((7, 3), 2)[2:6], b"J\xff\xff\xff\x7fK\x03")
     assert swollen != data
@@ -290,7 +290,7 @@ def npy(shape: tuple[int, ...], content: bytes) -> bytes:
 
 
 @pytest.mark.parametrize("shape", [(10**12,), (2**40, 2**40), (3,)])
-def test_an_npz_whose_header_promises_another_size_is_told(shape: tuple[int, ...]) -> None:
+def test_an_npz_whose_header_promises_another_size_is_reported(shape: tuple[int, ...]) -> None:
     with pytest.raises(BadTable, match="promised"):
         npz_archive.unpack(zipped("x.npy", npy(shape, bytes(8))), ("x",), "file")
 

@@ -1,7 +1,7 @@
 """The red team: what does not dance ranks below an honest estimate on every headline figure.
 
 On the true motions of the bundled clips. `docs/metrics.md` says which figures are headlines; those
-that are not are shown here with an impostor that fools them, so that nobody makes them one.
+that are not are shown here with an impostor that fools them, so that no one makes them one.
 """
 
 from collections.abc import Callable

@@ -115,7 +115,7 @@ def test_the_path_comes_from_one_focal_length_and_not_from_the_boxes() -> None:
     np.testing.assert_allclose(points[:, 0], seen()[:, 0], atol=0.03)
 
 
-def test_frames_without_a_person_are_filled_and_told() -> None:
+def test_frames_without_a_person_are_filled_and_reported() -> None:
     kept = np.delete(np.arange(FRAMES), [6, 7, 8])
     content = {
         key: [value[i] for i in kept] if isinstance(value, list) else value[kept]
@@ -168,6 +168,6 @@ def test_names_of_pictures_that_say_nothing_count_the_rows(names: object) -> Non
     np.testing.assert_array_equal(read(res_pk(img_path=names)).frame, np.arange(FRAMES))
 
 
-def test_a_box_without_width_is_told() -> None:
+def test_a_box_without_width_is_reported() -> None:
     with pytest.raises(BadTable, match="box"):
         read(res_pk(bbox=np.zeros((FRAMES, 4))))

@@ -126,7 +126,7 @@ def test_page_before_training_has_no_verdict() -> None:
 
 
 @pytest.mark.medium
-def test_notes_are_told(results: Results) -> None:
+def test_notes_are_reported(results: Results) -> None:
     assert '<p class="note">the camera moves</p>' in render(page_content(results, None))
 
 
@@ -195,7 +195,7 @@ def test_training_curve_is_the_median() -> None:
     np.testing.assert_allclose(line.get_ydata(), [2.0])
 
 
-def test_limb_that_does_not_move_is_told_so() -> None:
+def test_limb_that_does_not_move_is_reported_so() -> None:
     texts = [text.get_text() for text in run_plots.limb_gains(SUMMARY).axes[0].texts]
     assert texts == [" 0.93", " does not move in the reference"]
 

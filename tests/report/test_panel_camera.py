@@ -1,4 +1,4 @@
-"""The camera of a panel: nobody is cut at an edge, and every robot stands in the same light."""
+"""The camera of a panel: no one is cut at an edge, and every robot stands in the same light."""
 
 from contextlib import ExitStack
 

@@ -35,7 +35,7 @@ def test_crop_box_holds_every_point() -> None:
     assert inside.all()
 
 
-def test_crop_box_has_the_asked_shape() -> None:
+def test_crop_box_has_the_requested_shape() -> None:
     points = np.random.default_rng(2).uniform(50, 200, (40, 2))
     _, _, width, height = canvas.crop_box(points, (400, 300), 2 / 3)
     assert width / height == pytest.approx(2 / 3, abs=0.01)

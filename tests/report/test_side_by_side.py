@@ -61,7 +61,7 @@ def test_progress_reaches_its_total(
     assert told == [(k, 4) for k in range(1, 5)]
 
 
-def test_frame_in_which_nobody_was_found_is_still_shown(
+def test_frame_in_which_no_one_was_found_is_still_shown(
     clip: Path, track: LandmarkTrack, sequence: SmplSequence, reference: ReferenceMotion,
     model: mujoco.MjModel, tmp_path: Path,
 ) -> None:  # fmt: skip

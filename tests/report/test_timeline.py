@@ -40,7 +40,7 @@ def test_rollout_that_ends_early_is_held_and_marked(reference: ReferenceMotion) 
     np.testing.assert_array_equal(np.flatnonzero(when.ended), np.arange(10, 27))
 
 
-def test_video_is_no_longer_than_asked(reference: ReferenceMotion) -> None:
+def test_video_is_no_longer_than_requested(reference: ReferenceMotion) -> None:
     assert len(timeline(reference, 30.0, 12, 4000, 30.0, 2.0)) == 60
 
 

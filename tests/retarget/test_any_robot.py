@@ -1,4 +1,4 @@
-"""A robot that nobody knew, by its description alone: ankles, soles, servos, clashing names."""
+"""A robot that no one knew, by its description alone: ankles, soles, servos, clashing names."""
 
 import hashlib
 from dataclasses import replace

@@ -27,7 +27,7 @@ def _aims(robot: Robot) -> Targets:
 
 
 def _spoilt(change: Callable[[np.ndarray], None]) -> ReferenceMotion:
-    """The hip shake with its poses changed and all that follows from them made anew."""
+    """The hip shake with its poses changed and all that follows from them made again."""
     motion = robot_motion("hip_shake")
     qpos = motion.qpos.copy()
     change(qpos)

@@ -51,7 +51,7 @@ def test_training_starts_from_a_repository_of_the_hub(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """With the layers of the zip, which is asked for once and then lies in the cache."""
+    """With the layers of the zip, which is requested once and then lies in the cache."""
     config = load(TrainConfig, None, {**BRIEF, "start": REPOSITORY})
     with serving({ZIP: theirs}) as (address, asked):
         at(address, tmp_path / "cache", monkeypatch)

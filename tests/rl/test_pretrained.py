@@ -154,7 +154,7 @@ def test_without_a_network_the_hub_is_one_clear_line(monkeypatch: pytest.MonkeyP
     assert "\n" not in str(told.value)
 
 
-def test_the_hubs_zip_is_asked_for_by_its_own_name(
+def test_the_hubs_zip_is_requested_by_its_own_name(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     import huggingface_sb3

@@ -1,4 +1,4 @@
-"""All that is wrong with a description is told in one go, a line each."""
+"""All that is wrong with a description is reported in one go, a line each."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A first description of a model that nobody has described comes near to what a person wrote."""
+"""A first description of a model that no one has described comes near to what a person wrote."""
 
 import json
 import re

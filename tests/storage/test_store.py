@@ -162,7 +162,7 @@ def test_an_unwritable_root_is_one_line(tmp_path: Path) -> None:
         Store(tmp_path / "file" / "store").require_writable()
 
 
-def test_a_root_that_nobody_can_open_is_one_line() -> None:
+def test_a_root_that_no_one_can_open_is_one_line() -> None:
     with pytest.raises(StoreError, match="cannot open the store nonsense://x"):
         Store("nonsense://x")
 
@@ -203,7 +203,7 @@ def test_a_link_stays_one_and_a_file_keeps_its_mode(tmp_path: Path) -> None:
     )
 
 
-def test_a_name_that_nobody_can_read_is_refused_before_it_is_written(tmp_path: Path) -> None:
+def test_a_name_that_no_one_can_read_is_refused_before_it_is_written(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="no UTF-8"):
         Store(tmp_path).put(os.fsdecode(b"b\xff.csv"), b"x")
     assert files_under(tmp_path) == []

@@ -58,7 +58,7 @@ def test_a_process_that_does_not_listen_is_killed() -> None:
         assert child.wait(5) == -signal.SIGKILL
 
 
-def test_a_flow_that_ends_well_ends_nobody() -> None:
+def test_a_flow_that_ends_well_ends_no_one() -> None:
     command = [sys.executable, "-c", FLOW, "0"]
     done = subprocess.run(command, capture_output=True, text=True, env=environment(), check=True)
     assert done.stdout.split()[1] == "None"

@@ -63,7 +63,7 @@ def started(*words: str) -> tuple[subprocess.Popen[bytes], int]:
 @pytest.mark.parametrize(
     ("answer", "code"), [("SIG_DFL", -signal.SIGTERM), ("SIG_IGN", -signal.SIGKILL)]
 )
-def test_a_group_is_asked_first_and_then_killed(answer: str, code: int) -> None:
+def test_a_group_gets_a_signal_first_and_is_then_killed(answer: str, code: int) -> None:
     leader, child = started(LEADER, answer)
     with leader:
         end_group(leader, grace_s=5.0 if answer == "SIG_DFL" else 0.2)

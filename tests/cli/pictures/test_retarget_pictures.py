@@ -24,7 +24,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_the_video_has_two_panels_and_the_asked_length(folder: Path) -> None:
+def test_the_video_has_two_panels_and_the_requested_length(folder: Path) -> None:
     told = draw_retargeting(folder / "smpl.parquet", folder, "base", TINY)
     with av.open(told["video"]) as container:
         frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
@@ -37,13 +37,13 @@ def test_both_plots_are_pictures(folder: Path) -> None:
     assert heads == [b"\x89PNG"] * 2
 
 
-def test_a_motion_that_is_not_there_is_told(folder: Path) -> None:
+def test_a_motion_that_is_not_there_is_reported(folder: Path) -> None:
     (folder / "reference.parquet").unlink()
     with pytest.raises(StoreError, match="no such file"):
         draw_retargeting(folder / "smpl.parquet", folder, "base", TINY)
 
 
-def test_the_command_draws_when_it_is_asked_to(folder: Path, tmp_path: Path) -> None:
+def test_the_command_draws_on_request(folder: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     said = robojackson(
         *("retarget", folder / "smpl.parquet", "-o", out, "--video", "--config=smoke", "--json")

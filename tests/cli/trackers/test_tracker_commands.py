@@ -112,7 +112,7 @@ def test_offline_is_one_line(pin) -> None:
 
 
 def write_yaml_for_nobody(path: Path, pin: Callable[..., Path]) -> None:
-    """Let the YAML name a port at which nobody answers."""
+    """Let the YAML name a port at which no one answers."""
     yaml = next((path.parents[3] / "configs" / "trackers").glob("*.yaml"))
     lines = yaml.read_text().splitlines()
     told = ["  url: http://127.0.0.1:9/x" if "  url:" in line else line for line in lines]

@@ -1,4 +1,4 @@
-"""Laws of the camera's path: a pan is measured, a person is no background, a cut is told."""
+"""Laws of the camera's path: a pan is measured, a person is no background, a cut is reported."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""Laws of telling people apart: nobody becomes another, whatever hides him."""
+"""Laws of telling people apart: no one becomes another, whatever hides him."""
 
 from collections.abc import Callable, Sequence
 

@@ -46,7 +46,7 @@ def test_the_guard_ends_and_lets_a_proxy_be() -> None:
     assert socket.getaddrinfo("127.0.0.1", 9)
 
 
-def test_a_private_page_is_not_asked_for(web: Web) -> None:
+def test_a_private_page_is_not_requested(web: Web) -> None:
     with pytest.raises(DownloadFailed, match=r"web\.private_addresses=true"):
         offer(f"{web.url}/moved/clip.mp4", "score", FormatConfig(), STRICT)
     assert web.asked == []

@@ -118,7 +118,7 @@ def test_cookies_are_passed_through(web: Web, tmp_path: Path) -> None:
 
 
 def test_a_proxy_is_passed_through(web: Web) -> None:
-    """With our server as the proxy, it is asked for the whole address."""
+    """With our server as the proxy, it gets the whole address."""
     config = WebConfig(retries=0, proxy=web.url, request_pause_s=0.0)
     with pytest.raises(DownloadFailed):
         offer("http://nowhere.invalid/clip.mp4", "score", FormatConfig(), config)

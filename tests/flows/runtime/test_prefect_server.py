@@ -1,4 +1,4 @@
-"""A Prefect server that is not there, or that knows another password, is told in one line."""
+"""A Prefect server that is not there, or that knows another password, is reported in one line."""
 
 import threading
 from collections.abc import Iterator

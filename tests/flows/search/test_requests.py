@@ -1,4 +1,4 @@
-"""What `find` is asked for, before anything is searched."""
+"""The arguments of `find`, before anything is searched."""
 
 from pathlib import Path
 

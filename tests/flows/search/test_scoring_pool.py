@@ -1,4 +1,4 @@
-"""Candidates are scored by threads, or by Dask where it is asked for, and come out the same."""
+"""Candidates are scored by threads, or by Dask on request, and come out the same."""
 
 import asyncio
 import sys

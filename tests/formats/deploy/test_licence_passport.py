@@ -1,4 +1,4 @@
-"""The licence passport: the strictest licence counts, and what nobody recorded is unknown."""
+"""The licence passport: the strictest licence counts, and what no one recorded is unknown."""
 
 import json
 from dataclasses import replace
@@ -32,7 +32,7 @@ def test_the_strictest_licence_counts_right_by_right() -> None:
 
 
 @pytest.mark.parametrize("licence", ["unknown", "All rights reserved", ""])
-def test_a_licence_that_nobody_knows_makes_the_whole_unknown(licence: str) -> None:
+def test_a_licence_that_no_one_knows_makes_the_whole_unknown(licence: str) -> None:
     assert together([FREE, Ingredient("clip", "film", licence)]) == dict.fromkeys(RIGHTS, "unknown")
 
 

@@ -51,7 +51,7 @@ def test_a_raised_foot_is_in_the_air_still_or_not(speed: float) -> None:
     assert (found == [PLANTED, PLANTED, AIR, AIR]).all()
 
 
-def test_nobody_levitates_outside_free_fall() -> None:
+def test_no_one_levitates_outside_free_fall() -> None:
     assert (states(0.4, 0.5) != AIR).any(1).all()
 
 

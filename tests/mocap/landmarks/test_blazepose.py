@@ -1,4 +1,4 @@
-"""Laws of the repair of a track: gaps are bridged, swapped sides put back, nobody is an error."""
+"""Laws of the repair of a track: gaps are bridged, swapped sides put back, no one is an error."""
 
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ from robojackson.motion.landmark_track import LandmarkTrack
 
 
 def without(track: LandmarkTrack, frames: list[int]) -> LandmarkTrack:
-    """The track with nobody found in some frames."""
+    """The track with no one found in some frames."""
     arrays = [np.array(a) for a in (track.landmarks, track.world_landmarks, track.visibility)]
     for array in arrays:
         array[frames] = np.nan
@@ -88,7 +88,7 @@ def test_undetected_frames_are_invalid_and_invisible(hip_shake: LandmarkTrack) -
     assert not np.isnan(repaired.local).any()
 
 
-def test_nobody_in_the_clip_names_the_frames(hip_shake: LandmarkTrack) -> None:
+def test_no_one_in_the_clip_names_the_frames(hip_shake: LandmarkTrack) -> None:
     with pytest.raises(NoPersonFound, match="no person found in 120 of 120 frames"):
         repair(without(hip_shake, list(range(120))))
 

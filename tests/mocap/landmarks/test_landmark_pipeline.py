@@ -42,7 +42,7 @@ def test_best_asks_both_larger_models_and_they_vote(
     assert np.allclose(found.landmarks, hip_shake.landmarks)
 
 
-def test_one_model_is_asked_once_and_its_track_is_kept(
+def test_one_model_is_requested_once_and_its_track_is_kept(
     followed: list[str], hip_shake: LandmarkTrack
 ) -> None:
     found = look("full")
@@ -77,7 +77,7 @@ def test_pictures_that_pass_by_tell_what_a_second_look_tells(hip_shake: Landmark
 
 
 @pytest.mark.parametrize("size", [(1920, 1080), (480, 640), (300, 320), (100, 90)])
-def test_pictures_are_made_about_as_small_as_wanted(size: tuple[int, int]) -> None:
+def test_pictures_are_made_about_as_small_as_requested(size: tuple[int, int]) -> None:
     small = landmark_pipeline.shrunk(np.zeros((*size, 3), np.uint8))
     assert min(small.shape[:2]) <= 1.2 * landmark_pipeline.SHORT_SIDE
     assert small.shape[0] / small.shape[1] == pytest.approx(size[0] / size[1], rel=0.02)

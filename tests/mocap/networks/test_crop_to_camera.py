@@ -165,7 +165,7 @@ def test_weights_without_smpl_have_no_body() -> None:
     assert body_of(Weights(Path("w48.pth"), "hybrik_hrnet48", {}, {})) is None
 
 
-def test_a_body_of_another_size_is_told(tables: dict[str, torch.Tensor]) -> None:
+def test_a_body_of_another_size_is_reported(tables: dict[str, torch.Tensor]) -> None:
     other = tables | {"v_template": torch.zeros(10475, 3)}
     with pytest.raises(BadWeights, match=r"'v_template' is \(10475, 3\), expected \(6890, 3\)"):
         body_of(Weights(Path("w48.pth"), "hybrik_hrnet48", {}, other))

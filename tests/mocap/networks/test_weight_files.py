@@ -1,4 +1,4 @@
-"""Files of weights: what is loaded, what is refused, and what the user is told."""
+"""Files of weights: what is loaded, what is refused, and what the user is reported."""
 
 import pickle
 from pathlib import Path
@@ -94,7 +94,7 @@ def test_a_plain_pickle_is_refused_and_does_not_run(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", [".pth", ".safetensors"])
-def test_a_truncated_file_is_told(
+def test_a_truncated_file_is_reported(
     tmp_path: Path, weights: dict[str, torch.Tensor], suffix: str
 ) -> None:
     path = tmp_path / f"whole{suffix}"
@@ -109,25 +109,25 @@ def test_a_truncated_file_is_told(
 
 
 @pytest.mark.parametrize("content", [b"", b"\x00" * 64, b"<html>quota exceeded</html>"])
-def test_something_else_than_weights_is_told(tmp_path: Path, content: bytes) -> None:
+def test_something_else_than_weights_is_reported(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "weights.pth"
     path.write_bytes(content)
     with pytest.raises(BadWeights, match=r"weights\.pth"):
         read_weights(path, "hybrik")
 
 
-def test_a_missing_file_is_told(tmp_path: Path) -> None:
+def test_a_missing_file_is_reported(tmp_path: Path) -> None:
     with pytest.raises(BadWeights, match="no such file"):
         read_weights(tmp_path / "nowhere.pth", "hybrik")
 
 
-def test_a_foreign_network_is_told_by_its_keys(tmp_path: Path) -> None:
+def test_a_foreign_network_is_reported_by_its_keys(tmp_path: Path) -> None:
     path = saved(tmp_path / "foreign.pth", {"backbone.conv1.weight": torch.zeros(1)})
     with pytest.raises(BadWeights, match=r"hybrik_hrnet48.*backbone\.conv1\.weight"):
         read_weights(path, "hybrik")
 
 
-def test_niki_in_the_place_of_hybrik_is_told(
+def test_niki_in_the_place_of_hybrik_is_reported(
     tmp_path: Path, weights: dict[str, torch.Tensor]
 ) -> None:
     with pytest.raises(BadWeights, match="holds niki_one_stage, expected weights of hybrik"):
@@ -150,7 +150,7 @@ def test_missing_unexpected_and_misshapen_keys_are_named(
     assert "regressor.flow.t.0.0.bias is (7,), expected (512,)" in message
 
 
-def test_weights_that_are_not_finite_are_told(
+def test_weights_that_are_not_finite_are_reported(
     tmp_path: Path, weights: dict[str, torch.Tensor]
 ) -> None:
     spoilt = dict(weights)
@@ -175,7 +175,7 @@ def test_niki_alone_is_refused() -> None:
         NetworkConfig(niki="niki.pth")
 
 
-def test_a_gpu_that_is_not_there_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_gpu_that_is_not_there_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
     with pytest.raises(BadConfiguration, match="PyTorch sees no GPU"):
         device_of(NetworkConfig(hybrik="x", device="cuda"))

@@ -182,7 +182,7 @@ def test_a_state_that_blows_up_ends_its_episode(robot: Robot, sway: ReferenceMot
 def test_a_settled_state_comes_back_at_its_own_step_and_place(
     robot: Robot, sway: ReferenceMotion
 ) -> None:
-    """A state kept on cycle 3 begins anew on cycle 0, as far from its reference as it was."""
+    """A state kept on cycle 3 begins again on cycle 0, as far from its reference as it was."""
     moved = dataclasses.replace(sway, cycle_offset=np.array([0.5, 0.0, 0.0]))
     reset = ResetConfig(settled_share=1.0, stand_share=0.0)
     config = TrackConfig(episode_seconds=0.015, reset=reset)
@@ -196,7 +196,7 @@ def test_a_settled_state_comes_back_at_its_own_step_and_place(
     np.testing.assert_allclose(env.sim.qpos[:, :2] - home, [[0.07, 0.0]] * env.n, atol=0.02)
 
 
-def test_the_default_stand_touches_the_floor_and_faces_as_asked(robot: Robot) -> None:
+def test_the_default_stand_touches_the_floor_and_faces_as_requested(robot: Robot) -> None:
     stand = default_standing_pose(robot)
     turned = standing_pose_at(stand, np.array([1.0, 2.0, 9.0, np.cos(0.6), 0.0, 0.0, np.sin(0.6)]))
     data = mujoco.MjData(robot.model)

@@ -110,7 +110,7 @@ def test_curiosity_pays_the_sum_of_absolute_hinge_speeds(preset: str, bonus: flo
     assert found["curiosity"] == pytest.approx(bonus)
 
 
-def test_nobody_is_paid_for_hanging_upside_down() -> None:
+def test_no_one_is_paid_for_hanging_upside_down() -> None:
     assert terms(PaperConfig(), state(upright=np.full(1, -0.8)))["upright"] == 0.0
 
 
@@ -327,7 +327,7 @@ def test_a_setup_is_a_difference_in_data(mode: str, setup: str) -> None:
     assert beta == ("formula" if "curiosity" in setup else "off")
 
 
-def test_paper_mode_learns_with_the_papers_numbers_unless_told() -> None:
+def test_paper_mode_learns_with_the_papers_numbers_unless_reported() -> None:
     assert TrainConfig(mode="paper").tqc.learning_rate == 3e-4
     released = load(TrainConfig, None, {"mode": "paper", "tqc": "{preset: released, batch: 64}"})
     assert (released.tqc.actor, released.tqc.batch) == ((512, 512, 512), 64)

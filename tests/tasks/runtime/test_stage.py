@@ -86,7 +86,7 @@ class Standin:
         self.ran: list[str] = importlib.import_module("standin_io").ran
 
     def rewrite(self, module: str, old: str, new: str) -> None:
-        """Edit a module of the package, and load it anew as another process would."""
+        """Edit a module of the package, and load it again as another process would."""
         path = self.folder / f"{module}.py"
         text = path.read_text()
         assert old in text
