@@ -172,7 +172,6 @@ def test_the_server_refuses_strangers(stack: Stack) -> None:
     assert run.returncode != 0
 
 
-@pytest.mark.ci
 def test_no_secret_is_in_logs_results_pages_or_the_database(stack: Stack) -> None:
     """After what the tests above have run: studies that ended well, failed, and were refused."""
     given = {
