@@ -58,7 +58,7 @@ class HolosomaPolicy:
         self.session = InferenceSession(path.read_bytes(), providers=["CPUExecutionProvider"])
         self.description = TrackerDescription(
             name=f"holosoma_{kind}", robot="g1", network="regulator", licence="Apache-2.0",
-            trained_on="the motion that it dances", homepage="https://pypi.org/project/holosoma-inference/",
+            trained_on="the motion that it dances", homepage="https://github.com/amazon-far/holosoma",
             control_dt=DT,
         )  # fmt: skip
         self.window: tuple[int, ...] = (0,)
