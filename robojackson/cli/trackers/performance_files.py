@@ -14,7 +14,8 @@ from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.yaml_loader import load
 from robojackson.report.pages.performance_page import performance_page
 from robojackson.retarget.performance.programme import ProgrammeConfig
-from robojackson.rl.evaluation.performance import PartRow, PerformanceConfig, RunRow, Summary
+from robojackson.rl.evaluation.performance import PerformanceConfig
+from robojackson.rl.evaluation.performance_record import PartRow, RunRow, Summary
 
 FILM, PAGE = "performance.mp4", "index.html"
 COLUMNS = ("seconds", "began", "whole", "mpjpe_l_m")

@@ -7,7 +7,7 @@ from robojackson.files.file_tree import FileTree
 from robojackson.report.pages import inline
 from robojackson.report.pages.evaluation_text import Verdict
 from robojackson.report.quantities import Quantity, format_value
-from robojackson.rl.evaluation.performance import PartRow, RunRow, Summary
+from robojackson.rl.evaluation.performance_record import PartRow, RunRow, Summary
 
 PART_COLUMNS = ("part", "length", "runs that began", "danced whole", "infeasible", "error")
 RUN_COLUMNS = ("seed", "up for", "given up", "danced", "carried off", "away", "error")
