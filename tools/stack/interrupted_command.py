@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -71,15 +72,14 @@ class Running:
                 raise TimeoutError(self.said())
 
     def wait_until_guarded(self, limit_s: float = LIMIT_S) -> None:
-        """Return when the command's supervisor waits for signals, which it blocks for that.
+        """Return when the command's supervisor has started its worker, and so takes signals.
 
         Raises:
-            TimeoutError: It does not.
+            TimeoutError: It has not.
         """
-        status, deadline = Path(f"/proc/{self.process.pid}/status"), time.monotonic() + limit_s
+        deadline = time.monotonic() + limit_s
         while time.monotonic() < deadline:
-            blocked = next(line for line in status.read_text().splitlines() if "SigBlk" in line)
-            if int(blocked.split()[1], 16) & 1 << (signal.SIGINT - 1):
+            if self.process.pid in parents():
                 return
             time.sleep(0.01)
         raise TimeoutError(self.said())
@@ -134,6 +134,15 @@ class Running:
             with self._changed:
                 self._lines.append((time.monotonic(), line.rstrip()))
                 self._changed.notify_all()
+
+
+def parents() -> set[int]:
+    """Return the parents of all living processes."""
+    found = set()
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):  # ended meanwhile
+            found.add(int(stat.read_text().rpartition(")")[2].split()[1]))
+    return found
 
 
 def living_with(variable: str) -> dict[int, str]:
