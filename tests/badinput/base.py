@@ -1,5 +1,6 @@
 """The files that cases are made of: the motions of the bundled clip and a policy, made once."""
 
+import fcntl
 import pickle
 import shutil
 import subprocess
@@ -25,8 +26,15 @@ MADE = (
 
 
 def base() -> Path:
-    """The folder with all of them; what is there is left alone."""
+    """Return the folder with all of them; existing ones stay. One process at a time makes them."""
     BASE.mkdir(parents=True, exist_ok=True)
+    with (BASE / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        _make()
+    return BASE
+
+
+def _make() -> None:
     for name, words in MADE:
         if not (BASE / name).is_file():
             command = [sys.executable, "-m", "robojackson", *words]
@@ -38,4 +46,3 @@ def base() -> Path:
         with np.load(BASE / "amass.npz") as motion:
             found = {"smpl_poses": motion["poses"][:, :72], "smpl_trans": motion["trans"]}
         (BASE / "aist.pkl").write_bytes(pickle.dumps({**found, "smpl_scaling": np.ones(1)}))
-    return BASE
