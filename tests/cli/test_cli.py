@@ -12,8 +12,8 @@ import av
 import numpy as np
 import pytest
 
+from robojackson.cli import scoring
 from robojackson.cli.console import lines, to_json_types
-from robojackson.clips import pose_detector
 from robojackson.errors import TruncatedVideo
 from tests.fixtures.commands import ROOT, environment, in_process, robojackson
 
@@ -138,14 +138,14 @@ def test_a_clip_without_a_person_has_a_score(tmp_path: Path) -> None:
 def test_a_video_that_breaks_off_while_it_is_looked_at_loses_no_other_score(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    detect = pose_detector.detect
+    in_process = scoring.in_video_process
 
-    def breaks_off(video: Path, *rest: Any) -> Any:
+    def breaks_off(function: Any, video: Path, *rest: Any, **more: Any) -> Any:
         if video.name == "b.mp4":
             raise TruncatedVideo(f"{video}: damaged")
-        return detect(video, *rest)
+        return in_process(function, video, *rest, **more)
 
-    monkeypatch.setattr(pose_detector, "detect", breaks_off)
+    monkeypatch.setattr(scoring, "in_video_process", breaks_off)
     clips = [write_video(tmp_path / name, 5) for name in ("a.mp4", "b.mp4", "c.mp4")]
     code, out, _ = invoke("score", *clips, "--json")
     told = [set(video) & {"error", "stability_score"} for video in json.loads(out)["videos"]]

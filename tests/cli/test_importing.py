@@ -76,7 +76,7 @@ def test_what_was_imported_can_be_retargeted(smpl: Path, tmp_path: Path) -> None
 
 @pytest.mark.parametrize("to", ["gmr", "keyframes"])
 def test_a_format_for_robots_does_not_fit_a_person(to: str, smpl: Path, tmp_path: Path) -> None:
-    with pytest.raises(UnknownName, match=r"holds a person's.*Known: amass, bvh, csv, gvhmr"):
+    with pytest.raises(UnknownName, match=r"holds a person's.*Known: amass, bvh, csv, gltf, gvhmr"):
         export(smpl, to, tmp_path / "motion")
 
 

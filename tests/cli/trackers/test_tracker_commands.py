@@ -147,7 +147,7 @@ def test_an_altered_file_is_refused_and_added_again(pin, tmp_path: Path, network
 
 def test_without_the_file_the_error_is_the_command_that_brings_it(pin, tmp_path: Path) -> None:
     pin()
-    with pytest.raises(BadPolicy, match=r"not here .*; run: robojackson trackers add standin"):
+    with pytest.raises(BadPolicy, match=r"not installed .*; run: robojackson trackers add standin"):
         open_tracker(stand_in(tmp_path)[1])
 
 
