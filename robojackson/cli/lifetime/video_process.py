@@ -124,7 +124,7 @@ class _Reader:
         until = time.monotonic() + seconds
         try:
             with suppress(BrokenPipeError, ConnectionResetError):  # the answer has the cause
-                self._connection.send((function, args, progress is not None))
+                self._connection.send((os.getcwd(), function, args, progress is not None))
             while self._connection.poll(max(until - time.monotonic(), 0.0)):
                 kind, value = self._answer()
                 if kind != REPORT:
@@ -185,7 +185,8 @@ def _serve(parent: int, connection: Connection) -> None:
     cv2.setNumThreads(1)
     with limited_memory(VIDEO_MEMORY), suppress(EOFError, BrokenPipeError):
         while True:
-            function, args, reports = connection.recv()
+            folder, function, args, reports = connection.recv()
+            os.chdir(folder)  # names may be relative to the caller's current folder
             more = {"progress": _Reporter(connection)} if reports else {}
             connection.send(_outcome(function, args, more))
 
