@@ -54,5 +54,5 @@ def test_a_large_file_and_a_device_are_not_read(tmp_path: Path) -> None:
 def test_the_ceiling_fails_an_allocation_and_goes_away() -> None:
     before = resource.getrlimit(resource.RLIMIT_DATA)
     with limited_memory(2**26), pytest.raises(MemoryError):
-        np.ones(2**26)
+        np.empty(2**30)  # 8 GB: more than the process may have freed before
     assert resource.getrlimit(resource.RLIMIT_DATA) == before
