@@ -19,7 +19,7 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.rollout import Rollout
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.pipeline.run_names import motion_name
-from robojackson.pipeline.tracker_descriptions import require_tracker
+from robojackson.pipeline.tracker_descriptions import require_tracker, usual_robot
 from robojackson.retarget.performance.programme import Programme, ProgrammeConfig, plan
 from robojackson.retarget.retarget_config import RetargetConfig
 from robojackson.rl.evaluation import performance
@@ -77,7 +77,7 @@ class Performance:
 
 def perform(
     dances: Sequence[Dance],
-    robot: RobotLike = "g1",
+    robot: RobotLike | None = None,
     *,
     tracker: str | Tracker | None = None,
     config: PerformanceConfig | None = None,
@@ -89,7 +89,7 @@ def perform(
 
     Args:
         dances: Videos, motions of people, or reference motions of the robot; or files of them.
-        robot: Name, YAML file, or what `load_robot` returned.
+        robot: Name, YAML file, or what `load_robot` returned; the first tracker's when None.
         tracker: Who dances: a name of configs/trackers or a tracker; the robot's first one that is
             here when None.
         config: Runs, pushes, and when a robot gives a part up.
@@ -105,7 +105,8 @@ def perform(
         BadPolicy: no tracker for the robot is here.
         UnreadableVideo, NoPersonFound, ...: see `recover_motion` and `retarget_motion`.
     """
-    machine, solving = load_robot(robot), retarget or RetargetConfig()
+    machine = load_robot(usual_robot() if robot is None else robot)
+    solving = retarget or RetargetConfig()
     who = _tracker(tracker, machine)
     motions = [_motion(dance, i, machine, solving) for i, dance in enumerate(dances)]
     planned = plan(motions, machine, programme or ProgrammeConfig(), solving)

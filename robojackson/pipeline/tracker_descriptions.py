@@ -32,6 +32,11 @@ def describe_tracker(name: str) -> TrackerDescription:
     return found
 
 
+def usual_robot() -> str:
+    """Return the robot of the first tracker, for what needs a tracker and names no robot."""
+    return describe_tracker(tracker_names()[0]).robot
+
+
 def trackers_of(robot: str) -> list[TrackerDescription]:
     """Return the trackers that drive a robot, in the order of their names."""
     return [each for each in map(describe_tracker, tracker_names()) if each.robot == robot]

@@ -171,8 +171,8 @@ def test_names_are_found_from_any_folder(monkeypatch, tmp_path) -> None:
     [
         ({"tqc.quantiles": 2}, "must leave some of the 2 quantiles"),
         ({"tqc.buffer": 2000}, "room for 1984 transitions .* begin after 2000: raise buffer"),
-        ({"mode": "paper", "paper.curiosity": "formula"}, "say curiosity=formula instead"),
-        ({"track.reward.curiosity": "formula"}, "say curiosity=formula instead"),
+        ({"mode": "paper", "paper.curiosity": "formula"}, "set curiosity=formula instead"),
+        ({"track.reward.curiosity": "formula"}, "set curiosity=formula instead"),
         ({"track.random.integrators": ["RK5"]}, "integrators"),
         ({"mode": "paper", "paper.weights": {}}, "one at least must count"),
     ],

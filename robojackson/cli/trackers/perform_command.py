@@ -20,7 +20,9 @@ def perform(
         typer.Argument(help="Videos, smpl.parquet or reference.parquet, in the order of dances."),
     ],
     out: Folder,
-    robot: Annotated[str, typer.Option(help="Name or YAML of the robot.")] = "g1",
+    robot: Annotated[
+        str | None, typer.Option(help="Name or YAML of the robot; the first tracker's.")
+    ] = None,
     tracker: Annotated[
         str | None,
         typer.Option(help="Who dances (`robojackson trackers`); the first one here."),
@@ -42,13 +44,14 @@ def perform(
     """Stand, dance one dance after the other, pushed as it goes, and stand: film, page, table."""
     from robojackson.cli import cards
     from robojackson.cli.trackers import performance_files
+    from robojackson.pipeline.tracker_descriptions import usual_robot
     from robojackson.retarget.performance.programme import ProgrammeConfig
     from robojackson.rl.evaluation.performance import PerformanceConfig
 
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     log_to_stderr()
     answer = performance_files.perform(
-        dances, out, robot, tracker,
+        dances, out, robot or usual_robot(), tracker,
         PerformanceConfig(runs=runs, seed=seed, pushes=pushes), ProgrammeConfig(dance_s=seconds),
         config, overrides_from(set_, {}), film,
     )  # fmt: skip
