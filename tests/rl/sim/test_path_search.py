@@ -106,6 +106,7 @@ def test_the_regulator_that_keeps_robots_up_longer_is_taken(
     action, feet = residual_scale(robot, ControlConfig()), Feet(robot)
     monkeypatch.setattr(sampled_regulator, "regulator", lambda *given: plain)
     monkeypatch.setattr(sampled_regulator, "PASSES", 1)
+    monkeypatch.setattr(sampled_regulator, "TRIES", 1)
     for shares, anchored in (((1.0,), False), ((0.5, 0.4), False), ((0.5, 0.6), True)):
         held = iter(shares)
         monkeypatch.setattr(sampled_regulator, "_held_share", lambda *given, held=held: next(held))
