@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
+from robojackson.geometry.blends import minimum_jerk
 from robojackson.geometry.rotations import heading
 from robojackson.motion.floor_move import FloorMove
 from robojackson.motion.reference_motion import ReferenceMotion
@@ -96,7 +97,7 @@ def way(
     points, yaw = pose(tree(robot), both).site_pos, float(heading(start[3:7]))
     feet, goal = (feet_of(each, yaw, robot) for each in points)
     keypoints, contact = _way_targets(points, feet, goal, yaw, robot, dt)
-    share = _minimum_jerk(len(keypoints) - round(REST_S / dt), len(keypoints))[:, None]
+    share = _shares(len(keypoints) - round(REST_S / dt), len(keypoints))[:, None]
     ends = continuous(both)
     guess = (1 - share) * ends[:1] + share * ends[1:]
     guess[:, 3:7] /= np.linalg.norm(guess[:, 3:7], axis=1, keepdims=True)
@@ -112,7 +113,7 @@ def _way_targets(
 ) -> tuple[Float[np.ndarray, "N K 3"], Int[np.ndarray, "N C"]]:
     """Return the keypoints of a way between two stands, and the contact states."""
     steps, rest = round(BLEND_S / dt), round(REST_S / dt)
-    share = _minimum_jerk(steps, steps)[:, None, None]
+    share = _shares(steps, steps)[:, None, None]
     first, last = points
     if all(feet[side].near(goal[side], SAME_SHARE) for side in SIDES):
         parts, air = [first + share * (last - first)], np.zeros((0, 2), bool)
@@ -165,7 +166,7 @@ def _pinned(
 ) -> Float[np.ndarray, "N nq"]:
     """Return a way that begins and ends exactly in the stands that it joins."""
     count = max(2, min(round(FADE_S / dt), len(qpos) // 2))
-    found, fade = qpos.copy(), 1 - _minimum_jerk(count, count)[:, None]
+    found, fade = qpos.copy(), 1 - _shares(count, count)[:, None]
     fade = np.concatenate([[[1.0]], fade[:-1]])
     for rows, end in ((slice(0, count), ends[0]), (slice(len(qpos) - 1, -count - 1, -1), ends[1])):
         part = found[rows]
@@ -176,7 +177,7 @@ def _pinned(
     return continuous(found)
 
 
-def _minimum_jerk(steps: int, count: int) -> Float[np.ndarray, " N"]:
+def _shares(steps: int, count: int) -> Float[np.ndarray, " N"]:
     """Return shares of a way from rest to rest, without its beginning; 1 after so many steps."""
     t = np.minimum(np.arange(1, count + 1) / steps, 1.0)
-    return np.asarray(t**3 * (10 - 15 * t + 6 * t**2))
+    return minimum_jerk(t)

@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float
 
+from robojackson.geometry.blends import minimum_jerk
 from robojackson.geometry.rotations import wrapped
 from robojackson.robot.model import Robot
 
@@ -214,7 +215,7 @@ def _smooth(seconds: float, dt: float) -> Float[np.ndarray, " N"]:
     """Return the shares of a way from rest to rest, without its beginning: fifth-order
     polynomial."""
     t = np.arange(1, max(2, round(seconds / dt)) + 1) / max(2, round(seconds / dt))
-    return np.asarray(t**3 * (10 - 15 * t + 6 * t**2))
+    return minimum_jerk(t)
 
 
 def _turn(start: float, end: float) -> float:

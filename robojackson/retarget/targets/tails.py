@@ -18,6 +18,7 @@ from pydantic import Field
 from scipy.spatial.transform import Rotation, Slerp
 
 from robojackson.config import config_dataclass
+from robojackson.geometry.blends import minimum_jerk
 from robojackson.motion.smpl_sequence import AIR, PLANTED
 from robojackson.retarget.targets.footsteps import (
     SIDES,
@@ -117,7 +118,7 @@ def settled(
         time = np.arange(count) * dt
         time = time[::-1] if stand.start == 0 else time
         share = np.clip(time / SETTLE_S, 0.0, 1.0)
-        way = (share**3 * (10 - 15 * share + 6 * share**2))[:, None]
+        way = minimum_jerk(share)[:, None]
         same = np.sign(np.sum(qpos[stand, 3:7] * held[3:7], -1, keepdims=True))
         target = np.repeat(held[None], count, 0)
         target[:, 3:7] *= same
@@ -186,7 +187,7 @@ def _polynomial(
     """Return a path from a place and a speed (per unit of time) to rest, without acceleration at
     both ends."""
     t = time[:, None, None]
-    way = t**3 * (10 - 15 * t + 6 * t**2)
+    way = minimum_jerk(t)
     swing = t - t**3 * (6 - 8 * t + 3 * t**2)
     return np.asarray(start + way * (end - start) + swing * speed)
 

@@ -9,18 +9,18 @@ import io
 import json
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from zipfile import BadZipFile
 
 import numpy as np
-from jaxtyping import Float, Int
 
 from robojackson.errors import StoreError
 from robojackson.files.file_tree import FileTree
 from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
 from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.sim import sampled_regulator
+from robojackson.rl.sim.feedback_law import Feedback
 from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.motors import actuation_facts, feedback_share, residual_scale
 from robojackson.rl.sim.nominal_path import Gains, Progress, no_progress
@@ -28,7 +28,6 @@ from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.regulator import regulator, settings
 from robojackson.rl.sim.simulation import Simulation, resolved
 from robojackson.rl.sim.standing_feet import Feet
-from robojackson.rl.sim.tangent import state_difference
 from robojackson.robot.mjcf import robots_folder
 from robojackson.robot.model import Robot
 
@@ -39,55 +38,6 @@ VARIED = ("body_mass", "body_ipos", "body_inertia", "geom_friction", "dof_armatu
 LARGEST = 2.0
 """Largest offset of a target by the feedback, in full actions of a policy: small enough that a
 policy of a few minutes can correct it."""
-
-
-@dataclass(frozen=True)
-class StepFeedback:
-    """The feedback of N robots at one step of their references."""
-
-    gain: Float[np.ndarray, "N nu X"]
-    offset: Float[np.ndarray, "N nu"]
-    qpos: Float[np.ndarray, "N nq"]
-    qvel: Float[np.ndarray, "N nv"]
-    limit: Float[np.ndarray, " nu"]
-    feet: Feet
-    places: Float[np.ndarray, "N F 3"]
-
-    def targets(
-        self, qpos: Float[np.ndarray, "N nq"], qvel: Float[np.ndarray, "N nv"]
-    ) -> Float[np.ndarray, "N nu"]:
-        """Return the offsets of the motors' targets, rad."""
-        apart = state_difference(qpos, qvel, self.qpos, self.qvel)
-        moved = np.isfinite(self.places[:, 0, 0])
-        if moved.any():
-            apart[moved, :2] -= self.feet.apart(qpos[moved], self.places[moved])
-        turned = (self.gain @ apart[:, :, None])[:, :, 0] + self.offset
-        result: np.ndarray = -np.clip(turned, -self.limit, self.limit)
-        return result
-
-
-@dataclass(frozen=True)
-class Feedback:
-    """The feedback along one motion or several, their steps one after the other.
-
-    Attributes:
-        gains: Gains and nominal states, scaled by the share of the control law.
-        limit: Largest offset of each target, rad.
-        feet: The robot's feet.
-    """
-
-    gains: Gains
-    limit: Float[np.ndarray, " nu"]
-    feet: Feet
-
-    def at(self, row: Int[np.ndarray, " N"], shift: Float[np.ndarray, "N 3"]) -> StepFeedback:
-        """Return the feedback at rows of the joined motions, whose cycles have moved them by
-        `shift`, m."""
-        gains = self.gains
-        qpos = gains.qpos[row]
-        qpos[:, :3] += shift
-        found = (gains.gain[row], gains.offset[row], qpos, gains.qvel[row])
-        return StepFeedback(*found, self.limit, self.feet, gains.places[row] + shift[:, None])
 
 
 def feedback_of(
@@ -123,7 +73,7 @@ def _cached(
     if path.is_file():
         # A damaged file is computed again.
         with suppress(OSError, ValueError, KeyError, BadZipFile), np.load(path) as arrays:
-            found = Gains(*(arrays[one.name].astype(float) for one in fields(Gains)))
+            found = Gains(*(arrays[name].astype(float) for name in ARRAYS))
             if _fits(found, robot, motion):
                 return found
     gains = regulator_of(robot, motion, control, progress)

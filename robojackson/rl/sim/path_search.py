@@ -82,7 +82,6 @@ class PathSearch:
         self._sim, self._action, self._feet = sim, action, feet
         self._reference, self._rng = reference, rng
         self._places = feet.places(reference.qpos)
-        self._own = np.zeros((len(reference), 2))
 
     def run(self, path: Path, law: Recursion, begin: int) -> tuple[Path, bool]:
         """Return a simulated path from a step of another on, and whether it reaches the end."""
@@ -90,12 +89,12 @@ class PathSearch:
         none = np.zeros((1, len(self._action)))
         first = _Beam(path.qpos[[begin]], path.qvel[[begin]], none, np.zeros((1, 2)), np.zeros(1))
         beam, windows, t = first.of(rows), list[_Window](), begin
-        self._own = self._feet.apart(path.qpos, self._places)
+        aside = self._feet.apart(path.qpos, self._places)
         beam.shift = self._feet.apart(beam.qpos, self._places[begin])
         upright = True
         while upright and t < len(path) - 1:
             steps = min(WINDOW, len(path) - 1 - t)
-            beam, window = self._window(beam, path, law, t, steps)
+            beam, window = self._window(beam, path, aside, law, t, steps)
             windows.append(window)
             t += steps
             beam.shift = self._feet.apart(beam.qpos, self._places[t])
@@ -114,7 +113,13 @@ class PathSearch:
         return Path(*parts)
 
     def _window(
-        self, beam: _Beam, path: Path, law: Recursion, t: int, steps: int
+        self,
+        beam: _Beam,
+        path: Path,
+        aside: Float[np.ndarray, "T 2"],
+        law: Recursion,
+        t: int,
+        steps: int,
     ) -> tuple[_Beam, _Window]:
         rng, action = self._rng, self._action
         parent = np.concatenate([np.arange(KEPT), rng.integers(0, KEPT, SAMPLES - KEPT)])
@@ -124,30 +129,24 @@ class PathSearch:
         states = []
         for k in range(steps):
             offset = now.offset + (aim - now.offset) * min(1.0, (k + 1) / (0.6 * steps))
-            apart = self._apart(now, path, t + k)
+            apart = _apart(now, path, aside, t + k)
             fed = apart @ law.gain[t + k].T + law.offset[t + k]
             moved = offset - np.clip(fed, -LARGEST_FEEDBACK * action, LARGEST_FEEDBACK * action)
             targets = path.targets[t + k] + moved
             now.qpos, now.qvel = advance(self._sim, now.qpos, now.qvel, targets)
             states.append((now.qpos, now.qvel, targets))
-            apart = self._apart(now, path, t + k + 1)
+            apart = _apart(now, path, aside, t + k + 1)
             now.cost = now.cost + apart**2 @ state_cost + OFFSET_COST * offset**2 @ effort
         last = t + steps
         ahead = (
             np.einsum("ni,ij,nj->n", apart, law.value[last], apart) + 2 * apart @ law.slope[last]
         )
-        aside = now.qpos[:, :2] - self._reference.qpos[last, :2]
-        score = now.cost + ahead + PLACE_COST * (aside**2).sum(1)
+        away = now.qpos[:, :2] - self._reference.qpos[last, :2]
+        score = now.cost + ahead + PLACE_COST * (away**2).sum(1)
         rows = _best(np.where(np.isfinite(score), score, np.inf), parent)
         now.offset = aim
         chosen = [(qpos[rows], qvel[rows], targets[rows]) for qpos, qvel, targets in states]
         return now.of(rows), _Window(parent[rows], chosen)
-
-    def _apart(self, beam: _Beam, path: Path, t: int) -> Float[np.ndarray, "N X"]:
-        """Return the distance of robots from a path that is moved to their feet."""
-        apart = state_difference(beam.qpos, beam.qvel, path.qpos[t], path.qvel[t])
-        apart[:, :2] -= beam.shift - self._own[t]
-        return apart
 
     def _offsets(self, beam: _Beam, gain: Float[np.ndarray, "nu X"]) -> Float[np.ndarray, "N nu"]:
         """Draw the offsets of a window; the first robots have none."""
@@ -167,6 +166,19 @@ class PathSearch:
         limit = LARGEST_OFFSET * self._action
         result: np.ndarray = np.clip(offset, -limit, limit)
         return result
+
+
+def _apart(
+    beam: _Beam, path: Path, aside: Float[np.ndarray, "T 2"], t: int
+) -> Float[np.ndarray, "N X"]:
+    """Return the distances of robots from a path that is moved to where they stand.
+
+    Args:
+        aside: How far the path's own feet are from the motion's, along the floor.
+    """
+    apart = state_difference(beam.qpos, beam.qvel, path.qpos[t], path.qvel[t])
+    apart[:, :2] -= beam.shift - aside[t]
+    return apart
 
 
 def _best(score: Float[np.ndarray, " N"], parent: Int[np.ndarray, " N"]) -> Int[np.ndarray, " M"]:

@@ -4,6 +4,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from robojackson.rl.sim import path_search
+from robojackson.rl.sim.feedback_law import Feedback
 from robojackson.rl.sim.nominal_path import Gains, Linear, Path, Progress, no_progress
 from robojackson.rl.sim.path_search import LOST_RAD, WINDOW, PathSearch
 from robojackson.rl.sim.reference_clip import Clip
@@ -54,13 +55,13 @@ def sampled_regulator(
     """
     best, motion, linear = regulator(sim, clip, action, feet.count, progress)
     held = _held_share(sim, clip, action, feet, best, motion)
+    if held == 1.0:
+        return best
     cycles = max(3, int(np.ceil(CYCLES_S / (clip.steps * clip.dt)))) if clip.cyclic else 1
     reference = reference_path(sim, clip, cycles * clip.steps)
     linear = _repeated(linear, cycles)
     tries = int(np.clip(TRIED_S / (len(reference) * clip.dt), 1, TRIES))
     for number in range(tries):
-        if held == 1.0:
-            break
         rng = np.random.default_rng([seed, number])
         search = PathSearch(sim, action, feet, reference, rng)
         path, along = _searched(search, sim, reference, linear, action, clip.dt, progress)
@@ -68,6 +69,8 @@ def sampled_regulator(
         share = _held_share(sim, clip, action, feet, found, motion)
         if share > held:
             best, held = found, share
+        if held == 1.0:
+            break
     return best
 
 
@@ -105,21 +108,15 @@ def _held_share(
     """
     last = clip.steps if clip.cyclic else clip.steps // 4
     start = np.linspace(0, last, STARTS, endpoint=False).astype(int)
-    at, most = clip.at(start), LARGEST_MOVE * action
-    qpos, qvel, upright = at.qpos.copy(), at.qvel.copy(), np.ones(STARTS, bool)
+    at, upright = clip.at(start), np.ones(STARTS, bool)
+    qpos, qvel = at.qpos, at.qvel
     steps = round(HELD_S / clip.dt) if clip.cyclic else clip.steps - 1 - int(start[-1])
-    held = np.zeros(STARTS)
+    held, law = np.zeros(STARTS), Feedback(gains, LARGEST_MOVE * action, feet)
     for k in range(steps):
         row = (start + k) % clip.steps
         there = clip.at(start + k).qpos
-        moved = there[:, :3] - clip.at(row).qpos[:, :3]
-        nominal = gains.qpos[row]
-        nominal[:, :3] += moved
-        apart = state_difference(qpos, qvel, nominal, gains.qvel[row])
-        places = gains.places[row] + moved[:, None]
-        apart[:, :2] -= np.nan_to_num(feet.apart(qpos, places))
-        fed = np.einsum("nij,nj->ni", gains.gain[row], apart) + gains.offset[row]
-        qpos, qvel = advance(sim, qpos, qvel, path.targets[row] - np.clip(fed, -most, most))
+        step = law.at(row, there[:, :3] - clip.at(row).qpos[:, :3])
+        qpos, qvel = advance(sim, qpos, qvel, path.targets[row] + step.targets(qpos, qvel))
         tilt = state_difference(qpos, qvel, there, qvel)[:, 3:6]
         upright &= np.less(np.linalg.norm(tilt, axis=1), LOST_RAD)
         held += upright

@@ -1,0 +1,59 @@
+"""How gains along a motion move the targets of motors. World frame, metres, radians."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from robojackson.rl.sim.nominal_path import Gains
+from robojackson.rl.sim.standing_feet import Feet
+from robojackson.rl.sim.tangent import state_difference
+
+
+@dataclass(frozen=True)
+class StepFeedback:
+    """The feedback of N robots at one step of their references."""
+
+    gain: Float[np.ndarray, "N nu X"]
+    offset: Float[np.ndarray, "N nu"]
+    qpos: Float[np.ndarray, "N nq"]
+    qvel: Float[np.ndarray, "N nv"]
+    limit: Float[np.ndarray, " nu"]
+    feet: Feet
+    places: Float[np.ndarray, "N F 3"]
+
+    def targets(
+        self, qpos: Float[np.ndarray, "N nq"], qvel: Float[np.ndarray, "N nv"]
+    ) -> Float[np.ndarray, "N nu"]:
+        """Return the offsets of the motors' targets, rad."""
+        apart = state_difference(qpos, qvel, self.qpos, self.qvel)
+        moved = np.isfinite(self.places[:, 0, 0])
+        if moved.any():
+            apart[moved, :2] -= self.feet.apart(qpos[moved], self.places[moved])
+        turned = (self.gain @ apart[:, :, None])[:, :, 0] + self.offset
+        result: np.ndarray = -np.clip(turned, -self.limit, self.limit)
+        return result
+
+
+@dataclass(frozen=True)
+class Feedback:
+    """The feedback along one motion or several, their steps one after the other.
+
+    Attributes:
+        gains: Gains and nominal states, scaled by the share of the control law.
+        limit: Largest offset of each target, rad.
+        feet: The robot's feet.
+    """
+
+    gains: Gains
+    limit: Float[np.ndarray, " nu"]
+    feet: Feet
+
+    def at(self, row: Int[np.ndarray, " N"], shift: Float[np.ndarray, "N 3"]) -> StepFeedback:
+        """Return the feedback at rows of the joined motions, whose cycles have moved them by
+        `shift`, m."""
+        gains = self.gains
+        qpos = gains.qpos[row]
+        qpos[:, :3] += shift
+        found = (gains.gain[row], gains.offset[row], qpos, gains.qvel[row])
+        return StepFeedback(*found, self.limit, self.feet, gains.places[row] + shift[:, None])
