@@ -8,7 +8,7 @@
     print(rj.evaluate_policy(trained.policy, reference))
 
 Each function takes a path or what an earlier one returned; each result has `save` and a repr that
-tells what it is. Importing the package opens no file, socket or clock, and loads no library until a
+says what it is. Importing the package opens no file, socket or clock, and loads no library until a
 function is named.
 """
 

@@ -66,11 +66,11 @@ def records(prefect_server: None, store_folder: Path) -> Iterator[None]:
         temporary_settings,
     )
 
-    wanted = {
+    expected = {
         PREFECT_FLOWS_HEARTBEAT_FREQUENCY: None,
         PREFECT_LOGGING_LEVEL: "ERROR",
     }
-    with temporary_settings(wanted):
+    with temporary_settings(expected):
         yield
 
 

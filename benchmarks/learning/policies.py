@@ -144,7 +144,7 @@ def source_of(move: Move) -> Path | None:
 
 
 def reference_of(name: str, folders: Folders) -> Path:
-    """Return the motion of a move for the robot, made once; `gate.json` beside it tells the
+    """Return the motion of a move for the robot, made once; `gate.json` beside it has the
     verdict."""
     move, work = MOVES[name], folders.work / name
     reference = work / "reference.parquet"

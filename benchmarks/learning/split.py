@@ -55,12 +55,12 @@ class Split:
 
 def load_split(path: Path = FILE) -> Split:
     """Read the split."""
-    said = yaml.safe_load(path.read_text())
+    result = yaml.safe_load(path.read_text())
     return Split(
-        judged=tuple(said["judged"]),
-        train=tuple(said["train"]),
-        excluded=said["excluded"],
-        references=said["references"],
+        judged=tuple(result["judged"]),
+        train=tuple(result["train"]),
+        excluded=result["excluded"],
+        references=result["references"],
     )
 
 

@@ -151,9 +151,9 @@ def _spread_table(title: str, rows: list) -> Table:  # type: ignore[type-arg]
     for group in (*GROUPS, "all"):
         which = group == GROUP_OF if group != "all" else np.ones(len(JOINTS), bool)
         across, depth = off[:, which, :2], off[:, which, 2]
-        said = spread[:, which]
+        result = spread[:, which]
         cells = []
-        for error, own in ((across.mean(-1), said[..., 0]), (depth, said[..., 1])):
+        for error, own in ((across.mean(-1), result[..., 0]), (depth, result[..., 1])):
             axes = across if error is not depth else depth[..., None]
             cells.append(f"{np.mean(axes < own[..., None]):.2f}")
             cells.append(f"{spearmanr(error.ravel(), own.ravel())[0]:.2f}")

@@ -66,8 +66,8 @@ def stated_licence(clip: Path) -> tuple[str, str]:
             return found[1].strip(), beside.name
     info = clip.with_suffix(".info.json")
     with suppress(OSError, ValueError):
-        told = json.loads(info.read_text("utf-8"))
-        licence = told.get("license") if isinstance(told, dict) else None
+        facts = json.loads(info.read_text("utf-8"))
+        licence = facts.get("license") if isinstance(facts, dict) else None
         if isinstance(licence, str) and licence.strip():
             return " ".join(licence.split())[:LONGEST], info.name
     return "", ""

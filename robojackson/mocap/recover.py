@@ -67,7 +67,7 @@ class View:
         landmarks: The same, repaired.
         pinhole: The camera.
         points: Landmarks in the camera frame, metres.
-        depth_m: Standard deviation of the depths of the body, metres; None where nothing tells.
+        depth_m: Standard deviation of the depths of the body, metres; None where they are unknown.
     """
 
     track: LandmarkTrack

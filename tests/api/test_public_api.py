@@ -1,4 +1,4 @@
-"""The public functions: light to import, from file, array or value, saved and told."""
+"""The public functions: light to import, from file, array or value, saved and shown."""
 
 import json
 import subprocess
@@ -67,11 +67,11 @@ def test_importing_it_loads_no_library() -> None:
 
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_a_function_has_a_docstring_with_its_results_and_errors(name: str) -> None:
-    told = getattr(rj, name).__doc__
+    result = getattr(rj, name).__doc__
     assert name in rj.__all__
-    assert "Args:" in told
-    assert "Returns:" in told
-    assert "Raises:" in told
+    assert "Args:" in result
+    assert "Returns:" in result
+    assert "Raises:" in result
 
 
 def test_an_unknown_name_is_an_attribute_error() -> None:
@@ -240,7 +240,7 @@ def test_a_video_has_a_panel_for_what_is_given(
 @pytest.mark.medium
 @pytest.mark.parametrize("name", ["track", "motion", "reference"])
 def test_a_repr_is_one_line(name: str, request: pytest.FixtureRequest) -> None:
-    told = repr(request.getfixturevalue(name))
-    assert len(told) < 140
-    assert "\n" not in told
-    assert "array" not in told
+    result = repr(request.getfixturevalue(name))
+    assert len(result) < 140
+    assert "\n" not in result
+    assert "array" not in result

@@ -123,9 +123,9 @@ class Warm:
 def _faults(
     case: Case, code: int, peak_mb: float, out: bytes, err: bytes, left: list[str]
 ) -> Iterable[str]:
-    said = err.decode(errors="replace")
-    own = [line for line in said.splitlines() if line.startswith("robojackson: ")]
-    if "Traceback" in said or "InternalError" in said:
+    result = err.decode(errors="replace")
+    own = [line for line in result.splitlines() if line.startswith("robojackson: ")]
+    if "Traceback" in result or "InternalError" in result:
         yield "traceback"
     if any((byte < 32 and byte not in (9, 10)) or byte in (27, 127) for byte in out + err):
         yield "control bytes"
@@ -138,9 +138,9 @@ def _faults(
     if code not in (1, 2):
         yield f"exit code {code}"
     checked = case.words[:2] == ("robots", "check") and out  # a list of problems is its answer
-    if not checked and (len(own) != 1 or not said.splitlines()[-1].startswith("robojackson: ")):
+    if not checked and (len(own) != 1 or not result.splitlines()[-1].startswith("robojackson: ")):
         yield f"{len(own)} lines of ours"
-    if case.says and case.says not in said:
+    if case.says and case.says not in result:
         yield f"does not say {case.says!r}"
     if left:
         yield f"left {', '.join(left)[:80]}"
@@ -163,8 +163,8 @@ def main() -> int:
     parser.add_argument("--table", type=Path)
     given = parser.parse_args()
     began, made = time.monotonic(), base()
-    wanted = [name for name in given.groups.split(",") if name]
-    cases = [c for c in corpus() if c.group in (wanted or [c.group]) and given.name in c.name]
+    expected = [name for name in given.groups.split(",") if name]
+    cases = [c for c in corpus() if c.group in (expected or [c.group]) and given.name in c.name]
     free: Queue[Warm] = Queue()
     for _ in range(given.workers):
         free.put(Warm(given.cold))
@@ -222,9 +222,9 @@ def _summary(outcomes: list[Outcome], seconds: float) -> list[str]:
     kinds = Counter(each.case.valid for each in outcomes)
     failed = sum(bool(each.faults) for each in outcomes)
     cpu_min = sum(each.cpu_s for each in outcomes) / 60
-    told = f"{kinds[False]} bad and {kinds[True]} odd but valid cases, {failed} failed; "
-    told += f"{cpu_min:.1f} minutes of processor time, {seconds / 60:.1f} minutes by the clock"
-    return [*rows, "", told]
+    result = f"{kinds[False]} bad and {kinds[True]} odd but valid cases, {failed} failed; "
+    result += f"{cpu_min:.1f} minutes of processor time, {seconds / 60:.1f} minutes by the clock"
+    return [*rows, "", result]
 
 
 if __name__ == "__main__":

@@ -44,17 +44,17 @@ def test_a_walker_that_halves_the_time_saves_the_other_half() -> None:
 
 def test_a_walker_pays_after_its_cost_over_what_it_saves() -> None:
     pairs = [{"seed": 0, "scratch_s": 1.0, "pretrain_s": 2.0, "level_s": 2.0, "saved_cpu_s": 50.0}]
-    told = races.concluded(pairs, minutes=5, cost_s=400.0)
-    assert told["pays_after_dances"] == pytest.approx(8)
-    assert told["gain_95"] == [1.0, 1.0]
+    result = races.concluded(pairs, minutes=5, cost_s=400.0)
+    assert result["pays_after_dances"] == pytest.approx(8)
+    assert result["gain_95"] == [1.0, 1.0]
 
 
 def test_a_line_tells_the_mean_and_the_worst_seed() -> None:
-    told = line("hip_shake", MOVES["hip_shake"], 10.0, [rollouts(1.0, 1.0), rollouts(0.9, 1.0)])
-    assert told["strict_success"] == pytest.approx(0.95)
-    assert told["worst_seed"] == pytest.approx(0.9)
-    assert told["holds"]
-    assert told["beside"]["statue"]["survived_s"] == 10.0
+    result = line("hip_shake", MOVES["hip_shake"], 10.0, [rollouts(1.0, 1.0), rollouts(0.9, 1.0)])
+    assert result["strict_success"] == pytest.approx(0.95)
+    assert result["worst_seed"] == pytest.approx(0.9)
+    assert result["holds"]
+    assert result["beside"]["statue"]["survived_s"] == 10.0
 
 
 def test_steps_are_reported_only_where_every_seed_tells_them() -> None:
@@ -67,14 +67,14 @@ def test_steps_are_reported_only_where_every_seed_tells_them() -> None:
 def test_a_limb_that_flails_misses_its_own_bar_alone() -> None:
     rows = rollouts(1.0, 1.0)
     rows[0]["limb_gain_left_hand"] = 2.0
-    told = line("hip_shake", MOVES["hip_shake"], 10.0, [rows])
-    assert [bar for bar, held in told["bars"].items() if not held] == ["gain left_hand 0.8-1.2"]
+    result = line("hip_shake", MOVES["hip_shake"], 10.0, [rows])
+    assert [bar for bar, held in result["bars"].items() if not held] == ["gain left_hand 0.8-1.2"]
 
 
 def test_of_the_authors_clips_limbs_are_reported_and_not_requested() -> None:
-    told = line("authors_apt1", MOVES["authors_apt1"], 10.0, [rollouts(1.0, 3.0)])
-    assert not any("gain" in bar for bar in bars(told, MOVES["authors_apt1"]))
-    assert told["limb_gain"]["head"] == 3.0
+    result = line("authors_apt1", MOVES["authors_apt1"], 10.0, [rollouts(1.0, 3.0)])
+    assert not any("gain" in bar for bar in bars(result, MOVES["authors_apt1"]))
+    assert result["limb_gain"]["head"] == 3.0
 
 
 def test_the_interval_of_equal_seeds_is_a_point() -> None:

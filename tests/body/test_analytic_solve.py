@@ -48,11 +48,11 @@ def test_the_solution_poses_the_skeleton_onto_the_keypoints(method: str) -> None
 def test_every_bone_gets_the_twist_that_was_requested(method: str) -> None:
     _, points, _ = pose_and_twist(2)
     angle = np.random.default_rng(2).uniform(-1.0, 1.0, size=(FRAMES, 23))
-    wanted = np.stack([np.cos(angle), np.sin(angle)], -1)
-    local = solve(points, REST_JOINTS[None], wanted, method)
+    expected = np.stack([np.cos(angle), np.sin(angle)], -1)
+    local = solve(points, REST_JOINTS[None], expected, method)
     for joint in range(1, 24):
         bone = REST_JOINTS[AIM_CHILD[joint]] - REST_JOINTS[joint]
-        assert np.allclose(split(local[:, joint], bone)[1], wanted[:, joint - 1], atol=1e-7)
+        assert np.allclose(split(local[:, joint], bone)[1], expected[:, joint - 1], atol=1e-7)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -96,8 +96,8 @@ def test_a_target_too_far_is_aimed_at_with_the_predicted_bone() -> None:
     moved[:, below] += [1.0, 0.0, 0.0]
     local = solve(moved, REST_JOINTS[None], twists)
     reached = forward(local, REST_JOINTS[None], moved[:, 0]).points
-    shin, wanted = reached[:, 7] - reached[:, 4], moved[:, 7] - moved[:, 4]
-    assert np.allclose(np.cross(shin, wanted), 0.0, atol=1e-9)
+    shin, expected = reached[:, 7] - reached[:, 4], moved[:, 7] - moved[:, 4]
+    assert np.allclose(np.cross(shin, expected), 0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("method", METHODS)

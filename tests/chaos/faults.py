@@ -175,8 +175,8 @@ def exits(machine: Machine, count: int) -> Iterator[Row]:
                 capture_output=True, cwd=machine.scratch,
             )  # fmt: skip
             codes[done.returncode] += 1
-        told = ", ".join(f"{number} times {code}" for code, number in codes.items())
-        yield Row("normal exits", name, max(codes), told, "" if set(codes) == {0} else told)
+        result = ", ".join(f"{number} times {code}" for code, number in codes.items())
+        yield Row("normal exits", name, max(codes), result, "" if set(codes) == {0} else result)
 
 
 def _refused(code: int, err: str, says: str) -> str:
@@ -208,21 +208,21 @@ def main() -> None:
     parser.add_argument("--only", default="disk,temporary,home,store,pair,exits")
     parser.add_argument("--exits", type=int, default=60)
     parser.add_argument("--out", type=Path, default=RESULTS)
-    wanted = parser.parse_args()
+    options = parser.parse_args()
     base()
     kinds = {"disk": full_disks, "temporary": temporary, "home": home, "store": read_only_store}
     rows, began = [], time.monotonic()
     with tempfile.TemporaryDirectory(prefix="robojackson-faults-") as scratch:
         machine = Machine(Path(scratch))
-        for kind in wanted.only.split(","):
-            made = exits(machine, wanted.exits) if kind == "exits" else None
+        for kind in options.only.split(","):
+            made = exits(machine, options.exits) if kind == "exits" else None
             made = made or ({**kinds, "pair": pair}[kind])(machine)
             for row in made:
                 rows.append(row)
                 print("BAD" if row.wrong else "ok ", *asdict(row).values(), sep=" | ", flush=True)
-            told = {"command": f"python -m tests.chaos.faults --exits {wanted.exits}",
+            facts = {"command": f"python -m tests.chaos.faults --exits {options.exits}",
                     "rows": [asdict(row) for row in rows]}  # fmt: skip
-            wanted.out.write_text(json.dumps(told, indent=1) + "\n")
+            options.out.write_text(json.dumps(facts, indent=1) + "\n")
     bad = sum(bool(row.wrong) for row in rows)
     print(f"{len(rows)} faults, {bad} bad, {(time.monotonic() - began) / 60:.0f} minutes")
     sys.exit(bool(bad))

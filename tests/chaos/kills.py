@@ -201,7 +201,7 @@ def _write(
     out: Path, kills: int, seed: int, usual_s: float, tables: int, dances: list[Dance]
 ) -> None:
     done = [kill for dance in dances for kill in dance.kills]
-    told: dict[str, Any] = {
+    facts: dict[str, Any] = {
         "command": f"python -m tests.chaos.kills --kills {kills} --seed {seed}",
         "undisturbed_s": round(usual_s, 1),
         "tables_and_networks": tables,
@@ -209,7 +209,7 @@ def _write(
         "resumed_to_equal_tables": sum(len(dance.kills) for dance in dances if dance.good),
         "dances": [asdict(dance) for dance in dances],
     }
-    out.write_text(json.dumps(told, indent=1) + "\n")
+    out.write_text(json.dumps(facts, indent=1) + "\n")
 
 
 def main() -> None:
@@ -220,10 +220,10 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--folder", type=Path, default=None, help="for logs and data")
     parser.add_argument("--out", type=Path, default=RESULTS, help="what has been shown, as JSON")
-    wanted = parser.parse_args()
-    folder = wanted.folder or Path(tempfile.mkdtemp(prefix="robojackson-kills-"))
+    options = parser.parse_args()
+    folder = options.folder or Path(tempfile.mkdtemp(prefix="robojackson-kills-"))
     folder.mkdir(parents=True, exist_ok=True)
-    dances = campaign(Place(folder.resolve()), wanted.kills, wanted.seed, wanted.out)
+    dances = campaign(Place(folder.resolve()), options.kills, options.seed, options.out)
     bad = [dance for dance in dances if not dance.good]
     print(f"{len(dances) - len(bad)} of {len(dances)} dances good")
     sys.exit(bool(bad))

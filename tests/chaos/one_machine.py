@@ -69,9 +69,9 @@ class Alone:
             subprocess.run(["umount", "--lazy", disk], check=True)
 
     def start(self, study: dict[str, Any]) -> Any:
-        wanted = self._folder / "study.yaml"
-        wanted.write_text(yaml.safe_dump(study))
-        command = [sys.executable, "-m", "robojackson", "ablation", str(wanted), "--json"]
+        expected = self._folder / "study.yaml"
+        expected.write_text(yaml.safe_dump(study))
+        command = [sys.executable, "-m", "robojackson", "ablation", str(expected), "--json"]
         with self._log.open("ab") as out:
             self._run = subprocess.Popen(
                 command, env=self._environment(), cwd=ROOT, stdout=out, stderr=out

@@ -53,23 +53,23 @@ def main() -> None:
     parser.add_argument("--folder", type=Path, default=None, help="for logs and data")
     parser.add_argument("--out", type=Path, default=RESULTS, help="what has been shown, as JSON")
     parser.add_argument("--hold", type=Path, help="no trial begins while this file is there")
-    wanted = parser.parse_args()
+    options = parser.parse_args()
     for how in (signal.SIGINT, signal.SIGTERM):  # either ends all that was started
         signal.signal(how, signal.default_int_handler)
-    folder = wanted.folder or Path(tempfile.mkdtemp(prefix="robojackson-chaos-"))
-    given = wanted.kind or [*Cluster.KINDS, *Alone.KINDS]
-    kinds = plan(given, wanted.trials, random.Random(wanted.seed))
-    coming = list(enumerate(kinds, 1))[wanted.first - 1 :]
+    folder = options.folder or Path(tempfile.mkdtemp(prefix="robojackson-chaos-"))
+    given = options.kind or [*Cluster.KINDS, *Alone.KINDS]
+    kinds = plan(given, options.trials, random.Random(options.seed))
+    coming = list(enumerate(kinds, 1))[options.first - 1 :]
     print(f"logs: {folder}", flush=True)
-    trials = known_trials(wanted.out)[: wanted.first - 1] if wanted.first > 1 else []
+    trials = known_trials(options.out)[: options.first - 1] if options.first > 1 else []
     with benches(folder, [kind for _, kind in coming]) as (known, expected):
         _say(COLUMNS)
         for number, kind in coming:
-            _hold(wanted.hold)
-            trials.append(tried(number, kind, wanted.seed, *known[kind], expected))
+            _hold(options.hold)
+            trials.append(tried(number, kind, options.seed, *known[kind], expected))
             _say([_cell(getattr(trials[-1], name)) for name in COLUMNS])
             facts = {"undisturbed_s": {kind: round(s, 1) for kind, (_, s) in known.items()}}
-            _keep(wanted.out, f"--trials {wanted.trials} --seed {wanted.seed}", trials, facts)
+            _keep(options.out, f"--trials {options.trials} --seed {options.seed}", trials, facts)
     bad = [trial.number for trial in trials if not trial.good]
     print(
         f"{len(trials) - len(bad)} of {len(trials)} trials good" + (f"; bad: {bad}" if bad else "")
@@ -89,8 +89,8 @@ def tried(
 
 def known_trials(file: Path) -> list[Trial]:
     """The trials that a file tells of."""
-    told = json.loads(file.read_text())["trials"]
-    return [Trial(**facts) for facts in told]
+    answer = json.loads(file.read_text())["trials"]
+    return [Trial(**facts) for facts in answer]
 
 
 @contextmanager
@@ -131,13 +131,13 @@ def _hold(file: Path | None) -> None:
 
 
 def _keep(file: Path, words: str, trials: list[Trial], facts: dict[str, Any]) -> None:
-    told = {
+    record = {
         "command": f"python -m tests.chaos.run {words}",
         "good": sum(trial.good for trial in trials),
         "trials": [asdict(trial) for trial in trials],
         **facts,
     }
-    file.write_text(json.dumps(told, indent=1) + "\n")
+    file.write_text(json.dumps(record, indent=1) + "\n")
 
 
 if __name__ == "__main__":

@@ -171,14 +171,14 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=RESULTS)
     parser.add_argument("--picture", type=Path, default=PICTURE)
     parser.add_argument("--loop", type=Path, help=argparse.SUPPRESS)
-    wanted = parser.parse_args()
-    if wanted.loop:
-        refresh_for_ever(wanted.loop)
-    folder = wanted.folder or Path(tempfile.mkdtemp(prefix="robojackson-soak-"))
-    seen = soak(folder.resolve(), wanted.minutes)
+    options = parser.parse_args()
+    if options.loop:
+        refresh_for_ever(options.loop)
+    folder = options.folder or Path(tempfile.mkdtemp(prefix="robojackson-soak-"))
+    seen = soak(folder.resolve(), options.minutes)
     nights = folder / "refresh" / "nights.txt"
-    told: dict[str, Any] = {
-        "command": f"python -m tests.chaos.soak --minutes {wanted.minutes:g}",
+    facts: dict[str, Any] = {
+        "command": f"python -m tests.chaos.soak --minutes {options.minutes:g}",
         "refreshes": len(nights.read_text().splitlines()) if nights.exists() else 0,
         "growth_per_hour_in_second_half": {
             name: {column: round(growth(rows, column), 2) for column in COLUMNS}
@@ -189,9 +189,9 @@ def main() -> None:
             for name, rows in seen.items()
         },
     }
-    wanted.out.write_text(json.dumps(told, indent=1) + "\n")
-    draw(seen, wanted.picture)
-    print(json.dumps({key: told[key] for key in list(told)[:3]}, indent=1))
+    options.out.write_text(json.dumps(facts, indent=1) + "\n")
+    draw(seen, options.picture)
+    print(json.dumps({key: facts[key] for key in list(facts)[:3]}, indent=1))
 
 
 if __name__ == "__main__":

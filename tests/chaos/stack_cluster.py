@@ -156,8 +156,8 @@ class Cluster:
         if needed:
             time.sleep(seconds)
         self._wire.mend()
-        told = f"S3 for {seconds:.0f} s, {self._wire.refused - before} calls refused"
-        return told if needed else None
+        result = f"S3 for {seconds:.0f} s, {self._wire.refused - before} calls refused"
+        return result if needed else None
 
 
 def _killed(rng: random.Random, found: list[Found]) -> str | None:

@@ -42,34 +42,34 @@ def wire() -> Iterator[Proxy]:
         server.shutdown()
 
 
-def said(wire: Proxy) -> bytes:
+def answer_of(wire: Proxy) -> bytes:
     with urlopen(f"http://127.0.0.1:{wire.port}/", timeout=5) as answer:
         return bytes(answer.read())
 
 
 def test_a_wire_forwards(wire: Proxy) -> None:
-    assert said(wire) == b"hello"
+    assert answer_of(wire) == b"hello"
 
 
 def test_a_cut_wire_answers_no_one(wire: Proxy) -> None:
     wire.cut()
     with pytest.raises((URLError, ConnectionError)):
-        said(wire)
+        answer_of(wire)
 
 
 def test_a_cut_wire_counts_who_needed_it(wire: Proxy) -> None:
-    said(wire)
+    answer_of(wire)
     before = wire.refused
     wire.cut()
     with suppress(URLError, ConnectionError):
-        said(wire)
+        answer_of(wire)
     assert (before, wire.refused) == (0, 1)
 
 
 def test_a_mended_wire_forwards_again(wire: Proxy) -> None:
     wire.cut()
     wire.mend()
-    assert said(wire) == b"hello"
+    assert answer_of(wire) == b"hello"
 
 
 def test_processes_are_found_by_their_home_and_killed(tmp_path: Path) -> None:

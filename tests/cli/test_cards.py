@@ -34,8 +34,8 @@ def test_the_steadiest_video_is_marked_and_what_cannot_be_read_is_reported() -> 
 
 
 def test_advice_stands_a_line_each_in_its_words() -> None:
-    told = {"advice": [{"kind": "dark", "words": "more light"}, {"words": "nearer"}]}
-    assert cards.advice_lines(told) == ["advice    more light", "advice    nearer"]
+    facts = {"advice": [{"kind": "dark", "words": "more light"}, {"words": "nearer"}]}
+    assert cards.advice_lines(facts) == ["advice    more light", "advice    nearer"]
     assert cards.advice_lines({}) == []
 
 
@@ -54,9 +54,9 @@ def test_the_card_has_a_bar_for_every_gated_figure_and_ends_with_the_verdict() -
 
 
 def test_a_motion_over_a_bar_is_refused_by_the_name_of_the_figure() -> None:
-    told = cards.retarget_verdict(CARD | {"planted_slip_cm_s": 7.0})
-    assert told["kind"] == "refused"
-    assert "planted slip cm s is 7, at most 1" in told["sentence"]
+    result = cards.retarget_verdict(CARD | {"planted_slip_cm_s": 7.0})
+    assert result["kind"] == "refused"
+    assert "planted slip cm s is 7, at most 1" in result["sentence"]
 
 
 @pytest.mark.parametrize(
@@ -97,5 +97,5 @@ def test_an_option_takes_the_place_of_its_earlier_value(
     words: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(interruption.sys, "argv", ["robojackson", "dance", "a.mp4", *words])
-    told = interruption.with_option("--minutes", "15")
-    assert told == "robojackson dance a.mp4 --minutes 15"
+    result = interruption.with_option("--minutes", "15")
+    assert result == "robojackson dance a.mp4 --minutes 15"

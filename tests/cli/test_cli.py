@@ -22,8 +22,8 @@ COMMANDS = ["dance", "score", "mocap", "retarget", "train", "evaluate", "doctor"
 
 
 def invoke(*words: object) -> tuple[int, str, str]:
-    said = in_process(*words)
-    return said.code, said.out, said.err
+    result = in_process(*words)
+    return result.code, result.out, result.err
 
 
 def write_video(path: Path, frames: int) -> Path:
@@ -101,7 +101,7 @@ def missing_file(folder: Path) -> list[object]:
 
 @pytest.mark.medium
 @pytest.mark.parametrize(
-    ("make", "told"),
+    ("make", "message"),
     [
         (text_as_video, "UnreadableVideo"),
         (half_a_video, "TruncatedVideo"),
@@ -117,11 +117,11 @@ def missing_file(folder: Path) -> list[object]:
         (missing_file, "gone.mp4: no such file"),
     ],
 )
-def test_bad_input_gets_one_line_and_no_answer(make, told: str, tmp_path: Path) -> None:
+def test_bad_input_gets_one_line_and_no_answer(make, message: str, tmp_path: Path) -> None:
     code, out, err = invoke(*make(tmp_path), "--json")
-    said = [line for line in err.splitlines() if line.startswith("robojackson: ")]
-    assert (code, out, len(said)) == (1, "", 1)
-    assert told in said[0]
+    result = [line for line in err.splitlines() if line.startswith("robojackson: ")]
+    assert (code, out, len(result)) == (1, "", 1)
+    assert message in result[0]
     assert "Traceback" not in err
 
 
@@ -148,8 +148,8 @@ def test_a_video_that_breaks_off_while_it_is_looked_at_loses_no_other_score(
     monkeypatch.setattr(scoring, "in_video_process", breaks_off)
     clips = [write_video(tmp_path / name, 5) for name in ("a.mp4", "b.mp4", "c.mp4")]
     code, out, _ = invoke("score", *clips, "--json")
-    told = [set(video) & {"error", "stability_score"} for video in json.loads(out)["videos"]]
-    assert (code, told) == (1, [{"stability_score"}, {"stability_score"}, {"error"}])
+    answer = [set(video) & {"error", "stability_score"} for video in json.loads(out)["videos"]]
+    assert (code, answer) == (1, [{"stability_score"}, {"stability_score"}, {"error"}])
     code, _, err = invoke("score", clips[1])
     assert (code, err.splitlines()[-1]) == (
         1,
@@ -178,16 +178,16 @@ def test_a_readable_video_is_scored_beside_one_that_is_not(tmp_path: Path) -> No
     write_video(tmp_path / "more" / "empty.mp4", 5)
     (tmp_path / "notes.mp4").write_text("this is not a video")
     code, out, _ = invoke("score", tmp_path / "notes.mp4", tmp_path / "more", "--json")
-    told = [set(video) & {"error", "stability_score"} for video in json.loads(out)["videos"]]
-    assert (code, told) == (1, [{"stability_score"}, {"error"}])
+    answer = [set(video) & {"error", "stability_score"} for video in json.loads(out)["videos"]]
+    assert (code, answer) == (1, [{"stability_score"}, {"error"}])
 
 
 def test_only_a_video_that_is_named_must_be_readable(tmp_path: Path) -> None:
     write_video(tmp_path / "empty.mp4", 5)
     (tmp_path / "notes.mp4").write_text("this is not a video")
     code, out, _ = invoke("score", tmp_path, "--json")
-    told = [set(video) & {"error", "stability_score"} for video in json.loads(out)["videos"]]
-    assert (code, told) == (0, [{"stability_score"}, {"error"}])
+    answer = [set(video) & {"error", "stability_score"} for video in json.loads(out)["videos"]]
+    assert (code, answer) == (0, [{"stability_score"}, {"error"}])
 
 
 @pytest.mark.parametrize("make", [nobody, one_frame, unknown_robot])
@@ -205,7 +205,7 @@ def test_a_folder_is_not_one_video(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "message"),
     [
         (["notes.mp4"], "notes.mp4: not a video"),
         (["."], "notes.mp4: not a video"),
@@ -215,18 +215,18 @@ def test_a_folder_is_not_one_video(tmp_path: Path) -> None:
     ],
 )
 def test_dance_refuses_bad_input_before_prefect_starts(
-    words: list[object], told: str, monkeypatch, tmp_path: Path
+    words: list[object], message: str, monkeypatch, tmp_path: Path
 ) -> None:
     (tmp_path / "notes.mp4").write_text("this is not a video")
     monkeypatch.chdir(tmp_path)
     code, _, err = invoke("dance", *words)
     assert (code, len(err.splitlines())) == (1, 1)
-    assert told in err
+    assert message in err
     assert not (tmp_path / "store").exists()
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "message"),
     [
         ("find nosuchfolder --source folder", "nosuchfolder: no such file or folder"),
         ("find nosuch.txt --source urls", "nosuch.txt: no such file"),
@@ -246,12 +246,12 @@ def test_dance_refuses_bad_input_before_prefect_starts(
     ],
 )
 def test_a_flow_refuses_simple_mistakes_before_prefect_starts(
-    words: str, told: str, monkeypatch, tmp_path: Path
+    words: str, message: str, monkeypatch, tmp_path: Path
 ) -> None:
     monkeypatch.chdir(tmp_path)
     code, _, err = invoke(*shlex.split(words))
     assert (code, len(err.splitlines())) == (1, 1)
-    assert told in err
+    assert message in err
     assert not (tmp_path / "store").exists()
 
 
@@ -269,14 +269,16 @@ def test_an_override_without_a_value_is_refused() -> None:
 
 @pytest.mark.medium
 def test_doctor_tells_what_is_there_in_one_object() -> None:
-    said = robojackson("doctor", "--json")
-    assert {"ok", "packages", "libraries", "models", "missing", "optional"} == set(said.answer) - {
+    result = robojackson("doctor", "--json")
+    assert {"ok", "packages", "libraries", "models", "missing", "optional"} == set(
+        result.answer
+    ) - {
         "python",
         "python_supported",
         "ffmpeg",
         "javascript",
     }
-    assert not said.loaded_prefect
+    assert not result.loaded_prefect
 
 
 def test_what_a_library_prints_does_not_stand_beside_the_answer(tmp_path: Path) -> None:

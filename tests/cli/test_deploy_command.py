@@ -36,9 +36,9 @@ def folder(tmp_path: Path) -> Path:
 
 def test_the_command_writes_the_pack_and_tells_what_is_open(folder: Path) -> None:
     words = ("export", folder / "policy.safetensors", "--to", "deploy", "-o", folder / "pack")
-    said = in_process(*words, "--json")
-    assert said.code == 0, said.err
-    answer = json.loads(said.out)
+    result = in_process(*words, "--json")
+    assert result.code == 0, result.err
+    answer = json.loads(result.out)
     assert {path.name for path in (folder / "pack").iterdir()} == FILES | {"licences"}
     assert answer["verdict"]["kind"] == "incomplete"
     assert "no sim-to-sim passport" in answer["verdict"]["sentence"]
@@ -62,9 +62,9 @@ def test_an_evaluation_beside_the_policy_brings_its_passport(folder: Path) -> No
 
 def test_a_policy_that_sees_what_no_robot_measures_is_refused(folder: Path) -> None:
     random_policy(stock(), swaying(stock()), "full").save(folder / "full.safetensors")
-    with pytest.raises(BadPolicy, match=r"train with --set track\.observation=onboard") as told:
+    with pytest.raises(BadPolicy, match=r"train with --set track\.observation=onboard") as caught:
         export(folder / "full.safetensors", "deploy", folder / "pack")
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(caught.value)
     assert not (folder / "pack").exists()
 
 
@@ -107,5 +107,5 @@ def test_a_declared_licence_wants_its_kind() -> None:
 
 @pytest.mark.slow
 def test_the_help_lists_the_pack_among_the_formats_of_policies() -> None:
-    said = robojackson("export", "--help")
-    assert "a policy: deploy, onnx" in " ".join(said.out.replace("│", " ").split())
+    result = robojackson("export", "--help")
+    assert "a policy: deploy, onnx" in " ".join(result.out.replace("│", " ").split())

@@ -38,8 +38,8 @@ def test_a_person_reads_each_missing_thing_on_a_line_and_a_verdict() -> None:
         "optional  c",
         "1 required item is missing.",
     ]
-    told = doctor_lines({"ok": True, "missing": [], "optional": []})
-    assert told[-2:] == ["Everything required is installed.", "next: robojackson dance"]
+    result = doctor_lines({"ok": True, "missing": [], "optional": []})
+    assert result[-2:] == ["Everything required is installed.", "next: robojackson dance"]
 
 
 def test_the_versions_are_those_of_the_project() -> None:

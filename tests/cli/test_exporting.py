@@ -50,23 +50,25 @@ def test_every_format_starts_with_the_first_pose(to: str, reference: Path, tmp_p
     out = tmp_path / "motion"
     export(reference, to, out)
     first = READERS[to](out.read_bytes()).qpos[0]
-    wanted = robot_motion("hip_shake").qpos[0]
-    sign = np.sign(first[3:7] @ wanted[3:7])
-    np.testing.assert_allclose(first, [*wanted[:3], *sign * wanted[3:7], *wanted[7:]], atol=1e-5)
+    expected = robot_motion("hip_shake").qpos[0]
+    sign = np.sign(first[3:7] @ expected[3:7])
+    np.testing.assert_allclose(
+        first, [*expected[:3], *sign * expected[3:7], *expected[7:]], atol=1e-5
+    )
 
 
 @pytest.mark.medium
 def test_the_answer_tells_what_was_written(reference: Path, tmp_path: Path) -> None:
     out = tmp_path / "motion.csv"
-    told = export(reference, "csv", out)
-    assert (told["file"], told["bytes"]) == (str(out), out.stat().st_size)
+    result = export(reference, "csv", out)
+    assert (result["file"], result["bytes"]) == (str(out), out.stat().st_size)
 
 
 @pytest.mark.medium
 def test_the_answer_judges_the_motion_by_its_score_card(reference: Path, tmp_path: Path) -> None:
-    told = export(reference, "csv", tmp_path / "motion.csv")
-    assert told["verdict"]["kind"] == "feasible"
-    assert told["next"] == command_line("train", reference, "-o", reference.parent / "training")
+    result = export(reference, "csv", tmp_path / "motion.csv")
+    assert result["verdict"]["kind"] == "feasible"
+    assert result["next"] == command_line("train", reference, "-o", reference.parent / "training")
 
 
 @pytest.mark.medium
@@ -77,9 +79,9 @@ def test_a_motion_that_no_robot_can_follow_is_retargeted_next(
     card: dict[str, float], kind: str, tmp_path: Path
 ) -> None:
     motion = replace(robot_motion("hip_shake"), scorecard=card, certificate=None)
-    told = export(motion.save(tmp_path / "r.parquet"), "csv", tmp_path / "motion.csv")
-    assert told["verdict"]["kind"] == kind
-    assert told["next"].startswith("robojackson retarget ")
+    result = export(motion.save(tmp_path / "r.parquet"), "csv", tmp_path / "motion.csv")
+    assert result["verdict"]["kind"] == kind
+    assert result["next"].startswith("robojackson retarget ")
 
 
 @pytest.mark.medium
@@ -114,21 +116,21 @@ def test_a_format_of_motions_does_not_fit_a_policy(tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def said(reference: Path) -> Said:
+def answered(reference: Path) -> Said:
     """The command, in a process of its own."""
     out = reference.parent / "motion.pkl"
     return robojackson("export", reference, "--to", "gmr", "-o", out, "--json")
 
 
 @pytest.mark.medium
-def test_the_command_writes_the_file_it_names(said: Said) -> None:
-    assert said.code == 0, said.err
-    assert len(gmr.read(Path(said.answer["file"]).read_bytes())) > 1
+def test_the_command_writes_the_file_it_names(answered: Said) -> None:
+    assert answered.code == 0, answered.err
+    assert len(gmr.read(Path(answered.answer["file"]).read_bytes())) > 1
 
 
 @pytest.mark.medium
-def test_the_command_loads_no_prefect(said: Said) -> None:
-    assert not said.loaded_prefect
+def test_the_command_loads_no_prefect(answered: Said) -> None:
+    assert not answered.loaded_prefect
 
 
 def test_the_help_lists_every_format() -> None:

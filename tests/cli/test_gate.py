@@ -21,11 +21,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.medium
 def test_a_bad_motion_is_refused_in_one_line_and_kept(folder: Path, tmp_path: Path) -> None:
-    said = in_process(
+    result = in_process(
         *("retarget", folder / "smpl.parquet", "-o", tmp_path, "--method", "paper", *SMOKE)
     )
-    (line,) = [line for line in said.err.splitlines() if "reference refused" in line]
-    assert said.code == 1
+    (line,) = [line for line in result.err.splitlines() if "reference refused" in line]
+    assert result.code == 1
     assert "--force" in line
     assert str(tmp_path) in line
     assert (tmp_path / "reference.parquet").exists()
@@ -34,7 +34,7 @@ def test_a_bad_motion_is_refused_in_one_line_and_kept(folder: Path, tmp_path: Pa
 @pytest.mark.medium
 def test_force_goes_on_with_it(folder: Path, tmp_path: Path) -> None:
     words = ("retarget", folder / "smpl.parquet", "-o", tmp_path, "--method", "paper")
-    said = in_process(*words, "--force", *SMOKE)
-    assert said.code == 0
-    assert said.answer["scorecard"]["passed"] == 0.0
-    assert said.answer["scorecard"]["findings"]
+    result = in_process(*words, "--force", *SMOKE)
+    assert result.code == 0
+    assert result.answer["scorecard"]["passed"] == 0.0
+    assert result.answer["scorecard"]["findings"]

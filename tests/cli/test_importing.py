@@ -47,8 +47,8 @@ def read(path: Path) -> SmplSequence:
 )
 def test_a_motion_goes_out_and_comes_back(to: str, smpl: Path, tmp_path: Path) -> None:
     export(smpl, to, tmp_path / "motion")
-    told = import_motion(tmp_path / "motion", tmp_path / "back", None, None, "base", {})
-    assert told["format"] == to
+    result = import_motion(tmp_path / "motion", tmp_path / "back", None, None, "base", {})
+    assert result["format"] == to
     back = read(tmp_path / "back" / "smpl.parquet")
     np.testing.assert_allclose(back.joints, read(smpl).joints, atol=1e-5)
 
@@ -59,8 +59,8 @@ def test_a_motion_goes_out_and_comes_back(to: str, smpl: Path, tmp_path: Path) -
 def test_an_import_is_judged_by_its_feet_and_its_length(
     frames: int, share: float, kind: str
 ) -> None:
-    told = import_verdict({"frames": frames, "fps": 30.0, "contact_share": share})
-    assert told["kind"] == kind
+    result = import_verdict({"frames": frames, "fps": 30.0, "contact_share": share})
+    assert result["kind"] == kind
 
 
 @pytest.mark.medium
@@ -106,18 +106,18 @@ def test_a_file_without_a_rate_needs_one(tmp_path: Path) -> None:
 
 def test_another_rate_than_the_files_is_reported(smpl: Path, tmp_path: Path) -> None:
     export(smpl, "bvh", tmp_path / "motion.bvh")
-    told = import_motion(tmp_path / "motion.bvh", tmp_path, 60.0, None, "base", {})
-    assert told["fps"] == 60.0
-    assert "the file has 30 frames a second: 60 was given" in told["notes"]
+    result = import_motion(tmp_path / "motion.bvh", tmp_path, 60.0, None, "base", {})
+    assert result["fps"] == 60.0
+    assert "the file has 30 frames a second: 60 was given" in result["notes"]
 
 
 def test_the_axis_that_points_up_can_be_given(smpl: Path, tmp_path: Path) -> None:
     export(smpl, "bvh", tmp_path / "motion.bvh")
-    told = import_motion(tmp_path / "motion.bvh", tmp_path, None, "z", "base", {})
+    result = import_motion(tmp_path / "motion.bvh", tmp_path, None, "z", "base", {})
     joints = read(tmp_path / "smpl.parquet").joints
     trunk = joints[:, keypoint("neck")] - joints[:, 0]
     assert (np.abs(trunk[:, 1]) > 2.0 * np.abs(trunk[:, 2])).all()
-    assert told["frames"] == len(joints)
+    assert result["frames"] == len(joints)
 
 
 class Trap:
@@ -149,7 +149,7 @@ def test_no_ones_file_lists_what_is_read(content: bytes, tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize(
-    ("content", "told"),
+    ("content", "message"),
     [
         (b"", "empty"),
         (tables.encode(person()), "retarget"),
@@ -159,10 +159,10 @@ def test_no_ones_file_lists_what_is_read(content: bytes, tmp_path: Path) -> None
     ],
 )
 def test_a_file_that_cannot_be_read_says_what_to_do(
-    content: bytes, told: str, tmp_path: Path
+    content: bytes, message: str, tmp_path: Path
 ) -> None:
     (tmp_path / "file").write_bytes(content)
-    with pytest.raises(BadTable, match=told):
+    with pytest.raises(BadTable, match=message):
         import_motion(tmp_path / "file", tmp_path / "out", None, None, "base", {})
     assert not (tmp_path / "out").exists()
 
@@ -192,7 +192,7 @@ def test_a_missing_file_is_reported(tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def said(smpl: Path) -> Said:
+def answered(smpl: Path) -> Said:
     """The command, in a process of its own."""
     path = smpl.parent / "motion.bvh"
     path.write_bytes(bvh.write(read(smpl)))
@@ -200,11 +200,11 @@ def said(smpl: Path) -> Said:
 
 
 @pytest.mark.medium
-def test_the_command_writes_the_table_it_names(said: Said) -> None:
-    assert said.code == 0, said.err
-    assert len(read(Path(said.answer["smpl"]))) == said.answer["frames"]
+def test_the_command_writes_the_table_it_names(answered: Said) -> None:
+    assert answered.code == 0, answered.err
+    assert len(read(Path(answered.answer["smpl"]))) == answered.answer["frames"]
 
 
 @pytest.mark.medium
-def test_the_command_loads_no_prefect(said: Said) -> None:
-    assert not said.loaded_prefect
+def test_the_command_loads_no_prefect(answered: Said) -> None:
+    assert not answered.loaded_prefect

@@ -38,9 +38,9 @@ def server() -> Iterator[str]:
 
 
 def test_the_report_is_a_table_in_markdown_with_what_an_issue_needs() -> None:
-    said = in_process("doctor", "--report")
-    head, blank, *table = said.out.splitlines()
-    assert (said.code, head, blank) == (0, "### robojackson doctor", "")
+    result = in_process("doctor", "--report")
+    head, blank, *table = result.out.splitlines()
+    assert (result.code, head, blank) == (0, "### robojackson doctor", "")
     assert all(line.startswith("|") and line.endswith("|") for line in table)
     rows = dict(line.strip("| ").split(" | ", 1) for line in table[2:])
     assert platform.python_version() in rows["Python"]
@@ -53,7 +53,7 @@ def test_the_report_names_no_home_no_user_and_no_secret(
 ) -> None:
     home = tmp_path / "somebody"
     (home / "store").mkdir(parents=True)
-    said = in_process(
+    text = in_process(
         "doctor",
         "--report",
         HOME=str(home),
@@ -63,10 +63,10 @@ def test_the_report_names_no_home_no_user_and_no_secret(
     )
     words = {"somebody", SECRET, platform.node()}
     words |= {getpass.getuser()} - {"root"}  # a word that others use
-    found = re.findall(r"[\w/.-]+", said.out)
+    found = re.findall(r"[\w/.-]+", text.out)
     assert [word for word in words if any(word in each.split("/") for each in found)] == []
-    assert str(tmp_path) not in said.out
-    assert "the folder of ROBOJACKSON_STORE: writable" in said.out
+    assert str(tmp_path) not in text.out
+    assert "the folder of ROBOJACKSON_STORE: writable" in text.out
 
 
 def test_a_server_that_answers_is_named_with_its_version(server: str) -> None:

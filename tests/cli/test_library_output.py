@@ -67,9 +67,9 @@ def run(*words: object, **more: str) -> Said:
     return Said(done.returncode, done.stdout, done.stderr)
 
 
-def strange(said: Said) -> list[str]:
+def strange(output: Said) -> list[str]:
     """Lines of stderr that are not ours."""
-    lines = (line for line in said.err.splitlines() if line.strip())
+    lines = (line for line in output.err.splitlines() if line.strip())
     return [line for line in lines if not OURS.fullmatch(line)]
 
 
@@ -118,26 +118,26 @@ def danced(short_clip: Path, folder: Path) -> Said:
     "command", ["scored", "captured", "retargeted", "trained", "judged", "danced"]
 )
 def test_every_line_of_a_command_is_ours(command: str, request: pytest.FixtureRequest) -> None:
-    said: Said = request.getfixturevalue(command)
-    assert said.code == 0, said.err
-    assert strange(said) == []
+    result: Said = request.getfixturevalue(command)
+    assert result.code == 0, result.err
+    assert strange(result) == []
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", ["scored", "captured", "retargeted", "trained", "judged"])
 def test_the_answer_is_alone_on_stdout(command: str, request: pytest.FixtureRequest) -> None:
-    said: Said = request.getfixturevalue(command)
-    assert not re.search(r"WARNING|Warning:|OpenGL|absl|[IWE]\d{4} \d\d:", said.out)
+    result: Said = request.getfixturevalue(command)
+    assert not re.search(r"WARNING|Warning:|OpenGL|absl|[IWE]\d{4} \d\d:", result.out)
 
 
 def test_warnings_and_logs_of_packages_are_dropped_and_ours_are_shown() -> None:
-    said = run("-c", NOISY)
-    assert (said.out, said.err) == ("answer\n", "ours\n")
+    result = run("-c", NOISY)
+    assert (result.out, result.err) == ("answer\n", "ours\n")
 
 
 def test_whoever_asks_for_warnings_gets_them() -> None:
-    said = run("-W", "default", "-c", NOISY)
-    assert "from a library" in said.err
+    result = run("-W", "default", "-c", NOISY)
+    assert "from a library" in result.err
 
 
 def test_a_simulation_that_diverges_writes_no_line_and_no_file(tmp_path: Path) -> None:

@@ -32,21 +32,21 @@ def weights(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.slow
 def test_a_video_goes_through_both_networks(weights: Path, tmp_path: Path) -> None:
     brought = ("--hybrik", weights / "r34.pth", "--niki", weights / "niki's.pth")
-    said = robojackson("mocap", weights / "short.mp4", "-o", tmp_path, *brought, "--json")
-    assert said.code == 0, said.err
-    assert said.answer["frames"] == 6
-    assert "hybrik_resnet34 (r34.pth), refined by niki_twist_swing" in said.answer["notes"][0]
+    result = robojackson("mocap", weights / "short.mp4", "-o", tmp_path, *brought, "--json")
+    assert result.code == 0, result.err
+    assert result.answer["frames"] == 6
+    assert "hybrik_resnet34 (r34.pth), refined by niki_twist_swing" in result.answer["notes"][0]
     assert (tmp_path / "smpl.parquet").is_file()
-    assert not said.loaded_prefect
+    assert not result.loaded_prefect
 
 
 @pytest.mark.medium
 def test_weights_that_cannot_be_used_are_told_in_one_line(weights: Path, tmp_path: Path) -> None:
     wrong = ("--hybrik", weights / "niki's.pth")
-    said = in_process("mocap", weights / "short.mp4", "-o", tmp_path / "out", *wrong)
-    assert said.code == 1
-    assert "BadWeights" in said.err
-    assert "expected weights of hybrik" in said.err
+    result = in_process("mocap", weights / "short.mp4", "-o", tmp_path / "out", *wrong)
+    assert result.code == 1
+    assert "BadWeights" in result.err
+    assert "expected weights of hybrik" in result.err
     assert not (tmp_path / "out").exists()
 
 

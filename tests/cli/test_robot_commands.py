@@ -66,9 +66,9 @@ def describe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """Makes `configs/robots/machine.yaml` say something."""
 
     def give(source: RobotSource | None) -> RobotDescription:
-        told = replace(machine.description(tmp_path), mjcf="store:machine.xml", source=source)
-        monkeypatch.setattr(robot_models, "describe_robot", lambda name: told)
-        return told
+        result = replace(machine.description(tmp_path), mjcf="store:machine.xml", source=source)
+        monkeypatch.setattr(robot_models, "describe_robot", lambda name: result)
+        return result
 
     return give
 
@@ -76,9 +76,9 @@ def describe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
 @pytest.mark.medium
 def test_the_model_is_unpacked_with_its_licence_and_loads(source, describe, tmp_path: Path):
     description = describe(source)
-    told = robot_models.add_robot("machine")
+    result = robot_models.add_robot("machine")
     folder = tmp_path / "store" / "robots" / "machine"
-    assert told == {
+    assert result == {
         "robot": "machine", "model": str(folder / "machine.xml"), "added": True, "licence": "ours",
     }  # fmt: skip
     assert (folder / "licences" / "LICENSE").read_text() == "do what you like"
@@ -198,11 +198,11 @@ def broken(folder: Path, old: str, new: str) -> Path:
 
 @pytest.mark.medium
 def test_a_good_description_is_reported_and_drawn(tmp_path: Path):
-    told, lines = robot_sheets.check_robot(str(own_robot(tmp_path)), tmp_path / "mine.png")
-    assert (told["ok"], told["problems"], told["hinges"], told["motors"]) == (True, [], 17, 17)
-    assert told["height_m"] == pytest.approx(1.56, abs=0.02)
-    assert told["contacts"] == pytest.approx({"left_foot": 0.0, "right_foot": 0.0}, abs=1e-9)
-    assert told["keypoints"]["left_knee"] == "left_shin"
+    found, lines = robot_sheets.check_robot(str(own_robot(tmp_path)), tmp_path / "mine.png")
+    assert (found["ok"], found["problems"], found["hinges"], found["motors"]) == (True, [], 17, 17)
+    assert found["height_m"] == pytest.approx(1.56, abs=0.02)
+    assert found["contacts"] == pytest.approx({"left_foot": 0.0, "right_foot": 0.0}, abs=1e-9)
+    assert found["keypoints"]["left_knee"] == "left_shin"
     assert any(re.match(r"left_knee +-160.0 +-2.0 +-17.2 +80$", line) for line in lines)
     with Image.open(tmp_path / "mine.png") as picture:
         assert picture.width > 2000
@@ -223,17 +223,17 @@ def test_a_broken_description_is_reported_in_a_line_that_names_the_file(
     tmp_path: Path, old, new, cause
 ):
     path = broken(tmp_path, old, new)
-    told, lines = robot_sheets.check_robot(str(path), None)
-    assert not told["ok"]
-    assert any(cause in line and str(path) in line for line in told["problems"])
-    assert told["problems"] == lines[1:-2]
-    assert told["verdict"]["kind"] == "problems"
+    found, lines = robot_sheets.check_robot(str(path), None)
+    assert not found["ok"]
+    assert any(cause in line and str(path) in line for line in found["problems"])
+    assert found["problems"] == lines[1:-2]
+    assert found["verdict"]["kind"] == "problems"
 
 
 def test_wrong_keys_are_reported_all_at_once(tmp_path: Path):
     path = broken(tmp_path, "root_body: torso", "root_bodi: torso\nspeed: 3")
-    told, _ = robot_sheets.check_robot(str(path), None)
-    assert all(any(key in line for line in told["problems"]) for key in ("root_bodi", "speed"))
+    found, _ = robot_sheets.check_robot(str(path), None)
+    assert all(any(key in line for line in found["problems"]) for key in ("root_bodi", "speed"))
 
 
 def test_new_writes_a_description_that_passes_and_keeps_a_file_that_is_there(
@@ -242,8 +242,8 @@ def test_new_writes_a_description_that_passes_and_keeps_a_file_that_is_there(
     model = tmp_path / "model.xml"
     model.write_text(gymnasium_model().read_text())
     monkeypatch.chdir(tmp_path)
-    told, lines = robot_sheets.new_robot(model, None, force=False)
-    assert (told["file"], told["ok"], told["left"]) == ("my_humanoid.yaml", True, [])
+    found, lines = robot_sheets.new_robot(model, None, force=False)
+    assert (found["file"], found["ok"], found["left"]) == ("my_humanoid.yaml", True, [])
     assert lines[-1] == "next: robojackson robots check my_humanoid.yaml -o my_humanoid.png"
     Path("my_humanoid.yaml").write_text("mine")
     with pytest.raises(StoreError, match="exists; --force"):
@@ -273,7 +273,7 @@ def test_new_says_why_no_legs_were_found(tmp_path: Path):
 @pytest.mark.medium
 def test_the_commands_answer_as_json_with_an_exit_code(tmp_path: Path):
     good, bad = own_robot(tmp_path / "a"), broken(tmp_path / "b", "[torso,", "[tors,")
-    said = [commands.robojackson("robots", "check", path, "--json") for path in (good, bad)]
-    assert [(each.code, each.answer["ok"]) for each in said] == [(0, True), (1, False)]
+    result = [commands.robojackson("robots", "check", path, "--json") for path in (good, bad)]
+    assert [(each.code, each.answer["ok"]) for each in result] == [(0, True), (1, False)]
     assert good.with_suffix(".png").is_file()
     assert not bad.with_suffix(".png").exists()

@@ -48,8 +48,8 @@ def test_train_evaluate_and_export_find_the_robot_by_themselves(made: Made) -> N
     overrides = {"evaluate.seconds": 0.1}
     judged = stages.evaluate(policy, made.reference, None, "smoke", overrides)
     assert judged["rollouts"] > 0
-    told = exporting.export(made.reference, "gmr", made.folder / "motion.pkl")
-    assert told["robot"] == "mine"
+    result = exporting.export(made.reference, "gmr", made.folder / "motion.pkl")
+    assert result["robot"] == "mine"
 
 
 @pytest.mark.medium
@@ -61,8 +61,8 @@ def test_a_file_that_is_gone_is_one_line_that_says_what_to_give(made: Made) -> N
         ):
             made.train("gone")
         assert made.train("given", str(elsewhere))["steps"] >= SHORT["steps"]
-        told = exporting.export(made.reference, "gmr", made.folder / "m.pkl", str(elsewhere))
-        assert told["robot"] == "mine"
+        text = exporting.export(made.reference, "gmr", made.folder / "m.pkl", str(elsewhere))
+        assert text["robot"] == "mine"
     finally:
         elsewhere.rename(made.robot)
 

@@ -62,14 +62,14 @@ STAGES = ["scored", "captured", "retargeted", "trained", "judged"]
 
 @pytest.mark.parametrize("stage", STAGES)
 def test_a_stage_ends_well(stage: str, request: pytest.FixtureRequest) -> None:
-    said: Said = request.getfixturevalue(stage)
-    assert said.code == 0, said.err
+    result: Said = request.getfixturevalue(stage)
+    assert result.code == 0, result.err
 
 
 @pytest.mark.parametrize("stage", STAGES)
 def test_a_stage_loads_no_prefect(stage: str, request: pytest.FixtureRequest) -> None:
-    said: Said = request.getfixturevalue(stage)
-    assert not said.loaded_prefect
+    result: Said = request.getfixturevalue(stage)
+    assert not result.loaded_prefect
 
 
 @pytest.mark.parametrize(
@@ -88,8 +88,8 @@ def test_a_stage_loads_no_prefect(stage: str, request: pytest.FixtureRequest) ->
 def test_a_stage_answers_with_its_figures(
     stage: str, keys: set[str], request: pytest.FixtureRequest
 ) -> None:
-    said: Said = request.getfixturevalue(stage)
-    assert keys <= set(said.answer)
+    result: Said = request.getfixturevalue(stage)
+    assert keys <= set(result.answer)
 
 
 def test_score_answers_for_every_video(scored: Said) -> None:

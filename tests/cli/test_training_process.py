@@ -43,8 +43,8 @@ def budgets(monkeypatch: pytest.MonkeyPatch) -> list[TrainConfig]:
 
 
 def test_before_the_first_episode_there_are_dashes() -> None:
-    said = "    1,000 steps  500/s  survived - s  error - cm  return -  1:05 left"
-    assert training_process.status(ROW) == said
+    result = "    1,000 steps  500/s  survived - s  error - cm  return -  1:05 left"
+    assert training_process.status(ROW) == result
 
 
 def test_a_refused_training_leaves_nothing(budgets: list, tmp_path: Path) -> None:
@@ -86,16 +86,16 @@ def written(folder: Path, text: str) -> str:
 
 def test_a_configuration_of_dance_trains_with_its_section(tmp_path: Path) -> None:
     config = written(tmp_path, "train: {seed: 3, tqc: {batch: 64}}\n")
-    wanted = training_process.requested(config, None, {})
-    assert (wanted.train.seed, wanted.train.tqc.batch, wanted.gate) == (3, 64, True)
-    assert wanted.train == load(PipelineConfig, config).train
+    expected = training_process.requested(config, None, {})
+    assert (expected.train.seed, expected.train.tqc.batch, expected.gate) == (3, 64, True)
+    assert expected.train == load(PipelineConfig, config).train
 
 
 @pytest.mark.parametrize("key", ["seed", "train.seed"])
 def test_what_is_typed_wins_over_the_configuration(key: str, tmp_path: Path) -> None:
     config = written(tmp_path, "gate: false\ntrain: {seed: 3}\n")
-    wanted = training_process.requested(config, None, {key: "4"})
-    assert (wanted.train.seed, wanted.gate) == (4, False)
+    expected = training_process.requested(config, None, {key: "4"})
+    assert (expected.train.seed, expected.gate) == (4, False)
 
 
 def test_a_wrong_key_of_the_configuration_is_named_with_its_path(tmp_path: Path) -> None:

@@ -32,8 +32,8 @@ def test_it_names_every_setting_that_the_checkpoint_insists_on(
     config: TrainConfig, words: str, tmp_path: Path
 ) -> None:
     folder = folder_of(config, tmp_path)
-    told = train_longer(Path("r.parquet"), folder, 20)
-    assert told == f"robojackson train r.parquet -o {folder} --minutes 20{words}"
+    result = train_longer(Path("r.parquet"), folder, 20)
+    assert result == f"robojackson train r.parquet -o {folder} --minutes 20{words}"
 
 
 def test_a_folder_without_a_checkpoint_is_trained_from_the_start(tmp_path: Path) -> None:

@@ -47,9 +47,9 @@ def completions(command: Path, words: str) -> list[str]:
 
 
 def test_the_version_is_that_of_the_package() -> None:
-    said = in_process("--version")
-    assert (said.code, said.err) == (0, "")
-    assert said.out == f"robojackson {version('robojackson')}, Python {sys.version.split()[0]}\n"
+    result = in_process("--version")
+    assert (result.code, result.err) == (0, "")
+    assert result.out == f"robojackson {version('robojackson')}, Python {sys.version.split()[0]}\n"
 
 
 @pytest.mark.medium

@@ -31,11 +31,13 @@ def test_a_walker_for_the_papers_mode_takes_all_348_observations(tmp_path: Path)
     networks = load_networks(Path(made["walker"]))
     assert networks.observation_size == 348
     assert not networks.tensors["actor.0.weight"][45:].any()
-    told = json.loads((tmp_path / "walker.json").read_text())
-    assert shlex.split(told["command"])[:4] == ["robojackson", "pretrain", "--kind", "paper"]
-    assert (told["seed"], told["steps"]) == (3, 64)
-    assert told["evaluation"]["episode_return"] > 0
-    assert [point["step"] for point in told["curve"]] == sorted(p["step"] for p in told["curve"])
+    answer = json.loads((tmp_path / "walker.json").read_text())
+    assert shlex.split(answer["command"])[:4] == ["robojackson", "pretrain", "--kind", "paper"]
+    assert (answer["seed"], answer["steps"]) == (3, 64)
+    assert answer["evaluation"]["episode_return"] > 0
+    assert [point["step"] for point in answer["curve"]] == sorted(
+        p["step"] for p in answer["curve"]
+    )
 
 
 def test_a_walker_that_follows_no_motion_takes_none(tmp_path: Path) -> None:

@@ -47,18 +47,18 @@ def onsets(samples: np.ndarray) -> np.ndarray:
 def test_slowed_clicks_stay_within_20_ms_of_their_pictures() -> None:
     tempo, samples = 0.78, clicks(8.0)
     times = np.arange(0, 8 / tempo, HOP / RATE) * tempo
-    heard, said = onsets(warped(samples, times)), onsets(samples) / tempo
-    assert len(heard) == len(said)
-    assert np.abs(heard - said).max() < 0.02
+    heard, expected = onsets(warped(samples, times)), onsets(samples) / tempo
+    assert len(heard) == len(expected)
+    assert np.abs(heard - expected).max() < 0.02
 
 
 def test_locally_warped_clicks_stay_within_20_ms_of_their_pictures() -> None:
     samples, result = clicks(8.0), np.arange(0, 9.0, HOP / RATE)
     times = 0.85 * result + 0.12 * np.sin(result)
     heard = onsets(warped(samples, times))
-    said = np.interp(onsets(samples), times, result)
-    said = said[said < 8.9]
-    assert np.abs(heard[: len(said)] - said).max() < 0.02
+    answer = np.interp(onsets(samples), times, result)
+    answer = answer[answer < 8.9]
+    assert np.abs(heard[: len(answer)] - answer).max() < 0.02
 
 
 def test_a_slowed_tone_keeps_its_pitch() -> None:
@@ -81,9 +81,9 @@ def test_sound_and_picture_of_a_written_film_are_in_step(tmp_path: Path) -> None
     film = write_video(pictures, FPS, tmp_path / "film.mp4", sound=sound)
     found = read_sound(film)
     assert found is not None
-    heard, said = onsets(found.samples), onsets(sound.samples)
-    assert len(heard) == len(said)
-    assert np.abs(heard - said).max() < 0.02
+    heard, expected = onsets(found.samples), onsets(sound.samples)
+    assert len(heard) == len(expected)
+    assert np.abs(heard - expected).max() < 0.02
 
 
 def clip_of(samples: np.ndarray, seconds: float, folder: Path) -> Path:
@@ -132,11 +132,11 @@ def test_sound_and_picture_of_a_slowed_dance_are_in_step(tempo: float, tmp_path:
     pictures = [source[min(round(t * FPS), len(source) - 1)] for t in shown]
     film = write_video(pictures, FPS, tmp_path / "film.mp4", sound=sound)
     heard = onsets(require_sound(film).samples)
-    said = np.arange(0.25, 5.0, BEAT_S) / tempo
-    assert heard[: len(said)] == pytest.approx(said, abs=0.02)
+    answer = np.arange(0.25, 5.0, BEAT_S) / tempo
+    assert heard[: len(answer)] == pytest.approx(answer, abs=0.02)
     first = flashes(film)
     first = first[np.insert(np.diff(first) > 2 / FPS, 0, True)]
-    assert first[: len(said)] == pytest.approx(heard[: len(said)], abs=0.02 + 1 / FPS)
+    assert first[: len(answer)] == pytest.approx(heard[: len(answer)], abs=0.02 + 1 / FPS)
 
 
 def test_other_music_is_heard_in_place_of_the_clips_own(tmp_path: Path) -> None:

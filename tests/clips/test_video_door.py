@@ -22,7 +22,7 @@ def test_a_name_is_no_protocol(name: str, tmp_path: Path, monkeypatch: pytest.Mo
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "told"),
+    ("name", "text", "message"),
     [
         ("a.m3u8", "#EXTM3U\n#EXTINF:9,\nfile://{clip}\n", "HLS"),
         ("a.mp4", "ffconcat version 1.0\nfile {clip}\n", "concat"),
@@ -30,9 +30,11 @@ def test_a_name_is_no_protocol(name: str, tmp_path: Path, monkeypatch: pytest.Mo
         ("a.sdp", "v=0\nm=video 5004 RTP/AVP 96\n", "SDP"),
     ],
 )
-def test_what_names_other_files_is_refused(name: str, text: str, told: str, tmp_path: Path) -> None:
+def test_what_names_other_files_is_refused(
+    name: str, text: str, message: str, tmp_path: Path
+) -> None:
     (tmp_path / name).write_text(text.format(clip=CLIP))
-    with pytest.raises(UnreadableVideo, match=told):
+    with pytest.raises(UnreadableVideo, match=message):
         probe(tmp_path / name, VideoLimits())
 
 

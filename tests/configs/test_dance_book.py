@@ -42,7 +42,7 @@ def test_an_unknown_dance_is_refused_with_the_known_ones(book: DanceBook) -> Non
 
 
 @pytest.mark.parametrize(
-    ("given", "told"),
+    ("given", "message"),
     [
         ({"name": "x", "query": "y", "languge": "en"}, "languge"),
         ({"name": "x", "query": "y", "top": 0}, "top"),
@@ -52,8 +52,8 @@ def test_an_unknown_dance_is_refused_with_the_known_ones(book: DanceBook) -> Non
         ({"name": "x", "query": "y", "language": "english"}, "language"),
     ],
 )
-def test_a_wrong_key_or_value_is_named(given: dict[str, object], told: str) -> None:
-    with pytest.raises(BadConfiguration, match=told):
+def test_a_wrong_key_or_value_is_named(given: dict[str, object], message: str) -> None:
+    with pytest.raises(BadConfiguration, match=message):
         build(DanceBook, {"dances": [given]}, "dances.yaml")
 
 

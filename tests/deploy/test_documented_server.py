@@ -70,15 +70,15 @@ class Documented:
         )  # fmt: skip
 
     def robojackson(self, *words: object) -> dict[str, Any]:
-        said = self.run(sys.executable, "-m", "robojackson", *words, "--json")
-        assert said.returncode == 0, said.stderr
-        return dict(json.loads(said.stdout))
+        result = self.run(sys.executable, "-m", "robojackson", *words, "--json")
+        assert result.returncode == 0, result.stderr
+        return dict(json.loads(result.stdout))
 
     def deployment(self, name: str, **parameters: object) -> None:
         given = [w for k, v in parameters.items() for w in ("-p", f"{k}={json.dumps(v)}")]
         words = ("-m", "prefect", "deployment", "run", name, *given, "--watch")
-        said = self.run(sys.executable, *words)
-        assert said.returncode == 0, said.stdout[-2000:]
+        result = self.run(sys.executable, *words)
+        assert result.returncode == 0, result.stdout[-2000:]
 
 
 @contextmanager

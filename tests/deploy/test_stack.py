@@ -54,21 +54,21 @@ def ask(stack: Stack, sql: str) -> list[dict[str, Any]]:
 def begin(stack: Stack, **given: Any) -> str:
     """Start a small study on the workers; the id of its run."""
     study = json.dumps({**STUDY, "executor": "work-pool", **given})
-    said = prefect(stack, "deployment", "run", "ablation/smoke", "-p", f"study={study}").stdout
-    found = re.search(r"UUID: ([0-9a-f-]{36})", said)
-    assert found, said
+    output = prefect(stack, "deployment", "run", "ablation/smoke", "-p", f"study={study}").stdout
+    found = re.search(r"UUID: ([0-9a-f-]{36})", output)
+    assert found, output
     return found[1]
 
 
 def inspect(stack: Stack, run: str) -> dict[str, Any]:
-    said = prefect(stack, "flow-run", "inspect", run, "--output", "json")
-    return dict(json.loads(said.stdout)) if said.returncode == 0 else {}
+    result = prefect(stack, "flow-run", "inspect", run, "--output", "json")
+    return dict(json.loads(result.stdout)) if result.returncode == 0 else {}
 
 
 def listed(stack: Stack, *words: str) -> list[dict[str, Any]]:
     """The runs that the server tells of."""
-    said = prefect(stack, "flow-run", "ls", *words, "--output", "json")
-    return list(json.loads(said.stdout)) if said.returncode == 0 else []
+    result = prefect(stack, "flow-run", "ls", *words, "--output", "json")
+    return list(json.loads(result.stdout)) if result.returncode == 0 else []
 
 
 def until(question: Callable[[], Any], seconds: float = 900.0) -> Any:
@@ -148,16 +148,16 @@ def test_the_runs_of_a_dead_worker_are_marked_crashed(stack: Stack) -> None:
 @pytest.mark.ci
 def test_nonsense_is_refused_before_a_run_starts(stack: Stack) -> None:
     wrong = json.dumps({"name": "x", "setups": ["bogus"]})
-    said = prefect(stack, "deployment", "run", "ablation/smoke", "-p", f"study={wrong}")
-    assert said.returncode != 0
-    assert "bogus" in said.stdout + said.stderr
+    result = prefect(stack, "deployment", "run", "ablation/smoke", "-p", f"study={wrong}")
+    assert result.returncode != 0
+    assert "bogus" in result.stdout + result.stderr
 
 
 @pytest.mark.ci
 def test_a_dance_is_requested_by_its_name_and_not_by_nothing(stack: Stack) -> None:
-    said = prefect(stack, "deployment", "run", "dance/on-demand", "-p", "source= ")
-    assert said.returncode != 0
-    assert "source" in said.stdout + said.stderr
+    result = prefect(stack, "deployment", "run", "dance/on-demand", "-p", "source= ")
+    assert result.returncode != 0
+    assert "source" in result.stdout + result.stderr
 
 
 @pytest.mark.ci

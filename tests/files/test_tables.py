@@ -155,7 +155,7 @@ def with_nan(table: pa.Table) -> pa.Table:
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "message"),
     [
         (lambda t: t.drop_columns(["transl"]), "'transl' of SmplSequence is missing"),
         (as_column(pa.array(["x"] * 5)), "'transl' is string, expected fixed_size_list"),
@@ -169,8 +169,8 @@ def with_nan(table: pa.Table) -> pa.Table:
         (lambda t: t.replace_schema_metadata({}), "metadata key 'fps'"),
     ],
 )
-def test_a_violated_schema_names_column_and_file(change, told) -> None:
-    with pytest.raises(BadTable, match=told) as caught:
+def test_a_violated_schema_names_column_and_file(change, message) -> None:
+    with pytest.raises(BadTable, match=message) as caught:
         tables.decode(SmplSequence, rewritten(change), "runs/smpl.parquet")
     assert str(caught.value).startswith("runs/smpl.parquet: ")
 
@@ -188,8 +188,8 @@ def test_a_foreign_file_is_refused() -> None:
 
 def test_another_table_is_refused() -> None:
     data = tables.encode(a_track(np.random.default_rng(1)))
-    told = "holds a LandmarkTrack, expected a SmplSequence; `robojackson mocap` writes one"
-    with pytest.raises(BadTable, match=told):
+    result = "holds a LandmarkTrack, expected a SmplSequence; `robojackson mocap` writes one"
+    with pytest.raises(BadTable, match=result):
         tables.decode(SmplSequence, data, "landmarks.parquet")
 
 

@@ -1,4 +1,4 @@
-"""An ablation whose cells are played: who fails, who waits, who is started again, what is told."""
+"""An ablation whose cells are played: failures, queues, restarts and what is reported."""
 
 import asyncio
 import json
@@ -46,17 +46,17 @@ class Played:
     def __init__(self, fails: str = "") -> None:
         self.fails, self.now, self.most = fails, 0, 0
 
-    async def __call__(self, wanted: Cell) -> dict[str, Artifact]:
+    async def __call__(self, cell: Cell) -> dict[str, Artifact]:
         self.now += 1
         self.most = max(self.most, self.now)
         await asyncio.sleep(0.05)
         self.now -= 1
-        if wanted.name == self.fails:
+        if cell.name == self.fails:
             raise TrainingCrashed("run x was killed by SIGKILL")
         store, summary = Store.from_environment(), {"survived_s": 1.25, "skill": 0.5}
         return {
             "evaluation": store.put("evaluation.json", json.dumps(summary).encode()),
-            "episodes": store.put(EPISODES.format(wanted.name), b"rows"),
+            "episodes": store.put(EPISODES.format(cell.name), b"rows"),
         }
 
 
@@ -95,11 +95,11 @@ def play(
     return run
 
 
-def states_told() -> dict[str, str]:
+def states_reported() -> dict[str, str]:
     """The last version of the table on Prefect's page: states by cell."""
     with get_client(sync_client=True) as client:
-        wanted = ArtifactFilter(key=ArtifactFilterKey(any_=["ablation-played"]))
-        versions = client.read_artifacts(artifact_filter=wanted)
+        expected = ArtifactFilter(key=ArtifactFilterKey(any_=["ablation-played"]))
+        versions = client.read_artifacts(artifact_filter=expected)
     newest = max(versions, key=lambda version: str(version.created))
     return {row["cell"]: row["state"] for row in json.loads(str(newest.data))}
 
@@ -108,8 +108,8 @@ def states_told() -> dict[str, str]:
 def test_a_failed_cell_is_named_and_its_neighbours_are_done(play: Any) -> None:
     with pytest.raises(StudyFailed, match=r"1 of 3 cells failed \(pretrain-walk-s0: run x was"):
         play(Played(fails="pretrain-walk-s0"))
-    told = {"scratch-walk-s0": "done", "pretrain-walk-s0": "failed", "curiosity-walk-s0": "done"}
-    assert states_told() == told
+    facts = {"scratch-walk-s0": "done", "pretrain-walk-s0": "failed", "curiosity-walk-s0": "done"}
+    assert states_reported() == facts
 
 
 @pytest.mark.medium
@@ -127,8 +127,8 @@ def test_the_page_is_of_the_cells_that_ended_well_in_this_run(
 @pytest.mark.medium
 def test_a_study_on_a_refused_motion_begins_no_cell_and_says_why(play: Any) -> None:
     executor = Played()
-    told = r"1 of 1 motions are refused \(walk: .*infeasible_share is 0.5.*gate=false"
-    with pytest.raises(RejectedReference, match=told):
+    result = r"1 of 1 motions are refused \(walk: .*infeasible_share is 0.5.*gate=false"
+    with pytest.raises(RejectedReference, match=result):
         play(executor, infeasible_share=0.5)
     assert executor.most == 0
 
@@ -156,7 +156,7 @@ def test_nonsense_is_refused_before_a_run_starts(wrong: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("wrong", "told"),
+    ("wrong", "expected_message"),
     [
         ({"seeds": [1, 0, 1]}, r"--set seeds: 'seeds' is \[1, 0, 1\]: 1 is listed twice"),
         ({"moves": ["walk", "walk"]}, "--set moves: .*: walk is listed twice"),
@@ -167,9 +167,9 @@ def test_nonsense_is_refused_before_a_run_starts(wrong: dict[str, Any]) -> None:
     ],
 )
 def test_a_cell_that_would_stand_twice_in_a_study_is_refused(
-    wrong: dict[str, Any], told: str
+    wrong: dict[str, Any], expected_message: str
 ) -> None:
-    with pytest.raises(BadConfiguration, match=told):
+    with pytest.raises(BadConfiguration, match=expected_message):
         load(Study, "studies/smoke", wrong)
 
 
@@ -177,9 +177,9 @@ def test_a_cell_that_would_stand_twice_in_a_study_is_refused(
 def test_a_deployment_is_the_study_of_its_name_on_workers(name: str) -> None:
     entries = yaml.safe_load((ROOT / "prefect.yaml").read_text())["deployments"]
     (ours,) = [e for e in entries if e["entrypoint"].endswith(".ablation") and e["name"] == name]
-    wanted = load(Study, f"studies/{name}", {"executor": "work-pool"})
+    expected = load(Study, f"studies/{name}", {"executor": "work-pool"})
     ours = Study(**ours["parameters"]["study"])
-    assert (ours, ours.robot) == (wanted, wanted.robot)
+    assert (ours, ours.robot) == (expected, expected.robot)
 
 
 class Pool:

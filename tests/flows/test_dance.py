@@ -78,11 +78,11 @@ def passes(
     folder = tmp_path_factory.mktemp("dance")
     (folder / "clips").mkdir()
     shutil.copy(short_clip, folder / "clips" / "hips.mp4")
-    wanted = {
+    expected = {
         PREFECT_FLOWS_HEARTBEAT_FREQUENCY: None,
         PREFECT_LOGGING_LEVEL: "ERROR",
     }
-    with pytest.MonkeyPatch.context() as patch, temporary_settings(wanted):
+    with pytest.MonkeyPatch.context() as patch, temporary_settings(expected):
         patch.setenv("ROBOJACKSON_STORE", str(folder / "store"))
         yield Passes(folder / "clips", folder / "store")
 
@@ -124,9 +124,9 @@ def test_an_altered_video_in_the_folder_is_put_back(passes: Passes) -> None:
 @pytest.mark.slow
 def test_a_renamed_copy_of_the_clip_trains_nothing(passes: Passes) -> None:
     (passes.source / "hips.mp4").rename(passes.source / "sway.mp4")
-    told = passes.run()
+    result = passes.run()
     assert passes.executed() == {"write_page": 1}
-    shown = Path(told["page"]).read_text()
+    shown = Path(result["page"]).read_text()
     assert ("sway.mp4" in shown, "hips.mp4" in shown) == (True, False)
 
 
@@ -227,10 +227,10 @@ def test_when_the_landmarks_of_all_clips_fail_the_first_cause_is_reported(
 @pytest.mark.slow
 def test_a_person_who_is_not_there_is_one_line(short_clip: Path, tmp_path: Path) -> None:
     words = ("dance", short_clip, "--person", 3, "--config", "smoke")
-    said = robojackson(*words, ROBOJACKSON_STORE=str(tmp_path / "store"))
-    (told,) = (line for line in said.err.splitlines() if line.startswith("robojackson: "))
-    assert (said.code, "Traceback" in said.err) == (1, False)
-    assert told.startswith("robojackson: NoPersonFound: ")
+    text = robojackson(*words, ROBOJACKSON_STORE=str(tmp_path / "store"))
+    (refusal,) = (line for line in text.err.splitlines() if line.startswith("robojackson: "))
+    assert (text.code, "Traceback" in text.err) == (1, False)
+    assert refusal.startswith("robojackson: NoPersonFound: ")
 
 
 def test_without_a_source_the_hip_shake_is_danced() -> None:
@@ -246,13 +246,13 @@ def test_a_source_without_words_or_with_too_many_is_refused(source: str) -> None
 
 def test_a_training_that_says_its_processor_time_gets_no_clock() -> None:
     settings = load(PipelineConfig, "base", {"train.cpu_minutes": 60})
-    told, whole_pass = dance_stages._budgeted(settings)
-    assert (told.minutes, told.cpu_minutes, whole_pass) == (None, 60, False)
+    budgeted, whole_pass = dance_stages._budgeted(settings)
+    assert (budgeted.minutes, budgeted.cpu_minutes, whole_pass) == (None, 60, False)
 
 
 def test_a_training_without_a_budget_has_that_of_the_pass() -> None:
-    told, whole_pass = dance_stages._budgeted(load(PipelineConfig, "base", {"minutes": 3.5}))
-    assert (told.minutes, whole_pass) == (3.5, True)
+    budgeted, whole_pass = dance_stages._budgeted(load(PipelineConfig, "base", {"minutes": 3.5}))
+    assert (budgeted.minutes, whole_pass) == (3.5, True)
 
 
 def test_files_that_cannot_be_read_are_left_out(tmp_path: Path) -> None:

@@ -57,8 +57,8 @@ def test_dances_can_be_named_from_outside() -> None:
 
 
 def test_dances_are_requested_by_name() -> None:
-    wanted = next(d for d in DEPLOYMENTS if d["entrypoint"] == "flows.dance.dance")
-    assert flow_of(wanted).validate_parameters({"source": "APT"})["source"] == "APT"
+    expected = next(d for d in DEPLOYMENTS if d["entrypoint"] == "flows.dance.dance")
+    assert flow_of(expected).validate_parameters({"source": "APT"})["source"] == "APT"
 
 
 def within(**silence: str) -> dict[str, int]:
@@ -75,8 +75,8 @@ def test_the_silence_of_a_run_can_be_chosen() -> None:
 
 
 def test_an_automation_tells_its_seconds() -> None:
-    told = {f["trigger"]["within"]: f["actions"][0]["message"] for f in automations()}
-    assert all(f" {seconds} s" in message for seconds, message in told.items())
+    document = {f["trigger"]["within"]: f["actions"][0]["message"] for f in automations()}
+    assert all(f" {seconds} s" in message for seconds, message in document.items())
 
 
 @pytest.mark.parametrize("seconds", ["60", "-1", "soon"])

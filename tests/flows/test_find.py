@@ -35,8 +35,8 @@ def test_find_answers_with_the_chosen_video(found: Said) -> None:
 
 @pytest.mark.medium
 def test_find_gives_every_video_its_reason(found: Said) -> None:
-    told = {row["title"]: (row["decision"], row["reason"]) for row in found.answer["candidates"]}
-    assert told == {
+    facts = {row["title"]: (row["decision"], row["reason"]) for row in found.answer["candidates"]}
+    assert facts == {
         "hips.mp4": ("chosen", ""),
         "night.mp4": ("rejected", "no person found in 35 of 35 frames"),
         "words.mp4": ("failed", "not a video that FFmpeg can read"),
@@ -45,27 +45,27 @@ def test_find_gives_every_video_its_reason(found: Said) -> None:
 
 @pytest.mark.medium
 def test_the_catalogue_has_the_same_rows_and_needs_no_prefect(found: Said, store: Path) -> None:
-    said = robojackson("catalogue", "--json", ROBOJACKSON_STORE=str(store))
-    rows = said.answer["candidates"]
+    text = robojackson("catalogue", "--json", ROBOJACKSON_STORE=str(store))
+    rows = text.answer["candidates"]
     assert {r["title"]: r["decision"] for r in rows} == {
         r["title"]: r["decision"] for r in found.answer["candidates"]
     }
-    assert not said.loaded_prefect
+    assert not text.loaded_prefect
 
 
 @pytest.mark.medium
 def test_the_catalogue_answers_sql(found: Said, store: Path) -> None:
     sql = "SELECT count(*) AS n FROM candidates WHERE decision = 'chosen'"
-    said = in_process("catalogue", "--sql", sql, "--json", ROBOJACKSON_STORE=str(store))
-    assert said.answer == {"rows": [{"n": 1}]}
+    text = in_process("catalogue", "--sql", sql, "--json", ROBOJACKSON_STORE=str(store))
+    assert text.answer == {"rows": [{"n": 1}]}
 
 
 @pytest.mark.medium
 def test_an_unknown_source_is_one_line(store: Path) -> None:
-    said = in_process("find", "x", "--source", "myspace", ROBOJACKSON_STORE=str(store))
-    assert said.code == 1
-    assert "unknown source 'myspace'" in said.err
-    assert "youtube" in said.err
+    text = in_process("find", "x", "--source", "myspace", ROBOJACKSON_STORE=str(store))
+    assert text.code == 1
+    assert "unknown source 'myspace'" in text.err
+    assert "youtube" in text.err
 
 
 @pytest.mark.parametrize(

@@ -45,8 +45,8 @@ def test_the_walker_is_kept_and_its_folder_of_work_is_gone(
 ) -> None:
     key = train(steps=64)
     (command,) = asked
-    told = f"walker_paper.safetensors of {folder_of(command).name}"
-    assert Store(store_folder).read(key).decode() == told
+    result = f"walker_paper.safetensors of {folder_of(command).name}"
+    assert Store(store_folder).read(key).decode() == result
     assert not folder_of(command).exists()
 
 
@@ -81,8 +81,8 @@ def test_a_configuration_that_was_changed_starts_again(
 @pytest.mark.medium
 def test_a_walker_whose_flow_is_gone_is_not_trained(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    said = robojackson("pretrain", "--kind", "paper", "-o", out, "--steps", 64, "--parent", 1)
-    assert "the process that started this training is gone" in said.err
+    result = robojackson("pretrain", "--kind", "paper", "-o", out, "--steps", 64, "--parent", 1)
+    assert "the process that started this training is gone" in result.err
     assert not out.exists()
 
 

@@ -75,9 +75,9 @@ def night(book: Path, dances: list[str] | None = None) -> dict[str, Any]:
 
 def artifact(key: str) -> Any:
     """The data of the newest artifact of a key."""
-    wanted = ArtifactFilter(key=ArtifactFilterKey(any_=[key]))
+    expected = ArtifactFilter(key=ArtifactFilterKey(any_=[key]))
     with get_client(sync_client=True) as client:
-        found = client.read_artifacts(artifact_filter=wanted)
+        found = client.read_artifacts(artifact_filter=expected)
     return max(found, key=lambda each: each.created).data
 
 
@@ -99,13 +99,13 @@ def nights(
     prefect_server: None, tmp_path_factory: pytest.TempPathFactory, short_clip: Path
 ) -> Iterator[Nights]:
     folder = tmp_path_factory.mktemp("refresh")
-    wanted = {
+    expected = {
         PREFECT_FLOWS_HEARTBEAT_FREQUENCY: None,
         PREFECT_LOGGING_LEVEL: "ERROR",
     }
     with (
         pytest.MonkeyPatch.context() as patch,
-        temporary_settings(wanted),
+        temporary_settings(expected),
         serving(short_clip.read_bytes()) as web,
     ):
         patch.setenv("ROBOJACKSON_STORE", str(folder / "store"))
@@ -221,7 +221,7 @@ def test_a_choice_of_which_no_motion_can_be_made_leaves_the_one_before(
             raise TrackTooShort("1 frame")
         return {"reference": video.key}
 
-    async def show(*told: object) -> None:
+    async def show(*shown: object) -> None:
         return None
 
     monkeypatch.setenv("ROBOJACKSON_STORE", str(tmp_path))

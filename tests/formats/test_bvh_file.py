@@ -137,13 +137,13 @@ def test_another_skeletons_limbs_are_where_an_independent_reader_sees_them(tmp_p
     other = pybvh.read_bvh_file(path)
     names = [node.name for node in other.nodes]
     places = other.node_positions()[:, [names.index(name) for name in LIMBS.values()]]
-    wanted = places[..., [2, 0, 1]] * CENTIMETRE
+    expected = places[..., [2, 0, 1]] * CENTIMETRE
     found = ground_foreign_motion(bvh.read(path.read_bytes()), 50.0).joints[
         :, [keypoint(n) for n in LIMBS]
     ]
-    shift = np.median(found - wanted, axis=(0, 1))
+    shift = np.median(found - expected, axis=(0, 1))
     assert np.abs(shift[:2]).max() < 1e-3
-    np.testing.assert_allclose(found - shift, wanted, atol=5e-3)
+    np.testing.assert_allclose(found - shift, expected, atol=5e-3)
 
 
 def test_names_with_a_prefix_are_known() -> None:

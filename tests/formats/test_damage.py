@@ -48,7 +48,7 @@ def damaged(data: bytes, rng: np.random.Generator) -> bytes:
 )
 def test_a_damaged_file_is_read_or_refused_in_one_line(kind: str) -> None:
     rng = np.random.default_rng(0)
-    told = []
+    calls = []
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         for _ in range(TRIALS):
@@ -56,5 +56,5 @@ def test_a_damaged_file_is_read_or_refused_in_one_line(kind: str) -> None:
             try:
                 recognise(data, "file").read(data)
             except RoboJacksonError as cause:
-                told.append(len(str(cause)))
-    assert 0 < max(told) < 2000
+                calls.append(len(str(cause)))
+    assert 0 < max(calls) < 2000

@@ -79,10 +79,10 @@ def test_what_is_written_is_read_back(
     name: str, swaying: ReferenceMotion, model: mujoco.MjModel
 ) -> None:
     back = READERS[name](exported(name, swaying, model))
-    wanted = poses(np.arange(len(back)) / back.fps)
+    expected = poses(np.arange(len(back)) / back.fps)
     rest = [0, 1, 2, *range(7, 24)]
-    np.testing.assert_allclose(back.qpos[:, rest], wanted[:, rest], atol=2e-5)
-    np.testing.assert_allclose(same_rotations(back.qpos[:, 3:7], wanted[:, 3:7]), 1.0, atol=1e-6)
+    np.testing.assert_allclose(back.qpos[:, rest], expected[:, rest], atol=2e-5)
+    np.testing.assert_allclose(same_rotations(back.qpos[:, 3:7], expected[:, 3:7]), 1.0, atol=1e-6)
 
 
 @pytest.mark.parametrize("name", READERS)
@@ -178,8 +178,8 @@ def test_beyondmimic_turns_are_reported_in_the_axes_of_the_world(
     swaying: ReferenceMotion, model: mujoco.MjModel
 ) -> None:
     turns = arrays(beyondmimic.write(swaying, model))["body_ang_vel_w"][:, 0]
-    wanted = yaw_rate(np.arange(75) / 50)[:, None] * [0.0, 0.0, 1.0]
-    np.testing.assert_allclose(turns, wanted, atol=0.005)
+    expected = yaw_rate(np.arange(75) / 50)[:, None] * [0.0, 0.0, 1.0]
+    np.testing.assert_allclose(turns, expected, atol=0.005)
 
 
 def test_beyondmimic_says_which_column_is_which_body(

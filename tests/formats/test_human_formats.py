@@ -38,18 +38,18 @@ def from_pelvis(joints: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("module", [amass, bvh, gvhmr, smpl_csv])
 def test_a_motion_comes_back_as_it_went(module: Any) -> None:
-    wanted = person()
-    motion = module.read(module.write(wanted))
+    expected = person()
+    motion = module.read(module.write(expected))
     back = ground_foreign_motion(motion, motion.fps)
-    assert back.fps == pytest.approx(wanted.fps)
-    np.testing.assert_allclose(back.joints, wanted.joints, atol=1e-5)
+    assert back.fps == pytest.approx(expected.fps)
+    np.testing.assert_allclose(back.joints, expected.joints, atol=1e-5)
 
 
 @pytest.mark.parametrize("module", [bvh, smpl_csv])
 def test_formats_with_hands_bring_their_tips_back(module: Any) -> None:
-    wanted = person()
-    back = ground_foreign_motion(module.read(module.write(wanted)), wanted.fps)
-    np.testing.assert_allclose(back.keypoints_w, wanted.keypoints_w, atol=1e-5)
+    expected = person()
+    back = ground_foreign_motion(module.read(module.write(expected)), expected.fps)
+    np.testing.assert_allclose(back.keypoints_w, expected.keypoints_w, atol=1e-5)
 
 
 @pytest.mark.parametrize("scale", [0.3, 0.5, 0.65, 1.3])

@@ -25,10 +25,10 @@ RATES = (30, 50, 120)
 @pytest.mark.parametrize("cyclic", [True, False])
 def test_frames_lie_on_the_motion(swaying: ReferenceMotion, fps: int, cyclic: bool) -> None:
     found = sampled(replace(swaying, cyclic=cyclic), fps).qpos
-    wanted = poses(np.arange(len(found)) / fps)
-    np.testing.assert_allclose(np.delete(found, range(3, 7), 1), np.delete(wanted, range(3, 7), 1),
-                               atol=2e-5)  # fmt: skip
-    np.testing.assert_allclose(same_rotations(found[:, 3:7], wanted[:, 3:7]), 1.0, atol=1e-9)
+    expected = poses(np.arange(len(found)) / fps)
+    hinges = np.delete(found, range(3, 7), 1), np.delete(expected, range(3, 7), 1)
+    np.testing.assert_allclose(*hinges, atol=2e-5)
+    np.testing.assert_allclose(same_rotations(found[:, 3:7], expected[:, 3:7]), 1.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("fps", RATES)
@@ -46,16 +46,16 @@ def test_an_open_motion_ends_at_its_last_step(swaying: ReferenceMotion, fps: int
 @pytest.mark.parametrize("cyclic", [True, False])
 def test_hinge_velocities_are_the_derivative(swaying: ReferenceMotion, cyclic: bool) -> None:
     found = sampled(replace(swaying, cyclic=cyclic), 50).qvel
-    wanted = hinge_rates(np.arange(len(found)) / 50)
-    np.testing.assert_allclose(found[:, 6:], wanted, atol=0.01)
+    expected = hinge_rates(np.arange(len(found)) / 50)
+    np.testing.assert_allclose(found[:, 6:], expected, atol=0.01)
 
 
 def test_the_roots_turn_is_reported_in_its_own_axes(swaying: ReferenceMotion) -> None:
     """A turn about the vertical, seen by a root that leans about its own x axis."""
     found = sampled(swaying, 50).qvel[:, 3:6]
     rate = yaw_rate(np.arange(len(found)) / 50)
-    wanted = rate[:, None] * [0.0, np.sin(TILT), np.cos(TILT)]
-    np.testing.assert_allclose(found, wanted, atol=0.005)
+    expected = rate[:, None] * [0.0, np.sin(TILT), np.cos(TILT)]
+    np.testing.assert_allclose(found, expected, atol=0.005)
 
 
 def test_without_a_rate_the_control_steps_stay(swaying: ReferenceMotion) -> None:

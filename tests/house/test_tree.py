@@ -33,12 +33,12 @@ def text_files() -> Iterator[Path]:
 
 
 def lines_with(pattern: re.Pattern[str]) -> list[str]:
-    told = []
+    calls = []
     for path in text_files():
         for number, line in enumerate(path.read_text(errors="replace").splitlines(), 1):
             if pattern.search(line):
-                told.append(f"{path.relative_to(ROOT)}:{number}: {line.strip()[:80]}")
-    return told
+                calls.append(f"{path.relative_to(ROOT)}:{number}: {line.strip()[:80]}")
+    return calls
 
 
 def test_no_file_names_a_path_of_a_machine() -> None:

@@ -17,15 +17,15 @@ def test_the_jerk_of_a_cubic_is_six_times_its_coefficient():
 
 
 def test_a_bone_turned_by_a_right_angle_is_ninety_degrees_off():
-    wanted = np.array([[[0.0, 0, 0], [1.0, 0, 0]]])
+    expected = np.array([[[0.0, 0, 0], [1.0, 0, 0]]])
     actual = np.array([[[5.0, 0, 0], [5.0, 2.0, 0]]])
-    np.testing.assert_allclose(retarget_error.bone_angles_deg(actual, wanted, [(0, 1)]), 90.0)
+    np.testing.assert_allclose(retarget_error.bone_angles_deg(actual, expected, [(0, 1)]), 90.0)
 
 
 def test_keypoint_error_counts_weighted_points_only():
-    actual, wanted = np.zeros((2, 3, 3)), np.zeros((2, 3, 3))
+    actual, expected = np.zeros((2, 3, 3)), np.zeros((2, 3, 3))
     actual[:, 0, 2], actual[:, 1, 0] = 0.01, 9.0
-    error = retarget_error.keypoint_error_mm(actual, wanted, np.array([True, False, True]))
+    error = retarget_error.keypoint_error_mm(actual, expected, np.array([True, False, True]))
     np.testing.assert_allclose(error, [[10.0, 0.0]] * 2)
 
 

@@ -24,8 +24,8 @@ def dance(amplitude: float = 0.3, lag_s: float = 0.0) -> np.ndarray:
 
 
 def skill_of(points: np.ndarray) -> float:
-    wanted = dance()
-    return skill(float(site_error(points, wanted).mean()), best_frozen_error(wanted))
+    expected = dance()
+    return skill(float(site_error(points, expected).mean()), best_frozen_error(expected))
 
 
 def test_the_dance_itself_has_skill_one() -> None:
@@ -64,9 +64,9 @@ def test_the_heading_frame_ignores_where_and_which_way() -> None:
 
 @pytest.mark.parametrize("gain", [0.5, 1.0, 2.0])
 def test_the_gain_of_a_limb_is_its_amplitude(gain: float) -> None:
-    wanted = dance()[:, 3]
-    limb = wanted.mean(0) + gain * (wanted - wanted.mean(0))
-    found = limb_response(limb, wanted, DT, fast=0.15, max_lag=0.1)
+    expected = dance()[:, 3]
+    limb = expected.mean(0) + gain * (expected - expected.mean(0))
+    found = limb_response(limb, expected, DT, fast=0.15, max_lag=0.1)
     assert found is not None
     assert found.gain == pytest.approx(gain)
     assert found.r2 == pytest.approx(1 - (1 - gain) ** 2)

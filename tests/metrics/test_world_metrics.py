@@ -80,8 +80,8 @@ def test_the_jitter_is_a_tenth_of_the_jerk() -> None:
 def test_the_acceleration_error_of_a_frozen_pose_is_the_truths_acceleration() -> None:
     truth = clip(3)
     frozen = np.repeat(truth[:1], len(truth), axis=0)
-    wanted = motion_quality.acceleration(truth, FPS)
-    assert motion_quality.acceleration_error(frozen, truth, FPS) == pytest.approx(wanted)
+    expected = motion_quality.acceleration(truth, FPS)
+    assert motion_quality.acceleration_error(frozen, truth, FPS) == pytest.approx(expected)
 
 
 def test_foot_sliding_counts_only_feet_that_truly_stand() -> None:

@@ -91,9 +91,9 @@ def test_the_motion_stands_in_our_world(tilt_deg: float, thetas: bool) -> None:
         del content["pred_thetas"]
     sequence = imported_motion.ground_hybrik_motion(read(content), 30.0, CONFIG)
     trunk = sequence.joints[:, keypoint("neck")] - sequence.joints[:, 0]
-    wanted = WORLD.joints[:, keypoint("neck")] - WORLD.joints[:, 0]
+    expected = WORLD.joints[:, keypoint("neck")] - WORLD.joints[:, 0]
     assert trunk[:, 2].min() > 0.3
-    turn = Rotation.align_vectors(trunk, wanted)[0]
+    turn = Rotation.align_vectors(trunk, expected)[0]
     assert np.degrees(turn.magnitude()) < 8.0
     left, right = pair("hip")
     across = sequence.joints[:, left] - sequence.joints[:, right]

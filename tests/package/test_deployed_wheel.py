@@ -63,8 +63,8 @@ def require_deployed_dance(installed: Installed, folder: Path, limit_s: float = 
     with started([str(installed.root / "bin" / server[0]), *server[1:]], folder, environment):
         environment["PREFECT_API_URL"] = address
         deploy = ("robojackson", "deploy", "--wait", "100", "--json")
-        told = installed.run(*deploy, cwd=folder, limit_s=limit_s, **environment)
-        assert "dance/on-demand" in json.loads(told.stdout)["deployments"]
+        result = installed.run(*deploy, cwd=folder, limit_s=limit_s, **environment)
+        assert "dance/on-demand" in json.loads(result.stdout)["deployments"]
         worker = [python, "-m", "prefect", "worker", "start", "--pool", "flows"]
         with started(worker, folder, environment):
             time.sleep(1)

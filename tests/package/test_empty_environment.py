@@ -62,8 +62,8 @@ def test_the_stages_run_without_extras(empty: Installed, tmp_path: Path) -> None
     missing = empty.run("python", "-c", "import tasks", cwd=tmp_path, code=1)
     assert "No module named 'tasks'" in missing.stderr
     code = RECOVER.format(clip=str(ROOT / "clips" / "hip_shake.mp4"), root=str(empty.root))
-    told = empty.run("python", "-c", code, cwd=tmp_path, limit_s=1800).stdout
-    assert told.splitlines()[-1] == "120 humanoid True"
+    output = empty.run("python", "-c", code, cwd=tmp_path, limit_s=1800).stdout
+    assert output.splitlines()[-1] == "120 humanoid True"
 
 
 def test_dance_says_what_to_install(empty: Installed, tmp_path: Path) -> None:

@@ -34,8 +34,8 @@ def test_a_file_of_amass_becomes_a_dancing_robot(installed: Installed, tmp_path:
 
 def test_a_reward_of_ones_own_is_paid(installed: Installed, tmp_path: Path) -> None:
     done = installed.run("python", EXAMPLES / "own_reward.py", FEW, cwd=tmp_path)
-    told = next(line for line in done.stdout.splitlines() if line.startswith("quiet_hands"))
-    first, last = map(float, told.split(":")[1].split())
+    output = next(line for line in done.stdout.splitlines() if line.startswith("quiet_hands"))
+    first, last = map(float, output.split(":")[1].split())
     assert first < 0 > last
 
 
@@ -59,9 +59,9 @@ def test_the_notebook_runs(
         notebook, km=manager, timeout=280, resources={"metadata": {"path": str(tmp_path)}}
     )
     client.execute()
-    told = json.dumps([cell.get("outputs", []) for cell in notebook.cells])
-    assert "TrainedPolicy(" in told
-    assert "image/png" in told
+    result = json.dumps([cell.get("outputs", []) for cell in notebook.cells])
+    assert "TrainedPolicy(" in result
+    assert "image/png" in result
     assert (tmp_path / "dance.mp4").is_file()
 
 

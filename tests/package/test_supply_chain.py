@@ -25,9 +25,9 @@ def test_every_pin_of_a_lock_has_a_digest(python: str) -> None:
 @pytest.mark.parametrize("python", PYTHONS)
 def test_a_lock_pins_what_the_constraints_say(python: str) -> None:
     lines = (ROOT / "constraints.txt").read_text().splitlines()
-    said = dict(PINNED.findall("\n".join(line for line in lines if ";" not in line)))
+    result = dict(PINNED.findall("\n".join(line for line in lines if ";" not in line)))
     locked = dict(PINNED.findall((ROOT / "locks" / f"py{python.replace('.', '')}.txt").read_text()))
-    apart = {n: (v, said[n]) for n, v in locked.items() if n in said and said[n] != v}
+    apart = {n: (v, result[n]) for n, v in locked.items() if n in result and result[n] != v}
     assert apart == {}
 
 
@@ -44,7 +44,7 @@ def test_every_package_has_a_licence_and_stands_in_the_bill(tmp_path: Path) -> N
 
 
 def test_the_data_that_ships_has_a_licence() -> None:
-    said = " ".join(row["data"] for row in licences.data())
+    result = " ".join(row["data"] for row in licences.data())
     table = (ROOT / "THIRD_PARTY.md").read_text().split("| files |")[1].split("\n\n")[0]
     for name in re.findall(r"`[\w/]*?(\w+)\*?[^`]*`", table):
-        assert name.rstrip("_") in said or name in said, name
+        assert name.rstrip("_") in result or name in result, name

@@ -35,9 +35,9 @@ def test_what_runs_is_in_the_wheel(installed: Installed) -> None:
     ]  # fmt: skip
     library = [*ROOT.glob("robojackson/**/*.py"), *ROOT.glob("robojackson/report/pages/*.html")]
     assert len(shipped) > 80
-    wanted = {f"robojackson/_app/{path.relative_to(ROOT).as_posix()}" for path in shipped}
-    wanted |= {path.relative_to(ROOT).as_posix() for path in library}
-    assert wanted - names == set()
+    expected = {f"robojackson/_app/{path.relative_to(ROOT).as_posix()}" for path in shipped}
+    expected |= {path.relative_to(ROOT).as_posix() for path in library}
+    assert expected - names == set()
     assert "robojackson/py.typed" in names
 
 

@@ -108,9 +108,9 @@ def test_a_description_is_what_it_says_and_not_where_it_lies(tmp_path: Path) -> 
 def test_a_file_that_is_not_there_is_one_line_with_the_machine_and_the_names(given: str) -> None:
     with pytest.raises(
         UnknownName, match=r"no file /.* on \S+\)\. Known: g1, g1_23, humanoid"
-    ) as told:
+    ) as caught:
         describe_robot(given)
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(caught.value)
 
 
 def test_a_model_in_place_of_its_description_names_the_command_that_makes_one(

@@ -82,8 +82,8 @@ def test_a_value_out_of_its_range_is_refused(write) -> None:
 
 
 def test_a_value_that_fits_no_alternative_is_reported_all_of_them(write) -> None:
-    told = r"'speed' is -1: Input should be 'auto' or greater than or equal to 0\.25$"
-    with pytest.raises(BadConfiguration, match=told):
+    result = r"'speed' is -1: Input should be 'auto' or greater than or equal to 0\.25$"
+    with pytest.raises(BadConfiguration, match=result):
         yaml_loader.load(Outer, write("speed: -1"))
 
 
@@ -167,7 +167,7 @@ def test_names_are_found_from_any_folder(monkeypatch, tmp_path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "told"),
+    ("given", "expected_message"),
     [
         ({"tqc.quantiles": 2}, "must leave some of the 2 quantiles"),
         ({"tqc.buffer": 2000}, "room for 1984 transitions .* begin after 2000: raise buffer"),
@@ -178,9 +178,9 @@ def test_names_are_found_from_any_folder(monkeypatch, tmp_path) -> None:
     ],
 )
 def test_numbers_with_which_nothing_would_be_learnt_are_refused(
-    given: dict[str, Any], told: str
+    given: dict[str, Any], expected_message: str
 ) -> None:
-    with pytest.raises(BadConfiguration, match=told):
+    with pytest.raises(BadConfiguration, match=expected_message):
         yaml_loader.load(TrainConfig, None, given)
 
 
@@ -254,7 +254,7 @@ def test_a_wrong_key_is_named_with_the_file_that_it_stands_in(
 
 
 @pytest.mark.parametrize(
-    ("base", "told"),
+    ("base", "expected_message"),
     [
         ("part.yaml", r"part\.yaml: extends is 'part\.yaml', which extends this file"),
         ("gone", r"part\.yaml: extends is 'gone': unknown configuration 'gone'"),
@@ -262,8 +262,8 @@ def test_a_wrong_key_is_named_with_the_file_that_it_stands_in(
     ],
 )
 def test_a_base_that_cannot_be_is_reported_with_the_file_that_names_it(
-    extended: Path, base: str, told: str
+    extended: Path, base: str, expected_message: str
 ) -> None:
     (extended / "part.yaml").write_text(f"extends: {base}\n")
-    with pytest.raises(BadConfiguration, match=told):
+    with pytest.raises(BadConfiguration, match=expected_message):
         yaml_loader.load(Outer, extended / "part.yaml")

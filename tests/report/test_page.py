@@ -91,13 +91,13 @@ def test_headline_names_the_best_baseline() -> None:
 
 
 @pytest.mark.parametrize(
-    ("success", "told"),
+    ("success", "message"),
     [(0.62, "(statue) does as well: 62%."), (0.9, "(statue) does better: 90%.")],
 )
-def test_headline_says_when_learning_gained_nothing(success: float, told: str) -> None:
+def test_headline_says_when_learning_gained_nothing(success: float, message: str) -> None:
     baselines = {"statue": {**SUMMARY["baselines"]["statue"], "success": success}}
     html = render(PageContent(title="x", evaluation={**SUMMARY, "baselines": baselines}))
-    assert told in html
+    assert message in html
 
 
 @pytest.mark.parametrize("figure", ["lean_deg", "keypoint_leaned_mm"])
@@ -107,11 +107,11 @@ def test_the_lean_of_the_targets_is_shown(figure: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("figure", "told"), [("drift_m", "0.25 m"), ("heading_error_deg", "0.2 deg")]
+    ("figure", "message"), [("drift_m", "0.25 m"), ("heading_error_deg", "0.2 deg")]
 )
-def test_where_the_robot_ends_up_is_shown(figure: str, told: str) -> None:
+def test_where_the_robot_ends_up_is_shown(figure: str, message: str) -> None:
     html = render(PageContent(title="x", evaluation={**SUMMARY, figure: 0.249}))
-    assert f"<td>{told}</td>" in html
+    assert f"<td>{message}</td>" in html
 
 
 def test_missing_figure_is_a_dash() -> None:

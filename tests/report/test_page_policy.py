@@ -13,19 +13,19 @@ def digest(text: str) -> str:
 
 
 def test_only_the_scripts_and_styles_of_the_page_run() -> None:
-    told = dict(part.split(" ", 1) for part in inline.policy(["a()"], ["b {}"]).split("; "))
-    assert told["default-src"] == "'none'"
-    assert told["script-src"] == digest("a()")
-    assert told["style-src"] == digest("b {}")
+    result = dict(part.split(" ", 1) for part in inline.policy(["a()"], ["b {}"]).split("; "))
+    assert result["default-src"] == "'none'"
+    assert result["script-src"] == digest("a()")
+    assert result["style-src"] == digest("b {}")
     assert "unsafe" not in inline.policy(["a()"], ["b {}"])
-    assert {told["base-uri"], told["form-action"]} == {"'none'"}
+    assert {result["base-uri"], result["form-action"]} == {"'none'"}
 
 
 def test_a_page_bears_the_digests_of_what_stands_in_it() -> None:
     page = render_gallery([])
-    said = re.search(r'http-equiv="Content-Security-Policy" content="([^"]*)"', page)
-    assert said
-    policy = said[1].replace("&#39;", "'")
+    result = re.search(r'http-equiv="Content-Security-Policy" content="([^"]*)"', page)
+    assert result
+    policy = result[1].replace("&#39;", "'")
     scripts = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
     styles = re.findall(r"<style>(.*?)</style>", page, re.DOTALL)
     assert styles

@@ -53,12 +53,12 @@ def test_the_robot_is_on_the_right(frames: list[np.ndarray]) -> None:
 def test_progress_counts_every_picture(
     sequence: SmplSequence, reference: ReferenceMotion, model: mujoco.MjModel, tmp_path: Path
 ) -> None:
-    told: list[tuple[int, int]] = []
+    calls: list[tuple[int, int]] = []
     side_by_side(
         None, None, sequence, reference, None, tmp_path / "r.mp4", model=model, config=SMALL,
-        progress=lambda done, total: told.append((done, total)),
+        progress=lambda done, total: calls.append((done, total)),
     )  # fmt: skip
-    assert told == [(count, 4) for count in range(1, 5)]
+    assert calls == [(count, 4) for count in range(1, 5)]
 
 
 def loaded(reference: ReferenceMotion) -> ReferenceMotion:
@@ -72,8 +72,8 @@ def test_the_heat_map_tells_how_long_each_motor_is_over_its_limit(
     reference: ReferenceMotion,
 ) -> None:
     axes = run_plots.torque_heat_map(loaded(reference), reference.joint_names).axes[0]
-    told = [label.get_text().split("  ")[1] for label in axes.get_yticklabels()]
-    assert told == ["0 %", "33 %", *["0 %"] * (len(told) - 2)]
+    result = [label.get_text().split("  ")[1] for label in axes.get_yticklabels()]
+    assert result == ["0 %", "33 %", *["0 %"] * (len(result) - 2)]
 
 
 @pytest.mark.parametrize(("ratio", "warm"), [(0.95, False), (1.05, True)])

@@ -53,12 +53,12 @@ def test_progress_reaches_its_total(
     clip: Path, track: LandmarkTrack, sequence: SmplSequence, reference: ReferenceMotion,
     model: mujoco.MjModel, tmp_path: Path,
 ) -> None:  # fmt: skip
-    told: list[tuple[int, int]] = []
+    calls: list[tuple[int, int]] = []
     side_by_side(
         clip, track, sequence, reference, None, tmp_path / "d.mp4", model=model, config=SMALL,
-        progress=lambda done, total: told.append((done, total)),
+        progress=lambda done, total: calls.append((done, total)),
     )  # fmt: skip
-    assert told == [(k, 4) for k in range(1, 5)]
+    assert calls == [(k, 4) for k in range(1, 5)]
 
 
 def test_frame_in_which_no_one_was_found_is_still_shown(

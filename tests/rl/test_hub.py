@@ -67,9 +67,9 @@ def test_a_repository_that_the_hub_has_not_is_one_clear_line(
 ) -> None:
     with serving({}) as (address, _):
         at(address, tmp_path, monkeypatch)
-        with pytest.raises(MissingDependency, match=REFUSAL) as told:
+        with pytest.raises(MissingDependency, match=REFUSAL) as caught:
             pretrained(REPOSITORY, "paper")
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(caught.value)
 
 
 def test_a_file_of_the_hub_that_is_no_zip_of_sb3_is_refused(
@@ -91,7 +91,7 @@ def test_the_command_says_in_one_line_that_the_hub_cannot_be_reached(
     words = ("train", tmp_path / "reference.parquet", "-o", tmp_path / "run", "--force")
     options = [f"--set={key}={value}" for key, value in {**BRIEF, "start": REPOSITORY}.items()]
     cache = {"HF_HOME": str(tmp_path / "cache"), "HF_ENDPOINT": address}
-    said = robojackson(*words, *options, **cache)
-    assert said.code != 0
-    assert "Traceback" not in said.err
-    assert " ".join(said.err.split()).count(REFUSAL) == 1
+    result = robojackson(*words, *options, **cache)
+    assert result.code != 0
+    assert "Traceback" not in result.err
+    assert " ".join(result.err.split()).count(REFUSAL) == 1

@@ -35,8 +35,8 @@ def training(reference: Path, out: Path, trainer: str) -> subprocess.Popen[str]:
 
 
 def ended(process: subprocess.Popen[str]) -> None:
-    _, told = process.communicate(timeout=240)
-    assert process.returncode == 0, told
+    _, found = process.communicate(timeout=240)
+    assert process.returncode == 0, found
 
 
 def killed(reference: Path, out: Path, trainer: str, rng: np.random.Generator) -> bool:
@@ -44,8 +44,8 @@ def killed(reference: Path, out: Path, trainer: str, rng: np.random.Generator) -
     before = (out / "progress.json").stat().st_mtime if (out / "progress.json").exists() else 0.0
     process = training(reference, out, trainer)
     while process.poll() is None:
-        told = out / "progress.json"
-        if told.exists() and told.stat().st_mtime > before:
+        result = out / "progress.json"
+        if result.exists() and result.stat().st_mtime > before:
             break
         time.sleep(0.02)
     time.sleep(rng.uniform(0.0, 1.5))

@@ -98,7 +98,7 @@ def test_a_policy_tells_the_setup_of_its_training(facts: dict[str, object], setu
 
 
 @pytest.mark.parametrize(
-    ("facts", "told"),
+    ("facts", "message"),
     [
         ({"seed": 3, "steps": 512}, {"seed": 3, "step": 512}),
         ({}, {"seed": 0, "step": None}),
@@ -107,6 +107,6 @@ def test_a_policy_tells_the_setup_of_its_training(facts: dict[str, object], setu
     ],
 )
 def test_a_policy_tells_the_columns_of_its_training(
-    facts: dict[str, object], told: dict[str, object]
+    facts: dict[str, object], message: dict[str, object]
 ) -> None:
-    assert Policy((), facts).training == told
+    assert Policy((), facts).training == message

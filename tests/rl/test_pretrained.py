@@ -149,9 +149,9 @@ def test_without_a_network_the_hub_is_one_clear_line(monkeypatch: pytest.MonkeyP
         raise ConnectionError("no route to host\nand a long story")
 
     monkeypatch.setattr(huggingface_sb3, "load_from_hub", unreachable)
-    with pytest.raises(MissingDependency, match=r"farama-minari.*give its path") as told:
+    with pytest.raises(MissingDependency, match=r"farama-minari.*give its path") as caught:
         pretrained("farama-minari/Humanoid-v5-TQC-simple", "paper")
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(caught.value)
 
 
 def test_the_hubs_zip_is_requested_by_its_own_name(
@@ -227,18 +227,18 @@ DAMAGES = {
 }
 
 
-@pytest.mark.parametrize("told", DAMAGES)
+@pytest.mark.parametrize("message", DAMAGES)
 def test_networks_that_are_not_whole_are_refused_and_nothing_is_left(
-    robot: Robot, sway: ReferenceMotion, env: VecEnv, tmp_path: Path, told: str
+    robot: Robot, sway: ReferenceMotion, env: VecEnv, tmp_path: Path, message: str
 ) -> None:
     """What is missing would stay random, unseen; what does not fit would end in a traceback."""
     tensors = make_trainer("sb3", env, replace(SMALL, layer_norm=True), seed=1).networks()
-    name, array = DAMAGES[told]
+    name, array = DAMAGES[message]
     tensors.pop(name, None)
     path = tmp_path / "networks.safetensors"
     path.write_bytes(Networks(tensors | ({} if array is None else {name: array}), {}).to_bytes())
     config = TrainConfig(mode="paper", steps=16, start=str(path), tqc=SMALL)
-    with pytest.raises(BadPolicy, match=told):
+    with pytest.raises(BadPolicy, match=message):
         train_policy(sway, robot, config, tmp_path / "run")
     assert not (tmp_path / "run").exists()
 

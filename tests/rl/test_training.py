@@ -287,14 +287,14 @@ def test_an_interrupted_run_keeps_its_replay(
 def test_rows_are_safe_before_the_checkpoint_that_follows_them(
     robot: Robot, sway: ReferenceMotion, tmp_path: Path
 ) -> None:
-    told: list[str] = []
+    calls: list[str] = []
     hooks = Hooks(
-        sink=lambda rows: told.append("row"),
-        saving=lambda: told.append("checkpoint" if (tmp_path / "checkpoint").exists() else "safe"),
+        sink=lambda rows: calls.append("row"),
+        saving=lambda: calls.append("checkpoint" if (tmp_path / "checkpoint").exists() else "safe"),
     )
     train_policy(sway, robot, brief("sb3"), tmp_path, hooks)
-    assert told[-1] == "safe"
-    assert "row" in told
+    assert calls[-1] == "safe"
+    assert "row" in calls
 
 
 @pytest.mark.slow

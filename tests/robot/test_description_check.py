@@ -22,7 +22,7 @@ def test_a_shipped_robot_has_no_problems(name: str) -> None:
 
 
 def test_every_unknown_name_is_reported_at_once(humanoid: RobotDescription) -> None:
-    told = problems(
+    result = problems(
         replace(
             humanoid,
             sites={**humanoid.sites, "left_knee": ("left_chin", (0.0, 0.0, 0.0))},
@@ -33,19 +33,19 @@ def test_every_unknown_name_is_reported_at_once(humanoid: RobotDescription) -> N
         )
     )
     words = ["chin", "shoe", "'tail'", "gnee", "*_tail"]
-    assert [next(word for word in words if word in line) for line in told] == words
+    assert [next(word for word in words if word in line) for line in result] == words
 
 
 def test_every_missing_site_is_reported(humanoid: RobotDescription) -> None:
     sites = {k: v for k, v in humanoid.sites.items() if k not in ("head", "left_hand")}
     weights = {k: v for k, v in humanoid.weights.items() if k in sites}
-    told = problems(replace(humanoid, sites=sites, weights=weights))
-    assert [line.rpartition(" ")[2] for line in told] == ["left_hand", "head"]
+    result = problems(replace(humanoid, sites=sites, weights=weights))
+    assert [line.rpartition(" ")[2] for line in result] == ["left_hand", "head"]
 
 
 def test_a_model_that_is_not_there_is_one_line(humanoid: RobotDescription) -> None:
-    (told,) = problems(replace(humanoid, mjcf="gone.xml"))
-    assert told.endswith("mjcf: no such file: gone.xml")
+    (found,) = problems(replace(humanoid, mjcf="gone.xml"))
+    assert found.endswith("mjcf: no such file: gone.xml")
 
 
 @pytest.mark.parametrize(
@@ -58,14 +58,14 @@ def test_a_root_that_does_not_stand_upright_and_face_along_x_is_reported(
     text = mjcf_path(humanoid).read_text()
     turned = text.replace('<body name="torso"', f'<body name="torso" euler="{turn}"')
     (tmp_path / "turned.xml").write_text(turned)
-    told = problems(replace(humanoid, mjcf=str(tmp_path / "turned.xml")))
-    assert any("root_body: the axes of 'torso'" in line for line in told) == wrong
+    message_text = problems(replace(humanoid, mjcf=str(tmp_path / "turned.xml")))
+    assert any("root_body: the axes of 'torso'" in line for line in message_text) == wrong
 
 
 def test_limbs_of_different_length_are_reported(humanoid: RobotDescription) -> None:
     sites = {**humanoid.sites, "left_hand": ("left_lower_arm", (0.1, -0.1, 0.1))}
-    (told,) = problems(replace(humanoid, sites=sites))
-    assert "they must be mirrored" in told
+    (found,) = problems(replace(humanoid, sites=sites))
+    assert "they must be mirrored" in found
 
 
 def test_sides_that_are_swapped_are_reported(humanoid: RobotDescription) -> None:
@@ -74,9 +74,9 @@ def test_sides_that_are_swapped_are_reported(humanoid: RobotDescription) -> None
         sites[f"left_{name}"], sites[f"right_{name}"] = (
             humanoid.sites[f"{side}_{name}"] for side in ("right", "left")
         )
-    told = problems(replace(humanoid, sites=sites))
-    assert len(told) == 3
-    assert all("to the right of" in line for line in told)
+    result = problems(replace(humanoid, sites=sites))
+    assert len(result) == 3
+    assert all("to the right of" in line for line in result)
 
 
 def test_a_keypoint_off_its_mirror_image_is_reported(humanoid: RobotDescription) -> None:
@@ -86,13 +86,13 @@ def test_a_keypoint_off_its_mirror_image_is_reported(humanoid: RobotDescription)
         "left_knee": ("left_shin", (0.03, 0.0, 0.02)),
         "left_foot": ("left_foot", (0.03, 0.0, 0.1)),
     }
-    told = problems(replace(humanoid, sites=sites))
-    assert [line.split(": ")[1].split()[0] for line in told] == [
+    result = problems(replace(humanoid, sites=sites))
+    assert [line.split(": ")[1].split()[0] for line in result] == [
         "sites.left_hip", "sites.left_knee", "sites.left_foot",
     ]  # fmt: skip
-    assert "30 mm from the mirror image" in told[0]
+    assert "30 mm from the mirror image" in result[0]
 
 
 def test_a_rest_angle_beyond_its_range_is_reported(humanoid: RobotDescription) -> None:
-    (told,) = problems(replace(humanoid, rest_pose={**humanoid.rest_pose, "abdomen_z": 1.0}))
-    assert "rest_pose.abdomen_z is 1: beyond its range" in told
+    (found,) = problems(replace(humanoid, rest_pose={**humanoid.rest_pose, "abdomen_z": 1.0}))
+    assert "rest_pose.abdomen_z is 1: beyond its range" in found

@@ -72,8 +72,8 @@ def test_the_oldest_stands_first(store: Store) -> None:
 
 
 def test_of_one_search_the_chosen_stands_first_and_the_rejected_last(store: Store) -> None:
-    told = (("poor", "rejected", 0.1), ("good", "accepted", 0.5), ("best", "chosen", 0.2))
-    rows = [row(name, decision=said, score_per_second=score) for name, said, score in told]
+    result = (("poor", "rejected", 0.1), ("good", "accepted", 0.5), ("best", "chosen", 0.2))
+    rows = [row(name, decision=shown, score_per_second=score) for name, shown, score in result]
     candidate_catalogue.append(store, [*rows, row("lost", decision="failed")])
     found = [each["video_id"] for each in candidate_catalogue.records(store)]
     assert found == ["best", "good", "lost", "poor"]

@@ -11,7 +11,7 @@ from storage.store import Store
 
 
 @pytest.mark.parametrize(
-    ("sql", "told"),
+    ("sql", "message"),
     [
         ("SELECT repeat('x', 2000000000)", "memory"),
         ("SELECT list(range) FROM range(400000000)", "memory"),
@@ -20,8 +20,8 @@ from storage.store import Store
         ("--", "no query"),
     ],
 )
-def test_a_question_has_limits(sql: str, told: str, tmp_path: Path) -> None:
-    with pytest.raises(BadTable, match=told):
+def test_a_question_has_limits(sql: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(BadTable, match=message):
         study_tables.query(Store(tmp_path), sql)
 
 

@@ -138,9 +138,9 @@ def test_a_question_cannot_read_other_files(store: Store, tmp_path: Path) -> Non
 
 
 def test_a_question_that_is_no_sql_is_one_line(store: Store) -> None:
-    with pytest.raises(BadTable) as told:
+    with pytest.raises(BadTable) as caught:
         study_tables.query(store, "SELEC")
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(caught.value)
 
 
 def test_a_table_that_is_not_one_is_refused_before_anything_is_written(store: Store) -> None:

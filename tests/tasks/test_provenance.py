@@ -1,4 +1,4 @@
-"""Where the rows of a cell come from, told beside them."""
+"""Where the rows of a cell come from, written beside them."""
 
 from pathlib import Path
 
@@ -50,12 +50,12 @@ def test_rows_that_are_made_again_get_the_commit_that_made_them(
     store_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     store = Store(store_folder)
-    told = []
+    calls = []
     for commit, policy in (("a", b"first"), ("b", b"first"), ("c", b"second")):
         monkeypatch.setattr(publish_tables, "_commit", lambda commit=commit: commit)
         publish_tables.publish(CELL, "r", made(store, policy))
-        told.append(commits(store))
-    assert told == [["a"], ["a"], ["c"]]
+        calls.append(commits(store))
+    assert calls == [["a"], ["a"], ["c"]]
 
 
 def test_without_git_the_commit_is_what_the_environment_says(

@@ -87,10 +87,10 @@ def results(folder: Path) -> dict[str, Any]:
 
 @pytest.mark.medium
 def test_the_claims_are_about_the_yardstick_and_have_its_sign(folder: Path) -> None:
-    said = {claim["text"]: claim for claim in results(folder)["claims"]}
-    assert said["Pretraining helps"]["verdict"] == "holds"
-    assert said["Pretraining helps"]["effect"]["difference"]["mean"] == pytest.approx(2.0)
-    assert said["Curiosity helps on dances"]["verdict"] == "not measured"
+    record = {claim["text"]: claim for claim in results(folder)["claims"]}
+    assert record["Pretraining helps"]["verdict"] == "holds"
+    assert record["Pretraining helps"]["effect"]["difference"]["mean"] == pytest.approx(2.0)
+    assert record["Curiosity helps on dances"]["verdict"] == "not measured"
 
 
 @pytest.mark.medium
@@ -146,8 +146,8 @@ def test_what_is_to_be_known_first_stands_above_the_claims(folder: Path) -> None
 
 
 def test_the_smoke_study_says_that_its_numbers_mean_nothing() -> None:
-    (said,) = write_study_page._meaningless(load(Study, "studies/smoke"))
-    assert said.endswith("its numbers mean nothing.")
+    (shown,) = write_study_page._meaningless(load(Study, "studies/smoke"))
+    assert shown.endswith("its numbers mean nothing.")
     assert write_study_page._meaningless(load(Study, "studies/paper")) == []
 
 
@@ -179,10 +179,10 @@ def test_rows_of_other_runs_under_the_name_of_the_study_do_not_count(
     store = Store(store_folder)
     for seed in (0, 1, 2):
         publish(store, "walk", "scratch", seed)
-    wanted = {"scratch-walk-s0", "scratch-walk-s2"}
-    report(STUDY, {"walk": load(Move, "moves/walk")}, runs=wanted)
-    told = json.loads((store_folder / "studies/known/results.json").read_text())
-    line = next(line for line in told["lines"] if line["move"] == "walk")
+    expected = {"scratch-walk-s0", "scratch-walk-s2"}
+    report(STUDY, {"walk": load(Move, "moves/walk")}, runs=expected)
+    answer = json.loads((store_folder / "studies/known/results.json").read_text())
+    line = next(line for line in answer["lines"] if line["move"] == "walk")
     assert line["seeds"] == 2
     assert line["values"]["return_own"]["mean"] == pytest.approx(1.01)
 

@@ -40,9 +40,11 @@ def ends(pid: int, within_s: float = 10.0) -> bool:
 
 
 def test_a_process_that_is_killed_is_reported_with_its_run_and_cause(tmp_path: Path) -> None:
-    with pytest.raises(TrainingFailed, match=r"run walk-scratch-s0 was killed by SIGKILL") as told:
+    with pytest.raises(
+        TrainingFailed, match=r"run walk-scratch-s0 was killed by SIGKILL"
+    ) as caught:
         run("import os; os.kill(os.getpid(), 9)", tmp_path)
-    assert str(tmp_path / child_process.LOG) in str(told.value)
+    assert str(tmp_path / child_process.LOG) in str(caught.value)
 
 
 def test_a_process_that_fails_is_reported_with_its_last_line(tmp_path: Path) -> None:
@@ -70,10 +72,10 @@ def test_a_cancelled_task_leaves_no_process(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: str, grace_s: float, times: int
 ) -> None:
     monkeypatch.setattr(child_process, "SECONDS_TO_SAVE", grace_s)
-    told = f"import os, sys; print(os.getpid(), file=sys.stderr, flush=True); {code}"
+    output = f"import os, sys; print(os.getpid(), file=sys.stderr, flush=True); {code}"
 
     async def cancelled() -> None:
-        command = [sys.executable, "-c", told]
+        command = [sys.executable, "-c", output]
         running = asyncio.create_task(child_process.run_process(command, "run", tmp_path, None))
         while "started" not in _read(tmp_path / child_process.LOG):
             await asyncio.sleep(0.02)

@@ -65,11 +65,11 @@ def test_unit_range_default_and_meaning_are_those_of_the_code() -> None:
 @dataclass
 class Silent:
     """Attributes:
-    told: Steps.
+    shown: Steps.
     """
 
-    told: int = 1
-    untold: int = 2
+    shown: int = 1
+    silent: int = 2
 
 
 @dataclass
@@ -81,7 +81,7 @@ class Bare:
     speed: float = 1.0
 
 
-@pytest.mark.parametrize(("kind", "lack"), [(Silent, "untold.*meaning"), (Bare, "speed.*unit")])
+@pytest.mark.parametrize(("kind", "lack"), [(Silent, "silent.*meaning"), (Bare, "speed.*unit")])
 def test_a_key_without_meaning_or_unit_is_refused(kind: type, lack: str) -> None:
     with pytest.raises(ValueError, match=lack):
         listed(kind, kind())

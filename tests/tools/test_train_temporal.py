@@ -130,8 +130,8 @@ def test_filmed_constants_are_those_of_the_stage() -> None:
     sight.flat[:, features.INPUT_LANDMARKS] = filmed.flat[1]
     sight.local[:, features.INPUT_LANDMARKS] = filmed.local[1]
     sight.root[:] = np.outer(filmed.distance[1], [0.0, 0.0, 1.0])
-    told = with_constants(filmed).constant[1]
-    assert np.allclose(told, features.constants(sight), rtol=1e-3)
+    result = with_constants(filmed).constant[1]
+    assert np.allclose(result, features.constants(sight), rtol=1e-3)
 
 
 def test_a_detector_without_depth_sees_the_image_alone() -> None:

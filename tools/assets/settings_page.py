@@ -175,7 +175,7 @@ def allowed_of(schema: Mapping[str, Any]) -> str:
 
 def _of(kind: type, value: Any, prefix: str) -> Iterator[Setting]:
     schemas = TypeAdapter(kind).json_schema()["properties"]
-    said, hints = meanings(kind), get_type_hints(kind)
+    shown, hints = meanings(kind), get_type_hints(kind)
     inner = []
     for each in fields(kind):
         key, held = f"{prefix}{each.name}", getattr(value, each.name)
@@ -183,12 +183,12 @@ def _of(kind: type, value: Any, prefix: str) -> Iterator[Setting]:
             inner.append((next(c for c in (hints[each.name], *get_args(hints[each.name]))
                                if is_dataclass(c)), held, key))  # fmt: skip
             continue
-        unit = unit_of(each.name, said.get(each.name, ""), schemas[each.name])
-        if each.name not in said or unit is None:
-            lacks = "a unit" if each.name in said else "a meaning"
+        unit = unit_of(each.name, shown.get(each.name, ""), schemas[each.name])
+        if each.name not in shown or unit is None:
+            lacks = "a unit" if each.name in shown else "a meaning"
             raise ValueError(f"{key}: the docstring of {kind.__qualname__} gives it no {lacks[2:]}")
         default = json.dumps(to_json_types(held), ensure_ascii=False)
-        meaning = said[each.name].replace("|", "\\|")
+        meaning = shown[each.name].replace("|", "\\|")
         yield Setting(key, unit, default, allowed_of(schemas[each.name]), meaning)
     for cls, held, key in inner:
         yield from _of(cls, held, f"{key}.")

@@ -69,7 +69,7 @@ class Running:
         """
         with self._changed:
             if not self._changed.wait_for(lambda: self._lines_from(text) > more, limit_s):
-                raise TimeoutError(self.said())
+                raise TimeoutError(self.output())
 
     def wait_until_guarded(self, limit_s: float = LIMIT_S) -> None:
         """Return when the command's supervisor has started its worker, and so takes signals.
@@ -82,9 +82,9 @@ class Running:
             if self.process.pid in parents():
                 return
             time.sleep(0.01)
-        raise TimeoutError(self.said())
+        raise TimeoutError(self.output())
 
-    def said(self) -> str:
+    def output(self) -> str:
         """Return the lines so far."""
         return "\n".join(line for _, line in self._lines)
 
@@ -104,7 +104,7 @@ class Running:
         first = next(((m, line) for m, line in after if "interrupted" in line), (float("inf"), ""))
         faults = [
             *([f"exit code {code}"] if code != 130 else []),
-            *(["traceback"] if "Traceback" in self.said() else []),
+            *(["traceback"] if "Traceback" in self.output() else []),
             *(f"left: {pid} {words}" for pid, words in left.items()),
             *(f"half-written: {path}" for path in self._store.parent.rglob(".part-*")),
             *(

@@ -40,7 +40,7 @@ class Change:
             the detector errs in other ways on pictures of real people than on rendered ones.
         drift_m: Of the depth of each landmark, slowly varying, for windows whose depth is bad.
         bad_depth: Chance of that, and of limbs whose depth is reversed for a while.
-        no_depth: Chance that the detector tells no depth at all.
+        no_depth: Chance that the detector gives no depth at all.
         shake_m: Of each landmark in each frame.
         hidden: Chance of hidden limbs.
         hidden_s: How long they are hidden.

@@ -39,7 +39,7 @@ def interrupted(
         running.wait_for(text, more)
     time.sleep(delay_s)
     end = running.end(running.interrupt(*WAYS[way]))
-    assert end.faults == (), running.said()
+    assert end.faults == (), running.output()
     assert end.acknowledged_s < ACKNOWLEDGED_S
     assert end.ended_s < (SAVED_S if end.saving else ENDED_S)
     return end

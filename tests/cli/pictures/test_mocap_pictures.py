@@ -79,8 +79,8 @@ def test_the_film_of_mocap_has_the_source_the_skeleton_over_it_and_the_body(
 
 
 def test_mocap_without_video_writes_no_film(short_clip: Path, tmp_path: Path) -> None:
-    said = in_process("mocap", short_clip, "-o", tmp_path, "--config", "smoke")
-    assert said.code == 0, said.err
+    result = in_process("mocap", short_clip, "-o", tmp_path, "--config", "smoke")
+    assert result.code == 0, result.err
     assert (tmp_path / "mocap.png").is_file()
     assert not (tmp_path / "mocap.mp4").exists()
 

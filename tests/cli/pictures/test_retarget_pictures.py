@@ -25,15 +25,15 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_the_video_has_two_panels_and_the_requested_length(folder: Path) -> None:
-    told = draw_retargeting(folder / "smpl.parquet", folder, "base", TINY)
-    with av.open(told["video"]) as container:
+    result = draw_retargeting(folder / "smpl.parquet", folder, "base", TINY)
+    with av.open(result["video"]) as container:
         frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
     assert (len(frames), frames[0].shape) == (9, (128, 2 * 96 + 2, 3))
 
 
 def test_both_plots_are_pictures(folder: Path) -> None:
-    told = draw_retargeting(folder / "smpl.parquet", folder, "base", TINY)
-    heads = [Path(told[name]).read_bytes()[:4] for name in ("contacts", "torques")]
+    result = draw_retargeting(folder / "smpl.parquet", folder, "base", TINY)
+    heads = [Path(result[name]).read_bytes()[:4] for name in ("contacts", "torques")]
     assert heads == [b"\x89PNG"] * 2
 
 
@@ -45,9 +45,9 @@ def test_a_motion_that_is_not_there_is_reported(folder: Path) -> None:
 
 def test_the_command_draws_on_request(folder: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    said = robojackson(
+    result = robojackson(
         *("retarget", folder / "smpl.parquet", "-o", out, "--video", "--config=smoke", "--json")
     )
-    drawn = {name: Path(said.answer[name]).exists() for name in ("video", "contacts", "torques")}
+    drawn = {name: Path(result.answer[name]).exists() for name in ("video", "contacts", "torques")}
     assert drawn == {"video": True, "contacts": True, "torques": True}
-    assert not said.loaded_prefect
+    assert not result.loaded_prefect

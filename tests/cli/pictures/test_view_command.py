@@ -64,10 +64,10 @@ def test_a_run_becomes_a_recording_for_rerun(folder: Path, tmp_path: Path) -> No
     out = tmp_path / "dance.rrd"
     assert in_process("view", folder, "--to", "rerun", "-o", out).code == 0
     words = [sys.executable, "-m", "rerun", "rrd", "print", str(out)]
-    told = subprocess.run(words, capture_output=True, text=True, check=True).stdout
-    paths = set(re.findall(r" - (/\S+) - data columns", told))
-    for wanted in ("/video", "/landmarks", "/person/bones", "/robot/torso", "/robot/torso/0"):
-        assert wanted in paths
+    output = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+    paths = set(re.findall(r" - (/\S+) - data columns", output))
+    for expected in ("/video", "/landmarks", "/person/bones", "/robot/torso", "/robot/torso/0"):
+        assert expected in paths
     assert {"/contacts/left_heel", "/rewards/sum", "/errors/head"} <= paths
 
 
@@ -98,6 +98,6 @@ def test_a_trackers_folder_is_a_run_as_well(folder: Path, tmp_path: Path) -> Non
 
 
 def test_another_folder_is_refused_in_one_line(tmp_path: Path) -> None:
-    said = in_process("view", tmp_path, "--to", "gltf", "-o", tmp_path / "x.glb")
-    assert (said.code != 0, "not the folder of a run" in said.err) == (True, True)
+    result = in_process("view", tmp_path, "--to", "gltf", "-o", tmp_path / "x.glb")
+    assert (result.code != 0, "not the folder of a run" in result.err) == (True, True)
     assert "name it with -o FILE" in in_process("view", tmp_path, "--to", "gif").err

@@ -30,9 +30,9 @@ def reference(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.slow
 def test_a_tracker_is_a_row_of_the_table_under_its_name(reference: Path, tmp_path: Path) -> None:
-    said = robojackson("evaluate", NAME, reference, "-o", tmp_path / "out", *SHORT)
-    assert said.code == 0, said.err
-    assert said.out.splitlines()[1].startswith(NAME)
+    result = robojackson("evaluate", NAME, reference, "-o", tmp_path / "out", *SHORT)
+    assert result.code == 0, result.err
+    assert result.out.splitlines()[1].startswith(NAME)
     table = tmp_path / "out" / "evaluations.parquet"
     rows = tables.decode_rows(EVALUATION_RECORD, table.read_bytes(), str(table))
     own = [row for row in rows if row["policy"] == "trained"]
@@ -42,13 +42,13 @@ def test_a_tracker_is_a_row_of_the_table_under_its_name(reference: Path, tmp_pat
 
 @pytest.mark.slow
 def test_twist2_refuses_a_motion_of_the_humanoid_or_says_how_to_get_it(reference: Path) -> None:
-    said = robojackson("evaluate", "twist2", reference, *SHORT)
-    assert (said.code, said.out) == (1, "")
-    assert "run: robojackson trackers add twist2" in said.err
+    result = robojackson("evaluate", "twist2", reference, *SHORT)
+    assert (result.code, result.out) == (1, "")
+    assert "run: robojackson trackers add twist2" in result.err
 
 
 @pytest.mark.slow
 def test_what_is_neither_file_nor_tracker_is_one_line(reference: Path) -> None:
-    said = robojackson("evaluate", "twist3", reference)
-    assert said.code == 1
-    assert "robojackson: BadPolicy: twist3: no such file\n" in said.err
+    result = robojackson("evaluate", "twist3", reference)
+    assert result.code == 1
+    assert "robojackson: BadPolicy: twist3: no such file\n" in result.err

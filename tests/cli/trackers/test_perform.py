@@ -30,12 +30,12 @@ def dance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.slow
 def test_a_performance_leaves_its_tables_and_a_page(dance: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    said = robojackson(
+    result = robojackson(
         *("perform", dance, "-o", out, "--robot", "humanoid", "--tracker", NAME, "--runs", 2),
         *("--seconds", 1, "--no-film", "--json"),
     )
-    assert said.code == 0, said.err
-    answer = json.loads(said.out)
+    assert result.code == 0, result.err
+    answer = json.loads(result.out)
     assert (answer["tracker"], answer["runs"], answer["film"]) == (NAME, 2, None)
     assert [row["seed"] for row in answer["rows"]] == [0, 1]
     assert answer["finished"] == sum(row["finished"] for row in answer["rows"])
@@ -52,7 +52,7 @@ def test_a_performance_leaves_its_tables_and_a_page(dance: Path, tmp_path: Path)
 @pytest.mark.slow
 def test_a_robot_that_nobody_knows_is_one_line(dance: Path, tmp_path: Path) -> None:
     words = ("perform", dance, "-o", tmp_path / "out", "--robot", "nobody")
-    said = robojackson(*words, "--tracker", NAME)
-    assert said.code == 1
-    assert said.err.startswith("robojackson: UnknownName: unknown robot 'nobody'")
-    assert "Traceback" not in said.err
+    result = robojackson(*words, "--tracker", NAME)
+    assert result.code == 1
+    assert result.err.startswith("robojackson: UnknownName: unknown robot 'nobody'")
+    assert "Traceback" not in result.err

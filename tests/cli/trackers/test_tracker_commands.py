@@ -115,8 +115,8 @@ def write_yaml_for_nobody(path: Path, pin: Callable[..., Path]) -> None:
     """Let the YAML name a port at which no one answers."""
     yaml = next((path.parents[3] / "configs" / "trackers").glob("*.yaml"))
     lines = yaml.read_text().splitlines()
-    told = ["  url: http://127.0.0.1:9/x" if "  url:" in line else line for line in lines]
-    yaml.write_text("\n".join(told))
+    result = ["  url: http://127.0.0.1:9/x" if "  url:" in line else line for line in lines]
+    yaml.write_text("\n".join(result))
 
 
 def test_a_copy_that_the_user_has_is_checked_and_taken(pin, web: Web, network: Path) -> None:
@@ -159,20 +159,20 @@ def test_an_unknown_tracker_lists_those_that_are(pin) -> None:
 
 def test_the_list_says_robot_licence_training_and_whether_it_is_here(pin, network: Path) -> None:
     pin()
-    before, told = listed(), in_process("trackers").out
+    before, found = listed(), in_process("trackers").out
     assert before == {"regulator": True, "standin": False, "twist2": False}
-    assert all(word in told for word in ("g1", "MIT", "AMASS", "robojackson trackers add twist2"))
+    assert all(word in found for word in ("g1", "MIT", "AMASS", "robojackson trackers add twist2"))
     assert in_process("trackers", "add", NAME, "--file", network).code == 0
     assert listed() == {"regulator": True, "standin": True, "twist2": False}
 
 
 def test_a_tracker_without_a_file_has_nothing_to_add() -> None:
-    said = in_process("trackers", "add", "regulator", "--json")
-    assert (said.code, said.answer["added"], said.answer["file"]) == (0, False, "")
+    result = in_process("trackers", "add", "regulator", "--json")
+    assert (result.code, result.answer["added"], result.answer["file"]) == (0, False, "")
     with pytest.raises(BadPolicy, match="'regulator' takes no file"):
         add_tracker("regulator", Path("README.md"))
 
 
 def listed() -> dict[str, bool]:
-    said: Said = in_process("trackers", "--json")
-    return {each["tracker"]: each["ready"] for each in said.answer["trackers"]}
+    result: Said = in_process("trackers", "--json")
+    return {each["tracker"]: each["ready"] for each in result.answer["trackers"]}

@@ -65,14 +65,14 @@ def test_a_row_of_another_person_is_not_taken() -> None:
 
 
 def test_a_gap_is_filled_from_what_was_found_on_the_way() -> None:
-    told = checked(FULL, [gap(FULL, 3, 6), FAR], 0, TIMES, SIZE, DancerConfig())
-    assert hips_x(told) == pytest.approx(100 + np.arange(10))
+    result = checked(FULL, [gap(FULL, 3, 6), FAR], 0, TIMES, SIZE, DancerConfig())
+    assert hips_x(result) == pytest.approx(100 + np.arange(10))
 
 
 def test_a_gap_beside_another_person_stays() -> None:
     beside = np.array([row_of(130) for _ in range(10)])
-    told = checked(FULL, [gap(FULL, 3, 6), beside], 0, TIMES, SIZE, DancerConfig())
-    assert np.isnan(hips_x(told)[3:6]).all()
+    result = checked(FULL, [gap(FULL, 3, 6), beside], 0, TIMES, SIZE, DancerConfig())
+    assert np.isnan(hips_x(result)[3:6]).all()
 
 
 def test_a_long_absence_is_not_searched() -> None:

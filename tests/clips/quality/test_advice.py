@@ -87,9 +87,9 @@ def test_ten_frames_a_second_are_reported_in_these_words() -> None:
 
 @pytest.mark.parametrize("kind", LIMITS)
 def test_every_kind_has_words_with_its_figure(kind: str) -> None:
-    told = Advice(kind, 7.0, LIMITS[kind]).record  # type: ignore[arg-type]
-    assert told["kind"] == kind
-    assert "7" in told["words"]
+    result = Advice(kind, 7.0, LIMITS[kind]).record  # type: ignore[arg-type]
+    assert result["kind"] == kind
+    assert "7" in result["words"]
 
 
 def test_a_table_keeps_what_advice_is_made_of() -> None:

@@ -58,9 +58,9 @@ def test_configuration_allows_it(web: Web) -> None:
 
 
 def test_a_packed_answer_is_counted_as_it_is_unpacked(tmp_path: Path) -> None:
-    told: list[tuple[int, int | None]] = []
-    hook = _watch(lambda done, total: told.append((done, total)), WebConfig(largest_file_mb=1.0))
+    calls: list[tuple[int, int | None]] = []
+    hook = _watch(lambda done, total: calls.append((done, total)), WebConfig(largest_file_mb=1.0))
     hook({"status": "downloading", "downloaded_bytes": 900_000, "total_bytes": 400_000})
-    assert told == [(900_000, None)]
+    assert calls == [(900_000, None)]
     with pytest.raises(DownloadFailed, match="larger than 1 MB"):
         hook({"status": "downloading", "downloaded_bytes": 1_100_000, "total_bytes": 400_000})

@@ -32,16 +32,16 @@ def test_a_site_that_answers_is_reachable(web: Web) -> None:
 
 
 def test_a_refused_connection_names_the_host_and_what_to_do() -> None:
-    said = r"no connection to 127.0.0.1 .*refused.*--source folder"
-    with pytest.raises(SearchFailed, match=said):
+    result = r"no connection to 127.0.0.1 .*refused.*--source folder"
+    with pytest.raises(SearchFailed, match=result):
         require_reachable(NOBODY)
 
 
 def test_a_name_that_cannot_be_resolved_is_one_line(unresolved: None) -> None:
-    said = r"www\.youtube\.com \(Name or service not known\)"
-    with pytest.raises(SearchFailed, match=said) as told:
+    result = r"www\.youtube\.com \(Name or service not known\)"
+    with pytest.raises(SearchFailed, match=result) as caught:
         require_reachable("https://www.youtube.com")
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(caught.value)
 
 
 def test_a_name_server_that_is_silent_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -101,10 +101,10 @@ def test_the_rate_limit_is_kept(web: Web, tmp_path: Path) -> None:
 
 
 def test_progress_ends_with_the_whole_file(web: Web, tmp_path: Path) -> None:
-    told: list[tuple[int, int | None]] = []
+    calls: list[tuple[int, int | None]] = []
     chosen = offer(f"{web.url}/good/clip.mp4", "score", FormatConfig(), PATIENT)
-    fetch(chosen, tmp_path, PATIENT, lambda done, total: told.append((done, total)))
-    assert told[-1] == (len(web.video), len(web.video))
+    fetch(chosen, tmp_path, PATIENT, lambda done, total: calls.append((done, total)))
+    assert calls[-1] == (len(web.video), len(web.video))
 
 
 def test_cookies_are_passed_through(web: Web, tmp_path: Path) -> None:

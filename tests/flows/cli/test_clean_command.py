@@ -20,17 +20,17 @@ def clean(store: Store, *words: str) -> Said:
 
 
 def test_it_lists_what_would_go_and_removes_nothing(store: Store) -> None:
-    said = clean(store, "--older-than", "0")
-    assert said.code == 0
-    assert "Would go: 1 item, 2.0 MB. Nothing was removed." in said.out
-    assert "next: robojackson " in said.out
+    result = clean(store, "--older-than", "0")
+    assert result.code == 0
+    assert "Would go: 1 item, 2.0 MB. Nothing was removed." in result.out
+    assert "next: robojackson " in result.out
     assert len(store.list()) == 1
 
 
 @pytest.mark.parametrize("word", ["--delete", "--yes"])
 def test_it_removes_when_it_should(word: str, store: Store) -> None:
-    said = clean(store, "--older-than", "0", word)
-    assert said.out.splitlines()[-1] == "Removed: 1 item, 2.0 MB."
+    result = clean(store, "--older-than", "0", word)
+    assert result.out.splitlines()[-1] == "Removed: 1 item, 2.0 MB."
     assert store.list() == []
 
 

@@ -14,8 +14,8 @@ from tasks.train_policy import BUDGET
 def test_on_a_terminal_it_says_what_training_gets_and_no_other_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    told = io.StringIO()
-    terminal = Console(file=told, force_terminal=True, width=100)
+    result = io.StringIO()
+    terminal = Console(file=result, force_terminal=True, width=100)
     monkeypatch.setattr(dance_bar, "Console", lambda **_: terminal)
     log = logging.getLogger(dance_bar.TASK_LOG)
     monkeypatch.setattr(log, "level", logging.INFO)
@@ -23,6 +23,6 @@ def test_on_a_terminal_it_says_what_training_gets_and_no_other_line(
     with dance_bar.dance_bar(6.0, tmp_path):
         log.info(BUDGET, 2.6, 6.0, 10.0)
         log.info("%d steps", 512)
-    assert "training gets 2.6 of 6 min; dances of this length need about 10" in told.getvalue()
-    assert "512 steps" not in told.getvalue()
+    assert "training gets 2.6 of 6 min; dances of this length need about 10" in result.getvalue()
+    assert "512 steps" not in result.getvalue()
     assert not any(isinstance(each, dance_bar._Budget) for each in log.handlers)

@@ -14,7 +14,7 @@ def typed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "seconds", "told"),
+    ("kind", "seconds", "message"),
     [
         ("too_short", 0.5, "robojackson dance a.mp4 --config smoke --set evaluate.seconds=10"),
         ("too_short", 10.0, "film or choose a range of at least two seconds (--start, --end)"),
@@ -22,5 +22,5 @@ def typed(monkeypatch: pytest.MonkeyPatch) -> None:
         ("dances", 10.0, f"{interruption.python()} -m webbrowser page.html"),
     ],
 )
-def test_the_next_command_mends_what_was_wrong(kind: str, seconds: float, told: str) -> None:
-    assert commands._next(kind, "page.html", 10.0, seconds) == told
+def test_the_next_command_mends_what_was_wrong(kind: str, seconds: float, message: str) -> None:
+    assert commands._next(kind, "page.html", 10.0, seconds) == message

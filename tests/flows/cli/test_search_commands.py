@@ -6,17 +6,17 @@ from tests.fixtures.commands import in_process
 
 
 def test_an_empty_catalogue_says_what_fills_it(tmp_path: Path) -> None:
-    said = in_process("catalogue", ROBOJACKSON_STORE=str(tmp_path / "store"))
-    assert said.code == 0, said.err
-    assert "robojackson find DANCE" in said.out
-    assert "--source folder" in said.out
+    text = in_process("catalogue", ROBOJACKSON_STORE=str(tmp_path / "store"))
+    assert text.code == 0, text.err
+    assert "robojackson find DANCE" in text.out
+    assert "--source folder" in text.out
 
 
 def test_a_dance_that_was_never_assessed_says_how_to_look_for_it(tmp_path: Path) -> None:
-    said = in_process("catalogue", "--dance", "it's", ROBOJACKSON_STORE=str(tmp_path / "store"))
-    assert "robojackson find 'it'" in said.out
+    text = in_process("catalogue", "--dance", "it's", ROBOJACKSON_STORE=str(tmp_path / "store"))
+    assert "robojackson find 'it'" in text.out
 
 
 def test_an_empty_catalogue_is_an_empty_list_for_programs(tmp_path: Path) -> None:
-    said = in_process("catalogue", "--json", ROBOJACKSON_STORE=str(tmp_path / "store"))
-    assert said.answer == {"candidates": []}
+    text = in_process("catalogue", "--json", ROBOJACKSON_STORE=str(tmp_path / "store"))
+    assert text.answer == {"candidates": []}

@@ -35,10 +35,10 @@ def refreshed(**made: bool) -> dict[str, Any]:
 
 
 def test_a_chosen_video_is_assessed_and_danced_next() -> None:
-    told = find_verdict(found(row("chosen"), row("accepted"), row("rejected")))
-    assert "APT cover is the steadiest of 3, 3.46 a second" in told["verdict"]["sentence"]
-    assert "2 may be danced" in told["verdict"]["sentence"]
-    assert shlex.split(told["next"]) == ["robojackson", "dance", "https://example.org/a b"]
+    result = find_verdict(found(row("chosen"), row("accepted"), row("rejected")))
+    assert "APT cover is the steadiest of 3, 3.46 a second" in result["verdict"]["sentence"]
+    assert "2 may be danced" in result["verdict"]["sentence"]
+    assert shlex.split(result["next"]) == ["robojackson", "dance", "https://example.org/a b"]
 
 
 def test_a_search_without_a_dance_names_the_commonest_reason(
@@ -46,9 +46,9 @@ def test_a_search_without_a_dance_names_the_commonest_reason(
 ) -> None:
     monkeypatch.setattr("sys.argv", ["robojackson", "find", "APT", "--top", "3"])
     rows = [row("rejected"), row("rejected"), row("failed", reason="no video")]
-    told = find_verdict(found(*rows))
-    assert told["verdict"]["sentence"].endswith("of 2 the reason is: two people.")
-    assert told["next"] == "robojackson find APT --top 6"
+    result = find_verdict(found(*rows))
+    assert result["verdict"]["sentence"].endswith("of 2 the reason is: two people.")
+    assert result["next"] == "robojackson find APT --top 6"
 
 
 def test_a_search_that_finds_nothing_says_what_to_type() -> None:
@@ -56,15 +56,15 @@ def test_a_search_that_finds_nothing_says_what_to_type() -> None:
 
 
 def test_the_words_of_a_title_are_no_words_of_ours() -> None:
-    told = find_verdict(found(row("chosen", title="a\x1b[31mb\nc")))
-    assert "\x1b" not in told["verdict"]["sentence"]
-    assert "\n" not in told["verdict"]["sentence"]
+    result = find_verdict(found(row("chosen", title="a\x1b[31mb\nc")))
+    assert "\x1b" not in result["verdict"]["sentence"]
+    assert "\n" not in result["verdict"]["sentence"]
 
 
 def test_a_refresh_trains_a_new_video_next() -> None:
-    told = refresh_verdict(refreshed(old=False, fresh=True))
-    assert told["verdict"]["sentence"] == "2 of 2 dances have a motion, 1 of a new video."
-    assert told["next"] == "robojackson train store/fresh.parquet -o fresh"
+    result = refresh_verdict(refreshed(old=False, fresh=True))
+    assert result["verdict"]["sentence"] == "2 of 2 dances have a motion, 1 of a new video."
+    assert result["next"] == "robojackson train store/fresh.parquet -o fresh"
 
 
 def test_a_refresh_that_failed_is_given_again() -> None:
@@ -89,29 +89,29 @@ def test_a_refresh_with_nothing_due_says_what_waits() -> None:
 def test_a_study_says_what_its_numbers_are_worth(
     steps: int, seeds: int, kind: str, words: str
 ) -> None:
-    told = ablation_verdict({"cells": 9, "page": "p.html"}, steps, seeds, 10_000)
-    assert told["verdict"]["kind"] == kind
-    assert words in told["verdict"]["sentence"]
-    assert told["next"]
+    result = ablation_verdict({"cells": 9, "page": "p.html"}, steps, seeds, 10_000)
+    assert result["verdict"]["kind"] == kind
+    assert words in result["verdict"]["sentence"]
+    assert result["next"]
 
 
 def test_a_catalogue_counts_what_may_be_danced_and_dances_the_first() -> None:
     rows = [row("rejected", dance="APT"), row("accepted", dance="moonwalk", url="https://x.org/m")]
-    told = catalogue_verdict(rows)
-    assert told["verdict"]["sentence"] == "2 videos of 2 dances were assessed, 1 may be danced."
-    assert shlex.split(told["next"]) == ["robojackson", "dance", "https://x.org/m"]
+    result = catalogue_verdict(rows)
+    assert result["verdict"]["sentence"] == "2 videos of 2 dances were assessed, 1 may be danced."
+    assert shlex.split(result["next"]) == ["robojackson", "dance", "https://x.org/m"]
     none = catalogue_verdict([row("rejected", dance="APT")])
     assert shlex.split(none["next"]) == ["robojackson", "find", "APT"]
 
 
 def test_the_overview_of_studies_counts_what_can_be_evaluated() -> None:
     rows = [{"study": "smoke", "strict_success": None}, {"study": "smoke", "strict_success": 0.5}]
-    told = metrics_verdict(rows)
-    assert told["verdict"]["sentence"] == "2 cells of 1 study; 1 can be evaluated."
-    assert shlex.split(told["next"])[:3] == ["robojackson", "metrics", "--sql"]
+    result = metrics_verdict(rows)
+    assert result["verdict"]["sentence"] == "2 cells of 1 study; 1 can be evaluated."
+    assert shlex.split(result["next"])[:3] == ["robojackson", "metrics", "--sql"]
 
 
 def test_what_is_registered_needs_a_worker() -> None:
-    told = deploy_verdict({"deployments": ["a", "b"], "pools": ["flows"], "automations": []})
-    assert told["verdict"]["sentence"].startswith("2 deployments")
-    assert told["next"] == "prefect worker start --pool flows"
+    result = deploy_verdict({"deployments": ["a", "b"], "pools": ["flows"], "automations": []})
+    assert result["verdict"]["sentence"].startswith("2 deployments")
+    assert result["next"] == "prefect worker start --pool flows"

@@ -60,8 +60,8 @@ def named(address: str) -> Iterator[None]:
 def test_a_server_that_refuses_us_is_reported_with_what_to_set(
     name: str, guarded: str, store_folder: Path
 ) -> None:
-    told = rf"{guarded} refuses us \(401 Unauthorized\); set PREFECT_API_AUTH_STRING"
-    with named(guarded), pytest.raises(DeploymentFailed, match=told):
+    result = rf"{guarded} refuses us \(401 Unauthorized\); set PREFECT_API_AUTH_STRING"
+    with named(guarded), pytest.raises(DeploymentFailed, match=result):
         COMMANDS[name]()
 
 
@@ -71,8 +71,8 @@ def test_a_server_that_is_not_there_is_reported_with_what_to_do(
     name: str, store_folder: Path
 ) -> None:
     address = f"http://127.0.0.1:{free_port()}/api"
-    told = rf"{address} does not answer \(.*\); start it"
-    with named(address), pytest.raises(DeploymentFailed, match=told):
+    result = rf"{address} does not answer \(.*\); start it"
+    with named(address), pytest.raises(DeploymentFailed, match=result):
         COMMANDS[name]()
 
 
@@ -80,7 +80,7 @@ def test_a_server_that_is_not_there_is_reported_with_what_to_do(
 def test_the_command_says_it_in_one_line(tmp_path: Path) -> None:
     address = f"http://127.0.0.1:{free_port()}/api"
     environment = {"PREFECT_API_URL": address, "ROBOJACKSON_STORE": str(tmp_path / "store")}
-    said = robojackson("ablation", "smoke", **environment)
-    lines = [line for line in said.err.splitlines() if line and "prefect loaded" not in line]
-    assert (said.code, len(lines)) == (1, 1)
+    result = robojackson("ablation", "smoke", **environment)
+    lines = [line for line in result.err.splitlines() if line and "prefect loaded" not in line]
+    assert (result.code, len(lines)) == (1, 1)
     assert lines[0].startswith("robojackson: DeploymentFailed: the Prefect server of PREFECT_API_")

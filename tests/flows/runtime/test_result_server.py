@@ -95,10 +95,14 @@ def test_a_server_with_a_password_asks_for_it(
 def test_a_port_that_is_taken_is_one_line(tmp_path: Path) -> None:
     with create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        said = robojackson("server", "--port", port, ROBOJACKSON_STORE=str(tmp_path / "store"))
-    assert said.code == 1
-    assert f"DeploymentFailed: cannot listen on 127.0.0.1:{port}: Address already" in said.err
-    assert "Traceback" not in said.err
+        message_text = robojackson(
+            "server", "--port", port, ROBOJACKSON_STORE=str(tmp_path / "store")
+        )
+    assert message_text.code == 1
+    assert (
+        f"DeploymentFailed: cannot listen on 127.0.0.1:{port}: Address already" in message_text.err
+    )
+    assert "Traceback" not in message_text.err
 
 
 PRINTED = """

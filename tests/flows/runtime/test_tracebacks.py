@@ -11,23 +11,23 @@ FAULT = SearchFailed("youtube: HTTP 404 not found")
 
 
 def record(message: str, error: BaseException | None = None) -> logging.LogRecord:
-    told = (type(error), error, None) if error else None
-    return logging.LogRecord("prefect.task_runs", logging.ERROR, "", 0, message, (), told)
+    result = (type(error), error, None) if error else None
+    return logging.LogRecord("prefect.task_runs", logging.ERROR, "", 0, message, (), result)
 
 
 def test_what_the_command_says_at_its_end_is_said_once() -> None:
     once = Once()
-    said = [
+    result = [
         record(f"Task run failed with exception: {FAULT!r}", FAULT),
         record(f'Finished in state Failed("Task run encountered an exception: {FAULT}")'),
         record(f"Encountered exception during execution: {FAULT!r}", FAULT),
         record(f'Finished in state Failed("Flow run encountered an exception: {FAULT}")'),
     ]
-    assert not any(once(each) for each in said)
+    assert not any(once(each) for each in result)
 
 
 @pytest.mark.parametrize(
-    "told",
+    "expected_message",
     [
         record("Task run failed with exception: ... - Retry 1/3 will start in 2 s", FAULT),
         record("Task run failed with exception: ZeroDivisionError()", ZeroDivisionError()),
@@ -35,13 +35,15 @@ def test_what_the_command_says_at_its_end_is_said_once() -> None:
         record("Finished in state Completed()"),
     ],
 )
-def test_everything_else_is_still_written(told: logging.LogRecord) -> None:
+def test_everything_else_is_still_written(expected_message: logging.LogRecord) -> None:
     once = Once()
     once(record("Task run failed", FAULT))
-    assert once(told)
+    assert once(expected_message)
 
 
 def test_the_line_of_the_temporary_server_has_no_advertisement() -> None:
-    told = record("Starting temporary server on http://127.0.0.1:1\nSee https://docs.prefect.io/v3")
-    assert Once()(told)
-    assert told.getMessage() == "Starting temporary server on http://127.0.0.1:1"
+    result = record(
+        "Starting temporary server on http://127.0.0.1:1\nSee https://docs.prefect.io/v3"
+    )
+    assert Once()(result)
+    assert result.getMessage() == "Starting temporary server on http://127.0.0.1:1"

@@ -56,10 +56,10 @@ def test_without_a_network_a_name_is_refused_unless_it_was_found_before(
 @pytest.mark.medium
 def test_find_without_a_network_is_one_line_and_starts_no_prefect(tmp_path: Path) -> None:
     where = ("--source", "server", "--address", "http://127.0.0.1:9/")
-    said = robojackson("find", "apt", *where, ROBOJACKSON_STORE=str(tmp_path))
-    assert said.code == 1
-    assert not said.loaded_prefect
-    assert [line for line in said.err.splitlines() if "SearchFailed" in line] == [
-        line for line in said.err.splitlines() if line and "prefect loaded" not in line
+    text = robojackson("find", "apt", *where, ROBOJACKSON_STORE=str(tmp_path))
+    assert text.code == 1
+    assert not text.loaded_prefect
+    assert [line for line in text.err.splitlines() if "SearchFailed" in line] == [
+        line for line in text.err.splitlines() if line and "prefect loaded" not in line
     ]
     assert not list(tmp_path.iterdir())

@@ -21,14 +21,14 @@ def study(tmp_path: Path, **given: object) -> Path:
 
 
 def test_a_move_may_have_steps_of_its_own(tmp_path: Path) -> None:
-    wanted = study_of(str(study(tmp_path)), {})
-    assert (wanted.steps_of("walk"), wanted.steps_of("dance_b")) == (500, 700)
-    assert wanted.steps_label == "walk 500, dance_b 700"
+    expected = study_of(str(study(tmp_path)), {})
+    assert (expected.steps_of("walk"), expected.steps_of("dance_b")) == (500, 700)
+    assert expected.steps_label == "walk 500, dance_b 700"
 
 
 def test_steps_of_the_command_are_those_of_every_move(tmp_path: Path) -> None:
-    wanted = study_of(str(study(tmp_path)), {"steps": 64})
-    assert wanted.steps_label == "64"
+    expected = study_of(str(study(tmp_path)), {"steps": 64})
+    assert expected.steps_label == "64"
 
 
 def test_a_study_cut_to_one_move_keeps_the_steps_of_the_others(tmp_path: Path) -> None:
@@ -43,10 +43,10 @@ def test_steps_of_a_move_that_does_not_exist_are_refused(tmp_path: Path) -> None
 def test_a_setup_from_a_walker_is_refused_for_a_robot_that_has_none(
     tmp_path: Path, store_folder: Path
 ) -> None:
-    wanted = Study(name="mine", setups=("scratch", "pretrain"), mode="track")
+    expected = Study(name="mine", setups=("scratch", "pretrain"), mode="track")
     robot = machine.description(tmp_path)
     with pytest.raises(BadPolicy, match="run: robojackson pretrain --robot"):
-        trainings_of(wanted, robot)
+        trainings_of(expected, robot)
     alone = Study(name="mine", setups=("scratch",), mode="track")
     assert list(trainings_of(alone, robot)) == ["scratch"]
 
@@ -57,6 +57,10 @@ def test_a_study_of_a_robot_whose_model_is_missing_names_the_command(store_folde
 
 
 def test_the_study_of_the_g1_is_scratch_and_walker_on_three_moves_and_five_seeds() -> None:
-    wanted = load(Study, "studies/g1")
-    assert (wanted.setups, len(wanted.moves), len(wanted.seeds)) == (("scratch", "pretrain"), 3, 5)
-    assert [wanted.steps_of(move) for move in wanted.moves] == [500_000, 750_000, 750_000]
+    expected = load(Study, "studies/g1")
+    assert (expected.setups, len(expected.moves), len(expected.seeds)) == (
+        ("scratch", "pretrain"),
+        3,
+        5,
+    )
+    assert [expected.steps_of(move) for move in expected.moves] == [500_000, 750_000, 750_000]

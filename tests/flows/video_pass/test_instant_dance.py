@@ -48,8 +48,8 @@ def dances(tmp_path_factory: pytest.TempPathFactory, short_clip: Path) -> Iterat
 
 @pytest.mark.slow
 def test_nothing_is_trained_and_the_tracker_is_evaluated(dances: Dances) -> None:
-    told = dances.instant.answer
-    there = {path.name for path in Path(told["page"]).parent.iterdir()}
+    result = dances.instant.answer
+    there = {path.name for path in Path(result["page"]).parent.iterdir()}
     assert there >= {
         "index.html",
         "tracker.mp4",
@@ -57,8 +57,8 @@ def test_nothing_is_trained_and_the_tracker_is_evaluated(dances: Dances) -> None
         "reference.parquet",
     }
     assert not {"policy.safetensors", "episodes.parquet", "network.onnx"} & there
-    assert told["evaluation"]["tracker"] == NAME
-    assert told["evaluation"]["rollouts"] == 5  # two phases, two resets, and the stand
+    assert result["evaluation"]["tracker"] == NAME
+    assert result["evaluation"]["rollouts"] == 5  # two phases, two resets, and the stand
 
 
 @pytest.mark.slow
@@ -85,16 +85,16 @@ def test_a_recorded_instant_dance_is_answered_without_prefect(dances: Dances) ->
 
 @pytest.mark.slow
 def test_a_trained_robot_joins_the_tracker_on_one_page(dances: Dances) -> None:
-    said = dances.run(*TRAINED)
-    assert said.code == 0, said.err
-    told = said.answer
-    assert list(told["evaluation"]["trackers"]) == [NAME]
-    text = Path(told["page"]).read_text()
+    first = dances.run(*TRAINED)
+    assert first.code == 0, first.err
+    result = first.answer
+    assert list(result["evaluation"]["trackers"]) == [NAME]
+    text = Path(result["page"]).read_text()
     assert "trained robot" in text
     assert f"tracker {NAME}" in text
-    assert {"dance.mp4", "tracker.mp4"} <= {p.name for p in Path(told["page"]).parent.iterdir()}
+    assert {"dance.mp4", "tracker.mp4"} <= {p.name for p in Path(result["page"]).parent.iterdir()}
     again = dances.run(*TRAINED)
-    assert (again.loaded_prefect, json.dumps(again.answer)) == (False, json.dumps(told))
+    assert (again.loaded_prefect, json.dumps(again.answer)) == (False, json.dumps(result))
 
 
 @pytest.mark.slow

@@ -58,19 +58,21 @@ def test_a_missing_file_starts_the_flow_which_makes_it_again(dances: Dances) -> 
 
 @pytest.mark.slow
 def test_forcing_every_task_runs_the_flow(dances: Dances) -> None:
-    said = dances.run(PREFECT_TASKS_REFRESH_CACHE="true", PREFECT_API_URL="http://127.0.0.1:9/api")
-    assert said.code == 1
-    assert "http://127.0.0.1:9/api does not answer" in said.err
+    result = dances.run(
+        PREFECT_TASKS_REFRESH_CACHE="true", PREFECT_API_URL="http://127.0.0.1:9/api"
+    )
+    assert result.code == 1
+    assert "http://127.0.0.1:9/api does not answer" in result.err
 
 
 @pytest.mark.slow
 def test_a_recorded_motion_that_the_gate_refuses_is_refused_alike(dances: Dances) -> None:
     wrong = ("--set", "retarget.method=paper")
     first, again = dances.run(*wrong), dances.run(*wrong)
-    assert [said.code for said in (first, again)] == [1, 1]
-    assert [said.loaded_prefect for said in (first, again)] == [True, False]
+    assert [found.code for found in (first, again)] == [1, 1]
+    assert [found.loaded_prefect for found in (first, again)] == [True, False]
     refused = [
-        [line for line in said.err.splitlines() if line.startswith("robojackson: Rejected")]
-        for said in (first, again)
+        [line for line in found.err.splitlines() if line.startswith("robojackson: Rejected")]
+        for found in (first, again)
     ]
     assert refused[0] == refused[1] != []

@@ -79,6 +79,6 @@ def test_the_flow_dances_on_a_robot_given_by_its_file(
 ) -> None:
     overrides = {"train.trainer": "sb3", "train.steps": 300}
     robot = str(own_robot(tmp_path / "here"))
-    told = asyncio.run(dance(str(short_clip), "smoke", overrides, robot=robot))
-    assert told["robot"] == "mine"
-    assert Path(told["page"]).is_file()
+    text = asyncio.run(dance(str(short_clip), "smoke", overrides, robot=robot))
+    assert text["robot"] == "mine"
+    assert Path(text["page"]).is_file()

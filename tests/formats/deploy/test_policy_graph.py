@@ -38,17 +38,17 @@ def run(session: onnxruntime.InferenceSession, seen: np.ndarray, step: int) -> n
 
 def observation(pack: Pack, sim: Simulation, row: int, last: np.ndarray) -> np.ndarray:
     """mjlab's terms, from MuJoCo's own body poses."""
-    data, wanted = sim.datas[0], np.asarray(pack.reference.qpos, float)[row]
+    data, expected = sim.datas[0], np.asarray(pack.reference.qpos, float)[row]
     robot, root = pack.robot, pack.robot.model.body(pack.robot.description.root_body).id
     head = robot.model.site_bodyid[robot.keypoint_sites[robot.keypoint_names.index("head")]]
     here = data.xmat[head].reshape(3, 3)
     other = Simulation(robot, sim.control, 1)
-    other.place(np.array([0]), wanted[None], np.zeros((1, robot.model.nv)))
+    other.place(np.array([0]), expected[None], np.zeros((1, robot.model.nv)))
     there = other.datas[0].xmat[head].reshape(3, 3)
-    assert not np.allclose(quat_to_matrix(wanted[3:7]), here) or head == root
+    assert not np.allclose(quat_to_matrix(expected[3:7]), here) or head == root
     default, qpos, qvel = robot.standing[7:], sim.qpos[0], sim.qvel[0]
     speeds, apart = np.asarray(pack.reference.qvel, float)[row, 6:], (here.T @ there)[:, :2]
-    terms = [wanted[7:], speeds, apart.ravel(), qvel[3:6], qpos[7:] - default, qvel[6:], last]
+    terms = [expected[7:], speeds, apart.ravel(), qvel[3:6], qpos[7:] - default, qvel[6:], last]
     return np.concatenate(terms)
 
 

@@ -77,8 +77,8 @@ def figures_of(
     np.savez(work / "starts.npz", qpos=starts.qpos, qvel=starts.qvel, step=starts.step,
              steps=horizon[0])  # fmt: skip
     words = (str(folder), str(work / "starts.npz"), str(work / "tracks.npy"))
-    said = run_bare(packages, ROLL_OUT, *words, cwd=work)
-    assert said.returncode == 0, said.stderr
+    result = run_bare(packages, ROLL_OUT, *words, cwd=work)
+    assert result.returncode == 0, result.stderr
     theirs = recorded(pack, clip, starts, np.load(work / "tracks.npy").transpose(1, 0, 2))
     judge = RolloutScorer(robot, reference, BRIEF)
     both = [summarise([judge.row("x", label, rollouts, i) for i, label in enumerate(labels)])
@@ -101,9 +101,9 @@ def recorded(pack: Pack, clip: Clip, starts: Starts, qpos: np.ndarray) -> Rollou
     for now, target in zip(qpos, targets, strict=True):
         alive &= ~fall.has_fallen(now, target.qpos)
         length += alive
-    wanted, there = (np.stack([getattr(t, name) for t in targets]) for name in ("points", "qpos"))
+    expected, there = (np.stack([getattr(t, name) for t in targets]) for name in ("points", "qpos"))
     horizon = np.full(count, steps)
-    return Rollouts(length, length < horizon, horizon, qpos, points, wanted, there, {}, True)
+    return Rollouts(length, length < horizon, horizon, qpos, points, expected, there, {}, True)
 
 
 def test_the_runner_is_short_and_imports_three_packages(pack: Pack) -> None:
@@ -141,9 +141,9 @@ def test_the_command_soft_starts_dances_and_damps(
 ) -> None:
     code = "import runpy\nsys.argv = sys.argv[1:]\nrunpy.run_path(sys.argv[0], run_name='__main__')"
     words = (str(pack.folder / "run.py"), "--seconds", "0.15", "--soft-start", "0.3")
-    said = run_bare(packages, code, *words, cwd=tmp_path)
-    assert said.returncode == 0, said.stderr
-    assert said.stdout == "danced 0.15 s, then damped: the end\n"
+    result = run_bare(packages, code, *words, cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert result.stdout == "danced 0.15 s, then damped: the end\n"
 
 
 @pytest.mark.slow
@@ -161,10 +161,10 @@ run.SimulatedRobot.drive = lambda *w: (driven.append(abs(w[2]).max()), drive(*w)
 threading.Timer(1.0, lambda: os.kill(os.getpid(), signal.{name})).start()
 print(run.main(5.0, 2000.0, False), driven[0], max(driven[-100:]), len(driven))
 """
-    said = run_bare(packages, code, str(pack.folder / "run.py"), cwd=tmp_path)
-    assert said.returncode == 0, said.stderr
-    words = said.stdout.split()
-    assert said.stdout.startswith("danced 0.00 s, then damped: stopped by hand")
+    message_text = run_bare(packages, code, str(pack.folder / "run.py"), cwd=tmp_path)
+    assert message_text.returncode == 0, message_text.stderr
+    words = message_text.stdout.split()
+    assert message_text.stdout.startswith("danced 0.00 s, then damped: stopped by hand")
     assert float(words[-2]) == 0.0, "no stiffness at the end"
     assert int(words[-1]) < 100_000, "of 133,333: it did not wait for the end"
 

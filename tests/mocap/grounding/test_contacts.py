@@ -154,9 +154,9 @@ def test_pinned_feet_stand_still_on_the_floor() -> None:
 
 
 def test_a_correction_fades_after_the_contact_and_between_two_it_goes_over() -> None:
-    wanted = np.full((30, 1), np.nan)
-    wanted[:5], wanted[10:12] = 0.1, 0.2
-    found = foot_pinning.faded(wanted, 6.0)[:, 0]
+    selected = np.full((30, 1), np.nan)
+    selected[:5], selected[10:12] = 0.1, 0.2
+    found = foot_pinning.faded(selected, 6.0)[:, 0]
     assert np.allclose(found[:5], 0.1)
     assert np.allclose(found[10:12], 0.2)
     assert ((found[5:10] > 0.05) & (found[5:10] < 0.25)).all()

@@ -71,8 +71,8 @@ def test_what_is_said_to_be_surer_is_nearer_to_the_truth() -> None:
     columns = [keypoint(name) for name in JOINTS]
     mine = pose_error.align_clip(found.joints[:, columns], truth, HIPS)
     error = np.linalg.norm(mine - pose_error.root_relative(truth, HIPS), axis=-1)
-    said = found.confidence[:, columns]
-    order = np.argsort(said.ravel())
+    result = found.confidence[:, columns]
+    order = np.argsort(result.ravel())
     quarter = len(order) // 4
     least, most = order[:quarter], order[-quarter:]
     assert error.ravel()[most].mean() < 0.8 * error.ravel()[least].mean()

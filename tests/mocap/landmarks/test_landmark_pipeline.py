@@ -51,9 +51,9 @@ def test_one_model_is_requested_once_and_its_track_is_kept(
 
 
 def test_progress_of_two_models_runs_once_from_nothing_to_all(followed: list[str]) -> None:
-    told: list[tuple[int, int]] = []
-    look("best", lambda done, total: told.append((done, total)))
-    assert told == [(30, 120), (60, 120), (90, 120), (120, 120)]
+    calls: list[tuple[int, int]] = []
+    look("best", lambda done, total: calls.append((done, total)))
+    assert calls == [(30, 120), (60, 120), (90, 120), (120, 120)]
 
 
 def test_a_camera_that_stands_leaves_the_track_without_a_note(followed: list[str]) -> None:

@@ -33,7 +33,9 @@ def test_a_swaying_camera_moves_the_root_unless_its_background_is_known(
 ) -> None:
     window, camera = panned(hip_shake)
     still = recover_motion(hip_shake, MocapConfig()).joints[:, 0, :2]
-    told = recover_motion(replace(window, to_first=camera.to_first), MocapConfig()).joints[:, 0, :2]
+    result = recover_motion(replace(window, to_first=camera.to_first), MocapConfig()).joints[
+        :, 0, :2
+    ]
     blind = recover_motion(window, MocapConfig()).joints[:, 0, :2]
-    assert np.linalg.norm(told - still, axis=-1).max() < 0.08
+    assert np.linalg.norm(result - still, axis=-1).max() < 0.08
     assert np.linalg.norm(blind - still, axis=-1).max() > 0.25

@@ -142,9 +142,9 @@ def test_missing_unexpected_and_misshapen_keys_are_named(
     changed["regressor.extra"] = torch.zeros(2)
     changed["regressor.flow.t.0.0.bias"] = torch.zeros(7)
     found = read_weights(saved(tmp_path / "niki.pth", changed), "niki")
-    with pytest.raises(BadWeights) as told:
+    with pytest.raises(BadWeights) as caught:
         install(OneStage(), found)
-    message = str(told.value)
+    message = str(caught.value)
     assert "1 missing (regressor.flow.s.3.2.bias)" in message
     assert "1 unexpected (regressor.extra)" in message
     assert "regressor.flow.t.0.0.bias is (7,), expected (512,)" in message

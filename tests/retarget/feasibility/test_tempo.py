@@ -29,9 +29,9 @@ DT = 0.015
 
 
 def _rate(count: int, slowest: float) -> np.ndarray:
-    wanted = np.ones(count)
-    wanted[count // 3 : count // 2] = slowest
-    return smooth_rate(wanted, DT, ring=False)
+    expected = np.ones(count)
+    expected[count // 3 : count // 2] = slowest
+    return smooth_rate(expected, DT, ring=False)
 
 
 def test_a_rate_of_one_changes_nothing():

@@ -36,13 +36,13 @@ def test_the_kind_follows_from_the_figures(
 
 
 def test_a_fall_is_reported_beside_the_statue() -> None:
-    told = verdict_on(figures(1.1, 0.0), STATUE, 10.0).sentence
-    assert told == "The robot falls after 1.1 s, no better than a statue."
+    text = verdict_on(figures(1.1, 0.0), STATUE, 10.0).sentence
+    assert text == "The robot falls after 1.1 s, no better than a statue."
 
 
 def test_no_success_is_reported_of_what_is_too_short() -> None:
-    told = verdict_on(figures(0.5, 1.0), {"statue": figures(0.5, 1.0)}, 0.5)
-    assert told.sentence.startswith("Too short to evaluate: rollouts last 0.5 s, and a statue")
+    result = verdict_on(figures(0.5, 1.0), {"statue": figures(0.5, 1.0)}, 0.5)
+    assert result.sentence.startswith("Too short to evaluate: rollouts last 0.5 s, and a statue")
     left = without_short_figures({"success": 1.0, "skill": 0.9, "survived_s": 0.5})
     assert left == {"success": None, "skill": None, "survived_s": 0.5}
     assert set(left) - {"survived_s"} <= set(NEEDS_FULL_LENGTH)

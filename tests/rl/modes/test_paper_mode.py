@@ -132,9 +132,9 @@ def test_the_points_are_compared_as_the_option_says() -> None:
 
 def test_the_weights_are_those_of_a_mean() -> None:
     here = state()
-    wanted = here.points.copy()
-    wanted[0, 0, 1] += 0.2
-    apart = miss(here, wanted, here.root, np.array([1.0, 3.0]))
+    selected = here.points.copy()
+    selected[0, 0, 1] += 0.2
+    apart = miss(here, selected, here.root, np.array([1.0, 3.0]))
     assert apart.world[0] == pytest.approx(0.04 / 4)
 
 
@@ -271,8 +271,8 @@ def test_a_robot_whose_spine_has_other_names_is_rewarded_without_it(
     sway: ReferenceMotion, tmp_path: Path
 ) -> None:
     other = altered(tmp_path, ('"lwaist"', '"belly"'))
-    told = tuple("belly" if name == "lwaist" else name for name in sway.body_names)
-    audit = audit_both_readings(other, dataclasses.replace(sway, body_names=told), PaperConfig())
+    answer = tuple("belly" if name == "lwaist" else name for name in sway.body_names)
+    audit = audit_both_readings(other, dataclasses.replace(sway, body_names=answer), PaperConfig())
     assert audit["root"].of["statue"] < 1.0
 
 

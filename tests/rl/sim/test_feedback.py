@@ -150,8 +150,8 @@ def test_who_does_not_see_all_gets_none(kind: str) -> None:
 
 def test_a_policy_from_before_has_none(robot: Robot, sway: ReferenceMotion) -> None:
     policy = random_policy(robot, sway)
-    said = policy.facts["control"]
-    assert isinstance(said, dict)
-    before = {name: value for name, value in said.items() if name != "feedback"}
+    result = policy.facts["control"]
+    assert isinstance(result, dict)
+    before = {name: value for name, value in result.items() if name != "feedback"}
     old = Policy(policy.layers, {**policy.facts, "control": before})
     assert policy_control(old, robot).feedback == 0.0

@@ -78,9 +78,9 @@ def test_motors_in_the_order_of_the_hinges_follow_the_pd_law(
     batch = Batch([sim.model] * 2, sim.datas, motors, sim.control, sim.kp, sim.kd)
     targets = sway.qpos[5:7, 7:] + rng.normal(0, 0.1, (2, 17))
     torque = (targets - sim.qpos[:, 7:]) * sim.kp - sim.qvel[:, 6:] * sim.kd
-    told = np.clip(torque, -motors.limit, motors.limit) / motors.gear
+    result = np.clip(torque, -motors.limit, motors.limit) / motors.gear
     for _ in range(2):  # the memory that a call leaves is not read by the next
-        np.testing.assert_array_equal(batch.controls(targets), told)
+        np.testing.assert_array_equal(batch.controls(targets), result)
 
 
 def test_threads_do_not_change_the_result(robot: Robot, sway: ReferenceMotion) -> None:

@@ -71,7 +71,7 @@ def test_a_critics_slope_by_actions_is_flaxs(made: SimpleNamespace) -> None:
 
 @pytest.mark.medium
 def test_an_actor_and_its_slope_are_flaxs(made: SimpleNamespace) -> None:
-    def told(apply: object) -> object:
+    def compiled(apply: object) -> object:
         def value(params: object) -> jax.Array:
             chosen = apply(params, made.seen)  # type: ignore[operator]
             actions = chosen.sample(seed=jax.random.PRNGKey(1))
@@ -79,4 +79,7 @@ def test_an_actor_and_its_slope_are_flaxs(made: SimpleNamespace) -> None:
 
         return jax.value_and_grad(value)
 
-    same(told(dense_networks.actions_of)(made.of_actor), told(made.actor.apply)(made.of_actor))  # type: ignore[operator]
+    same(
+        compiled(dense_networks.actions_of)(made.of_actor),
+        compiled(made.actor.apply)(made.of_actor),
+    )  # type: ignore[operator]

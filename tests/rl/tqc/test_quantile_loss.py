@@ -15,11 +15,11 @@ def drawn() -> tuple[np.ndarray, np.ndarray]:
     return rng.normal(0, 2, (QUANTILES, BATCH)), rng.normal(0, 2, (TARGETS, BATCH))
 
 
-def formula(current: np.ndarray, wanted: np.ndarray) -> float:
+def formula(current: np.ndarray, target_quantiles: np.ndarray) -> float:
     """Of the lowest targets, pair by pair."""
     total = 0.0
     for b in range(BATCH):
-        for target in np.sort(wanted[:, b])[:KEPT]:
+        for target in np.sort(target_quantiles[:, b])[:KEPT]:
             for i, value in enumerate(current[:, b]):
                 miss = target - value
                 huber = 0.5 * miss**2 if abs(miss) <= 1 else abs(miss) - 0.5
@@ -27,24 +27,24 @@ def formula(current: np.ndarray, wanted: np.ndarray) -> float:
     return total / (BATCH * KEPT * QUANTILES)
 
 
-def ours(current: np.ndarray, wanted: np.ndarray) -> tuple[jax.Array, jax.Array]:
-    aims = jnp.asarray(wanted, jnp.float32)
+def ours(current: np.ndarray, target_quantiles: np.ndarray) -> tuple[jax.Array, jax.Array]:
+    aims = jnp.asarray(target_quantiles, jnp.float32)
     return quantile_huber(jnp.asarray(current, jnp.float32), aims, lowest(aims, KEPT), KEPT)
 
 
 @pytest.mark.medium
 def test_the_loss_is_the_papers() -> None:
-    current, wanted = drawn()
-    np.testing.assert_allclose(ours(current, wanted)[0], formula(current, wanted), rtol=1e-5)
+    current, expected = drawn()
+    np.testing.assert_allclose(ours(current, expected)[0], formula(current, expected), rtol=1e-5)
 
 
 def test_the_slope_is_what_the_loss_changes_by() -> None:
-    current, wanted = drawn()
-    slope = np.asarray(ours(current, wanted)[1])
+    current, expected = drawn()
+    slope = np.asarray(ours(current, expected)[1])
     for place in np.ndindex(current.shape):
         step = np.zeros_like(current)
         step[place] = 1e-5
-        rise = formula(current + step, wanted) - formula(current - step, wanted)
+        rise = formula(current + step, expected) - formula(current - step, expected)
         np.testing.assert_allclose(slope[place], rise / 2e-5, atol=1e-5)
 
 

@@ -22,11 +22,11 @@ class Spy:
 
     def __init__(self, joints: int) -> None:
         self.seen: list[np.ndarray] = []
-        self.said = np.linspace(-3.0, 3.0, joints) + np.arange(N)[:, None]
+        self.action = np.linspace(-3.0, 3.0, joints) + np.arange(N)[:, None]
 
     def __call__(self, values: np.ndarray) -> np.ndarray:
         self.seen.append(values.copy())
-        return self.said
+        return self.action
 
 
 @pytest.fixture
@@ -79,12 +79,12 @@ def test_the_network_sees_frame_history_and_target_as_they_are_written_by_hand(m
     tracker._network = spy
     follower = tracker.follow(robot, N)
     frames: list[list[float]] = []
-    action = np.zeros_like(spy.said)
+    action = np.zeros_like(spy.action)
     for count in range(13):
         qpos, qvel = random_state(robot, rng)
-        wanted = random_state(robot, rng)
-        follower.targets(TrackerInput(qpos, qvel, np.zeros((N, 14, 3)), (step_of(*wanted),)))
-        target = target_by_hand(robot, description.joints, wanted[0][1], wanted[1][1])
+        selected = random_state(robot, rng)
+        follower.targets(TrackerInput(qpos, qvel, np.zeros((N, 14, 3)), (step_of(*selected),)))
+        target = target_by_hand(robot, description.joints, selected[0][1], selected[1][1])
         frame = frame_by_hand(robot, description, target, qpos[1], qvel[1], action[1])
         past = frames[-10:] if frames else []
         past = [(frames or [frame])[0]] * (10 - len(past)) + past
@@ -92,7 +92,7 @@ def test_the_network_sees_frame_history_and_target_as_they_are_written_by_hand(m
             spy.seen[-1][1], [*frame, *np.ravel(past), *target], atol=1e-12, err_msg=str(count)
         )
         frames.append(frame)
-        action = spy.said  # as the network said it, not as it is limited
+        action = spy.action  # as the network gives it, not as it is limited
 
 
 def test_an_action_is_limited_scaled_and_added_to_the_default_pose(made) -> None:
@@ -100,7 +100,7 @@ def test_an_action_is_limited_scaled_and_added_to_the_default_pose(made) -> None
     robot, rng = stock(), np.random.default_rng(1)
     spy = Spy(len(description.joints))
     tracker._network = spy
-    told = tracker.follow(robot, N).targets(
+    result = tracker.follow(robot, N).targets(
         TrackerInput(
             *random_state(robot, rng), np.zeros((N, 14, 3)), (step_of(*random_state(robot, rng)),)
         )
@@ -108,9 +108,9 @@ def test_an_action_is_limited_scaled_and_added_to_the_default_pose(made) -> None
     default = {"right_knee": -0.4, "left_knee": -0.4, "left_elbow": -1.0, "abdomen_z": 0.1}
     for motor in range(robot.model.nu):
         name = robot.model.joint(robot.model.actuator_trnid[motor, 0]).name
-        said = spy.said[:, description.joints.index(name)]
-        expected = default.get(name, 0.0) + 0.5 * np.minimum(np.maximum(said, -2.0), 2.0)
-        np.testing.assert_allclose(told[:, motor], expected, err_msg=name)
+        action = spy.action[:, description.joints.index(name)]
+        expected = default.get(name, 0.0) + 0.5 * np.minimum(np.maximum(action, -2.0), 2.0)
+        np.testing.assert_allclose(result[:, motor], expected, err_msg=name)
 
 
 def test_a_network_that_says_zero_holds_the_default_pose(tmp_path: Path) -> None:
@@ -120,9 +120,11 @@ def test_a_network_that_says_zero_holds_the_default_pose(tmp_path: Path) -> None
     names = [robot.model.joint(i).name for i in robot.model.actuator_trnid[:, 0]]
     held = {"right_knee": -0.4, "left_knee": -0.4, "left_elbow": -1.0, "abdomen_z": 0.1}
     for _ in range(3):
-        state, wanted = random_state(robot, rng), random_state(robot, rng)
-        told = follower.targets(TrackerInput(*state, np.zeros((N, 14, 3)), (step_of(*wanted),)))
-        np.testing.assert_allclose(told, [[held.get(name, 0.0) for name in names]] * N)
+        state, reference = random_state(robot, rng), random_state(robot, rng)
+        result = follower.targets(
+            TrackerInput(*state, np.zeros((N, 14, 3)), (step_of(*reference),))
+        )
+        np.testing.assert_allclose(result, [[held.get(name, 0.0) for name in names]] * N)
 
 
 def test_robots_that_begin_together_move_as_if_each_was_alone(made) -> None:
@@ -131,9 +133,9 @@ def test_robots_that_begin_together_move_as_if_each_was_alone(made) -> None:
     states = [(random_state(robot, rng), random_state(robot, rng)) for _ in range(4)]
     together, alone = tracker.follow(robot, N), tracker.follow(robot, 1)
     points = np.zeros((N, 14, 3))
-    for state, wanted in states:
-        told = together.targets(TrackerInput(*state, points, (step_of(*wanted),)))
-        one = ClipStep(np.zeros(1, int), *(a[1:2] for a in wanted), points[:1], points[:1],
+    for state, reference in states:
+        result = together.targets(TrackerInput(*state, points, (step_of(*reference),)))
+        one = ClipStep(np.zeros(1, int), *(a[1:2] for a in reference), points[:1], points[:1],
                        np.zeros(1))  # fmt: skip
         single = alone.targets(TrackerInput(state[0][1:2], state[1][1:2], points[:1], (one,)))
-        np.testing.assert_allclose(told[1:2], single, atol=1e-6)
+        np.testing.assert_allclose(result[1:2], single, atol=1e-6)

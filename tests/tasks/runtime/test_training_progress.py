@@ -20,16 +20,16 @@ class Page:
 
     def __init__(self, away: bool = False) -> None:
         self.away = away
-        self.told: list[tuple[float, str]] = []
+        self.updates: list[tuple[float, str]] = []
 
     async def create(self, progress: float, key: str, description: str) -> UUID:
         if self.away:
             raise ConnectionError("no server")
-        self.told.append((progress, description))
+        self.updates.append((progress, description))
         return uuid4()
 
     async def update(self, artifact: UUID, progress: float, description: str) -> None:
-        self.told.append((progress, description))
+        self.updates.append((progress, description))
 
 
 def train(page: Page, work: Path, monkeypatch: pytest.MonkeyPatch) -> str:
@@ -54,8 +54,8 @@ def test_the_bar_tells_survival_and_time_left_and_ends_at_the_end(
     page = Page()
     train(page, tmp_path, monkeypatch)
     half = "scratch-walk-s0: survives 1.50 s, 500 steps, 17 steps/s, 0:30 left"
-    assert (50.0, half) in page.told
-    assert page.told[-1][0] == 100.0
+    assert (50.0, half) in page.updates
+    assert page.updates[-1][0] == 100.0
 
 
 def test_a_server_that_is_away_stops_no_training(
@@ -63,4 +63,4 @@ def test_a_server_that_is_away_stops_no_training(
 ) -> None:
     page: Any = Page(away=True)
     assert train(page, tmp_path, monkeypatch) == "trained"
-    assert page.told == []
+    assert page.updates == []
