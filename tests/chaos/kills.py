@@ -14,6 +14,7 @@ import hashlib
 import json
 import os
 import random
+import re
 import shutil
 import signal
 import subprocess
@@ -40,6 +41,9 @@ STAGES = (
     *("train_policy", "evaluate_policy", "evaluate_dance", "render_video", "draw_snapshot"),
     "write_page",
 )
+DIGEST = re.compile(r"(?<=^dances/clip)-[0-9a-f]{8}/")
+CACHE = "torchinductor_"
+"""PyTorch's cache of a user, which every process that imports it shares and keeps."""
 QUIET_S, PATIENCE_S = 60.0, 900.0
 
 
@@ -69,18 +73,18 @@ class Dance:
     Attributes:
         kills: Those before its end.
         code: Exit code of the last run.
-        equal: Whether tables and networks are those of the undisturbed run.
+        different: Tables and networks that are not those of the undisturbed run.
         left: Processes and files that no one owns.
     """
 
     kills: list[Kill] = field(default_factory=list)
     code: int = -1
-    equal: bool = False
+    different: list[str] = field(default_factory=list)
     left: list[str] = field(default_factory=list)
 
     @property
     def good(self) -> bool:
-        return not self.code and self.equal and not self.left
+        return not (self.code or self.different or self.left)
 
 
 class Place:
@@ -112,11 +116,23 @@ class Place:
         return [name for name in STAGES if any((self.store / "records" / name).glob("*"))]
 
     def tables(self) -> dict[str, str]:
-        files = (f for f in self.store.rglob("*") if f.suffix in COMPARED and f.is_file())
-        return {
-            f.relative_to(self.store).as_posix(): hashlib.sha256(f.read_bytes()).hexdigest()
-            for f in files
-        }
+        """Return the digests of tables and networks by their names in the store.
+
+        The name of a dance's folder ends with a digest of all its results, of which the log of the
+        training has clock times; a dance has one folder, whatever its digest.
+        """
+        dances = [path.name for path in (self.store / "dances").glob("*")]
+        found = {"dances": " ".join(name.rpartition("-")[0] for name in dances)}
+        for file in self.store.rglob("*"):
+            if file.suffix in COMPARED and file.is_file():
+                name = DIGEST.sub("/", file.relative_to(self.store).as_posix(), count=1)
+                found[name] = hashlib.sha256(file.read_bytes()).hexdigest()
+        return found
+
+    def different(self, expected: dict[str, str]) -> list[str]:
+        found = self.tables()
+        both = sorted(found.keys() | expected.keys())
+        return [name for name in both if found.get(name) != expected.get(name)]
 
     def left(self) -> list[str]:
         """Return what is left when the processes have had time to end."""
@@ -124,7 +140,10 @@ class Place:
         while under(self.home) and time.monotonic() < end:
             time.sleep(0.3)
         alive = [f"{found.pid} {found.command[:90]}" for found in under(self.home)]
-        temporary = [path for path in (self.folder / "tmp").iterdir() if path.name[:1] != "."]
+        temporary = [
+            path for path in (self.folder / "tmp").iterdir()
+            if path.name[:1] != "." and not path.name.startswith(CACHE)
+        ]  # fmt: skip
         return [*alive, *map(str, [*leftovers_in(self.store), *temporary])]
 
 
@@ -189,7 +208,7 @@ def campaign(place: Place, kills: int, seed: int, out: Path) -> list[Dance]:
             if ended.ended != "exit 0":
                 continue
             ended = 0
-        now.code, now.equal, now.left = ended, place.tables() == expected, place.left()
+        now.code, now.different, now.left = ended, place.different(expected), place.left()
         print(f"dance after {len(now.kills)} kills: {'good' if now.good else now}", flush=True)
         _write(out, kills, seed, usual_s, len(expected), dances)
         place.wipe()

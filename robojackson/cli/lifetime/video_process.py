@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, TypeVar, cast
 from robojackson.cli.lifetime.parent_death import watch_parent
 from robojackson.errors import RoboJacksonError, UnreadableVideo
 from robojackson.files.memory_limit import VIDEO_MEMORY, limited_memory
+from robojackson.files.processor_cores import cores
 
 if TYPE_CHECKING:
     from robojackson.clips.video import VideoInfo, VideoLimits
@@ -41,11 +42,6 @@ one busy core."""
 BETWEEN_REPORTS_S = 0.05
 ATTEMPTS = 2
 """Attempts for a clip whose process died: the machine may have been short of memory."""
-
-
-def cores() -> int:
-    """Return the cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def probed(path: Path, limits: "VideoLimits") -> "VideoInfo":

@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Float
 from mujoco import rollout
 
+from robojackson.files.processor_cores import cores
 from robojackson.rl.sim.nominal_path import (
     Gains,
     Linear,
@@ -37,8 +38,8 @@ LAPS, STILL = 3, 200
 """Backward passes over a motion that repeats; steps of the stand after one that ends."""
 HEIGHTS_M = np.linspace(-0.006, 0.002, 9)
 """Largest displacement of the root that gives the soles the reference's pressure, metres."""
-ROWS = 3200
-"""Number of states that are simulated at once."""
+ROWS, ROBOTS_A_THREAD = 3200, 16
+"""Numbers of states that are simulated at once, and for which another thread pays."""
 
 
 def settings() -> list[float]:
@@ -100,15 +101,20 @@ def advance(
     qvel: Float[np.ndarray, "B nv"],
     targets: Float[np.ndarray, "B nu"],
 ) -> tuple[Float[np.ndarray, "B nq"], Float[np.ndarray, "B nv"]]:
-    """Return the states one control step later, under the PD law of a simulation."""
-    model, motors, hinge = sim.model, sim.motors, sim.motors.hinge
-    data, nq = mujoco.MjData(model), model.nq
+    """Return the states one control step later, under the PD law of a simulation.
+
+    As many threads as cores step the robots; their number does not change the states.
+    """
+    model, motors, hinge, nq = sim.model, sim.motors, sim.motors.hinge, sim.model.nq
+    threads = max(1, min(cores(), len(qpos) // ROBOTS_A_THREAD))
+    data = [mujoco.MjData(model) for _ in range(threads)]
     state = np.concatenate([np.zeros((len(qpos), 1)), qpos, qvel], 1)
-    for _ in range(sim.control.substeps or 1):
-        angles, speeds = state[:, 8 : 1 + nq][:, hinge], state[:, 7 + nq :][:, hinge]
-        torque = sim.kp * (targets - angles) - sim.kd * speeds
-        control = np.clip(torque, -motors.limit, motors.limit) / motors.gear
-        state = np.asarray(rollout.rollout(model, data, state, control[:, None])[0])[:, 0]
+    with rollout.Rollout(nthread=threads if threads > 1 else 0) as pool:
+        for _ in range(sim.control.substeps or 1):
+            angles, speeds = state[:, 8 : 1 + nq][:, hinge], state[:, 7 + nq :][:, hinge]
+            torque = sim.kp * (targets - angles) - sim.kd * speeds
+            control = np.clip(torque, -motors.limit, motors.limit) / motors.gear
+            state = np.asarray(pool.rollout(model, data, state, control[:, None])[0])[:, 0]
     return state[:, 1 : 1 + nq], state[:, 1 + nq :]
 
 
