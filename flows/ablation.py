@@ -24,8 +24,8 @@ from flows.runtime.tracebacks import without_tracebacks
 from flows.study.progress_table import ProgressTable
 from flows.study.study_plan import trainings_of
 from flows.video_pass.motion_stages import to_reference
-from robojackson.files.processor_cores import cores
 from robojackson.errors import RejectedReference, StudyFailed
+from robojackson.files.processor_cores import cores
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.pipeline.yaml_loader import load

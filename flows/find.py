@@ -18,9 +18,9 @@ from flows.runtime.launch import launch
 from flows.search.search_artifacts import publish_search
 from flows.search.search_entries import Entry, SearchResult, rows, summary
 from flows.search.search_pipeline import download_candidates, search_and_rank
-from robojackson.files.processor_cores import cores
 from robojackson.clips.web.video_candidate import VideoCandidate
 from robojackson.errors import NoPersonFound, SearchFailed
+from robojackson.files.processor_cores import cores
 from robojackson.pipeline.yaml_loader import build, load
 from storage import candidate_catalogue
 from storage.artifact import Artifact
