@@ -103,7 +103,6 @@ class Place:
     def start(self) -> subprocess.Popen[bytes]:
         own = {"HOME": str(self.home), "TMPDIR": str(self.folder / "tmp")}
         own |= {"ROBOJACKSON_STORE": str(self.store), "PYTHONPATH": str(ROOT)}
-        own |= {"PREFECT_SERVER_EPHEMERAL_STARTUP_TIMEOUT_SECONDS": "600"}
         host = {k: os.environ[k] for k in ("LANG", "PATH", "LD_LIBRARY_PATH") if k in os.environ}
         words = ("dance", str(self.clip), "--config", "smoke", "--trainer", "sb3", "--force")
         with (self.folder / "log.txt").open("ab") as log:
