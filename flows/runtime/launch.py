@@ -4,12 +4,14 @@ import asyncio
 from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
 
+from httpx import TransportError
 from prefect.exceptions import TerminationSignal
 
 from flows.runtime.prefect_server import require_server
 from flows.runtime.tracebacks import without_tracebacks
 from robojackson.cli.console import Interrupted, same_command
 from robojackson.cli.lifetime.orphans import none_left
+from robojackson.errors import DeploymentFailed
 
 Outcome = TypeVar("Outcome")
 
@@ -18,7 +20,8 @@ def launch(flow: Callable[..., Coroutine[Any, Any, Outcome]], *given: Any) -> Ou
     """Return what a flow returns; a fault of the input comes without a traceback.
 
     Raises:
-        DeploymentFailed: the server that is named does not answer, or refuses us.
+        DeploymentFailed: the server that is named does not answer, or refuses us; or the run's
+            server has died.
         Interrupted: Ctrl-C or SIGTERM; every stage that has ended is cached, a training in work has
             its last checkpoint, and `interruption` leaves no process.
     """
@@ -29,3 +32,8 @@ def launch(flow: Callable[..., Coroutine[Any, Any, Outcome]], *given: Any) -> Ou
             return asyncio.run(flow(*given))
     except (KeyboardInterrupt, asyncio.CancelledError, TerminationSignal):
         raise Interrupted(f"resume: {same_command()}") from None
+    except TransportError as cause:
+        raise DeploymentFailed(
+            f"the Prefect server of this run has ended or does not answer any more ({cause}); "
+            f"finished stages are kept; resume: {same_command()}"
+        ) from cause

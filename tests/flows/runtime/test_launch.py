@@ -1,4 +1,4 @@
-"""A flow that is started from the command line ends in a moment, with its temporary server."""
+"""The end of a flow from the command line: interrupted, or after the death of its server."""
 
 import os
 import signal
@@ -8,8 +8,11 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import httpx
 import pytest
 
+from flows.runtime import launch
+from robojackson.errors import DeploymentFailed
 from tests.fixtures.commands import environment
 from tools.stack.interrupted_command import living_with
 
@@ -70,3 +73,18 @@ def test_an_interrupted_flow_ends_at_once_and_says_how_to_resume(
     ]
     assert time.monotonic() - began < ENDED_S
     assert living_with(f"ROBOJACKSON_STORE={store}") == {}
+
+
+def test_a_server_that_dies_during_a_run_is_one_line_with_the_next_step(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async def lost() -> None:
+        raise httpx.ConnectError("All connection attempts failed")
+
+    monkeypatch.delenv("PREFECT_API_URL", raising=False)
+    monkeypatch.setattr(launch, "same_command", lambda: "robojackson dance a.mp4")
+    with pytest.raises(
+        DeploymentFailed, match=r"server of this run .*\(All connection attempts"
+    ) as caught:
+        launch.launch(lost)
+    assert str(caught.value).endswith("finished stages are kept; resume: robojackson dance a.mp4")
