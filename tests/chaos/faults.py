@@ -155,7 +155,7 @@ def pair(machine: Machine) -> Iterator[Row]:
     codes = [each.wait(1200) for each in both]
     wrong = "" if place.tables() == expected else "other tables than one alone makes"
     wrong = wrong or ("" if not any([alone, *codes]) else f"exit codes {alone}, {codes}")
-    yield Row("two processes on one store", "dance", max(codes), "", wrong or str(*place.left()))
+    yield Row("two processes on one store", "dance", max(codes), "", wrong or ", ".join(place.left()))
 
 
 def exits(machine: Machine, count: int) -> Iterator[Row]:

@@ -93,6 +93,7 @@ class Place:
     def __init__(self, folder: Path) -> None:
         self.folder, self.home, self.store = folder, folder / "home", folder / "store"
         self.clip = folder / "clip.mp4"
+        folder.mkdir(parents=True, exist_ok=True)
         trim(CLIP, 0.0, LENGTH_S, self.clip)
 
     def wipe(self) -> None:
