@@ -46,8 +46,10 @@ PRESETS: dict[str, dict[str, Any]] = {
         "gsde": True,
         "log_std_init": -2.0,
     },
+    "polish": {"zero_init": True, "log_std_init": -2.5, "burn_in": 50_000, "action_penalty": 0.4},
 }
-"""`dance` is our configuration for tracking: the defaults below."""
+"""`dance` is our configuration for tracking: the defaults below. `polish` improves a robot that
+dances without a policy already (`track.control.feedback_path: sampled`)."""
 
 
 NORM_EPSILON = 1e-6
@@ -79,12 +81,17 @@ class TqcConfig:
         layer_norm: Layer normalisation between the critics' layers.
         gsde: State-dependent exploration; `sbx` has none and explores with plain noise.
         log_std_init: Logarithm of the first exploration noise; `sb3` uses it with gSDE only.
+        zero_init: Begin with actions of zero and noise of `log_std_init`, without random actions
+            (residual policy learning, Silver et al., 2018).
+        burn_in: Transitions before the first update of the actor; the critics learn alone.
+        action_penalty: Weight of mean squared actions in the actor's loss, multiples of the mean
+            absolute value (TD3+BC, Fujimoto and Gu, 2021, about actions of zero), unitless.
         target_entropy: Target entropy of the exploration, multiples of minus the number of actions.
         actor_average: Weight of the past in the running mean of the actor that becomes the
             policy, a round of updates; 0 is the last actor.
     """
 
-    preset: Literal["dance", "paper", "released"] = "dance"
+    preset: Literal["dance", "paper", "released", "polish"] = "dance"
     n_envs: int = Field(default=32, ge=1)
     steps_per_round: int = Field(default=8, ge=1)
     updates_per_round: int = Field(default=24, ge=1)
@@ -104,6 +111,9 @@ class TqcConfig:
     layer_norm: bool = True
     gsde: bool = False
     log_std_init: float = 0.0
+    zero_init: bool = False
+    burn_in: int = Field(default=0, ge=0)
+    action_penalty: float = Field(default=0.0, ge=0)
     target_entropy: float = Field(default=1.5, gt=0)
     actor_average: float = Field(default=0.98, ge=0, lt=1)
 

@@ -108,6 +108,17 @@ class TrainConfig:
             )
         return self
 
+    @model_validator(mode="after")
+    def _residual_learning(self) -> "TrainConfig":
+        given = (self.tqc.zero_init, self.tqc.burn_in, self.tqc.action_penalty)
+        if self.trainer == "sb3" and any(given):
+            raise ConflictingValues(
+                "tqc.zero_init, burn_in and action_penalty (preset polish) need trainer sbx",
+                "trainer",
+                "tqc",
+            )
+        return self
+
     @property
     def has_budget(self) -> bool:
         """Return whether the training has a budget."""

@@ -26,6 +26,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
 from robojackson.rl.config.train_config import TqcConfig
 from robojackson.rl.tqc.dense_networks import LOG_STD_RANGE, dense_count
+from robojackson.rl.tqc.flax_arrays import dense_layers, filled, tensors_of
 from robojackson.rl.tqc.network_arrays import CRITICS, TARGETS, Tensors
 from robojackson.rl.tqc.off_policy import OffPolicyTrainer, arguments, is_warming_up
 from robojackson.rl.tqc.replay_files import buffer_of
@@ -42,6 +43,7 @@ class OverlappedTQC(TQC):
         super().__init__(*args, **kwargs)
         self.warmup = 0
         self.seen: int | None = None
+        self.burn_in, self.action_penalty = 0, 0.0
         self.noise = np.random.default_rng(self.seed)
         self._acting = dense_layers(self.policy.actor_state.params)
 
@@ -93,17 +95,12 @@ class OverlappedTQC(TQC):
             count=gradient_steps,
             delay=self.policy_delay,
             seen=self.seen,
+            actor_learns=self.num_timesteps >= self.burn_in,
+            penalty=self.action_penalty,
         )
         policy.actor_state, self.ent_coef_state, self.key = learnt.actor, learnt.entropy, learnt.key
         policy.qf1_state, policy.qf2_state = learnt.critics
         self._n_updates += gradient_steps
-
-
-def dense_layers(params: Any) -> Layers:
-    """Return dense layers in order as numpy arrays; an actor's last two are mean and log std."""
-    tree = jax.device_get(params)["params"]
-    names = [f"Dense_{i}" for i in range(dense_count(params))]
-    return tuple((np.asarray(tree[n]["kernel"]), np.asarray(tree[n]["bias"])) for n in names)
 
 
 class SbxTrainer(OffPolicyTrainer):
@@ -114,12 +111,15 @@ class SbxTrainer(OffPolicyTrainer):
         given["policy_kwargs"] |= {"layer_norm": config.layer_norm}
         model = OverlappedTQC(env=env, policy_delay=config.policy_delay, **given)
         model.warmup, model.seen = config.warmup, seen
+        model.burn_in, model.action_penalty = config.burn_in, config.action_penalty
         model.ent_coef_state = jax.tree_util.tree_map(_strong, model.ent_coef_state)
         if config.gsde:
             log.warning("trainer sbx has no gSDE: it explores with plain Gaussian noise")
-        if config.log_std_init:
-            _raise_noise(model, config.log_std_init)
+        if config.log_std_init or config.zero_init:
+            _start_heads(model, config.log_std_init, config.zero_init)
         super().__init__(model, {"noise": model.noise})
+        if config.zero_init:
+            self._act_at_once()
 
     def learn(self, callback: BaseCallback) -> None:
         """Learn until the callback stops it; wait for the last round."""
@@ -141,9 +141,9 @@ class SbxTrainer(OffPolicyTrainer):
     def networks(self) -> Tensors:
         """Return actor and critics by name."""
         policy = self.model.policy
-        tensors = _tensors(policy.actor_state.params, "actor")
+        tensors = tensors_of(policy.actor_state.params, "actor")
         for name, params in self._critics().items():
-            tensors |= _tensors(params, name)
+            tensors |= tensors_of(params, name)
         alpha = self.model.ent_coef_state.params["log_ent_coef"]
         return tensors | {"log_alpha": np.array(jax.device_get(alpha)).reshape(())}
 
@@ -151,12 +151,12 @@ class SbxTrainer(OffPolicyTrainer):
         """Load named arrays into the networks."""
         policy = self.model.policy
         policy.actor_state = policy.actor_state.replace(
-            params=_filled(policy.actor_state.params, tensors, "actor")
+            params=filled(policy.actor_state.params, tensors, "actor")
         )
         for i, (critic, target) in enumerate(zip(CRITICS, TARGETS, strict=True), 1):
             state = getattr(policy, f"qf{i}_state")
-            params = _filled(state.params, tensors, critic)
-            aimed = _filled(state.target_params, tensors, target)
+            params = filled(state.params, tensors, critic)
+            aimed = filled(state.target_params, tensors, target)
             setattr(policy, f"qf{i}_state", state.replace(params=params, target_params=aimed))
         if "log_alpha" in tensors:
             alpha = _strong(np.float32(tensors["log_alpha"])).reshape(())
@@ -210,41 +210,15 @@ def _strong(leaf: Any) -> jax.Array:
     return jax.numpy.asarray(np.asarray(leaf))
 
 
-def _places(params: Any, part: str) -> dict[str, tuple[str, str]]:
-    """Return module and leaf of flax's tree for each of our tensors of a part."""
-    dense = dense_count(params)
-    heads = {dense - 2: "mean", dense - 1: "log_std"} if part == "actor" else {}
-    places: dict[str, tuple[str, str]] = {}
-    for i in range(dense):
-        name, module = heads.get(i, f"{part}.{i}"), f"Dense_{i}"
-        places |= {f"{name}.weight": (module, "kernel"), f"{name}.bias": (module, "bias")}
-    for i in range(len(params["params"]) - dense):
-        name, module = f"{part}.norm.{i}", f"LayerNorm_{i}"
-        places |= {f"{name}.scale": (module, "scale"), f"{name}.offset": (module, "bias")}
-    return places
-
-
-def _tensors(params: Any, part: str) -> Tensors:
-    """Return the parameters of a part by our names."""
-    tree = jax.device_get(params)["params"]
-    places = _places(params, part).items()
-    return {name: np.array(tree[module][leaf]) for name, (module, leaf) in places}
-
-
-def _filled(params: Any, tensors: Mapping[str, np.ndarray], part: str) -> Any:
-    """Return the parameters with named arrays in their places."""
-    tree = jax.tree_util.tree_map(lambda leaf: leaf, params)
-    for name, (module, leaf) in _places(params, part).items():
-        if name in tensors:
-            tree["params"][module][leaf] = jax.numpy.asarray(tensors[name], jax.numpy.float32)
-    return tree
-
-
-def _raise_noise(model: OverlappedTQC, log_std: float) -> None:
-    """Start with another exploration noise: set the bias of the log std's head."""
+def _start_heads(model: OverlappedTQC, log_std: float, zero: bool) -> None:
+    """Start with another exploration noise, and with actions of zero if so: set the last layers."""
     state = model.policy.actor_state
-    head = f"Dense_{len(state.params['params']) - 1}"
+    last = dense_count(state.params) - 1
     tree = jax.tree_util.tree_map(lambda leaf: leaf, state.params)
-    tree["params"][head]["bias"] = jax.numpy.full_like(tree["params"][head]["bias"], log_std)
+    for number, bias in ((last - 1, 0.0), (last, log_std)) if zero else ((last, log_std),):
+        head = tree["params"][f"Dense_{number}"]
+        head["bias"] = jax.numpy.full_like(head["bias"], bias)
+        if zero:
+            head["kernel"] = jax.numpy.zeros_like(head["kernel"])
     model.policy.actor_state = state.replace(params=tree)
     model._acting = dense_layers(tree)

@@ -33,7 +33,7 @@ class LearnerState(NamedTuple):
     key: Array
 
 
-@partial(jax.jit, static_argnames=("kept", "count", "delay", "seen"))
+@partial(jax.jit, static_argnames=("kept", "count", "delay", "seen", "actor_learns", "penalty"))
 def round_of_updates(
     learnt: LearnerState,
     samples: Samples,
@@ -43,6 +43,8 @@ def round_of_updates(
     count: int,
     delay: int,
     seen: int | None = None,
+    actor_learns: bool = True,
+    penalty: float = 0.0,
 ) -> LearnerState:
     """Run `count` updates of the critics, each on its part of the samples, and after every `delay`
     of them one of the actor and the entropy coefficient.
@@ -52,6 +54,8 @@ def round_of_updates(
         kept: Number of lowest target quantiles that are used, of both critics together.
         delay: Divides `count`.
         seen: Number of first inputs of an observation that the actor sees; all when None.
+        actor_learns: Whether actor and entropy coefficient are updated at all.
+        penalty: Weight of mean squared actions, multiples of the mean absolute value.
     """
     size = len(samples.rewards) // count
 
@@ -61,7 +65,9 @@ def round_of_updates(
             part = partial(jax.lax.dynamic_slice_in_dim, start_index=first, slice_size=size)
             batch = jax.tree_util.tree_map(part, samples)
             learnt = _critics(learnt, batch, kept, tau, seen)
-        return _actor(learnt, batch.observations, target_entropy, seen)
+        if not actor_learns:
+            return learnt
+        return _actor(learnt, batch.observations, target_entropy, seen, penalty)
 
     result: LearnerState = jax.lax.fori_loop(0, count // delay, step, learnt)
     return result
@@ -99,6 +105,7 @@ def _actor(
     observations: Float[Array, "B O"],
     target_entropy: float,
     seen: int | None,
+    penalty: float,
 ) -> LearnerState:
     """Run one update of the actor and the entropy coefficient."""
     key, _, _, noise = jax.random.split(learnt.key, 4)
@@ -112,7 +119,11 @@ def _actor(
             dense_networks.quantiles_of_actions(c.params, observations, actions)
             for c in learnt.critics
         ]
-        return jnp.mean(alpha * log_prob) - jnp.mean(jnp.stack(values)), -jnp.mean(log_prob)
+        value = jnp.mean(alpha * log_prob) - jnp.mean(jnp.stack(values))
+        if penalty:
+            scale = jax.lax.stop_gradient(jnp.mean(jnp.abs(jnp.stack(values))))
+            value += penalty * scale * jnp.mean(actions**2)
+        return value, -jnp.mean(log_prob)
 
     slope, entropy = jax.grad(loss, has_aux=True)(learnt.actor.params)
     coefficient, _ = TQC.update_temperature(target_entropy, learnt.entropy, entropy)
