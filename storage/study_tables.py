@@ -1,7 +1,9 @@
-"""The tables of the studies: episodes and evaluations of every cell, one file a cell and table.
+"""The tables of the studies: episodes and evaluations of every cell, one file a cell and table; and
+the beats of dances to music, as the study `dances`.
 
     metrics/episodes/study=S/move=M/setup=P/seed=N/<run_id>.parquet
     metrics/evaluations/study=S/move=M/setup=P/seed=N/<run_id>.parquet
+    metrics/beats/study=dances/move=M/setup=P/seed=N/<run_id>.parquet
     metrics/runs/<run_id>-<study>.json           where the numbers come from
 
 The run id is a digest of the configuration and the inputs, so a cell that is done again writes the
@@ -22,12 +24,16 @@ from robojackson.files import tables
 from robojackson.files.local_folder import sha256_of
 from robojackson.files.sql_tables import RunQuery, answering
 from robojackson.files.table_types import TableSchema
-from robojackson.pipeline.table_schemas import EPISODE_RECORD, EVALUATION_RECORD
+from robojackson.pipeline.table_schemas import BEAT_RECORD, EPISODE_RECORD, EVALUATION_RECORD
 from storage.artifact import Artifact
 from storage.store import Store
 
 FOLDER = "metrics"
-TABLES: Mapping[str, TableSchema] = {"episodes": EPISODE_RECORD, "evaluations": EVALUATION_RECORD}
+CELL: Mapping[str, TableSchema] = {"episodes": EPISODE_RECORD, "evaluations": EVALUATION_RECORD}
+"""Tables that every cell of a study has."""
+TABLES = {**CELL, "beats": BEAT_RECORD}
+DANCES = "dances"
+"""Study of the passes of `robojackson dance`."""
 RUNS = f"{FOLDER}/runs"
 ALWAYS = ("run_id", "study", "move", "setup", "config")
 """Columns of `runs` that always exist."""
@@ -66,7 +72,7 @@ def write(store: Store, place: Place, given: Mapping[str, Artifact]) -> dict[str
         StoreError: the store refuses it; nothing half-written is left.
     """
     made = {}
-    for table, schema in TABLES.items():
+    for table, schema in CELL.items():
         key = given[table].key
         rows = tables.decode_rows(schema, store.read(key), store.address(key))
         made[table] = _put(
@@ -77,6 +83,12 @@ def write(store: Store, place: Place, given: Mapping[str, Artifact]) -> dict[str
             if store.exists(old):
                 store.remove(old)
     return made
+
+
+def write_beats(store: Store, place: Place, rows: list[dict[str, Any]]) -> Artifact:
+    """Write how the motions of a dance meet its music."""
+    content = tables.encode_rows(BEAT_RECORD, _relabelled(place, rows))
+    return _put(store, place.key("beats"), content)
 
 
 def note_key(place: Place) -> str:
@@ -99,7 +111,7 @@ def note(store: Store, place: Place, facts: Mapping[str, Any]) -> Artifact:
 
 
 def query(store: Store, sql: str, given: Mapping[str, Any] | None = None) -> list[dict[str, Any]]:
-    """Return rows of a question in DuckDB's SQL about `episodes`, `evaluations` and `runs`.
+    """Return rows of a question in SQL about `episodes`, `evaluations`, `beats` and `runs`.
 
     It reaches no other file.
 
@@ -213,7 +225,7 @@ def _as_text(value: Any) -> str | None:
 def _outdated(store: Store, place: Place) -> list[str]:
     """Return the files of the same cell under another run id: an earlier configuration or code."""
     found = []
-    for table in TABLES:
+    for table in CELL:
         folder = place.key(table).rsplit("/", 1)[0]
         found += [key for key in store.list(folder) if key != place.key(table)]
     return found

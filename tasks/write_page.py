@@ -131,8 +131,6 @@ def _written(
         shown = shown_run(run, clip, settings.render)
     results, files = _results(store, made, Path(file), run, shown, settings), {}
     live = live_page(run, results.title)
-    if shown.beats is not None:
-        files["beats"] = store.put(f"{folder}/{BEATS}", json.dumps(shown.beats).encode())
     if live is not None:
         files["live"] = store.put(f"{folder}/{LIVE}", live.encode())
         results = replace(results, live=LIVE)
@@ -142,6 +140,11 @@ def _written(
         for name, artifact in made.items()
         if name not in LEFT_OUT
     }
+    if shown.beats is not None:
+        files["beats"] = store.put(f"{folder}/{BEATS}", json.dumps(shown.beats).encode())
+        card = _json(store, made["scorecard"]) | {"beats": shown.beats["figures"]}
+        key = f"{folder}/{made['scorecard'].name}"
+        files["scorecard"] = store.put(key, json.dumps(card, indent=1).encode())
     return {**kept, **files, "page": store.put(f"{folder}/{PAGE}", text.encode())}
 
 

@@ -17,7 +17,7 @@ from flows.cli.gallery_command import gallery
 from flows.cli.search_commands import catalogue, find, refresh
 from flows.cli.study_commands import ablation, deploy, metrics, server
 from robojackson.cli.app import add_stages, make_app
-from robojackson.cli.console import CommandResult, command
+from robojackson.cli.console import CommandResult, command, table
 from robojackson.cli.options import (
     Config,
     Force,
@@ -51,6 +51,8 @@ LONGER_MINUTES = 15
 INSTANT_MINUTES = 1.0
 """About what an instant dance takes, for its bar."""
 INSTANT = "--instant"
+BEATS = ("beats", "precision", "recall", "f1", "bas")
+"""How a dance meets its music."""
 LONG_ENOUGH_S = 10.0
 """Advised rollout length where the settings' is too short to evaluate, seconds."""
 
@@ -147,7 +149,8 @@ def _concluded(made: dict[str, Any], minutes: float, seconds: float) -> CommandR
     verdict = made["evaluation"]["verdict"]
     made |= {"verdict": verdict, "next": _next(verdict["kind"], made["page"], minutes, seconds)}
     where = [f"page   {made['page']}", f"video  {made['video']}"]
-    text = [*verdict_lines(made["evaluation"]), *advice_lines(made), *where, *closing(made)]
+    beats = table(made["beats"], BEATS) if made["beats"] else []
+    text = [*verdict_lines(made["evaluation"]), *beats, *advice_lines(made), *where, *closing(made)]
     return CommandResult(made, text=text)
 
 

@@ -51,7 +51,7 @@ def ablation(
 def metrics(
     sql: Annotated[
         str | None,
-        typer.Option(help="A question in SQL about `episodes`, `evaluations` and `runs`."),
+        typer.Option(help="A question in SQL about `episodes`, `evaluations`, `beats` and `runs`."),
     ] = None,
     as_json: Json = False,
 ) -> CommandResult:

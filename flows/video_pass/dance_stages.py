@@ -25,7 +25,7 @@ from robojackson.pipeline.run_names import run_name
 from robojackson.retarget.scorecard_gate import check
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.robot.model import RobotDescription
-from storage import artifact_tables, run_catalogue
+from storage import artifact_tables, run_catalogue, study_tables
 from storage.artifact import Artifact
 from storage.store import Store
 from tasks.draw_pictures import draw_snapshot
@@ -146,7 +146,7 @@ def conclude(
     settings: PipelineConfig,
     labels: RunLabels,
 ) -> Facts:
-    """Add the pass to the catalogue of runs and return its answer."""
+    """Add the pass to the catalogue of runs and the tables, and return its answer."""
     summary = joined_evaluation(store, made)
     tracker = summary.get("tracker")
     setup, seed = (tracker, 0) if tracker else (labels.setup, settings.train.seed)
@@ -160,6 +160,11 @@ def conclude(
         **names, setup=setup, seed=seed, finished_at=when, artifacts=made, summary=summary
     )
     run_catalogue.record(store, entry)
+    beats = json.loads(store.read(made["beats"].key))["figures"] if "beats" in made else None
+    if beats is not None:
+        place = study_tables.Place(study_tables.DANCES, labels.move, setup, seed, run_id)
+        rows = [{"robot": robot, "motion": name, **one} for name, one in beats.items()]
+        study_tables.write_beats(store, place, rows)
     return {
         "page": store.address(made["page"].key),
         "video": store.address(made["dance"].key),
@@ -168,7 +173,7 @@ def conclude(
         "candidates": {c.name: c.score.score_per_second for c in candidates},
         "scorecard": json.loads(store.read(made["scorecard"].key)),
         "evaluation": summary,
-        "beats": json.loads(store.read(made["beats"].key))["figures"] if "beats" in made else None,
+        "beats": beats,
         "advice": [each.record for each in advise(track)],
         "artifacts": {name: store.address(artifact.key) for name, artifact in made.items()},
     }

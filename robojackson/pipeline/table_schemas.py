@@ -99,3 +99,19 @@ EVALUATION_RECORD = TableSchema(
         "error_": "",
     },
 )
+
+BEAT_RECORD = TableSchema(
+    "BeatRecord",
+    "motion",
+    (
+        *RUN_COLUMNS,
+        Column("robot", TEXT),
+        # person, reference, robot, or control: the last of them half a beat later.
+        Column("motion", TEXT),
+        Column("beats", I32),
+        Column("precision", F64, "1"),
+        Column("recall", F64, "1"),
+        Column("f1", F64, "1"),
+        Column("bas", F64, "1"),
+    ),
+)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robojackson.report.web.live_data import RECORDS
+from robojackson.report.web.live_records import RECORDS
 from robojackson.report.web.shown_run import RecordedRun
 from robojackson.rl.evaluation.controllers import control_of, trained_driver
 from robojackson.rl.evaluation.rollouts import Starts, roll_out

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from robojackson.motion.reference_motion import ReferenceMotion
-from robojackson.report.web.live_data import RECORDS, live_data
+from robojackson.report.web.live_data import live_data
+from robojackson.report.web.live_records import RECORDS
 from robojackson.report.web.shown_run import RecordedRun
 from robojackson.rl.evaluation.controllers import control_of, sees_ahead, trained_driver
 from robojackson.rl.evaluation.rollouts import Moment, Starts, roll_out
@@ -100,6 +101,16 @@ def in_python(run: RecordedRun, data: Mapping[str, Any], pushes: np.ndarray) -> 
     return np.column_stack([done.length, errors])
 
 
+def assert_within_5_mm_where_python_is(data: Mapping[str, Any], deviations: np.ndarray) -> None:
+    """Every state is, but those that 1e-7 rad moves as far in Python, where a limb just touches:
+    at most a fifth, of dancers whom nobody trained."""
+    shaken = np.array([one["shaken"] for one in data["records"]])
+    assert np.median(deviations) <= 0.1
+    assert (deviations[shaken <= 0.5] <= 5.0).all()
+    assert (deviations <= np.maximum(5.0, 1.5 * shaken)).all()
+    assert (deviations <= 5.0).sum() >= 0.8 * RECORDS
+
+
 @pytest.mark.parametrize("speed", [0.3, 1.0])
 def test_pushes_are_survived_as_in_python(
     shaking: RecordedRun, speed: float, tmp_path: Path
@@ -126,7 +137,7 @@ def test_a_policy_that_sees_ahead_does_the_same_as_in_python(
     data = live_data(policy, run.reference, run.robot)
     assert data is not None
     found = in_node(data, np.zeros((RECORDS, 2)), tmp_path)
-    assert np.median(found["deviations"]) <= 0.1
+    assert_within_5_mm_where_python_is(data, found["deviations"])
     ours = in_python(replace(run, policy=policy), data, np.zeros((RECORDS, 2)))
     assert found["found"][:, 0].mean() == pytest.approx(ours[:, 0].mean(), abs=2.0)
 
@@ -145,7 +156,7 @@ def test_feedback_from_where_the_feet_stand_is_the_same_as_in_python(
     assert isinstance(fed, dict)
     assert fed["places"]
     found = in_node(data, np.zeros((RECORDS, 2)), tmp_path)
-    assert np.median(found["deviations"]) <= 0.1
+    assert_within_5_mm_where_python_is(data, found["deviations"])
     ours = in_python(replace(shaking, policy=policy), data, np.zeros((RECORDS, 2)))
     assert found["found"][:, 0].mean() == pytest.approx(ours[:, 0].mean(), abs=2.0)
     del fed["places"]

@@ -1,7 +1,9 @@
 """The whole flow on a real clip, as short as it can be: it makes everything, and only once."""
 
 import asyncio
+import json
 import shutil
+import wave
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -23,7 +25,7 @@ from robojackson.clips.quality.stability import Stability
 from robojackson.errors import NoPersonFound, RejectedReference, UnreadableVideo
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.yaml_loader import load
-from storage import artifact_tables, run_catalogue
+from storage import artifact_tables, run_catalogue, study_tables
 from storage.artifact import Artifact
 from storage.store import Store
 from tests.fixtures.commands import robojackson
@@ -56,7 +58,8 @@ class Passes:
         self.executed_first = self.executed()
 
     def run(self) -> dict[str, Any]:
-        return asyncio.run(dance(str(self.source), "smoke", OVERRIDES))
+        music = {"render.music": str(self.store.parent / "clicks.wav")}
+        return asyncio.run(dance(str(self.source), "smoke", {**OVERRIDES, **music}))
 
     def executed(self) -> dict[str, int]:
         """How often each task really ran in the last pass."""
@@ -78,6 +81,11 @@ def passes(
     folder = tmp_path_factory.mktemp("dance")
     (folder / "clips").mkdir()
     shutil.copy(short_clip, folder / "clips" / "hips.mp4")
+    with wave.open(str(folder / "clicks.wav"), "wb") as music:
+        music.setnchannels(1)
+        music.setsampwidth(1)
+        music.setframerate(8000)
+        music.writeframes(4 * (bytes([255, 0] * 100) + bytes([128]) * 2800))
     expected = {
         PREFECT_FLOWS_HEARTBEAT_FREQUENCY: None,
         PREFECT_LOGGING_LEVEL: "ERROR",
@@ -91,6 +99,18 @@ def passes(
 def test_the_flow_leaves_everything_in_one_folder(passes: Passes) -> None:
     there = {path.name for path in Path(passes.first["page"]).parent.iterdir()}
     assert there >= FILES
+
+
+@pytest.mark.slow
+def test_beats_are_in_score_card_tables_and_page(passes: Passes) -> None:
+    beats = passes.first["beats"]
+    assert list(beats) == ["person", "reference", "robot", "control"]
+    page = Path(passes.first["page"])
+    assert json.loads((page.parent / "scorecard.json").read_text())["beats"] == beats
+    assert "<h2>On the beat</h2>" in page.read_text()
+    rows = study_tables.query(Store(passes.store), "SELECT * FROM beats")
+    found = {row["motion"]: {key: row[key] for key in beats["robot"]} for row in rows}
+    assert found == beats
 
 
 @pytest.mark.slow

@@ -12,6 +12,7 @@ from robojackson.clips.quality.stability import Stability
 from robojackson.clips.video import VideoInfo
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
+from robojackson.report.pages.evaluation_text import beat_rows
 from robojackson.report.pages.page_content import Results, page_content, versions
 from robojackson.report.pages.run_page import PageContent, render, write_page
 from robojackson.report.plots import run_plots
@@ -83,6 +84,15 @@ def test_markup_in_names_is_text(results: Results) -> None:
     html = render(page_content(replace(results, title="<script>alert(1)</script>"), None))
     assert "<script>" not in html
     assert "hip <i>shake" not in html
+
+
+def test_beats_are_a_table_and_a_tile_beside_chance() -> None:
+    figures = {"beats": 9, "precision": 0.5, "recall": 0.25, "f1": 0.33, "bas": 0.4}
+    report = {"person": figures, "robot": figures, "control": {**figures, "f1": 0.05}}
+    html = render(PageContent(title="x", beats=beat_rows({"figures": report})))
+    assert "<b>0.33</b><span>on the beat (F1)</span>" in html
+    assert "robot in simulation; half a beat later 0.05" in html
+    assert "<h2>On the beat</h2>" in html
 
 
 def test_headline_names_the_best_baseline() -> None:

@@ -127,6 +127,20 @@ def test_a_line_a_cell_evaluates_nothing_that_is_too_short(
     assert (row["strict_success"], row["skill"], row["rollouts"]) == (known, known, 1)
 
 
+def test_beats_of_a_dance_are_a_table_of_their_own(store: Store) -> None:
+    figures = {"beats": 4, "precision": 0.5, "recall": 1.0, "f1": 2 / 3, "bas": 0.9}
+    rows = [{"robot": "humanoid", "motion": name, **figures} for name in ("robot", "control")]
+    place = study_tables.Place(study_tables.DANCES, "walk", "scratch", 0, "r1")
+    first = study_tables.write_beats(store, place, rows)
+    assert study_tables.write_beats(store, place, rows) == first
+    study_tables.write(store, cell(), made(store))
+    sql = "SELECT run_id, motion, precision, f1 FROM beats ORDER BY motion DESC"
+    assert study_tables.query(store, sql)[0] == {
+        "run_id": "r1", "motion": "robot", "precision": 0.5, "f1": 2 / 3,
+    }  # fmt: skip
+    assert [row["study"] for row in study_tables.query(store, OVERVIEW)] == ["smoke"]
+
+
 def test_an_empty_store_answers_with_no_rows(store: Store) -> None:
     assert study_tables.query(store, OVERVIEW) == []
 

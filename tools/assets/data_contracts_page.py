@@ -12,7 +12,12 @@ from robojackson.motion.landmark_track import LANDMARK_TRACK
 from robojackson.motion.reference_motion import REFERENCE_MOTION
 from robojackson.motion.rollout import ROLLOUT
 from robojackson.motion.smpl_sequence import SMPL_SEQUENCE
-from robojackson.pipeline.table_schemas import EPISODE_RECORD, EVALUATION_RECORD, VIDEO_CANDIDATE
+from robojackson.pipeline.table_schemas import (
+    BEAT_RECORD,
+    EPISODE_RECORD,
+    EVALUATION_RECORD,
+    VIDEO_CANDIDATE,
+)
 from storage.candidate_catalogue import CANDIDATE_RECORD
 from tools.assets.generated_page import write_or_check
 
@@ -37,6 +42,7 @@ WRITTEN_BY = (
     (ROLLOUT, "`rollout.parquet` of `dance` and `evaluate`: what a policy did."),
     (EPISODE_RECORD, "`episodes.parquet` of `train`: the episodes of a training."),
     (EVALUATION_RECORD, "`evaluations.parquet` of `evaluate`: the rollouts of an evaluation."),
+    (BEAT_RECORD, "`beats` of `metrics`: how the motions of a dance meet its music."),
 )
 
 

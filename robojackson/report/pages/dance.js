@@ -30,7 +30,7 @@ const Dance = (() => {
       this.model = mujoco.MjModel.from_xml_string(dance.xml);
       this.data = new mujoco.MjData(this.model);
       this.ghost = new mujoco.MjData(this.model);
-      this.model.actuator_gear.set(dance.gears);
+      for (const [name, values] of Object.entries(dance.numbers)) this.model[name].set(doubles(values));
       const { nq, nv, nu } = this.model;
       Object.assign(this, { nq, nv, nu });
       for (const name of ['qpos', 'qvel', 'points', 'lead']) this[name] = dance[name] && doubles(dance[name]);

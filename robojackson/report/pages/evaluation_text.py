@@ -101,6 +101,8 @@ def verdicts(evaluation: Evaluation) -> list[Verdict]:
     return rows
 
 
+F1 = 3
+"""Place of F1 in the values of a row of beats."""
 PASSPORT_COLUMNS = ("strict_success", "skill", "survived_s", "kept")
 
 
@@ -112,6 +114,15 @@ def passport_rows(evaluation: Evaluation) -> list[Verdict]:
         )
         for index, row in enumerate(evaluation.get("passport", []))
     ]
+
+
+def beat_tiles(rows: Sequence[Verdict]) -> list[Quantity]:
+    """Return how the dancer meets the music, beside chance, as a headline figure."""
+    if not rows:
+        return []
+    *_, dancer, control = rows
+    meaning = f"{dancer.title}; half a beat later {control.values[F1]}"
+    return [Quantity("on the beat (F1)", dancer.values[F1], meaning)]
 
 
 def beat_rows(report: Evaluation) -> list[Verdict]:

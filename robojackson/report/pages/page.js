@@ -21,7 +21,7 @@
     track.at = Stage.floats(track.target);
     track.values = Stage.floats(track.poses ?? track.points);
     track.row = track.values.length / count;
-    figures[name] = name === 'body' ? Stage.person(data.person, materials, materials.shadow)
+    figures[name] = name === 'body' ? Stage.person(data.person, materials, materials.shadow, view.software)
       : Stage.robot(data.robot, materials[name], materials.shadow, view.software);
     pane.scene.add(figures[name].group);
     Object.assign(pane, { track, height: track.height, width: track.width });

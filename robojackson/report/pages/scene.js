@@ -23,15 +23,17 @@ const Stage = (() => {
     return geometry;
   }
 
-  function geometryOf(geom, mesh) {
-    const [a, b, c] = geom.size;
+  /* Corners of a circle, and of half a meridian, by the level of detail; a processor takes as long for a corner as for ten pixels. */
+  const ROUND = { '': [20, 14], rough: [12, 8], shadow: [8, 5] };
+  function geometryOf(geom, mesh, level) {
+    const [a, b, c] = geom.size, [round, half] = ROUND[level];
     switch (geom.kind) {
-      case 'mesh': return meshGeometry(mesh);
-      case 'capsule': return new T.CapsuleGeometry(a, 2 * b, 6, 16).rotateX(Math.PI / 2);
-      case 'cylinder': return new T.CylinderGeometry(a, a, 2 * b, 20).rotateX(Math.PI / 2);
+      case 'mesh': return meshGeometry(level ? mesh[level] : mesh);
+      case 'capsule': return new T.CapsuleGeometry(a, 2 * b, half >> 1, round).rotateX(Math.PI / 2);
+      case 'cylinder': return new T.CylinderGeometry(a, a, 2 * b, round).rotateX(Math.PI / 2);
       case 'box': return new T.BoxGeometry(2 * a, 2 * b, 2 * c);
-      case 'ellipsoid': return new T.SphereGeometry(1, 20, 14).scale(a, b, c);
-      default: return new T.SphereGeometry(a, 20, 14);
+      case 'ellipsoid': return new T.SphereGeometry(1, round, half).scale(a, b, c);
+      default: return new T.SphereGeometry(a, round, half);
     }
   }
 
@@ -39,7 +41,7 @@ const Stage = (() => {
   function partsOf(shape, level) {
     const bodies = new Map(), pose = new T.Matrix4(), one = new T.Vector3(1, 1, 1), turn = new T.Quaternion();
     for (const geom of shape.geoms) {
-      const mesh = shape.meshes[geom.mesh], part = geometryOf(geom, level ? mesh?.[level] : mesh);
+      const part = geometryOf(geom, shape.meshes[geom.mesh], level);
       turn.set(geom.quat[1], geom.quat[2], geom.quat[3], geom.quat[0]);
       part.applyMatrix4(pose.compose(new T.Vector3(...geom.pos), turn, one));
       if (!bodies.has(geom.body)) bodies.set(geom.body, { corners: [], normals: [], index: [] });
@@ -85,19 +87,20 @@ const Stage = (() => {
   }
 
   /* A person of rounded parts between points; `pose` takes rows of x y z from an offset. */
-  function person(shape, colours, shadowMaterial) {
+  function person(shape, colours, shadowMaterial, simple = false) {
     const group = new T.Group(), up = new T.Vector3(0, 1, 0), a = new T.Vector3(), b = new T.Vector3();
-    const stick = new T.CylinderGeometry(1, 1, 1, 12, 1, true).translate(0, 0.5, 0), ball = new T.SphereGeometry(1, 14, 10);
+    const stick = (round) => new T.CylinderGeometry(1, 1, 1, round, 1, true).translate(0, 0.5, 0), ball = (round, half) => new T.SphereGeometry(1, round, half);
+    const fine = simple ? [10, 6] : [14, 10], coarse = [6, 4];
     const turn = new T.Quaternion(), matrix = new T.Matrix4(), size = new T.Vector3();
     const sides = ['left', 'right', 'middle'].map((side) => {
       const bones = shape.bones.filter((bone) => bone.side === side);
-      const build = (geometry, count) => {
-        const shown = new T.InstancedMesh(geometry, colours[side], count), below = asShadow(new T.InstancedMesh(geometry, shadowMaterial, count));
+      const build = (geometry, shadow, count) => {
+        const shown = new T.InstancedMesh(geometry, colours[side], count), below = asShadow(new T.InstancedMesh(shadow, shadowMaterial, count));
         below.instanceMatrix = shown.instanceMatrix; shown.frustumCulled = false;
         group.add(shown, below);
         return shown;
       };
-      return { bones, rods: build(stick, bones.length), balls: build(ball, 2 * bones.length) };
+      return { bones, rods: build(stick(fine[0]), stick(coarse[0]), bones.length), balls: build(ball(...fine), ball(...coarse), 2 * bones.length) };
     });
     const pose = (values, at = 0) => {
       for (const { bones, rods, balls } of sides) {
@@ -155,6 +158,7 @@ const Stage = (() => {
       const floor = new T.Mesh(new T.PlaneGeometry(80, 80), new T.MeshBasicMaterial());
       const grid = new T.GridHelper(40, 80, 0, 0);
       grid.rotateX(Math.PI / 2); grid.position.z = 0.0015;
+      floor.renderOrder = 1; grid.renderOrder = 2;
       scene.add(sky, key, floor, grid);
       scene.fog = new T.Fog(0, 6, 18);
       return { element, scene, camera, floor, grid, target: new T.Vector3(0, 0, 0.9), height: 1.8, width: 1.2 };

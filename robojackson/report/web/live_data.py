@@ -1,19 +1,18 @@
 """Data that a browser needs to run a trained policy: model, motion, network, control law, fall
 rule.
 
-The model has no geoms without collision: their masses are written into the bodies. Metres, radians,
-seconds, newton-metres.
+Metres, radians, seconds, newton-metres.
 """
 
 import mujoco
 import numpy as np
 
 from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.report.web.live_model import live_model
+from robojackson.report.web.live_records import live_records
 from robojackson.report.web.shapes import packed, robot_shape
-from robojackson.rl.config.train_config import ControlConfig, EvaluateConfig
-from robojackson.rl.evaluation.controllers import Evaluated, control_of, sees_ahead, trained_driver
-from robojackson.rl.evaluation.rollouts import Starts
-from robojackson.rl.evaluation.starts import starts_of
+from robojackson.rl.config.train_config import ControlConfig
+from robojackson.rl.evaluation.controllers import Evaluated, control_of, sees_ahead
 from robojackson.rl.modes.observation import (
     CLIP,
     HINGE_SPEED_SCALE,
@@ -27,19 +26,12 @@ from robojackson.rl.policy_facts import mode_of, observation_of
 from robojackson.rl.sim.feedback import feedback_of
 from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.motors import Motors, gains, residual_scale
-from robojackson.rl.sim.preview import driven_clip, preview_of
-from robojackson.rl.sim.simulation import Simulation
+from robojackson.rl.sim.preview import preview_of
 from robojackson.rl.sim.standing_feet import LOW_M
 from robojackson.rl.trackers.policy_tracker import PolicyTracker
 from robojackson.rl.trackers.regulator_tracker import RegulatorTracker
 from robojackson.robot.fall import Fall
-from robojackson.robot.mjcf import described_spec, mjcf_path
 from robojackson.robot.model import Robot
-
-RECORDS = 20
-"""Number of states at which the browser's physics is compared with ours."""
-SUBSTEPS = 300
-"""Substeps of each comparison."""
 
 
 def live_data(
@@ -59,8 +51,10 @@ def live_data(
     motors, (kp, kd) = Motors.of(robot.model), gains(robot, control)
     lead, fall = lead_of(robot, reference, control), Fall.of(robot)
     names = [robot.model.site(int(site)).name for site in robot.keypoint_sites]
+    xml, numbers = live_model(robot)
     return {
-        "xml": model_xml(robot),
+        "xml": xml,
+        "numbers": numbers,
         "dt": reference.dt,
         "substeps": control.substeps or robot.substeps,
         "qpos": packed(reference.qpos, np.float64),
@@ -84,7 +78,6 @@ def live_data(
         },
         "hinge": motors.hinge.tolist(),
         "gear": motors.gear.tolist(),
-        "gears": robot.model.actuator_gear.ravel().tolist(),
         "limit": motors.limit.tolist(),
         "kp": kp.tolist(),
         "kd": kd.tolist(),
@@ -95,7 +88,7 @@ def live_data(
             "cosTilt": float(np.cos(fall.tilt)),
         },
         "shape": robot_shape(robot.model),
-        "records": records(policy, reference, robot),
+        "records": live_records(policy, reference, robot),
     }  # fmt: skip
 
 
@@ -113,59 +106,6 @@ def _network(policy: Evaluated) -> Policy | None:
         if isinstance(policy, PolicyTracker)
         else (policy if isinstance(policy, Policy) else None)
     )
-
-
-def model_xml(robot: Robot) -> str:
-    """Return the robot's MJCF as one text, without visual parts."""
-    spec = described_spec(robot.description, mjcf_path(robot.description))
-    for body in spec.bodies[1:]:
-        shown = [geom for geom in body.geoms if not (geom.contype or geom.conaffinity)]
-        if not shown:
-            continue
-        index = robot.model.body(body.name).id
-        body.mass, body.explicitinertial = float(robot.model.body_mass[index]), True
-        body.inertia = robot.model.body_inertia[index]
-        body.ipos, body.iquat = robot.model.body_ipos[index], robot.model.body_iquat[index]
-        for geom in shown:
-            spec.delete(geom)
-    parts = [*spec.meshes, *spec.sensors, *spec.keys]
-    if any(texture.file for texture in spec.textures):
-        parts += [*spec.textures, *spec.materials]
-        for geom in spec.geoms:
-            geom.material = ""
-    for part in parts:
-        spec.delete(part)
-    spec.compile()
-    return str(spec.to_xml())
-
-
-def records(policy: Evaluated, reference: ReferenceMotion, robot: Robot) -> list[dict[str, object]]:
-    """Return noisy starts across the motion and the positions of the bodies `SUBSTEPS` later."""
-    control = control_of(policy, robot)
-    clip = driven_clip(robot, reference, control, sees_ahead(policy))
-    starts, _ = starts_of(robot, clip, EvaluateConfig(phases=RECORDS, resets=1))
-    starts = Starts(starts.step[:RECORDS], starts.qpos[:RECORDS], starts.qvel[:RECORDS])
-    driver, count = trained_driver(policy, robot, reference), len(starts.step)
-    sim = Simulation(robot, driver.control, count)
-    sim.place(np.arange(count), starts.qpos, starts.qvel)
-    steps = SUBSTEPS // (sim.control.substeps or 1)
-    last = np.zeros((count, robot.model.nu))
-    for step in range(steps):
-        following = clip.at(starts.step + step + 1)
-        command = driver.command(sim, following, starts.step, last)
-        last = np.clip((command - sim.reference_angles(following)) / sim.residual, -1, 1)
-        sim.step(command)
-    sim.close()
-    return [
-        {
-            "step": int(starts.step[i]),
-            "qpos": starts.qpos[i].tolist(),
-            "qvel": starts.qvel[i].tolist(),
-            "steps": steps,
-            "places": sim.datas[i].xpos[1:].ravel().tolist(),
-        }
-        for i in range(count)
-    ]
 
 
 def _feedback(

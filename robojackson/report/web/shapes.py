@@ -16,7 +16,7 @@ from robojackson.robot.body_states import drawn_geoms
 
 DETAIL_M = 0.009
 """Smallest detail of a mesh; a robot of 30 meshes then has some 40,000 triangles."""
-ROUGH_M, SHADOW_M = 0.018, 0.04
+ROUGH_M, SHADOW_M = 0.018, 0.06
 """The same for browsers that draw on the processor, and for shadows."""
 MESH_STEPS, NORMAL_STEPS = 32767, 127
 """Steps of a mesh's largest coordinate, and of a normal's."""
