@@ -187,7 +187,7 @@ def _explain(cls: type, cause: ValidationError) -> str:
     where = ".".join(path) or cls.__name__
     if error["type"] in ("unexpected_keyword_argument", "extra_forbidden"):
         known = _keys_at(cls, path[:-1])
-        close = difflib.get_close_matches(path[-1], known, 1)
+        close = difflib.get_close_matches(path[-1], known, 1) or _elsewhere(cls, path[-1])
         hint = f" Did you mean {close[0]!r}?" if close else ""
         return f"unknown key {where!r}.{hint} Known: {', '.join(known)}"
     if error["type"] in ("missing", "missing_argument"):
@@ -217,6 +217,12 @@ def _keys(cause: ValidationError) -> list[str]:
 def _is_branch(part: int | str) -> bool:
     """Return whether a key is the tried type of a union, which Pydantic puts between the keys."""
     return isinstance(part, str) and ("[" in part or part == "dataclass")
+
+
+def _elsewhere(cls: type, key: str) -> list[str]:
+    """Return the path of a key in a section of a configuration, if only one section has it."""
+    found = [f"{section}.{key}" for section in _keys_at(cls, []) if key in _keys_at(cls, [section])]
+    return found if len(found) == 1 else []
 
 
 def _keys_at(cls: Any, path: list[str]) -> list[str]:

@@ -267,3 +267,8 @@ def test_a_base_that_cannot_be_is_reported_with_the_file_that_names_it(
     (extended / "part.yaml").write_text(f"extends: {base}\n")
     with pytest.raises(BadConfiguration, match=expected_message):
         yaml_loader.load(Outer, extended / "part.yaml")
+
+
+def test_a_key_of_one_section_is_found_there() -> None:
+    with pytest.raises(BadConfiguration, match=r"'phases'\. Did you mean 'evaluate\.phases'\?"):
+        yaml_loader.load(PipelineConfig, "base", {"phases": 24})
