@@ -46,7 +46,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "gsde": True,
         "log_std_init": -2.0,
     },
-    "polish": {"zero_init": True, "log_std_init": -2.5, "burn_in": 50_000, "action_penalty": 0.4},
+    "polish": {"zero_init": True, "log_std_init": -2.5, "burn_in": 50_000, "action_penalty": 0.12},
 }
 """`dance` is our configuration for tracking: the defaults below. `polish` improves a robot that
 dances without a policy already (`track.control.feedback_path: sampled`)."""
