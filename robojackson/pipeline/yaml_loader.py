@@ -26,6 +26,8 @@ Config = TypeVar("Config")
 SHIPPED = app_folder() / "configs"
 SUFFIXES = (".yaml", ".yml")
 EXTENDS = "extends"
+UNEXPECTED = ("unexpected_keyword_argument", "extra_forbidden")
+"""Kinds of Pydantic's errors about a key that there is not."""
 LARGEST = 2**20
 """Bytes of a file."""
 
@@ -185,7 +187,7 @@ def _explain(cls: type, cause: ValidationError) -> str:
     error = cause.errors()[0]
     path = _keys(cause)
     where = ".".join(path) or cls.__name__
-    if error["type"] in ("unexpected_keyword_argument", "extra_forbidden"):
+    if error["type"] in UNEXPECTED:
         known = _keys_at(cls, path[:-1])
         close = difflib.get_close_matches(path[-1], known, 1) or _elsewhere(cls, path[-1])
         hint = f" Did you mean {close[0]!r}?" if close else ""
@@ -210,8 +212,12 @@ def _expected(cause: ValidationError) -> str:
 
 
 def _keys(cause: ValidationError) -> list[str]:
-    """Return the path of the key of the first error."""
-    return [str(part) for part in cause.errors()[0]["loc"] if not _is_branch(part)]
+    """Return the path of the key of the first error; an unexpected one may look like a branch."""
+    error = cause.errors()[0]
+    *path, last = error["loc"] or ("",)
+    kept = [part for part in path if not _is_branch(part)]
+    is_key = last != "" and (error["type"] in UNEXPECTED or not _is_branch(last))
+    return [str(part) for part in (*kept, *([last] if is_key else []))]
 
 
 def _is_branch(part: int | str) -> bool:

@@ -11,6 +11,8 @@ FILES: Mapping[str, bytes | str] = {
     "damaged": "a: [",
     "tabs": "a:\n\tb: 1",
     "unknown key": "evil: 1",
+    "unknown key with a bracket": "a[: 1",
+    "unknown key of Pydantic's": "mocap: {dataclass: 1}",
     "unknown inner key": "mocap: {evil: 1}",
     "section of text": "mocap: x",
     "key twice": "detector: full\ndetector: lite",

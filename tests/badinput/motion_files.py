@@ -139,6 +139,9 @@ TEXTS: Mapping[str, Maker] = {
     "bvh: offset nan": bvh(lambda t: t.replace("OFFSET 0.0", "OFFSET nan", 1)),
     "bvh: channels 10^9": bvh(lambda t: t.replace("CHANNELS 3", f"CHANNELS {10**9}", 1)),
     "bvh: channels -3": bvh(lambda t: t.replace("CHANNELS 3", "CHANNELS -3", 1)),
+    "bvh: channels twice": bvh(
+        lambda t: t.replace("CHANNELS 3", "CHANNELS 3 Xrotation Yrotation Zrotation CHANNELS 3", 1)
+    ),
     "bvh: no motion": bvh(lambda t: t.split("MOTION")[0]),
     "bvh: cut": bvh(lambda t: t[: len(t) // 2]),
     "bvh: numbers of text": bvh(lambda t: t[:-30] + " x y z\n"),

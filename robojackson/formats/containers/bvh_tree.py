@@ -149,6 +149,8 @@ def _hierarchy(words: Iterator[str]) -> list[Node]:
             nodes[open_nodes[-1]].offset = np.array([float(next(words)) for _ in range(3)])
         elif word == "CHANNELS":
             node = nodes[open_nodes[-1]]
+            if node.channels:
+                raise BadTable(f"{WHERE}: {node.name} has channels twice")
             node.channels = tuple(islice(words, int(next(words))))
             node.first, column = column, column + len(node.channels)
             if not set(node.channels) <= _CHANNELS:
