@@ -28,6 +28,24 @@ ROLLOUTS = """steps => { const { dancer, dance } = robojackson; robojackson.stat
     return [dancer.danced, error / Math.max(1, count)];
   }); }"""  # noqa: E501
 
+ROOT_ON_SCREEN = """() => { const { dancer, view } = robojackson, [pane] = view.panes, at = dancer.data.xpos;
+  view.aim(pane); pane.camera.updateMatrixWorld();
+  const place = new THREE.Vector3(at[3], at[4], at[5]).project(pane.camera), box = pane.element.getBoundingClientRect();
+  return [box.left + (place.x + 1) / 2 * box.width, box.top + (1 - place.y) / 2 * box.height]; }"""  # noqa: E501
+DRAGGED_AND_PUSHED = """speed => { const { dancer, dance, drag, held } = robojackson;
+  const mass = dancer.model.body_subtreemass[1], impulse = [0, 0];
+  const roll = (act) => { dancer.start(0);
+    for (let k = 0; k < 12; k++) { act(k); dancer.advance(); }
+    dancer.mujoco.mj_forward(dancer.model, dancer.data); return Array.from(dancer.data.subtree_com).slice(3, 5); };
+  const size = () => Math.hypot(...impulse) / mass, force = dancer.data.xfrc_applied;
+  let steps = 0;
+  const plain = roll(() => {});
+  const dragged = roll((k) => { force.fill(0);
+    if (size() < speed) { drag(); steps = k + 1; [0, 1].forEach((i) => { impulse[i] += force[6 * held.body + i] * dance.dt; }); } });
+  const pushed = roll((k) => { force.fill(0); if (k === Math.floor(steps / 2)) dancer.push(impulse[0] / mass, impulse[1] / mass); });
+  const apart = (a) => Math.hypot(a[0] - plain[0], a[1] - plain[1]);
+  return { steps, impulse: impulse.map((value) => value / mass), dragged: apart(dragged), pushed: apart(pushed) }; }"""  # noqa: E501
+
 
 def test_live_page_asks_for_nothing_and_fits(opened: Open, live_file: Path) -> None:
     found = opened(live_file, 375, "dark")
@@ -45,6 +63,26 @@ def test_every_recorded_state_ends_within_5_mm_of_python(opened: Open, live_file
     apart = page.evaluate("robojackson.dance.records.map((r) => robojackson.dancer.deviation(r))")
     assert len(apart) == RECORDS
     assert max(apart) <= 5.0
+
+
+def test_a_drag_moves_the_robot_as_far_as_a_push_of_the_same_impulse(
+    opened: Open, live_file: Path
+) -> None:
+    page = opened(live_file).page
+    page.wait_for_selector("[data-checked=yes]")
+    page.evaluate(PAUSE)
+    page.evaluate("robojackson.again()")
+    page.wait_for_timeout(500)
+    x, y = page.evaluate(ROOT_ON_SCREEN)
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 300, y, steps=5)
+    moved = page.evaluate(DRAGGED_AND_PUSHED, 0.3)
+    page.mouse.up()
+    assert not page.evaluate("robojackson.dancer.data.xfrc_applied.some((force) => force !== 0)")
+    assert np.linalg.norm(moved["impulse"]) == pytest.approx(0.3, abs=0.1)
+    assert moved["dragged"] > 0.01
+    assert moved["dragged"] == pytest.approx(moved["pushed"], rel=0.25)
 
 
 def test_rollouts_survive_and_err_as_in_python(

@@ -3,11 +3,8 @@
 const Dance = (() => {
   const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
   const doubles = (text) => new Float64Array(bytes(text));
-  /* Numbers of 16 bits, as IEEE 754 has them. */
-  const halves = (text) => Float32Array.from(new Uint16Array(bytes(text)), (word) => {
-    const sign = word & 0x8000 ? -1 : 1, power = (word >> 10) & 31, part = word & 1023;
-    return sign * (power ? 2 ** (power - 15) * (1 + part / 1024) : 2 ** -24 * part);
-  });
+  /* Numbers as shares of the largest of their row. */
+  const shares = (text, largest, width) => Float32Array.from(new Int16Array(bytes(text)), (part, i) => part * largest[Math.floor(i / width)]);
 
   async function load(zipped) {
     const stream = new Blob([bytes(zipped)]).stream().pipeThrough(new DecompressionStream('gzip'));
@@ -24,6 +21,42 @@ const Dance = (() => {
   /* The transpose of a matrix times a vector: a world vector in the frame of the body. */
   const local = (r, x, y, z) => [r[0] * x + r[3] * y + r[6] * z, r[1] * x + r[4] * y + r[7] * z, r[2] * x + r[5] * y + r[8] * z];
 
+  const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+  const STAGES = [[0.5], [0, 0.5], [0, 0, 1], [1 / 6, 1 / 3, 1 / 3, 1 / 6]], RK4 = 1;
+
+  /* Positions after a velocity has been held for h seconds: a free root, then hinges. */
+  function moved(qpos, v, h) {
+    const to = Float64Array.from(qpos, (value, k) => (k < 3 ? value + h * v[k] : k < 7 ? value : value + h * v[k - 1]));
+    const speed = Math.hypot(v[3], v[4], v[5]), half = (h * speed) / 2, s = speed ? Math.sin(half) / speed : 0;
+    const [w, x, y, z] = qpos.slice(3, 7), a = Math.cos(half), b = s * v[3], c = s * v[4], d = s * v[5];
+    to.set([w * a - x * b - y * c - z * d, w * b + x * a + y * d - z * c, w * c - x * d + y * a + z * b, w * d + x * c - y * b + z * a], 3);
+    return to;
+  }
+
+  /* The rate at which a turn by `turn` grows when a body turns with `v`, both in its own frame. */
+  function turning(v, turn) {
+    const rate = Float64Array.from(v), n = Math.hypot(...turn), share = n > 1e-4 ? (1 - n / 2 / Math.tan(n / 2)) / (n * n) : 1 / 12;
+    const once = cross(turn, v.slice(3, 6)), twice = cross(turn, once);
+    for (let k = 0; k < 3; k++) rate[3 + k] += 0.5 * once[k] + share * twice[k];
+    return rate;
+  }
+
+  /* One step as MuJoCo 4.0 takes it, whose RK4 adds turns in one frame; the wasm's 3.14 adds them in the frame of each stage. */
+  function stepOfRungeKutta(mujoco, model, data) {
+    mujoco.mj_forward(model, data);
+    const h = model.opt.timestep, from = Float64Array.from(data.qpos), speed = Float64Array.from(data.qvel);
+    const rates = [speed], forces = [Float64Array.from(data.qacc)];
+    const sum = (shares, rows) => speed.map((_, k) => shares.reduce((all, share, i) => all + share * rows[i][k], 0));
+    STAGES.forEach((shares, stage) => {
+      const rate = sum(shares, rates), force = sum(shares, forces);
+      data.qpos.set(moved(from, rate, h)); data.qvel.set(speed.map((value, k) => value + h * force[k]));
+      if (stage === STAGES.length - 1) return;
+      mujoco.mj_forward(model, data);
+      forces.push(Float64Array.from(data.qacc)); rates.push(turning(Float64Array.from(data.qvel), Array.from(rate.slice(3, 6), (value) => h * value)));
+    });
+    data.qacc_warmstart.set(forces.at(-1));
+  }
+
   class Dancer {
     constructor(mujoco, dance) {
       Object.assign(this, { mujoco, dance, mode: 'policy' });
@@ -37,12 +70,14 @@ const Dance = (() => {
       this.preview = dance.preview && new Float32Array(bytes(dance.preview));
       this.steps = this.qpos.length / nq;
       if (dance.feedback) {
-        const { gain, offset, qpos, qvel } = dance.feedback;
-        this.feedback = { gain: halves(gain), offset: doubles(offset), qpos: doubles(qpos), qvel: doubles(qvel), apart: new Float64Array(2 * nv) };
+        const { gain, step, offset, qpos, qvel } = dance.feedback;
+        this.feedback = { gain: shares(gain, new Float32Array(bytes(step)), 2 * nv), offset: doubles(offset), qpos: doubles(qpos), qvel: doubles(qvel), apart: new Float64Array(2 * nv) };
         if (dance.feedback.places) this.feedback.places = doubles(dance.feedback.places);
       }
       this.layers = dance.layers.map(({ weight, bias, inputs }) => ({ inputs, weight: new Float32Array(bytes(weight)), bias: new Float32Array(bytes(bias)) }));
       this.sites = dance.sites.map((name) => mujoco.mj_name2id(this.model, mujoco.mjtObj.mjOBJ_SITE.value, name));
+      const rk4 = (this.model.opt.integrator.value ?? this.model.opt.integrator) === RK4;
+      this.substep = rk4 ? (model, data) => stepOfRungeKutta(mujoco, model, data) : mujoco.mj_step;
       this.friction = Float64Array.from(this.model.geom_friction);
       this.gravity = this.model.opt.gravity[2];
       this.last = new Float64Array(nu); this.targets = new Float64Array(nu);
@@ -165,7 +200,7 @@ const Dance = (() => {
           const torque = dance.kp[k] * (this.targets[k] - qpos[7 + dance.hinge[k]]) - dance.kd[k] * qvel[6 + dance.hinge[k]];
           ctrl[k] = Math.min(dance.limit[k], Math.max(-dance.limit[k], torque)) / dance.gear[k];
         }
-        mujoco.mj_step(model, data);
+        this.substep(model, data);
       }
       mujoco.mj_kinematics(model, data);
       this.step += 1;

@@ -33,6 +33,9 @@ from robojackson.rl.trackers.regulator_tracker import RegulatorTracker
 from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
 
+LARGEST, TINY = 32767, 1e-30
+"""Largest number of 16 bits, and of a motor without gains."""
+
 
 def live_data(
     policy: Evaluated, reference: ReferenceMotion, robot: Robot
@@ -111,14 +114,17 @@ def _network(policy: Evaluated) -> Policy | None:
 def _feedback(
     robot: Robot, reference: ReferenceMotion, control: ControlConfig
 ) -> dict[str, object] | None:
-    """Return the feedback along the reference, its gains in 16 bits; None without one."""
+    """Return the feedback along the reference, its gains as 16-bit shares of the largest of their
+    motor; None without one."""
     found = feedback_of(robot, [reference], control)
     if found is None:
         return None
     gains, feet = found.gains, np.unique(robot.contact_keypoints)
+    step = np.maximum(np.abs(gains.gain).max(-1), TINY).astype(np.float32) / LARGEST
     anchored = bool(np.isfinite(gains.places).all())
     return {
-        "gain": packed(gains.gain, np.float16),
+        "gain": packed(np.round(gains.gain / step[..., None]), np.int16),
+        "step": packed(step),
         **{name: packed(getattr(gains, name), np.float64) for name in ("offset", "qpos", "qvel")},
         "limit": found.limit.tolist(),
         "places": packed(gains.places, np.float64) if anchored else None,

@@ -1,7 +1,7 @@
 """A robot's model for a browser: MJCF without visual parts, and the numbers that the text rounds.
 
-MuJoCo writes six digits: a mass that differs in the seventh moves a robot by millimetres after a
-step at which a limb just touches, or just does not.
+MuJoCo writes six digits. A mass that differs in the seventh moves a robot by centimetres, where a
+limb just touches or just does not.
 """
 
 import mujoco
