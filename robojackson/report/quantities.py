@@ -85,7 +85,6 @@ _FORMS: Mapping[str, _Form] = {
     "seam_deg": _Form("jump at the seam of a cycle", "deg", 2),
     "seam_mm": _Form("gap at the seam of a cycle", "mm", 2),
     "seam_speed_rad_s": _Form("change of speed at the seam", "rad/s", 2),
-    "quat_error": _Form("error of quaternions' lengths", "", 7),
     "speed_over_limit": _Form("fastest joint over its limit", "", 2),
     "planted_slip_p95_cm_s": _Form("slip of planted feet, 95th percentile", "cm/s", 2),
     "contact_gap_mm": _Form("height of planted feet", "mm", 2),
