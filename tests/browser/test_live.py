@@ -139,3 +139,19 @@ def test_axe_finds_nothing_serious_in_a_live_dance(opened: Open, live_file: Path
     page = opened(live_file).page
     page.evaluate(PAUSE)
     assert serious(page, axe) == []
+
+
+def test_keys_pause_switch_the_dancer_and_start_again(opened: Open, live_file: Path) -> None:
+    page = opened(live_file).page
+    page.wait_for_selector("[data-checked=yes]")
+    page.focus("#live")
+    for key in (" ", "o", "g", "s"):
+        page.keyboard.press(key)
+    assert page.evaluate("robojackson.state.playing") is False
+    assert page.evaluate("robojackson.dancer.mode") == "reference"
+    assert page.get_attribute("#ghost", "aria-pressed") == "true"
+    assert page.inner_text("#speed-value") == "0.2×"
+    page.keyboard.press("p")
+    assert page.evaluate("Math.hypot(...robojackson.dancer.data.qvel.slice(0, 2))") > 0.1
+    page.keyboard.press("r")
+    assert page.evaluate("robojackson.dancer.danced") == 0
