@@ -141,6 +141,12 @@ def test_axe_finds_nothing_serious_in_a_live_dance(opened: Open, live_file: Path
     assert serious(page, axe) == []
 
 
+def test_every_slider_has_its_name_for_a_screen_reader(opened: Open, live_file: Path) -> None:
+    page = opened(live_file).page
+    for name in ("Speed", "Floor friction", "Gravity", "Push", "Start at"):
+        assert page.get_by_role("slider", name=name).count() == 1
+
+
 def test_keys_pause_switch_the_dancer_and_start_again(opened: Open, live_file: Path) -> None:
     page = opened(live_file).page
     page.wait_for_selector("[data-checked=yes]")
