@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Literal
 
 import av
 import mujoco
@@ -47,6 +48,29 @@ def test_video_without_a_rollout_has_three_panels(
         clip, track, sequence, reference, None, tmp_path / "d.mp4", model=model, config=SMALL
     )
     assert decoded(out)[0].shape[1] == 3 * 64 + 2 * 2
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize(
+    ("shape", "size"),
+    [("square", (1080, 1080)), ("vertical", (1080, 1920)), ("wide", (1920, 1080))],
+)
+def test_a_shape_has_its_size_with_the_robot_beside_the_dancer_or_alone(
+    shape: Literal["square", "vertical", "wide"], size: tuple[int, int], clip: Path,
+    track: LandmarkTrack, sequence: SmplSequence, reference: ReferenceMotion, model: mujoco.MjModel,
+    tmp_path: Path,
+) -> None:  # fmt: skip
+    shown = []
+    for alone in (False, True):
+        config = VideoConfig(fps=5, max_seconds=0.2, shape=shape, alone=alone)
+        out = side_by_side(
+            clip, track, sequence, reference, reference.qpos, tmp_path / "d.mp4", model=model,
+            config=config,
+        )  # fmt: skip
+        shown.append(decoded(out)[0])
+        assert shown[-1].shape[1::-1] == pytest.approx(size, abs=2)
+    corner = [picture[300:400, 20:120].mean() for picture in shown]
+    assert abs(corner[0] - corner[1]) > 10
 
 
 def test_progress_reaches_its_total(
