@@ -18,7 +18,7 @@ from typing import Any
 import pytest
 
 from storage.store import Store
-from storage.study_tables import TABLES, query
+from storage.study_tables import CELL, query
 from tools.stack import postgres
 from tools.stack.processes import under
 from tools.stack.service import ROOT, free_port
@@ -154,7 +154,7 @@ def documented(
 
 def test_the_documented_study_ends_well(documented: Documented) -> None:
     assert documented.code == 0, documented.log.read_text()[-4000:]
-    for table in TABLES:
+    for table in CELL:
         cells = f"SELECT DISTINCT move, setup, seed FROM {table}"
         assert len(query(documented.store, cells)) == CELLS
 
