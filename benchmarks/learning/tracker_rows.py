@@ -1,6 +1,6 @@
-"""Downloaded trackers on the frozen references, with our evaluation: no training at all.
+"""Trackers on the references of the benchmark, with our evaluation: no training at all.
 
-    python -m benchmarks.learning.tracker_rows [--moves g1_walk ...] [--folder FOLDER]
+    python -m benchmarks.learning.tracker_rows [--moves g1_walk ...] [--friction 1] [--folder FOLDER]
 
 A row is a tracker, a reference motion at its own tempo and a friction; what exists is not computed
 again. A tracker is measured where its file is: in the store (`robojackson trackers add`), or in the
@@ -12,14 +12,14 @@ import json
 import os
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.learning.policies import FROZEN, MOVES, Folders, require_frozen
+from benchmarks.learning.policies import FROZEN, MOVES, Folders, reference_of, require_frozen
 from robojackson.api.robots import load_robot
 from robojackson.errors import BadConfiguration, BadPolicy
 from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
@@ -49,35 +49,49 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     frozen = sorted(path.stem for path in FROZEN.glob("*.parquet"))
-    parser.add_argument("--moves", nargs="*", default=frozen, choices=frozen)
+    parser.add_argument("--moves", nargs="*", default=frozen, choices=sorted(MOVES))
+    parser.add_argument("--friction", nargs="*", type=float, default=FRICTIONS)
     parser.add_argument("--folder", type=Path, help="for everything, instead of the usual places")
     given = parser.parse_args()
-    path = Folders.at(given.folder).results / "trackers.json"
+    folders = Folders.at(given.folder)
+    path = folders.results / "trackers.json"
     held = json.loads(path.read_text())["rows"] if path.is_file() else []
     command = f"python -m benchmarks.learning.tracker_rows {' '.join(sys.argv[1:])}".strip()
-    for row in measured(given.moves, held):
+    for row in measured(given.moves, held, folders, given.friction):
         held.append(row)
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps({"command": command, "rows": held}, indent=1) + "\n")
     _show(held)
 
 
-def measured(moves: list[str], held: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+def measured(
+    moves: list[str],
+    held: list[dict[str, Any]],
+    folders: Folders,
+    frictions: Sequence[float] = FRICTIONS,
+) -> Iterator[dict[str, Any]]:
     """Yield rows that are not held yet, of the trackers that are here."""
     known = {(row["tracker"], row["move"], row["friction"], row["poses"]) for row in held}
     for name in tracker_names():
         tracker = present(name)
         for move in moves if tracker is not None else ():
-            reference = FROZEN / f"{move}.parquet"
-            require_frozen(move, reference)
-            motion = ReferenceMotion.load(reference)
             if tracker is None or MOVES[move].robot != tracker.description.robot:
                 continue
-            for friction in FRICTIONS:
+            motion = ReferenceMotion.load(frozen_or_made(move, folders))
+            for friction in frictions:
                 key = (name, move, friction, poses_sha256(motion))
                 if key not in known:
                     labels = dict(zip(("tracker", "move", "friction", "poses"), key, strict=True))
                     yield labels | evaluated(tracker, motion, friction)
+
+
+def frozen_or_made(move: str, folders: Folders) -> Path:
+    """Return the frozen reference of a move, or the one made from a file that is not ours."""
+    frozen = FROZEN / f"{move}.parquet"
+    if not frozen.is_file():
+        return reference_of(move, folders)
+    require_frozen(move, frozen)
+    return frozen
 
 
 def evaluated(tracker: Tracker, motion: ReferenceMotion, friction: float) -> dict[str, Any]:

@@ -57,6 +57,8 @@ def policy_control(policy: Policy, robot: Robot) -> ControlConfig:
     control = fact(policy, "control", ControlConfig)
     if control.feedback is None:  # trained before the feedback existed
         control = replace(control, feedback=0.0)
+    if control.feedback_path is None:  # trained before there was a choice
+        control = replace(control, feedback_path="reference")
     _require_same_actuation(policy, robot, control)
     return control
 

@@ -22,6 +22,8 @@ Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 Offset = tuple[float, float, float]
 Weight = Annotated[float, Field(ge=0)]
 Positive = Annotated[float, Field(gt=0)]
+FeedbackPath = Literal["reference", "sampled"]
+"""What a linear feedback keeps a robot on (`rl.config.track_config.ControlConfig`)."""
 
 
 @config_dataclass
@@ -166,6 +168,8 @@ class RobotDescription:
             law lead its joint angles, unitless.
         feedback: Share of the linear-quadratic feedback along a reference by which the targets of
             the PD law move, for policies that see all, unitless.
+        feedback_path: What the feedback keeps the robot on: the `reference`, or, where that falls,
+            a path beside it that is `sampled` by simulations.
         stand_pose: Hinge -> angle of the default stand, radians; zero where it is not named.
         simulation: How the physics is stepped.
         fall: When the robot has fallen.
@@ -198,6 +202,7 @@ class RobotDescription:
     robust_action_factor: Positive = 1.0
     feedforward: float = Field(default=0.0, ge=0, le=2)
     feedback: float = Field(default=0.0, ge=0, le=2)
+    feedback_path: FeedbackPath = "reference"
     stand_pose: Mapping[str, float] = Field(default_factory=dict)
     simulation: SimulationDescription = Field(default_factory=SimulationDescription)
     fall: FallRule = Field(default_factory=FallRule)

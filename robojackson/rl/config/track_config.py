@@ -7,6 +7,7 @@ from pydantic import Field
 
 from robojackson.config import config_dataclass
 from robojackson.rl.config.paper_config import Curiosity
+from robojackson.robot.description import FeedbackPath
 
 
 @config_dataclass
@@ -26,8 +27,9 @@ class ControlConfig:
         feedback: Share of the linear-quadratic feedback along the reference by which the targets
             move, unitless; 0 leaves balance to the policy alone; when null the robot's, or 0 where
             the policy does not see the full state.
-        feedback_path: What the feedback keeps the robot on: the `reference`, or a path beside it
-            that simulations with `sampled` offsets have found, wherever the feet stand.
+        feedback_path: What the feedback keeps the robot on: the `reference`, or, where that falls,
+            a path beside it that simulations with `sampled` offsets have found, wherever the feet
+            stand; the robot's when null.
         residual: Largest offset that the policy adds to the reference's joint angles, rad; the
             robot's action scale when null.
         action_factor: Factor on the robot's action scale; when null 1, or the robot's
@@ -41,7 +43,7 @@ class ControlConfig:
     damping: float | None = Field(default=None, ge=0)
     feedforward: float | None = Field(default=None, ge=0, le=2)
     feedback: float | None = Field(default=None, ge=0, le=2)
-    feedback_path: Literal["reference", "sampled"] = "reference"
+    feedback_path: FeedbackPath | None = None
     residual: float | None = Field(default=None, gt=0)
     arm_residual: float | None = Field(default=None, gt=0)
     action_factor: float | None = Field(default=None, gt=0)

@@ -22,7 +22,12 @@ from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.sim import sampled_regulator
 from robojackson.rl.sim.feedback_law import Feedback
 from robojackson.rl.sim.feedforward import lead_of
-from robojackson.rl.sim.motors import actuation_facts, feedback_share, residual_scale
+from robojackson.rl.sim.motors import (
+    actuation_facts,
+    feedback_path,
+    feedback_share,
+    residual_scale,
+)
 from robojackson.rl.sim.nominal_path import Gains, Progress, no_progress
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.regulator import regulator, settings
@@ -61,7 +66,7 @@ def feedback_of(
     scaled = Gains(
         share * joined.gain, share * joined.offset, joined.qpos, joined.qvel, joined.places
     )
-    most = LARGEST if control.feedback_path == "reference" else sampled_regulator.LARGEST_MOVE
+    most = LARGEST if feedback_path(robot, control) == "reference" else sampled_regulator.LARGEST_MOVE
     return Feedback(scaled, most * action, Feet(robot))
 
 
@@ -117,7 +122,7 @@ def regulator_of(
     clip = Clip(motion, lead_of(robot, motion, control))
     action = residual_scale(robot, ControlConfig())
     feet = Feet(robot)
-    if control.feedback_path == "reference":
+    if feedback_path(robot, control) == "reference":
         return regulator(sim, clip, action, feet.count, progress)[0]
     return sampled_regulator.sampled_regulator(sim, clip, action, feet, progress=progress)
 
@@ -128,7 +133,7 @@ def _digest(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> st
     named = {name: getattr(law, name) for name in ("substeps", "feedforward", "feedback_path")}
     facts = [poses_sha256(motion), robot.sha256, named, actuation_facts(robot, ControlConfig()),
              actuation_facts(robot, control), settings(), asdict(robot.description)]  # fmt: skip
-    if control.feedback_path == "sampled":
+    if law.feedback_path == "sampled":
         facts.append(sampled_regulator.settings())
     digest = hashlib.sha256(json.dumps(facts, sort_keys=True, default=str).encode())
     model = robot.model

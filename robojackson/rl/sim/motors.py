@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from robojackson.rl.config.train_config import ControlConfig
+from robojackson.robot.description import FeedbackPath
 from robojackson.robot.model import Robot
 
 
@@ -82,6 +83,12 @@ def feedback_share(robot: Robot, control: ControlConfig) -> float:
     own, unless the configuration has one."""
     named = control.feedback
     return robot.description.feedback if named is None else named
+
+
+def feedback_path(robot: Robot, control: ControlConfig) -> FeedbackPath:
+    """Return what the feedback keeps the robot on: the robot's own choice, unless the configuration
+    has one."""
+    return control.feedback_path or robot.description.feedback_path
 
 
 def actuation_facts(robot: Robot, control: ControlConfig) -> dict[str, list[float]]:

@@ -40,6 +40,7 @@ def sampled_regulator(
     feet: Feet,
     seed: int = 0,
     progress: Progress = no_progress,
+    most_tries: int = TRIES,
 ) -> Gains:
     """Return the regulator along a motion, or along a path beside it where that holds it better.
 
@@ -52,6 +53,7 @@ def sampled_regulator(
         feet: The robot's feet.
         seed: Of the samples.
         progress: Called with a name, the steps that are done, and all.
+        most_tries: Searches at most.
     """
     best, motion, linear = regulator(sim, clip, action, feet.count, progress)
     held = _held_share(sim, clip, action, feet, best, motion)
@@ -60,7 +62,7 @@ def sampled_regulator(
     cycles = max(3, int(np.ceil(CYCLES_S / (clip.steps * clip.dt)))) if clip.cyclic else 1
     reference = reference_path(sim, clip, cycles * clip.steps)
     linear = _repeated(linear, cycles)
-    tries = int(np.clip(TRIED_S / (len(reference) * clip.dt), 1, TRIES))
+    tries = int(np.clip(TRIED_S / (len(reference) * clip.dt), 1, most_tries))
     for number in range(tries):
         rng = np.random.default_rng([seed, number])
         search = PathSearch(sim, action, feet, reference, rng)

@@ -25,6 +25,7 @@ from robojackson.rl.sim.disturbances import Disturbances
 from robojackson.rl.sim.motors import (
     Motors,
     actuation_facts,
+    feedback_path,
     feedback_share,
     feedforward_share,
     gains,
@@ -58,6 +59,7 @@ def resolved(
         substeps=control.substeps or robot.substeps,
         feedforward=feedforward_share(robot, control),
         feedback=feedback_share(robot, control),
+        feedback_path=feedback_path(robot, control),
         action_factor=control.action_factor or usual,
     )
 
