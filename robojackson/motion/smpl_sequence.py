@@ -4,7 +4,7 @@ World frame: x forward, y left, z up, metres, the floor at z = 0. Rotations are 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -126,6 +126,10 @@ class SmplSequence(TableFile):
             f"{int(np.sum(self.valid))} detected, foot planted in {planted:.0%}, "
             f"person={self.person})"
         )
+
+    def part(self, frames: slice) -> "SmplSequence":
+        """Return some frames of the motion."""
+        return replace(self, **{name: getattr(self, name)[frames] for name in ARRAYS})
 
     def to_columns(self) -> tuple[Columns, Facts]:
         """Return the columns and the metadata of the table."""

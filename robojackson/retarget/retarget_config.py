@@ -52,6 +52,8 @@ class RetargetConfig:
         jump_bar_m_s2: Largest acceleration of a keypoint that is taken for a movement, m/s2, where
             the clip's own are not half as large; beyond it limbs have passed through each other,
             and another start is tried.
+        cut_glides: Whether a beginning or an end in which the person glides over the floor is left
+            out: a cut, a fade or a person who leaves the picture looks like that.
         tails: Stands before and after a motion that does not repeat.
         cycle, weights, solver, repair: Configurations of the stages.
     """
@@ -66,6 +68,7 @@ class RetargetConfig:
     depth_bar_m: float = Field(default=0.0045, gt=0)
     slip_bar_m_s: float = Field(default=0.007, gt=0)
     jump_bar_m_s2: float = Field(default=300.0, gt=0)
+    cut_glides: bool = True
     tails: TailConfig = Field(default_factory=TailConfig)
     cycle: CycleConfig = Field(default_factory=CycleConfig)
     weights: Weights = Field(default_factory=Weights)

@@ -24,6 +24,7 @@ from robojackson.retarget.feasible_motion import Feasible, make_feasible
 from robojackson.retarget.retarget_config import RetargetConfig
 from robojackson.retarget.scorecard import hovers, score
 from robojackson.retarget.scorecard_gate import BARS, failures
+from robojackson.retarget.targets.clip_ends import danced_frames
 from robojackson.retarget.targets.cycle import Cycle, human_clip
 from robojackson.retarget.targets.human_clip import HumanClip
 from robojackson.retarget.targets.keypoint_targets import Targets, select_steps, targets
@@ -54,8 +55,14 @@ def retarget_motion(
     """
     dt = robot.description.control_dt
     cyclic = config.cyclic if config.method == "optimise" else "no"
+    whole, frames = len(sequence), slice(0, len(sequence))
+    if config.cut_glides and config.method == "optimise":
+        frames = danced_frames(sequence)
+        sequence = sequence.part(frames)
     clip, cycle = human_clip(sequence, dt, cyclic, config.fixed_tempo, config.cycle)
+    clip = replace(clip, time_s=clip.time_s + frames.start / sequence.fps)
     extra = _notes(sequence, clip, cycle, config)
+    extra["trimmed_s"] += (whole - len(sequence)) / sequence.fps
     plain = targets(clip, robot)
     danced: Bool[np.ndarray, " S"] | None = None
     tailed = Tailed(plain, slice(0, len(plain)))

@@ -76,7 +76,9 @@ def test_a_rehearsal_returns_what_the_expert_would_do(rng: np.random.Generator) 
     assert lessons.seen.shape[1] == rehearsal.size[0]
     assert len(lessons.seen) == len(lessons.advice) > 0
     expected = -gains.offset[0] / Rehearsal(robot, [motion], [gains], 1, 0).full_action
-    np.testing.assert_allclose(lessons.advice, np.tile(expected, (len(lessons.advice), 1)), atol=2e-3)
+    np.testing.assert_allclose(
+        lessons.advice, np.tile(expected, (len(lessons.advice), 1)), atol=2e-3
+    )
 
 
 def made_up_gains(robot: Robot, motion: ReferenceMotion) -> experts.Gains:

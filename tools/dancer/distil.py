@@ -64,7 +64,9 @@ def share_alone(number: int) -> float:
 def facts(robot: Robot, seed: int, rounds: int, steps: int, motions: int) -> dict[str, object]:
     """Return the facts of a policy's file."""
     control = resolved(CONTROL, robot)
-    environment = json.loads(json.dumps(asdict(TrackConfig(observation="preview", control=CONTROL))))
+    environment = json.loads(
+        json.dumps(asdict(TrackConfig(observation="preview", control=CONTROL)))
+    )
     return {
         "robot": robot.description.name, "model_sha256": robot.sha256, "mode": "track",
         "trainer": "dagger", "seed": seed, "setup": "dancer", "start": "scratch",
@@ -111,7 +113,14 @@ def main() -> None:
         lessons = lessons_of.run(student.act, share_alone(number), STEPS)
         memory.add(lessons, rng)
         loss = student.learn(memory, UPDATES, rate, rng)
-        row = [number, memory.count, share_alone(number), lessons.survived, loss, time.process_time()]
+        row = [
+            number,
+            memory.count,
+            share_alone(number),
+            lessons.survived,
+            loss,
+            time.process_time(),
+        ]
         print(" ".join(f"{value:.4g}" for value in row), flush=True)
         with (given.out / "curve.csv").open("a", newline="") as file:
             csv.writer(file).writerow(row)

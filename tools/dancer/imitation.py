@@ -3,6 +3,8 @@
 Layers as in `rl.policy`: ReLU between them, tanh at the end; observations are not normalised.
 """
 
+from itertools import pairwise
+
 import numpy as np
 import torch
 from jaxtyping import Float
@@ -41,7 +43,7 @@ class Student:
         torch.manual_seed(seed)
         widths = (size, *hidden, motors)
         layers: list[nn.Module] = []
-        for wide, narrow in zip(widths, widths[1:], strict=False):
+        for wide, narrow in pairwise(widths):
             layers += [nn.Linear(wide, narrow), nn.ReLU()]
         self._net = nn.Sequential(*layers[:-1], nn.Tanh())
         self._optimiser = torch.optim.Adam(self._net.parameters(), lr=1e-3)

@@ -66,7 +66,9 @@ def feedback_of(
     scaled = Gains(
         share * joined.gain, share * joined.offset, joined.qpos, joined.qvel, joined.places
     )
-    most = LARGEST if feedback_path(robot, control) == "reference" else sampled_regulator.LARGEST_MOVE
+    most = (
+        LARGEST if feedback_path(robot, control) == "reference" else sampled_regulator.LARGEST_MOVE
+    )
     return Feedback(scaled, most * action, Feet(robot))
 
 
