@@ -1,6 +1,6 @@
 """Trackers on the references of the benchmark, with our evaluation: no training at all.
 
-    python -m benchmarks.learning.tracker_rows [--moves g1_walk ...] [--friction 1] [--folder FOLDER]
+    python -m benchmarks.learning.tracker_rows [--moves g1_walk ...] [--friction 1] [--folder F]
 
 A row is a tracker, a reference motion at its own tempo and a friction; what exists is not computed
 again. A tracker is measured where its file is: in the store (`robojackson trackers add`), or in the

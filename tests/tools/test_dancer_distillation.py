@@ -31,9 +31,8 @@ def short(seconds: float = 0.6) -> ReferenceMotion:
     """The beginning of dance_b, on the stock robot."""
     motion = robot_motion("dance_b")
     rows = slice(0, round(seconds / motion.dt))
-    cut = {name: getattr(motion, name)[rows]
-           for name in ("qpos", "qvel", "body_pos_w", "keypoints_w", "contact", "torque_ratio")}  # fmt: skip
-    return replace(motion, **cut)
+    names = ("qpos", "qvel", "body_pos_w", "keypoints_w", "contact", "torque_ratio")
+    return replace(motion, **{name: getattr(motion, name)[rows] for name in names})
 
 
 def observed(
