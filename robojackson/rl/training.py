@@ -8,14 +8,18 @@ the caller writes the tables.
 
 import logging
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from robojackson.errors import BadConfiguration, BadPolicy
-from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.reference_motion import ReferenceMotion, motions_of
+from robojackson.rl.config.tqc_config import PRESETS
 from robojackson.rl.config.train_config import TqcConfig, TrainConfig
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.env.vec_env import TrackingVecEnv
+from robojackson.rl.modes.track_mode import control_of
 from robojackson.rl.pretrained import pretrained
+from robojackson.rl.sim.motors import feedback_path, feedback_share
 from robojackson.rl.tqc.network_arrays import Networks, chosen, fitted
 from robojackson.rl.tqc.trainers import make_trainer
 from robojackson.rl.training_hooks import BudgetSpent, Hooks
@@ -51,7 +55,10 @@ def train_policy(
     core = TrackingCore(robot, reference, config.environment, *of_tqc, hooks.rewards)
     run = Run(out, config, core, Task.of(reference, robot), hooks)
     env = TrackingVecEnv(core, run.episodes)
-    tqc = config.tqc if networks is None else _shaped(networks, core, config)
+    if networks is None:
+        tqc = residual_learning(config, robot, reference)
+    else:
+        tqc = _shaped(networks, core, config)
     seen = core.actor_size if core.actor_size < core.observation_size else None
     trainer = make_trainer(config.trainer, env, tqc, config.seed, seen)
     if networks is not None:
@@ -65,6 +72,34 @@ def train_policy(
     finally:
         env.close()
     return run.result()
+
+
+def residual_learning(
+    config: TrainConfig, robot: Robot, reference: ReferenceMotion | Sequence[ReferenceMotion]
+) -> TqcConfig:
+    """Return TQC's configuration: that of `polish` where the feedback dances by itself, else the
+    given one.
+
+    A motion that repeats is learnt better from falls, by actions that are random at first; one that
+    ends is unlearnt by them (docs/learning.md).
+    """
+    if not polishes(config, robot, reference):
+        return config.tqc
+    log.info("the training improves what the feedback alone does (train.polish: no learns anew)")
+    return replace(config.tqc, **PRESETS["polish"])
+
+
+def polishes(
+    config: TrainConfig, robot: Robot, reference: ReferenceMotion | Sequence[ReferenceMotion]
+) -> bool:
+    """Return whether a training begins with what the feedback alone does."""
+    track, motions = config.track, motions_of(reference)
+    control = control_of(track)
+    usual = config.mode == "track" and config.trainer == "sbx" and config.start == "scratch"
+    fed = feedback_share(robot, control) > 0 and feedback_path(robot, control) == "sampled"
+    ends = len(motions) == 1 and not motions[0].cyclic
+    chosen = config.polish == "auto" and config.tqc.preset == "dance" and not track.random.pushes
+    return usual and chosen and control.law == "pd" and fed and ends
 
 
 def _shaped(networks: Networks, core: TrackingCore, config: TrainConfig) -> TqcConfig:

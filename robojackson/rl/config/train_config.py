@@ -50,6 +50,9 @@ class TrainConfig:
         start: Source of the networks: `scratch`, our `walker` of the mode, a networks.safetensors,
             an SB3 zip, or a repository of the hub (`owner/name`).
         start_critics: Whether the critics come from the same source.
+        polish: Whether the training starts from what the feedback alone does and improves it
+            (preset `polish` of TQC). `auto`: on a motion that does not repeat, from scratch, on a
+            robot whose feedback follows a sampled path (`track.control.feedback_path`).
         curiosity: Which of the paper's three weights the curiosity bonus gets.
         checkpoint_seconds: Time between two checkpoints, s.
         progress_seconds: Time between two progress rows, s.
@@ -64,6 +67,7 @@ class TrainConfig:
     cpu_minutes: float | None = Field(default=None, gt=0)
     start: str = Field(default="scratch", min_length=1)
     start_critics: bool = True
+    polish: Literal["auto", "no"] = "auto"
     curiosity: Curiosity = "off"
     checkpoint_seconds: Annotated[float, Field(gt=0)] = field(default=60.0, compare=False)
     progress_seconds: Annotated[float, Field(gt=0)] = field(default=5.0, compare=False)

@@ -69,6 +69,9 @@ class PathSearch:
         feet: The robot's feet.
         reference: The motion as a path.
         rng: Draws the offsets.
+
+    Attributes:
+        breadth: Factor on the number of robots, and, by its root, on their offsets.
     """
 
     def __init__(
@@ -82,6 +85,7 @@ class PathSearch:
         self._sim, self._action, self._feet = sim, action, feet
         self._reference, self._rng = reference, rng
         self._places = feet.places(reference.qpos)
+        self.breadth = 1
 
     def run(self, path: Path, law: Recursion, begin: int) -> tuple[Path, bool]:
         """Return a simulated path from a step of another on, and whether it reaches the end."""
@@ -122,7 +126,8 @@ class PathSearch:
         steps: int,
     ) -> tuple[_Beam, _Window]:
         rng, action = self._rng, self._action
-        parent = np.concatenate([np.arange(KEPT), rng.integers(0, KEPT, SAMPLES - KEPT)])
+        more = self.breadth * SAMPLES - KEPT
+        parent = np.concatenate([np.arange(KEPT), rng.integers(0, KEPT, more)])
         now = beam.of(parent)
         aim = self._offsets(now, law.gain[t + steps // 2])
         state_cost, effort = (np.diag(matrix) for matrix in weights(action, law.slope.shape[1]))
@@ -151,7 +156,7 @@ class PathSearch:
     def _offsets(self, beam: _Beam, gain: Float[np.ndarray, "nu X"]) -> Float[np.ndarray, "N nu"]:
         """Draw the offsets of a window; the first robots have none."""
         rng, (n, motors) = self._rng, beam.offset.shape
-        scale = rng.choice(OFFSET_SCALES, (n, 1))
+        scale = np.sqrt(self.breadth) * rng.choice(OFFSET_SCALES, (n, 1))
         moved = rng.random((n, motors)) < rng.choice(OFFSET_SHARES, (n, 1))
         offset = scale * self._action * rng.normal(size=(n, motors)) * moved
         along: Bool[np.ndarray, " N"] = np.less(rng.random(n), ALONG)

@@ -20,8 +20,13 @@ from robojackson.rl.sim.simulation import Simulation
 from robojackson.rl.sim.standing_feet import Feet
 from robojackson.rl.sim.tangent import state_difference
 
-PASSES, BACK_S, AGAIN_S = 12, 1.2, 0.6
-"""Searches at most; how far before a fall a path is kept; how far before that the next begins."""
+PASSES, PASSES_A_S = 6, 2.0
+"""Searches at most: so many, and so many for every second of the motion."""
+BACK_S, AGAIN_S = 1.2, 0.6
+"""How far before a fall a path is kept; how far before that the next search begins."""
+STALLS, ADVANCE_S = 3, 0.1
+"""Searches in a row at most that do not come so much further; each is broader than the one before
+and begins earlier."""
 TRIES, TRIED_S = 6, 30.0
 """Searches from the beginning, of which the best is taken: at most so many, and of so long a motion
 in all."""
@@ -40,7 +45,7 @@ def sampled_regulator(
     feet: Feet,
     seed: int = 0,
     progress: Progress = no_progress,
-    most_tries: int = TRIES,
+    most_tries: int | None = None,
 ) -> Gains:
     """Return the regulator along a motion, or along a path beside it where that holds it better.
 
@@ -53,7 +58,7 @@ def sampled_regulator(
         feet: The robot's feet.
         seed: Of the samples.
         progress: Called with a name, the steps that are done, and all.
-        most_tries: Searches at most.
+        most_tries: Searches from the beginning at most; `TRIES` when None.
     """
     best, motion, linear = regulator(sim, clip, action, feet.count, progress)
     held = _held_share(sim, clip, action, feet, best, motion)
@@ -62,7 +67,7 @@ def sampled_regulator(
     cycles = max(3, int(np.ceil(CYCLES_S / (clip.steps * clip.dt)))) if clip.cyclic else 1
     reference = reference_path(sim, clip, cycles * clip.steps)
     linear = _repeated(linear, cycles)
-    tries = int(np.clip(TRIED_S / (len(reference) * clip.dt), 1, most_tries))
+    tries = int(np.clip(TRIED_S / (len(reference) * clip.dt), 1, most_tries or TRIES))
     for number in range(tries):
         rng = np.random.default_rng([seed, number])
         search = PathSearch(sim, action, feet, reference, rng)
@@ -86,17 +91,22 @@ def _searched(
     progress: Progress,
 ) -> tuple[Path, Linear]:
     """Return a path that was searched from a motion's, and the system along it."""
-    begin = 0
-    for _ in range(PASSES):
+    begin, furthest, stalls = 0, 0, 0
+    for _ in range(PASSES + round(PASSES_A_S * len(path) * dt)):
+        search.breadth = 1 + stalls
         found, ended = search.run(path, riccati(linear, action, False), begin)
         end = begin + len(found) - 1
-        kept = end + 1 if ended else max(begin + WINDOW, end - round(BACK_S / dt))
-        path = search.joined(path, found, begin, kept)
-        linear = _with(linear, np.arange(begin, min(kept + 1, len(path))), sim, path)
+        stalls = 0 if end > furthest + ADVANCE_S / dt else stalls + 1
+        furthest = max(furthest, end)
+        back = round((1 + stalls / 2) * BACK_S / dt)
+        kept = end + 1 if ended else max(0, end - back)
+        first, last = min(begin, kept), max(begin, kept)
+        path = search.joined(path, found, first, kept)
+        linear = _with(linear, np.arange(first, min(last + 1, len(path))), sim, path)
         progress("sampled path", kept, len(path))
-        if ended:
+        if ended or stalls > STALLS:
             break
-        begin = max(begin + 1, kept - round(AGAIN_S / dt))
+        begin = max(0, kept - round(AGAIN_S / dt))
     return path, linear
 
 
@@ -170,7 +180,10 @@ def settings() -> list[float]:
     """Return the numbers that decide what is found."""
     return [
         PASSES,
+        PASSES_A_S,
         BACK_S,
+        STALLS,
+        ADVANCE_S,
         AGAIN_S,
         STARTS,
         HELD_S,

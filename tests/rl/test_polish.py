@@ -1,0 +1,64 @@
+"""When a training begins with what the feedback alone does."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import pytest
+
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.pipeline.yaml_loader import load
+from robojackson.rl.config.tqc_config import PRESETS
+from robojackson.rl.config.train_config import TrainConfig
+from robojackson.rl.training import polishes, residual_learning
+from robojackson.robot.model import Robot
+
+
+@pytest.fixture
+def fed(robot: Robot) -> Robot:
+    """A robot whose feedback follows a sampled path."""
+    named = replace(robot.description, feedback=1.0, feedback_path="sampled")
+    return replace(robot, description=named)
+
+
+def configured(**named: object) -> TrainConfig:
+    """A training of 100 steps with some settings."""
+    return load(TrainConfig, "setups/scratch", {"steps": 100, **named})
+
+
+def test_a_motion_that_ends_is_polished(fed: Robot, sway: ReferenceMotion) -> None:
+    ending = replace(sway, cyclic=False)
+    tqc = residual_learning(configured(), fed, ending)
+    assert {name: getattr(tqc, name) for name in PRESETS["polish"]} == PRESETS["polish"]
+    assert replace(tqc, **{n: getattr(configured().tqc, n) for n in PRESETS["polish"]}) == (
+        configured().tqc
+    )
+
+
+def test_a_motion_that_repeats_is_learnt_from_falls(fed: Robot, sway: ReferenceMotion) -> None:
+    repeating = replace(sway, cyclic=True)
+    assert residual_learning(configured(), fed, repeating) == configured().tqc
+
+
+@pytest.mark.parametrize(
+    "named",
+    [
+        {"polish": "no"},
+        {"trainer": "sb3"},
+        {"start": "walker"},
+        {"mode": "paper"},
+        {"tqc.preset": "released"},
+        {"track.observation": "onboard"},
+        {"track.control.feedback": 0.0},
+        {"track.control.feedback_path": "reference"},
+        {"track.random.pushes": 1.0},
+    ],
+    ids=lambda named: "-".join(map(str, *named.items())),
+)
+def test_other_trainings_are_not(
+    fed: Robot, sway: ReferenceMotion, named: Mapping[str, object]
+) -> None:
+    assert not polishes(configured(**named), fed, replace(sway, cyclic=False))
+
+
+def test_a_robot_without_feedback_is_not(robot: Robot, sway: ReferenceMotion) -> None:
+    assert not polishes(configured(), robot, replace(sway, cyclic=False))
