@@ -6,7 +6,7 @@ from jaxtyping import Float, Int
 from robojackson.rl.sim import path_search
 from robojackson.rl.sim.feedback_law import Feedback
 from robojackson.rl.sim.nominal_path import Gains, Linear, Path, Progress, no_progress
-from robojackson.rl.sim.path_search import LOST_RAD, WINDOW, PathSearch
+from robojackson.rl.sim.path_search import LOST_RAD, PathSearch
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.regulator import (
     advance,
