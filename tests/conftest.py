@@ -27,9 +27,9 @@ def pytest_xdist_auto_num_workers() -> int:
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out what needs more than a machine has by itself, unless `-m` asks for it by name."""
-    asked = str(config.getoption("-m"))
-    unasked = [marker for marker in ("network", "cluster", "browser") if marker not in asked]
-    outside = [item for item in items if any(item.get_closest_marker(m) for m in unasked)]
+    marks = str(config.getoption("-m"))
+    left_out = [marker for marker in ("network", "cluster", "browser") if marker not in marks]
+    outside = [item for item in items if any(item.get_closest_marker(m) for m in left_out)]
     if outside:
         config.hook.pytest_deselected(items=outside)
         items[:] = [item for item in items if item not in outside]

@@ -23,7 +23,7 @@ GO = "k => { robojackson.video.pause(); robojackson.go(k); }"
 
 @pytest.mark.parametrize("width", [375, 1600])
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_page_asks_for_nothing_complains_of_nothing_and_fits(
+def test_page_requests_nothing_logs_no_error_and_fits(
     opened: Open, page_file: Path, width: int, scheme: str
 ) -> None:
     found = opened(page_file, width, scheme)

@@ -58,14 +58,14 @@ def test_every_format_starts_with_the_first_pose(to: str, reference: Path, tmp_p
 
 
 @pytest.mark.medium
-def test_the_answer_tells_what_was_written(reference: Path, tmp_path: Path) -> None:
+def test_the_answer_names_what_was_written(reference: Path, tmp_path: Path) -> None:
     out = tmp_path / "motion.csv"
     result = export(reference, "csv", out)
     assert (result["file"], result["bytes"]) == (str(out), out.stat().st_size)
 
 
 @pytest.mark.medium
-def test_the_answer_judges_the_motion_by_its_score_card(reference: Path, tmp_path: Path) -> None:
+def test_the_answer_rates_the_motion_by_its_score_card(reference: Path, tmp_path: Path) -> None:
     result = export(reference, "csv", tmp_path / "motion.csv")
     assert result["verdict"]["kind"] == "feasible"
     assert result["next"] == command_line("train", reference, "-o", reference.parent / "training")

@@ -56,7 +56,7 @@ def test_a_motion_goes_out_and_comes_back(to: str, smpl: Path, tmp_path: Path) -
 @pytest.mark.parametrize(
     ("frames", "share", "kind"), [(90, 0.9, "whole"), (90, 0.1, "airborne"), (30, 0.9, "too_short")]
 )
-def test_an_import_is_judged_by_its_feet_and_its_length(
+def test_an_import_is_rated_by_its_feet_and_its_length(
     frames: int, share: float, kind: str
 ) -> None:
     result = import_verdict({"frames": frames, "fps": 30.0, "contact_share": share})

@@ -39,8 +39,8 @@ def completions(command: Path, words: str) -> list[str]:
         ["robojackson"], env=env | {COMPLETE: "source_bash"}, capture_output=True, check=True
     )
     (command / "completion.sh").write_bytes(script.stdout)
-    asked = ["bash", "-c", ASK, "bash", str(command / "completion.sh"), words]
-    done = subprocess.run(asked, env=env, capture_output=True, text=True, check=True, cwd=ROOT)
+    shell = ["bash", "-c", ASK, "bash", str(command / "completion.sh"), words]
+    done = subprocess.run(shell, env=env, capture_output=True, text=True, check=True, cwd=ROOT)
     first, *found = done.stdout.split("\n")
     assert first.startswith("complete ")
     return [word for word in found if word]

@@ -152,7 +152,7 @@ def test_a_service_has_the_keys_of_its_role_alone(name: str) -> None:
     assert held == {f"S3_{role.upper()}_PASSWORD"}
 
 
-def test_workers_cannot_reach_the_database_and_nobody_is_its_administrator() -> None:
+def test_workers_cannot_reach_the_database_and_no_role_administers_it() -> None:
     holders = {
         name: {n for n in SERVICES if f"${{{name}:" in str(SERVICES[n])}
         for name in ("POSTGRES_ADMIN_PASSWORD", "POSTGRES_PASSWORD", "POSTGRES_BACKUP_PASSWORD")

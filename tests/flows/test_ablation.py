@@ -215,7 +215,7 @@ def on_workers(
     return asyncio.run(cells.run_on_worker(a_cell()))
 
 
-def test_a_cell_that_was_done_before_asks_no_worker(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_cell_that_was_done_before_uses_no_worker(monkeypatch: pytest.MonkeyPatch) -> None:
     pool = Pool()
     assert on_workers(pool, monkeypatch, kept=True) == {"policy": REFERENCE}
     assert pool.names == []

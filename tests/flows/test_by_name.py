@@ -51,11 +51,11 @@ def files(source: str, config: str = "finding", book: str = "dances") -> dict[st
     """Names and contents of the videos that are meant."""
 
     @flow
-    async def asked() -> dict[str, bytes]:
+    async def resolved() -> dict[str, bytes]:
         async with videos_of(source, Search(config=config, book=book)) as paths:
             return {path.name: path.read_bytes() for path in paths}
 
-    return asyncio.run(asked())
+    return asyncio.run(resolved())
 
 
 def refused(**given: Any) -> bool:
@@ -84,7 +84,7 @@ def test_a_video_that_was_downloaded_leaves_no_copy(
 
 
 @pytest.mark.medium
-def test_a_name_without_a_video_that_can_be_danced_tells_every_reason(
+def test_a_name_without_a_usable_video_reports_every_reason(
     records: None, store_folder: Path, tmp_path: Path
 ) -> None:
     with serving(b"") as web, pytest.raises(NoPersonFound, match="HTTP 404 not found"):

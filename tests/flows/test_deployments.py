@@ -74,7 +74,7 @@ def test_the_silence_of_a_run_can_be_chosen() -> None:
     assert quick == {name: seconds / 2 for name, seconds in shipped.items()}
 
 
-def test_an_automation_tells_its_seconds() -> None:
+def test_an_automation_names_its_seconds() -> None:
     document = {f["trigger"]["within"]: f["actions"][0]["message"] for f in automations()}
     assert all(f" {seconds} s" in message for seconds, message in document.items())
 

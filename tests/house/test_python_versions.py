@@ -25,8 +25,8 @@ def required_python(name: str, version: str) -> str | None:
 
 @pytest.mark.parametrize("system", OF_A_SYSTEM)
 def test_no_pin_refuses_the_python_of_a_system(system: str) -> None:
-    asked = {name: required_python(name, version) for name, version in PINNED}
-    known = {name: text for name, text in asked.items() if text is not None}
+    required = {name: required_python(name, version) for name, version in PINNED}
+    known = {name: text for name, text in required.items() if text is not None}
     assert len(known) > 200
     refused = {n: t for n, t in known.items() if OF_A_SYSTEM[system] not in SpecifierSet(t)}
     assert refused == {}

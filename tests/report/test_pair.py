@@ -30,7 +30,7 @@ def frames(
         return [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
 
 
-def test_one_lap_is_shown(frames: list[np.ndarray], reference: ReferenceMotion) -> None:
+def test_one_cycle_is_shown(frames: list[np.ndarray], reference: ReferenceMotion) -> None:
     assert len(frames) == round(len(reference) * reference.dt * SMALL.fps)
 
 
@@ -68,7 +68,7 @@ def loaded(reference: ReferenceMotion) -> ReferenceMotion:
     return replace(reference, torque_ratio=ratio)
 
 
-def test_the_heat_map_tells_how_long_each_motor_is_over_its_limit(
+def test_the_heat_map_shows_how_long_each_motor_is_over_its_limit(
     reference: ReferenceMotion,
 ) -> None:
     axes = run_plots.torque_heat_map(loaded(reference), reference.joint_names).axes[0]

@@ -53,13 +53,13 @@ def test_training_starts_from_a_repository_of_the_hub(
 ) -> None:
     """With the layers of the zip, which is requested once and then lies in the cache."""
     config = load(TrainConfig, None, {**BRIEF, "start": REPOSITORY})
-    with serving({ZIP: theirs}) as (address, asked):
+    with serving({ZIP: theirs}) as (address, requests):
         at(address, tmp_path / "cache", monkeypatch)
         for name in ("first", "second"):
             train_policy(sway, robot, config, tmp_path / name)
             learnt = load_networks(tmp_path / name / "networks.safetensors")
             assert (learnt.widths("actor"), learnt.widths("critic1")) == ((16, 12), (16, 12, 25))
-    assert asked.count(f"GET /{ZIP}") == 1
+    assert requests.count(f"GET /{ZIP}") == 1
 
 
 def test_a_repository_that_the_hub_has_not_is_one_clear_line(

@@ -160,15 +160,15 @@ def test_the_hubs_zip_is_requested_by_its_own_name(
     import huggingface_sb3
 
     _, path = zipped(tmp_path)
-    asked: list[tuple[str, str]] = []
+    requests: list[tuple[str, str]] = []
 
     def fetch(repository: str, name: str) -> str:
-        asked.append((repository, name))
+        requests.append((repository, name))
         return str(path)
 
     monkeypatch.setattr(huggingface_sb3, "load_from_hub", fetch)
     found = pretrained("farama-minari/Humanoid-v5-TQC-simple", "paper")
-    assert asked == [("farama-minari/Humanoid-v5-TQC-simple", "humanoid-v5-TQC-simple.zip")]
+    assert requests == [("farama-minari/Humanoid-v5-TQC-simple", "humanoid-v5-TQC-simple.zip")]
     assert found is not None
     assert found.observation_size == 348
 

@@ -78,7 +78,7 @@ def test_a_second_put_replaces_the_first(store: Store) -> None:
     assert store.read("a") == b"new"
 
 
-def test_list_tells_the_keys_under_a_folder(store: Store) -> None:
+def test_list_returns_the_keys_under_a_folder(store: Store) -> None:
     for key in ("runs/b.json", "runs/a.json", "other/c.json"):
         store.put(key, b"{}")
     assert store.list("runs") == ["runs/a.json", "runs/b.json"]

@@ -69,7 +69,7 @@ def test_speeds_are_mirrored_with_the_places() -> None:
     np.testing.assert_allclose(image.qvel[:, 5], -motion.qvel[:, 5])
 
 
-def test_the_dancer_is_taught_nothing_that_judges_it(tmp_path: Path) -> None:
+def test_the_dancer_trains_on_no_motion_that_evaluates_it(tmp_path: Path) -> None:
     for name in load_split().judged:
         (tmp_path / f"{name.removeprefix('cmu_')}.bvh.gz").touch()
     assert [name for name, *_ in sequences(tmp_path, 0)] == []

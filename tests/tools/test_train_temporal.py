@@ -166,14 +166,14 @@ def test_invented_pairs_are_not_refused() -> None:
     train_temporal.check_motions([person(motion="invented"), person(motion="jump")])
 
 
-def test_discrepancy_tells_another_distribution() -> None:
+def test_discrepancy_detects_another_distribution() -> None:
     torch.manual_seed(7)
     a, b = torch.randn(200, 4), torch.randn(200, 4)
     assert discrepancy(a, b + 1.0) > 5.0 * discrepancy(a, b).abs()
 
 
 @pytest.mark.slow
-def test_a_kept_state_goes_on_where_it_was(tmp_path: Path) -> None:
+def test_a_saved_state_goes_on_where_it_was(tmp_path: Path) -> None:
     from tools.temporal import fit
 
     config = fit.FitConfig(steps=4, batch=2, change=Change(frames=20))

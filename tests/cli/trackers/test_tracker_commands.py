@@ -52,7 +52,7 @@ def test_the_file_is_downloaded_once_and_can_be_run(pin, web: Web, network: Path
     first, again = add_tracker(NAME), add_tracker(NAME)
     assert (first["added"], again["added"], first["licence"]) == (True, False, "ours")
     assert path.read_bytes() == network.read_bytes()
-    assert len(web.asked) == 1
+    assert len(web.requests) == 1
     assert names_in(path.parent) == ["network.onnx"]
 
 
@@ -60,7 +60,7 @@ def test_a_download_that_was_cut_off_goes_on_where_it_ended(pin, web: Web, netwo
     path = pin("half-once")
     add_tracker(NAME)
     half = len(network.read_bytes()) // 2
-    assert [asked for _, asked in web.asked] == [None, f"bytes={half}-"]
+    assert [requested for _, requested in web.requests] == [None, f"bytes={half}-"]
     assert path.read_bytes() == network.read_bytes()
 
 
@@ -69,7 +69,7 @@ def test_the_same_command_goes_on_from_what_an_earlier_one_left(pin, web, networ
     path.parent.mkdir(parents=True)
     path.with_name("network.onnx.part").write_bytes(network.read_bytes()[:100])
     add_tracker(NAME)
-    assert web.asked[0][1] == "bytes=100-"
+    assert web.requests[0][1] == "bytes=100-"
     assert path.read_bytes() == network.read_bytes()
     assert names_in(path.parent) == ["network.onnx"]
 
@@ -106,12 +106,12 @@ def test_a_refusal_is_one_line_with_its_code(pin, kind: str, words: str) -> None
 
 def test_offline_is_one_line(pin) -> None:
     path = pin()
-    write_yaml_for_nobody(path, pin)
+    write_yaml_for_a_closed_port(path, pin)
     with pytest.raises(DownloadFailed, match=r"cannot be downloaded: .*; check the network"):
         add_tracker(NAME)
 
 
-def write_yaml_for_nobody(path: Path, pin: Callable[..., Path]) -> None:
+def write_yaml_for_a_closed_port(path: Path, pin: Callable[..., Path]) -> None:
     """Let the YAML name a port at which no one answers."""
     yaml = next((path.parents[3] / "configs" / "trackers").glob("*.yaml"))
     lines = yaml.read_text().splitlines()
@@ -122,7 +122,7 @@ def write_yaml_for_nobody(path: Path, pin: Callable[..., Path]) -> None:
 def test_a_copy_that_the_user_has_is_checked_and_taken(pin, web: Web, network: Path) -> None:
     path = pin()
     assert add_tracker(NAME, network)["added"] is True
-    assert (path.read_bytes(), web.asked) == (network.read_bytes(), [])
+    assert (path.read_bytes(), web.requests) == (network.read_bytes(), [])
 
 
 def test_a_foreign_copy_is_one_line(pin, tmp_path: Path) -> None:

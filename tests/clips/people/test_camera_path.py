@@ -9,7 +9,7 @@ import pytest
 from robojackson.clips.people.camera_path import CameraPath, camera_path, warp
 
 WIDTH, HEIGHT, FRAMES = 320, 240, 40
-NOBODY = np.full((FRAMES, 33, 2), np.nan)
+NO_PERSON = np.full((FRAMES, 33, 2), np.nan)
 
 
 def wall(seed: int = 0) -> np.ndarray:
@@ -25,7 +25,7 @@ def view(picture: np.ndarray, x: int, y: int = HEIGHT) -> np.ndarray:
 
 
 def path_of(images: list[np.ndarray]) -> CameraPath:
-    return camera_path(images, NOBODY[: len(images)], WIDTH, HEIGHT)
+    return camera_path(images, NO_PERSON[: len(images)], WIDTH, HEIGHT)
 
 
 def test_a_camera_that_stands_is_reported_to_stand() -> None:
@@ -57,12 +57,12 @@ def test_a_zoom_is_measured() -> None:
 
 def test_the_measure_is_in_pixels_of_the_full_image() -> None:
     images = [view(wall(), WIDTH + step) for step in range(FRAMES)]
-    found = camera_path(images, NOBODY, 2 * WIDTH, 2 * HEIGHT)
+    found = camera_path(images, NO_PERSON, 2 * WIDTH, 2 * HEIGHT)
     assert found.to_first[-1][0, 2] == pytest.approx(2.0 * (FRAMES - 1), abs=2.0)
 
 
 def test_a_person_who_moves_is_no_background() -> None:
-    blots, images, marks = wall(1), [], np.tile(NOBODY[:1], (FRAMES, 1, 1))
+    blots, images, marks = wall(1), [], np.tile(NO_PERSON[:1], (FRAMES, 1, 1))
     for step in range(FRAMES):
         image = view(wall(), WIDTH)
         image[60:200, 60 + 4 * step : 120 + 4 * step] = blots[:140, :60]
@@ -111,7 +111,7 @@ def walker_at(x: int) -> np.ndarray:
     return np.linspace(corners[0], corners[1], 33)
 
 
-def test_a_standing_camera_before_little_texture_moves_nothing_and_tells_nothing() -> None:
+def test_a_standing_camera_before_little_texture_moves_and_reports_nothing() -> None:
     found = path_of([floor_and_sky(seed) for seed in range(FRAMES)])
     assert found.notes == ()
     assert np.allclose(found.to_first, np.eye(3))

@@ -119,7 +119,7 @@ def test_the_dancer_is_never_exchanged(crossed: Crossed) -> None:
 
 
 @pytest.mark.medium
-def test_an_impossible_number_tells_who_is_there(
+def test_an_impossible_number_lists_who_is_there(
     crossed: Crossed, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(dancer, "track_people", lambda *_: crossed.cast)

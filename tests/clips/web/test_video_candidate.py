@@ -60,7 +60,7 @@ def test_a_flat_entry_becomes_a_candidate() -> None:
     )
 
 
-def test_a_full_entry_tells_its_page_and_not_its_file() -> None:
+def test_a_full_entry_names_its_page_and_not_its_file() -> None:
     full = flat(
         _type="video",
         extractor_key="Youtube",

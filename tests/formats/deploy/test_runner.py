@@ -80,8 +80,8 @@ def figures_of(
     result = run_bare(packages, ROLL_OUT, *words, cwd=work)
     assert result.returncode == 0, result.stderr
     theirs = recorded(pack, clip, starts, np.load(work / "tracks.npy").transpose(1, 0, 2))
-    judge = RolloutScorer(robot, reference, BRIEF)
-    both = [summarise([judge.row("x", label, rollouts, i) for i, label in enumerate(labels)])
+    scorer = RolloutScorer(robot, reference, BRIEF)
+    both = [summarise([scorer.row("x", label, rollouts, i) for i, label in enumerate(labels)])
             for rollouts in (done, theirs)]  # fmt: skip
     return both[0], both[1]
 
@@ -119,7 +119,9 @@ def test_the_runner_is_short_and_imports_three_packages(pack: Pack) -> None:
 
 
 @pytest.mark.slow
-def test_alone_it_reaches_the_judges_figures(pack: Pack, packages: Path, tmp_path: Path) -> None:
+def test_alone_it_reaches_the_figures_of_the_evaluation(
+    pack: Pack, packages: Path, tmp_path: Path
+) -> None:
     ours, theirs = figures_of(pack, pack.folder, packages, tmp_path)
     assert abs(ours["success"] - theirs["success"]) <= 0.02
     assert abs(ours["survived_s"] - theirs["survived_s"]) <= 0.02

@@ -129,7 +129,7 @@ def test_root_correction_minimises_its_cost() -> None:
     assert np.allclose(shift[:, :2].reshape(-1), expected)
 
 
-def test_who_is_moved_away_from_the_camera_keeps_his_place_in_the_image() -> None:
+def test_a_person_moved_away_from_the_camera_keeps_the_place_in_the_image() -> None:
     """Feet that drift along the ray pull the body back along it."""
     feet = four_feet()
     drift = 0.2 * (np.arange(FRAMES) / FRAMES)[:, None]

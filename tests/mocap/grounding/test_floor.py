@@ -98,7 +98,7 @@ def test_a_jump_is_ballistic_as_long_as_it_lasts(height_m: float) -> None:
     assert abs(found[-1] - true[-1]) <= 2
 
 
-def test_somebody_who_drops_into_a_squat_does_not_jump() -> None:
+def test_a_person_who_drops_into_a_squat_does_not_jump() -> None:
     time = np.arange(60) / 30.0
     height = 1.0 - 0.4 * np.clip((time - 0.7) / 0.25, 0.0, 1.0) ** 2
     assert not air.ballistic(height, np.zeros(60), 30.0).any()

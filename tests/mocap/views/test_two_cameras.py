@@ -82,7 +82,7 @@ def test_the_offset_of_the_same_sound_is_found() -> None:
     assert found == pytest.approx(1.3, abs=0.01)
 
 
-def test_sounds_of_different_places_tell_no_offset() -> None:
+def test_sounds_of_different_places_give_no_offset() -> None:
     rng = np.random.default_rng(1)
     one, two = (Sound(0.1 * rng.normal(size=(3 * RATE, 2))) for _ in range(2))
     assert sound_offset(one, two) is None

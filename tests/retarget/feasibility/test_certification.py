@@ -149,7 +149,7 @@ def test_an_arm_swung_too_fast_is_repaired_by_a_slower_tempo(robot: Robot):
     assert all(finding.repair.startswith("slow to") for finding in torques)
 
 
-def test_an_arm_held_out_costs_what_gravity_asks(robot: Robot):
+def test_an_arm_held_out_costs_what_gravity_demands(robot: Robot):
     """Shoulder torque of the forearm and upper arm about the hinge, from masses and levers."""
     qpos = _resting(robot)
     found = _certified(robot, _held(qpos))

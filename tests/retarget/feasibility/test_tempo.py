@@ -135,5 +135,5 @@ def test_slower_tempos_are_tried_where_the_own_one_is_too_fast(robot: Robot):
     forces = inverse_dynamics.free_space(robot, qpos, DT, None)
     near = inverse_dynamics.touching(robot, pose(tree(robot), qpos))
     for row, k in zip(found, GRID, strict=True):
-        asked = inverse_dynamics.demand(robot, qpos, forces.at(k), near, Tolerance())
-        np.testing.assert_allclose(row[hard], supply(asked).slack[hard], atol=1e-6)
+        demand = inverse_dynamics.demand(robot, qpos, forces.at(k), near, Tolerance())
+        np.testing.assert_allclose(row[hard], supply(demand).slack[hard], atol=1e-6)

@@ -60,6 +60,6 @@ def test_slippery_floor_and_late_actions_change_the_outcome(
     assert same == ["integrator RK4", "pushes every 1 to 3 s"]
 
 
-def test_train_robust_sets_what_the_passport_asks() -> None:
+def test_train_robust_disturbs_what_the_passport_tests() -> None:
     config = load(TrainConfig, None, robust_settings())
     assert config.track.random == ROBUST

@@ -296,9 +296,9 @@ def test_the_motion_is_turned_ahead_without_being_bent(robot: Robot, sway: Refer
 def test_a_statue_earns_what_a_dancer_earns_by_the_papers_reward(
     robot: Robot, sway: ReferenceMotion
 ) -> None:
-    asked = audit_both_readings(robot, sway, PaperConfig())
-    assert set(asked) == {"root", "world"}
-    assert asked["root"].of["statue"] > 0.95
+    audits = audit_both_readings(robot, sway, PaperConfig())
+    assert set(audits) == {"root", "world"}
+    assert audits["root"].of["statue"] > 0.95
 
 
 @pytest.mark.medium

@@ -158,7 +158,7 @@ def test_the_library_has_one_digest_on_all_pythons(python: str) -> None:
 
 
 @pytest.mark.parametrize("task", ["evaluate_dance", "train_policy", "recover_motion"])
-def test_how_values_are_kept_in_files_is_no_part_of_what_a_stage_computes(task: str) -> None:
+def test_how_values_are_stored_is_no_part_of_what_a_stage_computes(task: str) -> None:
     """The layout of tables is in every key by itself; a lock or an atomic write changes nothing."""
     roots = imports_of(ROOT / "tasks" / f"{task}.py")
     modules = reached(roots, "robojackson", ROOT / "robojackson")
