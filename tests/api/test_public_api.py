@@ -56,7 +56,7 @@ def config() -> TrainConfig:
 
 
 def paid(state: rj.RewardState) -> np.ndarray:
-    """A reward term of a user."""
+    """Return a reward term of a user."""
     return np.full(len(state.qpos), 0.5)
 
 

@@ -9,7 +9,7 @@ Maker = Callable[[Path], object]
 
 
 def nothing(folder: Path) -> None:
-    """No file is needed."""
+    """Make no file."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Case:
 
 
 def writes(name: str, content: bytes | str) -> Maker:
-    """A maker of one file."""
+    """Return a maker of one file."""
     data = content.encode() if isinstance(content, str) else content
 
     def make(folder: Path) -> None:

@@ -145,7 +145,7 @@ def read_only_store(machine: Machine) -> Iterator[Row]:
 
 
 def pair(machine: Machine) -> Iterator[Row]:
-    """Two dances of one clip at once in one store, and one alone.
+    """Yield two dances of one clip at once in one store, and one alone.
 
     The second may be refused in one line while the first trains; repeated, it ends well.
     """
@@ -168,7 +168,8 @@ def pair(machine: Machine) -> Iterator[Row]:
 
 
 def exits(machine: Machine, count: int) -> Iterator[Row]:
-    """Commands that load MediaPipe, MuJoCo, PyTorch and JAX, each in a process of its own."""
+    """Yield a row for each command that loads MediaPipe, MuJoCo, PyTorch and JAX in a process of
+    its own."""
     kinds = {
         "score": ("score", str(machine.clip)),
         "retarget": ("export", SMPL, "--to", "csv", "-o", "{out}/m.csv"),

@@ -50,7 +50,7 @@ class Alone:
     @classmethod
     @contextmanager
     def ready(cls, folder: Path) -> Iterator["Alone"]:
-        """A mounted disk for the time of a block.
+        """Yield a mounted disk for the time of a block.
 
         Raises:
             CalledProcessError: it cannot be mounted.

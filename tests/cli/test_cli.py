@@ -27,7 +27,7 @@ def invoke(*words: object) -> tuple[int, str, str]:
 
 
 def write_video(path: Path, frames: int) -> Path:
-    """Grey frames with no one in them."""
+    """Write grey frames without a person."""
     with av.open(str(path), "w") as container:
         stream = container.add_stream("libx264", rate=10)
         stream.width, stream.height, stream.pix_fmt = 64, 64, "yuv420p"

@@ -19,7 +19,7 @@ ROWS = [("nominal", 1.0, 1.0, 0.5, 0.02, 1.0), ("gains x 0.8", 0.75, 0.8, 0.4, 0
 
 
 def cases(weakest: float) -> list[dict[str, object]]:
-    """A passport of two rows."""
+    """Return a passport of two rows."""
     found = [dict(zip(COLUMNS, row, strict=True)) for row in ROWS]
     found[1]["strict_success"] = weakest
     return found
@@ -27,7 +27,7 @@ def cases(weakest: float) -> list[dict[str, object]]:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A policy with its motion beside it."""
+    """Return a policy with its motion beside it."""
     reference = swaying(stock())
     reference.save(tmp_path / "reference.parquet")
     random_policy(stock(), reference).save(tmp_path / "policy.safetensors")

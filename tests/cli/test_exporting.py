@@ -38,7 +38,7 @@ READERS = {
 
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The hip shake, as `robojackson retarget` leaves it."""
+    """Return the hip shake, as `robojackson retarget` leaves it."""
     path = tmp_path_factory.mktemp("export") / "reference.parquet"
     path.write_bytes(tables.encode(robot_motion("hip_shake")))
     return path
@@ -117,7 +117,7 @@ def test_a_format_of_motions_does_not_fit_a_policy(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def answered(reference: Path) -> Said:
-    """The command, in a process of its own."""
+    """Run the command in a process of its own."""
     out = reference.parent / "motion.pkl"
     return robojackson("export", reference, "--to", "gmr", "-o", out, "--json")
 

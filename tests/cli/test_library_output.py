@@ -56,7 +56,7 @@ start(body)
 
 
 def run(*words: object, **more: str) -> Said:
-    """The command as a user starts it."""
+    """Run the command as a user starts it."""
     own = {"TF_CPP_MIN_LOG_LEVEL", "GLOG_minloglevel", "PYTHONWARNINGS", "MUJOCO_GL"}
     outer = {key: value for key, value in environment(**more).items() if key not in own}
     command = [sys.executable, *map(str, words)]
@@ -68,7 +68,7 @@ def run(*words: object, **more: str) -> Said:
 
 
 def strange(output: Said) -> list[str]:
-    """Lines of stderr that are not ours."""
+    """Return the lines of stderr that are not ours."""
     lines = (line for line in output.err.splitlines() if line.strip())
     return [line for line in lines if not OURS.fullmatch(line)]
 

@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.fixture(scope="module")
 def weights(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with random weights in the official keys, and a clip of six frames."""
+    """Return a folder with random weights in the official keys, and a clip of six frames."""
     folder = tmp_path_factory.mktemp("weights")
     torch.manual_seed(0)
     network = HybrikResNet()

@@ -25,7 +25,7 @@ FOLDER = "bundle/zoo/machine"
 
 
 def _wheel(folder: Path, model: str) -> Path:
-    """A wheel of the same layout as the one that bundles the G1."""
+    """Return a wheel of the same layout as the one that bundles the G1."""
     path = folder / "bundle-1.0-py3-none-any.whl"
     info = "bundle-1.0.dist-info"
     with zipfile.ZipFile(path, "w") as wheel:
@@ -43,7 +43,7 @@ def _wheel(folder: Path, model: str) -> Path:
 
 @pytest.fixture
 def source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> RobotSource:
-    """The machine, to be had from a folder that stands for the package index."""
+    """Return the machine's source: a folder that stands for the package index."""
     index = tmp_path / "index"
     index.mkdir()
     wheel = _wheel(index, machine.mjcf())
@@ -63,7 +63,7 @@ def source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> RobotSource:
 
 @pytest.fixture
 def describe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Makes `configs/robots/machine.yaml` say something."""
+    """Return a writer of `configs/robots/machine.yaml`."""
 
     def give(source: RobotSource | None) -> RobotDescription:
         result = replace(machine.description(tmp_path), mjcf="store:machine.xml", source=source)
@@ -188,7 +188,7 @@ def test_the_command_lists_the_robots_as_json(tmp_path: Path):
 
 
 def broken(folder: Path, old: str, new: str) -> Path:
-    """A user's description with one thing changed."""
+    """Return a user's description with one thing changed."""
     path = own_robot(folder)
     text = path.read_text()
     assert old in text

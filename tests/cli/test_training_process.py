@@ -26,7 +26,7 @@ ROW |= {"episode_return": NAN, "seconds_left": 65.0}
 
 @pytest.fixture
 def budgets(monkeypatch: pytest.MonkeyPatch) -> list[TrainConfig]:
-    """The configurations of trainings that are all refused."""
+    """Return the configurations of trainings, each of which is refused."""
     seen: list[TrainConfig] = []
 
     def refuse(motion, robot, config: TrainConfig, *rest, **more) -> None:

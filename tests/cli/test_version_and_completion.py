@@ -23,7 +23,7 @@ printf '%s\\n' "${COMPREPLY[@]}"
 
 @pytest.fixture(scope="module")
 def command(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the command `robojackson` of this interpreter."""
+    """Return a folder with the command `robojackson` of this interpreter."""
     folder = tmp_path_factory.mktemp("bin")
     program = folder / "robojackson"
     program.write_text(f"#!{sys.executable}\nfrom robojackson.__main__ import main\n\nmain()\n")
@@ -32,7 +32,7 @@ def command(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def completions(command: Path, words: str) -> list[str]:
-    """What bash offers after these words, the last of them unfinished."""
+    """Return what bash offers after these words, the last of them incomplete."""
     path = f"{command}{os.pathsep}{os.environ['PATH']}"
     env = environment(PATH=path)
     script = subprocess.run(

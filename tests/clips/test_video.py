@@ -159,7 +159,7 @@ def test_folder_without_videos_is_refused(tmp_path: Path) -> None:
 
 
 def write_at(path: Path, times: np.ndarray) -> Path:
-    """Frame k is grey of level 8 k, shown from times[k] on."""
+    """Write a clip whose frame k is grey of level 8 k and shown from times[k] on."""
     pictures = ((t, np.full((48, 64, 3), 8 * k, np.uint8)) for k, t in enumerate(times))
     write_timed(path, pictures)
     return path

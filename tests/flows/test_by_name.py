@@ -27,7 +27,8 @@ IMPATIENT = {
 
 @pytest.fixture
 def config(tmp_path: Path) -> str:
-    """No patience, and a proxy that is not there: whatever is no local server is out of reach."""
+    """Return a configuration without patience and with a dead proxy: only local servers can be
+    reached."""
     path = tmp_path / "finding.yaml"
     path.write_text(yaml.safe_dump({"web": {**IMPATIENT, "proxy": "http://127.0.0.1:9"}}))
     return str(path)
@@ -48,7 +49,7 @@ def near(folder: Path) -> str:
 
 
 def files(source: str, config: str = "finding", book: str = "dances") -> dict[str, bytes]:
-    """Names and contents of the videos that are meant."""
+    """Return the names and contents of the videos that a source stands for."""
 
     @flow
     async def resolved() -> dict[str, bytes]:
@@ -59,7 +60,7 @@ def files(source: str, config: str = "finding", book: str = "dances") -> dict[st
 
 
 def refused(**given: Any) -> bool:
-    """Whether Prefect's server takes no such parameters for a run of `dance`."""
+    """Return whether Prefect's server refuses these parameters for a run of `dance`."""
     schema = parameter_schema(dance.fn).model_dump_for_openapi()
     return bool(validate(given, schema, raise_on_error=False))
 

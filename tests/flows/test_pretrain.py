@@ -18,7 +18,7 @@ from tests.fixtures.own_robot import own_robot
 
 @pytest.fixture
 def commands(store_folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
-    """The commands of played processes, which leave a walker in their folder."""
+    """Return the commands of simulated processes, which leave a walker in their folder."""
     commands: list[list[str]] = []
 
     async def play(command: list[str], run_id: str, work: Path, *rest: Any) -> bytes:

@@ -63,7 +63,7 @@ class Nights:
         return night(self.book, dances)
 
     def row(self, word: str) -> dict[str, Any]:
-        """What the catalogue says of the first video whose address has the word."""
+        """Return the row of the catalogue for the first video whose address has the word."""
         return next(
             row for row in candidate_catalogue.records(self.store) if f"/{word}/" in row["url"]
         )
@@ -74,7 +74,7 @@ def night(book: Path, dances: list[str] | None = None) -> dict[str, Any]:
 
 
 def artifact(key: str) -> Any:
-    """The data of the newest artifact of a key."""
+    """Return the data of the newest artifact of a key."""
     expected = ArtifactFilter(key=ArtifactFilterKey(any_=[key]))
     with get_client(sync_client=True) as client:
         found = client.read_artifacts(artifact_filter=expected)

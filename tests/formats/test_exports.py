@@ -43,7 +43,7 @@ def exported(name: str, reference: ReferenceMotion, model: mujoco.MjModel) -> by
 
 
 def arrays(data: bytes) -> dict[str, np.ndarray]:
-    """An .npz as a foreign reader sees it that does not trust it."""
+    """Return the arrays of an .npz, read without pickles."""
     with np.load(io.BytesIO(data), allow_pickle=False) as archive:
         return dict(archive)
 

@@ -14,7 +14,8 @@ PINNED = re.findall(r"(?m)^([\w.-]+)==([^\s;]+)\s*$", (ROOT / "constraints.txt")
 
 
 def required_python(name: str, version: str) -> str | None:
-    """What a pinned package asks of Python; None where it is not installed in this version."""
+    """Return the Python that a pinned package requires; None where it is not installed in this
+    version."""
     try:
         found = metadata(name)
     except PackageNotFoundError:

@@ -23,7 +23,7 @@ BLUE_TO_GREY = 20
 def frames(
     sequence: SmplSequence, reference: ReferenceMotion, model: mujoco.MjModel, tmp_path: Path
 ) -> list[np.ndarray]:
-    """The small video, decoded."""
+    """Return the small video, decoded."""
     given = (None, None, sequence, reference, None, tmp_path / "r.mp4")
     out = side_by_side(*given, model=model, config=SMALL)
     with av.open(str(out)) as container:
@@ -62,7 +62,8 @@ def test_progress_counts_every_picture(
 
 
 def loaded(reference: ReferenceMotion) -> ReferenceMotion:
-    """The second motor beyond its limit for a third of the time, the first never."""
+    """Return a motion whose second motor is beyond its limit for a third of the time, the first
+    never."""
     ratio = np.full_like(reference.torque_ratio, 0.4)
     ratio[: len(ratio) // 3, 1] = 1.5
     return replace(reference, torque_ratio=ratio)

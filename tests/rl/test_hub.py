@@ -1,4 +1,4 @@
-"""A start that lies on the hub, asked of a stand-in that speaks the hub's protocol."""
+"""Starts from networks of the hub, with a local server that speaks the hub's protocol."""
 
 from pathlib import Path
 
@@ -27,7 +27,7 @@ REFUSAL = f"start '{REPOSITORY}' cannot be fetched from the hub"
 
 @pytest.fixture(scope="module")
 def theirs(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    """A zip that sb3-contrib wrote."""
+    """Return a zip that sb3-contrib wrote."""
     path = tmp_path_factory.mktemp("theirs") / "model.zip"
     stock = gymnasium.make("Humanoid-v5")
     TQC("MlpPolicy", stock, policy_kwargs={"net_arch": [16, 12]}, device="cpu").save(path)
@@ -35,7 +35,7 @@ def theirs(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 
 def at(address: str, cache: Path, patch: pytest.MonkeyPatch) -> None:
-    """What HF_ENDPOINT and HF_HOME say to a process that starts."""
+    """Set the hub's address and cache, as HF_ENDPOINT and HF_HOME do at start-up."""
     constants = huggingface_hub.constants
     usual = constants.HUGGINGFACE_CO_URL_TEMPLATE.removeprefix(constants.ENDPOINT)
     patch.setattr(constants, "ENDPOINT", address)

@@ -19,7 +19,7 @@ def small_policy() -> Policy:
 
 
 def a_file(weight: np.ndarray, header: str) -> bytes:
-    """A policy of one layer."""
+    """Return a policy of one layer."""
     tensors = {"layer0.weight": weight, "layer0.bias": np.zeros(3)}
     return save({n: np.asarray(t, np.float32) for n, t in tensors.items()}, {FORMAT: header})
 

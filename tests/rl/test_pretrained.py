@@ -40,7 +40,7 @@ def env(robot: Robot, sway: ReferenceMotion) -> VecEnv:
 
 
 def acts(networks: Networks, seen: np.ndarray) -> np.ndarray:
-    """The mean action of an actor, computed here."""
+    """Return the mean action of an actor, computed here."""
     hidden = seen
     for i in range(len(networks.widths("actor"))):
         layer = networks.tensors[f"actor.{i}.weight"], networks.tensors[f"actor.{i}.bias"]
@@ -69,7 +69,7 @@ def test_both_trainers_write_the_same_policy_from_the_same_networks(env: VecEnv)
 
 
 def zipped(tmp_path: Path, sde: bool = False) -> tuple[TQC, Path]:
-    """A zip that sb3-contrib wrote, as those of the hub are."""
+    """Save an untrained TQC of sb3-contrib as a zip like those of the hub; return both."""
     stock = gymnasium.make("Humanoid-v5")
     net = {"net_arch": [16, 12], "clip_mean": 0.0}
     model = TQC("MlpPolicy", stock, policy_kwargs=net, use_sde=sde, seed=4, device="cpu")

@@ -17,7 +17,7 @@ from tests.fixtures.own_robot import own_robot
 
 @pytest.fixture
 def other(tmp_path: Path) -> RobotDescription:
-    """A robot for which no walker ships."""
+    """Return a robot for which no walker ships."""
     (tmp_path / "machine").mkdir()
     return machine.description(tmp_path / "machine")
 

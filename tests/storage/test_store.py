@@ -34,7 +34,7 @@ fsspec.register_implementation("fulldisk", FullDisk, clobber=True)
 
 @pytest.fixture(scope="session")
 def s3_url() -> Iterator[str]:
-    """A bucket of a local S3 server."""
+    """Yield a bucket of a local S3 server."""
     server = ThreadedMotoServer(port=0, verbose=False)
     server.start()
     host, port = server.get_host_and_port()

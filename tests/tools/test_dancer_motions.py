@@ -22,7 +22,8 @@ AT = np.tile([0.3, 0.9, -0.2], (12, 1))
 
 
 def posed(**turns: Rotation) -> np.ndarray:
-    """Keypoints of a motionless person, some of whose parts are turned, relative to the pelvis."""
+    """Return the keypoints of a motionless person, some of whose parts are turned, relative to the
+    pelvis."""
     turned = {name: Rotation.concatenate([turn] * 12) for name, turn in turns.items()}
     points = smpl_sequence(deepmimic.Motion(30.0, AT, STILL | turned)).keypoints_w[5]
     return np.asarray(points - points[keypoint("pelvis")])

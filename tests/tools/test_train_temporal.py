@@ -105,7 +105,7 @@ def test_changed_windows_are_still_seen_as_they_are() -> None:
 
 
 def bank() -> Bank:
-    """One motion of somebody who sways."""
+    """Return one motion of a person who sways."""
     rng = np.random.default_rng(8)
     still = rng.uniform(-0.1, 0.1, (len(features.INPUT_LANDMARKS), 3))
     sway = 0.02 * np.sin(np.arange(FRAMES) / 7.0)[:, None, None] * [1.0, 0.0, 0.0]
@@ -202,7 +202,7 @@ def test_a_saved_state_goes_on_where_it_was(tmp_path: Path) -> None:
 
 
 def stop_early(progress: object, where: object, config: object, watch: object) -> None:
-    """Two of four steps of the same schedule."""
+    """Take two of the four steps of the same schedule."""
     from tools.temporal import fit
 
     assert isinstance(progress, fit.Progress)

@@ -89,7 +89,7 @@ def misjudged(local: np.ndarray, how: Change, rng: np.random.Generator) -> np.nd
 
 
 def slow(rng: np.random.Generator, shape: tuple[int, int, int], seconds: float) -> np.ndarray:
-    """Noise (B, L, N) of unit size that changes over so many seconds."""
+    """Return noise (B, L, N) of unit size that changes over a number of seconds."""
     count, frames, width = shape
     knots = int(np.ceil(frames / FPS / seconds)) + 3
     values = rng.standard_normal((count, knots, width), np.float32)

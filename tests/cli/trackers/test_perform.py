@@ -16,7 +16,7 @@ from tests.fixtures.stand_in_tracker import NAME, stand_in, write_yaml
 
 @pytest.fixture
 def dance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A motion of the humanoid named `<b>`, and the stand-in in the store."""
+    """Return a motion of the humanoid named `<b>`, and the stand-in in the store."""
     monkeypatch.setenv("ROBOJACKSON_STORE", str(tmp_path / "store"))
     monkeypatch.setenv("ROBOJACKSON_CONFIGS", str(tmp_path / "configs"))
     file, description = stand_in(tmp_path)

@@ -16,20 +16,21 @@ from tests.fixtures.web_server import Web, serving
 
 @pytest.fixture
 def network(tmp_path: Path) -> Path:
-    """The file that the stand-in's YAML pins."""
+    """Return the file that the stand-in's YAML pins."""
     return stand_in(tmp_path)[0]
 
 
 @pytest.fixture
 def web(network: Path) -> Iterator[Web]:
-    """A server that has it."""
+    """Yield a server that has the file."""
     with serving(network.read_bytes()) as running:
         yield running
 
 
 @pytest.fixture
 def pin(tmp_path: Path, web: Web, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Path]:
-    """Writes `configs/trackers/standin.yaml` for a kind of server; returns where the file comes."""
+    """Return a writer of `configs/trackers/standin.yaml` for a kind of server; it returns the
+    file's place."""
     monkeypatch.setenv("ROBOJACKSON_STORE", str(tmp_path / "store"))
     monkeypatch.setenv("ROBOJACKSON_CONFIGS", str(tmp_path / "configs"))
 

@@ -13,7 +13,7 @@ NO_PERSON = np.full((FRAMES, 33, 2), np.nan)
 
 
 def wall(seed: int = 0) -> np.ndarray:
-    """A large picture with blots all over it, RGB."""
+    """Return a large picture with blots all over it, RGB."""
     rng = np.random.default_rng(seed)
     rough = rng.uniform(0, 255, size=(3 * HEIGHT, 3 * WIDTH)).astype(np.float32)
     grey = cv2.normalize(cv2.GaussianBlur(rough, (0, 0), 4.0), None, 0, 255, cv2.NORM_MINMAX)
@@ -96,7 +96,8 @@ def test_a_bare_wall_is_reported_to_show_nothing() -> None:
 
 
 def floor_and_sky(seed: int = 0) -> np.ndarray:
-    """Little to hold on to: a plain sky over a floor with a few faint tiles, and noise."""
+    """Return a picture with little texture: a plain sky over a floor with a few faint tiles, and
+    noise."""
     image = np.full((HEIGHT, WIDTH), 180, np.uint8)
     image[HEIGHT // 2 :] = 140
     for x in range(20, WIDTH, 90):
@@ -106,7 +107,7 @@ def floor_and_sky(seed: int = 0) -> np.ndarray:
 
 
 def walker_at(x: int) -> np.ndarray:
-    """Landmarks of somebody 60 pixels wide."""
+    """Return the landmarks of a person 60 pixels wide."""
     corners = np.array([[x, 40], [x + 60, 200]]) / [WIDTH, HEIGHT]
     return np.linspace(corners[0], corners[1], 33)
 
@@ -118,7 +119,7 @@ def test_a_standing_camera_before_little_texture_moves_and_reports_nothing() -> 
 
 
 def tiles(seed: int = 0) -> np.ndarray:
-    """A plain sky over a floor of tiles."""
+    """Return a plain sky over a floor of tiles."""
     image = floor_and_sky(seed)
     rows, columns = np.indices(image.shape[:2])
     dark = (rows // 16 + columns // 20) % 2 == 1

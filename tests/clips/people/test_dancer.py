@@ -94,7 +94,8 @@ def test_the_picture_shows_the_frame_with_most_people() -> None:
 
 
 def whose(rows: np.ndarray, places: np.ndarray) -> tuple[set[int], float]:
-    """Which of the two a track shows while they are apart, and in which share of those frames."""
+    """Return which of the two dancers a track shows while they are apart, and in which share of
+    frames."""
     hips = rows[:, [23, 24], :2].mean(1) * SIZE
     apart = np.linalg.norm(places[:, 0] - places[:, 1], axis=-1) > 40
     known = ~np.isnan(hips[:, 0]) & apart

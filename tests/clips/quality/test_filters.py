@@ -23,7 +23,7 @@ def track_of(xy: np.ndarray, visibility: float = 0.9, fps: float = 30.0) -> Land
 
 
 def dance(frames: int = 60, seed: int = 0) -> np.ndarray:
-    """A person whose landmarks wander smoothly, each its own way."""
+    """Return a person whose landmarks wander smoothly and independently."""
     rng = np.random.default_rng(seed)
     phase, speed = rng.uniform(0, 6.28, (33, 2)), rng.uniform(0.05, 0.15, (33, 2))
     time = np.arange(frames)[:, None, None]
@@ -43,7 +43,7 @@ def shifted(image: np.ndarray, px: float) -> np.ndarray:
 
 
 def a_body() -> np.ndarray:
-    """A standing person, upright in the middle of the image."""
+    """Return a standing person, upright in the middle of the image."""
     xy = np.full((33, 2), 0.5)
     xy[:11, 1] = 0.2
     for index, (x, y) in {

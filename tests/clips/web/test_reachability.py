@@ -16,7 +16,7 @@ CLOSED_PORT = "http://127.0.0.1:9"
 
 @pytest.fixture
 def unresolved(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A machine without a name server."""
+    """Take the name server away."""
 
     def fail(*_: object, **__: object) -> None:
         raise socket.gaierror(-2, "Name or service not known")

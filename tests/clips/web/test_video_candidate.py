@@ -13,7 +13,7 @@ NOW = datetime(2026, 11, 21, tzinfo=UTC)
 
 
 def flat(video_id: str = "AbCdEfGhIjK", **more: Any) -> dict[str, Any]:
-    """One entry of a flat search of YouTube."""
+    """Return one entry of a flat search of YouTube."""
     return {
         "_type": "url",
         "ie_key": "Youtube",
@@ -37,7 +37,7 @@ def flat(video_id: str = "AbCdEfGhIjK", **more: Any) -> dict[str, Any]:
 
 
 def search(*entries: dict[str, Any]) -> dict[str, Any]:
-    """What `ytsearchN:` returns."""
+    """Return what `ytsearchN:` returns."""
     return {"_type": "playlist", "id": "APT dance", "title": "APT dance", "entries": list(entries)}
 
 

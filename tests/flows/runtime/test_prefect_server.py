@@ -36,12 +36,12 @@ class Guarded(BaseHTTPRequestHandler):
         self.end_headers()
 
     def log_message(self, *args: object) -> None:
-        """Quiet."""
+        """Log nothing."""
 
 
 @pytest.fixture
 def guarded() -> Iterator[str]:
-    """The address of a server that refuses us."""
+    """Yield the address of a server that refuses us."""
     server = ThreadingHTTPServer(("127.0.0.1", 0), Guarded)
     server.daemon_threads = True
     threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True).start()

@@ -67,7 +67,7 @@ def with_setting(folder: Path, key: str, value: object) -> Path:
 def figures_of(
     pack: Pack, folder: Path, packages: Path, work: Path
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """The judge's figures of the policy in our simulation, and of what the runner did alone."""
+    """Return the evaluation's figures of the policy in our simulation, and of the runner alone."""
     robot, reference = pack.robot, pack.reference
     driver, fall = trained_driver(pack.policy, robot, reference), Fall.of(robot)
     clip = Clip(reference, lead_of(robot, reference, driver.control))
@@ -87,7 +87,7 @@ def figures_of(
 
 
 def recorded(pack: Pack, clip: Clip, starts: Starts, qpos: np.ndarray) -> Rollouts:
-    """What was recorded elsewhere, as a rollout that the judge can read."""
+    """Return states that were recorded elsewhere as a rollout that the scorer can read."""
     robot, (steps, count) = pack.robot, qpos.shape[:2]
     data, fall = mujoco.MjData(robot.model), Fall.of(robot)
     points = np.zeros((steps, count, len(robot.keypoint_names), 3))
@@ -222,7 +222,7 @@ def test_a_robot_with_its_joints_in_another_order_is_refused(pack: Pack, tmp_pat
 
 
 def standing(pack: Pack) -> Runner:
-    """A runner whose robot stands at the motion's first row."""
+    """Return a runner whose robot stands at the motion's first row."""
     runner = Runner(pack.folder)
     runner.robot.data.qpos[:] = pack.reference.qpos[0]
     runner.begin(0)

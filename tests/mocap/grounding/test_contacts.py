@@ -22,7 +22,7 @@ CONFIG = ContactConfig()
 
 
 def four_feet(height: float = 0.0, speed: float = 0.0) -> np.ndarray:
-    """Four points at a height that move sideways (y) at a speed."""
+    """Return four points at a height that move sideways (y) at a speed."""
     feet = np.zeros((FRAMES, 4, 3))
     feet[..., 2] = height
     feet[..., 1] = (np.arange(FRAMES) / FPS * speed)[:, None]
@@ -30,7 +30,7 @@ def four_feet(height: float = 0.0, speed: float = 0.0) -> np.ndarray:
 
 
 def states(height: float, speed: float, falling: np.ndarray = GROUNDED) -> np.ndarray:
-    """Of four points that are all as high and as fast."""
+    """Return the states of four points that are all as high and as fast."""
     shape = np.ones((FRAMES, 4))
     return contacts(height * shape, speed * shape, falling, FPS, CONFIG)
 

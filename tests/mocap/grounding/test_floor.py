@@ -17,7 +17,7 @@ CONFIG = ground.GravityConfig()
 
 
 def standing_in_camera(tilt: Rotation) -> tuple[np.ndarray, np.ndarray]:
-    """Points and feet of a person at rest before a camera that is turned by `tilt`."""
+    """Return points and feet of a person at rest before a camera that is turned by `tilt`."""
     local = np.broadcast_to(np.eye(3), (FRAMES, 24, 3, 3)).copy()
     pose = forward(local, REST_JOINTS[None], np.zeros((FRAMES, 3)))
     upright = Rotation.from_matrix(np.diag([1.0, -1.0, -1.0]))

@@ -15,7 +15,7 @@ CLIP = Path(__file__).parents[3] / "clips" / "hip_shake.mp4"
 
 @pytest.fixture
 def followed(hip_shake: LandmarkTrack, monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """The pose models that were asked, each of which sees the recorded track."""
+    """Return the pose models that ran, each of which finds the recorded track."""
     used: list[str] = []
 
     def follow(path, info, size, dancer, progress=None, watch=None) -> LandmarkTrack:

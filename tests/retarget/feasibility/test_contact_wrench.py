@@ -17,7 +17,8 @@ BARRIER = 0.05
 
 
 def _demand(robot: Robot, hurry: float = 1.0) -> Demand:
-    """Some steps of the walk, played `hurry` times as fast: too fast for some motors."""
+    """Return the demand of some steps of the walk, played `hurry` times as fast: too fast for some
+    motors."""
     motion = robot_motion("walk")
     force = inverse_dynamics.free_space(robot, motion.qpos, motion.dt, motion.cycle_offset).at(
         hurry
@@ -27,7 +28,8 @@ def _demand(robot: Robot, hurry: float = 1.0) -> Demand:
 
 
 def _scipy_slack(demand: Demand, step: int) -> float:
-    """The same least squares by scipy's bounded solver, torques as unknowns."""
+    """Solve the same least squares by scipy's bounded solver, torques as unknowns; return the
+    slack."""
     use = demand.usable[step]
     edges, hinges = int(use.sum()), len(demand.ease)
     matrix = np.zeros((6 + hinges, edges + hinges))

@@ -99,7 +99,7 @@ def test_what_slowing_down_does_not_help_keeps_its_tempo():
 
 
 def _hurried(robot: Robot, tempo: float | str) -> dict[str, float]:
-    """The hip shake as if it had been filmed at a third of its speed, hardly repaired."""
+    """Retarget the hip shake as if it had been filmed at a third of its speed, hardly repaired."""
     fast = replace(human("hip_shake"), fps=90.0)
     gentle = replace(RetargetConfig().repair, weights=(1e-5,))
     config = RetargetConfig(tempo=tempo, repair=gentle)  # type: ignore[arg-type]

@@ -21,7 +21,7 @@ def idle(robot: Robot) -> Policy:
 
 
 def seeing(robot: Robot) -> Policy:
-    """A policy whose action depends a little on all that it sees."""
+    """Return a policy whose action depends a little on its whole observation."""
     shape = (Observer(robot, "full").size, robot.model.nu)
     weights = 0.01 * np.random.default_rng(0).normal(size=shape)
     return Policy(((weights, np.zeros(robot.model.nu)),), idle(robot).facts)

@@ -27,7 +27,7 @@ STEPS = 160
 
 
 def perfect(sway: ReferenceMotion) -> Rollouts:
-    """A rollout that is the reference itself for two cycles."""
+    """Return a rollout that is the reference itself for two cycles."""
     at = Clip(sway).at(np.arange(STEPS))
     return Rollouts(
         length=np.array([STEPS]),
@@ -46,7 +46,7 @@ def row(robot: Robot, sway: ReferenceMotion, rollouts: Rollouts) -> dict[str, ob
 
 
 def idle(robot: Robot, sway: ReferenceMotion, control: ControlConfig | None = None) -> Policy:
-    """A policy that adds nothing to the reference."""
+    """Return a policy that adds nothing to the reference."""
     size = Observer(robot, "full").size
     nothing = (np.zeros((size, robot.model.nu)), np.zeros(robot.model.nu))
     control = control or ControlConfig()

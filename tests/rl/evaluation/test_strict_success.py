@@ -42,7 +42,7 @@ def findings(robot: Robot, sway: ReferenceMotion, rollouts: Rollouts, start: int
 
 
 def lying(rollouts: Rollouts, first: int) -> Rollouts:
-    """The same with the torso on the floor from a step on."""
+    """Return the rollouts with the torso on the floor from a step on."""
     qpos = rollouts.qpos.copy()
     qpos[first:, 0, 2] = 0.1
     qpos[first:, 0, 3:7] = [np.cos(np.pi / 4), 0.0, np.sin(np.pi / 4), 0.0]

@@ -30,7 +30,7 @@ FED = dataclasses.replace(LED, feedback=1.0)
 
 @pytest.fixture(autouse=True)
 def store(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """One for all tests of this file: the gains are computed once."""
+    """Return one store for all tests of this file: the gains are computed once."""
     folder = tmp_path_factory.getbasetemp() / "feedback_store"
     folder.mkdir(exist_ok=True)
     monkeypatch.setenv("ROBOJACKSON_STORE", str(folder))

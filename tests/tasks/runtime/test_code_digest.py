@@ -125,7 +125,7 @@ print(total.hexdigest())
 
 
 def pythons() -> list[str]:
-    """Every interpreter of a supported version that is installed beside ours."""
+    """Return every installed interpreter of another supported version."""
     named = [found for minor in (11, 12, 13) if (found := shutil.which(f"python3.{minor}"))]
     kept = sorted((Path.home() / ".pyenv" / "versions").glob("3.1[123].*/bin/python"))
     return [name for name in (*named, *map(str, kept)) if _runs(name)]

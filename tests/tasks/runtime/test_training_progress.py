@@ -33,7 +33,7 @@ class Page:
 
 
 def train(page: Page, work: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """A training that writes how far it is, twice."""
+    """Run a training that reports its progress twice."""
     monkeypatch.setattr(artifacts, "acreate_progress_artifact", page.create)
     monkeypatch.setattr(artifacts, "aupdate_progress_artifact", page.update)
     monkeypatch.setattr(training_progress, "EVERY_S", 0.01)
