@@ -26,7 +26,7 @@ class RunFolder:
     """A run.
 
     Attributes:
-        robot: Who danced.
+        robot: The robot that danced.
         track, sequence, reference: Landmarks, person and target.
         rollout: What was danced.
         shown: All of it at the moments of its film.

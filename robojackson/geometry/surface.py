@@ -28,7 +28,7 @@ class Surface:
 
     Attributes:
         vertices: Places of the corners.
-        normals: Of length one, out of the solid.
+        normals: Normals of length one, out of the solid.
         faces: Three corners each.
     """
 

@@ -1,6 +1,6 @@
 """The door for robot models: an MJCF or URDF and the files that it names, before MuJoCo opens them.
 
-Whatever it names is a plain file of modest size; what MuJoCo makes of it is finite.
+Every file that it names is a plain file of modest size; what MuJoCo makes of it is finite.
 """
 
 import re

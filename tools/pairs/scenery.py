@@ -1,4 +1,4 @@
-"""Pictures of people before all sorts of backgrounds, with things in the way.
+"""Pictures of people before many backgrounds, with objects in front of them.
 
 Camera frame as in `robojackson.mocap.landmarks.pinhole_camera`: x right, y down, z forward, metres.
 """

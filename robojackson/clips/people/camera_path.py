@@ -230,7 +230,7 @@ def _mask(grey: np.ndarray, xy: np.ndarray) -> np.ndarray:
 
 
 def _corners(grey: np.ndarray, xy: np.ndarray) -> Float32[np.ndarray, "N 1 2"]:
-    """Return the best corners of each cell of the image: one striking thing has no more votes than
+    """Return the best corners of each cell of the image: one striking object has no more votes than
     others.
 
     What is no corner but noise is lost at once by Lucas-Kanade (`LEAST_TEXTURE`).

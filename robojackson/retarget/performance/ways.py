@@ -42,7 +42,7 @@ class Piece:
     """A part of a performance before the parts are joined.
 
     Attributes:
-        qpos: From its first step on, standing at both ends.
+        qpos: Poses from its first step on, standing at both ends.
         contact: State of the contact points at every step.
         danced: Its steps that show the dance; none of a way.
     """

@@ -33,7 +33,7 @@ class RegulatorTracker:
         return robot
 
     def follow(self, robot: Robot, n: int) -> Follower:
-        """Begin with n robots."""
+        """Return a follower of n robots."""
         require_robot(robot, self.description)
         return _RegulatorFollower(robot)
 

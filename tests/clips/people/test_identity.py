@@ -1,4 +1,4 @@
-"""Laws of telling people apart: no one becomes another, whatever hides him."""
+"""Laws of identities: no person takes another's, whatever hides them."""
 
 from collections.abc import Callable, Sequence
 
