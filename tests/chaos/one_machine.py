@@ -31,7 +31,7 @@ class Alone:
 
     Attributes:
         store: What is kept.
-        kinds: What can happen: does it and tells what it hit, or None if it cannot now.
+        kinds: What can happen: does it and returns what it hit, or None if it cannot now.
     """
 
     KINDS: ClassVar = ("disk", "command", "training")

@@ -3,7 +3,7 @@
     python -m tests.chaos.run --trials 20 --seed 0                          (make chaos)
     python -m tests.chaos.run --trials 20 --seed 0 --first 8 --out FILE     goes on where FILE ends
 
-Every trial disturbs a running study once, runs it again, and asks for tables that are byte for byte
+Every trial disturbs a running study once, runs it again, and requires tables that are byte for byte
 those of an undisturbed run, no process and no temporary file left. Most trials are on the stack of
 docker-compose.yml (tools/stack/compose_stack.py; its services start again by themselves, as
 `restart: unless-stopped` does); some are one command on one machine whose store is a disk of

@@ -33,7 +33,7 @@ class Cluster:
 
     Attributes:
         store: What it keeps.
-        kinds: What can happen to it: does it and tells what it hit, or None if it cannot now.
+        kinds: What can happen to it: does it and returns what it hit, or None if it cannot now.
     """
 
     KINDS: ClassVar = ("cell", "worker", "machine", "parent", "server", "database", "wire")

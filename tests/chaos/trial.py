@@ -40,7 +40,7 @@ class Bench(Protocol):
     kinds: dict[str, Callable[[random.Random], str | None]]
 
     def start(self, study: dict[str, Any]) -> Any:
-        """Begin a study; returns what `state` wants."""
+        """Begin a study; return the argument of `state`."""
 
     def state(self, run: Any) -> str | None:
         """Return how it ended, or None while it runs."""

@@ -1,4 +1,4 @@
-"""From what somebody asks to be danced to files, and what happens without a net."""
+"""From the source that a user names to files, and what happens without a network."""
 
 import asyncio
 from datetime import UTC, datetime

@@ -35,7 +35,7 @@ def test_the_file_is_in_the_store(web: Web, store_folder: Path) -> None:
 def test_a_second_download_checks_the_file_and_fetches_nothing(
     web: Web, store_folder: Path
 ) -> None:
-    """The page and the file of a bare video are one address: first both are asked for, then one."""
+    """The page and the file of a bare video are one address: first both are requested, then one."""
     first = bring(web)
     before = len(web.requests)
     assert bring(web) == first

@@ -1,4 +1,4 @@
-"""The motions that the dancer is taught: converted, mirrored, and none of those that judge it."""
+"""The motions that the dancer learns: converted, mirrored, and none that are held out."""
 
 from pathlib import Path
 
@@ -71,7 +71,7 @@ def test_speeds_are_mirrored_with_the_places() -> None:
 
 
 def test_the_dancer_trains_on_no_motion_that_evaluates_it(tmp_path: Path) -> None:
-    for name in load_split().judged:
+    for name in load_split().held_out:
         (tmp_path / f"{name.removeprefix('cmu_')}.bvh.gz").touch()
     assert [name for name, *_ in sequences(tmp_path, 0)] == []
     motion: ReferenceMotion = robot_motion("dance_b")

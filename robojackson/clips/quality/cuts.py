@@ -40,7 +40,7 @@ class CutConfig:
 
 
 class Changes:
-    """Sees every frame of a clip in order and counts cuts and pictures that moved."""
+    """Reads every frame of a clip in order and counts cuts and pictures that moved."""
 
     def __init__(self, fps: float, config: CutConfig) -> None:
         from scenedetect.detectors import ContentDetector

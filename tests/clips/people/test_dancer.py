@@ -1,4 +1,4 @@
-"""Laws of following one of several: never another; an impossible number tells who is there."""
+"""Laws of following one of several: never another; an impossible number lists the people there."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -80,7 +80,7 @@ def test_the_cartoon_loses_though_algorithm_1_likes_it(
 
 @pytest.mark.medium
 def test_the_score_is_algorithm_1(assessed: Assessed) -> None:
-    """Worked out once more, landmark by landmark, without numpy's arithmetic."""
+    """Computed again, landmark by landmark, without numpy's arithmetic."""
     for name in ("hip_shake", "slideshow", "black"):
         track = assessed[name].track
         missing, jitter = 0, 0.0

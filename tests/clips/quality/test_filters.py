@@ -1,4 +1,4 @@
-"""The parts of the judge, on pictures and tracks with known answers."""
+"""The parts of an assessment, on pictures and tracks with known answers."""
 
 import cv2
 import numpy as np

@@ -28,7 +28,7 @@ COMMANDS = {
 
 
 class Guarded(BaseHTTPRequestHandler):
-    """As Prefect's with a password: everybody may ask whether it is well, and nothing else."""
+    """A server like Prefect's with a password: without it, only the health check is answered."""
 
     def do_GET(self) -> None:
         self.send_response(200 if self.path.endswith("/health") else 401)

@@ -121,7 +121,7 @@ def test_refocusing_with_the_same_lens_changes_nothing() -> None:
 
 
 def test_the_refined_scale_is_that_of_the_true_bones() -> None:
-    """A scale that is wrong by 5 % makes a person with other bones; his own bones tell it."""
+    """A scale that is wrong by 5 % makes a person with other bones, which the clip's bones show."""
     view, (points, twist) = a_view(), a_motion()
     uvd, scale = seen_through_crops(points, view)
     zero = np.zeros((6, 29))

@@ -1,4 +1,4 @@
-"""The judge: rows made by hand, so that each verdict has one known answer."""
+"""The evaluation: rows made by hand, so that each verdict has one known answer."""
 
 import dataclasses
 
