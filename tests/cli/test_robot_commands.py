@@ -253,6 +253,22 @@ def test_new_writes_a_description_that_passes_and_keeps_a_file_that_is_there(
     assert Path("my_humanoid.yaml").read_text() != "mine"
 
 
+@pytest.mark.medium
+def test_new_runs_as_a_command(tmp_path: Path):
+    model = tmp_path / "machine.xml"
+    model.write_text(machine.mjcf())
+    result = commands.in_process("robots", "new", model, "-o", tmp_path / "it.yaml", "--json")
+    assert (result.code, result.answer["file"]) == (0, str(tmp_path / "it.yaml"))
+    assert (tmp_path / "it.yaml").is_file()
+
+
+@pytest.mark.medium
+def test_add_runs_as_a_command(source, describe):
+    describe(source)
+    result = commands.in_process("robots", "add", "machine", "--json")
+    assert (result.code, result.answer["added"]) == (0, True)
+
+
 def test_new_says_which_keys_are_left(tmp_path: Path):
     model = tmp_path / "machine.xml"
     model.write_text(machine.mjcf())
