@@ -58,7 +58,7 @@ class SearchResult:
 
     @property
     def chosen(self) -> Entry | None:
-        """The one to dance, None when there is none."""
+        """The entry to dance; None when all are rejected."""
         return next((entry for entry in self.entries if entry.decision == "chosen"), None)
 
 

@@ -44,7 +44,7 @@ def read_run(folder: Path) -> RunFolder:
     """Read the folder of a run.
 
     Raises:
-        StoreError: it is none, or a table is missing.
+        StoreError: it is not the folder of a run, or a table is missing.
         RejectedReference: the robot's model has changed since.
     """
     rollout = Rollout.load(one_of(folder, ROLLOUTS)).qpos

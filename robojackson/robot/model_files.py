@@ -88,7 +88,7 @@ def read_model(path: Path) -> mujoco.MjModel:
     """Return a model as it is, compiled.
 
     Raises:
-        BadConfiguration: MuJoCo cannot read it, or it is none that we open.
+        BadConfiguration: MuJoCo cannot read it, or its format is not accepted.
     """
     require_model_files(path, str(path))
     silence_mujoco()

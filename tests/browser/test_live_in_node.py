@@ -108,7 +108,7 @@ def in_python(run: RecordedRun, data: Mapping[str, Any], pushes: np.ndarray) -> 
 def test_pushes_are_survived_as_in_python(
     shaking: RecordedRun, speed: float, tmp_path: Path
 ) -> None:
-    """0.3 m/s, and so much that some fall."""
+    """0.3 m/s, and a speed at which some fall."""
     pushed = replace(shaking, policy=steadied(made_policy(shaking.robot)))
     assert pushed.policy is not None
     data = live_data(pushed.policy, pushed.reference, pushed.robot)

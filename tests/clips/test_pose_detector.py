@@ -1,4 +1,4 @@
-"""The detector on real files: a person is found, an empty room is not, what lacks is reported."""
+"""The detector on real files: it finds a person, no one in an empty room, and names what it lacks."""
 
 from pathlib import Path
 

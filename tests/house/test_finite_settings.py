@@ -14,7 +14,7 @@ from pydantic.dataclasses import is_pydantic_dataclass
 ROOT = Path(__file__).parents[2]
 DECORATOR = "@config_dataclass"
 CLASSES, FIELDS = 50, 200
-"""At least so many are found."""
+"""Least number of settings that are found."""
 
 
 def configurations() -> list[type]:

@@ -178,6 +178,6 @@ def _pinned(
 
 
 def _shares(steps: int, count: int) -> Float[np.ndarray, " N"]:
-    """Return shares of a way from rest to rest, without its beginning; 1 after so many steps."""
+    """Return shares of a way from rest to rest, without its beginning; 1 after the last step."""
     t = np.minimum(np.arange(1, count + 1) / steps, 1.0)
     return minimum_jerk(t)
