@@ -1,4 +1,4 @@
-"""The detector on real files: it finds a person, no one in an empty room, and names what it lacks."""
+"""The detector on real files: it finds a person, none in an empty room, and names what it lacks."""
 
 from pathlib import Path
 

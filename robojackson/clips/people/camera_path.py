@@ -41,8 +41,8 @@ STANDS, FEWEST_STANDING = 0.4, 6
 SPREAD = 0.25
 """Least share of the image inside the hull of the corners by which a motion is believed."""
 CHANGED, CHANGED_SHARE = 5.0, 30
-"""A frame is another picture if more than this percentage of the background's pixels changed by
-more than this, of 255."""
+"""A frame is another picture if more than CHANGED_SHARE percent of the background's pixels changed
+by more than CHANGED, of 255."""
 STILL = 0.01
 """A camera whose background strays less than this from the first frame stands, image diagonals."""
 BLIND_SHARE = 0.3
