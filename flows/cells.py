@@ -76,7 +76,7 @@ async def with_retries(
     Prefect's own retries would give every attempt the time of the first.
 
     Args:
-        stage: Runs it within so many seconds.
+        stage: Function that runs it, given its limit in seconds.
         deadline: At which the cell has failed, by the monotonic clock, seconds.
     Raises:
         TrainingFailed: its process failed, was killed too often, or the deadline has come.

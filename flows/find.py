@@ -97,7 +97,7 @@ def in_good_quality(chosen: Entry, settings: FindConfig) -> Artifact:
 def of_candidate(
     candidate: VideoCandidate, scored: Artifact | None, settings: FindConfig
 ) -> Artifact:
-    """Return the best format of a video, or its scored file when that cannot be had.
+    """Return the best format of a video, or its scored file when that cannot be downloaded.
 
     Raises:
         SearchFailed: neither is there.

@@ -1,8 +1,8 @@
 """The `robojackson` command with all of its commands: where library and flows are composed.
 
 The only module of the library that knows the flows; nothing imports it. The commands of one stage
-run with the library alone; for the others the app folder (`pipeline.app_folder`) goes first on this
-process's path.
+run with the library alone; for the others the app folder (`pipeline.app_folder`) comes first on
+this process's path.
 """
 
 import sys

@@ -172,7 +172,7 @@ class SearchFailed(RoboJacksonError):
 
 
 class DownloadFailed(RoboJacksonError):
-    """A video of the web cannot be had; the message is the reason that its table row gets."""
+    """A video of the web cannot be downloaded; the message is the reason in its table row."""
 
 
 class DeploymentFailed(RoboJacksonError):

@@ -100,7 +100,7 @@ class Backups:
         """Return the manifest of a backup, the newest without a name.
 
         Raises:
-            BackupFailed: there is none, or its manifest is damaged.
+            BackupFailed: there is no backup, or its manifest is damaged.
         """
         names = self.names()
         if not names:

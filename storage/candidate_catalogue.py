@@ -2,7 +2,7 @@
 
 Each refresh writes its rows as one new Parquet file under a name that no other can have, so two
 refreshes at once never touch the same file, on a disk or in an object store. Compaction writes what
-it read into one file and only then takes the read ones away: between the two a row stands in two
+it read into one file and only then removes the read ones: between the two a row is in two
 files, and a reader counts it once by its `record_id`. DuckDB answers questions.
 """
 

@@ -31,7 +31,7 @@ class BackupResult:
         files, size_mb: Files and size in it.
         copied, copied_mb: Files and millions of bytes that earlier backups did not have.
         database: Address of the database that was dumped; None: there is none.
-        freed_mb: Size of contents that only removed backups had.
+        freed_mb: Size of contents that were in removed backups alone, MB.
     """
 
     name: str

@@ -71,7 +71,7 @@ def root_of(store: Store) -> Path:
     """Return the folder of a store.
 
     Raises:
-        StoreError: it is an object store, or there is none yet.
+        StoreError: it is an object store, or it does not exist yet.
     """
     if not isinstance(store.place, LocalFolder):
         raise StoreError(

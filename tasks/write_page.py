@@ -51,7 +51,7 @@ class ScoredClip:
     """A candidate.
 
     Attributes:
-        name: Of the file.
+        name: Name of the file.
         video: The clip.
         reason: Why it is danced, or not.
         chosen: Whether it is danced.
@@ -68,9 +68,9 @@ class PageSettings:
     """What a page needs besides what the stages made.
 
     Attributes:
-        robot: Who dances.
+        robot: The robot that dances.
         render: How the video looks; the page shows the same moments.
-        configuration: Of the pass, as YAML.
+        configuration: Configuration of the pass, as YAML.
         candidates: Clips that were scored, the one that is danced among them.
     """
 

@@ -83,9 +83,9 @@ def report(
 
     Args:
         moves: Moves of the study, by name.
-        pictures: By move, a picture of video frame, recovered body and robot side by side, as PNG.
+        pictures: Picture of each move as PNG: video frame, recovered body and robot side by side.
         runs: Ids of the trainings that count; all that the tables have under its name if absent.
-        reward_audits: By move, what the rewards of the setups pay to bodies that do not dance it.
+        reward_audits: What the rewards of the setups pay to bodies that do not dance, by move.
     """
     store, rng = Store.from_environment(), np.random.default_rng(0)
     with study_tables.opened(store, study.name, runs) as ask:

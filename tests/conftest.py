@@ -27,9 +27,9 @@ def pytest_xdist_auto_num_workers() -> int:
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out what needs more than a machine has by itself, unless `-m` asks for it by name."""
-    asked = str(config.getoption("-m"))
-    unasked = [marker for marker in ("network", "cluster", "browser") if marker not in asked]
-    outside = [item for item in items if any(item.get_closest_marker(m) for m in unasked)]
+    marks = str(config.getoption("-m"))
+    left_out = [marker for marker in ("network", "cluster", "browser") if marker not in marks]
+    outside = [item for item in items if any(item.get_closest_marker(m) for m in left_out)]
     if outside:
         config.hook.pytest_deselected(items=outside)
         items[:] = [item for item in items if item not in outside]
@@ -37,7 +37,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.fixture
 def store_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty store that `Store.from_environment` finds, in this process and its children."""
+    """Return an empty store that `Store.from_environment` finds, in this process and its
+    children."""
     folder = tmp_path / "store"
     monkeypatch.setenv("ROBOJACKSON_STORE", str(folder))
     return folder
@@ -45,7 +46,7 @@ def store_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture(scope="session")
 def prefect_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """One temporary Prefect server for the whole session; it takes seconds to start."""
+    """Yield one temporary Prefect server for the whole session; it takes seconds to start."""
     home = tmp_path_factory.mktemp("prefect")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PREFECT_HOME", str(home))
@@ -59,7 +60,7 @@ def prefect_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 @pytest.fixture
 def records(prefect_server: None, store_folder: Path) -> Iterator[None]:
-    """An empty store for the records of stages, and a server for their runs."""
+    """Yield an empty store for the records of stages, and a server for their runs."""
     from prefect.settings import (
         PREFECT_FLOWS_HEARTBEAT_FREQUENCY,
         PREFECT_LOGGING_LEVEL,
@@ -76,7 +77,7 @@ def records(prefect_server: None, store_folder: Path) -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def short_clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The first second of the hip shake."""
+    """Return the first second of the hip shake."""
     from robojackson.clips.trim import trim
 
     out = tmp_path_factory.mktemp("clip") / "hips.mp4"

@@ -155,7 +155,7 @@ class Bare:
 
     Args:
         batched: Speed in the environment's order, a batch at a time, which the cache of
-            the processor likes; else substep by substep over all robots, as anybody would write it.
+            the processor likes; else substep by substep over all robots, as a plain loop does.
     """
 
     def __init__(self, model: mujoco.MjModel, n: int, script: Script, batched: bool) -> None:

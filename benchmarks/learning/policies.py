@@ -183,7 +183,7 @@ def load(reference: Path) -> ReferenceMotion:
 
 
 def _made(move: Move, work: Path) -> int:
-    """Make the motion of a move from its source; the exit status of the gate."""
+    """Make the motion of a move from its source; return the exit status of the gate."""
     source = source_of(move)
     assert source is not None
     must("import" if move.is_foreign else "mocap", source, "-o", work)

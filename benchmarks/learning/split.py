@@ -28,13 +28,13 @@ class Split:
     """The lists of `split.yaml`.
 
     Attributes:
-        judged: Motions that no training, pretraining or tuning may see.
+        held_out: Motions that no training, pretraining or tuning may see.
         train: Motions that trainings may see.
         excluded: Near-duplicates of evaluated ones, with the motion and the share of it.
         references: sha256 of the poses of frozen references, by row.
     """
 
-    judged: tuple[str, ...]
+    held_out: tuple[str, ...]
     train: tuple[str, ...]
     excluded: Mapping[str, Mapping[str, Any]]
     references: Mapping[str, str]
@@ -57,19 +57,19 @@ def load_split(path: Path = FILE) -> Split:
     """Read the split."""
     result = yaml.safe_load(path.read_text())
     return Split(
-        judged=tuple(result["judged"]),
+        held_out=tuple(result["held_out"]),
         train=tuple(result["train"]),
         excluded=result["excluded"],
         references=result["references"],
     )
 
 
-def shares(motions: Mapping[str, SmplSequence], judged: Iterable[str]) -> list[dict[str, Any]]:
+def shares(motions: Mapping[str, SmplSequence], held_out: Iterable[str]) -> list[dict[str, Any]]:
     """Return, for every evaluated motion, the others that contain some of it, plain or mirrored."""
     plain = {name: windows(motion) for name, motion in motions.items()}
     mirrored = {name: windows(motion, mirrored=True) for name, motion in motions.items()}
     rows = []
-    for name in judged:
+    for name in held_out:
         for other in motions:
             if name == other or name not in motions:
                 continue
@@ -77,7 +77,7 @@ def shares(motions: Mapping[str, SmplSequence], judged: Iterable[str]) -> list[d
                 contained_share(plain[name], plain[other]),
                 contained_share(plain[name], mirrored[other]),
             )
-            rows.append({"judged": name, "motion": other, "share": share})
+            rows.append({"held_out": name, "motion": other, "share": share})
     return rows
 
 
@@ -85,10 +85,10 @@ def main() -> None:
     """Print what contains the evaluated motions."""
     folder = Path(sys.argv[1])
     motions = {path.stem: SmplSequence.load(path) for path in sorted(folder.glob("*.parquet"))}
-    for row in shares(motions, load_split().judged):
+    for row in shares(motions, load_split().held_out):
         if row["share"] >= WORTH_TELLING:
             mark = "  near-duplicate" if row["share"] >= DUPLICATE_SHARE else ""
-            print(f"{row['judged']:>14} in {row['motion']:<14} {row['share']:.2f}{mark}")
+            print(f"{row['held_out']:>14} in {row['motion']:<14} {row['share']:.2f}{mark}")
 
 
 if __name__ == "__main__":

@@ -43,7 +43,7 @@ def seed_of(weights: Path) -> int:
 
 
 def make(number: int, seed: int, files: dict[str, Path], tools: tuple[Any, Any]) -> dict[str, Any]:
-    """Clip of one stratum."""
+    """Make the clip of one stratum."""
     from tools.pairs import clips, cmu_bvh, scenery, sources
     from tools.render import deepmimic
 

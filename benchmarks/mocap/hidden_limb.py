@@ -86,7 +86,7 @@ def draw_cases(
 
 
 def hide(track: LandmarkTrack, case: Case) -> LandmarkTrack:
-    """Return the track as if nothing of the limb had been seen."""
+    """Return the track as if no landmark of the limb were detected."""
     columns = [landmark(f"{case.side}_{name}") for name in MARKS[case.limb]]
     visibility = np.array(track.visibility)
     visibility[case.start : case.end, columns] = 0.0

@@ -48,7 +48,7 @@ class Costs:
 
 
 class Begun:
-    """Costs at the start of every so many cells; a reading takes 30 ms."""
+    """Costs at the start of every n-th cell; a reading takes 30 ms."""
 
     def __init__(self, stack: Stack, every: int = 1) -> None:
         self._every = every
@@ -61,7 +61,7 @@ class Begun:
         self.orchestration_s: list[float] = []
 
     def __call__(self) -> None:
-        """Count one cell, and read the costs at every so many."""
+        """Count one cell, and read the costs at every n-th."""
         if self.count % self._every == 0:
             own = _own_cpu_s()
             self.wall_s.append(time.monotonic())

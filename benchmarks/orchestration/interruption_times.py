@@ -32,7 +32,7 @@ ACKNOWLEDGED_S, ENDED_S, SAVED_S = 1.0, 3.0, 30.0
 FIRST_S = 0.05
 """The first moment: before, Python itself is starting."""
 EARLIER = 0.8
-"""Share of the time after which a command is interrupted that had ended before."""
+"""Share of the usual duration of a command after which it is interrupted."""
 WAYS = [(how, alone) for how in (signal.SIGINT, signal.SIGTERM) for alone in (False, True)]
 LEARNING = ("--set=checkpoint_seconds=5", "--set=progress_seconds=1")
 

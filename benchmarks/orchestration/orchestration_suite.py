@@ -43,7 +43,7 @@ QUARTERS = 4
 
 
 def sleepers(count: int) -> dict[str, Any]:
-    """Return a grid of about so many cells of one move."""
+    """Return a grid of about `count` cells of one move."""
     return {"moves": ("walk",), "setups": SETUPS, "seeds": tuple(range(count // len(SETUPS)))}
 
 

@@ -89,7 +89,7 @@ def measure(file: Path) -> PageSpeed:
 
 
 def _played(page: "Page") -> float:
-    """Pictures a second while it plays."""
+    """Return the pictures a second while a page plays."""
     page.wait_for_timeout(1000)
     first, began = page.evaluate(DRAWN), time.monotonic()
     page.wait_for_timeout(1000 * SECONDS)
@@ -97,7 +97,7 @@ def _played(page: "Page") -> float:
 
 
 def processor_s(root: int) -> float:
-    """Processor time of a process' descendants, seconds."""
+    """Return the processor time of a process' descendants, seconds."""
     children: dict[int, list[tuple[int, int]]] = {}
     for entry in os.listdir("/proc"):
         if entry.isdigit():

@@ -166,7 +166,7 @@ def table(rows: list[dict[str, Any]]) -> Table:
 
 
 def markdown(rows: list[dict[str, Any]]) -> str:
-    """Return the rows for docs/benchmarks.md."""
+    """Return the rows for docs/benchmarks_retarget.md."""
     names = ["robot", "source", "clip", "method"]
     lines = ["| " + " | ".join([*names, *COLUMNS.values()]) + " |"]
     lines.append("|---" * (len(names) + len(COLUMNS)) + "|")

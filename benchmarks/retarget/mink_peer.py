@@ -2,8 +2,8 @@
 
 Same robot, same keypoint targets and weights as ours; position tasks on the sites, joint limits, a
 true limit of speed from frame to frame. `lock` gives it the contacts, too, as our solver has them:
-a foot in contact is at the height of the floor and stays where it was first planted. Without, it
-follows the keypoints alone and may slip, float and sink.
+a foot in contact is at the height of the floor and stays where it was first planted. Without
+`lock` it follows the keypoints alone and may slip, float and sink.
 `filtered` is the same motion through a zero-phase low-pass of 6 Hz. mink is a bench dependency:
 `.venv/bin/pip install -e '.[bench]'`.
 """

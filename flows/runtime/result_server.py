@@ -42,7 +42,7 @@ def serve(store: Store, host: str, port: int) -> None:
     """Run the server until it gets a signal to end.
 
     Args:
-        store: Whose results it shows.
+        store: The store whose results it shows.
         host, port: Where it listens.
     Raises:
         DeploymentFailed: it cannot listen there.

@@ -26,7 +26,7 @@ class Entry:
         candidate: The video.
         decision: chosen, accepted, rejected or failed.
         reason: Why not; empty for those that may be danced.
-        video: Its file, scored; None when it could not be had.
+        video: Its scored file; None when the download failed.
         artifacts: Results of the assessment.
         score, quality: The figures; None when it could not be assessed.
     """
@@ -58,7 +58,7 @@ class SearchResult:
 
     @property
     def chosen(self) -> Entry | None:
-        """The one to dance, None when there is none."""
+        """The entry to dance; None when all are rejected."""
         return next((entry for entry in self.entries if entry.decision == "chosen"), None)
 
 

@@ -80,7 +80,7 @@ def of_address(address: str, search: Search) -> tuple[str, Artifact]:
     """Return a video of the web in good quality, and its name.
 
     Raises:
-        SearchFailed: it cannot be had; the message has the reason.
+        SearchFailed: it cannot be found or downloaded; the message has the reason.
     """
     settings = load(FindConfig, search.config)
     (candidate,) = urls.search("", address, 1, settings.web, datetime.now(UTC))

@@ -8,7 +8,7 @@ _listeners: list[Listener] = []
 
 
 def announce(stage: str) -> None:
-    """Tell all listeners of this process that a stage begins."""
+    """Notify all listeners of this process that a stage begins."""
     for listener in _listeners:
         listener(stage)
 

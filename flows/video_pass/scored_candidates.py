@@ -71,7 +71,7 @@ def choose(candidates: list[Candidate]) -> Candidate:
     """Return the steadiest candidate in which there is a person: the lowest score a second.
 
     Raises:
-        NoPersonFound: there is none.
+        NoPersonFound: no candidate shows a person.
     """
     danced = [candidate for candidate in candidates if candidate.score.detected]
     if not danced:

@@ -60,7 +60,7 @@ def chosen_tracker(robot: RobotDescription, settings: PipelineConfig) -> Tracker
     training, a fallback is taken by name alone.
 
     Raises:
-        BadPolicy: `instant` needs one that is not here, or there is none for the robot.
+        BadPolicy: `instant` needs a tracker that is not installed, or none exists for the robot.
         MissingDependency: `instant` needs one, and what runs it is not installed.
         UnknownName: no tracker of that name.
     """

@@ -103,7 +103,7 @@ def format_of(name: str, known: Mapping[str, Exporter], what: str) -> Exporter:
         what: What is at hand, as a clause.
 
     Raises:
-        UnknownName: it is none of them.
+        UnknownName: the name is not among them.
     """
     if name not in known:
         raise UnknownName("format", name, f"--to; {what}", known)

@@ -71,7 +71,7 @@ def recover_motion(
         source: A video, a landmarks.parquet, or the landmarks themselves.
         second: The same dance from another camera, likewise; neither camera may move.
         quality: Pose model for a video; see `detect_landmarks`.
-        person: Whom to follow in a video; see `detect_landmarks`.
+        person: Number of the person to follow in a video; see `detect_landmarks`.
         config: How landmarks become a motion.
         networks: Weights of HybrIK, and NIKI, that take the place of our own network; what
             `load_weights` returned, or their paths.

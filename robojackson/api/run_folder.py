@@ -26,7 +26,7 @@ class RunFolder:
     """A run.
 
     Attributes:
-        robot: Who danced.
+        robot: The robot that danced.
         track, sequence, reference: Landmarks, person and target.
         rollout: What was danced.
         shown: All of it at the moments of its film.
@@ -44,7 +44,7 @@ def read_run(folder: Path) -> RunFolder:
     """Read the folder of a run.
 
     Raises:
-        StoreError: it is none, or a table is missing.
+        StoreError: it is not the folder of a run, or a table is missing.
         RejectedReference: the robot's model has changed since.
     """
     rollout = Rollout.load(one_of(folder, ROLLOUTS)).qpos

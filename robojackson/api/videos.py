@@ -57,7 +57,7 @@ def detect_landmarks(
         video: File, or frames (T, H, W, 3) as uint8 RGB.
         fps: Frames a second of an array; a file has its own.
         quality: Pose model: lite, full, heavy, or best, which lets two vote.
-        person: Whom to follow among several people; 1 is the largest steady one, None too.
+        person: Number of the person to follow; 1, and None, is the largest steady one.
         limits: Longest and shortest clip.
         config: Everything else about how the person is found.
         progress: True shows a bar; a function is called with (frames done, frames in all).

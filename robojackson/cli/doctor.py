@@ -1,4 +1,4 @@
-"""Report what this machine has and lacks, with the command that installs each missing thing.
+"""Report what is installed and what is missing, with the command that installs each part.
 Imports no Prefect."""
 
 import ctypes
@@ -83,7 +83,7 @@ def examine() -> dict[str, Any]:
 
 
 def doctor_lines(found: Mapping[str, Any]) -> list[str]:
-    """Return the lines about `examine`'s findings: each missing thing on a line, a verdict."""
+    """Return the lines about `examine`'s findings: one for each missing part, then a verdict."""
     advice = ("missing", "optional")
     rows = [*lines({key: value for key, value in found.items() if key not in advice})]
     rows += [f"{key:<8}  {each}" for key in advice for each in found[key]]

@@ -74,7 +74,7 @@ def detect(
         info: What `probe` found in it.
         size: lite, full or heavy.
         progress: Called with (frames done, frames in all) after every frame.
-        watch: Sees every frame too, so that a clip is decoded once.
+        watch: Called with every frame too, so that a clip is decoded once.
     Raises:
         MissingDependency: no model bundle, or no EGL and GLES libraries.
     """

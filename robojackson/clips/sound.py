@@ -33,7 +33,7 @@ class Sound:
 
 
 def read_sound(path: Path) -> Sound | None:
-    """Read the first sound track of a video or of a sound file; None where there is none to hear.
+    """Read the first sound track of a video or of a sound file; None where it has none.
 
     What follows damage is left out.
 

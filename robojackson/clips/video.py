@@ -173,7 +173,7 @@ def timed_frames(
         path: Video file.
         start_s, end_s: Range, seconds.
         short_side: Images that are larger by more than a tenth are made smaller until their short
-            side has so many pixels.
+            side has this number of pixels.
     """
     origin = None
     for stamp, frame in _decoded(path):

@@ -24,7 +24,7 @@ class Column:
 
     Attributes:
         name: Name of the column.
-        type: Of one number (or text).
+        type: Type of one number (or text).
         unit: SI symbol, `1` for a ratio, `` for what has none.
         frame: Axes of a vector, `` for a scalar.
         width: Numbers a row; 1 is a scalar, None a vector whose width the file itself gives.

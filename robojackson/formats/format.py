@@ -128,7 +128,7 @@ class Importer:
     """A format of human motions that can be read.
 
     Attributes:
-        name: Of the format.
+        name: Name of the format.
         read: Function that returns the motion in a file.
         recognises: Function that returns whether a file is of this format.
         fps: Frames a second where a file has none; None where the file must have it.

@@ -56,7 +56,7 @@ def add_robot(
     Args:
         clock: Times of the poses (`GltfScene.clock`).
         name: Put before the names of the bodies, where a scene holds several robots.
-        tint: Of the whole robot; None takes the model's own colours.
+        tint: Colour of the whole robot; None takes the model's own colours.
         aside_m: How far to its left the robot is put.
     """
     states = body_states(model, np.asarray(qpos, float))

@@ -13,9 +13,9 @@ CREASE_DEG = 40.0
 ROUND_STEPS, CAP_STEPS = 24, 6
 """Corners around a round part, and from the pole of a half ball to its rim."""
 NORMAL_STEPS = 32
-"""Normals that round to the same of so many steps are one."""
+"""Steps a unit to which normals are rounded; equal ones are one."""
 WAYS = 6
-"""Faces at one place whose normals round to the same of so many steps are of one direction."""
+"""Steps a unit to which faces' normals are rounded; equal ones at one place are one direction."""
 CORNERS_AT_ONCE = 20_000
 """Corners whose neighbours are compared in one array."""
 TOWARDS_MEAN = 0.02
@@ -28,7 +28,7 @@ class Surface:
 
     Attributes:
         vertices: Places of the corners.
-        normals: Of length one, out of the solid.
+        normals: Normals of length one, out of the solid.
         faces: Three corners each.
     """
 

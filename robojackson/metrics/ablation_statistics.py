@@ -18,7 +18,7 @@ COMPARED = (
     ("scratch-curiosity", "scratch"),
     ("curiosity", "pretrain"),
 )
-"""Setups that differ in one thing: twice in pretraining, twice in curiosity."""
+"""Pairs of setups with one difference: two in pretraining, two in curiosity."""
 Verdict = Literal["holds", "not shown", "reversed", "not measured"]
 
 

@@ -28,7 +28,7 @@ class BeatAlignment:
     """Figures of one motion beside one piece of music.
 
     Attributes:
-        beats: Of the motion.
+        beats: Beats of the motion, seconds.
         precision: Share of them that hit a beat of the music.
         recall: Share of the music's beats that are hit.
         f1: Harmonic mean of the two.

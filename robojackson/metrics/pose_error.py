@@ -32,7 +32,7 @@ def procrustes(
     truth: Float[np.ndarray, "*B J 3"],
     scaled: bool = True,
 ) -> Similarity:
-    """Return the similarity (or rigid motion) that brings points nearest to the truth, never a
+    """Return the similarity (or rigid motion) that maps points nearest to the truth, never a
     reflection.
 
     Umeyama, PAMI 1991, over any batch.

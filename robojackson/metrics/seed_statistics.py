@@ -40,7 +40,7 @@ class Effect:
     Attributes:
         difference: Mean of treated minus control, with its interval.
         p: Two-sided, of the exact sign-flip test; NaN with fewer than two pairs.
-        smallest_p: The smallest that so many pairs can give.
+        smallest_p: The smallest p that this number of pairs can give.
         improvement: Probability that a run of the treated beats one of the control.
     """
 

@@ -32,7 +32,7 @@ class FloorMove:
     def onto(
         cls, qpos: Float[np.ndarray, "N nq"], target: Float[np.ndarray, "N nq"]
     ) -> "FloorMove":
-        """Return what brings the roots of `qpos` over those of `target`, with their headings."""
+        """Return the move that puts the roots of `qpos` over those of `target`, headings too."""
         turn = heading(target[:, 3:7]) - heading(qpos[:, 3:7])
         return cls(turn, target[:, :2] - _turned(qpos[:, :2], turn))
 

@@ -31,7 +31,7 @@ class PipelineConfig:
         tracker: Name of the tracker (`configs/trackers`) whose dance is on the page first; null is
             the first for the robot whose file is here, `none` is no tracker.
         gate: Refuse to train on a reference motion that breaks a hard bar of its score card.
-        network: Published networks whose weights the user brings; none by default.
+        network: Published networks whose weights the user supplies; none by default.
         video, stability, mocap, retarget, train, evaluate, render: Configurations of the stages.
     """
 

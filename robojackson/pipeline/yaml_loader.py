@@ -85,7 +85,7 @@ def find(name_or_path: str | Path) -> Path:
     """Return the file of a configuration.
 
     Raises:
-        UnknownName: there is none; the message lists those that exist.
+        UnknownName: there is no such file; the message lists those that exist.
     """
     given = Path(name_or_path)
     if given.suffix in SUFFIXES:

@@ -40,7 +40,7 @@ class Feasible:
     Attributes:
         qpos: At the control step.
         aims: Targets at its steps.
-        steps: Fractional step of the motion before that each step shows.
+        steps: Step of the motion before repair that each step shows, fractional.
         clip: Steps of that motion that are the clip's; the others are tails.
     """
 

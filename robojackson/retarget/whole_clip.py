@@ -40,7 +40,7 @@ class Optimised:
 
     Attributes:
         qpos: At the control step.
-        aims: The targets, leaned where the body had to be.
+        aims: The targets, leaned where the body is leaned.
         shift: How far at one metre of height, forward and left.
         faults: The bars that it could not hold.
     """

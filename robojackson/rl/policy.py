@@ -166,6 +166,6 @@ def _layers(
 
 
 def _extra(tensors: Mapping[str, np.ndarray], count: int) -> str:
-    """Return a name that is none of a layer's."""
+    """Return a name that belongs to no layer."""
     known = {f"layer{i}.{part}" for i in range(count) for part in ("weight", "bias")}
     return min(set(tensors) - known)

@@ -101,8 +101,8 @@ def _first(*choices: Float[np.ndarray, " J"]) -> Float[np.ndarray, " J"]:
 def torque_limits(
     model: mujoco.MjModel, description: RobotDescription, joints: tuple[str, ...]
 ) -> Float[np.ndarray, " J"]:
-    """Return the limit of every hinge, infinite where nothing drives it; the description goes
-    first.
+    """Return the limit of every hinge, infinite where nothing drives it; the description takes
+    precedence.
 
     A motor gives gear times gain times control range, several of one joint together; one without a
     range, or a position or velocity servo, what its force range allows; the joint's own force

@@ -90,8 +90,7 @@ def _upright(robot: Robot) -> Iterator[str]:
 
 
 def _out_of_range(robot: Robot) -> Iterator[str]:
-    """Yield the rest angles beyond a limit: the robot would stand otherwise than its soles were
-    checked."""
+    """Yield the rest angles beyond a limit: the robot would not stand as its soles were checked."""
     place = where(robot.description, "rest_pose")
     for name, rest, low, high in zip(
         robot.joint_names, robot.rest, robot.lower, robot.upper, strict=True

@@ -73,7 +73,7 @@ def remove(
 
 
 def _moved(actuator: mujoco.MjsActuator) -> mujoco.mjtObj:
-    """Return what kind of thing an actuator pulls at."""
+    """Return the kind of element that an actuator drives."""
     kind = mujoco.mjtTrn
     if actuator.trntype in (kind.mjTRN_JOINT, kind.mjTRN_JOINTINPARENT):
         return _JOINT
@@ -81,7 +81,7 @@ def _moved(actuator: mujoco.MjsActuator) -> mujoco.mjtObj:
 
 
 def _coupled(equality: mujoco.MjsEquality) -> mujoco.mjtObj:
-    """Return what kind of thing an equality constraint couples."""
+    """Return the kind of element that an equality constraint couples."""
     if equality.type == mujoco.mjtEq.mjEQ_JOINT:
         return _JOINT
     tendon = equality.type == mujoco.mjtEq.mjEQ_TENDON

@@ -1,6 +1,6 @@
 """The door for robot models: an MJCF or URDF and the files that it names, before MuJoCo opens them.
 
-Whatever it names is a plain file of modest size; what MuJoCo makes of it is finite.
+Every file that it names is a plain file of modest size; what MuJoCo makes of it is finite.
 """
 
 import re
@@ -88,7 +88,7 @@ def read_model(path: Path) -> mujoco.MjModel:
     """Return a model as it is, compiled.
 
     Raises:
-        BadConfiguration: MuJoCo cannot read it, or it is none that we open.
+        BadConfiguration: MuJoCo cannot read it, or its format is not accepted.
     """
     require_model_files(path, str(path))
     silence_mujoco()

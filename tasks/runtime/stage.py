@@ -132,7 +132,7 @@ class Stage(Generic[P, R]):
         """Run as a task, which reads the record where there is one.
 
         Raises:
-            NotRecorded: there is none, inside `records_only`.
+            NotRecorded: there is no record, inside `records_only`.
         """
         if not _records_only.get():
             return self.task(*args, **kwargs)

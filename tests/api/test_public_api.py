@@ -56,7 +56,7 @@ def config() -> TrainConfig:
 
 
 def paid(state: rj.RewardState) -> np.ndarray:
-    """A reward term of a user."""
+    """Return a reward term of a user."""
     return np.full(len(state.qpos), 0.5)
 
 
@@ -182,7 +182,7 @@ def test_a_reward_of_ones_own_is_in_the_table_and_the_policy_is_saved(
         folder / "policy.safetensors", reference, config=EvaluateConfig(0.5, phases=2, resets=1)
     )
     assert again.summary["rollouts"] == 3.0
-    assert {path.name for path in again.save(tmp_path / "judged").iterdir()} == {
+    assert {path.name for path in again.save(tmp_path / "evaluated").iterdir()} == {
         "evaluation.json", "evaluations.parquet", "rollout.parquet",
     }  # fmt: skip
 

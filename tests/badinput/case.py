@@ -9,7 +9,7 @@ Maker = Callable[[Path], object]
 
 
 def nothing(folder: Path) -> None:
-    """No file is needed."""
+    """Make no file."""
 
 
 @dataclass(frozen=True)
@@ -19,12 +19,12 @@ class Case:
     Attributes:
         group: Kind of foreign input.
         name: What is wrong (or odd), unique in the group.
-        words: Of the command line; `@` at the beginning stands for the folder of the base files.
-        make: Makes the files.
-        env: Variables, `{here}` in a value stands for the folder of the case.
+        words: Words of the command; `@` at the beginning stands for the folder of the base files.
+        make: Writer of the files.
+        env: Environment variables; `{here}` in a value stands for the folder of the case.
         valid: Whether it must succeed.
         fuzzed: Found by a fuzzer.
-        says: What the line must hold.
+        says: Text that the line must contain.
     """
 
     group: str
@@ -37,7 +37,7 @@ class Case:
 
 
 def writes(name: str, content: bytes | str) -> Maker:
-    """A maker of one file."""
+    """Return a maker of one file."""
     data = content.encode() if isinstance(content, str) else content
 
     def make(folder: Path) -> None:

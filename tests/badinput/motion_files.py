@@ -27,7 +27,7 @@ class Evil:
 
 
 def amass(**changes: object) -> Maker:
-    """A maker of an AMASS archive with other arrays; `...` takes one away."""
+    """Return a maker of an AMASS archive with other arrays; `...` removes one."""
 
     def make(here: Path) -> None:
         with np.load(BASE / "amass.npz") as archive:
@@ -43,7 +43,7 @@ def amass(**changes: object) -> Maker:
 
 
 def sized(poses: int) -> Maker:
-    """A compressed archive of so many frames of zeros."""
+    """Return a compressed archive of a number of frames of zeros."""
 
     def make(here: Path) -> None:
         zeros = {"poses": np.zeros((poses, 156), np.float32), "trans": np.zeros((poses, 3))}
@@ -53,7 +53,7 @@ def sized(poses: int) -> Maker:
 
 
 def lying(shape: tuple[int, ...], kind: str = "<f8") -> Maker:
-    """An array whose head promises more than there is."""
+    """Return an array whose header promises more than the file holds."""
 
     def make(here: Path) -> None:
         head = str({"descr": kind, "fortran_order": False, "shape": shape}).encode()
@@ -67,7 +67,7 @@ def lying(shape: tuple[int, ...], kind: str = "<f8") -> Maker:
 
 
 def pickled(value: Callable[[], object], name: str = "a.pkl", protocol: int = 4) -> Maker:
-    """A maker of a pickle."""
+    """Return a maker of a pickle."""
     return lambda here: (here / name).write_bytes(pickle.dumps(value(), protocol))
 
 
@@ -78,12 +78,12 @@ def _zip_bomb(here: Path) -> None:
 
 
 def bvh(edit: Callable[[str], str]) -> Maker:
-    """A maker of a BVH with one thing wrong."""
+    """Return a maker of a BVH with one thing wrong."""
     return lambda here: (here / "a.bvh").write_text(edit((BASE / "motion.bvh").read_text()))
 
 
 def csv(edit: Callable[[str], str]) -> Maker:
-    """A maker of a csv with one thing wrong."""
+    """Return a maker of a csv with one thing wrong."""
     return lambda here: (here / "a.csv").write_text(edit((BASE / "motion.csv").read_text()))
 
 

@@ -26,7 +26,7 @@ def policy(
     facts: Callable[[dict[str, Any]], Any] = lambda f: f,
     raw: str | None = None,
 ) -> Maker:
-    """A maker of a policy with other tensors or facts."""
+    """Return a maker of a policy with other tensors or facts."""
 
     def make(here: Path) -> None:
         with safe_open(BASE / "policy.safetensors", framework="np") as file:

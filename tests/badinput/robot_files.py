@@ -18,12 +18,12 @@ SHIPPED = "gymnasium:envs/mujoco/assets/humanoid.xml"
 
 
 def robot(edit: Callable[[str], str]) -> Maker:
-    """A maker of a description with one thing wrong."""
+    """Return a maker of a description with one thing wrong."""
     return lambda here: (here / "mine.yaml").write_text(edit(YAML))
 
 
 def model(edit: Callable[[str], str]) -> Maker:
-    """A maker of a description with a model of its own."""
+    """Return a maker of a description with a model of its own."""
 
     def make(here: Path) -> None:
         (here / "mine.yaml").write_text(YAML.replace(SHIPPED, "mine.xml"))
@@ -33,7 +33,7 @@ def model(edit: Callable[[str], str]) -> Maker:
 
 
 def bare(xml: str) -> Maker:
-    """A maker of a description with a model that is nothing but this."""
+    """Return a maker of a description with a model that is this text alone."""
     return model(lambda _: xml)
 
 

@@ -1,4 +1,4 @@
-"""`make badinput`: every case of the corpus through the real command, and a table of what came of it.
+"""`make badinput`: every case of the corpus through the real command, and a table of the results.
 
     python -m tests.badinput.run [--groups NAME,...] [--workers 2] [--table FILE]
 
@@ -39,7 +39,7 @@ KEPT_VARIABLES = ("PATH", "LANG", "VIRTUAL_ENV", "PYTHONPATH", "OMP_NUM_THREADS"
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a case.
+    """The result of a case.
 
     Attributes:
         faults: What is wrong; nothing where it passed.

@@ -15,7 +15,7 @@ Change = Callable[[pa.Table], pa.Table]
 
 
 def facts(**changes: object) -> Change:
-    """The table with other facts in its metadata; `...` takes one away."""
+    """Return the table with other facts in its metadata; `...` removes one."""
 
     def change(table: pa.Table) -> pa.Table:
         known = dict(table.schema.metadata)
@@ -30,7 +30,7 @@ def facts(**changes: object) -> Change:
 
 
 def column(name: str, value: Callable[[np.ndarray], np.ndarray]) -> Change:
-    """The table with another vector column."""
+    """Return the table with another vector column."""
 
     def change(table: pa.Table) -> pa.Table:
         old = table.column(name).combine_chunks()
@@ -45,7 +45,7 @@ def column(name: str, value: Callable[[np.ndarray], np.ndarray]) -> Change:
 
 
 def scalar(name: str, values: object) -> Change:
-    """The table with a plain column."""
+    """Return the table with a plain column."""
 
     def change(table: pa.Table) -> pa.Table:
         return table.set_column(
@@ -56,7 +56,7 @@ def scalar(name: str, values: object) -> Change:
 
 
 def entry(value: float) -> Callable[[np.ndarray], np.ndarray]:
-    """One number of a column replaced."""
+    """Return a column with one number replaced."""
 
     def change(rows: np.ndarray) -> np.ndarray:
         rows[len(rows) // 2, 0] = value
@@ -66,7 +66,7 @@ def entry(value: float) -> Callable[[np.ndarray], np.ndarray]:
 
 
 def rows(count: int) -> Change:
-    """The table repeated to so many rows."""
+    """Return the table repeated to a number of rows."""
 
     def change(table: pa.Table) -> pa.Table:
         return table.take(pa.array(np.arange(count) % max(len(table), 1)))
@@ -169,7 +169,7 @@ REFERENCE: Mapping[str, Change] = {
 
 
 def changed(name: str, change: Change) -> Maker:
-    """A maker of a base table with one thing wrong."""
+    """Return a maker of a base table with one thing wrong."""
 
     def make(here: Path) -> None:
         pq.write_table(change(pq.read_table(BASE / name)), here / name, compression="zstd")
@@ -178,7 +178,7 @@ def changed(name: str, change: Change) -> Maker:
 
 
 def damaged(name: str, at: float, flip: int = 0) -> Maker:
-    """A maker of a base file that is cut off, or in which bytes are overwritten."""
+    """Return a maker of a base file that is cut off, or in which bytes are overwritten."""
 
     def make(here: Path) -> None:
         data = bytearray((BASE / name).read_bytes())
@@ -191,7 +191,7 @@ def damaged(name: str, at: float, flip: int = 0) -> Maker:
 
 
 def _long_text(here: Path) -> None:
-    """Few bytes that promise one long text for every row."""
+    """Write a few bytes that promise one long text for every row."""
     text = pa.array(["x" * 5_000_000]).dictionary_encode()
     many = pa.DictionaryArray.from_arrays(pa.array(np.zeros(200_000, np.int32)), text.dictionary)
     pq.write_table(pa.table({"run_id": many.cast(pa.dictionary(pa.int32(), pa.string()))}),

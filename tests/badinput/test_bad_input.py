@@ -10,7 +10,7 @@ from tests.badinput.corpus import corpus
 from tests.badinput.run import Warm, run
 
 EVERY = 12
-"""Of the bad cases, one in so many; of the valid ones, too."""
+"""One in this number of cases is tried, of the bad ones and of the valid ones."""
 SLOW = ("endless work", "endless recursion", "zip bomb", "800000", "300000", "million")
 
 

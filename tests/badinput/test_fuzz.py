@@ -72,7 +72,7 @@ edits = st.lists(
 
 
 def altered(seed: bytes, changes: list[tuple[float, int, bytes]]) -> bytes:
-    """The file with pieces replaced: (where, how much goes, what comes)."""
+    """Return the file with pieces replaced: (place 0..1, bytes removed, bytes inserted)."""
     data = bytearray(seed)
     for share, gone, comes in changes:
         place = int(share * len(data))

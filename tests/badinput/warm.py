@@ -48,7 +48,7 @@ def _ended(request: dict[str, object]) -> dict[str, float]:
 
 
 def _become(request: dict[str, object]) -> None:
-    """Be the process of a command: its folder, environment, files and words."""
+    """Turn this process into that of a command: its folder, environment, files and words."""
     code = 70
     try:
         os.setsid()

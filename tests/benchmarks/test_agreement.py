@@ -13,7 +13,7 @@ POINTS = GENERATOR.normal(0.0, 0.4, (20, 29, 3))
 
 
 def official(frame: np.ndarray) -> HybrikMotion:
-    """A file of those frames."""
+    """Return a file of these frames."""
     points = POINTS[frame] - POINTS[frame][:, :1]
     twist = np.broadcast_to([1.0, 0.0], (len(frame), 23, 2))
     pixels, sure = np.zeros((len(frame), 29, 2)), np.ones((len(frame), 29))

@@ -49,7 +49,7 @@ def test_a_walker_pays_after_its_cost_over_what_it_saves() -> None:
     assert result["gain_95"] == [1.0, 1.0]
 
 
-def test_a_line_tells_the_mean_and_the_worst_seed() -> None:
+def test_a_line_shows_the_mean_and_the_worst_seed() -> None:
     result = line("hip_shake", MOVES["hip_shake"], 10.0, [rollouts(1.0, 1.0), rollouts(0.9, 1.0)])
     assert result["strict_success"] == pytest.approx(0.95)
     assert result["worst_seed"] == pytest.approx(0.9)
@@ -57,7 +57,7 @@ def test_a_line_tells_the_mean_and_the_worst_seed() -> None:
     assert result["beside"]["statue"]["survived_s"] == 10.0
 
 
-def test_steps_are_reported_only_where_every_seed_tells_them() -> None:
+def test_steps_are_reported_only_where_every_seed_has_them() -> None:
     first, second = rollouts(1.0, 1.0), rollouts(1.0, 1.0)
     first[0]["step"], second[0]["step"] = 1000, None
     assert line("walk", MOVES["walk"], 10.0, [first])["steps"] == 1000

@@ -17,7 +17,7 @@ def walk() -> Truth:
 
 
 def sequence_with(joints: np.ndarray, contact: np.ndarray | None = None) -> SmplSequence:
-    """A sequence that has the twelve joints of a truth and nothing else of interest."""
+    """Return a sequence that has the twelve joints of a truth and nothing else of interest."""
     count = len(joints)
     points = np.zeros((count, 29, 3))
     points[:, [keypoint(name) for name in JOINTS]] = joints

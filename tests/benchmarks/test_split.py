@@ -23,13 +23,13 @@ def motion() -> SmplSequence:
 
 
 def test_no_motion_stands_in_two_lists() -> None:
-    lists = [SPLIT.judged, SPLIT.train, tuple(SPLIT.excluded)]
+    lists = [SPLIT.held_out, SPLIT.train, tuple(SPLIT.excluded)]
     names = [name for names in lists for name in names]
     assert len(names) == len(set(names))
 
 
 def test_the_three_evaluation_dances_are_evaluated() -> None:
-    assert {"cmu_05_02", "cmu_05_09", "cmu_05_18"} <= set(SPLIT.judged)
+    assert {"cmu_05_02", "cmu_05_09", "cmu_05_18"} <= set(SPLIT.held_out)
 
 
 @pytest.mark.parametrize("path", sorted(FROZEN.glob("*.parquet")), ids=lambda path: path.stem)
@@ -47,7 +47,7 @@ def test_another_reference_is_refused() -> None:
 
 def test_every_near_duplicate_is_one_of_a_evaluated_motion() -> None:
     for found in SPLIT.excluded.values():
-        assert found["of"] in SPLIT.judged
+        assert found["of"] in SPLIT.held_out
         assert found["share"] >= DUPLICATE_SHARE
 
 
@@ -68,7 +68,7 @@ def test_a_mirrored_copy_is_found(motion: SmplSequence) -> None:
     order = (0, 2, 1, 3, 5, 4, 6, 8, 7, 9, 11, 10, 12, 14, 13, 15, 17, 16, 19, 18, 21, 20, 23, 22)
     copy = dataclasses.replace(motion, joints=motion.joints[:, order] * [1.0, -1.0, 1.0])
     rows = shares({"a": motion, "b": copy}, ["a"])
-    assert rows == [{"judged": "a", "motion": "b", "share": 1.0}]
+    assert rows == [{"held_out": "a", "motion": "b", "share": 1.0}]
 
 
 def test_another_movement_is_none(motion: SmplSequence) -> None:

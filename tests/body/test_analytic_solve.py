@@ -21,7 +21,7 @@ def random_rotations(seed: int, shape: tuple[int, int], largest: float) -> np.nd
 
 
 def pose_and_twist(seed: int, largest: float = 1.2) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Local rotations, the points that they pose, and the twists in them."""
+    """Return local rotations, the points that they pose, and the twists in them."""
     local = random_rotations(seed, (FRAMES, 24), largest)
     points = forward(local, REST_JOINTS[None], np.zeros((FRAMES, 3))).points
     twists = np.empty((FRAMES, 23, 2))

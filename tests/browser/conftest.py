@@ -55,7 +55,7 @@ class Opened:
 
 
 def standing_reference(robot: Robot) -> ReferenceMotion:
-    """A cyclic motion in which the arms swing."""
+    """Return a cyclic motion in which the arms swing."""
     model, times = robot.model, np.arange(STEPS) / STEPS
     qpos = np.tile(robot.standing, (STEPS, 1))
     arms = [i for i, name in enumerate(robot.joint_names) if "shoulder" in name or "elbow" in name]
@@ -81,7 +81,7 @@ def standing_reference(robot: Robot) -> ReferenceMotion:
 
 
 def made_policy(robot: Robot) -> Policy:
-    """A network that no one trained: small random corrections of the reference's angles."""
+    """Return an untrained network: small random corrections of the reference's angles."""
     from dataclasses import asdict
 
     from robojackson.rl.modes.observation import Observer
@@ -114,7 +114,7 @@ def run() -> RecordedRun:
 
 @pytest.fixture(scope="session")
 def page_file(run: RecordedRun, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A page whose clip gets brighter a frame, again and again: a picture tells its number."""
+    """Write a page whose clip gets brighter with each frame, so that a picture shows its number."""
     folder = tmp_path_factory.mktemp("page")
     pictures = [
         np.full((SIZE[1], SIZE[0], 3), LEVEL + LEVEL * (k % CYCLE), np.uint8) for k in range(FRAMES)
@@ -184,7 +184,7 @@ def _note(found: Opened, kind: str, text: str) -> None:
 
 @pytest.fixture(scope="session")
 def axe(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """axe-core (MPL-2.0) as npm brings it; it is no part of what we ship."""
+    """Return axe-core (MPL-2.0) from npm; it is no part of the package."""
     folder = tmp_path_factory.mktemp("axe")
     command = ["npm", "pack", "axe-core@4.14.1", "--silent", "--pack-destination", str(folder)]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)

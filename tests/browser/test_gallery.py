@@ -35,7 +35,7 @@ def gallery_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize(("width", "scheme"), [(375, "dark"), (1600, "light")])
-def test_gallery_asks_for_nothing_and_fits(
+def test_gallery_requests_nothing_and_fits(
     opened: Callable[..., Opened], gallery_file: Path, width: int, scheme: str, axe: str
 ) -> None:
     found = opened(gallery_file, width, scheme)

@@ -47,7 +47,7 @@ DRAGGED_AND_PUSHED = """speed => { const { dancer, dance, drag, held } = robojac
   return { steps, impulse: impulse.map((value) => value / mass), dragged: apart(dragged), pushed: apart(pushed) }; }"""  # noqa: E501
 
 
-def test_live_page_asks_for_nothing_and_fits(opened: Open, live_file: Path) -> None:
+def test_live_page_requests_nothing_and_fits(opened: Open, live_file: Path) -> None:
     found = opened(live_file, 375, "dark")
     found.page.wait_for_selector("[data-checked=yes]")
     assert [url for url in found.requests if not url.startswith("blob:")] == [live_file.as_uri()]

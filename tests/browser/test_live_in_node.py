@@ -42,12 +42,13 @@ DANCER = resources.files("robojackson.report.pages") / "dance.js"
 
 @pytest.fixture(scope="module")
 def shaking(run: RecordedRun) -> RecordedRun:
-    """The hip shake, whose steps all stand on the floor."""
+    """Return the hip shake, all of whose steps stand on the floor."""
     return replace(run, reference=ReferenceMotion.load(REFERENCES / "hip_shake.parquet"))
 
 
 def steadied(policy: Policy) -> Policy:
-    """The same network, its corrections small, under the linear feedback along the reference."""
+    """Return the same network, its corrections small, under the linear feedback along the
+    reference."""
     control = {**policy.facts["control"], "feedforward": 1.0, "feedback": 1.0}  # type: ignore[dict-item]
     (first, (weight, bias)) = policy.layers
     return Policy((first, (SMALL * weight, bias)), {**policy.facts, "control": control})
@@ -56,13 +57,13 @@ def steadied(policy: Policy) -> Policy:
 def anchored(
     sim: Simulation, clip: Clip, action: np.ndarray, feet: Feet, progress: Progress
 ) -> Gains:
-    """A regulator whose nominal states stand where the robot's feet do."""
+    """Return a regulator whose nominal states stand where the robot's feet stand."""
     gains = regulator(sim, clip, action, feet.count, progress)[0]
     return replace(gains, places=feet.places(gains.qpos))
 
 
 def seeing_ahead(policy: Policy, run: RecordedRun) -> Policy:
-    """A made network whose observation is the robot's own and the reference ahead."""
+    """Return an untrained network that observes the robot and the reference ahead."""
     rng, size = np.random.default_rng(2), Observer(run.robot, "preview").actor_size
     first = rng.normal(0, 0.3 / np.sqrt(size), (size, 64)).astype(np.float32)
     layers = ((first, policy.layers[0][1]), policy.layers[1])
@@ -79,7 +80,7 @@ def in_node(data: Mapping[str, Any], pushes: np.ndarray, folder: Path) -> dict[s
 
 
 def in_python(run: RecordedRun, data: Mapping[str, Any], pushes: np.ndarray) -> np.ndarray:
-    """Steps survived and mean site error of each start."""
+    """Return the steps survived and the mean site error of each start, in Python's MuJoCo."""
     assert run.policy is not None
     records = data["records"]
     starts = Starts(*(np.array([one[k] for one in records]) for k in ("step", "qpos", "qvel")))
@@ -107,7 +108,7 @@ def in_python(run: RecordedRun, data: Mapping[str, Any], pushes: np.ndarray) -> 
 def test_pushes_are_survived_as_in_python(
     shaking: RecordedRun, speed: float, tmp_path: Path
 ) -> None:
-    """0.3 m/s, and so much that some fall."""
+    """0.3 m/s, and a speed at which some fall."""
     pushed = replace(shaking, policy=steadied(made_policy(shaking.robot)))
     assert pushed.policy is not None
     data = live_data(pushed.policy, pushed.reference, pushed.robot)

@@ -23,7 +23,7 @@ GO = "k => { robojackson.video.pause(); robojackson.go(k); }"
 
 @pytest.mark.parametrize("width", [375, 1600])
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_page_asks_for_nothing_complains_of_nothing_and_fits(
+def test_page_requests_nothing_logs_no_error_and_fits(
     opened: Open, page_file: Path, width: int, scheme: str
 ) -> None:
     found = opened(page_file, width, scheme)
@@ -78,7 +78,7 @@ def test_panes_follow_the_picture_while_it_plays_and_when_it_pauses(
 
 
 def assert_one_moment(shown: dict[str, int], picture: int) -> None:
-    """The panes drew the picture, and the clip's grey says that its picture is within one of it."""
+    """Require that the panes draw a picture and that the clip shows it or a neighbour."""
     assert shown["drawn"] == shown["picture"] == picture
     seen = round(shown["grey"] / LEVEL) - 1
     assert (seen - picture + 1) % CYCLE <= 2
@@ -100,7 +100,7 @@ def test_axe_finds_nothing_serious(opened: Open, page_file: Path, axe: str) -> N
 
 
 def serious(page: object, axe: str) -> list[str]:
-    """Rules of axe-core that are broken seriously."""
+    """Return the rules of axe-core that are broken seriously."""
     found = page.evaluate(f"async () => {{ {axe}; return (await axe.run()).violations }}")  # type: ignore[attr-defined]
     return [
         f"{one['id']}: {one['nodes'][0]['html'][:80]}"

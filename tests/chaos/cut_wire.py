@@ -34,7 +34,7 @@ class Proxy:
             _close(end)
 
     def mend(self) -> None:
-        """Forward again."""
+        """Forward data again."""
         self.intact = True
 
     def close(self) -> None:

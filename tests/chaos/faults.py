@@ -66,7 +66,7 @@ class Machine:
         (scratch / "here").mkdir()
 
     def run(self, words: tuple[str, ...], out: Path, **variables: str) -> tuple[int, str]:
-        """Return the exit code and what came on stderr."""
+        """Return the exit code and the text on stderr."""
         given = [word.format(clip=self.clip, out=out) for word in words]
         env = {"HOME": str(self.scratch), "TMPDIR": str(self.scratch), "OMP_NUM_THREADS": "1"}
         env |= {"PATH": os.environ["PATH"], "PYTHONPATH": str(ROOT)}
@@ -79,7 +79,7 @@ class Machine:
 
 @contextmanager
 def disk(folder: Path, free: int | None = None, size_mb: int = DISK_MB) -> Iterator[Path]:
-    """Mount a small disk of which so many bytes are free; all of it where None."""
+    """Mount a small disk with a number of free bytes; None leaves all of it free."""
     folder.mkdir(exist_ok=True)
     subprocess.run(
         ["mount", "-t", "tmpfs", "-o", f"size={size_mb}m", "tmpfs", str(folder)], check=True
@@ -145,7 +145,7 @@ def read_only_store(machine: Machine) -> Iterator[Row]:
 
 
 def pair(machine: Machine) -> Iterator[Row]:
-    """Two dances of one clip at once in one store, and one alone.
+    """Yield two dances of one clip at once in one store, and one alone.
 
     The second may be refused in one line while the first trains; repeated, it ends well.
     """
@@ -168,7 +168,8 @@ def pair(machine: Machine) -> Iterator[Row]:
 
 
 def exits(machine: Machine, count: int) -> Iterator[Row]:
-    """Commands that load MediaPipe, MuJoCo, PyTorch and JAX, each in a process of its own."""
+    """Yield a row for each command that loads MediaPipe, MuJoCo, PyTorch and JAX in a process of
+    its own."""
     kinds = {
         "score": ("score", str(machine.clip)),
         "retarget": ("export", SMPL, "--to", "csv", "-o", "{out}/m.csv"),

@@ -31,7 +31,7 @@ class Alone:
 
     Attributes:
         store: What is kept.
-        kinds: What can happen: does it and tells what it hit, or None if it cannot now.
+        kinds: What can happen: does it and returns what it hit, or None if it cannot now.
     """
 
     KINDS: ClassVar = ("disk", "command", "training")
@@ -50,7 +50,7 @@ class Alone:
     @classmethod
     @contextmanager
     def ready(cls, folder: Path) -> Iterator["Alone"]:
-        """A mounted disk for the time of a block.
+        """Yield a mounted disk for the time of a block.
 
         Raises:
             CalledProcessError: it cannot be mounted.

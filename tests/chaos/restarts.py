@@ -43,6 +43,6 @@ class Restarts:
 
 
 def _plain(name: str) -> str:
-    """The service's name without the number of a second one."""
+    """Return the service's name without the number of a second one."""
     head, _, tail = name.rpartition("-")
     return head if tail.isdigit() else name

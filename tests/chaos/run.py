@@ -3,7 +3,7 @@
     python -m tests.chaos.run --trials 20 --seed 0                          (make chaos)
     python -m tests.chaos.run --trials 20 --seed 0 --first 8 --out FILE     goes on where FILE ends
 
-Every trial disturbs a running study once, runs it again, and asks for tables that are byte for byte
+Every trial disturbs a running study once, runs it again, and requires tables that are byte for byte
 those of an undisturbed run, no process and no temporary file left. Most trials are on the stack of
 docker-compose.yml (tools/stack/compose_stack.py; its services start again by themselves, as
 `restart: unless-stopped` does); some are one command on one machine whose store is a disk of
@@ -35,7 +35,7 @@ COLUMNS = tuple(field.name for field in fields(Trial))
 
 
 def plan(kinds: list[str], count: int, rng: random.Random) -> list[str]:
-    """Kinds in random order, each as often as any other."""
+    """Return kinds in random order, each as often as any other."""
     drawn: list[str] = []
     while len(drawn) < count:
         drawn += rng.sample(kinds, len(kinds))
@@ -80,7 +80,8 @@ def main() -> None:
 def tried(
     number: int, kind: str, seed: int, bench: Bench, seconds: float, expected: Tables
 ) -> Trial:
-    """One trial; its random numbers are its own, so that it can be tried alone."""
+    """Run one trial, whose random numbers depend on its number alone, so that it can be repeated
+    alone."""
     rng = random.Random(f"{seed}-{number}")
     trial = Trial(number, kind, round(rng.uniform(0.02, LATEST) * seconds, 1))
     disturb(bench, trial, rng, expected)
@@ -88,7 +89,7 @@ def tried(
 
 
 def known_trials(file: Path) -> list[Trial]:
-    """The trials that a file tells of."""
+    """Return the trials that a file lists."""
     answer = json.loads(file.read_text())["trials"]
     return [Trial(**facts) for facts in answer]
 
@@ -97,7 +98,8 @@ def known_trials(file: Path) -> list[Trial]:
 def benches(
     folder: Path, kinds: list[str]
 ) -> Iterator[tuple[dict[str, tuple[Bench, float]], Tables]]:
-    """Where each kind is tried, what an undisturbed run takes there, and its tables."""
+    """Yield, by kind, where it is tried, the seconds of an undisturbed run there, and its
+    tables."""
     known: dict[str, tuple[Bench, float]] = {}
     seen: list[Tables] = []
     with ExitStack() as stack:

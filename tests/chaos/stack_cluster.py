@@ -33,7 +33,7 @@ class Cluster:
 
     Attributes:
         store: What it keeps.
-        kinds: What can happen to it: does it and tells what it hit, or None if it cannot now.
+        kinds: What can happen to it: does it and returns what it hit, or None if it cannot now.
     """
 
     KINDS: ClassVar = ("cell", "worker", "machine", "parent", "server", "database", "wire")
@@ -52,7 +52,7 @@ class Cluster:
     @classmethod
     @contextmanager
     def ready(cls, folder: Path) -> Iterator["Cluster"]:
-        """A stack that is up for the time of a block, its S3 store behind a wire."""
+        """Yield a stack that is up for the time of a block, its S3 store behind a wire."""
         stack = Stack(folder / "stack", scale={CELL: TRAINERS})
         wire = Proxy(stack.ports["s3"])
         temporary = stack.folder / "tmp"
@@ -79,7 +79,8 @@ class Cluster:
         return _patiently(lambda: _create(DEPLOYMENT, {**study, "executor": "work-pool"}))
 
     def state(self, run: Any) -> str | None:
-        """Its final state, `DEAD` if its process is gone, None while it runs or no one answers."""
+        """Return the run's final state, `DEAD` if its process is gone, None while it runs or no
+        server answers."""
         with suppress(Exception):
             kind = _state(run)
             if kind in ("COMPLETED", "FAILED", "CRASHED", "CANCELLED"):
@@ -110,11 +111,12 @@ class Cluster:
         return [s for s in known if s.name.startswith(name) and s.name not in ("setup", "s3")]
 
     def _flows(self, name: str) -> list[Found]:
-        """Processes of flow runs that workers of a service have started."""
+        """Return the processes of flow runs that workers of a service have started."""
         return [f for s in self._services(name) for f in self._runs(s) if ENGINE in f.command]
 
     def _runs(self, service: Service) -> list[Found]:
-        """What a service has started: flow runs, trainings, helpers of these."""
+        """Return the processes that a service has started: flow runs, trainings and their
+        children."""
         assert service.process is not None
         found = under(self._homes / service.name)
         return [f for f in found if f.pid != service.process.pid and not _is_check(f)]
@@ -127,12 +129,12 @@ class Cluster:
         return _killed(rng, self._flows(FLOW))
 
     def _worker(self, rng: random.Random) -> str | None:
-        """The worker alone: the runs that it has started go on without it."""
+        """Kill a worker alone; the runs that it has started go on without it."""
         service = rng.choice([*self._services(FLOW), *self._services(CELL)])
         return service.name if service.murder() else None
 
     def _machine(self, rng: random.Random) -> str | None:
-        """A worker with everything that it has started, as when its container is killed."""
+        """Kill a worker with everything that it has started, as when its container is killed."""
         all_of_them = [*self._services(FLOW), *self._services(CELL)]
         busy = [s for s in all_of_them if self._runs(s)]
         if not busy:
@@ -149,7 +151,7 @@ class Cluster:
         return kill
 
     def _cut(self, rng: random.Random) -> str | None:
-        """From the first one that needed it and did not get it."""
+        """Cut the wire to the store from the first request that is lost."""
         seconds, before = rng.uniform(*CUT_S), self._wire.refused
         self._wire.cut()
         needed = wait(lambda: self._wire.refused > before, NEEDED_S)
@@ -188,7 +190,7 @@ def _state(run: Any) -> str:
 
 
 def _patiently(call: Callable[[], Any]) -> Any:
-    """The answer of a server that may be starting."""
+    """Return the answer of a server that may still be starting."""
     for _ in range(60):
         with suppress(Exception):
             return call()

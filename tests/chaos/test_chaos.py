@@ -33,7 +33,7 @@ class Hello(socketserver.BaseRequestHandler):
 
 @pytest.fixture
 def wire() -> Iterator[Proxy]:
-    """A wire to a server that says hello."""
+    """Yield a wire to a server that answers `hello`."""
     with socketserver.ThreadingTCPServer(("127.0.0.1", 0), Hello) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         proxy = Proxy(server.server_address[1])

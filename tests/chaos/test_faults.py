@@ -1,4 +1,4 @@
-"""How faults, kills and long runs are judged; the campaigns themselves are run by hand."""
+"""How faults, kills and long runs are rated; the campaigns themselves are run by hand."""
 
 import errno
 import os

@@ -19,7 +19,7 @@ STARTS = (
 
 @pytest.fixture
 def started(request: pytest.FixtureRequest) -> Iterator[tuple[int, int]]:
-    """A process and the one that it has made."""
+    """Yield the ids of a process and of its child."""
     command = [sys.executable, "-c", request.param]
     with subprocess.Popen(command, stdout=subprocess.PIPE, start_new_session=True) as process:
         assert process.stdout is not None

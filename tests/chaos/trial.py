@@ -40,19 +40,19 @@ class Bench(Protocol):
     kinds: dict[str, Callable[[random.Random], str | None]]
 
     def start(self, study: dict[str, Any]) -> Any:
-        """Begin a study; returns what `state` wants."""
+        """Begin a study; return the argument of `state`."""
 
     def state(self, run: Any) -> str | None:
-        """How it ended, or None while it runs."""
+        """Return how it ended, or None while it runs."""
 
     def mend(self) -> None:
         """Make everything work again after a disturbance."""
 
     def alive(self) -> list[str]:
-        """Processes that belong to a run."""
+        """Return the processes that belong to a run."""
 
     def folders(self) -> list[Path]:
-        """Where the machines keep files of their own."""
+        """Return the folders in which the machines have files of their own."""
 
 
 @dataclass
@@ -87,7 +87,7 @@ class Trial:
 
 
 def undisturbed(bench: Bench) -> tuple[Tables, float]:
-    """The tables of a run that no one disturbs, and what it took, seconds.
+    """Return the tables of an undisturbed run and its duration, seconds.
 
     Raises:
         RuntimeError: it did not end well.
@@ -148,7 +148,7 @@ def _ended(bench: Bench, run: Any) -> str:
 
 
 def wait(question: Callable[[], Any], seconds: float) -> Any:
-    """The first answer that is not empty, or None."""
+    """Return the first answer that is not empty, or None."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         if answer := question():
@@ -174,7 +174,7 @@ def wipe(store: Store) -> None:
 
 
 def tables(store: Store) -> Tables:
-    """The bytes of the tables of the study, by key."""
+    """Return the bytes of the tables of the study, by key."""
     found = {}
     for table in study_tables.TABLES:
         for key in store.list(f"{study_tables.FOLDER}/{table}/study={STUDY['name']}"):
@@ -183,12 +183,12 @@ def tables(store: Store) -> Tables:
 
 
 def leftovers(bench: Bench) -> list[str]:
-    """Half-written files, scratch folders and the work of finished cells."""
+    """Return half-written files, scratch folders and the work of finished cells."""
     return [str(path) for folder in bench.folders() for path in leftovers_in(folder)]
 
 
 def leftovers_in(folder: Path) -> list[Path]:
-    """The same in one folder."""
+    """Return the leftovers of one folder."""
     with suppress(FileNotFoundError):  # what goes away meanwhile is not left
         parts = list(folder.rglob(f"{TEMPORARY}*"))
         work = [path for path in folder.rglob("work/*") if path.name != SCRATCH]

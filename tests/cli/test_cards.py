@@ -42,7 +42,7 @@ def test_advice_stands_a_line_each_in_its_words() -> None:
 @pytest.mark.parametrize(
     ("detected", "kind"), [(100, "whole"), (95, "whole"), (80, "gaps"), (30, "poor")]
 )
-def test_a_motion_is_judged_by_how_much_was_seen(detected: int, kind: str) -> None:
+def test_a_motion_is_rated_by_how_much_was_detected(detected: int, kind: str) -> None:
     assert cards.mocap_verdict(100, detected)["kind"] == kind
 
 

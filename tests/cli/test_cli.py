@@ -27,7 +27,7 @@ def invoke(*words: object) -> tuple[int, str, str]:
 
 
 def write_video(path: Path, frames: int) -> Path:
-    """Grey frames with no one in them."""
+    """Write grey frames without a person."""
     with av.open(str(path), "w") as container:
         stream = container.add_stream("libx264", rate=10)
         stream.width, stream.height, stream.pix_fmt = 64, 64, "yuv420p"
@@ -54,7 +54,7 @@ def half_a_video(folder: Path) -> list[object]:
     return ["mocap", folder / "half.mp4", "-o", folder / "out"]
 
 
-def nobody(folder: Path) -> list[object]:
+def no_person(folder: Path) -> list[object]:
     return ["mocap", write_video(folder / "empty.mp4", 5), "-o", folder / "out"]
 
 
@@ -105,7 +105,7 @@ def missing_file(folder: Path) -> list[object]:
     [
         (text_as_video, "UnreadableVideo"),
         (half_a_video, "TruncatedVideo"),
-        (nobody, "NoPersonFound"),
+        (no_person, "NoPersonFound"),
         (one_frame, "TrackTooShort"),
         (unknown_robot, "unknown robot 'c3po'"),
         (unknown_robot_in_set, "unknown robot 'c3po'"),
@@ -165,7 +165,7 @@ def test_a_video_that_breaks_off_while_it_is_looked_at_loses_no_other_score(
         (">&-", "stdout is closed: there is nowhere to write the answer"),
     ],
 )
-def test_an_answer_that_no_one_gets_is_one_line(where: str, reason: str) -> None:
+def test_an_answer_that_cannot_be_written_is_one_line(where: str, reason: str) -> None:
     command = f"{shlex.quote(sys.executable)} -m robojackson robots --json {where}"
     done = subprocess.run(
         command, shell=True, cwd=ROOT, capture_output=True, text=True, check=False
@@ -190,14 +190,14 @@ def test_only_a_video_that_is_named_must_be_readable(tmp_path: Path) -> None:
     assert (code, answer) == (0, [{"stability_score"}, {"error"}])
 
 
-@pytest.mark.parametrize("make", [nobody, one_frame, unknown_robot])
+@pytest.mark.parametrize("make", [no_person, one_frame, unknown_robot])
 def test_a_command_that_failed_leaves_no_folder(make, tmp_path: Path) -> None:
     invoke(*make(tmp_path))
     assert not (tmp_path / "out").exists()
 
 
 def test_what_is_said_of_a_clip_without_a_person_names_it(tmp_path: Path) -> None:
-    assert f"{tmp_path / 'empty.mp4'}: no person found" in invoke(*nobody(tmp_path))[2]
+    assert f"{tmp_path / 'empty.mp4'}: no person found" in invoke(*no_person(tmp_path))[2]
 
 
 def test_a_folder_is_not_one_video(tmp_path: Path) -> None:
@@ -268,7 +268,7 @@ def test_an_override_without_a_value_is_refused() -> None:
 
 
 @pytest.mark.medium
-def test_doctor_tells_what_is_there_in_one_object() -> None:
+def test_doctor_reports_what_is_installed_in_one_object() -> None:
     result = robojackson("doctor", "--json")
     assert {"ok", "packages", "libraries", "models", "missing", "optional"} == set(
         result.answer
@@ -323,10 +323,10 @@ def test_ctrl_c_in_training_is_resumed_by_the_same_command(tmp_path: Path, short
         command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment()
     ) as process:
         assert process.stderr is not None
-        asked, progress = process.stderr.readline(), process.stderr.readline()
+        audit, progress = process.stderr.readline(), process.stderr.readline()
         process.send_signal(signal.SIGINT)
         rest = process.stderr.read()
-    assert "of a perfect dance" in asked
+    assert "of a perfect dance" in audit
     assert "steps" in progress
     assert "stopping after this round" in rest
     assert (process.returncode, rest.count("resume: robojackson train")) == (130, 1)

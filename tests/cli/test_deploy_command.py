@@ -19,7 +19,7 @@ ROWS = [("nominal", 1.0, 1.0, 0.5, 0.02, 1.0), ("gains x 0.8", 0.75, 0.8, 0.4, 0
 
 
 def cases(weakest: float) -> list[dict[str, object]]:
-    """A passport of two rows."""
+    """Return a passport of two rows."""
     found = [dict(zip(COLUMNS, row, strict=True)) for row in ROWS]
     found[1]["strict_success"] = weakest
     return found
@@ -27,14 +27,14 @@ def cases(weakest: float) -> list[dict[str, object]]:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A policy with its motion beside it."""
+    """Return a policy with its motion beside it."""
     reference = swaying(stock())
     reference.save(tmp_path / "reference.parquet")
     random_policy(stock(), reference).save(tmp_path / "policy.safetensors")
     return tmp_path
 
 
-def test_the_command_writes_the_pack_and_tells_what_is_open(folder: Path) -> None:
+def test_the_command_writes_the_pack_and_reports_what_is_unknown(folder: Path) -> None:
     words = ("export", folder / "policy.safetensors", "--to", "deploy", "-o", folder / "pack")
     result = in_process(*words, "--json")
     assert result.code == 0, result.err
@@ -82,7 +82,7 @@ def test_another_motion_than_the_policys_is_refused(folder: Path) -> None:
         export(folder / "policy.safetensors", "deploy", folder / "pack")
 
 
-def test_a_policy_without_its_motion_tells_the_option(folder: Path) -> None:
+def test_a_policy_without_its_motion_names_the_option(folder: Path) -> None:
     (folder / "reference.parquet").rename(folder / "elsewhere.parquet")
     with pytest.raises(StoreError, match="--reference FILE"):
         export(folder / "policy.safetensors", "deploy", folder / "pack")
@@ -96,7 +96,7 @@ def test_options_of_the_pack_are_refused_for_another_format(folder: Path) -> Non
         export(folder / "policy.safetensors", "onnx", folder / "policy.onnx", pack=inputs)
 
 
-def test_a_declared_licence_wants_its_kind() -> None:
+def test_a_declared_licence_needs_its_kind() -> None:
     assert licences_from(["clip=CC-BY-4.0", "body models = MIT"]) == {
         "clip": "CC-BY-4.0",
         "body models": "MIT",

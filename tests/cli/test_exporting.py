@@ -38,7 +38,7 @@ READERS = {
 
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The hip shake, as `robojackson retarget` leaves it."""
+    """Return the hip shake, as `robojackson retarget` leaves it."""
     path = tmp_path_factory.mktemp("export") / "reference.parquet"
     path.write_bytes(tables.encode(robot_motion("hip_shake")))
     return path
@@ -58,14 +58,14 @@ def test_every_format_starts_with_the_first_pose(to: str, reference: Path, tmp_p
 
 
 @pytest.mark.medium
-def test_the_answer_tells_what_was_written(reference: Path, tmp_path: Path) -> None:
+def test_the_answer_names_what_was_written(reference: Path, tmp_path: Path) -> None:
     out = tmp_path / "motion.csv"
     result = export(reference, "csv", out)
     assert (result["file"], result["bytes"]) == (str(out), out.stat().st_size)
 
 
 @pytest.mark.medium
-def test_the_answer_judges_the_motion_by_its_score_card(reference: Path, tmp_path: Path) -> None:
+def test_the_answer_rates_the_motion_by_its_score_card(reference: Path, tmp_path: Path) -> None:
     result = export(reference, "csv", tmp_path / "motion.csv")
     assert result["verdict"]["kind"] == "feasible"
     assert result["next"] == command_line("train", reference, "-o", reference.parent / "training")
@@ -117,7 +117,7 @@ def test_a_format_of_motions_does_not_fit_a_policy(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def answered(reference: Path) -> Said:
-    """The command, in a process of its own."""
+    """Run the command in a process of its own."""
     out = reference.parent / "motion.pkl"
     return robojackson("export", reference, "--to", "gmr", "-o", out, "--json")
 

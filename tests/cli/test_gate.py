@@ -13,7 +13,7 @@ SMOKE = ("--config", "smoke", "--json")
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A walk, as `robojackson mocap` leaves it."""
+    """Return a walk, as `robojackson mocap` leaves it."""
     out = tmp_path_factory.mktemp("gate")
     (out / "smpl.parquet").write_bytes(tables.encode(human("walk")))
     return out

@@ -32,7 +32,7 @@ pytestmark = pytest.mark.xdist_group("importing")
 
 @pytest.fixture(scope="module")
 def smpl(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """smpl.parquet of somebody who stands and waves."""
+    """Return smpl.parquet of a person who stands and waves."""
     path = tmp_path_factory.mktemp("import") / "smpl.parquet"
     path.write_bytes(tables.encode(person(legs=0.1, speed=0.0)))
     return path
@@ -56,7 +56,7 @@ def test_a_motion_goes_out_and_comes_back(to: str, smpl: Path, tmp_path: Path) -
 @pytest.mark.parametrize(
     ("frames", "share", "kind"), [(90, 0.9, "whole"), (90, 0.1, "airborne"), (30, 0.9, "too_short")]
 )
-def test_an_import_is_judged_by_its_feet_and_its_length(
+def test_an_import_is_rated_by_its_feet_and_its_length(
     frames: int, share: float, kind: str
 ) -> None:
     result = import_verdict({"frames": frames, "fps": 30.0, "contact_share": share})
@@ -87,7 +87,7 @@ def test_what_is_no_table_is_reported(tmp_path: Path) -> None:
 
 
 def lacking_rate(tmp_path: Path) -> Path:
-    """An AMASS file that does not say its frame rate."""
+    """Return an AMASS file without a frame rate."""
     sequence = person()
     poses = np.concatenate([sequence.global_orient, sequence.body_pose[:, :63]], axis=1)
     trans = sequence.transl - PELVIS["smpl"]
@@ -193,7 +193,7 @@ def test_a_missing_file_is_reported(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def answered(smpl: Path) -> Said:
-    """The command, in a process of its own."""
+    """Run the command in a process of its own."""
     path = smpl.parent / "motion.bvh"
     path.write_bytes(bvh.write(read(smpl)))
     return robojackson("import", path, "-o", smpl.parent / "out", "--json")

@@ -56,7 +56,7 @@ start(body)
 
 
 def run(*words: object, **more: str) -> Said:
-    """The command as a user starts it."""
+    """Run the command as a user starts it."""
     own = {"TF_CPP_MIN_LOG_LEVEL", "GLOG_minloglevel", "PYTHONWARNINGS", "MUJOCO_GL"}
     outer = {key: value for key, value in environment(**more).items() if key not in own}
     command = [sys.executable, *map(str, words)]
@@ -68,7 +68,7 @@ def run(*words: object, **more: str) -> Said:
 
 
 def strange(output: Said) -> list[str]:
-    """Lines of stderr that are not ours."""
+    """Return the lines of stderr that are not ours."""
     lines = (line for line in output.err.splitlines() if line.strip())
     return [line for line in lines if not OURS.fullmatch(line)]
 
@@ -101,7 +101,7 @@ def trained(retargeted: Said, folder: Path) -> Said:
 
 
 @pytest.fixture(scope="module")
-def judged(trained: Said, folder: Path) -> Said:
+def evaluated(trained: Said, folder: Path) -> Said:
     policy, reference = folder / "run" / "policy.safetensors", folder / "reference.parquet"
     return run("-m", "robojackson", "evaluate", policy, reference, *SMOKE)
 
@@ -115,7 +115,7 @@ def danced(short_clip: Path, folder: Path) -> Said:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "command", ["scored", "captured", "retargeted", "trained", "judged", "danced"]
+    "command", ["scored", "captured", "retargeted", "trained", "evaluated", "danced"]
 )
 def test_every_line_of_a_command_is_ours(command: str, request: pytest.FixtureRequest) -> None:
     result: Said = request.getfixturevalue(command)
@@ -124,7 +124,7 @@ def test_every_line_of_a_command_is_ours(command: str, request: pytest.FixtureRe
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("command", ["scored", "captured", "retargeted", "trained", "judged"])
+@pytest.mark.parametrize("command", ["scored", "captured", "retargeted", "trained", "evaluated"])
 def test_the_answer_is_alone_on_stdout(command: str, request: pytest.FixtureRequest) -> None:
     result: Said = request.getfixturevalue(command)
     assert not re.search(r"WARNING|Warning:|OpenGL|absl|[IWE]\d{4} \d\d:", result.out)
@@ -135,7 +135,7 @@ def test_warnings_and_logs_of_packages_are_dropped_and_ours_are_shown() -> None:
     assert (result.out, result.err) == ("answer\n", "ours\n")
 
 
-def test_whoever_asks_for_warnings_gets_them() -> None:
+def test_warnings_are_shown_on_request() -> None:
     result = run("-W", "default", "-c", NOISY)
     assert "from a library" in result.err
 

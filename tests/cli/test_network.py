@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.fixture(scope="module")
 def weights(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with random weights in the official keys, and a clip of six frames."""
+    """Return a folder with random weights in the official keys, and a clip of six frames."""
     folder = tmp_path_factory.mktemp("weights")
     torch.manual_seed(0)
     network = HybrikResNet()
@@ -41,7 +41,7 @@ def test_a_video_goes_through_both_networks(weights: Path, tmp_path: Path) -> No
 
 
 @pytest.mark.medium
-def test_weights_that_cannot_be_used_are_told_in_one_line(weights: Path, tmp_path: Path) -> None:
+def test_weights_that_cannot_be_used_are_refused_in_one_line(weights: Path, tmp_path: Path) -> None:
     wrong = ("--hybrik", weights / "niki's.pth")
     result = in_process("mocap", weights / "short.mp4", "-o", tmp_path / "out", *wrong)
     assert result.code == 1

@@ -25,7 +25,7 @@ FOLDER = "bundle/zoo/machine"
 
 
 def _wheel(folder: Path, model: str) -> Path:
-    """A wheel of the same layout as the one that bundles the G1."""
+    """Return a wheel of the same layout as the one that bundles the G1."""
     path = folder / "bundle-1.0-py3-none-any.whl"
     info = "bundle-1.0.dist-info"
     with zipfile.ZipFile(path, "w") as wheel:
@@ -43,7 +43,7 @@ def _wheel(folder: Path, model: str) -> Path:
 
 @pytest.fixture
 def source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> RobotSource:
-    """The machine, to be had from a folder that stands for the package index."""
+    """Return the machine's source: a folder that stands for the package index."""
     index = tmp_path / "index"
     index.mkdir()
     wheel = _wheel(index, machine.mjcf())
@@ -63,7 +63,7 @@ def source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> RobotSource:
 
 @pytest.fixture
 def describe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Makes `configs/robots/machine.yaml` say something."""
+    """Return a writer of `configs/robots/machine.yaml`."""
 
     def give(source: RobotSource | None) -> RobotDescription:
         result = replace(machine.description(tmp_path), mjcf="store:machine.xml", source=source)
@@ -188,7 +188,7 @@ def test_the_command_lists_the_robots_as_json(tmp_path: Path):
 
 
 def broken(folder: Path, old: str, new: str) -> Path:
-    """A user's description with one thing changed."""
+    """Return a user's description with one thing changed."""
     path = own_robot(folder)
     text = path.read_text()
     assert old in text
@@ -251,6 +251,22 @@ def test_new_writes_a_description_that_passes_and_keeps_a_file_that_is_there(
     assert Path("my_humanoid.yaml").read_text() == "mine"
     robot_sheets.new_robot(model, Path("my_humanoid.yaml"), force=True)
     assert Path("my_humanoid.yaml").read_text() != "mine"
+
+
+@pytest.mark.medium
+def test_new_runs_as_a_command(tmp_path: Path):
+    model = tmp_path / "machine.xml"
+    model.write_text(machine.mjcf())
+    result = commands.in_process("robots", "new", model, "-o", tmp_path / "it.yaml", "--json")
+    assert (result.code, result.answer["file"]) == (0, str(tmp_path / "it.yaml"))
+    assert (tmp_path / "it.yaml").is_file()
+
+
+@pytest.mark.medium
+def test_add_runs_as_a_command(source, describe):
+    describe(source)
+    result = commands.in_process("robots", "add", "machine", "--json")
+    assert (result.code, result.answer["added"]) == (0, True)
 
 
 def test_new_says_which_keys_are_left(tmp_path: Path):

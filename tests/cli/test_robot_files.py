@@ -46,8 +46,8 @@ def test_the_motion_remembers_the_file_whatever_its_name(made: Made) -> None:
 def test_train_evaluate_and_export_find_the_robot_by_themselves(made: Made) -> None:
     policy = Path(made.train("policy")["policy"])
     overrides = {"evaluate.seconds": 0.1}
-    judged = stages.evaluate(policy, made.reference, None, "smoke", overrides)
-    assert judged["rollouts"] > 0
+    evaluated = stages.evaluate(policy, made.reference, None, "smoke", overrides)
+    assert evaluated["rollouts"] > 0
     result = exporting.export(made.reference, "gmr", made.folder / "motion.pkl")
     assert result["robot"] == "mine"
 

@@ -52,12 +52,12 @@ def trained(retargeted: Said, folder: Path) -> Said:
 
 
 @pytest.fixture(scope="module")
-def judged(trained: Said, folder: Path) -> Said:
+def evaluated(trained: Said, folder: Path) -> Said:
     policy = folder / "run" / "policy.safetensors"
     return robojackson("evaluate", policy, folder / "reference.parquet", "-o", folder, *SMOKE)
 
 
-STAGES = ["scored", "captured", "retargeted", "trained", "judged"]
+STAGES = ["scored", "captured", "retargeted", "trained", "evaluated"]
 
 
 @pytest.mark.parametrize("stage", STAGES)
@@ -79,7 +79,7 @@ def test_a_stage_loads_no_prefect(stage: str, request: pytest.FixtureRequest) ->
         ("retargeted", {"scorecard", "steps", "dt", "cyclic"}),
         ("trained", {"policy", "steps", "seconds", "stopped"}),
         (
-            "judged",
+            "evaluated",
             {"survived_s", "success", "strict_success", "skill", "site_error_m", "limb_gain"}
             | {"baselines"},
         ),
@@ -117,16 +117,16 @@ def test_train_writes_one_row_an_episode(trained: Said, folder: Path) -> None:
 
 
 def test_evaluate_writes_one_row_a_rollout_of_every_policy(
-    trained: Said, judged: Said, folder: Path
+    trained: Said, evaluated: Said, folder: Path
 ) -> None:
     data = (folder / "evaluations.parquet").read_bytes()
     rows = tables.decode_rows(EVALUATION_RECORD, data, "f")
     assert {row["step"] for row in rows} == {trained.answer["steps"]}
-    known = {"trained", *judged.answer["baselines"], *judged.answer["variants"]}
+    known = {"trained", *evaluated.answer["baselines"], *evaluated.answer["variants"]}
     assert {row["policy"] for row in rows} == known
 
 
-def test_episodes_and_evaluations_of_a_run_can_be_joined(judged: Said, folder: Path) -> None:
+def test_episodes_and_evaluations_of_a_run_can_be_joined(evaluated: Said, folder: Path) -> None:
     episodes = (folder / "run" / "episodes.parquet").read_bytes()
     evaluations = (folder / "evaluations.parquet").read_bytes()
     keys = ("run_id", "move", "setup", "seed")

@@ -26,7 +26,7 @@ ROW |= {"episode_return": NAN, "seconds_left": 65.0}
 
 @pytest.fixture
 def budgets(monkeypatch: pytest.MonkeyPatch) -> list[TrainConfig]:
-    """The configurations of trainings that are all refused."""
+    """Return the configurations of trainings, each of which is refused."""
     seen: list[TrainConfig] = []
 
     def refuse(motion, robot, config: TrainConfig, *rest, **more) -> None:
@@ -55,7 +55,7 @@ def test_a_refused_training_leaves_nothing(budgets: list, tmp_path: Path) -> Non
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_motion_that_nobody_has_looked_at_is_not_trained_on(
+def test_a_motion_without_a_score_card_is_not_trained_on(
     budgets: list, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """The gate of `dance` holds for `train` alone, too; --force goes on."""
@@ -110,7 +110,7 @@ def test_a_setup_beside_a_configuration_is_refused(tmp_path: Path) -> None:
         training_process.requested(config, "pretrain", {})
 
 
-def test_what_the_reward_can_ask_for_is_one_line() -> None:
+def test_the_reward_audit_is_one_line() -> None:
     found = {"root": {"perfect_step": 4.9, "statue": 1.002, "flail": 0.978}}
     assert (
         training_process.format_reward_audit(found)

@@ -23,7 +23,7 @@ printf '%s\\n' "${COMPREPLY[@]}"
 
 @pytest.fixture(scope="module")
 def command(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the command `robojackson` of this interpreter."""
+    """Return a folder with the command `robojackson` of this interpreter."""
     folder = tmp_path_factory.mktemp("bin")
     program = folder / "robojackson"
     program.write_text(f"#!{sys.executable}\nfrom robojackson.__main__ import main\n\nmain()\n")
@@ -32,15 +32,15 @@ def command(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def completions(command: Path, words: str) -> list[str]:
-    """What bash offers after these words, the last of them unfinished."""
+    """Return what bash offers after these words, the last of them incomplete."""
     path = f"{command}{os.pathsep}{os.environ['PATH']}"
     env = environment(PATH=path)
     script = subprocess.run(
         ["robojackson"], env=env | {COMPLETE: "source_bash"}, capture_output=True, check=True
     )
     (command / "completion.sh").write_bytes(script.stdout)
-    asked = ["bash", "-c", ASK, "bash", str(command / "completion.sh"), words]
-    done = subprocess.run(asked, env=env, capture_output=True, text=True, check=True, cwd=ROOT)
+    shell = ["bash", "-c", ASK, "bash", str(command / "completion.sh"), words]
+    done = subprocess.run(shell, env=env, capture_output=True, text=True, check=True, cwd=ROOT)
     first, *found = done.stdout.split("\n")
     assert first.startswith("complete ")
     return [word for word in found if word]

@@ -13,7 +13,8 @@ Writer = Callable[..., Path]
 
 @pytest.fixture
 def write_video(tmp_path: Path) -> Writer:
-    """write_video(name, frames, size, fps, index_first) -> path of an H.264 mp4.
+    """Return write_video(name, frames, size, fps, index_first), which returns the path of an H.264
+    mp4.
 
     Frame k is grey of level 2 k; its left half is 60 brighter, so that its orientation shows.
     """

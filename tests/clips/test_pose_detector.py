@@ -1,4 +1,4 @@
-"""The detector on real files: a person is found, an empty room is not, what lacks is reported."""
+"""The detector on real files: it finds a person, none in an empty room, and names what it lacks."""
 
 from pathlib import Path
 
@@ -51,7 +51,7 @@ def test_unknown_size_names_the_known_ones() -> None:
         pose_detector.model_path("huge")
 
 
-def test_missing_bundle_tells_how_to_build_it(tmp_path: Path, monkeypatch) -> None:
+def test_missing_bundle_names_the_command_that_builds_it(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setattr(pose_detector, "ASSETS", tmp_path)
     with pytest.raises(
         MissingDependency, match=r"python -m tools\.assets\.build_pose_models --size heavy"

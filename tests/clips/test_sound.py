@@ -28,7 +28,7 @@ BEAT_S, FPS = 0.5, 30
 
 
 def clicks(seconds: float, every_s: float = BEAT_S, first_s: float = 0.25) -> np.ndarray:
-    """Short decaying tones."""
+    """Return short decaying tones."""
     samples, tone = np.zeros((round(seconds * RATE), 2)), np.arange(0, 0.03, 1 / RATE)
     burst = 0.8 * np.exp(-tone / 0.006) * np.sin(2 * np.pi * 1000 * tone)
     for start in np.arange(first_s, seconds - 0.05, every_s):
@@ -38,7 +38,7 @@ def clicks(seconds: float, every_s: float = BEAT_S, first_s: float = 0.25) -> np
 
 
 def onsets(samples: np.ndarray) -> np.ndarray:
-    """Times at which silence ends, seconds."""
+    """Return the times at which silence ends, seconds."""
     loud = np.abs(samples).max(1) > 0.15
     starts = np.flatnonzero(loud & ~np.roll(loud, 1))
     return starts[np.insert(np.diff(starts) > 0.1 * RATE, 0, True)] / RATE
@@ -87,7 +87,7 @@ def test_sound_and_picture_of_a_written_film_are_in_step(tmp_path: Path) -> None
 
 
 def clip_of(samples: np.ndarray, seconds: float, folder: Path) -> Path:
-    """A clip whose picture flashes while a click begins."""
+    """Return a clip whose picture flashes while a click begins."""
     starts = onsets(samples)
     pictures = [
         np.full((64, 64, 3), 250 if (np.abs(starts - k / FPS) < 0.5 / FPS).any() else 10, np.uint8)
@@ -97,7 +97,7 @@ def clip_of(samples: np.ndarray, seconds: float, folder: Path) -> Path:
 
 
 def flashes(film: Path) -> np.ndarray:
-    """Times of the pictures that flash, seconds."""
+    """Return the times of the pictures that flash, seconds."""
     bright = np.array([frame.mean() > 120 for _, frame in timed_frames(film, 0.0, 1e3)])
     times = np.array([time for time, _ in timed_frames(film, 0.0, 1e3)])
     return times[bright]
@@ -181,7 +181,7 @@ def test_a_film_without_sound_is_silent(tmp_path: Path) -> None:
 
 
 def bobbing(seconds: float, shift_s: float = 0.0) -> np.ndarray:
-    """Points that stand still for a moment at 0.25 s and every half second after it."""
+    """Return points that stand still for a moment at 0.25 s and every half second after it."""
     times = np.arange(0, seconds, 1 / FPS) - 0.25 - shift_s
     height = 0.1 * np.cos(2 * np.pi * times / (2 * BEAT_S))
     return np.stack([np.zeros_like(times), np.zeros_like(times), height], 1)[:, None]

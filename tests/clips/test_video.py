@@ -31,7 +31,7 @@ def turn_by_metadata(path: Path) -> None:
     path.write_bytes(bytes(data))
 
 
-def test_probe_tells_what_was_written(write_video) -> None:
+def test_probe_returns_what_was_written(write_video) -> None:
     info = probe(write_video(frames=20, size=(64, 48), fps=20), LIMITS)
     assert (info.width, info.height, info.fps, info.frames) == (64, 48, 20.0, 20)
     assert info.duration_s == pytest.approx(1.0)
@@ -159,7 +159,7 @@ def test_folder_without_videos_is_refused(tmp_path: Path) -> None:
 
 
 def write_at(path: Path, times: np.ndarray) -> Path:
-    """Frame k is grey of level 8 k, shown from times[k] on."""
+    """Write a clip whose frame k is grey of level 8 k and shown from times[k] on."""
     pictures = ((t, np.full((48, 64, 3), 8 * k, np.uint8)) for k, t in enumerate(times))
     write_timed(path, pictures)
     return path
@@ -185,7 +185,7 @@ def test_a_trimmed_range_keeps_its_varying_rate(tmp_path: Path) -> None:
     assert [t for t, _ in timed_frames(out)] == pytest.approx(UNEVEN_S[3:8] - 0.12, abs=1e-4)
 
 
-def test_frames_without_times_come_at_the_rate_that_the_file_tells(tmp_path: Path) -> None:
+def test_frames_without_times_come_at_the_rate_that_the_file_states(tmp_path: Path) -> None:
     path = tmp_path / "raw.h264"
     with av.open(str(path), "w", format="h264") as container:
         stream = container.add_stream("libx264", rate=25)

@@ -1,4 +1,4 @@
-"""The list of dances, and what may stand in it."""
+"""The list of dances, and the keys and values that it accepts."""
 
 import pytest
 

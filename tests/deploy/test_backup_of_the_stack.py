@@ -43,7 +43,7 @@ for key, content in json.load(sys.stdin).items():
 
 @pytest.fixture(scope="module")
 def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stack]:
-    """A stack without its workers."""
+    """Yield a stack without its workers."""
     made = Stack(tmp_path_factory.mktemp("stack"), more=QUICK)
     try:
         for name in CORE:

@@ -57,7 +57,7 @@ for name in sys.argv[1:]:
 
 
 def repository() -> Iterator[Path]:
-    """Files of the checkout, relative; of hidden folders only `.ci`."""
+    """Yield the files of the checkout, relative; of hidden folders only `.ci`."""
     for folder, inner, names in os.walk(ROOT):
         inner[:] = [
             name
@@ -71,7 +71,7 @@ def repository() -> Iterator[Path]:
 
 @pytest.fixture(scope="module")
 def context(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
-    """Files that a build would get."""
+    """Return the files that a build would get."""
     root = tmp_path_factory.mktemp("checkout")
     for path in (*repository(), *map(Path, JUNK)):
         (root / path).parent.mkdir(parents=True, exist_ok=True)
@@ -84,7 +84,7 @@ def context(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
 
 @pytest.fixture(scope="module")
 def image(context: set[str], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with what the image has under /app."""
+    """Return a folder with the files that the image has under /app."""
     root = tmp_path_factory.mktemp("app")
     for name in context:
         (root / name).parent.mkdir(parents=True, exist_ok=True)
@@ -180,7 +180,7 @@ def test_every_deployment_is_importable_from_it_alone(image: Path) -> None:
 
 
 def test_the_image_has_no_tools_of_developers() -> None:
-    """The extras that it is built with, of which `dev` is none."""
+    """The extras that it is built with; `dev` is not among them."""
     dockerfile = (ROOT / "Dockerfile").read_text()
     assert "EXTRAS=app,fast,s3 sh tools/bootstrap.sh install" in dockerfile
     bootstrap = (ROOT / "tools" / "bootstrap.sh").read_text()

@@ -120,7 +120,7 @@ def test_the_log_of_every_service_is_rotated(name: str) -> None:
 
 
 def identities(given: dict[str, str]) -> list[dict[str, Any]]:
-    """The S3 server's, as it reads them."""
+    """Return the identities of the S3 server, as it reads them."""
     mount = SERVICES["s3"]["configs"][0]
     assert f"-s3.config={mount['target']}" in SERVICES["s3"]["command"]
     content = interpolate(FILE["configs"][mount["source"]]["content"], given)
@@ -152,7 +152,7 @@ def test_a_service_has_the_keys_of_its_role_alone(name: str) -> None:
     assert held == {f"S3_{role.upper()}_PASSWORD"}
 
 
-def test_workers_cannot_reach_the_database_and_nobody_is_its_administrator() -> None:
+def test_workers_cannot_reach_the_database_and_no_role_administers_it() -> None:
     holders = {
         name: {n for n in SERVICES if f"${{{name}:" in str(SERVICES[n])}
         for name in ("POSTGRES_ADMIN_PASSWORD", "POSTGRES_PASSWORD", "POSTGRES_BACKUP_PASSWORD")
@@ -183,7 +183,7 @@ def test_a_backup_is_in_a_folder_of_the_host_as_a_user_of_choice(name: str) -> N
 
 
 def ports(**given: str) -> dict[str, list[str]]:
-    """Where each service listens for others than services."""
+    """Return the ports at which each service listens for programs outside the stack."""
     made = interpolate(SERVICES, {**passwords(), **given})
     return {name: service["ports"] for name, service in made.items() if "ports" in service}
 

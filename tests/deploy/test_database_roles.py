@@ -22,7 +22,7 @@ def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stack]:
         made.remove()
 
 
-def asked(stack: Stack, role: str, sql: str, database: str = "prefect") -> tuple[int, str]:
+def query(stack: Stack, role: str, sql: str, database: str = "prefect") -> tuple[int, str]:
     names = {"prefect": "POSTGRES_PASSWORD", "backup": "POSTGRES_BACKUP_PASSWORD"}
     access = {"PGPASSWORD": stack.given[names[role]], "PGPORT": str(stack.ports["postgres"])}
     done = subprocess.run(
@@ -33,9 +33,9 @@ def asked(stack: Stack, role: str, sql: str, database: str = "prefect") -> tuple
 
 
 def test_the_server_owns_its_tables_and_a_backup_reads_them(stack: Stack) -> None:
-    made = asked(stack, "prefect", "CREATE TABLE a AS SELECT 1 AS x; CREATE EXTENSION pg_trgm")
+    made = query(stack, "prefect", "CREATE TABLE a AS SELECT 1 AS x; CREATE EXTENSION pg_trgm")
     assert made[0] == 0, made[1]
-    assert asked(stack, "backup", "SELECT x FROM a") == (0, "1\n")
+    assert query(stack, "backup", "SELECT x FROM a") == (0, "1\n")
 
 
 @pytest.mark.parametrize(
@@ -53,6 +53,6 @@ def test_the_server_owns_its_tables_and_a_backup_reads_them(stack: Stack) -> Non
     ],
 )
 def test_what_a_role_may_not(stack: Stack, role: str, sql: str, database: str) -> None:
-    code, found = asked(stack, role, sql, database)
+    code, found = query(stack, role, sql, database)
     assert code
     assert "permission denied" in found or "must be superuser" in found or "must be" in found

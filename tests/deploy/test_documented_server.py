@@ -37,7 +37,7 @@ DANCE: dict[str, Any] = {"train.steps": 300, "train.trainer": "sb3"}
 
 
 def block() -> str:
-    """The first commands of the section."""
+    """Return the first commands of the section."""
     section = DOCUMENT.read_text().split(SECTION, 1)[1]
     found = re.search(r"```sh\n(.*?)```", section, re.DOTALL)
     assert found
@@ -99,7 +99,7 @@ def executed() -> Iterator[list[str]]:
 
 
 def ask(api: str, path: str, **body: Any) -> list[dict[str, Any]]:
-    """What a server answers to a question of its API."""
+    """Return the answer of a server to a request of its API."""
     request = urllib.request.Request(
         f"{api}/{path}", json.dumps(body).encode(), {"Content-Type": "application/json"}
     )
@@ -108,7 +108,7 @@ def ask(api: str, path: str, **body: Any) -> list[dict[str, Any]]:
 
 
 def bare(folder: Path) -> dict[str, str]:
-    """The environment of somebody who has set nothing but where the store is."""
+    """Return the environment of a user who has set the place of the store alone."""
     home = folder / "home"
     home.mkdir()
     kept = {k: os.environ[k] for k in ("PATH", "LANG", "LD_LIBRARY_PATH") if k in os.environ}

@@ -34,7 +34,7 @@ POLICY = (
 
 @pytest.fixture(scope="module")
 def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stack]:
-    """A stack of which only the S3 server runs."""
+    """Yield a stack of which only the S3 server runs."""
     made = Stack(tmp_path_factory.mktemp("stack"))
     try:
         made.start("s3")
@@ -60,7 +60,7 @@ def system(stack: Stack, key: str, secret: str) -> s3fs.S3FileSystem:
 
 
 def role(stack: Stack, name: str) -> s3fs.S3FileSystem:
-    """The bucket as a role reaches it, with the keys of a service of that role."""
+    """Return the bucket as a role reaches it, with the keys of a service of that role."""
     given = stack.file[SERVICES[name]]["environment"]
     assert given["AWS_ACCESS_KEY_ID"] == name
     return system(stack, name, given["AWS_SECRET_ACCESS_KEY"])
@@ -68,7 +68,7 @@ def role(stack: Stack, name: str) -> s3fs.S3FileSystem:
 
 @pytest.fixture(scope="module")
 def bucket(stack: Stack) -> Stack:
-    """The stack with its bucket and a file in it."""
+    """Return the stack with its bucket and a file in it."""
     role(stack, "setup").makedirs(BUCKET, exist_ok=True)
     role(stack, "worker").pipe_file(KEY, CONTENT)
     return stack
@@ -182,7 +182,7 @@ def test_a_wrong_key_is_forbidden(key: str, secret: str, bucket: Stack) -> None:
 
 
 def message(field: int, value: bytes) -> bytes:
-    """A field of a protobuf message, shorter than 128 bytes."""
+    """Return a field of a protobuf message, shorter than 128 bytes."""
     return bytes([field << 3 | 2, len(value)]) + value
 
 
@@ -205,7 +205,7 @@ def test_the_gateways_own_port_takes_no_identity_from_strangers(bucket: Stack) -
 
 
 def listening(stack: Stack) -> dict[str, set[int]]:
-    """Ports that the server listens on, by address."""
+    """Return the ports that the server listens on, by address."""
     process = stack.services["s3"].process
     assert process is not None
     found: dict[str, set[int]] = {}

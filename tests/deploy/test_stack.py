@@ -33,7 +33,7 @@ def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stack]:
 
 
 def command(stack: Stack, *words: str, **more: str) -> subprocess.CompletedProcess[str]:
-    """A command beside the stack."""
+    """Run a command beside the stack."""
     environment = {**stack.client(), **more}
     run = [sys.executable, "-m", *words]
     return subprocess.run(
@@ -66,13 +66,13 @@ def inspect(stack: Stack, run: str) -> dict[str, Any]:
 
 
 def listed(stack: Stack, *words: str) -> list[dict[str, Any]]:
-    """The runs that the server tells of."""
+    """Return the runs that the server lists."""
     result = prefect(stack, "flow-run", "ls", *words, "--output", "json")
     return list(json.loads(result.stdout)) if result.returncode == 0 else []
 
 
 def until(question: Callable[[], Any], seconds: float = 900.0) -> Any:
-    """The first answer that is not empty."""
+    """Return the first answer that is not empty."""
     end = time.monotonic() + seconds
     while not (answer := question()) and time.monotonic() < end:
         time.sleep(0.5)
@@ -90,7 +90,7 @@ def trainings(stack: Stack) -> list[Found]:
 
 
 def others(stack: Stack) -> list[Found]:
-    """Every process but the services'."""
+    """Return every process but those of the services."""
     services = stack.pids
     return [f for f in under(stack.folder / "home") if f.pid not in services]
 
@@ -191,7 +191,8 @@ def test_no_secret_is_in_logs_results_pages_or_the_database(stack: Stack) -> Non
 
 
 def dumped(stack: Stack) -> bytes:
-    """Everything that Prefect's server keeps: runs, logs, artifacts, blocks, variables."""
+    """Return everything in the database of Prefect's server: runs, logs, artifacts, blocks,
+    variables."""
     access = {"PGPASSWORD": stack.given["POSTGRES_BACKUP_PASSWORD"]}
     access["PGPORT"] = str(stack.ports["postgres"])
     words = ["pg_dump", "-h", "127.0.0.1", "-U", "backup", "prefect"]
@@ -203,7 +204,7 @@ def dumped(stack: Stack) -> bytes:
 
 
 def kept(stack: Stack) -> dict[str, bytes]:
-    """The result store: tables, pages, records."""
+    """Return the files of the result store: tables, pages, records."""
     own = stack.client()
     url = f"http://127.0.0.1:{stack.ports['s3']}"
     system = s3fs.S3FileSystem(

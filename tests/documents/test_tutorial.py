@@ -24,6 +24,7 @@ LOOKING = (
     ("docs/commands.md", ("catalogue",)),
     ("docs/ablation.md", ("metrics",)),
     ("docs/commands.md", ("clean",)),
+    ("docs/commands.md", ("licences",)),
     ("docs/robots.md", ("robots", "check", "humanoid")),
     ("docs/trackers.md", ("trackers",)),
 )

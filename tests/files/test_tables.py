@@ -25,7 +25,7 @@ from storage.store import Store
 
 
 def f32(rng: np.random.Generator, *shape: int) -> np.ndarray:
-    """Numbers that a float32 column holds exactly."""
+    """Return numbers that a float32 column holds exactly."""
     return rng.normal(size=shape).astype(np.float32).astype(float)
 
 

@@ -96,7 +96,7 @@ def play(
 
 
 def states_reported() -> dict[str, str]:
-    """The last version of the table on Prefect's page: states by cell."""
+    """Return the last version of the table on Prefect's page: states by cell."""
     with get_client(sync_client=True) as client:
         expected = ArtifactFilter(key=ArtifactFilterKey(any_=["ablation-played"]))
         versions = client.read_artifacts(artifact_filter=expected)
@@ -215,7 +215,7 @@ def on_workers(
     return asyncio.run(cells.run_on_worker(a_cell()))
 
 
-def test_a_cell_that_was_done_before_asks_no_worker(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_cell_that_was_done_before_uses_no_worker(monkeypatch: pytest.MonkeyPatch) -> None:
     pool = Pool()
     assert on_workers(pool, monkeypatch, kept=True) == {"policy": REFERENCE}
     assert pool.names == []
@@ -267,7 +267,7 @@ class Attempts:
         return {"policy": REFERENCE}
 
     def run(self) -> dict[str, Artifact]:
-        """The stage in a cell of one minute and two retries."""
+        """Run the stage in a cell of one minute and two retries."""
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(cells, "SECONDS_BEFORE_RETRY", 0.0)
             patch.setattr(cells, "time", SimpleNamespace(monotonic=lambda: self.now))

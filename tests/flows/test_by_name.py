@@ -1,4 +1,4 @@
-"""From what somebody asks to be danced to files, and what happens without a net."""
+"""From the source that a user names to files, and what happens without a network."""
 
 import asyncio
 from datetime import UTC, datetime
@@ -27,7 +27,8 @@ IMPATIENT = {
 
 @pytest.fixture
 def config(tmp_path: Path) -> str:
-    """No patience, and a proxy that is not there: whatever is no local server is out of reach."""
+    """Return a configuration without patience and with a dead proxy: only local servers can be
+    reached."""
     path = tmp_path / "finding.yaml"
     path.write_text(yaml.safe_dump({"web": {**IMPATIENT, "proxy": "http://127.0.0.1:9"}}))
     return str(path)
@@ -48,18 +49,18 @@ def near(folder: Path) -> str:
 
 
 def files(source: str, config: str = "finding", book: str = "dances") -> dict[str, bytes]:
-    """Names and contents of the videos that are meant."""
+    """Return the names and contents of the videos that a source stands for."""
 
     @flow
-    async def asked() -> dict[str, bytes]:
+    async def resolved() -> dict[str, bytes]:
         async with videos_of(source, Search(config=config, book=book)) as paths:
             return {path.name: path.read_bytes() for path in paths}
 
-    return asyncio.run(asked())
+    return asyncio.run(resolved())
 
 
 def refused(**given: Any) -> bool:
-    """Whether Prefect's server takes no such parameters for a run of `dance`."""
+    """Return whether Prefect's server refuses these parameters for a run of `dance`."""
     schema = parameter_schema(dance.fn).model_dump_for_openapi()
     return bool(validate(given, schema, raise_on_error=False))
 
@@ -84,7 +85,7 @@ def test_a_video_that_was_downloaded_leaves_no_copy(
 
 
 @pytest.mark.medium
-def test_a_name_without_a_video_that_can_be_danced_tells_every_reason(
+def test_a_name_without_a_usable_video_reports_every_reason(
     records: None, store_folder: Path, tmp_path: Path
 ) -> None:
     with serving(b"") as web, pytest.raises(NoPersonFound, match="HTTP 404 not found"):

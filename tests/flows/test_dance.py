@@ -62,7 +62,7 @@ class Passes:
         return asyncio.run(dance(str(self.source), "smoke", {**OVERRIDES, **music}))
 
     def executed(self) -> dict[str, int]:
-        """How often each task really ran in the last pass."""
+        """Return how often each task really ran in the last pass."""
         with get_client(sync_client=True) as client:
             flow_run = max(client.read_flow_runs(), key=lambda run: run.expected_start_time)
             runs = [
@@ -196,7 +196,8 @@ def test_only_clips_without_a_person_are_an_error_that_counts_frames() -> None:
 def score(
     records: None, store_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> Callable[..., list[str]]:
-    """Names of the candidates that are left when played landmarks of some files fail."""
+    """Return the names of the candidates that are left when the simulated landmarks of some files
+    fail."""
 
     def probe_video(source: Any, limits: Any, start: Any, end: Any) -> dict[str, Artifact]:
         return dict.fromkeys(("video", "info"), Artifact(source.path.name, source.sha256))

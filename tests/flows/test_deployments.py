@@ -74,7 +74,7 @@ def test_the_silence_of_a_run_can_be_chosen() -> None:
     assert quick == {name: seconds / 2 for name, seconds in shipped.items()}
 
 
-def test_an_automation_tells_its_seconds() -> None:
+def test_an_automation_names_its_seconds() -> None:
     document = {f["trigger"]["within"]: f["actions"][0]["message"] for f in automations()}
     assert all(f" {seconds} s" in message for seconds, message in document.items())
 
@@ -86,7 +86,8 @@ def test_a_silence_shorter_than_two_signs_of_life_is_refused(seconds: str) -> No
 
 
 async def environment_of_a_run(pool: str, known: dict[str, Any] | None) -> dict[str, Any]:
-    """What a worker gives a run of a pool that is registered, and may have been there before."""
+    """Return the environment that a worker gives a run of a pool, which may have been registered
+    before."""
     async with get_client() as client:
         if known is not None:
             before = WorkPoolCreate(name=pool, type="process", base_job_template=known)
@@ -112,7 +113,7 @@ def test_a_flow_from_the_command_line_may_miss_two_heartbeats() -> None:
 
 @pytest.fixture
 def bucket(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
-    """A store on an S3 server that only the environment knows."""
+    """Yield a store on an S3 server that only the environment knows."""
     server = ThreadedMotoServer(port=0, verbose=False)
     server.start()
     host, port = server.get_host_and_port()

@@ -17,8 +17,8 @@ from tests.fixtures.own_robot import own_robot
 
 
 @pytest.fixture
-def asked(store_folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
-    """The commands of played processes, which leave a walker in their folder."""
+def commands(store_folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
+    """Return the commands of simulated processes, which leave a walker in their folder."""
     commands: list[list[str]] = []
 
     async def play(command: list[str], run_id: str, work: Path, *rest: Any) -> bytes:
@@ -41,41 +41,41 @@ def folder_of(command: list[str]) -> Path:
 
 
 def test_the_walker_is_kept_and_its_folder_of_work_is_gone(
-    asked: list[list[str]], store_folder: Path
+    commands: list[list[str]], store_folder: Path
 ) -> None:
     key = train(steps=64)
-    (command,) = asked
+    (command,) = commands
     result = f"walker_paper.safetensors of {folder_of(command).name}"
     assert Store(store_folder).read(key).decode() == result
     assert not folder_of(command).exists()
 
 
-def test_trainings_that_differ_share_no_folder(asked: list[list[str]]) -> None:
+def test_trainings_that_differ_share_no_folder(commands: list[list[str]]) -> None:
     for given in ({"steps": 64}, {"steps": 65}, {"steps": 64, "seed": 1}):
         train(**given)
     train("track", steps=64)
-    assert len({folder_of(command) for command in asked}) == len(asked)
+    assert len({folder_of(command) for command in commands}) == len(commands)
 
 
 def test_the_walker_of_another_robot_is_what_its_trainings_start_from(
-    asked: list[list[str]], store_folder: Path, tmp_path: Path
+    commands: list[list[str]], store_folder: Path, tmp_path: Path
 ) -> None:
     file = own_robot(tmp_path / "mine")
     model = file.parent / "model.xml"
     model.write_text(model.read_text().replace('armature="1"', 'armature="2"'))
     key = train("track", steps=64, robot=str(file))
-    (command,) = asked
+    (command,) = commands
     assert command[command.index("--robot") + 1] == str(file)
     assert walker_file(describe_robot(str(file)), "track") == store_folder / key
 
 
 def test_a_configuration_that_was_changed_starts_again(
-    asked: list[list[str]], monkeypatch: pytest.MonkeyPatch
+    commands: list[list[str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     train(steps=64)
     monkeypatch.setattr(pretrain, "PIPELINE", "smoke")
     train(steps=64)
-    assert folder_of(asked[0]) != folder_of(asked[1])
+    assert folder_of(commands[0]) != folder_of(commands[1])
 
 
 @pytest.mark.medium
@@ -87,11 +87,11 @@ def test_a_walker_whose_flow_is_gone_is_not_trained(tmp_path: Path) -> None:
 
 
 def test_the_process_is_reported_whose_it_is(
-    asked: list[list[str]], monkeypatch: pytest.MonkeyPatch
+    commands: list[list[str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(pretrain.os, "getpid", lambda: 4321)
     train(steps=64)
-    assert asked[0][asked[0].index("--parent") + 1] == "4321"
+    assert commands[0][commands[0].index("--parent") + 1] == "4321"
 
 
 def test_the_bundled_walk_is_found_from_any_folder(

@@ -63,7 +63,7 @@ class Nights:
         return night(self.book, dances)
 
     def row(self, word: str) -> dict[str, Any]:
-        """What the catalogue says of the first video whose address has the word."""
+        """Return the row of the catalogue for the first video whose address has the word."""
         return next(
             row for row in candidate_catalogue.records(self.store) if f"/{word}/" in row["url"]
         )
@@ -74,7 +74,7 @@ def night(book: Path, dances: list[str] | None = None) -> dict[str, Any]:
 
 
 def artifact(key: str) -> Any:
-    """The data of the newest artifact of a key."""
+    """Return the data of the newest artifact of a key."""
     expected = ArtifactFilter(key=ArtifactFilterKey(any_=[key]))
     with get_client(sync_client=True) as client:
         found = client.read_artifacts(artifact_filter=expected)
@@ -170,10 +170,10 @@ def test_prefect_links_to_the_chosen_video(nights: Nights) -> None:
 
 @pytest.mark.medium
 def test_the_next_night_downloads_only_what_is_missing(nights: Nights) -> None:
-    before = list(nights.web.asked)
+    before = list(nights.web.requests)
     result = nights.again(["Good One"])
-    asked = {path.split("/")[1] for path, _ in nights.web.asked[len(before) :]}
-    assert asked == set(FAILURES)
+    requested = {path.split("/")[1] for path, _ in nights.web.requests[len(before) :]}
+    assert requested == set(FAILURES)
     done = result["dances"]["Good One"]
     assert not done["is_new"]
     assert done["reference"] == nights.first["dances"]["Good One"]["reference"]
@@ -210,7 +210,7 @@ def test_a_choice_of_which_no_motion_can_be_made_leaves_the_one_before(
         "new", "http://host/new", "", "", "site", retrieved_at=datetime.now(UTC)
     )
 
-    def hunt(dance: Dance, *rest: object) -> SearchResult:
+    def search(dance: Dance, *rest: object) -> SearchResult:
         entry = Entry(candidate, "chosen", video=kept)
         made = SearchResult(dance, "refresh-2", (entry,), Selection((candidate,), ()))
         candidate_catalogue.append(store, rows(made))
@@ -226,7 +226,7 @@ def test_a_choice_of_which_no_motion_can_be_made_leaves_the_one_before(
 
     monkeypatch.setenv("ROBOJACKSON_STORE", str(tmp_path))
     for name, stand_in in {
-        "search_and_rank": hunt, "motion": motion, "publish_search": show,
+        "search_and_rank": search, "motion": motion, "publish_search": show,
         "in_good_quality": lambda *given: Artifact("new", "0" * 64),
         "of_candidate": lambda *given: Artifact("old", "0" * 64),
         "get_run_logger": lambda: logging.getLogger("refresh"),

@@ -22,7 +22,7 @@ ROOT_HALF = np.sqrt(0.5)
 
 
 def poses(time_s: np.ndarray) -> np.ndarray:
-    """qpos: the root travels, sways about the vertical and leans; 17 hinges swing."""
+    """Return qpos: the root travels, sways about the vertical and leans; 17 hinges swing."""
     turn = 2 * np.pi * time_s / PERIOD_S
     root = np.array([0.0, 0.0, 1.3]) + time_s[:, None] / PERIOD_S * TRAVEL
     yaw, lean = YAW + SWAY * np.sin(turn), np.full(len(time_s), TILT)
@@ -32,7 +32,7 @@ def poses(time_s: np.ndarray) -> np.ndarray:
 
 
 def yaw_rate(time_s: np.ndarray) -> np.ndarray:
-    """Of the root about the vertical, rad/s."""
+    """Return the root's rate about the vertical, rad/s."""
     return SWAY * 2 * np.pi / PERIOD_S * np.cos(2 * np.pi * time_s / PERIOD_S)
 
 
@@ -42,7 +42,7 @@ def hinge_rates(time_s: np.ndarray) -> np.ndarray:
 
 
 def same_rotations(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """1 where two quaternions are one rotation."""
+    """Return 1 where two quaternions are one rotation."""
     return np.abs(np.sum(a * b, axis=-1))
 
 
@@ -53,7 +53,7 @@ def model() -> mujoco.MjModel:
 
 @pytest.fixture(scope="session")
 def swaying(model: mujoco.MjModel) -> ReferenceMotion:
-    """One cycle of `poses`."""
+    """Return one cycle of `poses`."""
     time_s = np.arange(STEPS) * DT
     qpos = poses(time_s)
     following = poses(time_s + 1e-6)
@@ -82,7 +82,7 @@ def swaying(model: mujoco.MjModel) -> ReferenceMotion:
 
 @pytest.fixture(scope="session")
 def turned(swaying: ReferenceMotion) -> ReferenceMotion:
-    """Upright, straight, and turned 90 degrees about the vertical, at rest."""
+    """Return a motion upright, straight, turned 90 degrees about the vertical, at rest."""
     qpos = np.zeros_like(swaying.qpos)
     qpos[:, :7] = [0.0, 0.0, 1.3, ROOT_HALF, 0.0, 0.0, ROOT_HALF]
     still = np.zeros_like(swaying.qvel)

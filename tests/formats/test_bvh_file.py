@@ -85,7 +85,7 @@ ELBOW_BENT = 90.0
 
 
 def stick(scale: float = 1.0, prefix: str = "", twisted: bool = False) -> bytes:
-    """Three frames of a skeleton like CMU's; in the last one the left elbow points forward.
+    """Return three frames of a skeleton like CMU's; in the last one the left elbow points forward.
 
     Twisted, it also turns its chest and lifts a leg.
     """

@@ -33,7 +33,7 @@ def file_of(kind: str) -> bytes:
 
 
 def damaged(data: bytes, rng: np.random.Generator) -> bytes:
-    """A few bytes changed, half of the time near the beginning, and sometimes cut off."""
+    """Return the file with a few bytes changed, often near the beginning, and sometimes cut off."""
     changed = bytearray(data)
     reach = min(len(data), BEGINNING) if rng.random() < 0.5 else len(data)
     for _ in range(rng.integers(1, 6)):

@@ -43,7 +43,7 @@ def exported(name: str, reference: ReferenceMotion, model: mujoco.MjModel) -> by
 
 
 def arrays(data: bytes) -> dict[str, np.ndarray]:
-    """An .npz as a foreign reader sees it that does not trust it."""
+    """Return the arrays of an .npz, read without pickles."""
     with np.load(io.BytesIO(data), allow_pickle=False) as archive:
         return dict(archive)
 
@@ -86,7 +86,7 @@ def test_what_is_written_is_read_back(
 
 
 @pytest.mark.parametrize("name", READERS)
-def test_a_lap_has_the_frames_of_the_formats_rate(
+def test_a_cycle_has_the_frames_of_the_formats_rate(
     name: str, swaying: ReferenceMotion, model: mujoco.MjModel
 ) -> None:
     back = READERS[name](exported(name, swaying, model))
@@ -127,7 +127,7 @@ def test_a_missing_array_is_named(name: str) -> None:
         READERS[name](sink.getvalue())
 
 
-def test_gmr_has_the_keys_that_its_readers_ask_for(
+def test_gmr_has_the_keys_that_its_readers_need(
     swaying: ReferenceMotion, model: mujoco.MjModel
 ) -> None:
     content = pickle.loads(gmr.write(swaying, model))

@@ -49,7 +49,7 @@ class Read:
         return self.content["accessors"][clock]["count"]
 
     def world(self) -> np.ndarray:
-        """Matrices of all nodes at every key frame (T, nodes, 4, 4), glTF's axes."""
+        """Return the matrices of all nodes at every key frame (T, nodes, 4, 4), glTF's axes."""
         nodes, count = self.content["nodes"], self.frames()
         local = np.tile(np.eye(4), (count, len(nodes), 1, 1))
         for k, node in enumerate(nodes):
@@ -92,7 +92,7 @@ def read(data: bytes) -> Read:
 
 @pytest.fixture(scope="module")
 def turning() -> SmplSequence:
-    """A person who walks along a curve and moves every joint."""
+    """Return a person who walks along a curve and moves every joint."""
     rng, frames = np.random.default_rng(3), 20
     times = np.linspace(0, 1, frames)[:, None]
     upright = Rotation.from_matrix(FROM_GLTF)

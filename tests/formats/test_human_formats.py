@@ -22,7 +22,7 @@ Y_UP = Rotation.from_matrix([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 
 
 def placed(motion: ForeignMotion) -> np.ndarray:
-    """Joints in our world, from the pelvis."""
+    """Return the joints in our world, from the pelvis."""
     found = ground_foreign_motion(motion, 30.0).joints
     return found - found[:, :1]
 
@@ -74,7 +74,7 @@ def amass_file(**arrays: Any) -> bytes:
 
 
 def z_up() -> tuple[np.ndarray, np.ndarray]:
-    """Poses (FRAMES, 22, 3) with the root turned upright, and the path of SMPL's trans."""
+    """Return poses (FRAMES, 22, 3) with the root turned upright, and the path of SMPL's trans."""
     vectors = axis_angles()[:, :22]
     vectors[:, 0] = UPRIGHT.as_rotvec()
     return vectors, path()
@@ -122,7 +122,7 @@ def test_a_file_of_amass_for_smplx_is_read_and_its_labels_are_not_unpickled() ->
 
 
 def y_up() -> tuple[np.ndarray, np.ndarray]:
-    """Root's axis-angle and pelvis of the person in axes with y up."""
+    """Return the root's axis-angle and the pelvis of the person in axes with y up."""
     root = (Y_UP * UPRIGHT).as_rotvec()
     return np.tile(root, (FRAMES, 1)), Y_UP.apply(path())
 

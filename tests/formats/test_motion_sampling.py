@@ -32,7 +32,7 @@ def test_frames_lie_on_the_motion(swaying: ReferenceMotion, fps: int, cyclic: bo
 
 
 @pytest.mark.parametrize("fps", RATES)
-def test_a_lap_fills_its_period_and_no_more(swaying: ReferenceMotion, fps: int) -> None:
+def test_a_cycle_fills_its_period_and_no_more(swaying: ReferenceMotion, fps: int) -> None:
     assert len(sampled(swaying, fps)) == np.ceil(PERIOD_S * fps)
 
 

@@ -103,7 +103,7 @@ FUNCTIONS: tuple[tuple[str, str, tuple[Any, ...]], ...] = (
 
 
 def value(given: object) -> bytes:
-    """The opcodes of a value, of protocol 2; a function is what pickle writes for it."""
+    """Return the opcodes of a value, of protocol 2; a function is what pickle writes for it."""
     return pickle.dumps(given, protocol=2)[2:-1]
 
 
@@ -173,7 +173,7 @@ OTHERS: dict[str, bytes] = {
 
 
 def program(words: bytes, protocol: int = 4) -> bytes:
-    """A pickle of a dictionary that holds what the words make."""
+    """Return a pickle of a dictionary that holds what the words make."""
     return b"\x80" + bytes([protocol]) + b"}" + value("x") + words + b"s."
 
 
@@ -214,7 +214,8 @@ sys.addaudithook(_hook)
 
 @pytest.fixture
 def events(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
-    """What the interpreter does in a folder of its own, modules of the readers loaded before."""
+    """Yield the audit events of the interpreter in a folder of its own, the readers loaded
+    before."""
     global _events
     monkeypatch.chdir(tmp_path)
     importlib.import_module("torch")
@@ -242,7 +243,7 @@ def zipped(name: str, content: bytes) -> bytes:
 
 
 def npy(content: bytes) -> bytes:
-    """An array of one object, as NumPy writes it before the pickle."""
+    """Return an array of one object, as NumPy writes it before the pickle."""
     sink = io.BytesIO()
     header = {"descr": "|O", "fortran_order": False, "shape": (1,)}
     np.lib.format.write_array_header_1_0(sink, header)

@@ -21,7 +21,7 @@ IMPORT = Importer("frames", bytes, lambda file: file.head.startswith(b"frames"),
 
 @pytest.fixture
 def with_a_new_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """One more module in the package, as a newcomer adds it."""
+    """Add one more module to the package, as a contributor would."""
     (tmp_path / "frames_format.py").write_text(NEW)
     monkeypatch.setattr(formats, "__path__", [*formats.__path__, str(tmp_path)])
     registry._formats.cache_clear()

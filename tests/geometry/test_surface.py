@@ -15,7 +15,7 @@ SOLIDS = {
 
 
 def grid(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """A flat square of 1 m in triangles."""
+    """Return a flat square of 1 m in triangles."""
     ticks = np.linspace(0, 1, count)
     x, y = np.meshgrid(ticks, ticks, indexing="ij")
     first = (np.arange(count - 1)[:, None] * count + np.arange(count - 1)).ravel()
@@ -25,7 +25,7 @@ def grid(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def volume(solid: Surface) -> float:
-    """By the divergence theorem; negative for a solid inside out."""
+    """Return the volume by the divergence theorem; negative for a solid inside out."""
     a, b, c = (solid.vertices[column] for column in solid.faces.T)
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
 

@@ -9,7 +9,7 @@ MOST = 376
 
 
 def names_of_any(path: Path) -> int:
-    """Times that a module writes `Any`, the import of it counted once."""
+    """Return how often a module writes `Any`, the import of it counted once."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
     return sum(
         (isinstance(node, ast.Name) and node.id == "Any")

@@ -13,7 +13,7 @@ MOST_FILES = 3
 
 
 def recipes() -> dict[str, list[str]]:
-    """The numbered steps of every recipe, by its title."""
+    """Return the numbered steps of every recipe, by its title."""
     parts = re.split(r"(?m)^## ", RECIPES)[1:]
     return {part.splitlines()[0]: re.findall(r"(?m)^\d\. (.*)$", part) for part in parts}
 
@@ -54,14 +54,15 @@ def test_the_new_names_of_modules_are_those_of_files() -> None:
 
 
 def documents() -> list[Path]:
-    """Markdown of the repository: what git has or would take."""
+    """Return the Markdown files of the repository: what git has or would take."""
     words = ("git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", "*.md")
     names = subprocess.run(words, cwd=ROOT, capture_output=True, check=True).stdout.decode()
     return [path for name in filter(None, names.split("\0")) if (path := ROOT / name).is_file()]
 
 
 def links(text: str) -> list[str]:
-    """Targets of links and pictures that are no address and no place in the same page."""
+    """Return the targets of links and pictures that are no address and no place in the same
+    page."""
     plain = re.sub(r"(?ms)^```.*?^```|`[^`\n]*`", "", text)
     found = re.findall(r"\]\(<?([^)\s>]+)", plain) + re.findall(r"(?m)^\[[^]]+\]:\s*(\S+)", plain)
     found += re.findall(r"<(?:img|a|source|video)\b[^>]*?(?:src|href)=\"([^\"]+)\"", plain)

@@ -14,11 +14,11 @@ from pydantic.dataclasses import is_pydantic_dataclass
 ROOT = Path(__file__).parents[2]
 DECORATOR = "@config_dataclass"
 CLASSES, FIELDS = 50, 200
-"""At least so many are found."""
+"""Least number of settings that are found."""
 
 
 def configurations() -> list[type]:
-    """Every dataclass that the decorator of configurations made, in order of its module."""
+    """Return every dataclass that the decorator of configurations made, in order of its module."""
     found: dict[str, type] = {}
     for folder in ("robojackson", "configs", "flows", "tasks"):
         for path in sorted((ROOT / folder).rglob("*.py")):
@@ -33,7 +33,7 @@ def configurations() -> list[type]:
 
 
 def with_number(kind: Any, number: float) -> Iterator[object]:
-    """Values of a type that hold the number: itself, or in a list or a mapping."""
+    """Yield values of a type that hold the number: itself, or in a list or a mapping."""
     if kind is float:
         yield number
         return

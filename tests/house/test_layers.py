@@ -41,7 +41,7 @@ def files(*folders: str) -> list[Path]:
 
 
 def imports(path: Path, only_top: bool = False) -> Iterator[str]:
-    """Dotted names that a file imports, those for the type checker left out."""
+    """Yield the dotted names that a file imports, those for the type checker left out."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
     nodes = tree.body if only_top else list(ast.walk(tree))
     package = path.relative_to(ROOT).with_suffix("").parts
@@ -54,7 +54,7 @@ def imports(path: Path, only_top: bool = False) -> Iterator[str]:
 
 
 def called(path: Path, only_top: bool = False) -> set[str]:
-    """Names of the functions that a file calls, or that it calls as it is imported."""
+    """Return the names of the functions that a file calls, or that it calls as it is imported."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
     plain = (ast.Assign, ast.AnnAssign, ast.Expr)
     start = [n for n in tree.body if isinstance(n, plain)] if only_top else [tree]
@@ -64,7 +64,7 @@ def called(path: Path, only_top: bool = False) -> set[str]:
 
 
 def strings(path: Path) -> Iterator[str]:
-    """Texts in a file, docstrings left out."""
+    """Yield the texts in a file, docstrings left out."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
     silent = {id(n.value) for n in ast.walk(tree) if isinstance(n, ast.Expr)}
     for node in ast.walk(tree):
@@ -90,7 +90,7 @@ def test_the_imports_keep_the_order() -> None:
 
 @pytest.fixture
 def house(tmp_path: Path) -> Path:
-    """A copy of the packages and of their contracts."""
+    """Return a copy of the packages and of their contracts."""
     shutil.copy(ROOT / "pyproject.toml", tmp_path)
     for path in files(*LAYERS):
         target = tmp_path / path.relative_to(ROOT)

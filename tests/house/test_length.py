@@ -18,7 +18,7 @@ def functions(path: Path) -> list[ast.FunctionDef | ast.AsyncFunctionDef]:
 
 
 def length(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
-    """Lines from `def` to the end, docstring included, decorators not."""
+    """Return the lines from `def` to the end, docstring included, decorators not."""
     return (function.end_lineno or function.lineno) - function.lineno + 1
 
 

@@ -14,7 +14,8 @@ PINNED = re.findall(r"(?m)^([\w.-]+)==([^\s;]+)\s*$", (ROOT / "constraints.txt")
 
 
 def required_python(name: str, version: str) -> str | None:
-    """What a pinned package asks of Python; None where it is not installed in this version."""
+    """Return the Python that a pinned package requires; None where it is not installed in this
+    version."""
     try:
         found = metadata(name)
     except PackageNotFoundError:
@@ -25,8 +26,8 @@ def required_python(name: str, version: str) -> str | None:
 
 @pytest.mark.parametrize("system", OF_A_SYSTEM)
 def test_no_pin_refuses_the_python_of_a_system(system: str) -> None:
-    asked = {name: required_python(name, version) for name, version in PINNED}
-    known = {name: text for name, text in asked.items() if text is not None}
+    required = {name: required_python(name, version) for name, version in PINNED}
+    known = {name: text for name, text in required.items() if text is not None}
     assert len(known) > 200
     refused = {n: t for n, t in known.items() if OF_A_SYSTEM[system] not in SpecifierSet(t)}
     assert refused == {}

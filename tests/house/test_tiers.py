@@ -26,7 +26,7 @@ sys.exit(pytest.main(["--collect-only", "-qq", "-p", "no:cacheprovider"], plugin
 
 
 def folders_of_tests() -> set[str]:
-    """Those of tests/ that hold a test of `make test`, by its file's name."""
+    """Return the folders of tests/ that hold a test of `make test`, by its file's name."""
     return {
         path.relative_to(ROOT / "tests").parts[0] for path in (ROOT / "tests").rglob("test_*.py")
     }

@@ -20,7 +20,7 @@ INDEX_HOST = re.compile(r"https?://\S*(?:/simple\b|pypi|whl/|npm)|--(?:extra-)?i
 
 
 def text_files() -> Iterator[Path]:
-    """Everything that may be committed and can be read; of hidden folders only `.ci`."""
+    """Yield everything that may be committed and can be read; of hidden folders only `.ci`."""
     for folder, inner, names in os.walk(ROOT):
         inner[:] = [
             name

@@ -43,7 +43,7 @@ def impostor(clip: str, name: str) -> np.ndarray:
 
 
 def elsewhere(points: np.ndarray) -> np.ndarray:
-    """The same in a world of its own, as a single camera gives it."""
+    """Return the motion in a world of its own, as a single camera gives it."""
     turn = Rotation.from_euler("zyx", [1.0, 0.02, -0.03])
     return turn.apply(points.reshape(-1, 3)).reshape(points.shape) + [2.0, -1.0, 0.1]
 
@@ -129,7 +129,7 @@ def test_a_root_relative_error_sees_all_others(figure: str, name: str) -> None:
 
 
 def jittery(clip: str) -> np.ndarray:
-    """The right motion with 5 mm of white noise, as a detector gives it frame by frame."""
+    """Return the right motion with 5 mm of white noise, as a detector gives it frame by frame."""
     noise = np.random.default_rng(2).normal(0.0, 0.005 / np.sqrt(3.0), truth_of(clip).shape)
     return truth_of(clip) + noise
 
@@ -175,7 +175,7 @@ WRISTS = (JOINTS.index("left_wrist"), JOINTS.index("right_wrist"))
 
 
 def bars(points: np.ndarray, truth: np.ndarray) -> dict[str, bool]:
-    """Which of the bars of a rollout a motion of the body holds."""
+    """Return which of the bars of a rollout a motion of the body holds."""
     here, there = pose_error.root_relative(points, HIPS), pose_error.root_relative(truth, HIPS)
     error = site_error(here, there)
     limbs = [limb_response(here[:, k], there[:, k], DT, FAST, MAX_LAG) for k in WRISTS]

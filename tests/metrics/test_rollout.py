@@ -17,7 +17,7 @@ TIME = np.arange(400) * DT
 
 
 def dance(amplitude: float = 0.3, lag_s: float = 0.0) -> np.ndarray:
-    """14 points that sway, each with its own phase, shape (400, 14, 3)."""
+    """Return 14 points that sway, each with its own phase, shape (400, 14, 3)."""
     phase = np.arange(14)[None, :, None] + np.arange(3)[None, None]
     home = np.random.default_rng(0).normal(0, 0.5, (1, 14, 3))
     return home + amplitude * np.sin(2 * np.pi * (TIME[:, None, None] - lag_s) / 2 + phase)

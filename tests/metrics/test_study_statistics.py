@@ -75,7 +75,7 @@ def test_steps_to_a_threshold_count_until_it_is_kept() -> None:
 
 
 def figures(**setups: float) -> dict[tuple[str, str], dict[int, float]]:
-    """Five seeds of two moves, each setup a little better than nothing by a constant."""
+    """Return five seeds of two moves, each setup a little better than nothing by a constant."""
     noise = RNG(4).normal(0.0, 0.05, 5)
     return {
         (move, setup.replace("_", "-")): {seed: value + noise[seed] for seed in range(5)}

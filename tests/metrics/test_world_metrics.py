@@ -12,7 +12,7 @@ FPS = 50.0
 
 
 def clip(seed: int = 0, frames: int = 230) -> np.ndarray:
-    """A body of 12 points that walks and trembles, metres."""
+    """Return a body of 12 points that walks and trembles, metres."""
     rng = np.random.default_rng(seed)
     home = rng.normal(0.0, 0.4, (1, 12, 3))
     path = np.cumsum(rng.normal(0.0, 0.02, (frames, 1, 3)), axis=0)

@@ -12,7 +12,7 @@ GOLDEN = Path(__file__).parents[1] / "golden"
 
 @pytest.fixture(scope="session")
 def hip_shake() -> LandmarkTrack:
-    """What MediaPipe (full) saw in clips/hip_shake.mp4: 120 frames."""
+    """Return the landmarks that MediaPipe (full) found in clips/hip_shake.mp4: 120 frames."""
     with np.load(GOLDEN / "hip_shake_track.npz") as data:
         return LandmarkTrack(
             fps=float(data["fps"]),

@@ -26,13 +26,13 @@ FRAMES = len(WORLD)
 
 
 def seen(tilt_deg: float = 0.0) -> np.ndarray:
-    """Keypoints before a camera that stands on +x and looks down by an angle, metres."""
+    """Return keypoints before a camera that stands on +x and looks down by an angle, metres."""
     points = WORLD.keypoints_w @ TO_CAMERA.T + [0.0, EYE, DISTANCE]
     return points @ Rotation.from_euler("x", tilt_deg, degrees=True).as_matrix().T
 
 
 def res_pk(tilt_deg: float = 0.0, **more: Any) -> dict[str, Any]:
-    """As HybrIK's demo saves it; its boxes breathe, and so does its focal length."""
+    """Return a file as HybrIK's demo saves it; its boxes breathe, and so does its focal length."""
     points = seen(tilt_deg)
     pixels = points[..., :2] / points[..., 2:] * FOCAL + [WIDTH / 2, HEIGHT / 2]
     side = BOX * (1.0 + 0.1 * np.sin(np.arange(FRAMES)))

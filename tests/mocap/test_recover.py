@@ -104,9 +104,9 @@ def test_frames_without_a_person_are_marked_and_noted(hip_shake: LandmarkTrack) 
 
 
 def test_a_clip_without_a_person_is_refused(hip_shake: LandmarkTrack) -> None:
-    nobody = replace(hip_shake, landmarks=np.full_like(hip_shake.landmarks, np.nan))
+    no_person = replace(hip_shake, landmarks=np.full_like(hip_shake.landmarks, np.nan))
     with pytest.raises(NoPersonFound, match="120 of 120"):
-        recover_motion(nobody, MocapConfig())
+        recover_motion(no_person, MocapConfig())
 
 
 def test_two_frames_are_enough(hip_shake: LandmarkTrack) -> None:

@@ -9,7 +9,7 @@ TIMES = np.array([0.0, 0.1, 0.2, 0.5, 0.6, 0.9])
 
 
 def moving(times: np.ndarray) -> LandmarkTrack:
-    """Everything moves by 1 a second."""
+    """Return a track in which everything moves by 1 a second."""
     points = np.tile(times[:, None, None], (1, 33, 3))
     fps = (len(times) - 1) / times[-1]
     time_s = times if uneven(times, fps) else None

@@ -65,7 +65,7 @@ def build(folder: Path) -> Path:
 
 
 def environment(folder: Path, wheel: Path) -> Installed:
-    """An environment with the wheel, and the libraries of this one by a path file.
+    """Return an environment with the wheel, and the libraries of this one by a path file.
 
     A folder in a path file is searched, its own path files are not: so the checkout that is
     installed here in editable mode is not found there.
@@ -82,6 +82,6 @@ def environment(folder: Path, wheel: Path) -> Installed:
 
 @pytest.fixture(scope="session")
 def installed(tmp_path_factory: pytest.TempPathFactory) -> Installed:
-    """The package as a user installs it."""
+    """Return the package as a user installs it."""
     folder = tmp_path_factory.mktemp("package")
     return environment(folder / "venv", build(folder))

@@ -26,7 +26,7 @@ STEPS = 600
 
 @contextmanager
 def started(command: list[str], folder: Path, environment: dict[str, str]) -> Iterator[None]:
-    """A process of its own group, ended by Ctrl-C."""
+    """Yield a process of its own group, ended by Ctrl-C."""
     with (folder / "log.txt").open("ab") as log:
         process = subprocess.Popen(
             command, cwd=folder, env=environment, stdout=log, stderr=log, start_new_session=True

@@ -47,7 +47,7 @@ def install(made: Installed, *words: object) -> None:
 
 @pytest.fixture(scope="module")
 def empty(tmp_path_factory: pytest.TempPathFactory) -> Installed:
-    """An environment with the wheel and what it requires, and nothing of the developer's."""
+    """Return an environment with the wheel and its requirements alone."""
     folder = tmp_path_factory.mktemp("empty")
     subprocess.run([PYTHON, "-m", "venv", folder / "venv"], check=True, cwd=folder)
     made = Installed(build(folder), folder / "venv")

@@ -9,7 +9,7 @@ APP = ("configs", "flows", "storage", "tasks")
 
 
 def folders_with_modules(top: str) -> set[str]:
-    """As names of packages, `top` included."""
+    """Return the folders with modules as names of packages, `top` included."""
     parents = {path.parent.relative_to(ROOT) for path in (ROOT / top).rglob("*.py")}
     return {folder.as_posix().replace("/", ".") for folder in parents}
 

@@ -35,7 +35,7 @@ def test_a_file_that_a_dead_process_left_holds_nothing(tmp_path: Path) -> None:
         assert (tmp_path / "lock").exists()
 
 
-def test_who_is_patient_gets_it_after_the_one_who_has_it(tmp_path: Path) -> None:
+def test_a_patient_process_gets_the_lock_after_its_holder(tmp_path: Path) -> None:
     order = []
 
     def wait() -> None:

@@ -218,7 +218,7 @@ def test_what_is_no_value_is_reported_with_its_key(text: str) -> None:
 
 @pytest.fixture
 def extended(tmp_path: Path) -> Path:
-    """A folder of configurations with a file that others extend."""
+    """Return a folder of configurations with a file that others extend."""
     text = "seed: 3\ninner: {width: 0.25, cyclic: no}\nspeed: 0.5\n"
     (tmp_path / "whole.yaml").write_text(text)
     return tmp_path

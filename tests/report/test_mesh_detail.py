@@ -9,7 +9,7 @@ from robojackson.report.video.mesh_detail import simplify
 
 @pytest.fixture
 def ball() -> mujoco.MjModel:
-    """A ball of 20 cm of many small triangles, and a small box mesh after it."""
+    """Return a ball of 20 cm of many small triangles, and a small box mesh after it."""
     spec = mujoco.MjSpec()
     turn, rise = np.meshgrid(np.linspace(0, 2 * np.pi, 60), np.linspace(-1.5, 1.5, 40))
     points = 0.2 * np.stack(
@@ -25,7 +25,7 @@ def ball() -> mujoco.MjModel:
 
 
 def surface(model: mujoco.MjModel, mesh: int) -> np.ndarray:
-    """Corners of the triangles of a mesh, metres."""
+    """Return the corners of the triangles of a mesh, metres."""
     first, count = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
     return model.mesh_vert[model.mesh_vertadr[mesh] + model.mesh_face[first : first + count]]
 

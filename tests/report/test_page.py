@@ -73,7 +73,7 @@ def test_page_shows_every_plot_inside_itself(results: Results) -> None:
 
 
 @pytest.mark.medium
-def test_page_asks_for_nothing_but_the_video(results: Results) -> None:
+def test_page_requests_nothing_but_the_video(results: Results) -> None:
     html = render(page_content(results, "my dance.mp4"))
     addresses = set(re.findall(r'(?:src|href)="((?!data:)[^"]*)"', html))
     assert addresses == {"my%20dance.mp4"}

@@ -23,14 +23,14 @@ BLUE_TO_GREY = 20
 def frames(
     sequence: SmplSequence, reference: ReferenceMotion, model: mujoco.MjModel, tmp_path: Path
 ) -> list[np.ndarray]:
-    """The small video, decoded."""
+    """Return the small video, decoded."""
     given = (None, None, sequence, reference, None, tmp_path / "r.mp4")
     out = side_by_side(*given, model=model, config=SMALL)
     with av.open(str(out)) as container:
         return [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
 
 
-def test_one_lap_is_shown(frames: list[np.ndarray], reference: ReferenceMotion) -> None:
+def test_one_cycle_is_shown(frames: list[np.ndarray], reference: ReferenceMotion) -> None:
     assert len(frames) == round(len(reference) * reference.dt * SMALL.fps)
 
 
@@ -62,13 +62,14 @@ def test_progress_counts_every_picture(
 
 
 def loaded(reference: ReferenceMotion) -> ReferenceMotion:
-    """The second motor beyond its limit for a third of the time, the first never."""
+    """Return a motion whose second motor is beyond its limit for a third of the time, the first
+    never."""
     ratio = np.full_like(reference.torque_ratio, 0.4)
     ratio[: len(ratio) // 3, 1] = 1.5
     return replace(reference, torque_ratio=ratio)
 
 
-def test_the_heat_map_tells_how_long_each_motor_is_over_its_limit(
+def test_the_heat_map_shows_how_long_each_motor_is_over_its_limit(
     reference: ReferenceMotion,
 ) -> None:
     axes = run_plots.torque_heat_map(loaded(reference), reference.joint_names).axes[0]

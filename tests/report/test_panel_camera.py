@@ -45,7 +45,7 @@ IN_THE_DARK = """
 
 
 def edge(picture: np.ndarray) -> np.ndarray:
-    """The outermost pixels below the title, (N, 3)."""
+    """Return the outermost pixels below the title, (N, 3)."""
     below = picture[canvas.strip_height(*picture.shape[1::-1]) :].astype(int)
     return np.concatenate([below[0], below[-1], below[:, 0], below[:, -1]])
 
@@ -64,7 +64,7 @@ def moments_of(reference: ReferenceMotion) -> Timeline:
 
 
 def robot_film(stack: ExitStack, reference: ReferenceMotion, model: mujoco.MjModel) -> Film:
-    """The front and the side of a robot, magenta."""
+    """Return a film of the front and the side of a robot, magenta."""
     when = moments_of(reference)
     qpos = np.asarray(reference.qpos)[when.frame]
     film = Film(stack, CONFIG, when)
@@ -153,7 +153,7 @@ def test_a_robot_that_falls_flat_touches_no_edge() -> None:
 
 
 def light(model: mujoco.MjModel, qpos: np.ndarray) -> tuple[float, float]:
-    """Mean luminance of the robot and of the floor beside it, 0..255."""
+    """Return the mean luminance of the robot and of the floor beside it, 0..255."""
     grey = np.array([0.2126, 0.7152, 0.0722])
     with RobotView(model, *SIZE, MAGENTA) as view:
         marked = view.picture(qpos, qpos[:2], 0.0)

@@ -13,7 +13,7 @@ from tests.fixtures.robots import human
 
 
 def _bent(joint: str, rotvec: list[float]) -> SmplSequence:
-    """The hip shake's first frame, held, with one SMPL joint turned."""
+    """Return the hip shake's first frame, held, with one SMPL joint turned."""
     source = human("hip_shake")
     pose = np.zeros((40, 23, 3))
     pose[:, JOINT_NAMES.index(joint) - 1] = rotvec

@@ -27,7 +27,8 @@ def _aims(robot: Robot) -> Targets:
 
 
 def _spoilt(change: Callable[[np.ndarray], None]) -> ReferenceMotion:
-    """The hip shake with its poses changed and all that follows from them made again."""
+    """Return the hip shake with its poses changed and everything that follows from them
+    recomputed."""
     motion = robot_motion("hip_shake")
     qpos = motion.qpos.copy()
     change(qpos)

@@ -21,7 +21,7 @@ def robot() -> Robot:
 
 @pytest.fixture(scope="session")
 def sway(robot: Robot) -> ReferenceMotion:
-    """1.2 s of knee bends and light arms, feet on the floor, exactly cyclic."""
+    """Return 1.2 s of knee bends and light arms, feet on the floor, exactly cyclic."""
     return make_reference(robot, sway_angles)
 
 

@@ -1,4 +1,4 @@
-"""A start that lies on the hub, asked of a stand-in that speaks the hub's protocol."""
+"""Starts from networks of the hub, with a local server that speaks the hub's protocol."""
 
 from pathlib import Path
 
@@ -27,7 +27,7 @@ REFUSAL = f"start '{REPOSITORY}' cannot be fetched from the hub"
 
 @pytest.fixture(scope="module")
 def theirs(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    """A zip that sb3-contrib wrote."""
+    """Return a zip that sb3-contrib wrote."""
     path = tmp_path_factory.mktemp("theirs") / "model.zip"
     stock = gymnasium.make("Humanoid-v5")
     TQC("MlpPolicy", stock, policy_kwargs={"net_arch": [16, 12]}, device="cpu").save(path)
@@ -35,7 +35,7 @@ def theirs(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 
 def at(address: str, cache: Path, patch: pytest.MonkeyPatch) -> None:
-    """What HF_ENDPOINT and HF_HOME say to a process that starts."""
+    """Set the hub's address and cache, as HF_ENDPOINT and HF_HOME do at start-up."""
     constants = huggingface_hub.constants
     usual = constants.HUGGINGFACE_CO_URL_TEMPLATE.removeprefix(constants.ENDPOINT)
     patch.setattr(constants, "ENDPOINT", address)
@@ -53,13 +53,13 @@ def test_training_starts_from_a_repository_of_the_hub(
 ) -> None:
     """With the layers of the zip, which is requested once and then lies in the cache."""
     config = load(TrainConfig, None, {**BRIEF, "start": REPOSITORY})
-    with serving({ZIP: theirs}) as (address, asked):
+    with serving({ZIP: theirs}) as (address, requests):
         at(address, tmp_path / "cache", monkeypatch)
         for name in ("first", "second"):
             train_policy(sway, robot, config, tmp_path / name)
             learnt = load_networks(tmp_path / name / "networks.safetensors")
             assert (learnt.widths("actor"), learnt.widths("critic1")) == ((16, 12), (16, 12, 25))
-    assert asked.count(f"GET /{ZIP}") == 1
+    assert requests.count(f"GET /{ZIP}") == 1
 
 
 def test_a_repository_that_the_hub_has_not_is_one_clear_line(

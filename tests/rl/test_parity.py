@@ -24,13 +24,14 @@ KINDS = {"plain": TQC, "normalised": replace(TQC, layer_norm=True)}
 
 
 def noise(shape: tuple[int, ...]) -> np.ndarray:
-    """What both trainers draw, always the same; JAX's distribution asks for actions x batch."""
+    """Return the numbers that both trainers draw, always the same; JAX's distribution draws actions
+    x batch."""
     drawn = np.random.default_rng(7).normal(size=(BATCH, 17)).astype(np.float32)
     return (drawn if shape[-1] == 17 else drawn.T).reshape(shape)
 
 
 def transitions() -> ReplayBufferSamples:
-    """A batch for each update, one after the other."""
+    """Return a batch for each update, one after the other."""
     rng = np.random.default_rng(3)
     n = UPDATES * BATCH
     shapes = {"observations": 348, "actions": 17, "next_observations": 348}
@@ -42,7 +43,7 @@ def transitions() -> ReplayBufferSamples:
 
 
 def part(rows: ReplayBufferSamples, i: int) -> ReplayBufferSamples:
-    """The batch of one update."""
+    """Return the batch of one update."""
     span = slice(i * BATCH, (i + 1) * BATCH)
     return ReplayBufferSamples(*(None if x is None else x[span] for x in rows))
 

@@ -19,7 +19,7 @@ def small_policy() -> Policy:
 
 
 def a_file(weight: np.ndarray, header: str) -> bytes:
-    """A policy of one layer."""
+    """Return a policy of one layer."""
     tensors = {"layer0.weight": weight, "layer0.bias": np.zeros(3)}
     return save({n: np.asarray(t, np.float32) for n, t in tensors.items()}, {FORMAT: header})
 
@@ -55,7 +55,7 @@ def test_a_folder_is_called_a_folder(tmp_path: Path) -> None:
         load_policy(tmp_path)
 
 
-def test_weights_of_somebody_else_are_refused(tmp_path: Path) -> None:
+def test_weights_of_another_network_are_refused(tmp_path: Path) -> None:
     save_file({"w": np.zeros(3, np.float32)}, tmp_path / "other.safetensors")
     with pytest.raises(BadPolicy, match="robojackson train"):
         load_policy(tmp_path / "other.safetensors")
@@ -93,7 +93,7 @@ def test_weights_that_no_layer_can_have_are_refused(
 @pytest.mark.parametrize(
     ("facts", "setup"), [({"setup": "pretrain"}, "pretrain"), ({}, ""), ({"setup": 3}, "")]
 )
-def test_a_policy_tells_the_setup_of_its_training(facts: dict[str, object], setup: str) -> None:
+def test_a_policy_names_the_setup_of_its_training(facts: dict[str, object], setup: str) -> None:
     assert Policy((), facts).setup == setup
 
 
@@ -106,7 +106,7 @@ def test_a_policy_tells_the_setup_of_its_training(facts: dict[str, object], setu
         ({"seed": 2**70, "steps": -1}, {"seed": 0, "step": None}),
     ],
 )
-def test_a_policy_tells_the_columns_of_its_training(
+def test_a_policy_names_the_columns_of_its_training(
     facts: dict[str, object], message: dict[str, object]
 ) -> None:
     assert Policy((), facts).training == message

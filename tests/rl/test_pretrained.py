@@ -40,7 +40,7 @@ def env(robot: Robot, sway: ReferenceMotion) -> VecEnv:
 
 
 def acts(networks: Networks, seen: np.ndarray) -> np.ndarray:
-    """The mean action of an actor, computed here."""
+    """Return the mean action of an actor, computed here."""
     hidden = seen
     for i in range(len(networks.widths("actor"))):
         layer = networks.tensors[f"actor.{i}.weight"], networks.tensors[f"actor.{i}.bias"]
@@ -69,7 +69,7 @@ def test_both_trainers_write_the_same_policy_from_the_same_networks(env: VecEnv)
 
 
 def zipped(tmp_path: Path, sde: bool = False) -> tuple[TQC, Path]:
-    """A zip that sb3-contrib wrote, as those of the hub are."""
+    """Save an untrained TQC of sb3-contrib as a zip like those of the hub; return both."""
     stock = gymnasium.make("Humanoid-v5")
     net = {"net_arch": [16, 12], "clip_mean": 0.0}
     model = TQC("MlpPolicy", stock, policy_kwargs=net, use_sde=sde, seed=4, device="cpu")
@@ -160,15 +160,15 @@ def test_the_hubs_zip_is_requested_by_its_own_name(
     import huggingface_sb3
 
     _, path = zipped(tmp_path)
-    asked: list[tuple[str, str]] = []
+    requests: list[tuple[str, str]] = []
 
     def fetch(repository: str, name: str) -> str:
-        asked.append((repository, name))
+        requests.append((repository, name))
         return str(path)
 
     monkeypatch.setattr(huggingface_sb3, "load_from_hub", fetch)
     found = pretrained("farama-minari/Humanoid-v5-TQC-simple", "paper")
-    assert asked == [("farama-minari/Humanoid-v5-TQC-simple", "humanoid-v5-TQC-simple.zip")]
+    assert requests == [("farama-minari/Humanoid-v5-TQC-simple", "humanoid-v5-TQC-simple.zip")]
     assert found is not None
     assert found.observation_size == 348
 

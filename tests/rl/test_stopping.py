@@ -19,7 +19,7 @@ CONFIG = TrainConfig(trainer="sb3", steps=320, tqc=SMALL)
 
 @pytest.fixture
 def updates(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Gradient updates of the trainer at every round."""
+    """Return the gradient updates of the trainer at every round."""
     seen: list[int] = []
     tick = Run.tick
 

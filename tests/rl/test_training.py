@@ -158,14 +158,14 @@ def test_every_episode_leaves_a_row_with_each_reward_term(trained: tuple) -> Non
 
 
 @pytest.mark.medium
-def test_progress_tells_rate_and_time_left(trained: tuple) -> None:
+def test_progress_shows_rate_and_time_left(trained: tuple) -> None:
     _, _, progress, _ = trained
     assert all(row["steps_per_s"] > 0 and row["seconds_left"] >= 0 for row in progress)
     assert progress
 
 
 @pytest.mark.medium
-def test_a_finished_run_asked_for_more_steps_goes_on(
+def test_a_finished_run_given_more_steps_goes_on(
     trained: tuple, robot: Robot, sway: ReferenceMotion
 ) -> None:
     """Episode numbers, steps and time go on, and so do the updates."""
@@ -192,7 +192,7 @@ def test_a_checkpoint_of_another_configuration_is_refused(
 
 
 @pytest.mark.medium
-def test_a_run_that_begins_anew_learns_nothing_from_the_one_before(
+def test_a_run_that_begins_again_learns_nothing_from_the_one_before(
     robot: Robot, sway: ReferenceMotion, tmp_path: Path
 ) -> None:
     """Only its checkpoint was removed, as the refusal of another configuration says."""
@@ -207,7 +207,7 @@ def test_a_run_that_begins_anew_learns_nothing_from_the_one_before(
 
 
 @pytest.mark.medium
-def test_a_training_that_diverges_says_so_and_keeps_what_it_had(
+def test_a_diverging_training_reports_it_and_keeps_its_policy(
     trained: tuple, robot: Robot, sway: ReferenceMotion, tmp_path: Path
 ) -> None:
     name = trained[3]

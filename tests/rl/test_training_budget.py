@@ -10,7 +10,7 @@ from robojackson.rl.training_budget import TrainingBudget
 
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """Wall and processor time, seconds, in the place of the machine's."""
+    """Return wall and processor time, seconds, which replace the machine's."""
     now = [1000.0, 50.0]
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
     monkeypatch.setattr(time, "process_time", lambda: now[1])

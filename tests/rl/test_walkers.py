@@ -17,7 +17,7 @@ from tests.fixtures.own_robot import own_robot
 
 @pytest.fixture
 def other(tmp_path: Path) -> RobotDescription:
-    """A robot for which no walker ships."""
+    """Return a robot for which no walker ships."""
     (tmp_path / "machine").mkdir()
     return machine.description(tmp_path / "machine")
 
@@ -51,7 +51,7 @@ def test_no_command_is_offered_for_a_walker_that_only_the_papers_robot_has(
         walker_file(other, "paper")
 
 
-def test_a_kept_walker_is_what_its_robot_starts_from(
+def test_a_saved_walker_is_what_its_robot_starts_from(
     store_folder: Path, other: RobotDescription
 ) -> None:
     kept = keep_walker(other, "track", shipped_walker("track").read_bytes())

@@ -75,7 +75,7 @@ def test_a_model_below_the_file_is_named_from_there(tmp_path: Path) -> None:
     assert yaml.safe_load(draft.text)["mjcf"] == "parts/model.xml"
 
 
-def test_names_that_say_nothing_leave_the_tree_to_tell_the_joints(tmp_path: Path) -> None:
+def test_meaningless_names_leave_the_joints_to_the_tree(tmp_path: Path) -> None:
     names = sorted(set(re.findall(r'<(?:body|joint) name="(\w+)"', machine.mjcf())))
     text = machine.mjcf()
     for number, name in enumerate(names):

@@ -111,7 +111,8 @@ def test_excluded_bodies_do_not_collide(tmp_path: Path) -> None:
 
 @pytest.fixture
 def on_balls(tmp_path: Path) -> Robot:
-    """The machine with a ball under each heel that is a body of its own, welded to the sole."""
+    """Return the machine with a ball under each heel that is a body of its own, welded to the
+    sole."""
     described = machine.description(tmp_path)
     ball = (
         '<body name="{}_ball" pos="-.04 0 -.03"><geom type="sphere" size=".01" mass=".01"/></body>'

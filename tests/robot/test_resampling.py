@@ -12,7 +12,8 @@ COUNT = 40
 
 
 def _turning(robot: Robot, turns: int) -> np.ndarray:
-    """A cycle in which the root turns about z, the hinges swing, and the root travels along x."""
+    """Return a cycle in which the root turns about z, the hinges swing, and the root travels along
+    x."""
     phase = 2 * np.pi * np.arange(COUNT) / COUNT
     qpos = np.tile(robot.standing, (COUNT, 1))
     qpos[:, 0] += 0.4 * np.arange(COUNT) / COUNT

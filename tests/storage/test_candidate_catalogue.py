@@ -32,7 +32,7 @@ def row(video_id: str = "v1", **more: Any) -> dict[str, Any]:
 
 @pytest.fixture(params=["folder", "memory"])
 def store(request: pytest.FixtureRequest, tmp_path: Path) -> Store:
-    """A folder, and an object store that fsspec keeps in memory."""
+    """Return a folder, and an object store that fsspec keeps in memory."""
     return Store(tmp_path if request.param == "folder" else f"memory://c-{tmp_path.name}")
 
 

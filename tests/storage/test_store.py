@@ -34,7 +34,7 @@ fsspec.register_implementation("fulldisk", FullDisk, clobber=True)
 
 @pytest.fixture(scope="session")
 def s3_url() -> Iterator[str]:
-    """A bucket of a local S3 server."""
+    """Yield a bucket of a local S3 server."""
     server = ThreadedMotoServer(port=0, verbose=False)
     server.start()
     host, port = server.get_host_and_port()
@@ -78,7 +78,7 @@ def test_a_second_put_replaces_the_first(store: Store) -> None:
     assert store.read("a") == b"new"
 
 
-def test_list_tells_the_keys_under_a_folder(store: Store) -> None:
+def test_list_returns_the_keys_under_a_folder(store: Store) -> None:
     for key in ("runs/b.json", "runs/a.json", "other/c.json"):
         store.put(key, b"{}")
     assert store.list("runs") == ["runs/a.json", "runs/b.json"]

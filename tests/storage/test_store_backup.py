@@ -34,7 +34,7 @@ CONTENTS = len({sha256_of(content) for content in FILES.values()})
 
 @pytest.fixture(params=["folder", "memory"])
 def store(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Store]:
-    """A store with files in it."""
+    """Yield a store with files in it."""
     root = tmp_path / "store" if request.param == "folder" else f"memory://{tmp_path.name}/store"
     made = filled(Store(root))
     yield made
@@ -63,7 +63,7 @@ def filled(store: Store) -> Store:
 
 
 def database(store: Store) -> SQLite:
-    """Where Prefect has its database beside a store on a disk."""
+    """Return Prefect's database beside a store on a disk."""
     return SQLite(store.here / "prefect" / "prefect.db")
 
 
@@ -397,7 +397,7 @@ def rows(path: Path) -> list[tuple[int]]:
 
 
 def made_database(path: Path, *numbers: int) -> sqlite3.Connection:
-    """A database as Prefect has it, open: its newest rows are in the journal beside it."""
+    """Return an open database like Prefect's: its newest rows are in the journal beside it."""
     path.parent.mkdir(parents=True, exist_ok=True)
     made = sqlite3.connect(path, check_same_thread=False)
     made.execute("PRAGMA journal_mode = WAL")

@@ -27,7 +27,7 @@ def store(tmp_path: Path) -> Store:
 
 
 def recorded(store: Store, name: str, result: object) -> str:
-    """A record as Prefect writes it: the result is JSON inside JSON."""
+    """Return a record as Prefect writes it: the result is JSON inside JSON."""
     import json
 
     key = stage_records.address(f"recover_motion/{name}")

@@ -27,7 +27,7 @@ def cell(seed: int = 0, run_id: str = "r1", setup: str = "scratch") -> study_tab
 
 
 def made(store: Store, survived: float = 1.0) -> dict[str, Artifact]:
-    """What the stages of a cell leave, under the names of another cell."""
+    """Return the artifacts of a cell, under the names of another cell."""
     episode = {"step": 10, "episode": 0, "episode_return": 2.5, "episode_length": 10}
     rollout = {"policy": "trained", "phase": 0, "reset": 0, "survived_s": survived, "fell": False}
     rollout |= {"clip_fraction": 1.0, "success": 1.0, "strict_success": 0.0}

@@ -32,14 +32,14 @@ def test_the_file_is_in_the_store(web: Web, store_folder: Path) -> None:
     assert Store(store_folder).read(bring(web).key) == web.video
 
 
-def test_a_second_download_asks_what_there_is_and_fetches_nothing(
+def test_a_second_download_checks_the_file_and_fetches_nothing(
     web: Web, store_folder: Path
 ) -> None:
-    """The page and the file of a bare video are one address: first both are asked for, then one."""
+    """The page and the file of a bare video are one address: first both are requested, then one."""
     first = bring(web)
-    before = len(web.asked)
+    before = len(web.requests)
     assert bring(web) == first
-    assert (before, len(web.asked) - before) == (2, 1)
+    assert (before, len(web.requests) - before) == (2, 1)
 
 
 @pytest.mark.medium

@@ -28,7 +28,7 @@ NAMES = {"run_id": "r", "move": "walk", "setup": "scratch", "seed": 0}
 
 
 def made(store: Store, policy: bytes) -> dict[str, Artifact]:
-    """What the stages of the cell leave."""
+    """Return the artifacts of the stages of the cell."""
     episode = {"step": 10, "episode": 0, "episode_return": 2.5, "episode_length": 10}
     rollout = {"policy": "trained", "phase": 0, "reset": 0, "survived_s": 1.0, "fell": False}
     rollout |= {"clip_fraction": 1.0, "success": 1.0, "strict_success": 0.0}

@@ -36,7 +36,7 @@ PAID = {"scratch": DULL, "pretrain": DULL, "curiosity": DULL | {"flail": 1.57}}
 
 
 def publish(store: Store, move: str, setup: str, seed: int) -> None:
-    """A cell that learns from nothing to what its setup is worth."""
+    """Publish a cell that learns from nothing to the level of its setup."""
     place = study_tables.Place("known", move, setup, seed, f"{setup}-{move}-s{seed}")
     names = {"run_id": place.run_id, "move": move, "setup": setup, "seed": seed}
     share = np.linspace(0.0, 1.0, 50)

@@ -1,4 +1,4 @@
-"""The motions that the dancer is taught: converted, mirrored, and none of those that judge it."""
+"""The motions that the dancer learns: converted, mirrored, and none that are held out."""
 
 from pathlib import Path
 
@@ -22,7 +22,8 @@ AT = np.tile([0.3, 0.9, -0.2], (12, 1))
 
 
 def posed(**turns: Rotation) -> np.ndarray:
-    """Keypoints of a motionless person, some of whose parts are turned, relative to the pelvis."""
+    """Return the keypoints of a motionless person, some of whose parts are turned, relative to the
+    pelvis."""
     turned = {name: Rotation.concatenate([turn] * 12) for name, turn in turns.items()}
     points = smpl_sequence(deepmimic.Motion(30.0, AT, STILL | turned)).keypoints_w[5]
     return np.asarray(points - points[keypoint("pelvis")])
@@ -69,8 +70,8 @@ def test_speeds_are_mirrored_with_the_places() -> None:
     np.testing.assert_allclose(image.qvel[:, 5], -motion.qvel[:, 5])
 
 
-def test_the_dancer_is_taught_nothing_that_judges_it(tmp_path: Path) -> None:
-    for name in load_split().judged:
+def test_the_dancer_trains_on_no_motion_that_evaluates_it(tmp_path: Path) -> None:
+    for name in load_split().held_out:
         (tmp_path / f"{name.removeprefix('cmu_')}.bvh.gz").touch()
     assert [name for name, *_ in sequences(tmp_path, 0)] == []
     motion: ReferenceMotion = robot_motion("dance_b")

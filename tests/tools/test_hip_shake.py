@@ -16,7 +16,7 @@ DOWN = np.array([0.0, -1.0, 0.0])
 
 
 def ankle(motion: deepmimic.Motion, name: str, side: float) -> np.ndarray:
-    """Forward kinematics of a leg in the axes of the file, metres."""
+    """Return an ankle by forward kinematics of a leg in the axes of the file, metres."""
     x, y, z = BODY.hips[side]
     hip = motion.root_position * BODY.scale + motion.rotations["root"].apply([x, z, -y])
     knee = hip + motion.rotations[f"{name}_hip"].apply(DOWN * BODY.thigh)

@@ -105,7 +105,7 @@ def test_changed_windows_are_still_seen_as_they_are() -> None:
 
 
 def bank() -> Bank:
-    """One motion of somebody who sways."""
+    """Return one motion of a person who sways."""
     rng = np.random.default_rng(8)
     still = rng.uniform(-0.1, 0.1, (len(features.INPUT_LANDMARKS), 3))
     sway = 0.02 * np.sin(np.arange(FRAMES) / 7.0)[:, None, None] * [1.0, 0.0, 0.0]
@@ -166,14 +166,14 @@ def test_invented_pairs_are_not_refused() -> None:
     train_temporal.check_motions([person(motion="invented"), person(motion="jump")])
 
 
-def test_discrepancy_tells_another_distribution() -> None:
+def test_discrepancy_detects_another_distribution() -> None:
     torch.manual_seed(7)
     a, b = torch.randn(200, 4), torch.randn(200, 4)
     assert discrepancy(a, b + 1.0) > 5.0 * discrepancy(a, b).abs()
 
 
 @pytest.mark.slow
-def test_a_kept_state_goes_on_where_it_was(tmp_path: Path) -> None:
+def test_a_saved_state_goes_on_where_it_was(tmp_path: Path) -> None:
     from tools.temporal import fit
 
     config = fit.FitConfig(steps=4, batch=2, change=Change(frames=20))
@@ -202,7 +202,7 @@ def test_a_kept_state_goes_on_where_it_was(tmp_path: Path) -> None:
 
 
 def stop_early(progress: object, where: object, config: object, watch: object) -> None:
-    """Two of four steps of the same schedule."""
+    """Take two of the four steps of the same schedule."""
     from tools.temporal import fit
 
     assert isinstance(progress, fit.Progress)

@@ -83,7 +83,7 @@ def with_normalization(model: bytes, mean: float, std: float) -> bytes:
 
 
 def fetch_tarball(folder: Path) -> Path:
-    """Return the tarball as `npm pack` brings it from the registry that npm is set to.
+    """Return the tarball that `npm pack` downloads from npm's configured registry.
 
     Raises:
         BuildError: npm is not installed.

@@ -129,7 +129,7 @@ def _sha256(content: bytes) -> str:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Command line."""
+    """Build the web assets from the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--packages", type=Path, help="folder of the tarballs")
     parser.add_argument("--out", type=Path, default=ASSETS)

@@ -9,7 +9,7 @@ def write_or_check(path: Path, text: str, description: str) -> None:
     """Write a page, or with `--check` on the command line only compare it.
 
     Args:
-        description: Of the tool; its first line stands in `--help`.
+        description: What the tool does; its first line is in `--help`.
     """
     parser = argparse.ArgumentParser(description=description.splitlines()[0])
     parser.add_argument("--check", action="store_true", help="only compare")

@@ -94,7 +94,7 @@ class Setting:
     Attributes:
         key: Its path.
         unit: Unit of a number; empty for all else.
-        default: As YAML.
+        default: The default as YAML.
         allowed: The range, or the values.
         meaning: What it is.
     """

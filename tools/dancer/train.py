@@ -31,7 +31,7 @@ def collection(folder: Path, robot: Robot) -> list[ReferenceMotion]:
     """
     paths = sorted(folder.glob("*.parquet"))
     split = load_split()
-    refused = [path.stem for path in paths if path.stem in (*split.judged, *split.excluded)]
+    refused = [path.stem for path in paths if path.stem in (*split.held_out, *split.excluded)]
     if refused:
         raise ValueError(f"not for training: {', '.join(refused)}")
     plain = [ReferenceMotion.load(path) for path in paths]

@@ -55,7 +55,7 @@ def choose_motion(
 def _captured(
     files: list[Path], cache: dict[Path, deepmimic.Motion], count: int, rng: np.random.Generator
 ) -> tuple[str, deepmimic.Motion]:
-    """So many frames of a captured motion at another tempo."""
+    """Return a number of frames of a captured motion at another tempo."""
     weights = np.array([1.0 if sources.motion_name(f) in ON_THE_FLOOR else 3.0 for f in files])
     path = files[rng.choice(len(files), p=weights / weights.sum())]
     if path not in cache:

@@ -1,4 +1,4 @@
-"""Pictures of people before all sorts of backgrounds, with things in the way.
+"""Pictures of people before many backgrounds, with objects in front of them.
 
 Camera frame as in `robojackson.mocap.landmarks.pinhole_camera`: x right, y down, z forward, metres.
 """
@@ -74,7 +74,7 @@ class Angles:
 
 
 def draw_angles(rng: np.random.Generator) -> Angles:
-    """On any side, looking up by 20 to down by 60 degrees, near or far."""
+    """Draw a camera on any side, from 20 degrees up to 60 degrees down, near or far."""
     level = rng.uniform() < 0.5
     yaw = rng.uniform(-np.pi, np.pi)
     pitch = np.radians(rng.normal(6.0, 9.0) if level else rng.uniform(-20.0, 60.0))

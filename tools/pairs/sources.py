@@ -24,7 +24,7 @@ LONG = (
 CMU = (
     "01_01", "01_03", "05_01", "05_04", "05_05", "05_06", "05_11", "05_14", "05_15", "05_17",
 )  # fmt: skip
-"""Subject 5 dances; those that `benchmarks/learning/split.yaml` judges or excludes are not here."""
+"""Dances of subject 5 that `benchmarks/learning/split.yaml` neither holds out nor excludes."""
 ALLOWED = (*DEEPMIMIC, *LONG, *CMU)
 REPORTED = (
     "dance_a", "dance_b", "walk", "kick", "spin", "cartwheel", "getup_facedown",

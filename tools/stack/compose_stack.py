@@ -234,7 +234,7 @@ def main() -> None:
     arguments = parser.parse_args()
     scale = {name: int(count) for name, count in (text.split("=") for text in arguments.scale)}
     folder = arguments.folder or Path(tempfile.mkdtemp(prefix="robojackson-"))
-    for how in (signal.SIGINT, signal.SIGTERM):  # a shell's `&` takes the first away
+    for how in (signal.SIGINT, signal.SIGTERM):  # a shell's `&` ignores the first
         signal.signal(how, signal.default_int_handler)
     with suppress(KeyboardInterrupt), running(folder, scale=scale) as stack:
         for name, value in stack.client().items():

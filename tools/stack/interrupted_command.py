@@ -62,7 +62,7 @@ class Running:
         self._reader.start()
 
     def wait_for(self, text: str, more: int = 0, limit_s: float = LIMIT_S) -> None:
-        """Return when a line with the text has come, and so many lines after it.
+        """Return when a line with the text and a number of lines after it have come.
 
         Raises:
             TimeoutError: They have not come; the message has the lines that have.

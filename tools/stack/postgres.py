@@ -49,7 +49,7 @@ def service(
 
 
 def remove(folder: Path) -> None:
-    """Take the data of a stack's database away."""
+    """Remove the data of a stack's database."""
     if (folder / "postgres.path").exists():
         shutil.rmtree(_home(folder), ignore_errors=True)
 

@@ -130,7 +130,7 @@ def hide(
     seen: Sequence[np.ndarray], visibility: np.ndarray, hidden_s: tuple[float, float],
     rng: np.random.Generator,
 ) -> None:  # fmt: skip
-    """Take a limb away: interpolated between the frames around, held at the ends."""
+    """Remove a limb: interpolate it between the frames around, hold it at the ends."""
     count, limb = len(visibility), LIMBS[rng.integers(len(LIMBS))]
     onset = int(rng.integers(-3, count - 3))
     start, end = max(onset, 0), min(onset + int(FPS * rng.uniform(*hidden_s)), count)

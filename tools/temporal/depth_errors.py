@@ -29,19 +29,19 @@ class Change:
 
     Attributes:
         frames: Length of a window.
-        roll_deg: Of the camera, standard deviation.
-        size: Of the person, standard deviation of the logarithm.
-        metre: Of the detector's metre, likewise.
-        shift_m: Of each landmark for the whole window, across the image: joints are not defined
-            alike everywhere.
-        tilt_deg: Of the detector's body about the image's x and y axes, and
+        roll_deg: Roll of the camera, standard deviation.
+        size: Size of the person, standard deviation of the logarithm.
+        metre: Length of the detector's metre, likewise.
+        shift_m: Shift of each landmark across the image for the whole window, because joints are
+            not defined alike everywhere.
+        tilt_deg: Tilt of the detector's body about the image's x and y axes, and
         depth: the logarithm of its depth, and
         depth_shift_m: the depth of each landmark, for the whole window, standard deviations:
             the detector errs in other ways on pictures of real people than on rendered ones.
-        drift_m: Of the depth of each landmark, slowly varying, for windows whose depth is bad.
+        drift_m: Slow drift of the depth of each landmark, for windows whose depth is bad.
         bad_depth: Chance of that, and of limbs whose depth is reversed for a while.
         no_depth: Chance that the detector gives no depth at all.
-        shake_m: Of each landmark in each frame.
+        shake_m: Error of each landmark in each frame.
         hidden: Chance of hidden limbs.
         hidden_s: How long they are hidden.
         strides: Chances that the clip has 30, 15 or 10 frames a second.
@@ -89,7 +89,7 @@ def misjudged(local: np.ndarray, how: Change, rng: np.random.Generator) -> np.nd
 
 
 def slow(rng: np.random.Generator, shape: tuple[int, int, int], seconds: float) -> np.ndarray:
-    """Noise (B, L, N) of unit size that changes over so many seconds."""
+    """Return noise (B, L, N) of unit size that changes over a number of seconds."""
     count, frames, width = shape
     knots = int(np.ceil(frames / FPS / seconds)) + 3
     values = rng.standard_normal((count, knots, width), np.float32)

@@ -91,7 +91,7 @@ def axes_along(root: np.ndarray) -> np.ndarray:
 
 
 def _played(bank: Bank, rows: np.ndarray, frames: int, rng: np.random.Generator) -> np.ndarray:
-    """Windows at any tempo, linear between frames."""
+    """Return windows at any tempo, linear between frames."""
     tempo = rng.uniform(*TEMPO, len(rows))
     spare = np.maximum(bank.lengths[rows] - 1 - tempo * frames, 0.0)
     place = rng.uniform(0.0, 1.0, len(rows))[:, None] * spare[:, None]
@@ -103,7 +103,7 @@ def _played(bank: Bank, rows: np.ndarray, frames: int, rng: np.random.Generator)
 
 
 def _before_cameras(points: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """World points (B, L, N, 3) in the frame of a drawn camera each."""
+    """Return world points (B, L, N, 3) in the frame of a drawn camera each."""
     count = len(points)
     yaw = rng.uniform(-np.pi, np.pi, count)
     level = rng.uniform(size=count) < LEVEL_SHARE

@@ -81,7 +81,7 @@ class Source:
 
 
 def source(examples: Sequence[Example], bank: Bank | None) -> Source:
-    """Tables of the real pairs, and the detector that they invent for the bank."""
+    """Return the tables of the real pairs and the simulated detector of the bank."""
     real = table(examples)
     return Source(real, bank, Detector(real, examples))
 

@@ -31,8 +31,8 @@ class Detector:
         self.sizes = [body_size(e.truth) for e in examples]
 
     def see(self, batch: Batch, rng: np.random.Generator) -> Batch:
-        """Windows of an exact detector as this one sees them: the map's errors and those of a real
-        clip, mirrored as often as not, each more or less strongly, and its visibility."""
+        """Return windows of an exact detector with this one's errors: the map's and those of a
+        real clip, mirrored as often as not, each more or less strongly, and its visibility."""
         count, frames = batch.good.shape
         rows = np.asarray(rng.integers(0, len(self.residuals.good), count))
         drawn = windows(self.residuals, rows, frames, rng)

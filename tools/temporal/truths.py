@@ -30,7 +30,7 @@ class Bank:
 
 
 def make(folders: list[Path], count: int, seed: int) -> Bank:
-    """So many motions of people of all shapes; captured ones of the list, changed, or invented."""
+    """Return a number of motions of people of all shapes: captured, changed or invented."""
     from tools.pairs import people, sources
     from tools.pairs.clips import choose_motion
     from tools.render import deepmimic

@@ -15,7 +15,7 @@ PICTURE = "people.png"
 def list_people(
     video: Path, out: Path, config: str, overrides: Mapping[str, object]
 ) -> tuple[dict[str, object], list[str]]:
-    """Return everybody in a video, as data and as lines; `--person N` selects one of them.
+    """Return all people in a video, as data and as lines; `--person N` selects one of them.
 
     Raises:
         NoPersonFound: no person is visible for long enough.

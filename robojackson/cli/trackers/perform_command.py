@@ -25,7 +25,9 @@ def perform(
     ] = None,
     tracker: Annotated[
         str | None,
-        typer.Option(help="Who dances (`robojackson trackers`); the first one here."),
+        typer.Option(
+            help="Tracker that dances (`robojackson trackers`); default: the first one here."
+        ),
     ] = None,
     runs: Annotated[int, typer.Option(min=1, help="Runs; the first one is filmed.")] = 8,
     seed: Annotated[int, typer.Option(min=0, help="Of the first run's pushes.")] = 0,

@@ -40,7 +40,7 @@ class CameraConfig:
 
 
 class CameraMotion:
-    """Sees every frame of a clip in order and measures a few."""
+    """Reads every frame of a clip in order and measures a few."""
 
     def __init__(self, frames: int, fps: float, config: CameraConfig) -> None:
         self._config = config

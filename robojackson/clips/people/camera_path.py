@@ -41,8 +41,8 @@ STANDS, FEWEST_STANDING = 0.4, 6
 SPREAD = 0.25
 """Least share of the image inside the hull of the corners by which a motion is believed."""
 CHANGED, CHANGED_SHARE = 5.0, 30
-"""A frame is another picture if more than so many percent of the background's pixels changed by
-more than this, of 255."""
+"""A frame is another picture if more than CHANGED_SHARE percent of the background's pixels changed
+by more than CHANGED, of 255."""
 STILL = 0.01
 """A camera whose background strays less than this from the first frame stands, image diagonals."""
 BLIND_SHARE = 0.3
@@ -142,7 +142,7 @@ class CameraFollower:
         self._found = 0
 
     def path(self, frames: int, width: int, height: int) -> CameraPath:
-        """Return the camera's motion over so many frames, pixels of the full upright image."""
+        """Return the camera's motion over a number of frames, pixels of the full upright image."""
         small = np.array(self.to_first[:frames])
         missing = max(frames - len(small), 0)
         small = np.concatenate([small, np.repeat(small[-1:], missing, axis=0)])
@@ -230,7 +230,7 @@ def _mask(grey: np.ndarray, xy: np.ndarray) -> np.ndarray:
 
 
 def _corners(grey: np.ndarray, xy: np.ndarray) -> Float32[np.ndarray, "N 1 2"]:
-    """Return the best corners of each cell of the image: one striking thing has no more votes than
+    """Return the best corners of each cell of the image: one striking object has no more votes than
     others.
 
     What is no corner but noise is lost at once by Lucas-Kanade (`LEAST_TEXTURE`).

@@ -40,7 +40,7 @@ class DancerConfig:
     """Configuration of following one dancer among others.
 
     Attributes:
-        number: The person to follow: 1 is the largest steady person, and so is None.
+        number: The person to follow; 1, and None, is the largest steady person.
         scouts: The few frames in which other people are looked for.
         detection, identity: Configurations of detecting and identifying all people in every frame.
         astray: Body heights; a detection further than this from the expected place is another's.
@@ -73,8 +73,8 @@ def track_dancer(
         size: lite, full or heavy.
         config: Which person to follow, and how.
         progress: Called with (frames done, frames in all); others in view make it several passes.
-        watch: Sees every frame with the landmarks of the first pass, which are the track's where
-            it finds no others (`people` 0).
+        watch: Called with every frame and the landmarks of the first pass, which are the track's
+            where it finds no others (`people` 0).
     Raises:
         NoPersonFound: there is no person of that number; the message lists the people.
         MissingDependency: no model bundle, or no EGL and GLES libraries.
@@ -214,7 +214,7 @@ def _course(
 
 
 def _shifted(progress: Progress | None, frames: int, before: int, passes: int) -> Progress | None:
-    """Return the progress of one pass over the frames, so many of which are done before it."""
+    """Return the progress of one pass over the frames, `before` passes after the first."""
     if progress is None:
         return None
     return lambda done, total: progress(before * frames + done, passes * frames)

@@ -1,4 +1,4 @@
-"""A picture of everybody in a clip with their numbers: the frame that shows most of them best."""
+"""A picture of all people in a clip with their numbers: the frame that shows most of them best."""
 
 from pathlib import Path
 

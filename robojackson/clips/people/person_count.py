@@ -41,7 +41,7 @@ class PeopleConfig:
 
 
 class People:
-    """Sees every frame of a clip in order and counts the people in a few."""
+    """Reads every frame of a clip in order and counts the people in a few."""
 
     def __init__(self, frames: int, fps: float, landmarker: Any, config: PeopleConfig) -> None:
         self._config, self._landmarker = config, landmarker

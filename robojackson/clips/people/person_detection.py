@@ -1,4 +1,4 @@
-"""Everybody in one picture. BlazePose finds one person well and a second one badly.
+"""All people in one picture. BlazePose finds one person well and a second one badly.
 
 With several poses, PoseLandmarker misses one of two people who stand side by side in every
 second frame, and in most after they crossed (measured): its detector throws away circles that

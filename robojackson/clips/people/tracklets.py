@@ -23,7 +23,7 @@ class TrackletConfig:
 
     Attributes:
         step: Distance of the trunk from one frame to the next, body heights.
-        step_speed: That distance as a speed, body heights a second: it counts at low frame rates.
+        step_speed: The distance as a speed, body heights a second: it counts at low frame rates.
         growth: Change of size from one frame to the next, ratio, that counts half of such a step.
         crowding: People whose trunks are nearer than this touch, body heights.
         pause_s: A tracklet outlives so long a gap, seconds.
@@ -129,7 +129,7 @@ def _touches(
 ) -> tuple[set[int], set[int]]:
     """Return the tracklets that end because people touch, and detections that may be either of two.
 
-    Beside somebody who just vanished a detection may be his; beside somebody who just appeared both
+    Beside a person who just vanished a detection may be theirs; beside one who just appeared both
     are seen apart again.
     """
     ended: set[int] = set()

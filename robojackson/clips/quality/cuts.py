@@ -24,7 +24,7 @@ class CutConfig:
         threshold: PySceneDetect's change of hue, saturation and lightness at a cut, 0..255.
         shortest_scene_s: Two cuts nearer than this are one, seconds.
         leap: Mean displacement of all landmarks between two frames at a jump cut, body heights.
-        leap_speed: That leap as a speed, body heights a second: it counts at low frame rates.
+        leap_speed: The leap as a speed, body heights a second: it counts at low frame rates.
         moving_level: Change of a pixel that is motion and not the noise of the encoder, 0..255.
         moving_share: Least part of a picture that such pixels are when it moves, share.
         short_side: Pixels of the short side of the small pictures that are compared.
@@ -40,7 +40,7 @@ class CutConfig:
 
 
 class Changes:
-    """Sees every frame of a clip in order and counts cuts and pictures that moved."""
+    """Reads every frame of a clip in order and counts cuts and pictures that moved."""
 
     def __init__(self, fps: float, config: CutConfig) -> None:
         from scenedetect.detectors import ContentDetector

@@ -41,7 +41,7 @@ class DrawingConfig:
 
 
 class Paint:
-    """Sees every frame of a clip in order and looks at the paint in a few."""
+    """Reads every frame of a clip in order and looks at the paint in a few."""
 
     def __init__(self, frames: int, fps: float, config: DrawingConfig) -> None:
         self._config = config

@@ -17,7 +17,7 @@ LEAST_PX = 24
 
 
 class PictureQuality:
-    """Looks at some of the pictures of a clip as they pass by, evenly spread however long it is."""
+    """Measures some of the pictures of a clip as they pass by, evenly spread however long it is."""
 
     def __init__(self) -> None:
         self._looks: list[tuple[float, float]] = []

@@ -18,7 +18,7 @@ EDGE = 0.03
 """Image heights beyond the edge at which a landmark counts nothing."""
 GAP_FRAMES = 2
 BESIDE_GAP = 0.7
-"""Visibility is multiplied by so much so many frames before and after a gap."""
+"""Number of frames before and after a gap, and the factor of their visibility."""
 FACE = slice(0, 11)
 FROM_BEHIND, NO_FACE = 0.8, 0.2
 """Times the visibility of a body that is seen from behind, and of its face."""

@@ -29,7 +29,7 @@ class PrivateAddress(OSError):
 
 @contextmanager
 def public_only(allowed: bool, proxy: str | None = None) -> Iterator[None]:
-    """Inside, this thread connects to public addresses alone.
+    """Let this thread connect to public addresses alone, inside the block.
 
     Args:
         allowed: Whether private addresses may be reached all the same.

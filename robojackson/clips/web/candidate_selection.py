@@ -56,7 +56,7 @@ def select(
         found: Candidates in the order of the search, which breaks ties of the view count.
         known: Keys of videos that were assessed before.
         config: Limits.
-        failed: Keys of videos that could not be had or assessed before.
+        failed: Keys of videos that could not be downloaded or assessed before.
     """
     fit: list[VideoCandidate] = []
     dropped: list[tuple[VideoCandidate, Rejection]] = []

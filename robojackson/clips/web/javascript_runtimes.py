@@ -24,7 +24,7 @@ def runtimes() -> dict[str, str]:
 
 
 def usable() -> str | None:
-    """Return the best one that is new enough, None where there is none."""
+    """Return the best runtime that is new enough; None where none is installed."""
     for name, program in runtimes().items():
         if name not in OLDEST or _version(program) >= OLDEST[name]:
             return name

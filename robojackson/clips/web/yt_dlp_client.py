@@ -94,7 +94,7 @@ def offer(url: str, purpose: Purpose, formats: FormatConfig, config: WebConfig) 
     """Return the format of a video that would be downloaded.
 
     Raises:
-        DownloadFailed: there is none, or the page cannot be had; the message is the reason.
+        DownloadFailed: there is no video, or the page cannot be read; the message is the reason.
     """
     options = _options(config) | {"format": _selector(purpose, formats)}
     info = _patiently(lambda: _extract(url, options), config)

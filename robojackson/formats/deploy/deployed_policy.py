@@ -28,7 +28,7 @@ class Link:
 
     Attributes:
         turn: Fixed rotation before the hinge.
-        hinge: Index of the hinge; None where there is none.
+        hinge: Index of the hinge; None where it has none.
         axis: Axis of the hinge, in its body.
         zero: Angle at the zero position of the hinge, rad.
     """

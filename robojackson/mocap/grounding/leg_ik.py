@@ -15,7 +15,7 @@ TINY = 1e-9
 
 
 def lift_offsets(feet: Float[np.ndarray, "T 4 3"]) -> Float[np.ndarray, "T 2 3"]:
-    """Return the lift of each foot that brings neither heel nor toe under the floor."""
+    """Return the lift of each foot that puts neither heel nor toe under the floor."""
     lowest = feet[..., 2].reshape(-1, 2, 2).min(2)
     result: np.ndarray = np.maximum(-lowest, 0.0)[..., None] * np.array([0.0, 0.0, 1.0])
     return result

@@ -28,7 +28,7 @@ def fuse_tracks(tracks: Sequence[LandmarkTrack]) -> LandmarkTrack:
     """Return one track of the same frames: the mean of those models that found the person.
 
     Args:
-        tracks: Of the same clip and frames, one a model.
+        tracks: Tracks of the same clip and frames, one a model.
     Raises:
         ValueError: the tracks are of different clips.
     """

@@ -1,1 +1,1 @@
-"""The published networks HybrIK and NIKI, for users who have their weights."""
+"""The published networks HybrIK and NIKI, for users with a copy of the weights."""

@@ -119,7 +119,7 @@ class DepthPrior:
     """Depths of single cameras.
 
     Attributes:
-        depths: Of each point before each camera, metres.
+        depths: Depth of each point before each camera, metres.
         weight: One over their spreads, 1/m.
     """
 

@@ -57,7 +57,7 @@ def evaluation_plots(
 
     Args:
         figures: Values of the seeds, by name of the figure.
-        baselines: By move, policy and name of the figure; drawn as lines.
+        baselines: Figures by move, policy and name of the figure; drawn as lines.
     """
     from robojackson.report.plots.run_plots import png  # matplotlib: only when something is drawn
     from robojackson.report.plots.study_plots import evaluation_plot

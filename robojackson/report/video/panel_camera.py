@@ -35,7 +35,7 @@ class Framing:
     """Distance and height of a camera relative to its subject.
 
     Attributes:
-        distance: From the camera to the point that it looks at, metres.
+        distance: Distance from the camera to the point that it looks at, metres.
         look_at_height: Height of that point above the floor, metres.
     """
 

@@ -26,7 +26,7 @@ def room_of(
     qpos: Float[np.ndarray, "N nq"],
     targets: Float[np.ndarray, "N 2"],
 ) -> Float[np.ndarray, "M 3"]:
-    """Corners of a robot and its shadows in every pose, relative to where the camera looks."""
+    """Return the corners of a robot and its shadows in every pose, from where the camera looks."""
     data, geoms = mujoco.MjData(model), drawn_geoms(model)
     reach = SHADOW_REACH * model.geom_rbound[geoms, None, None] * SIGNS[:4, :2]
     found = []

@@ -45,9 +45,9 @@ class Part:
     """A part of a programme.
 
     Attributes:
-        name: Of the dance; `stand`, or `way` from one to another.
+        name: Name of the dance; `stand`, or `way` from one dance to another.
         start, end: Its steps, [start, end).
-        danced: Of these, the steps that show the dance: the others lead into and out of it.
+        danced: The steps among them that show the dance: the others lead into and out of it.
         infeasible_share: Share of its steps that the certificate refuses.
     """
 

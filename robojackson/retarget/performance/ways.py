@@ -42,7 +42,7 @@ class Piece:
     """A part of a performance before the parts are joined.
 
     Attributes:
-        qpos: From its first step on, standing at both ends.
+        qpos: Poses from its first step on, standing at both ends.
         contact: State of the contact points at every step.
         danced: Its steps that show the dance; none of a way.
     """
@@ -178,6 +178,6 @@ def _pinned(
 
 
 def _shares(steps: int, count: int) -> Float[np.ndarray, " N"]:
-    """Return shares of a way from rest to rest, without its beginning; 1 after so many steps."""
+    """Return shares of a way from rest to rest, without its beginning; 1 after the last step."""
     t = np.minimum(np.arange(1, count + 1) / steps, 1.0)
     return minimum_jerk(t)

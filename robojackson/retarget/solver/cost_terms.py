@@ -41,7 +41,7 @@ def keypoint_normal(
     """Add the keypoint term; returns its cost a frame.
 
     Args:
-        frames: Whose targets the poses have; those of the clip in order when None.
+        frames: Frames whose targets the poses follow; those of the clip in order when None.
     """
     which = slice(None) if frames is None else frames
     weight = np.sqrt(problem.targets.weights[which])

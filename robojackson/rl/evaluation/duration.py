@@ -19,7 +19,7 @@ AROUND_A_STEP = 1.6
 """Time of a simulated step with control and scoring, in multiples of MuJoCo's alone."""
 CYCLIC_MINUTES, WALKING_MINUTES, OTHER_MINUTES = 10.0, 20.0, 40.0
 """Training times of the bundled hip_shake, walk and dance_b, minutes of one core
-(docs/benchmarks.md)."""
+(docs/benchmarks_learning.md)."""
 MEASURED_S = 4.0
 """Length of these motions, seconds; longer ones take proportionally longer."""
 WALKS_M = 0.2

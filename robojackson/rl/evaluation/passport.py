@@ -1,6 +1,7 @@
 """The passport of a policy: its evaluation under physics that differ from those of the training.
 
-Each case changes one thing: friction, masses, gains, delay, sensors, pushes, time step, integrator.
+Each case changes one condition: friction, masses, gains, delay, sensors, pushes, time step or
+integrator.
 24 phases without a second reset and the default stand; evaluated as in an evaluation.
 """
 

@@ -152,7 +152,7 @@ class _Stage:
     def watch(
         self, qpos: Float[np.ndarray, "N nq"], now: Float[np.ndarray, "N nq"], up: np.ndarray
     ) -> None:
-        """Give up a part where a robot is about to fall; continue where one is at rest."""
+        """Abandon a part where a robot is about to fall; continue where one is at rest."""
         along = np.sum(up_axis(qpos[:, 3:7]) * up_axis(now[:, 3:7]), -1)
         tilt = np.arccos(np.clip(along, -1.0, 1.0))
         self._calm = np.where(self.waits & (tilt < self._config.calm_rad), self._calm + 1, 0)

@@ -60,7 +60,7 @@ class Performance:
         length: Number of steps that each was up, at most T.
         fell: Whether each fell.
         step: Step of the programme of each after every step.
-        waits: Whether each had given up its part and stood.
+        waits: Whether each run has abandoned its part and stands.
         qpos: Their states, world; after the end of a run they repeat.
         points: Keypoints, in the frame of the programme, m.
         roots: Positions of the roots likewise, m.
@@ -130,7 +130,7 @@ class Performance:
         return result
 
     def _within(self, i: int, part: Part) -> Bool[np.ndarray, " L"]:
-        """Return when a run was in a part and had not given it up."""
+        """Return the steps at which a run is in a part that it has not abandoned."""
         return np.asarray(self._steps_of(i, part) & ~self.waits[: self.length[i], i])
 
     def _shown(self, i: int, part: Part) -> Bool[np.ndarray, " L"]:

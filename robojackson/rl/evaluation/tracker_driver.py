@@ -14,7 +14,7 @@ def tracker_driver(tracker: Tracker, robot: Robot, reference: ReferenceMotion) -
     """Return the driver of a tracker on one reference motion.
 
     Args:
-        robot: As `Tracker.equip` returned it.
+        robot: The robot that `Tracker.equip` returned.
 
     Raises:
         BadPolicy: the tracker is for another robot.

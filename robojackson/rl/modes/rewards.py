@@ -66,11 +66,11 @@ class TrackingErrors:
         feet: Root mean square over feet and toes, over the floor relative to the pelvis, in
             height as they are, m.
         site_mean: Mean distance of the sites relative to the pelvis, m.
-        orientation: Of the root, rad.
-        velocity: Of the root, m/s.
+        orientation: Error of the root's orientation, rad.
+        velocity: Error of the root's velocity, m/s.
         limb_speed: Root mean square over the limb ends' velocity differences, m/s.
-        height: Of the root, signed, m.
-        drift: Of the root over the floor, m.
+        height: Error of the root's height, signed, m.
+        drift: Error of the root's place over the floor, m.
     """
 
     joints: Float[np.ndarray, " N"]

@@ -36,7 +36,7 @@ class Disturbances:
     """Pushes and sensor noise of N robots.
 
     Args:
-        seed: Of all robots together, or of every one by itself.
+        seed: Seed of all robots together, or one of every robot.
 
     Attributes:
         count: Control steps so far, (1,).

@@ -56,7 +56,7 @@ def sampled_regulator(
         clip: One motion.
         action: Radians that a full action moves each target.
         feet: The robot's feet.
-        seed: Of the samples.
+        seed: Seed of the samples.
         progress: Called with a name, the steps that are done, and all.
         most_tries: Searches from the beginning at most; `TRIES` when None.
     """

@@ -38,7 +38,7 @@ class PolicyTracker:
         return robot
 
     def follow(self, robot: Robot, n: int) -> Follower:
-        """Begin with n robots."""
+        """Return a follower of n robots."""
         require_robot(robot, self.description)
         return _PolicyFollower(self.policy, self.control, robot, n)
 

@@ -1,7 +1,7 @@
 """The linear-quadratic feedback along a reference as a tracker: it needs no network and no file.
 
 A motion that the feedback along it does not hold is first simulated many times, for a path beside
-it that the physics follows (`docs/learning.md`, "A sampled path"). It works on any robot whose
+it that the physics follows (`docs/learning_g1.md`, "A sampled path"). It works on any robot whose
 contacts the physics knows; jumps need a policy.
 """
 
@@ -33,7 +33,7 @@ class RegulatorTracker:
         return robot
 
     def follow(self, robot: Robot, n: int) -> Follower:
-        """Begin with n robots."""
+        """Return a follower of n robots."""
         require_robot(robot, self.description)
         return _RegulatorFollower(robot)
 

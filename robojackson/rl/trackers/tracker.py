@@ -62,7 +62,7 @@ class Tracker(Protocol):
         """
 
     def follow(self, robot: Robot, n: int) -> Follower:
-        """Begin with n robots.
+        """Return a follower of n robots.
 
         Raises:
             BadPolicy: the tracker is for another robot.

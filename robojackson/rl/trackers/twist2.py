@@ -61,7 +61,7 @@ class Twist2Tracker:
         return equip(robot, self.description)
 
     def follow(self, robot: Robot, n: int) -> Follower:
-        """Begin with n robots, whose histories hold copies of the first frame."""
+        """Return a follower of n robots, whose histories hold copies of the first frame."""
         layout = layout_of(robot, self.description)
         return _Twist2Follower(self.description, self._network, layout, n)
 

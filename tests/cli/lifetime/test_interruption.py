@@ -47,13 +47,13 @@ def interrupted(
 
 @pytest.fixture(scope="module")
 def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A store in which the stages that have ended are cached from moment to moment."""
+    """Return a store in which the stages that have ended are cached from test to test."""
     return tmp_path_factory.mktemp("interrupted") / "store"
 
 
 @pytest.fixture(scope="module")
 def motion(tmp_path_factory: pytest.TempPathFactory, short_clip: Path) -> Path:
-    """A folder with what the stages after mocap start from."""
+    """Return a folder with the inputs of the stages after mocap."""
     folder = tmp_path_factory.mktemp("motion")
     robojackson("mocap", short_clip, "-o", folder)
     robojackson("retarget", folder / "smpl.parquet", "-o", folder, "--config", "smoke")
@@ -144,7 +144,7 @@ def test_a_training_that_learns_saves_its_checkpoint_and_resumes(
 
 
 def commands(motion: Path, out: Path) -> dict[str, tuple[str, ...]]:
-    """Commands of more than a second by name."""
+    """Return commands that take more than a second, by name."""
     given = {
         "mocap": (CLIP, "-o", str(out)),
         "retarget": (str(motion / "smpl.parquet"), "-o", str(out)),

@@ -36,7 +36,7 @@ subprocess.run([sys.executable, "-c", {ORPHAN!r}, str(os.getpid())])
 
 
 def has_ended(pid: int) -> bool:
-    """Whether a process ends soon; one that waits to be reaped has ended."""
+    """Return whether a process ends soon; one that waits to be reaped has ended."""
     until = time.monotonic() + 10
     while time.monotonic() < until:
         try:
@@ -49,7 +49,7 @@ def has_ended(pid: int) -> bool:
 
 
 def started(*words: str) -> tuple[subprocess.Popen[bytes], int]:
-    """A leader of a group and the number that it prints."""
+    """Start the leader of a group; return it and the number that it prints."""
     process = subprocess.Popen(
         [sys.executable, "-c", *words],
         stdout=subprocess.PIPE,

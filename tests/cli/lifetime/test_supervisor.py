@@ -89,7 +89,7 @@ def is_alive(pid: int) -> bool:
 
 
 def state_of(pid: int) -> str:
-    """The kernel's letter for a process, empty where there is none."""
+    """Return the kernel's letter for a process, empty where there is none."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
     except (FileNotFoundError, ProcessLookupError):
@@ -97,7 +97,7 @@ def state_of(pid: int) -> str:
 
 
 def becomes(pid: int, states: str) -> bool:
-    """Whether a process reaches one of the states soon."""
+    """Return whether a process reaches one of the states soon."""
     until = time.monotonic() + ENDED_S
     while state_of(pid) not in states and time.monotonic() < until:
         time.sleep(0.02)

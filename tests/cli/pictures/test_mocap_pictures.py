@@ -42,7 +42,7 @@ def retargeted(captured: Said, folder: Path) -> Said:
 
 
 def panels_of(film: Path) -> list[np.ndarray]:
-    """The panels of the first picture of a film."""
+    """Return the panels of the first picture of a film."""
     with av.open(str(film)) as container:
         first = next(container.decode(video=0)).to_ndarray(format="rgb24")
     assert first.shape[0] == HEIGHT

@@ -18,7 +18,7 @@ TINY = {"render.max_seconds": 0.3, "render.panel_width": 96, "render.panel_heigh
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """The hip shake, as `robojackson retarget` leaves it."""
+    """Return the hip shake, as `robojackson retarget` leaves it."""
     (tmp_path / "smpl.parquet").write_bytes(tables.encode(human("hip_shake")))
     (tmp_path / "reference.parquet").write_bytes(tables.encode(robot_motion("hip_shake")))
     return tmp_path

@@ -28,7 +28,7 @@ FRAMES, FPS, STEPS = 30, 30.0, 60
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What a dance leaves: a second of the hip shake, danced as it should be."""
+    """Return the files of a dance: a second of the hip shake, danced perfectly."""
     place = tmp_path_factory.mktemp("run")
     reference = ReferenceMotion.load(REFERENCE)
     points = np.tile(REST_JOINTS[:, [2, 0, 1]] + [0.0, 0.0, 1.0], (FRAMES, 1, 1))

@@ -17,7 +17,7 @@ SHORT = ("--set", "evaluate.phases=1", "--set", "evaluate.resets=1", "--seconds"
 
 @pytest.fixture
 def reference(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A motion of the humanoid, and the stand-in in the store."""
+    """Return a motion of the humanoid, and the stand-in in the store."""
     monkeypatch.setenv("ROBOJACKSON_STORE", str(tmp_path / "store"))
     monkeypatch.setenv("ROBOJACKSON_CONFIGS", str(tmp_path / "configs"))
     file, description = stand_in(tmp_path)

@@ -16,7 +16,7 @@ from tests.fixtures.stand_in_tracker import NAME, stand_in, write_yaml
 
 @pytest.fixture
 def dance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A motion of the humanoid named `<b>`, and the stand-in in the store."""
+    """Return a motion of the humanoid named `<b>`, and the stand-in in the store."""
     monkeypatch.setenv("ROBOJACKSON_STORE", str(tmp_path / "store"))
     monkeypatch.setenv("ROBOJACKSON_CONFIGS", str(tmp_path / "configs"))
     file, description = stand_in(tmp_path)
@@ -50,7 +50,7 @@ def test_a_performance_leaves_its_tables_and_a_page(dance: Path, tmp_path: Path)
 
 
 @pytest.mark.slow
-def test_a_robot_that_nobody_knows_is_one_line(dance: Path, tmp_path: Path) -> None:
+def test_an_unknown_robot_is_one_line(dance: Path, tmp_path: Path) -> None:
     words = ("perform", dance, "-o", tmp_path / "out", "--robot", "nobody")
     result = robojackson(*words, "--tracker", NAME)
     assert result.code == 1

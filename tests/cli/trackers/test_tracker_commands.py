@@ -16,20 +16,21 @@ from tests.fixtures.web_server import Web, serving
 
 @pytest.fixture
 def network(tmp_path: Path) -> Path:
-    """The file that the stand-in's YAML pins."""
+    """Return the file that the stand-in's YAML pins."""
     return stand_in(tmp_path)[0]
 
 
 @pytest.fixture
 def web(network: Path) -> Iterator[Web]:
-    """A server that has it."""
+    """Yield a server that has the file."""
     with serving(network.read_bytes()) as running:
         yield running
 
 
 @pytest.fixture
 def pin(tmp_path: Path, web: Web, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Path]:
-    """Writes `configs/trackers/standin.yaml` for a kind of server; returns where the file comes."""
+    """Return a writer of `configs/trackers/standin.yaml` for a kind of server; it returns the
+    file's place."""
     monkeypatch.setenv("ROBOJACKSON_STORE", str(tmp_path / "store"))
     monkeypatch.setenv("ROBOJACKSON_CONFIGS", str(tmp_path / "configs"))
 
@@ -52,7 +53,7 @@ def test_the_file_is_downloaded_once_and_can_be_run(pin, web: Web, network: Path
     first, again = add_tracker(NAME), add_tracker(NAME)
     assert (first["added"], again["added"], first["licence"]) == (True, False, "ours")
     assert path.read_bytes() == network.read_bytes()
-    assert len(web.asked) == 1
+    assert len(web.requests) == 1
     assert names_in(path.parent) == ["network.onnx"]
 
 
@@ -60,7 +61,7 @@ def test_a_download_that_was_cut_off_goes_on_where_it_ended(pin, web: Web, netwo
     path = pin("half-once")
     add_tracker(NAME)
     half = len(network.read_bytes()) // 2
-    assert [asked for _, asked in web.asked] == [None, f"bytes={half}-"]
+    assert [requested for _, requested in web.requests] == [None, f"bytes={half}-"]
     assert path.read_bytes() == network.read_bytes()
 
 
@@ -69,7 +70,7 @@ def test_the_same_command_goes_on_from_what_an_earlier_one_left(pin, web, networ
     path.parent.mkdir(parents=True)
     path.with_name("network.onnx.part").write_bytes(network.read_bytes()[:100])
     add_tracker(NAME)
-    assert web.asked[0][1] == "bytes=100-"
+    assert web.requests[0][1] == "bytes=100-"
     assert path.read_bytes() == network.read_bytes()
     assert names_in(path.parent) == ["network.onnx"]
 
@@ -106,12 +107,12 @@ def test_a_refusal_is_one_line_with_its_code(pin, kind: str, words: str) -> None
 
 def test_offline_is_one_line(pin) -> None:
     path = pin()
-    write_yaml_for_nobody(path, pin)
+    write_yaml_for_a_closed_port(path, pin)
     with pytest.raises(DownloadFailed, match=r"cannot be downloaded: .*; check the network"):
         add_tracker(NAME)
 
 
-def write_yaml_for_nobody(path: Path, pin: Callable[..., Path]) -> None:
+def write_yaml_for_a_closed_port(path: Path, pin: Callable[..., Path]) -> None:
     """Let the YAML name a port at which no one answers."""
     yaml = next((path.parents[3] / "configs" / "trackers").glob("*.yaml"))
     lines = yaml.read_text().splitlines()
@@ -122,7 +123,7 @@ def write_yaml_for_nobody(path: Path, pin: Callable[..., Path]) -> None:
 def test_a_copy_that_the_user_has_is_checked_and_taken(pin, web: Web, network: Path) -> None:
     path = pin()
     assert add_tracker(NAME, network)["added"] is True
-    assert (path.read_bytes(), web.asked) == (network.read_bytes(), [])
+    assert (path.read_bytes(), web.requests) == (network.read_bytes(), [])
 
 
 def test_a_foreign_copy_is_one_line(pin, tmp_path: Path) -> None:

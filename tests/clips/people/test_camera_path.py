@@ -9,11 +9,11 @@ import pytest
 from robojackson.clips.people.camera_path import CameraPath, camera_path, warp
 
 WIDTH, HEIGHT, FRAMES = 320, 240, 40
-NOBODY = np.full((FRAMES, 33, 2), np.nan)
+NO_PERSON = np.full((FRAMES, 33, 2), np.nan)
 
 
 def wall(seed: int = 0) -> np.ndarray:
-    """A large picture with blots all over it, RGB."""
+    """Return a large picture with blots all over it, RGB."""
     rng = np.random.default_rng(seed)
     rough = rng.uniform(0, 255, size=(3 * HEIGHT, 3 * WIDTH)).astype(np.float32)
     grey = cv2.normalize(cv2.GaussianBlur(rough, (0, 0), 4.0), None, 0, 255, cv2.NORM_MINMAX)
@@ -25,7 +25,7 @@ def view(picture: np.ndarray, x: int, y: int = HEIGHT) -> np.ndarray:
 
 
 def path_of(images: list[np.ndarray]) -> CameraPath:
-    return camera_path(images, NOBODY[: len(images)], WIDTH, HEIGHT)
+    return camera_path(images, NO_PERSON[: len(images)], WIDTH, HEIGHT)
 
 
 def test_a_camera_that_stands_is_reported_to_stand() -> None:
@@ -57,12 +57,12 @@ def test_a_zoom_is_measured() -> None:
 
 def test_the_measure_is_in_pixels_of_the_full_image() -> None:
     images = [view(wall(), WIDTH + step) for step in range(FRAMES)]
-    found = camera_path(images, NOBODY, 2 * WIDTH, 2 * HEIGHT)
+    found = camera_path(images, NO_PERSON, 2 * WIDTH, 2 * HEIGHT)
     assert found.to_first[-1][0, 2] == pytest.approx(2.0 * (FRAMES - 1), abs=2.0)
 
 
 def test_a_person_who_moves_is_no_background() -> None:
-    blots, images, marks = wall(1), [], np.tile(NOBODY[:1], (FRAMES, 1, 1))
+    blots, images, marks = wall(1), [], np.tile(NO_PERSON[:1], (FRAMES, 1, 1))
     for step in range(FRAMES):
         image = view(wall(), WIDTH)
         image[60:200, 60 + 4 * step : 120 + 4 * step] = blots[:140, :60]
@@ -96,7 +96,8 @@ def test_a_bare_wall_is_reported_to_show_nothing() -> None:
 
 
 def floor_and_sky(seed: int = 0) -> np.ndarray:
-    """Little to hold on to: a plain sky over a floor with a few faint tiles, and noise."""
+    """Return a picture with little texture: a plain sky over a floor with a few faint tiles, and
+    noise."""
     image = np.full((HEIGHT, WIDTH), 180, np.uint8)
     image[HEIGHT // 2 :] = 140
     for x in range(20, WIDTH, 90):
@@ -106,19 +107,19 @@ def floor_and_sky(seed: int = 0) -> np.ndarray:
 
 
 def walker_at(x: int) -> np.ndarray:
-    """Landmarks of somebody 60 pixels wide."""
+    """Return the landmarks of a person 60 pixels wide."""
     corners = np.array([[x, 40], [x + 60, 200]]) / [WIDTH, HEIGHT]
     return np.linspace(corners[0], corners[1], 33)
 
 
-def test_a_standing_camera_before_little_texture_moves_nothing_and_tells_nothing() -> None:
+def test_a_standing_camera_before_little_texture_moves_and_reports_nothing() -> None:
     found = path_of([floor_and_sky(seed) for seed in range(FRAMES)])
     assert found.notes == ()
     assert np.allclose(found.to_first, np.eye(3))
 
 
 def tiles(seed: int = 0) -> np.ndarray:
-    """A plain sky over a floor of tiles."""
+    """Return a plain sky over a floor of tiles."""
     image = floor_and_sky(seed)
     rows, columns = np.indices(image.shape[:2])
     dark = (rows // 16 + columns // 20) % 2 == 1

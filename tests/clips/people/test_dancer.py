@@ -1,4 +1,4 @@
-"""Laws of following one of several: never another; an impossible number tells who is there."""
+"""Laws of following one of several: never another; an impossible number lists the people there."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -94,7 +94,8 @@ def test_the_picture_shows_the_frame_with_most_people() -> None:
 
 
 def whose(rows: np.ndarray, places: np.ndarray) -> tuple[set[int], float]:
-    """Which of the two a track shows while they are apart, and in which share of those frames."""
+    """Return which of the two dancers a track shows while they are apart, and in which share of
+    frames."""
     hips = rows[:, [23, 24], :2].mean(1) * SIZE
     apart = np.linalg.norm(places[:, 0] - places[:, 1], axis=-1) > 40
     known = ~np.isnan(hips[:, 0]) & apart
@@ -119,7 +120,7 @@ def test_the_dancer_is_never_exchanged(crossed: Crossed) -> None:
 
 
 @pytest.mark.medium
-def test_an_impossible_number_tells_who_is_there(
+def test_an_impossible_number_lists_who_is_there(
     crossed: Crossed, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(dancer, "track_people", lambda *_: crossed.cast)

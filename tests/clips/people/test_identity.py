@@ -1,4 +1,4 @@
-"""Laws of telling people apart: no one becomes another, whatever hides him."""
+"""Laws of identities: no person takes another's, whatever hides them."""
 
 from collections.abc import Callable, Sequence
 
@@ -26,7 +26,8 @@ def leftward(t: float) -> float:
 
 
 def crossing(hidden_px: float, swap: bool, tall: tuple[float, float] = (200.0, 200.0)) -> list:
-    """Two who change places in two seconds; the second is not seen while nearer than so much."""
+    """Return two people who change places in two seconds; the second is hidden while nearer than a
+    distance."""
     frames = []
     for index in range(60):
         a, b = rightward(index / FPS), leftward(index / FPS)

@@ -15,7 +15,7 @@ FRAMES, WIDTH, HEIGHT = 90, 640, 480
 
 
 def good_track() -> LandmarkTrack:
-    """Three seconds of one person, 336 pixels tall, in good light."""
+    """Return three seconds of one person, 336 pixels tall, in good light."""
     rng = np.random.default_rng(4)
     landmarks = rng.uniform(0.3, 0.7, (FRAMES, 33, 3))
     landmarks[:, 0, 1], landmarks[:, 28, 1] = 0.15, 0.85
@@ -107,7 +107,7 @@ def test_a_table_of_an_earlier_version_has_no_such_figures() -> None:
 
 
 def pictures(blur: float, gain: float) -> list[np.ndarray]:
-    """Coloured patches with sharp borders, as clothes have."""
+    """Return coloured patches with sharp borders, as clothes have."""
     rng = np.random.default_rng(8)
     patches = rng.integers(0, 256, (24, 32, 3)).astype(np.uint8)
     image = cv2.resize(patches, (WIDTH, HEIGHT), interpolation=cv2.INTER_NEAREST)

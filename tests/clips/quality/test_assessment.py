@@ -1,4 +1,4 @@
-"""The folder of difficult clips, judged once: the ranking is what a person would choose."""
+"""The folder of difficult clips, assessed once: the ranking is what a person would choose."""
 
 import math
 from dataclasses import replace
@@ -28,25 +28,25 @@ REASONS = {
     "black": "no person found in 45 of 45 frames",
     "mirrored": "a mirrored copy of hip_shake",
 }
-Judged = dict[str, Assessment]
+Assessed = dict[str, Assessment]
 
 
 @pytest.fixture(scope="module")
-def judged(difficult: Path) -> Judged:
+def assessed(difficult: Path) -> Assessed:
     config = AssessmentConfig()
     return {path.stem: assess_video(path, config) for path in sorted(difficult.glob("*.mp4"))}
 
 
 @pytest.fixture(scope="module")
-def ranking(judged: Judged) -> list[Ranked]:
+def ranking(assessed: Assessed) -> list[Ranked]:
     config = FilterConfig()
-    order = candidate_ranking.order({name: j.stability for name, j in judged.items()}, config)
+    order = candidate_ranking.order({name: j.stability for name, j in assessed.items()}, config)
     against = {
-        n: candidate_ranking.objections(j.stability, j.quality, config) for n, j in judged.items()
+        n: candidate_ranking.objections(j.stability, j.quality, config) for n, j in assessed.items()
     }
     fit = [name for name in order if not against[name]]
-    fit.sort(key=lambda name: -judged[name].quality.person_height_px)
-    copied = find_duplicates({name: judged[name].track for name in fit}, DuplicateConfig())
+    fit.sort(key=lambda name: -assessed[name].quality.person_height_px)
+    copied = find_duplicates({name: assessed[name].track for name in fit}, DuplicateConfig())
     return candidate_ranking.rank(order, against, copied)
 
 
@@ -70,19 +70,19 @@ def test_a_bad_clip_is_rejected_for_what_is_wrong_with_it(ranking: list[Ranked],
 
 @pytest.mark.medium
 def test_the_cartoon_loses_though_algorithm_1_likes_it(
-    judged: Judged, ranking: list[Ranked]
+    assessed: Assessed, ranking: list[Ranked]
 ) -> None:
     """The paper's own example: a character that dances is steadier than a dancer."""
-    scores = {name: j.stability.stability_score for name, j in judged.items()}
+    scores = {name: j.stability.stability_score for name, j in assessed.items()}
     assert scores["cartoon"] < scores["dance_b"]
     assert "cartoon" not in {place.name for place in ranking if place.place}
 
 
 @pytest.mark.medium
-def test_the_score_is_algorithm_1(judged: Judged) -> None:
-    """Worked out once more, landmark by landmark, without numpy's arithmetic."""
+def test_the_score_is_algorithm_1(assessed: Assessed) -> None:
+    """Computed again, landmark by landmark, without numpy's arithmetic."""
     for name in ("hip_shake", "slideshow", "black"):
-        track = judged[name].track
+        track = assessed[name].track
         missing, jitter = 0, 0.0
         before = None
         for points, seen in zip(track.landmarks.tolist(), track.visibility.tolist(), strict=True):
@@ -94,39 +94,43 @@ def test_the_score_is_algorithm_1(judged: Judged) -> None:
                 ]
                 jitter += sum(steps) / 33
             before = now
-        assert judged[name].stability.stability_score == pytest.approx(missing + jitter, abs=1e-9)
+        assert assessed[name].stability.stability_score == pytest.approx(missing + jitter, abs=1e-9)
 
 
 @pytest.mark.medium
-def test_a_shaken_camera_hardly_ever_stands_still(judged: Judged) -> None:
-    assert judged["shaken"].quality.static_share < 0.2
-    assert judged["hip_shake"].quality.static_share == 1.0
+def test_a_shaken_camera_hardly_ever_stands_still(assessed: Assessed) -> None:
+    assert assessed["shaken"].quality.static_share < 0.2
+    assert assessed["hip_shake"].quality.static_share == 1.0
 
 
 @pytest.mark.medium
-def test_the_person_is_as_tall_as_the_drawing(judged: Judged) -> None:
+def test_the_person_is_as_tall_as_the_drawing(assessed: Assessed) -> None:
     """The clip that is 7/8 as large shows a person who is."""
     ratio = (
-        judged["mirrored"].quality.person_height_px / judged["hip_shake"].quality.person_height_px
+        assessed["mirrored"].quality.person_height_px
+        / assessed["hip_shake"].quality.person_height_px
     )
     assert ratio == pytest.approx(7 / 8, rel=0.02)
 
 
 @pytest.mark.medium
-def test_every_dancer_is_in_full_view(judged: Judged) -> None:
-    assert min(judged[name].quality.full_body_share for name in DANCERS) > 0.95
+def test_every_dancer_is_in_full_view(assessed: Assessed) -> None:
+    assert min(assessed[name].quality.full_body_share for name in DANCERS) > 0.95
 
 
 @pytest.mark.medium
-def test_filters_can_be_switched_off(judged: Judged) -> None:
+def test_filters_can_be_switched_off(assessed: Assessed) -> None:
     off = FilterConfig(people=None, cuts=None, static_share=None, flat_share=None)
     for name in ("two_people", "cut", "shaken", "cartoon"):
-        assert candidate_ranking.objections(judged[name].stability, judged[name].quality, off) == []
+        assert (
+            candidate_ranking.objections(assessed[name].stability, assessed[name].quality, off)
+            == []
+        )
 
 
 @pytest.mark.medium
-def test_by_frame_the_order_does_not_favour_short_clips(judged: Judged) -> None:
-    scores = {name: judged[name].stability for name in GOOD}
+def test_by_frame_the_order_does_not_favour_short_clips(assessed: Assessed) -> None:
+    scores = {name: assessed[name].stability for name in GOOD}
     by_frame = candidate_ranking.order(scores, FilterConfig(rank_by="frame"))
     expected = sorted(
         GOOD, key=lambda n: scores[n].jitter_per_frame + scores[n].missing_joints_per_frame
@@ -152,12 +156,12 @@ def test_by_second_a_short_clip_is_not_favoured() -> None:
 
 
 @pytest.mark.medium
-def test_a_clip_without_a_person_comes_last_however_low_its_score(judged: Judged) -> None:
-    order = candidate_ranking.order({n: j.stability for n, j in judged.items()}, FilterConfig())
+def test_a_clip_without_a_person_comes_last_however_low_its_score(assessed: Assessed) -> None:
+    order = candidate_ranking.order({n: j.stability for n, j in assessed.items()}, FilterConfig())
     assert set(order[-2:]) == {"black", "stick_figure"}
 
 
 @pytest.mark.medium
-def test_figures_are_plain_numbers(judged: Judged) -> None:
-    values = [v for j in judged.values() for v in vars(j.quality).values()]
+def test_figures_are_plain_numbers(assessed: Assessed) -> None:
+    values = [v for j in assessed.values() for v in vars(j.quality).values()]
     assert all(type(v) in (int, float) and np.isfinite(v) for v in values)

@@ -1,4 +1,4 @@
-"""The parts of the judge, on pictures and tracks with known answers."""
+"""The parts of an assessment, on pictures and tracks with known answers."""
 
 import cv2
 import numpy as np
@@ -12,7 +12,7 @@ from robojackson.clips.quality.duplicates import DuplicateConfig, find_duplicate
 from robojackson.clips.rejection import Rejection
 from robojackson.motion.landmark_track import LandmarkTrack
 
-NOBODY = np.full((33, 2), np.nan)
+NO_PERSON = np.full((33, 2), np.nan)
 SHAPE = (240, 320)
 
 
@@ -23,7 +23,7 @@ def track_of(xy: np.ndarray, visibility: float = 0.9, fps: float = 30.0) -> Land
 
 
 def dance(frames: int = 60, seed: int = 0) -> np.ndarray:
-    """A person whose landmarks wander smoothly, each its own way."""
+    """Return a person whose landmarks wander smoothly and independently."""
     rng = np.random.default_rng(seed)
     phase, speed = rng.uniform(0, 6.28, (33, 2)), rng.uniform(0.05, 0.15, (33, 2))
     time = np.arange(frames)[:, None, None]
@@ -43,7 +43,7 @@ def shifted(image: np.ndarray, px: float) -> np.ndarray:
 
 
 def a_body() -> np.ndarray:
-    """A standing person, upright in the middle of the image."""
+    """Return a standing person, upright in the middle of the image."""
     xy = np.full((33, 2), 0.5)
     xy[:11, 1] = 0.2
     for index, (x, y) in {
@@ -58,7 +58,7 @@ def a_body() -> np.ndarray:
 @pytest.mark.parametrize("px", [0.0, 1.0, 4.0, 8.0])
 def test_the_camera_moves_by_as_much_as_the_picture(px: float) -> None:
     before = noise()
-    found = displacement(before, shifted(before, px), NOBODY, 120)
+    found = displacement(before, shifted(before, px), NO_PERSON, 120)
     assert found * np.hypot(*SHAPE) == pytest.approx(px, abs=0.15)
 
 
@@ -72,13 +72,13 @@ def test_the_person_does_not_count_as_the_camera() -> None:
 
 def test_a_plain_wall_says_nothing_about_the_camera() -> None:
     wall = np.full(SHAPE, 128, np.uint8)
-    assert np.isnan(displacement(wall, wall, NOBODY, 120))
+    assert np.isnan(displacement(wall, wall, NO_PERSON, 120))
 
 
 def test_a_clip_without_background_counts_as_still() -> None:
     motion = CameraMotion(30, 30.0, CameraConfig())
     for index in range(30):
-        motion.add_frame(index, np.zeros((*SHAPE, 3), np.uint8), NOBODY)
+        motion.add_frame(index, np.zeros((*SHAPE, 3), np.uint8), NO_PERSON)
     assert motion.static_share == 1.0
 
 
@@ -192,7 +192,7 @@ def test_the_height_is_from_head_to_foot_in_pixels() -> None:
 
 
 def test_the_box_of_no_person_is_none() -> None:
-    assert box(NOBODY, 0.1, 100, 100) is None
+    assert box(NO_PERSON, 0.1, 100, 100) is None
 
 
 def test_paint_is_flat_and_cloth_is_not() -> None:

@@ -13,7 +13,8 @@ from tests.fixtures.web_server import Web, serving
 
 @pytest.fixture(scope="session")
 def small_video(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A second of coloured noise: large enough to be cut in half, small enough to send often."""
+    """Return a second of coloured noise: large enough to be cut in half, small enough to send
+    often."""
     path = tmp_path_factory.mktemp("video") / "clip.mp4"
     rng = np.random.default_rng(0)
     with av.open(str(path), "w", format="mp4", options={"movflags": "faststart"}) as container:
@@ -28,6 +29,6 @@ def small_video(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def web(small_video: Path) -> Iterator[Web]:
-    """A running server with the small video."""
+    """Yield a running server with the small video."""
     with serving(small_video.read_bytes()) as running:
         yield running

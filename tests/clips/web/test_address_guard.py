@@ -49,7 +49,7 @@ def test_the_guard_ends_and_lets_a_proxy_be() -> None:
 def test_a_private_page_is_not_requested(web: Web) -> None:
     with pytest.raises(DownloadFailed, match=r"web\.private_addresses=true"):
         offer(f"{web.url}/moved/clip.mp4", "score", FormatConfig(), STRICT)
-    assert web.asked == []
+    assert web.requests == []
 
 
 def test_configuration_allows_it(web: Web) -> None:

@@ -9,7 +9,8 @@ from robojackson.clips.web import javascript_runtimes
 
 @pytest.fixture
 def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """install(program, words): a program that says its version; there is no other."""
+    """Return install(program, words), which adds a program that prints its version; there is no
+    other."""
     monkeypatch.setattr(javascript_runtimes.sys, "executable", str(tmp_path / "python"))
     monkeypatch.setattr(javascript_runtimes.shutil, "which", lambda name: None)
 

@@ -11,12 +11,12 @@ from robojackson.clips.web.yt_dlp_client import WebConfig, listing
 from robojackson.errors import SearchFailed
 from tests.fixtures.web_server import PATIENT, Web
 
-NOBODY = "http://127.0.0.1:9"
+CLOSED_PORT = "http://127.0.0.1:9"
 
 
 @pytest.fixture
 def unresolved(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A machine without a name server."""
+    """Take the name server away."""
 
     def fail(*_: object, **__: object) -> None:
         raise socket.gaierror(-2, "Name or service not known")
@@ -34,7 +34,7 @@ def test_a_site_that_answers_is_reachable(web: Web) -> None:
 def test_a_refused_connection_names_the_host_and_what_to_do() -> None:
     result = r"no connection to 127.0.0.1 .*refused.*--source folder"
     with pytest.raises(SearchFailed, match=result):
-        require_reachable(NOBODY)
+        require_reachable(CLOSED_PORT)
 
 
 def test_a_name_that_cannot_be_resolved_is_one_line(unresolved: None) -> None:
@@ -63,7 +63,7 @@ def test_behind_a_proxy_only_the_proxy_has_to_answer(
 
 def test_a_proxy_that_does_not_answer_is_named() -> None:
     with pytest.raises(SearchFailed, match=r"nowhere\.invalid through the proxy 127\.0\.0\.1"):
-        require_reachable("https://nowhere.invalid", NOBODY)
+        require_reachable("https://nowhere.invalid", CLOSED_PORT)
 
 
 @pytest.mark.parametrize(
@@ -78,7 +78,7 @@ def test_a_proxy_that_does_not_answer_is_named() -> None:
         ("urls", "list.txt", ""),
     ],
 )
-def test_a_source_says_which_page_it_asks(source: str, address: str, page: str) -> None:
+def test_a_source_names_the_page_that_it_reads(source: str, address: str, page: str) -> None:
     assert page_of(source, "apt", address) == page
 
 
@@ -91,4 +91,4 @@ def test_a_name_that_cannot_be_resolved_is_requested_twice_at_most(unresolved: N
 
 def test_a_refused_connection_may_come_right_later() -> None:
     with pytest.raises(SearchFailed, match=r"\(3 attempts\)"):
-        listing(f"{NOBODY}/clip.mp4", PATIENT)
+        listing(f"{CLOSED_PORT}/clip.mp4", PATIENT)

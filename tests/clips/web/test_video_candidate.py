@@ -13,7 +13,7 @@ NOW = datetime(2026, 11, 21, tzinfo=UTC)
 
 
 def flat(video_id: str = "AbCdEfGhIjK", **more: Any) -> dict[str, Any]:
-    """One entry of a flat search of YouTube."""
+    """Return one entry of a flat search of YouTube."""
     return {
         "_type": "url",
         "ie_key": "Youtube",
@@ -37,7 +37,7 @@ def flat(video_id: str = "AbCdEfGhIjK", **more: Any) -> dict[str, Any]:
 
 
 def search(*entries: dict[str, Any]) -> dict[str, Any]:
-    """What `ytsearchN:` returns."""
+    """Return what `ytsearchN:` returns."""
     return {"_type": "playlist", "id": "APT dance", "title": "APT dance", "entries": list(entries)}
 
 
@@ -60,7 +60,7 @@ def test_a_flat_entry_becomes_a_candidate() -> None:
     )
 
 
-def test_a_full_entry_tells_its_page_and_not_its_file() -> None:
+def test_a_full_entry_names_its_page_and_not_its_file() -> None:
     full = flat(
         _type="video",
         extractor_key="Youtube",

@@ -57,7 +57,7 @@ def test_no_server_at_all_is_a_reason(tmp_path: Path) -> None:
 
 def test_a_download_that_was_cut_goes_on_where_it_stopped(web: Web, tmp_path: Path) -> None:
     path = get(web, "half_once/clip.mp4", tmp_path)
-    starts = [int(r.strip("bytes=-")) for _, r in web.asked if r]
+    starts = [int(r.strip("bytes=-")) for _, r in web.requests if r]
     assert path.read_bytes() == web.video
     assert len(starts) == 1
     assert 0 < starts[0] <= len(web.video) // 2
@@ -132,9 +132,9 @@ def test_the_id_of_a_path_stays_in_the_folder(web: Web, tmp_path: Path) -> None:
 
 def test_a_search_page_is_read_flat(web: Web) -> None:
     found = source("site").search("apt", f"{web.url}/search?q={{query}}", 10, PATIENT, NOW)
-    asked = {path for path, _ in web.asked}
+    requested = {path for path, _ in web.requests}
     titles = [candidate.title for candidate in found]
-    assert (titles, asked) == (["The good one", "Gone", "A long way & round"], {"/search"})
+    assert (titles, requested) == (["The good one", "Gone", "A long way & round"], {"/search"})
 
 
 def test_the_words_of_a_query_are_quoted_into_the_address(web: Web) -> None:

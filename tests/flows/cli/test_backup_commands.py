@@ -27,7 +27,7 @@ def no_server(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def store(store_folder: Path) -> Store:
-    """A store with a file and the database of a server in it."""
+    """Return a store with a file and the database of a server in it."""
     made = Store(store_folder)
     made.put(KEY, b"PAR1")
     home = store_folder / "prefect"

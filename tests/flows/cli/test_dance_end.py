@@ -1,4 +1,4 @@
-"""What `robojackson dance` tells people to type next."""
+"""The command that `robojackson dance` suggests next."""
 
 import sys
 

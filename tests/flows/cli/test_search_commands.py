@@ -1,4 +1,4 @@
-"""What `catalogue` says where nothing was judged yet."""
+"""The line of `catalogue` before any video is assessed."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Each search and study ends with a sentence that judges it and a command to type next."""
+"""Each search and study ends with a sentence about its result and a command to type next."""
 
 import shlex
 from typing import Any

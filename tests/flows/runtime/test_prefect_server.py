@@ -28,7 +28,7 @@ COMMANDS = {
 
 
 class Guarded(BaseHTTPRequestHandler):
-    """As Prefect's with a password: everybody may ask whether it is well, and nothing else."""
+    """A server like Prefect's with a password: without it, only the health check is answered."""
 
     def do_GET(self) -> None:
         self.send_response(200 if self.path.endswith("/health") else 401)
@@ -36,12 +36,12 @@ class Guarded(BaseHTTPRequestHandler):
         self.end_headers()
 
     def log_message(self, *args: object) -> None:
-        """Quiet."""
+        """Log nothing."""
 
 
 @pytest.fixture
 def guarded() -> Iterator[str]:
-    """The address of a server that refuses us."""
+    """Yield the address of a server that refuses us."""
     server = ThreadingHTTPServer(("127.0.0.1", 0), Guarded)
     server.daemon_threads = True
     threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True).start()

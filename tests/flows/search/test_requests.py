@@ -24,10 +24,10 @@ def test_a_query_that_the_book_knows_is_that_dance() -> None:
     assert find_dance("apt", "youtube", "", None, FindConfig()).full_query.startswith("APT dance")
 
 
-@pytest.mark.parametrize(("top", "judged"), [(None, ALL), (2, 2)])
-def test_a_folder_is_assessed_whole_unless_a_number_is_given(top, judged, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("top", "expected"), [(None, ALL), (2, 2)])
+def test_a_folder_is_assessed_whole_unless_a_number_is_given(top, expected, tmp_path: Path) -> None:
     (tmp_path / "a.mp4").write_text("")
-    assert find_dance(str(tmp_path), "folder", "", top, FindConfig()).top == judged
+    assert find_dance(str(tmp_path), "folder", "", top, FindConfig()).top == expected
 
 
 def offline(page: str, proxy: str | None) -> None:

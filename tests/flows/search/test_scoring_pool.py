@@ -25,9 +25,9 @@ def test_threads_score_by_themselves() -> None:
 
 
 def test_a_cluster_that_is_there_is_used() -> None:
-    asked = scorers({VARIABLE: "tcp://127.0.0.1:8786"})
-    assert isinstance(asked, DaskTaskRunner)
-    assert asked.address == "tcp://127.0.0.1:8786"
+    pool = scorers({VARIABLE: "tcp://127.0.0.1:8786"})
+    assert isinstance(pool, DaskTaskRunner)
+    assert pool.address == "tcp://127.0.0.1:8786"
 
 
 def test_dask_that_is_not_installed_is_reported_in_one_line(

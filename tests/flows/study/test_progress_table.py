@@ -27,7 +27,8 @@ def cells() -> list[Cell]:
 
 
 def versions(monkeypatch: pytest.MonkeyPatch, store: Path, away: bool = False) -> list[list[Any]]:
-    """The states by version, of a study whose cells all end at once but the last, which fails."""
+    """Return the states by version, of a study whose cells all end at once but the last, which
+    fails."""
     shown: list[list[Any]] = []
     summary = Store(store).put("evaluation.json", json.dumps({"skill": 0.5}).encode())
 

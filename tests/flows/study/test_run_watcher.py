@@ -19,12 +19,12 @@ class Server:
     """A server whose runs end one more a question, and that is away for the first ones."""
 
     def __init__(self, away: int = 0) -> None:
-        self.away, self.asked = away, 0
+        self.away, self.calls = away, 0
         self.over: set[UUID] = set()
 
     async def __call__(self, ids: list[UUID]) -> list[FlowRun]:
-        self.asked += 1
-        if self.asked <= self.away:
+        self.calls += 1
+        if self.calls <= self.away:
             raise ConnectionError("no server")
         self.over.add(min(ids))
         return [FlowRun(id=i, flow_id=uuid4(), state=Completed()) for i in ids if i in self.over]
@@ -56,13 +56,13 @@ def test_every_run_comes_back_as_itself(quick: pytest.MonkeyPatch) -> None:
 def test_all_runs_together_are_requested_once_a_look(quick: pytest.MonkeyPatch) -> None:
     server = Server()
     wait_for(waiting(5), server, quick)
-    assert server.asked == 5  # one more ends a look: not five questions a look
+    assert server.calls == 5  # one more ends a look: not five questions a look
 
 
 def test_a_run_that_has_ended_is_not_requested(quick: pytest.MonkeyPatch) -> None:
     server = Server()
     wait_for([FlowRun(id=uuid4(), flow_id=uuid4(), state=Completed())], server, quick)
-    assert server.asked == 0
+    assert server.calls == 0
 
 
 def test_a_server_that_is_away_for_a_while_loses_no_run(quick: pytest.MonkeyPatch) -> None:

@@ -13,7 +13,7 @@ from tests.fixtures import machine
 
 
 def study(tmp_path: Path, **given: object) -> Path:
-    """A study of two moves, one of them with steps of its own."""
+    """Return a study of two moves, one of them with steps of its own."""
     path = tmp_path / "mine.yaml"
     facts = {"name": "mine", "moves": ["walk", "dance_b"], "setups": ["scratch"], "steps": 700}
     path.write_text(yaml.safe_dump(facts | {"move_steps": {"walk": 500}} | given))

@@ -19,7 +19,7 @@ from tests.fixtures.own_robot import own_robot
 
 
 def key(robot: Path) -> str:
-    """Under which a motion for a robot is recorded."""
+    """Return the key under which a motion for a robot is recorded."""
     sequence = Artifact(key="smpl", sha256="0" * 64)
     given = {"sequence": sequence, "robot": describe_robot(str(robot)), "config": RetargetConfig()}
     return retarget_motion.recipe.key(given)

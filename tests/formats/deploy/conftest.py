@@ -40,18 +40,19 @@ def made(folder: Path, robot: Robot, cyclic: bool = True, feedforward: float = 0
 
 @pytest.fixture(scope="session")
 def packages(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """numpy, onnxruntime and mujoco, without RoboJackson."""
+    """Return a folder with numpy, onnxruntime and mujoco, without RoboJackson."""
     return bare_packages(tmp_path_factory.mktemp("bare"))
 
 
 @pytest.fixture(scope="session")
 def pack(tmp_path_factory: pytest.TempPathFactory) -> Pack:
-    """Of Humanoid-v5, whose motors are in another order than its hinges."""
+    """Return a pack of Humanoid-v5, whose motors are in another order than its hinges."""
     return made(tmp_path_factory.mktemp("deploy"), stock())
 
 
 @pytest.fixture(scope="session")
 def hipped(tmp_path_factory: pytest.TempPathFactory) -> Pack:
-    """The same with three hinges between the root and the anchor, a motion that ends, and lead."""
+    """Return a pack with three hinges between the root and the anchor, a motion that ends, and
+    lead."""
     robot = with_head_on(stock(), "pelvis")
     return made(tmp_path_factory.mktemp("hipped"), robot, cyclic=False, feedforward=0.5)

@@ -37,7 +37,7 @@ def run(session: onnxruntime.InferenceSession, seen: np.ndarray, step: int) -> n
 
 
 def observation(pack: Pack, sim: Simulation, row: int, last: np.ndarray) -> np.ndarray:
-    """mjlab's terms, from MuJoCo's own body poses."""
+    """Return mjlab's terms, from MuJoCo's own body poses."""
     data, expected = sim.datas[0], np.asarray(pack.reference.qpos, float)[row]
     robot, root = pack.robot, pack.robot.model.body(pack.robot.description.root_body).id
     head = robot.model.site_bodyid[robot.keypoint_sites[robot.keypoint_names.index("head")]]
@@ -53,7 +53,8 @@ def observation(pack: Pack, sim: Simulation, row: int, last: np.ndarray) -> np.n
 
 
 def largest_difference(pack: Pack, name: str, steps: int = 25, start: int = 50) -> float:
-    """Between the targets of graph and policy, rad, along a rollout that the policy drives."""
+    """Return the largest difference between the targets of graph and policy along a rollout of the
+    policy, rad."""
     robot, graph = pack.robot, session(pack, name)
     driver = trained_driver(pack.policy, robot, pack.reference)
     clip = Clip(pack.reference, lead_of(robot, pack.reference, driver.control))

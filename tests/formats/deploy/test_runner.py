@@ -67,7 +67,7 @@ def with_setting(folder: Path, key: str, value: object) -> Path:
 def figures_of(
     pack: Pack, folder: Path, packages: Path, work: Path
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """The judge's figures of the policy in our simulation, and of what the runner did alone."""
+    """Return the evaluation's figures of the policy in our simulation, and of the runner alone."""
     robot, reference = pack.robot, pack.reference
     driver, fall = trained_driver(pack.policy, robot, reference), Fall.of(robot)
     clip = Clip(reference, lead_of(robot, reference, driver.control))
@@ -80,14 +80,14 @@ def figures_of(
     result = run_bare(packages, ROLL_OUT, *words, cwd=work)
     assert result.returncode == 0, result.stderr
     theirs = recorded(pack, clip, starts, np.load(work / "tracks.npy").transpose(1, 0, 2))
-    judge = RolloutScorer(robot, reference, BRIEF)
-    both = [summarise([judge.row("x", label, rollouts, i) for i, label in enumerate(labels)])
+    scorer = RolloutScorer(robot, reference, BRIEF)
+    both = [summarise([scorer.row("x", label, rollouts, i) for i, label in enumerate(labels)])
             for rollouts in (done, theirs)]  # fmt: skip
     return both[0], both[1]
 
 
 def recorded(pack: Pack, clip: Clip, starts: Starts, qpos: np.ndarray) -> Rollouts:
-    """What was recorded elsewhere, as a rollout that the judge can read."""
+    """Return states that were recorded elsewhere as a rollout that the scorer can read."""
     robot, (steps, count) = pack.robot, qpos.shape[:2]
     data, fall = mujoco.MjData(robot.model), Fall.of(robot)
     points = np.zeros((steps, count, len(robot.keypoint_names), 3))
@@ -119,7 +119,9 @@ def test_the_runner_is_short_and_imports_three_packages(pack: Pack) -> None:
 
 
 @pytest.mark.slow
-def test_alone_it_reaches_the_judges_figures(pack: Pack, packages: Path, tmp_path: Path) -> None:
+def test_alone_it_reaches_the_figures_of_the_evaluation(
+    pack: Pack, packages: Path, tmp_path: Path
+) -> None:
     ours, theirs = figures_of(pack, pack.folder, packages, tmp_path)
     assert abs(ours["success"] - theirs["success"]) <= 0.02
     assert abs(ours["survived_s"] - theirs["survived_s"]) <= 0.02
@@ -220,7 +222,7 @@ def test_a_robot_with_its_joints_in_another_order_is_refused(pack: Pack, tmp_pat
 
 
 def standing(pack: Pack) -> Runner:
-    """A runner whose robot stands at the motion's first row."""
+    """Return a runner whose robot stands at the motion's first row."""
     runner = Runner(pack.folder)
     runner.robot.data.qpos[:] = pack.reference.qpos[0]
     runner.begin(0)

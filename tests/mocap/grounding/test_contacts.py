@@ -22,7 +22,7 @@ CONFIG = ContactConfig()
 
 
 def four_feet(height: float = 0.0, speed: float = 0.0) -> np.ndarray:
-    """Four points at a height that move sideways (y) at a speed."""
+    """Return four points at a height that move sideways (y) at a speed."""
     feet = np.zeros((FRAMES, 4, 3))
     feet[..., 2] = height
     feet[..., 1] = (np.arange(FRAMES) / FPS * speed)[:, None]
@@ -30,7 +30,7 @@ def four_feet(height: float = 0.0, speed: float = 0.0) -> np.ndarray:
 
 
 def states(height: float, speed: float, falling: np.ndarray = GROUNDED) -> np.ndarray:
-    """Of four points that are all as high and as fast."""
+    """Return the states of four points that are all as high and as fast."""
     shape = np.ones((FRAMES, 4))
     return contacts(height * shape, speed * shape, falling, FPS, CONFIG)
 
@@ -129,7 +129,7 @@ def test_root_correction_minimises_its_cost() -> None:
     assert np.allclose(shift[:, :2].reshape(-1), expected)
 
 
-def test_who_is_moved_away_from_the_camera_keeps_his_place_in_the_image() -> None:
+def test_a_person_moved_away_from_the_camera_keeps_the_place_in_the_image() -> None:
     """Feet that drift along the ray pull the body back along it."""
     feet = four_feet()
     drift = 0.2 * (np.arange(FRAMES) / FRAMES)[:, None]

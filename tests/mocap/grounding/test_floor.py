@@ -17,7 +17,7 @@ CONFIG = ground.GravityConfig()
 
 
 def standing_in_camera(tilt: Rotation) -> tuple[np.ndarray, np.ndarray]:
-    """Points and feet of a person at rest before a camera that is turned by `tilt`."""
+    """Return points and feet of a person at rest before a camera that is turned by `tilt`."""
     local = np.broadcast_to(np.eye(3), (FRAMES, 24, 3, 3)).copy()
     pose = forward(local, REST_JOINTS[None], np.zeros((FRAMES, 3)))
     upright = Rotation.from_matrix(np.diag([1.0, -1.0, -1.0]))
@@ -98,7 +98,7 @@ def test_a_jump_is_ballistic_as_long_as_it_lasts(height_m: float) -> None:
     assert abs(found[-1] - true[-1]) <= 2
 
 
-def test_somebody_who_drops_into_a_squat_does_not_jump() -> None:
+def test_a_person_who_drops_into_a_squat_does_not_jump() -> None:
     time = np.arange(60) / 30.0
     height = 1.0 - 0.4 * np.clip((time - 0.7) / 0.25, 0.0, 1.0) ** 2
     assert not air.ballistic(height, np.zeros(60), 30.0).any()

@@ -20,7 +20,7 @@ from robojackson.motion.landmark_track import LandmarkTrack
 
 
 def without(track: LandmarkTrack, frames: list[int]) -> LandmarkTrack:
-    """The track with no one found in some frames."""
+    """Return the track without a person in some frames."""
     arrays = [np.array(a) for a in (track.landmarks, track.world_landmarks, track.visibility)]
     for array in arrays:
         array[frames] = np.nan
@@ -29,7 +29,7 @@ def without(track: LandmarkTrack, frames: list[int]) -> LandmarkTrack:
 
 
 def swapped(track: LandmarkTrack, frames: list[int]) -> LandmarkTrack:
-    """The track with left and right exchanged in some frames."""
+    """Return the track with left and right exchanged in some frames."""
     arrays = [np.array(a) for a in (track.landmarks, track.world_landmarks, track.visibility)]
     for array in arrays:
         array[frames] = array[frames][:, MIRROR]

@@ -22,7 +22,7 @@ FPS = 30.0
 
 
 def clip(frames: int) -> np.ndarray:
-    """Landmarks of somebody who stands before the camera and sways."""
+    """Return the landmarks of a person who stands before the camera and sways."""
     rng = np.random.default_rng(3)
     points = rng.uniform(-0.6, 0.6, size=(1, 33, 3)) + [0.0, 0.0, 4.0]
     return points + 0.05 * np.sin(np.arange(frames) / 5.0)[:, None, None]

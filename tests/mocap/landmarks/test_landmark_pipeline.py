@@ -15,18 +15,18 @@ CLIP = Path(__file__).parents[3] / "clips" / "hip_shake.mp4"
 
 @pytest.fixture
 def followed(hip_shake: LandmarkTrack, monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """The pose models that were asked, each of which sees the recorded track."""
-    asked: list[str] = []
+    """Return the pose models that ran, each of which finds the recorded track."""
+    used: list[str] = []
 
     def follow(path, info, size, dancer, progress=None, watch=None) -> LandmarkTrack:
-        asked.append(size)
+        used.append(size)
         for done in (60, 120):
             if progress:
                 progress(done, 120)
         return hip_shake
 
     monkeypatch.setattr(landmark_pipeline, "track_dancer", follow)
-    return asked
+    return used
 
 
 def look(quality: str, progress=None) -> LandmarkTrack:
@@ -34,7 +34,7 @@ def look(quality: str, progress=None) -> LandmarkTrack:
     return landmark_pipeline.detect_landmarks(CLIP, info, quality, DancerConfig(), progress)
 
 
-def test_best_asks_both_larger_models_and_they_vote(
+def test_best_runs_both_larger_models_and_they_vote(
     followed: list[str], hip_shake: LandmarkTrack
 ) -> None:
     found = look("best")
@@ -62,7 +62,7 @@ def test_a_camera_that_stands_leaves_the_track_without_a_note(followed: list[str
     assert found.notes == ()
 
 
-def test_pictures_that_pass_by_tell_what_a_second_look_tells(hip_shake: LandmarkTrack) -> None:
+def test_pictures_of_one_pass_give_what_a_second_pass_gives(hip_shake: LandmarkTrack) -> None:
     """One decoding at full size and one made small from the start."""
     background = landmark_pipeline.Background()
     rows = hip_shake.landmarks

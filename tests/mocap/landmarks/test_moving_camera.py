@@ -15,7 +15,8 @@ ROOT = Path(__file__).parents[3]
 
 
 def panned(track: LandmarkTrack) -> tuple[LandmarkTrack, CameraPath]:
-    """The bundled hip-shake through a window that sways over it, and what the background tells."""
+    """Return the bundled hip-shake through a window that sways over it, and the path that the
+    background shows."""
     width, frames = 448, len(track)
     swing = 1.0 + np.sin(np.arange(frames) / frames * 4.0 * np.pi)
     offsets = np.round((track.width - width) / 2.0 * swing).astype(int)

@@ -17,7 +17,8 @@ CONFIG = RefineConfig()
 
 
 def true_clip() -> np.ndarray:
-    """The rest pose, swaying slowly before the camera, as 33 landmarks in the camera frame."""
+    """Return the rest pose, swaying slowly before the camera, as 33 landmarks in the camera
+    frame."""
     upright = REST_JOINTS * [1.0, -1.0, -1.0]
     points = np.zeros((FRAMES, 33, 3))
     for index in BODY:
@@ -27,7 +28,7 @@ def true_clip() -> np.ndarray:
 
 
 def with_noisy_depth(points: np.ndarray, spread: float, seed: int) -> np.ndarray:
-    """The same image, wrong depths."""
+    """Return landmarks with the same image and wrong depths."""
     depth = points[..., 2:] + np.random.default_rng(seed).normal(scale=spread, size=(FRAMES, 33, 1))
     return np.concatenate([points[..., :2] / points[..., 2:] * depth, depth], -1)
 

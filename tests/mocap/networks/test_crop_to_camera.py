@@ -24,7 +24,7 @@ def a_view(count: int = 6, seed: int = 0) -> crop_to_camera.View:
 
 
 def a_motion(count: int = 6, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
-    """A moving person in no particular pose, and his twists."""
+    """Return a moving person in random poses, and the twists."""
     from scipy.spatial.transform import Rotation
 
     generator = np.random.default_rng(seed)
@@ -39,7 +39,7 @@ def a_motion(count: int = 6, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
 def seen_through_crops(
     points: np.ndarray, view: crop_to_camera.View
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(uvd, scale) of points before each frame's own lens, by projection."""
+    """Return (uvd, scale) of points before each frame's own lens, by projection."""
     pixels = points[..., :2] / points[..., 2:] * view.focal_px[:, None, None]
     pixels += np.array([view.width, view.height]) / 2.0
     uv = (pixels - view.boxes[:, None, :2]) / view.boxes[:, None, 2:]
@@ -121,7 +121,7 @@ def test_refocusing_with_the_same_lens_changes_nothing() -> None:
 
 
 def test_the_refined_scale_is_that_of_the_true_bones() -> None:
-    """A scale that is wrong by 5 % makes a person with other bones; his own bones tell it."""
+    """A scale that is wrong by 5 % makes a person with other bones, which the clip's bones show."""
     view, (points, twist) = a_view(), a_motion()
     uvd, scale = seen_through_crops(points, view)
     zero = np.zeros((6, 29))
@@ -141,7 +141,7 @@ def test_a_scale_that_nothing_refines_stays() -> None:
 
 @pytest.fixture(scope="module")
 def tables() -> dict[str, torch.Tensor]:
-    """A body of SMPL's size with random vertices, one of which is every joint."""
+    """Return a body of SMPL's size with random vertices, one of which is every joint."""
     generator = torch.Generator().manual_seed(0)
     regressor = torch.zeros(24, 6890)
     regressor[torch.arange(24), torch.arange(24) * 100] = 1.0

@@ -29,7 +29,7 @@ SMPL_KEYS = 9
 
 
 def volume_of(uvd: Tensor, spread: float = 1.0) -> Tensor:
-    """Volumes whose softmax is a Gaussian of that many cells around (B, J, 3) points."""
+    """Return volumes whose softmax is a Gaussian of that many cells around (B, J, 3) points."""
     cells = torch.arange(64.0)
     u, v, d = ((uvd[..., axis, None] + 0.5) * 64.0 for axis in range(3))
     exponents = [-(((cells - place) / spread) ** 2) / 2.0 for place in (d, v, u)]
@@ -67,7 +67,7 @@ def resnet_state() -> Mapping[str, Tensor]:
 
 @pytest.fixture
 def seen_pair() -> tuple[NetworkOutput, NetworkOutput]:
-    """A crop and its mirror image, each with the flip test."""
+    """Return a crop and its mirror image, each with the flip test."""
     network = Painted(points(1))
     crop = torch.zeros(1, 3, 256, 256)
     crop[..., 0] = 1.0
@@ -224,7 +224,7 @@ def test_every_pair_of_sides_is_swapped_once() -> None:
 
 
 def _filled(key: str, value: Tensor) -> Tensor:
-    """Random weights of a size that keeps the signal's."""
+    """Return random weights of a size that keeps the signal's."""
     if value.ndim > 1:
         return torch.randn(value.shape) / value[0].numel() ** 0.5
     return torch.ones(value.shape, dtype=value.dtype) * (0.0 if "mean" in key else 1.0)

@@ -45,7 +45,7 @@ class Exact(HybrikNet):
 
 @pytest.fixture(scope="module")
 def track(hip_shake: LandmarkTrack) -> LandmarkTrack:
-    """The first frames of the hip-shake."""
+    """Return the first frames of the hip-shake."""
     return replace(
         hip_shake,
         landmarks=hip_shake.landmarks[:FRAMES],
@@ -56,13 +56,13 @@ def track(hip_shake: LandmarkTrack) -> LandmarkTrack:
 
 @pytest.fixture(scope="module")
 def dancer(track: LandmarkTrack) -> SmplSequence:
-    """A motion that stands for the truth: what our own mocap makes of the track."""
+    """Return a motion that stands for the truth: our own mocap of the track."""
     return recover_motion(track, MocapConfig())
 
 
 @pytest.fixture(scope="module")
 def truth(dancer: SmplSequence) -> Truth:
-    """The dancer before the camera: local rotations and points on our rest skeleton."""
+    """Return the dancer before the camera: local rotations and points on our rest skeleton."""
     rows = np.concatenate([dancer.global_orient, dancer.body_pose], 1).reshape(-1, 3)
     local = Rotation.from_rotvec(rows).as_matrix().reshape(FRAMES, 24, 3, 3)
     to_world = np.array(dancer.camera["rotation_w"])
@@ -77,7 +77,8 @@ def lens(track: LandmarkTrack) -> Pinhole:
 
 
 def exact_network(truth: Truth, track: LandmarkTrack, lens: Pinhole, rest: np.ndarray) -> HybrikNet:
-    """Sees the truth through each frame's own lens, as a perfect network would."""
+    """Return a network that finds the truth through each frame's own lens, as a perfect one
+    would."""
     local, points = truth
     boxes = person_crop.person_boxes(repair(track).image)
     view = crop_to_camera.View(boxes, lens.width, lens.height)

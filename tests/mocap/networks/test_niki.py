@@ -25,7 +25,7 @@ ERRORS = {OneStage: 32, TwistSwing: 32 + 46}
 
 @pytest.fixture(scope="module", params=[OneStage, TwistSwing])
 def network(request: pytest.FixtureRequest) -> Form:
-    """Random weights, larger than at the start of a training."""
+    """Return random weights, larger than at the start of a training."""
     torch.manual_seed(0)
     form: Form = request.param().eval().double()
     with torch.no_grad():
@@ -182,7 +182,7 @@ def test_a_file_of_a_form_gives_back_its_network(network: Form) -> None:
 
 
 def _single(network: Form) -> dict[str, Tensor]:
-    """As published weights are."""
+    """Return the weights as they are published."""
     return {key: value.float() for key, value in network.state_dict().items()}
 
 

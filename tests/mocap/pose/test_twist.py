@@ -12,7 +12,7 @@ from robojackson.mocap.pose.keypoints import LEFT
 
 
 def solved_twist(joint: str, cue: twist.Cue, local: np.ndarray) -> np.ndarray:
-    """Twist angle of one joint after a solve with one cue, radians."""
+    """Return the twist angle of one joint after a solve with one cue, radians."""
     points = forward(local, REST_JOINTS[None], np.zeros((len(local), 3))).points
     found = solve_with(points, REST_JOINTS[None], twist.rule({joint: cue}, REST_JOINTS))
     index = keypoint(joint)
@@ -22,7 +22,7 @@ def solved_twist(joint: str, cue: twist.Cue, local: np.ndarray) -> np.ndarray:
 
 
 def bent_arm(turn_deg: float, flexion_deg: float) -> np.ndarray:
-    """A left arm turned about its own axis and bent at the elbow; all else at rest."""
+    """Return a left arm turned about its own axis and bent at the elbow; all else at rest."""
     local = np.broadcast_to(np.eye(3), (1, 24, 3, 3)).copy()
     local[0, 16] = Rotation.from_euler("x", turn_deg, degrees=True).as_matrix()
     local[0, 18] = Rotation.from_euler("y", -flexion_deg, degrees=True).as_matrix()

@@ -92,7 +92,7 @@ def test_hypotheses_differ_only_where_a_limb_is_hidden(seen: Landmarks, placed: 
     assert moved[:30].max() < 1e-6
 
 
-def test_a_hypothesis_is_told_by_its_number_and_seed(seen: Landmarks, placed: np.ndarray) -> None:
+def test_a_hypothesis_is_fixed_by_its_number_and_seed(seen: Landmarks, placed: np.ndarray) -> None:
     once, again, other = (
         lifted(masked(seen), placed, hypothesis=1, seed=seed).points for seed in (3, 3, 4)
     )

@@ -22,7 +22,7 @@ FLAT = 0.4
 
 @pytest.fixture(scope="module")
 def dancer(hip_shake: LandmarkTrack) -> np.ndarray:
-    """A body that swings its limbs more than the recorded one, camera frame, metres."""
+    """Return a body that swings its limbs more than the recorded one, camera frame, metres."""
     points = view_track(hip_shake, MocapConfig()).points
     time = np.arange(len(points)) / hip_shake.fps
     away = points - points[:, HIPS].mean(1, keepdims=True)
@@ -36,14 +36,14 @@ def dancer(hip_shake: LandmarkTrack) -> np.ndarray:
 
 
 def second_frame(points: np.ndarray) -> np.ndarray:
-    """The points before a camera that stands 70 degrees aside."""
+    """Return the points before a camera that stands 70 degrees aside."""
     middle = points.mean((0, 1))
     result: np.ndarray = (points - middle) @ TURN.T + middle
     return result
 
 
 def filmed(points: np.ndarray, like: LandmarkTrack) -> LandmarkTrack:
-    """What a detector that flattens depth sees."""
+    """Return the landmarks of a detector that flattens depth."""
     focal = view_track(like, MocapConfig()).pinhole.focal_px
     image = points[..., :2] / points[..., 2:] * focal / [like.width, like.height] + 0.5
     local = (points - points[:, HIPS].mean(1, keepdims=True)) * [1.0, 1.0, FLAT]
@@ -82,7 +82,7 @@ def test_the_offset_of_the_same_sound_is_found() -> None:
     assert found == pytest.approx(1.3, abs=0.01)
 
 
-def test_sounds_of_different_places_tell_no_offset() -> None:
+def test_sounds_of_different_places_give_no_offset() -> None:
     rng = np.random.default_rng(1)
     one, two = (Sound(0.1 * rng.normal(size=(3 * RATE, 2))) for _ in range(2))
     assert sound_offset(one, two) is None

@@ -22,7 +22,8 @@ def _certified(robot: Robot, qpos: np.ndarray) -> Certified:
 
 
 def _resting(robot: Robot) -> np.ndarray:
-    """A stand that MuJoCo itself can balance: arms at the sides, soles on the floor, level."""
+    """Return a stand that MuJoCo itself can balance: arms at the sides, soles on the floor,
+    level."""
     qpos = robot.standing.copy()
     _bend(robot, qpos, "left_hip_y", -0.05)
     _bend(robot, qpos, "right_hip_y", -0.05)
@@ -46,7 +47,7 @@ def _on_the_floor(robot: Robot, qpos: np.ndarray) -> np.ndarray:
 
 
 def _balanced(robot: Robot, qpos: np.ndarray) -> np.ndarray:
-    """Pitched about the feet until the centre of mass is over them."""
+    """Return a pose pitched about the feet until the centre of mass is over them."""
     data, best = mujoco.MjData(robot.model), qpos
     misses = []
     pitches = np.linspace(-0.2, 0.2, 161)
@@ -149,7 +150,7 @@ def test_an_arm_swung_too_fast_is_repaired_by_a_slower_tempo(robot: Robot):
     assert all(finding.repair.startswith("slow to") for finding in torques)
 
 
-def test_an_arm_held_out_costs_what_gravity_asks(robot: Robot):
+def test_an_arm_held_out_costs_what_gravity_demands(robot: Robot):
     """Shoulder torque of the forearm and upper arm about the hinge, from masses and levers."""
     qpos = _resting(robot)
     found = _certified(robot, _held(qpos))
@@ -175,7 +176,7 @@ def test_a_hop_of_mujocos_own_physics_is_feasible(robot: Robot):
 
 
 def _simulated(robot: Robot) -> np.ndarray:
-    """A stiff robot dropped from 3 cm, one row a control step."""
+    """Simulate a stiff robot dropped from 3 cm; return one row a control step."""
     model, data = robot.model, mujoco.MjData(robot.model)
     data.qpos[:] = _resting(robot)
     data.qpos[2] += 0.03

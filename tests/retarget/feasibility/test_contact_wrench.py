@@ -17,7 +17,8 @@ BARRIER = 0.05
 
 
 def _demand(robot: Robot, hurry: float = 1.0) -> Demand:
-    """Some steps of the walk, played `hurry` times as fast: too fast for some motors."""
+    """Return the demand of some steps of the walk, played `hurry` times as fast: too fast for some
+    motors."""
     motion = robot_motion("walk")
     force = inverse_dynamics.free_space(robot, motion.qpos, motion.dt, motion.cycle_offset).at(
         hurry
@@ -26,16 +27,17 @@ def _demand(robot: Robot, hurry: float = 1.0) -> Demand:
     return inverse_dynamics.demand(robot, motion.qpos, force, near, Tolerance())
 
 
-def _scipy_slack(asked: Demand, step: int) -> float:
-    """The same least squares by scipy's bounded solver, torques as unknowns."""
-    use = asked.usable[step]
-    edges, hinges = int(use.sum()), len(asked.ease)
+def _scipy_slack(demand: Demand, step: int) -> float:
+    """Solve the same least squares by scipy's bounded solver, torques as unknowns; return the
+    slack."""
+    use = demand.usable[step]
+    edges, hinges = int(use.sum()), len(demand.ease)
     matrix = np.zeros((6 + hinges, edges + hinges))
-    matrix[:, :edges] = asked.scale[:, None] * asked.columns[step][:, use]
-    matrix[6:, edges:] = np.diag(asked.scale[6:])
-    lower = np.concatenate([np.zeros(edges), asked.lower[step]])
-    upper = np.concatenate([np.full(edges, np.inf), asked.upper[step]])
-    target = asked.scale * asked.force[step]
+    matrix[:, :edges] = demand.scale[:, None] * demand.columns[step][:, use]
+    matrix[6:, edges:] = np.diag(demand.scale[6:])
+    lower = np.concatenate([np.zeros(edges), demand.lower[step]])
+    upper = np.concatenate([np.full(edges, np.inf), demand.upper[step]])
+    target = demand.scale * demand.force[step]
     found = lsq_linear(matrix, target, bounds=(lower, upper), tol=1e-13, max_iter=500)
     return float(np.linalg.norm(found.fun))
 
@@ -43,56 +45,56 @@ def _scipy_slack(asked: Demand, step: int) -> float:
 @pytest.mark.medium
 @pytest.mark.parametrize("hurry", [1.0, 2.0])
 def test_no_bounded_solver_leaves_less(hurry: float, robot: Robot):
-    asked = _demand(robot, hurry)
-    slack = contact_wrench.supply(asked).slack
+    demand = _demand(robot, hurry)
+    slack = contact_wrench.supply(demand).slack
     for step in range(0, len(slack), 9):
-        assert slack[step] <= _scipy_slack(asked, step) + 1e-4
+        assert slack[step] <= _scipy_slack(demand, step) + 1e-4
 
 
 def test_pushes_pull_nothing_and_use_no_sole_in_the_air(robot: Robot):
-    asked = _demand(robot)
-    pushes = contact_wrench.supply(asked).pushes
+    demand = _demand(robot)
+    pushes = contact_wrench.supply(demand).pushes
     assert pushes.min() >= 0.0
-    np.testing.assert_array_equal(pushes[~asked.usable], 0.0)
+    np.testing.assert_array_equal(pushes[~demand.usable], 0.0)
 
 
 def test_a_sharper_barrier_comes_near_to_the_least(robot: Robot):
-    asked = _demand(robot, 2.0)
-    least = 0.5 * contact_wrench.supply(asked).slack ** 2
+    demand = _demand(robot, 2.0)
+    least = 0.5 * contact_wrench.supply(demand).slack ** 2
     soft, sharp = (
-        np.abs(contact_wrench.relaxed(asked, mu).value - least).max() for mu in (1e-2, 1e-4)
+        np.abs(contact_wrench.relaxed(demand, mu).value - least).max() for mu in (1e-2, 1e-4)
     )
     assert sharp < 0.1 * soft
 
 
 def test_slope_is_the_derivative_of_the_value(robot: Robot, rng: np.random.Generator):
-    asked = _demand(robot)
-    way = rng.normal(size=asked.force.shape) / asked.scale
+    demand = _demand(robot)
+    way = rng.normal(size=demand.force.shape) / demand.scale
     ahead, back = (
-        contact_wrench.relaxed(replace(asked, force=asked.force + s * 1e-4 * way), BARRIER).value
+        contact_wrench.relaxed(replace(demand, force=demand.force + s * 1e-4 * way), BARRIER).value
         for s in (1, -1)
     )
-    slope = np.sum(contact_wrench.relaxed(asked, BARRIER).slope * way, axis=1)
+    slope = np.sum(contact_wrench.relaxed(demand, BARRIER).slope * way, axis=1)
     np.testing.assert_allclose((ahead - back) / 2e-4, slope, rtol=1e-4, atol=1e-4)
 
 
 def test_the_roots_square_is_the_second_derivative(robot: Robot, rng: np.random.Generator):
-    asked = _demand(robot)
-    way = rng.normal(size=asked.force.shape) / asked.scale
+    demand = _demand(robot)
+    way = rng.normal(size=demand.force.shape) / demand.scale
     ahead, back = (
-        contact_wrench.relaxed(replace(asked, force=asked.force + s * 1e-4 * way), BARRIER).slope
+        contact_wrench.relaxed(replace(demand, force=demand.force + s * 1e-4 * way), BARRIER).slope
         for s in (1, -1)
     )
-    unit = np.broadcast_to(np.eye(len(asked.scale)), (len(asked.force), *[len(asked.scale)] * 2))
-    root = contact_wrench.relaxed(asked, BARRIER).root @ unit
+    unit = np.broadcast_to(np.eye(len(demand.scale)), (len(demand.force), *[len(demand.scale)] * 2))
+    root = contact_wrench.relaxed(demand, BARRIER).root @ unit
     bend = (root.swapaxes(1, 2) @ (root @ way[..., None]))[..., 0]
-    np.testing.assert_allclose((ahead - back) / 2e-4 / asked.scale, bend / asked.scale, atol=2e-3)
+    np.testing.assert_allclose((ahead - back) / 2e-4 / demand.scale, bend / demand.scale, atol=2e-3)
 
 
 def test_a_start_nearby_leads_to_the_same_place(robot: Robot, rng: np.random.Generator):
-    asked = _demand(robot)
-    start = contact_wrench.relaxed(asked, BARRIER).point
-    there = replace(asked, force=asked.force + 0.3 * rng.normal(size=asked.force.shape))
+    demand = _demand(robot)
+    start = contact_wrench.relaxed(demand, BARRIER).point
+    there = replace(demand, force=demand.force + 0.3 * rng.normal(size=demand.force.shape))
     cold = contact_wrench.relaxed(there, BARRIER)
     warm = contact_wrench.relaxed(there, BARRIER, start)
     np.testing.assert_allclose(warm.value, cold.value, atol=1e-6)
@@ -101,11 +103,11 @@ def test_a_start_nearby_leads_to_the_same_place(robot: Robot, rng: np.random.Gen
 
 def test_a_start_of_another_problem_is_not_taken(robot: Robot):
     """A hinge that leaves its stop has a limit that the start knows nothing of."""
-    asked = _demand(robot)
-    stopped = replace(asked, upper=np.full_like(asked.upper, np.inf))
+    demand = _demand(robot)
+    stopped = replace(demand, upper=np.full_like(demand.upper, np.inf))
     start = contact_wrench.relaxed(stopped, BARRIER).point
-    warm = contact_wrench.relaxed(asked, BARRIER, start)
-    np.testing.assert_allclose(warm.value, contact_wrench.relaxed(asked, BARRIER).value, atol=1e-6)
+    warm = contact_wrench.relaxed(demand, BARRIER, start)
+    np.testing.assert_allclose(warm.value, contact_wrench.relaxed(demand, BARRIER).value, atol=1e-6)
 
 
 def test_a_hinge_on_its_stop_needs_no_motor_to_stay_there(robot: Robot):
@@ -113,9 +115,9 @@ def test_a_hinge_on_its_stop_needs_no_motor_to_stay_there(robot: Robot):
     knee = robot.joint_names.index("left_knee")
     qpos[:, 7 + knee] = robot.upper[knee]  # straight: the stop pushes back, towards bending
     force = np.zeros((5, robot.model.nv))
-    asked = inverse_dynamics.demand(robot, qpos, force, np.zeros((5, 2), bool), Tolerance())
-    assert np.isinf(asked.lower[:, knee]).all()
-    np.testing.assert_allclose(asked.upper[:, knee], robot.torque_limit[knee])
+    demand = inverse_dynamics.demand(robot, qpos, force, np.zeros((5, 2), bool), Tolerance())
+    assert np.isinf(demand.lower[:, knee]).all()
+    np.testing.assert_allclose(demand.upper[:, knee], robot.torque_limit[knee])
 
 
 @pytest.mark.parametrize("tempo", [0.5, 0.8])

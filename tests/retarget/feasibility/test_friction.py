@@ -54,8 +54,8 @@ def test_no_push_leaves_the_cone(robot: Robot):
     posed = pose(tree(other), motion.qpos)
     force = inverse_dynamics.free_space(other, motion.qpos, motion.dt, motion.cycle_offset).at(1.0)
     near = inverse_dynamics.touching(other, posed)
-    asked = inverse_dynamics.demand(other, motion.qpos, force, near, Tolerance())
-    pushes = contact_wrench.supply(asked).pushes.reshape(len(force), len(near[0]), -1)
+    demand = inverse_dynamics.demand(other, motion.qpos, force, near, Tolerance())
+    pushes = contact_wrench.supply(demand).pushes.reshape(len(force), len(near[0]), -1)
     push = np.einsum("cxe,sce->scx", directions(other), pushes)
     along, up = np.linalg.norm(push[..., :2], axis=-1), push[..., 2]
     assert (along <= 0.3 * up + 1e-9).all()

@@ -23,7 +23,7 @@ def any_robot(request: pytest.FixtureRequest, tmp_path: Path) -> Robot:
 
 
 def _moving(robot: Robot) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Poses, velocities and accelerations away from the origin, turned and fast."""
+    """Return poses, velocities and accelerations away from the origin, turned and fast."""
     rng = np.random.default_rng(4)
     qpos = np.tile(robot.standing, (STEPS, 1))
     qpos[:, :3] = rng.normal(size=(STEPS, 3))

@@ -99,7 +99,7 @@ def test_what_slowing_down_does_not_help_keeps_its_tempo():
 
 
 def _hurried(robot: Robot, tempo: float | str) -> dict[str, float]:
-    """The hip shake as if it had been filmed at a third of its speed, hardly repaired."""
+    """Retarget the hip shake as if it had been filmed at a third of its speed, hardly repaired."""
     fast = replace(human("hip_shake"), fps=90.0)
     gentle = replace(RetargetConfig().repair, weights=(1e-5,))
     config = RetargetConfig(tempo=tempo, repair=gentle)  # type: ignore[arg-type]
@@ -135,5 +135,5 @@ def test_slower_tempos_are_tried_where_the_own_one_is_too_fast(robot: Robot):
     forces = inverse_dynamics.free_space(robot, qpos, DT, None)
     near = inverse_dynamics.touching(robot, pose(tree(robot), qpos))
     for row, k in zip(found, GRID, strict=True):
-        asked = inverse_dynamics.demand(robot, qpos, forces.at(k), near, Tolerance())
-        np.testing.assert_allclose(row[hard], supply(asked).slack[hard], atol=1e-6)
+        demand = inverse_dynamics.demand(robot, qpos, forces.at(k), near, Tolerance())
+        np.testing.assert_allclose(row[hard], supply(demand).slack[hard], atol=1e-6)

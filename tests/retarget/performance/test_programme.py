@@ -30,7 +30,7 @@ SHORT = ProgrammeConfig(dance_s=1.0, stand_s=0.3)
 
 @lru_cache
 def twice() -> Programme:
-    """The hip-shake two times, the second one turned and elsewhere in its file."""
+    """Return the hip-shake two times, the second one turned and elsewhere in its file."""
     dance = robot_motion("hip_shake")
     return plan([("first", dance), ("second", dance)], stock(), SHORT, QUICK)
 

@@ -49,7 +49,7 @@ def test_a_body_in_the_air_has_no_support():
 
 
 def _distance_mm(motion, robot: Robot) -> float:
-    """Mean static distance of the centre of mass from the line between the feet."""
+    """Return the mean static distance of the centre of mass from the line between the feet."""
     posed = pose(tree(robot), motion.qpos)
     com, feet = centre_of_mass(tree(robot), posed)[:, :2], posed.site_pos[:, [5, 6], :2]
     along = feet[:, 1] - feet[:, 0]

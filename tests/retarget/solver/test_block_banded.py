@@ -7,7 +7,7 @@ from robojackson.retarget.solver.block_banded import Chain, Normal
 
 
 def _random_system(frames: int, ring: bool, rng: np.random.Generator):
-    """Random residuals over three successive frames, in blocks and as one dense matrix."""
+    """Return random residuals over three successive frames, in blocks and as one dense matrix."""
     unknowns, normal = 4, Normal.empty(frames, 4)
     first = np.arange(frames if ring else frames - 2)
     rows = tuple(rng.normal(size=(len(first), 6, unknowns)) for _ in range(3))

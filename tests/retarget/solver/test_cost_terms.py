@@ -21,7 +21,7 @@ FRAMES = 12
 def _problem(
     robot: Robot, cycle_offset: np.ndarray | None, **weights: float
 ) -> tuple[Problem, np.ndarray]:
-    """A sway near the floor that moves every joint, and targets a little off it."""
+    """Return a sway near the floor that moves every joint, and targets a little off it."""
     rng = np.random.default_rng(3)
     phase = 2 * np.pi * np.arange(FRAMES)[:, None] / FRAMES
     sway = 0.05 * np.sin(phase + rng.uniform(0, 6, robot.model.nv))

@@ -29,7 +29,7 @@ def _problem(robot: Robot) -> Problem:
 
 
 def _gliding(problem: Problem) -> np.ndarray:
-    """One pose that goes as far as the cycle does."""
+    """Return one pose that travels as far as the cycle does."""
     count, cycle_offset = len(problem.targets), problem.targets.cycle_offset
     assert cycle_offset is not None
     qpos = np.repeat(robot_motion("walk").qpos[:1], count, 0)

@@ -13,7 +13,7 @@ from robojackson.robot.tree_kinematics import pose, tree
 
 
 def _sway(robot: Robot, steps: int) -> Targets:
-    """Keypoints of a robot that sways slowly on the spot."""
+    """Return the keypoints of a robot that sways slowly on the spot."""
     phase = 2 * np.pi * np.arange(steps)[:, None] * 0.015 * np.array([0.7, 1.1, 1.3] * 9)
     qpos = np.tile(robot.standing, (steps, 1))
     middle, spread = (robot.lower + robot.upper) / 2, (robot.upper - robot.lower) / 2

@@ -75,7 +75,7 @@ def test_a_body_that_does_not_fall_stands_on_something_whatever_the_labels_say(r
 
 
 def _jump(cycles: bool = False) -> HumanClip:
-    """Two seconds of which steps 20 to 34 are a leap."""
+    """Return two seconds of which steps 20 to 34 are a leap."""
     clip = _clip("hip_shake")
     time = np.arange(15) * clip.dt
     points = np.repeat(clip.keypoints_w[:1], 60, axis=0)

@@ -18,7 +18,7 @@ STRICT = CycleConfig(least_share=0.95)
 
 
 def _swaying(frames: int, period: int, drift: float = 0.0, yaw: float = 0.0) -> SmplSequence:
-    """A body that sways with a known period, drifts along x and turns about z."""
+    """Return a body that sways with a known period, drifts along x and turns about z."""
     base = human("hip_shake")
     time = np.arange(frames)
     points = np.repeat(base.keypoints_w[:1], frames, axis=0).copy()
@@ -80,7 +80,7 @@ def test_a_dancer_who_turns_on_with_every_cycle_is_closed_on_request():
 
 
 def _with_an_arm_that_rises(degrees: float) -> SmplSequence:
-    """A sway of whole periods through which the left forearm turns by an angle."""
+    """Return a sway of whole periods through which the left forearm turns by an angle."""
     base = _swaying(60, 30)
     elbow, wrist = (KEYPOINT_NAMES.index(f"left_{name}") for name in ("elbow", "wrist"))
     points = base.keypoints_w.copy()

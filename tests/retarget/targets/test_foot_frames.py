@@ -12,7 +12,7 @@ FRAMES, FLAT = 20, 12
 
 
 def _walker(slope_deg: float, pitches_deg: np.ndarray, heading_deg: float):
-    """A foot that is flat in the first frames, then pitched; its toe is below its ankle."""
+    """Return a foot that is flat in the first frames, then pitched; its toe is below its ankle."""
     turn = Rotation.from_euler("z", heading_deg, degrees=True)
     turns = turn * Rotation.from_rotvec(np.radians(pitches_deg)[:, None] * [0.0, 1.0, 0.0])
     slope = np.radians(slope_deg)

@@ -32,7 +32,7 @@ def own_feet(robot: Robot) -> Feet:
 
 
 def exchanged(robot: Robot) -> Feet:
-    """Crossed legs: each foot where the other belongs, the right one in front."""
+    """Return crossed legs: each foot where the other belongs, the right one in front."""
     own = own_feet(robot)
     ahead = 0.1 * np.array([np.cos(HEADING), np.sin(HEADING)])
     return {

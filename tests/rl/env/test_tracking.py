@@ -254,7 +254,7 @@ def test_an_episode_that_ends_hands_out_its_own_last_observation(
 
 
 def put(env: TrackingCore, sway: ReferenceMotion, step: int, drift: float = 0.0) -> None:
-    """All robots exactly on the reference at a step, the root moved along x by the drift."""
+    """Put all robots on the reference at a step, the root moved along x by the drift."""
     env.step_index[:] = step
     at = env.clip.at(env.step_index)
     qpos = at.qpos.copy()

@@ -21,7 +21,7 @@ def idle(robot: Robot) -> Policy:
 
 
 def seeing(robot: Robot) -> Policy:
-    """A policy whose action depends a little on all that it sees."""
+    """Return a policy whose action depends a little on its whole observation."""
     shape = (Observer(robot, "full").size, robot.model.nu)
     weights = 0.01 * np.random.default_rng(0).normal(size=shape)
     return Policy(((weights, np.zeros(robot.model.nu)),), idle(robot).facts)
@@ -60,6 +60,6 @@ def test_slippery_floor_and_late_actions_change_the_outcome(
     assert same == ["integrator RK4", "pushes every 1 to 3 s"]
 
 
-def test_train_robust_sets_what_the_passport_asks() -> None:
+def test_train_robust_disturbs_what_the_passport_tests() -> None:
     config = load(TrainConfig, None, robust_settings())
     assert config.track.random == ROBUST

@@ -41,7 +41,7 @@ class Replay:
 
 
 def programme() -> Programme:
-    """Three parts of the hip-shake's beginning, the middle one a dance."""
+    """Return three parts of the hip-shake's beginning, the middle one a dance."""
     motion = robot_motion("hip_shake")
     rows = {
         name: np.asarray(getattr(motion, name))[:STEPS]
@@ -57,7 +57,7 @@ def programme() -> Programme:
 
 
 def qpos_of(tilt: float) -> np.ndarray:
-    """One robot, turned about its left axis."""
+    """Return one robot, turned about its left axis."""
     return np.array([[0.0, 0.0, 1.2, np.cos(tilt / 2), 0.0, np.sin(tilt / 2), 0.0]])
 
 

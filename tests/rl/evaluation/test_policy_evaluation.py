@@ -1,4 +1,4 @@
-"""The judge: rows made by hand, so that each verdict has one known answer."""
+"""The evaluation: rows made by hand, so that each verdict has one known answer."""
 
 import dataclasses
 
@@ -27,7 +27,7 @@ STEPS = 160
 
 
 def perfect(sway: ReferenceMotion) -> Rollouts:
-    """A rollout that is the reference itself for two cycles."""
+    """Return a rollout that is the reference itself for two cycles."""
     at = Clip(sway).at(np.arange(STEPS))
     return Rollouts(
         length=np.array([STEPS]),
@@ -46,7 +46,7 @@ def row(robot: Robot, sway: ReferenceMotion, rollouts: Rollouts) -> dict[str, ob
 
 
 def idle(robot: Robot, sway: ReferenceMotion, control: ControlConfig | None = None) -> Policy:
-    """A policy that adds nothing to the reference."""
+    """Return a policy that adds nothing to the reference."""
     size = Observer(robot, "full").size
     nothing = (np.zeros((size, robot.model.nu)), np.zeros(robot.model.nu))
     control = control or ControlConfig()
@@ -56,10 +56,10 @@ def idle(robot: Robot, sway: ReferenceMotion, control: ControlConfig | None = No
 def test_the_reference_itself_is_a_strict_success_of_skill_one(
     robot: Robot, sway: ReferenceMotion
 ) -> None:
-    judged = row(robot, sway, perfect(sway))
-    assert (judged["success"], judged["strict_success"], judged["clip_fraction"]) == (1, 1, 1)
-    assert judged["skill"] == pytest.approx(1)
-    assert judged["limb_gain_left_hand"] == pytest.approx(1)
+    scored = row(robot, sway, perfect(sway))
+    assert (scored["success"], scored["strict_success"], scored["clip_fraction"]) == (1, 1, 1)
+    assert scored["skill"] == pytest.approx(1)
+    assert scored["limb_gain_left_hand"] == pytest.approx(1)
 
 
 @pytest.mark.parametrize(
@@ -73,13 +73,11 @@ def test_the_tempo_is_the_clips_own_times_what_retargeting_left_of_it(
     assert row(robot, slow, perfect(sway))["tempo"] == pytest.approx(tempo)
 
 
-def test_of_a_reference_that_stands_still_no_skill_is_told(
-    robot: Robot, sway: ReferenceMotion
-) -> None:
+def test_a_reference_that_stands_still_has_no_skill(robot: Robot, sway: ReferenceMotion) -> None:
     whole = perfect(sway)
     still = np.repeat(whole.target[:1], STEPS, 0)
-    judged = row(robot, sway, dataclasses.replace(whole, target=still, points=still + 0.01))
-    assert np.isnan(judged["skill"])
+    scored = row(robot, sway, dataclasses.replace(whole, target=still, points=still + 0.01))
+    assert np.isnan(scored["skill"])
 
 
 def test_the_velocity_score_is_one_at_the_reference_and_none_for_a_statue(
@@ -97,18 +95,18 @@ def test_the_velocity_score_sees_a_jump_that_the_pelvis_frame_does_not(
 ) -> None:
     points = perfect(sway).points.copy()
     points[90:, ..., 0] += 1.0
-    judged = row(robot, sway, dataclasses.replace(perfect(sway), points=points))
-    assert judged["skill"] == pytest.approx(1)
-    assert judged["velocity_score"] < 0  # type: ignore[operator]
+    scored = row(robot, sway, dataclasses.replace(perfect(sway), points=points))
+    assert scored["skill"] == pytest.approx(1)
+    assert scored["velocity_score"] < 0  # type: ignore[operator]
 
 
 def test_a_fall_has_no_skill_and_no_success(robot: Robot, sway: ReferenceMotion) -> None:
     fall = dataclasses.replace(perfect(sway), length=np.array([40]), fell=np.array([True]))
-    judged = row(robot, sway, fall)
-    assert (judged["success"], judged["strict_success"], judged["skill"]) == (0, 0, 0)
-    assert judged["velocity_score"] == 0
-    assert judged["survived_s"] == pytest.approx(40 * sway.dt)
-    assert judged["clip_fraction"] == pytest.approx(0.25)
+    scored = row(robot, sway, fall)
+    assert (scored["success"], scored["strict_success"], scored["skill"]) == (0, 0, 0)
+    assert scored["velocity_score"] == 0
+    assert scored["survived_s"] == pytest.approx(40 * sway.dt)
+    assert scored["clip_fraction"] == pytest.approx(0.25)
 
 
 @pytest.mark.parametrize("length", [0, 1])
@@ -123,9 +121,9 @@ def test_kneeling_for_one_step_is_no_strict_success(robot: Robot, sway: Referenc
     kneeling = perfect(sway)
     points = kneeling.points.copy()
     points[70, 0, robot.keypoint_names.index("left_knee"), 2] = 0.1
-    judged = row(robot, sway, dataclasses.replace(kneeling, points=points))
-    assert judged["kneels"]
-    assert (judged["success"], judged["strict_success"]) == (1, 0)
+    scored = row(robot, sway, dataclasses.replace(kneeling, points=points))
+    assert scored["kneels"]
+    assert (scored["success"], scored["strict_success"]) == (1, 0)
 
 
 def test_one_step_far_from_the_reference_is_no_strict_success(
@@ -143,9 +141,9 @@ def test_marching_on_the_spot_shows_in_drift_and_travel(
     """The pelvis-heading frame cannot see it, so the table has columns of its own for it."""
     still = perfect(sway)
     walked = still.target + np.linspace(0, 2, STEPS)[:, None, None, None] * [1.0, 0, 0]
-    judged = row(robot, sway, dataclasses.replace(still, target=walked))
-    assert judged["drift_m"] == pytest.approx(2.0, abs=0.05)
-    assert judged["travel_ratio"] == pytest.approx(0.0, abs=0.05)
+    scored = row(robot, sway, dataclasses.replace(still, target=walked))
+    assert scored["drift_m"] == pytest.approx(2.0, abs=0.05)
+    assert scored["travel_ratio"] == pytest.approx(0.0, abs=0.05)
 
 
 def test_a_robot_that_lies_down_has_fallen(robot: Robot, sway: ReferenceMotion) -> None:
@@ -213,7 +211,7 @@ def test_a_robot_whose_gains_changed_since_the_training_is_refused(
         control_of(known, softer)
 
 
-def test_a_policy_that_learnt_another_dance_is_judged_with_a_word(
+def test_a_policy_of_another_dance_is_evaluated_with_a_note(
     robot: Robot, sway: ReferenceMotion, caplog: pytest.LogCaptureFixture
 ) -> None:
     policy = idle(robot, sway)
@@ -274,8 +272,8 @@ def test_the_papers_reward_is_the_same_whatever_a_policy_was_trained_with(
     brief = EvaluateConfig(seconds=0.15, phases=1, resets=1)
     paid = []
     for preset in ("paper", "released", "walker"):
-        asked = dataclasses.asdict(PaperConfig(preset=preset))
-        policy = Policy((nothing,), {**facts, "environment": asked})
+        environment = dataclasses.asdict(PaperConfig(preset=preset))
+        policy = Policy((nothing,), {**facts, "environment": environment})
         rows = evaluate_policy(policy, sway, robot, brief).rows
         paid.append([row["return_paper"] for row in rows if row["policy"] == "trained"])
     assert paid[0][0] > 0
@@ -299,13 +297,13 @@ def test_the_usage_of_a_joint_is_its_spread_over_the_references(
     qpos = lively.qpos.copy()
     knee = 7 + robot.joint_names.index("left_knee")
     qpos[:, 0, knee] = 3 * qpos[:, 0, knee]
-    judged = row(robot, sway, dataclasses.replace(lively, qpos=qpos))
-    assert judged["usage_left_knee"] == pytest.approx(3)
-    assert judged["usage_right_knee"] == pytest.approx(1)
+    scored = row(robot, sway, dataclasses.replace(lively, qpos=qpos))
+    assert scored["usage_left_knee"] == pytest.approx(3)
+    assert scored["usage_right_knee"] == pytest.approx(1)
 
 
 @pytest.mark.medium
-def test_a_policy_of_paper_mode_is_judged_on_348_observations(
+def test_a_policy_of_paper_mode_is_evaluated_on_348_observations(
     robot: Robot, sway: ReferenceMotion
 ) -> None:
     nothing = (np.zeros((348, 17)), np.zeros(17))

@@ -19,7 +19,7 @@ STEPS = 100
 
 
 @pytest.fixture(scope="module")
-def judged_by_reference(robot: Robot) -> Robot:
+def reference_rules(robot: Robot) -> Robot:
     changed = dataclasses.replace(
         robot.description,
         fall=FallRule(frame="reference", height=0.25, tilt=0.8),
@@ -37,54 +37,52 @@ def perfect(sway: ReferenceMotion, start: int = 0) -> Rollouts:
 
 
 def findings(robot: Robot, sway: ReferenceMotion, rollouts: Rollouts, start: int = 0):
-    judge = StrictEvaluator(robot, sway, EvaluateConfig())
-    return judge.findings(rollouts, 0, slice(0, STEPS), start, np.zeros(STEPS))
+    evaluator = StrictEvaluator(robot, sway, EvaluateConfig())
+    return evaluator.findings(rollouts, 0, slice(0, STEPS), start, np.zeros(STEPS))
 
 
 def lying(rollouts: Rollouts, first: int) -> Rollouts:
-    """The same with the torso on the floor from a step on."""
+    """Return the rollouts with the torso on the floor from a step on."""
     qpos = rollouts.qpos.copy()
     qpos[first:, 0, 2] = 0.1
     qpos[first:, 0, 3:7] = [np.cos(np.pi / 4), 0.0, np.sin(np.pi / 4), 0.0]
     return dataclasses.replace(rollouts, qpos=qpos)
 
 
-def test_the_reference_itself_breaks_no_rule(
-    judged_by_reference: Robot, sway: ReferenceMotion
-) -> None:
-    assert not findings(judged_by_reference, sway, perfect(sway, 7), 7).any
+def test_the_reference_itself_breaks_no_rule(reference_rules: Robot, sway: ReferenceMotion) -> None:
+    assert not findings(reference_rules, sway, perfect(sway, 7), 7).any
 
 
-def test_a_body_on_the_floor_is_found(judged_by_reference: Robot, sway: ReferenceMotion) -> None:
-    assert findings(judged_by_reference, sway, lying(perfect(sway), 60)).floor
+def test_a_body_on_the_floor_is_found(reference_rules: Robot, sway: ReferenceMotion) -> None:
+    assert findings(reference_rules, sway, lying(perfect(sway), 60)).floor
 
 
 def test_where_the_reference_lies_a_robot_may_lie(
-    judged_by_reference: Robot, sway: ReferenceMotion
+    reference_rules: Robot, sway: ReferenceMotion
 ) -> None:
     flat = lying(perfect(sway), 0)
     one = len(sway)
     motion = dataclasses.replace(sway, qpos=np.repeat(flat.qpos[:1, 0], one, 0))
-    assert not findings(judged_by_reference, motion, flat).floor
+    assert not findings(reference_rules, motion, flat).floor
 
 
 @pytest.mark.parametrize(("lift", "broken"), [(0.24, False), (0.26, True)])
 def test_a_hand_may_be_25_cm_too_high(
-    judged_by_reference: Robot, sway: ReferenceMotion, lift: float, broken: bool
+    reference_rules: Robot, sway: ReferenceMotion, lift: float, broken: bool
 ) -> None:
     done = perfect(sway)
     points = done.points.copy()
-    points[40, 0, judged_by_reference.keypoint_names.index("left_hand"), 2] += lift
-    found = findings(judged_by_reference, sway, dataclasses.replace(done, points=points))
+    points[40, 0, reference_rules.keypoint_names.index("left_hand"), 2] += lift
+    found = findings(reference_rules, sway, dataclasses.replace(done, points=points))
     assert found.ends is broken
     assert found.worst_end_m == pytest.approx(lift)
 
 
 def test_a_robot_that_fell_is_counted_to_the_horizon(
-    judged_by_reference: Robot, sway: ReferenceMotion
+    reference_rules: Robot, sway: ReferenceMotion
 ) -> None:
     """Limp robots: their position error over the whole horizon exceeds that until the fall."""
-    robot, horizon = judged_by_reference, np.full(2, 150)
+    robot, horizon = reference_rules, np.full(2, 150)
     starts = Starts(np.zeros(2, int), sway.qpos[[0, 0]], sway.qvel[[0, 0]])
     limp = Driver(ControlConfig(stiffness=1e-6), lambda sim, *rest: np.zeros((sim.n, 17)))
     done = roll_out(

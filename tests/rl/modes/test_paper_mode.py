@@ -30,7 +30,8 @@ WALKER = PaperConfig(preset="walker", reset_noise=0.0)
 
 
 def state(**changed: np.ndarray) -> PaperState:
-    """One robot that stands as it should: its point at (1, 0, 1), its pelvis under its COM."""
+    """Return one robot that stands as it should: its point at (1, 0, 1), its pelvis under its
+    COM."""
     usual = {
         "points": np.array([[[1.0, 0.0, 1.0], [0.0, 0.0, 2.0]]]),
         "root": np.array([[0.0, 0.0, 1.0]]),
@@ -239,7 +240,7 @@ def test_weights_that_weigh_nothing_are_refused(weights: dict[str, float]) -> No
 
 
 def altered(folder: Path, *changes: tuple[str, str]) -> Robot:
-    """Humanoid-v5 with another model and no torque limits, as a user's own robot."""
+    """Return Humanoid-v5 with another model and no torque limits, as a user's own robot."""
     path = own_robot(folder)
     text = (folder / "model.xml").read_text()
     for old, new in changes:
@@ -296,9 +297,9 @@ def test_the_motion_is_turned_ahead_without_being_bent(robot: Robot, sway: Refer
 def test_a_statue_earns_what_a_dancer_earns_by_the_papers_reward(
     robot: Robot, sway: ReferenceMotion
 ) -> None:
-    asked = audit_both_readings(robot, sway, PaperConfig())
-    assert set(asked) == {"root", "world"}
-    assert asked["root"].of["statue"] > 0.95
+    audits = audit_both_readings(robot, sway, PaperConfig())
+    assert set(audits) == {"root", "world"}
+    assert audits["root"].of["statue"] > 0.95
 
 
 @pytest.mark.medium
@@ -335,7 +336,7 @@ def test_paper_mode_learns_with_the_papers_numbers_unless_reported() -> None:
 
 
 def turned_by(motion: ReferenceMotion, yaw: float) -> ReferenceMotion:
-    """The motion turned by an angle about the vertical and moved, by scipy."""
+    """Return the motion turned by an angle about the vertical and moved, by scipy."""
     from scipy.spatial.transform import Rotation
 
     turn = Rotation.from_euler("z", yaw)

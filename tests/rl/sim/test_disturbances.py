@@ -67,7 +67,7 @@ def test_noise_is_within_its_bounds_and_the_same_within_a_step(robot: Robot) -> 
     np.testing.assert_allclose(np.linalg.norm(qpos[:, 3:7], axis=1), 1.0)
 
 
-def test_without_noise_sensors_tell_the_truth(robot: Robot) -> None:
+def test_without_noise_sensors_are_exact(robot: Robot) -> None:
     sim = placed(robot, RandomConfig())
     assert sim.sensed()[0] is sim.qpos
 

@@ -30,7 +30,7 @@ FED = dataclasses.replace(LED, feedback=1.0)
 
 @pytest.fixture(autouse=True)
 def store(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """One for all tests of this file: the gains are computed once."""
+    """Return one store for all tests of this file: the gains are computed once."""
     folder = tmp_path_factory.getbasetemp() / "feedback_store"
     folder.mkdir(exist_ok=True)
     monkeypatch.setenv("ROBOJACKSON_STORE", str(folder))
@@ -140,7 +140,7 @@ def test_half_a_share_is_half_the_feedback(robot: Robot, sway: ReferenceMotion) 
 
 
 @pytest.mark.parametrize("kind", ["onboard", "preview"])
-def test_who_does_not_see_all_gets_none(kind: str) -> None:
+def test_a_policy_of_partial_observations_gets_no_feedback(kind: str) -> None:
     config = TrackConfig(observation=kind)  # type: ignore[arg-type]
     assert control_of(config).feedback == 0.0
     named = dataclasses.replace(config, control=FED)

@@ -1,4 +1,4 @@
-"""Feed-forward: the PD law gives the torque that the reference asks for."""
+"""Feed-forward: the PD law gives the torque that the reference requires."""
 
 from dataclasses import replace
 

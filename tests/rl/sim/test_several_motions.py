@@ -19,7 +19,7 @@ STEPS = 50
 
 @pytest.fixture(scope="module")
 def ending(sway: ReferenceMotion) -> ReferenceMotion:
-    """The first steps of the sway, elsewhere, which do not repeat."""
+    """Return the first steps of the sway, elsewhere, which do not repeat."""
     cut = {name: getattr(sway, name)[:STEPS] for name in ("qvel", "source_time_s", "contact")}
     qpos, points = np.array(sway.qpos[:STEPS]), np.array(sway.keypoints_w[:STEPS])
     qpos[:, 0] += 3.0

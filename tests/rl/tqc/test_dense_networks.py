@@ -18,13 +18,13 @@ UNITS = {"narrow": [16, 24], "wide": [128, 128]}
 
 @pytest.fixture(params=UNITS)
 def units(request: pytest.FixtureRequest) -> list[int]:
-    """Of the hidden layers."""
+    """Return the units of the hidden layers."""
     return UNITS[request.param]
 
 
 @pytest.fixture(params=[False, True], ids=["plain", "normalised"])
 def made(request: pytest.FixtureRequest, units: list[int]) -> SimpleNamespace:
-    """Networks of sbx, their parameters, and inputs."""
+    """Return networks of sbx, their parameters, and inputs."""
     keys = iter(jax.random.split(jax.random.PRNGKey(0), 4))
     seen = jax.random.normal(next(keys), (BATCH, SEEN))
     acts = jax.random.normal(next(keys), (BATCH, ACTS))

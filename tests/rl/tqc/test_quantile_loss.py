@@ -16,7 +16,7 @@ def drawn() -> tuple[np.ndarray, np.ndarray]:
 
 
 def formula(current: np.ndarray, target_quantiles: np.ndarray) -> float:
-    """Of the lowest targets, pair by pair."""
+    """Compute the loss of the lowest targets, pair by pair."""
     total = 0.0
     for b in range(BATCH):
         for target in np.sort(target_quantiles[:, b])[:KEPT]:

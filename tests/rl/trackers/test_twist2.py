@@ -47,7 +47,7 @@ def step_of(qpos: np.ndarray, qvel: np.ndarray) -> ClipStep:
 
 
 def target_by_hand(robot: Robot, joints: tuple[str, ...], qpos: np.ndarray, qvel: np.ndarray):
-    """One robot's target, number by number."""
+    """Return one robot's target, number by number."""
     turn = Rotation.from_quat(qpos[[4, 5, 6, 3]])
     velocity = turn.inv().apply(qvel[:3])
     _, pitch, roll = turn.as_euler("ZYX")
@@ -56,7 +56,8 @@ def target_by_hand(robot: Robot, joints: tuple[str, ...], qpos: np.ndarray, qvel
 
 
 def frame_by_hand(robot, description, target, qpos, qvel, action):
-    """One robot's frame, number by number, with the stand-in's default pose and silent knees."""
+    """Return one robot's frame, number by number, with the stand-in's default pose and silent
+    knees."""
     default = {"right_knee": -0.4, "left_knee": -0.4, "left_elbow": -1.0, "abdomen_z": 0.1}
     _, pitch, roll = Rotation.from_quat(qpos[[4, 5, 6, 3]]).as_euler("ZYX")
     frame = [*target, *(0.25 * qvel[3:6]), roll, pitch]

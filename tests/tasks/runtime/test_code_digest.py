@@ -125,7 +125,7 @@ print(total.hexdigest())
 
 
 def pythons() -> list[str]:
-    """Every interpreter of a supported version that is installed beside ours."""
+    """Return every installed interpreter of another supported version."""
     named = [found for minor in (11, 12, 13) if (found := shutil.which(f"python3.{minor}"))]
     kept = sorted((Path.home() / ".pyenv" / "versions").glob("3.1[123].*/bin/python"))
     return [name for name in (*named, *map(str, kept)) if _runs(name)]
@@ -158,7 +158,7 @@ def test_the_library_has_one_digest_on_all_pythons(python: str) -> None:
 
 
 @pytest.mark.parametrize("task", ["evaluate_dance", "train_policy", "recover_motion"])
-def test_how_values_are_kept_in_files_is_no_part_of_what_a_stage_computes(task: str) -> None:
+def test_how_values_are_stored_is_no_part_of_what_a_stage_computes(task: str) -> None:
     """The layout of tables is in every key by itself; a lock or an atomic write changes nothing."""
     roots = imports_of(ROOT / "tasks" / f"{task}.py")
     modules = reached(roots, "robojackson", ROOT / "robojackson")

@@ -95,7 +95,7 @@ class Standin:
         importlib.reload(sys.modules[f"standin.{module}"])
 
     def run(self, number: int = 3, hurry: bool = False) -> tuple[list[str], dict[str, Artifact]]:
-        """Names of the tasks that executed, and what all of them gave."""
+        """Return the names of the tasks that executed, and the results of all."""
         names = ("first", "second", "beside", "third")
         task = {name: getattr(importlib.import_module(f"standin.{name}"), name) for name in names}
 
@@ -111,7 +111,7 @@ class Standin:
         return list(self.ran), results
 
     def value(self, artifact: Artifact) -> int:
-        """What a stage made."""
+        """Return the number that a stage saved."""
         return int(Store.from_environment().read(artifact.key))
 
 

@@ -33,7 +33,7 @@ class Page:
 
 
 def train(page: Page, work: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """A training that writes how far it is, twice."""
+    """Run a training that reports its progress twice."""
     monkeypatch.setattr(artifacts, "acreate_progress_artifact", page.create)
     monkeypatch.setattr(artifacts, "aupdate_progress_artifact", page.update)
     monkeypatch.setattr(training_progress, "EVERY_S", 0.01)
@@ -48,7 +48,7 @@ def train(page: Page, work: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     return asyncio.run(run())
 
 
-def test_the_bar_tells_survival_and_time_left_and_ends_at_the_end(
+def test_the_bar_shows_survival_and_time_left_and_ends_at_the_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     page = Page()
