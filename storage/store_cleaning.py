@@ -84,7 +84,7 @@ def _without_named(store: Store, old: list[Item]) -> list[Item]:
         path
         for folder in ("records", "runs")
         for path in (root / folder).rglob("*.json")
-        if path.relative_to(root).as_posix() not in going
+        if path.is_file() and path.relative_to(root).as_posix() not in going
     ]
     named = {found.decode() for path in stay for found in ARTIFACT.findall(_content(path))}
     results = {item.key for item in old if not item.key.startswith(f"{PAGES}/")} & named

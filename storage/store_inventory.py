@@ -149,6 +149,8 @@ def _kind_of_text(path: Path) -> Kind:
 
 
 def _named_in(path: Path) -> set[str]:
+    if not path.is_file():
+        return set()
     try:
         return {match.decode() for match in ARTIFACT.findall(path.read_bytes())}
     except (OSError, UnicodeDecodeError):

@@ -1,11 +1,11 @@
 """The video that proves it: source, skeleton, reference robot and trained robot side by side."""
 
-import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from robojackson.errors import UnreadableVideo
+from robojackson.files.local_folder import sha256_of_file
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.rollout import Rollout
@@ -28,9 +28,10 @@ def music_digest(config: VideoConfig) -> list[str]:
     if not config.music:
         return []
     try:
-        return [hashlib.sha256(Path(config.music).read_bytes()).hexdigest()]
+        return [sha256_of_file(Path(config.music))]
     except OSError as cause:
-        raise UnreadableVideo(f"no music there ({cause.strerror})", Path(config.music)) from cause
+        reason = cause.strerror or cause
+        raise UnreadableVideo(f"no music there ({reason})", Path(config.music)) from cause
 
 
 def _models(parameters: Mapping[str, Any]) -> list[str]:

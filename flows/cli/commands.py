@@ -87,7 +87,13 @@ def dance(
 ) -> CommandResult:
     """Turn a video, a folder of candidates or the name of a dance into a robot that dances it."""
     from flows.runtime.environment import prepare
-    from flows.search.dance_source import is_name, load_settings, require_usable, resolve
+    from flows.search.dance_source import (
+        is_name,
+        load_settings,
+        require_music,
+        require_usable,
+        resolve,
+    )
     from flows.search.requests import require_findable
     from storage.store import Store
 
@@ -105,6 +111,7 @@ def dance(
     if force:
         overrides["gate"] = False
     settings = load_settings(config, overrides)
+    require_music(settings)
     if found is not None:
         require_usable(found, settings, start, end)
     else:

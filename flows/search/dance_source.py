@@ -77,6 +77,15 @@ def load_settings(config: str, overrides: Mapping[str, Any]) -> "PipelineConfig"
     return settings
 
 
+def require_music(settings: "PipelineConfig") -> None:
+    """Raise what the flow would raise after the training: the music cannot be heard."""
+    from robojackson.cli.lifetime.video_process import in_video_process
+    from robojackson.clips.sound import require_audible
+
+    if settings.render.music:
+        in_video_process(require_audible, Path(settings.render.music))
+
+
 def require_usable(
     source: Path, settings: "PipelineConfig", start_s: float | None, end_s: float | None
 ) -> None:

@@ -1,6 +1,5 @@
 """Write a deploy pack: a folder that runs a trained policy without RoboJackson."""
 
-import json
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
@@ -13,7 +12,7 @@ from robojackson.api.policy_ingredients import policy_ingredients
 from robojackson.api.robots import load_robot
 from robojackson.errors import BadConfiguration, BadPolicy, StoreError
 from robojackson.files.file_tree import results_in
-from robojackson.files.foreign_file import require_file
+from robojackson.files.foreign_file import read_json
 from robojackson.formats.deploy.deployed_policy import (
     DeployedPolicy,
     chain_between,
@@ -210,13 +209,7 @@ def _evaluation(policy: Path, given: FilePath | None) -> dict[str, Any] | None:
     path = path / EVALUATION if path.is_dir() else path
     if given is None and not path.is_file():
         return None
-    require_file(path)
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise BadConfiguration(
-            f"{path}: not what `robojackson evaluate` writes ({error})"
-        ) from error
+    found = read_json(path, BadConfiguration)
     if not isinstance(found, dict):
         raise BadConfiguration(f"{path}: not what `robojackson evaluate` writes")
     return found

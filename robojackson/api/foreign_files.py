@@ -78,6 +78,7 @@ def read_foreign(file: Path, fps: float | None, up: Up | None, config: MocapConf
         with _naming_the_file(file):
             sequence = ground_foreign_motion(replace(motion, to_world=axes), rate)
     sequence = replace(sequence, notes=(*sequence.notes, *notes))
+    SmplSequence.from_bytes(sequence.to_bytes(), str(file))  # what no command could read is refused
     return ForeignFile(sequence, importer.name, figures)
 
 

@@ -37,8 +37,9 @@ if TYPE_CHECKING:
     from robojackson.mocap.networks.inference import Networks
 
 TABLE = ".parquet"
-MOST_FRAMES = 20_000
-"""Of a motion that is fitted to a robot: eleven minutes at 30 frames a second."""
+MOST_FRAMES, MOST_STEPS = 20_000, 50_000
+"""Of a motion that is fitted to a robot: eleven minutes at 30 frames a second, and at 15 ms a
+control step."""
 
 
 @dataclass(frozen=True)
@@ -154,6 +155,12 @@ def retarget_motion(
         )
     require_person(sequence.keypoints_w, "the motion")
     machine = load_robot(robot)
+    seconds, most_s = len(sequence) / sequence.fps, MOST_STEPS * machine.description.control_dt
+    if seconds > most_s:
+        raise BadTable(
+            f"{seconds:,.0f} s at {sequence.fps:g} frames a second; at most {most_s:,.0f} s are "
+            "fitted together: cut the motion"
+        )
     reference = retargeting.retarget_motion(sequence, machine, config or RetargetConfig())
     return replace(reference, robot_file=machine.description.file)
 

@@ -1,11 +1,12 @@
 """Inputs of a policy, as far as the files beside it show, for the licence passport."""
 
 import hashlib
-import json
 import re
 from contextlib import suppress
 from pathlib import Path
 
+from robojackson.errors import StoreError
+from robojackson.files.foreign_file import read_json, read_text
 from robojackson.formats.deploy.licence_passport import UNKNOWN, Ingredient, robot_ingredient
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.rl.policy import Policy
@@ -47,8 +48,8 @@ def clip_ingredient(reference: Path) -> Ingredient:
     `CLIP.license`, or the `.info.json` of a download."""
     name, note = "the video or recording that is danced", "declare it with --licence clip=LICENCE"
     for folder in (reference.parent, reference.parent.parent):
-        with suppress(OSError, ValueError, KeyError, TypeError):
-            clip = Path(json.loads((folder / SOURCE).read_text())["video"])
+        with suppress(StoreError, OSError, ValueError, KeyError, TypeError):
+            clip = Path(read_json(folder / SOURCE)["video"])
             licence, where = stated_licence(clip)
             if licence:
                 return Ingredient("clip", clip.name, licence, f"stated by {where}")
@@ -60,13 +61,13 @@ def stated_licence(clip: Path) -> tuple[str, str]:
     """Return the licence that a sidecar of a clip states and the sidecar's name; empty texts where
     none does."""
     beside = clip.with_name(clip.name + ".license")
-    with suppress(OSError, UnicodeDecodeError):
-        found = SPDX.search(beside.read_text("utf-8"))
+    with suppress(StoreError):
+        found = SPDX.search(read_text(beside))
         if found:
             return found[1].strip(), beside.name
     info = clip.with_suffix(".info.json")
-    with suppress(OSError, ValueError):
-        facts = json.loads(info.read_text("utf-8"))
+    with suppress(StoreError):
+        facts = read_json(info)
         licence = facts.get("license") if isinstance(facts, dict) else None
         if isinstance(licence, str) and licence.strip():
             return " ".join(licence.split())[:LONGEST], info.name

@@ -1,5 +1,6 @@
 """A run as a recording of Rerun (.rrd): video, landmarks, skeleton, robot, contacts, rewards."""
 
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,6 +10,7 @@ import numpy as np
 from robojackson.api.run_folder import FILMS, RunFolder, one_of, read_run
 from robojackson.body.skeleton import KEYPOINT_NAMES, PARENTS
 from robojackson.errors import MissingDependency
+from robojackson.files.file_tree import FileTree
 from robojackson.formats.gltf_robot import body_parts
 from robojackson.motion.smpl_sequence import CONTACT_POINTS
 from robojackson.report.web.shapes import body_poses
@@ -29,25 +31,28 @@ def write_rerun(folder: Path, out: Path) -> Path:
 
     Raises:
         MissingDependency: rerun-sdk is not installed.
-        StoreError: a table of the run is missing.
+        StoreError: a table of the run is missing, or the file cannot be written.
     """
     try:
         import rerun as rr
     except ImportError as cause:
         raise MissingDependency("pip install 'robojackson[rerun]' writes .rrd files") from cause
     run, film = read_run(folder), one_of(folder, FILMS)
-    recording = rr.RecordingStream("robojackson")
-    recording.save(str(out))
-    recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    video = rr.AssetVideo(path=film)
-    recording.log("video", video, static=True)
-    times = video.read_frame_timestamps_nanos()
-    stamps = rr.VideoFrameReference.columns_nanos(times)
-    recording.send_columns("video", [rr.TimeColumn("time", duration=1e-9 * times)], stamps)
-    _log_person(recording, run)
-    _log_robot(recording, run)
-    _log_rewards(recording, run)
-    recording.disconnect()
+    with tempfile.TemporaryDirectory(prefix="robojackson-") as folder_of_result:
+        made = Path(folder_of_result) / "run.rrd"
+        recording = rr.RecordingStream("robojackson")
+        recording.save(str(made))
+        recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        video = rr.AssetVideo(path=film)
+        recording.log("video", video, static=True)
+        times = video.read_frame_timestamps_nanos()
+        stamps = rr.VideoFrameReference.columns_nanos(times)
+        recording.send_columns("video", [rr.TimeColumn("time", duration=1e-9 * times)], stamps)
+        _log_person(recording, run)
+        _log_robot(recording, run)
+        _log_rewards(recording, run)
+        recording.disconnect()
+        FileTree(out.parent).write(out.name, made)
     return out
 
 

@@ -2,6 +2,7 @@
 
 import functools
 import json
+import math
 import os
 import sys
 import time
@@ -66,6 +67,7 @@ def command(body: Callable[P, CommandResult]) -> Callable[P, None]:
     @functools.wraps(body)
     def run(*args: P.args, **kwargs: P.kwargs) -> None:
         silence_libraries()
+        _require_finite(kwargs)
         try:
             with stdout_is_stderr():
                 answer = body(*args, **kwargs)
@@ -98,6 +100,14 @@ def command(body: Callable[P, CommandResult]) -> Callable[P, None]:
             raise typer.Exit(answer.code)
 
     return run
+
+
+def _require_finite(options: Mapping[str, object]) -> None:
+    """Raise typer's error of usage for NaN and infinity, which it takes as numbers."""
+    for name, value in options.items():
+        if isinstance(value, float) and not math.isfinite(value):
+            option = f"--{name.strip('_').replace('_', '-')}"
+            raise typer.BadParameter(f"{option} is {value}, expected a finite number")
 
 
 def print_result(answer: CommandResult, as_json: bool) -> None:

@@ -105,6 +105,7 @@ def _motion_of(
     """Return the motion of a track, or of it and what a second camera sees."""
     from robojackson.api.motions import recover_motion
     from robojackson.api.second_camera import heard_offset
+    from robojackson.mocap.landmarks.blazepose import MIN_FRAMES
     from robojackson.mocap.views.two_cameras import recover_together
 
     try:
@@ -116,7 +117,8 @@ def _motion_of(
         heard_s = in_video_process(heard_offset, video, second)
         return recover_together(track, other, settings.mocap, heard_s)
     except (NoPersonFound, TrackTooShort) as cause:
-        raise type(cause)(cause.reason, video) from cause
+        is_first_good = track.detected.sum() >= MIN_FRAMES
+        raise type(cause)(cause.reason, second if second and is_first_good else video) from cause
 
 
 def retarget(smpl: Path, out: Path, config: str, overrides: Overrides) -> Figures:

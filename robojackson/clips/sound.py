@@ -18,6 +18,8 @@ RATE = 44_100
 """Samples a second of everything that is heard."""
 LONGEST_S = 600.0
 """More of a file is not read, seconds."""
+LOWEST_RATE = 1000
+"""Samples a second of a file below which nothing is heard."""
 SILENT = 1e-4
 """Largest amplitude of an inaudible sound."""
 
@@ -35,13 +37,14 @@ class Sound:
 def read_sound(path: Path) -> Sound | None:
     """Read the first sound track of a video or of a sound file; None where it has none.
 
-    What follows damage is left out.
+    What follows damage is left out, and so is a sound that begins after `LONGEST_S`
+    or has less than `LOWEST_RATE` samples a second.
 
     Raises:
         UnreadableVideo: the file cannot be read.
         TruncatedVideo: it ends before its index.
     """
-    parts: list[np.ndarray] = []
+    parts, heard_s = list[np.ndarray](), 0.0
     with opened(path, sounds=True) as container:
         if not container.streams.audio:
             return None
@@ -49,19 +52,23 @@ def read_sound(path: Path) -> Sound | None:
         shift = _start_s(container.streams.audio[0])
         if pictures:
             shift -= _start_s(pictures[0])
+        if shift > LONGEST_S or container.streams.audio[0].rate < LOWEST_RATE:  # fills the memory
+            return None
         resampler = av.AudioResampler(format="fltp", layout="stereo", rate=RATE)
         try:
             for frame in container.decode(audio=0):
                 parts += [part.to_ndarray().T for part in resampler.resample(frame)]
-                if sum(map(len, parts)) > LONGEST_S * RATE:
+                heard_s += frame.samples / max(frame.sample_rate, 1)
+                if heard_s > LONGEST_S:
                     break
             parts += [part.to_ndarray().T for part in resampler.resample(None)]
-        except av.FFmpegError:
-            pass  # heard as far as it goes
-    samples = np.concatenate(parts) if parts else np.zeros((0, 2), np.float32)
+        except (av.FFmpegError, ValueError):
+            pass  # damaged, or the rate changes: heard as far as it goes
+    samples = np.concatenate([np.zeros((0, 2), np.float32), *parts])
+    del parts
     late = round(shift * RATE)
     samples = np.pad(samples, ((late, 0), (0, 0))) if late > 0 else samples[-late:]
-    samples = np.clip(np.nan_to_num(samples), -1, 1)
+    np.clip(np.nan_to_num(samples, copy=False), -1, 1, out=samples)
     return Sound(samples) if np.abs(samples).max(initial=0.0) > SILENT else None
 
 
@@ -75,6 +82,11 @@ def require_sound(path: Path) -> Sound:
     if sound is None:
         raise UnreadableVideo("the file holds no sound that can be heard", path)
     return sound
+
+
+def require_audible(path: Path) -> None:
+    """Raise `UnreadableVideo` for a file without a sound that can be heard."""
+    require_sound(path)
 
 
 def encode_sound(container: OutputContainer, stream: AudioStream, sound: Sound) -> None:

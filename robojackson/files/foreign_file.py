@@ -62,6 +62,20 @@ def read_text(
         raise error(f"no text in UTF-8 ({cause.reason} at byte {cause.start})", path) from cause
 
 
+def read_json(
+    path: Path, error: type[RoboJacksonError] = StoreError, largest: int = LARGEST
+) -> Json:
+    """Return the value of a JSON file.
+
+    Raises:
+        RoboJacksonError: the file cannot be read, or is no JSON.
+    """
+    try:
+        return parse_json(read_text(path, error, largest))
+    except ValueError as cause:
+        raise error(f"no JSON ({cause})", path) from cause
+
+
 def parse_json(text: str | bytes, finite: bool = False) -> Json:
     """Return the value of a JSON text.
 

@@ -67,9 +67,21 @@ def decode(cls: type[Value], data: bytes, where: str) -> Value:
         raise BadTable(f"the {schema.name} has no rows", where)
     columns = {c.name: numbers_of(c, table, where) for c in schema.columns}
     try:
+        _require_order(schema, columns)
         return cls.from_columns(columns, facts_of(schema, table, where))
     except (KeyError, ValueError, TypeError) as cause:
         raise BadTable(f"the {schema.name} is inconsistent: {cause}", where) from cause
+
+
+def _require_order(schema: TableSchema, columns: Mapping[str, np.ndarray]) -> None:
+    """Raise `ValueError` where frames or steps are not counted from 0, or their times go back."""
+    if "time_s" not in columns:
+        return
+    number, times = columns[schema.row], columns["time_s"]
+    if (number != np.arange(len(number))).any():
+        raise ValueError(f"{schema.row} does not count the rows from 0")
+    if (np.diff(times) < 0.0).any() or (len(times) > 1 and times[0] == times[-1]):
+        raise ValueError("time_s does not go on")
 
 
 def encode_rows(schema: TableSchema, rows: Iterable[Row]) -> bytes:

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from robojackson.formats.containers import npz_archive
-from robojackson.formats.format import RobotExporter
+from robojackson.formats.format import RobotExporter, refusing
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.robot.body_states import body_states, names, require_same_joints
 from robojackson.robot.sampling import SampledMotion, sampled
@@ -56,9 +56,10 @@ def read(data: bytes) -> SampledMotion:
     """
     needed = ("fps", "joint_pos", "body_pos_w", "body_quat_w")
     arrays = npz_archive.unpack(data, needed, "BeyondMimic npz")
-    root = arrays["body_pos_w"][:, 0], arrays["body_quat_w"][:, 0]
-    qpos = np.concatenate([*root, arrays["joint_pos"]], axis=1).astype(float)
-    return SampledMotion(float(arrays["fps"].ravel()[0]), qpos)
+    with refusing("BeyondMimic npz"):
+        root = arrays["body_pos_w"][:, 0], arrays["body_quat_w"][:, 0]
+        qpos = np.concatenate([*root, arrays["joint_pos"]], axis=1).astype(float)
+        return SampledMotion(float(arrays["fps"].ravel()[0]), qpos)
 
 
 EXPORT = RobotExporter("beyondmimic", write)

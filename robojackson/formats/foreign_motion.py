@@ -30,6 +30,8 @@ BODY_JOINTS = 22
 """Joints that SMPL, SMPL+H and SMPL-X share: SMPL's two hands are fingers in the others."""
 LARGEST = 1e8
 """Largest magnitude of any number in a file."""
+NO_NUMBERS = "bmM"
+"""Kinds of arrays that NumPy would turn into numbers: truth values, spans and dates."""
 LEGS_M = (0.2, 3.0)
 """Range of a person's leg length (hip to ankle), metres."""
 MAX_LISTED = 12
@@ -117,6 +119,8 @@ def rows(content: Mapping[str, Any], name: str, width: int, where: str) -> np.nd
 def numbers(value: Any) -> np.ndarray:
     """Return numbers of any shape with at least one axis; an empty array for any other value."""
     try:
+        if np.asarray(value).dtype.kind in NO_NUMBERS:
+            return np.zeros(0)
         with np.errstate(all="ignore"), warnings.catch_warnings():
             warnings.simplefilter("error")  # of complex numbers, whose half would be lost
             return np.atleast_1d(np.asarray(value, float))

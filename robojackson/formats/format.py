@@ -5,7 +5,8 @@
 
 import io
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
@@ -138,6 +139,19 @@ class Importer:
     read: Callable[[bytes], ForeignMotion | HybrikMotion]
     recognises: Callable[[Content], bool]
     fps: float | None = None
+
+
+@contextmanager
+def refusing(where: str) -> Iterator[None]:
+    """Turn what the arrays of a foreign file raise into `BadTable`.
+
+    Args:
+        where: Kind of the file in errors.
+    """
+    try:
+        yield
+    except (KeyError, TypeError, IndexError, ValueError, OverflowError, SyntaxError) as cause:
+        raise BadTable(f"{where}: {type(cause).__name__}: {cause}") from cause
 
 
 Format = RobotExporter | PersonExporter | PolicyExporter | Importer

@@ -14,9 +14,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from robojackson.errors import BadTable
 from robojackson.formats.containers import safe_pickle
-from robojackson.formats.format import RobotExporter
+from robojackson.formats.format import RobotExporter, refusing
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.robot.body_states import body_states, names, require_same_joints
 from robojackson.robot.sampling import WXYZ, XYZW, SampledMotion, sampled
@@ -57,11 +56,9 @@ def read(data: bytes) -> SampledMotion:
         BadTable: not such a file, or one that holds anything but arrays of numbers.
     """
     content = safe_pickle.load(data, "GMR pickle")
-    try:
+    with refusing("GMR pickle"):
         parts = content["root_pos"], content["root_rot"][:, WXYZ], content["dof_pos"]
         return SampledMotion(float(content["fps"]), np.concatenate(parts, axis=1))
-    except (KeyError, TypeError, IndexError, ValueError) as cause:
-        raise BadTable(f"GMR pickle: {type(cause).__name__}: {cause}") from cause
 
 
 class _Portable(pickle.Pickler):

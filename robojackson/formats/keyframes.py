@@ -8,8 +8,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from robojackson.errors import BadTable
-from robojackson.formats.format import RobotExporter
+from robojackson.formats.format import RobotExporter, refusing
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.robot.sampling import SampledMotion, sampled
 
@@ -34,16 +33,17 @@ def read(data: bytes) -> SampledMotion:
     Raises:
         BadTable: not such a file.
     """
-    try:
+    with refusing("keyframes"):
         keys = ElementTree.fromstring(data).findall("keyframe/key")
         rows = {
             name: np.array([key.attrib[name].split() for key in keys], float)
             for name in ("time", "qpos", "qvel")
         }
-        fps = (len(keys) - 1) / float(rows["time"][-1, 0] - rows["time"][0, 0])
-    except (ElementTree.ParseError, KeyError, ValueError, IndexError, ZeroDivisionError) as cause:
-        raise BadTable(f"keyframes: not a fragment with keys over time ({cause})") from cause
-    return SampledMotion(fps, rows["qpos"], rows["qvel"])
+        if len(keys) < 2:
+            raise ValueError(f"{len(keys)} keys, no motion")
+        with np.errstate(all="ignore"):
+            fps = (len(keys) - 1) / (rows["time"][-1, 0] - rows["time"][0, 0])
+        return SampledMotion(float(fps), rows["qpos"], rows["qvel"])
 
 
 def _numbers(values: np.ndarray) -> str:

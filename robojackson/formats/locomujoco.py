@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from robojackson.formats.containers import npz_archive
-from robojackson.formats.format import RobotExporter
+from robojackson.formats.format import RobotExporter, refusing
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.robot.body_states import body_states, names, require_same_joints
 from robojackson.robot.sampling import SampledMotion, sampled
@@ -40,7 +40,8 @@ def read(data: bytes) -> SampledMotion:
         BadTable: not such a file.
     """
     arrays = npz_archive.unpack(data, ("frequency", "qpos", "qvel"), "LocoMuJoCo npz")
-    return SampledMotion(float(arrays["frequency"]), arrays["qpos"], arrays["qvel"])
+    with refusing("LocoMuJoCo npz"):
+        return SampledMotion(float(arrays["frequency"]), arrays["qpos"], arrays["qvel"])
 
 
 def _data(motion: SampledMotion, model: mujoco.MjModel) -> dict[str, np.ndarray]:

@@ -6,7 +6,7 @@ Root xyz (metres), root quaternion wxyz, hinges (radians), float64, 30 fps.
 import numpy as np
 
 from robojackson.formats.containers import npz_archive
-from robojackson.formats.format import RobotExporter
+from robojackson.formats.format import RobotExporter, refusing
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.robot.sampling import SampledMotion, sampled
 
@@ -25,7 +25,8 @@ def read(data: bytes) -> SampledMotion:
         BadTable: not such a file.
     """
     arrays = npz_archive.unpack(data, ("fps", "qpos"), "OmniRetarget npz")
-    return SampledMotion(float(arrays["fps"]), arrays["qpos"])
+    with refusing("OmniRetarget npz"):
+        return SampledMotion(float(arrays["fps"]), arrays["qpos"])
 
 
 EXPORT = RobotExporter("omniretarget", lambda reference, _: write(reference))

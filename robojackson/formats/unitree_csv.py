@@ -9,7 +9,7 @@ import io
 import numpy as np
 
 from robojackson.errors import BadTable
-from robojackson.formats.format import RobotExporter
+from robojackson.formats.format import RobotExporter, refusing
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.robot.sampling import WXYZ, XYZW, SampledMotion, sampled
 
@@ -33,10 +33,8 @@ def read(data: bytes, fps: float = FPS) -> SampledMotion:
     """
     if not data.strip():
         raise BadTable("csv: empty")
-    try:
+    with refusing("csv"):
         rows = np.loadtxt(io.StringIO(data.decode()), delimiter=",", ndmin=2)
-    except ValueError as cause:
-        raise BadTable(f"csv: {cause}") from cause
     if rows.shape[1] < 8:
         raise BadTable(f"csv: {rows.shape[1]} columns; a root has 7 and a robot has hinges")
     rows[:, 3:7] = rows[:, 3:7][:, WXYZ]

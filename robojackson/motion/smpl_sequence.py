@@ -140,6 +140,8 @@ class SmplSequence(TableFile):
     @classmethod
     def from_columns(cls, columns: Columns, facts: Facts) -> "SmplSequence":
         """Build the object from columns and metadata."""
+        if not columns["valid"].any():
+            raise ValueError("no frame shows the person: valid is false everywhere")
         arrays = {name: columns[name] for name in ARRAYS}
         arrays["joints"] = arrays["joints"].reshape(-1, 24, 3)
         arrays["keypoints_w"] = arrays["keypoints_w"].reshape(-1, 29, 3)

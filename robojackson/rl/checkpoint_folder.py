@@ -9,10 +9,11 @@ networks.safetensors     the newest networks, for other trainings to start from
 import logging
 import os
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
-from robojackson.errors import StoreError
+from robojackson.errors import RoboJacksonError, StoreError
 
 log = logging.getLogger(__name__)
 
@@ -26,6 +27,24 @@ def newest_checkpoint(out: Path) -> Path | None:
         if (out / name / "run.json").exists():
             return out / name
     return None
+
+
+@contextmanager
+def restoring(folder: Path) -> Iterator[None]:
+    """Raise `StoreError` where the files of a checkpoint are damaged.
+
+    Args:
+        folder: The checkpoint that is being read.
+    """
+    try:
+        yield
+    except RoboJacksonError:
+        raise
+    except Exception as cause:  # a damaged file fails in any way
+        reason = f"{type(cause).__name__}: {' '.join(str(cause).split())}"[:200]
+        raise StoreError(
+            f"{folder}: the checkpoint is damaged ({reason}); remove it to begin again"
+        ) from cause
 
 
 def write_checkpoint(out: Path, save: Callable[[Path], None], results: Mapping[str, bytes]) -> None:

@@ -16,6 +16,7 @@ import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 
 from robojackson.errors import BadConfiguration, TrainingDiverged
+from robojackson.rl import checkpoint_folder
 from robojackson.rl.checkpoint_folder import newest_checkpoint, set_results_aside, write_checkpoint
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.env.tracking_core import TrackingCore
@@ -65,19 +66,20 @@ class Run:
             shutil.rmtree(self._replay, ignore_errors=True)
             set_results_aside(self.out)
             return
-        state = json.loads((folder / "run.json").read_text())
-        if state["configuration"] != self._identity():
-            raise BadConfiguration(
-                f"{folder} belongs to another configuration, reference motion or robot; "
-                "remove it or choose another folder"
-            )
-        trainer.load(folder, self._replay, state["steps"], state["updates"])
-        with np.load(folder / "environment.npz", allow_pickle=False) as arrays:
-            self.core.restore(dict(arrays))
-        self._average.load(folder)
-        self.core.rng.bit_generator.state = state["random"]
-        self._budget.resume(state["steps"], state["seconds"], state["cpu_seconds"])
-        self._saved_updates = state["updates"]
+        with checkpoint_folder.restoring(folder):
+            state = json.loads((folder / "run.json").read_text())
+            if state["configuration"] != self._identity():
+                raise BadConfiguration(
+                    f"{folder} belongs to another configuration, reference motion or robot; "
+                    "remove it or choose another folder"
+                )
+            trainer.load(folder, self._replay, state["steps"], state["updates"])
+            with np.load(folder / "environment.npz", allow_pickle=False) as arrays:
+                self.core.restore(dict(arrays))
+            self._average.load(folder)
+            self.core.rng.bit_generator.state = state["random"]
+            self._budget.resume(state["steps"], state["seconds"], state["cpu_seconds"])
+            self._saved_updates = state["updates"]
         log.info("resuming at %d steps", state["steps"])
 
     def finished(self) -> str:

@@ -179,7 +179,7 @@ class RobotDescription:
             reader.
     """
 
-    name: str
+    name: Annotated[str, Field(pattern=r"^\w[\w.-]*$", max_length=64)]
     mjcf: str = field(compare=False)
     root_body: str
     sites: Mapping[str, tuple[str, Offset]]
@@ -189,7 +189,7 @@ class RobotDescription:
     collision_excludes: tuple[tuple[str, str], ...] = ()
     rest_pose: Mapping[str, float] = Field(default_factory=dict)
     max_joint_speed: float = Field(default=12.0, gt=0)
-    control_dt: float = Field(default=0.015, gt=0)
+    control_dt: float = Field(default=0.015, gt=0, le=1)
     gear_scale: float = Field(default=1.0, gt=0)
     torque_limits: Mapping[str, Positive] = Field(default_factory=dict)
     speed_limits: Mapping[str, Positive] = Field(default_factory=dict)

@@ -28,7 +28,7 @@ from robojackson.robot.description import (
 )
 from robojackson.robot.mjcf import compiled, mjcf_path, model_sha256, site_of
 from robojackson.robot.names import known, where
-from robojackson.robot.physics import substeps_of
+from robojackson.robot.physics import MOST_SUBSTEPS, substeps_of
 
 __all__ = [
     "KEYPOINTS", "TOES", "ContactPoint", "Robot", "RobotDescription", "RobotSource", "known",
@@ -208,7 +208,7 @@ def _substeps(model: mujoco.MjModel, description: RobotDescription) -> int:
     if count is None:
         raise BadConfiguration(
             f"{where(description, 'control_dt')}: {1e3 * description.control_dt:g} ms is no whole "
-            f"number of physics steps of {1e3 * timestep:g} ms"
+            f"number of physics steps of {1e3 * timestep:g} ms, 1 to {MOST_SUBSTEPS}"
         )
     return count
 

@@ -1,6 +1,7 @@
 """The door for robot models: an MJCF or URDF and the files that it names, before MuJoCo opens them.
 
-Every file that it names is a plain file of modest size; what MuJoCo makes of it is finite.
+Every file that it names is a plain file of modest size, and nothing else is opened to find that out;
+what MuJoCo makes of it is finite.
 """
 
 import re
@@ -19,33 +20,60 @@ PARTS = ("include", "model")
 """Elements whose file is MJCF again."""
 FAULTS = (ValueError, RuntimeError, MemoryError, mujoco.FatalError)
 """What MuJoCo raises for a model that it cannot read."""
-MOST_FILES, MOST_COPIES = 1000, 10_000
-COPIES = re.compile(r"count\s*=\s*[\"']([^\"']*)")
+MOST_FILES, MOST_PARTS, MOST_COPIES = 1000, 100, 10_000
+"""Largest number of files of a model, of those that are MJCF (MuJoCo reads them by recursion), and
+of copies."""
+COPIES, FILES = (re.compile(rf"\b{word}\s*=\s*[\"']([^\"']*)") for word in ("count", "file"))
 NUMBERS = (
-    *("body_pos", "body_quat", "body_mass", "body_inertia", "geom_pos", "geom_size", "jnt_axis"),
-    *("jnt_range", "site_pos", "dof_damping", "dof_armature", "actuator_gear", "qpos0"),
+    *(
+        "body_pos",
+        "body_quat",
+        "body_mass",
+        "body_inertia",
+        "geom_pos",
+        "geom_size",
+        "geom_friction",
+    ),
+    *("jnt_axis", "jnt_range", "jnt_stiffness", "site_pos", "dof_damping", "dof_armature"),
+    *("dof_frictionloss", "actuator_gear", "actuator_gainprm", "actuator_biasprm", "qpos0"),
 )
+OPTIONS = ("gravity", "wind", "magnetic", "density", "viscosity", "timestep")
 LARGEST = 1e6
 """Of any of these, SI units; an infinite range of a joint is MuJoCo's."""
+SHORTEST_STEP_S = 1e-6
+FAILED_INSIDE = "Caught an unknown exception"
+"""MuJoCo's words for a failure of the C++ library, such as a ceiling of memory."""
 
 
 def files_of(path: Path) -> list[Path]:
     """Return a model and every file that it names, as MuJoCo finds them."""
-    found, folders, texts = [path], [path.parent], [path]
-    for text in texts:  # grows while it is read
-        try:
-            tree = ElementTree.parse(text)
-        except ElementTree.ParseError:  # MuJoCo reads what is no strict XML, too
-            continue
-        for compiler in tree.iter("compiler"):
-            folders += [path.parent / compiler.get(name, "") for name in FOLDERS]
-        for element in (each for each in tree.iter() if each.get("file")):
-            places = [folder / element.get("file", "") for folder in folders]
+    return _files_and_parts(path)[0]
+
+
+def _files_and_parts(path: Path) -> tuple[list[Path], list[Path]]:
+    """Return all files of a model, and those of them that are MJCF."""
+    found, folders, parts = [path], [path.parent], [path]
+    for part in parts:  # grows while it is read
+        for tag, name in _named_in(part, path.parent, folders):
+            places = [folder / name for folder in folders]
             file = next((place for place in places if place.exists()), None)
             if file is not None and file not in found and len(found) < MOST_FILES:
                 found.append(file)
-                texts += [file] if element.tag in PARTS else []
-    return found
+                parts += [file] if tag in PARTS else []
+    return found, parts
+
+
+def _named_in(part: Path, root: Path, folders: list[Path]) -> list[tuple[str, str]]:
+    """Return (element, name) of the files that one MJCF names; add its folders to `folders`."""
+    if not part.is_file():  # a pipe has no end
+        return []
+    try:
+        tree = ElementTree.parse(part)
+    except ElementTree.ParseError:  # MuJoCo reads what is no strict XML, too
+        return [(PARTS[0], name) for name in FILES.findall(part.read_text(errors="replace"))]
+    for compiler in tree.iter("compiler"):
+        folders += [root / compiler.get(name, "") for name in FOLDERS]
+    return [(each.tag, name) for each in tree.iter() if (name := each.get("file"))]
 
 
 def require_model_files(path: Path, place: str) -> None:
@@ -57,7 +85,10 @@ def require_model_files(path: Path, place: str) -> None:
     Raises:
         BadConfiguration: the line names the file.
     """
-    for file in files_of(path):
+    files, parts = _files_and_parts(path)
+    if len(parts) > MOST_PARTS:
+        raise BadConfiguration(f"{place}: more than {MOST_PARTS} files that include one another")
+    for file in files:
         try:
             require_file(file, BadConfiguration)
         except BadConfiguration as cause:
@@ -76,12 +107,21 @@ def require_sound(model: mujoco.MjModel, place: str) -> None:
     Raises:
         BadConfiguration: the line names the numbers.
     """
-    for name in NUMBERS:
-        values = getattr(model, name)
+    checked = {name: getattr(model, name) for name in NUMBERS}
+    checked |= {f"option {name}": getattr(model.opt, name) for name in OPTIONS}
+    for name, values in checked.items():
         if not (np.abs(values) < LARGEST).all():
             raise BadConfiguration(
                 f"{place}: {name} holds numbers that are not finite, or too large"
             )
+    for name in (name for name in dir(model) if not name.startswith("_")):
+        values = getattr(model, name)
+        if isinstance(values, np.ndarray) and values.dtype.kind == "f" and np.isnan(values).any():
+            raise BadConfiguration(f"{place}: {name} holds NaN")
+    if not model.opt.timestep >= SHORTEST_STEP_S:
+        raise BadConfiguration(
+            f"{place}: a time step of {model.opt.timestep:g} s; at least {SHORTEST_STEP_S:g} s"
+        )
 
 
 def read_model(path: Path) -> mujoco.MjModel:
@@ -104,7 +144,8 @@ def read_model(path: Path) -> mujoco.MjModel:
 def first_line(error: Exception) -> str:
     """Return MuJoCo's reason in one line."""
     lines = str(error).splitlines() or [type(error).__name__]
-    return "not enough memory for this model" if isinstance(error, MemoryError) else lines[0]
+    is_full = isinstance(error, MemoryError) or FAILED_INSIDE in lines[0]
+    return "not enough memory for this model" if is_full else lines[0]
 
 
 def silence_mujoco() -> None:

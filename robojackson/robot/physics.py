@@ -14,6 +14,8 @@ from robojackson.robot.fixed_joints import fix_joints, remove
 from robojackson.robot.names import known, where
 
 SAME_S = 1e-9
+MOST_SUBSTEPS = 1000
+"""Largest number of physics steps in a control step."""
 
 
 def apply_physics(spec: mujoco.MjSpec, description: RobotDescription) -> None:
@@ -104,7 +106,8 @@ def is_plane(geom: mujoco.MjsGeom) -> bool:
 
 
 def substeps_of(control_dt: float, timestep: float) -> int | None:
-    """Return the physics substeps of a control step; None where that is no whole number."""
+    """Return the physics substeps of a control step; None where that is no whole number
+    up to `MOST_SUBSTEPS`."""
     count = round(control_dt / timestep)
-    whole = count >= 1 and abs(count * timestep - control_dt) < SAME_S
+    whole = 1 <= count <= MOST_SUBSTEPS and abs(count * timestep - control_dt) < SAME_S
     return count if whole else None

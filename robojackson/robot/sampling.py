@@ -34,6 +34,16 @@ class SampledMotion:
     qpos: Float[np.ndarray, "T nq"]
     qvel: Float[np.ndarray, "T nv"] | None = None
 
+    def __post_init__(self) -> None:
+        """Raise `ValueError` for a rate or arrays that are no motion."""
+        given = [self.qpos] if self.qvel is None else [self.qpos, self.qvel]
+        if not 0.0 < self.fps < np.inf:
+            raise ValueError(f"{self.fps!r} frames a second")
+        if any(each.ndim != 2 or each.dtype.kind not in "fiu" for each in given):
+            raise ValueError("qpos and qvel are not numbers with one row a frame")
+        if len({len(each) for each in given}) > 1:
+            raise ValueError("qpos and qvel have different numbers of frames")
+
     def __len__(self) -> int:
         return len(self.qpos)
 

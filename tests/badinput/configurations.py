@@ -40,6 +40,10 @@ VALUES = (
     "retarget.method=evil", "=1", "evil", "a..b=1", "detector={a: 1}", "detector=!!python/name:os",
     "detector=[", "network.hybrik=/dev/zero", "network.niki=x", "dancer=3", "mocap=null",
 )  # fmt: skip
+TRAIN_VALUES = (
+    "steps=-1", "seed=x", "evil=1", "mode=evil", "tqc.batch=0", "tqc.batch=1000000000", "seed=0x1_0",
+    "tqc.n_envs=1000000000", "tqc.actor=[100000, 100000]", "tqc.critic=[]",
+)  # fmt: skip
 
 
 def cases() -> Iterator[Case]:
@@ -56,7 +60,7 @@ def cases() -> Iterator[Case]:
     for name in ("nowhere", "/dev/zero", "../../etc/passwd", "robots/humanoid", "", "x.yaml"):
         words = ("mocap", str(CLIP), "-o", "out", "--config", name)
         yield Case("configuration", f"--config {name!r}", words)
-    for value in ("steps=-1", "seed=x", "evil=1", "mode=evil", "batch=0"):
+    for value in TRAIN_VALUES:
         words = ("train", "@/reference.parquet", "-o", "out", "--set", value)
         yield Case("configuration", f"train --set {value}", words)
     for value in ("filters.evil=1", "web.retries=-1", "web.timeout_s=0", "web.evil=1"):

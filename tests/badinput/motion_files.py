@@ -12,6 +12,7 @@ import numpy as np
 from tests.badinput.base import BASE
 from tests.badinput.case import Case, Maker, writes
 from tests.badinput.tables import damaged
+from tests.mocap.test_imported_motion import res_pk
 
 OUT = ("-o", "out")
 Arrays = dict[str, np.ndarray]
@@ -110,6 +111,11 @@ NPZ: Mapping[str, Maker] = {
     "trans shorter": amass(trans=lambda a: a["trans"][:-3]),
     "trans infinite": amass(trans=lambda a: a["trans"] + np.inf),
     "trans of 1e20": amass(trans=lambda a: a["trans"] + 1e20),
+    "trans of 1e7": amass(
+        trans=lambda a: a["trans"] + 9e6 * np.arange(len(a["trans"]))[:, None] / 100
+    ),
+    "poses of dates": amass(poses=lambda a: a["poses"].astype("M8[s]")),
+    "poses of truths": amass(poses=lambda a: a["poses"] > 0),
     "rate 0": amass(mocap_framerate=0.0),
     "rate negative": amass(mocap_framerate=-30.0),
     "rate nan": amass(mocap_framerate=np.nan),
@@ -170,6 +176,8 @@ PICKLES: Mapping[str, Maker] = {
     "bytes of 2^31": writes("a.pkl", b"\x80\x04B\xff\xff\xff\x7fxx."),
     "long of 2^31": writes("a.pkl", b"\x80\x04\x8b\xff\xff\xff\x7fxx."),
     "endless stack": writes("a.pkl", b"\x80\x04" + b"}" * 3_000_000 + b"."),
+    "an image of 1e7 pixels": lambda here: _hybrik(here, width=1e7, height=1e7),
+    "an image of no pixels": lambda here: _hybrik(here, width=0.0, height=0.0),
     "cut": lambda here: (here / "a.pkl").write_bytes((BASE / "aist.pkl").read_bytes()[:3000]),
     "poses of text": pickled(lambda: {"smpl_poses": "x", "smpl_trans": "y"}),
     "poses of one": pickled(lambda: {"smpl_poses": np.zeros((1, 72)), "smpl_trans": np.zeros((1, 3))}),
@@ -178,6 +186,13 @@ PICKLES: Mapping[str, Maker] = {
     "trans nan": pickled(lambda: {"smpl_poses": np.zeros((9, 72)), "smpl_trans": np.zeros((9, 3)) * np.nan,
                                   "smpl_scaling": np.ones(1)}),
 }  # fmt: skip
+
+
+def _hybrik(here: Path, **sizes: float) -> None:
+    content = res_pk()
+    for name, size in sizes.items():
+        content[name] = np.full_like(np.asarray(content[name], float), size)
+    (here / "a.pkl").write_bytes(pickle.dumps(content))
 
 
 def _member(here: Path, name: str) -> None:

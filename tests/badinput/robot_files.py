@@ -1,5 +1,6 @@
 """Descriptions and models of robots: wrong names, numbers, files and models that take for ever."""
 
+import os
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
@@ -37,6 +38,17 @@ def bare(xml: str) -> Maker:
     return model(lambda _: xml)
 
 
+def _piped(here: Path, inside: str) -> None:
+    bare(f"<mujoco>{inside}<worldbody/></mujoco>")(here)
+    os.mkfifo(here / "p.xml")
+
+
+def _chain(here: Path, links: int) -> None:
+    bare('<mujoco><include file="1.xml"/><worldbody/></mujoco>')(here)
+    for n in range(1, links):
+        (here / f"{n}.xml").write_text(f'<mujoco><include file="{n + 1}.xml"/></mujoco>')
+
+
 def _mjcf(value: str) -> Maker:
     return robot(lambda t: t.replace(SHIPPED, value))
 
@@ -65,6 +77,9 @@ DESCRIPTIONS: Mapping[str, Maker] = {
     "weight negative": robot(lambda t: t.replace("left_hip: 1.0", "left_hip: -1.0")),
     "rest of an unknown hinge": robot(lambda t: t.replace("left_knee: -0.3", "left_nose: -0.3")),
     "rest pose 1e300": robot(lambda t: t.replace("left_knee: -0.3", "left_knee: 1.0e+300")),
+    "name of a path": robot(lambda t: t.replace("name: mine", "name: ../../x")),
+    "name with an escape": robot(lambda t: t.replace("name: mine", 'name: "a\\e[31m"')),
+    "name of 5000": robot(lambda t: t.replace("name: mine", "name: " + "x" * 5000)),
     "timestep 0": robot(lambda t: t + "simulation: {timestep: 0.0}\n"),
     "iterations 10^9": robot(lambda t: t + "simulation: {iterations: -1}\n"),
     "contacts empty": robot(lambda t: t.split("contacts:")[0] + "contacts: {}\n"),
@@ -97,6 +112,11 @@ MODELS: Mapping[str, Maker] = {
     "infinite mass": model(lambda t: t.replace('type="capsule"', 'type="capsule" mass="inf"', 1)),
     "position 1e300": model(lambda t: t.replace('pos="0 0 1.4"', 'pos="1e300 0 1.4"')),
     "gear 1e30": model(lambda t: t.replace('gear="100"', 'gear="1e30"')),
+    "nan in gravity": model(lambda t: t.replace("<worldbody>", '<option gravity="nan 0 0"/><worldbody>')),
+    "gravity 1e300": model(lambda t: t.replace("<worldbody>", '<option gravity="0 0 1e300"/><worldbody>')),
+    "timestep 1e-300": model(lambda t: t.replace('timestep="0.003"', 'timestep="1e-300"')),
+    "stiffness 1e300": model(lambda t: t.replace('stiffness="10"', 'stiffness="1e300"')),
+    "nan in a colour": model(lambda t: t.replace('rgba="0.8 0.6 .4 1"', 'rgba="nan 0.6 .4 1"')),
     "empty": bare(""),
     "no XML": bare("{}"),
     "no robot": bare("<mujoco/>"),
@@ -105,6 +125,10 @@ MODELS: Mapping[str, Maker] = {
     "external entity": bare('<!DOCTYPE a [<!ENTITY x SYSTEM "file:///etc/passwd">]><mujoco model="&x;"/>'),
     "include itself": bare('<mujoco><include file="mine.xml"/></mujoco>'),
     "include a device": bare('<mujoco><include file="/dev/zero"/></mujoco>'),
+    "include a pipe": lambda here: _piped(here, '<include file="p.xml"/>'),
+    "include a pipe twice": lambda here: _piped(here, '<include file="p.xml" file="p.xml"/>'),
+    "mesh a pipe": lambda here: _piped(here, '<asset><mesh name="m" file="p.xml"/></asset>'),
+    "includes of includes": lambda here: _chain(here, 3000),
     "mesh a device": bare('<mujoco><asset><mesh name="m" file="/dev/zero"/></asset></mujoco>'),
     "texture of 60000": bare('<mujoco><asset><texture name="a" type="2d" builtin="flat" width="60000" '
                              'height="60000"/></asset><worldbody/></mujoco>'),

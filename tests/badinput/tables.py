@@ -55,6 +55,17 @@ def scalar(name: str, values: object) -> Change:
     return change
 
 
+def reversed_(name: str) -> Change:
+    """The table with the values of a column in the opposite order."""
+
+    def change(table: pa.Table) -> pa.Table:
+        index = table.column_names.index(name)
+        values = table.column(name).to_pylist()[::-1]
+        return table.set_column(index, name, pa.array(values, table.schema.field(name).type))
+
+    return change
+
+
 def entry(value: float) -> Callable[[np.ndarray], np.ndarray]:
     """Return a column with one number replaced."""
 
@@ -78,6 +89,7 @@ NESTED = b"[" * 100_000 + b"]" * 100_000
 SMPL: Mapping[str, Change] = {
     **{f"fps {v!r}": facts(fps=v) for v in (0, -30, "30", None, [30], True, 1e9, 1e-9)},
     "fps nan": facts(fps=b"NaN"),
+    "fps 0.02": facts(fps=0.02),
     "fps infinite": facts(fps=b"Infinity"),
     "fps nested": facts(fps=NESTED),
     "no fps": facts(fps=...),
@@ -115,6 +127,10 @@ SMPL: Mapping[str, Change] = {
     "column twice": lambda t: t.append_column("transl", t.column("transl")),
     "column of another": lambda t: t.append_column("evil", pa.array([1] * len(t))),
     "valid as numbers": scalar("valid", 1.5),
+    "valid nowhere": scalar("valid", False),
+    "time stands": scalar("time_s", 0.0),
+    "time goes back": reversed_("time_s"),
+    "frames count down": reversed_("frame"),
     "nulls": lambda t: t.set_column(
         2, "global_orient", pa.array([None] * len(t), t.column("global_orient").type)
     ),
@@ -129,6 +145,8 @@ REFERENCE: Mapping[str, Change] = {
     "robot a number": facts(robot=3),
     "robot file a device": facts(robot_file="/dev/zero"),
     "robot file missing": facts(robot_file="/nothing/robot.yaml"),
+    "time goes back": reversed_("time_s"),
+    "steps count down": reversed_("step"),
     "another model": facts(model_sha256="0" * 64),
     "model a number": facts(model_sha256=1),
     "joint names reversed": lambda t: facts(

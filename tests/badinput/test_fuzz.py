@@ -18,18 +18,39 @@ import pyarrow.parquet as pq
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from safetensors.numpy import save
 
 from robojackson.clips.web.untrusted_text import clean_text, safe_name, web_address
 from robojackson.errors import RoboJacksonError
 from robojackson.files import table_door
 from robojackson.files.foreign_file import parse_json
-from robojackson.formats import amass, bvh, smpl_csv
+from robojackson.formats import (
+    aist,
+    amass,
+    beyondmimic,
+    bvh,
+    gmr,
+    gvhmr,
+    hybrik_output,
+    keyframes,
+    locomujoco,
+    omniretarget,
+    smpl_csv,
+    unitree_csv,
+)
 from robojackson.formats.containers import bvh_tree, npz_archive, safe_pickle, torch_archive
+from robojackson.motion.landmark_track import LandmarkTrack
+from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.yaml_loader import load
 from robojackson.rl.policy import Policy, load_policy
-from tests.files.test_tables import a_sequence
+from robojackson.rl.tqc.network_arrays import load_networks
+from robojackson.robot.description import RobotDescription
+from tests.badinput.robot_files import YAML
+from tests.files.test_tables import a_reference, a_sequence, a_track
+from tests.formats.test_human_formats import aist_file
+from tests.mocap.test_imported_motion import res_pk
 
 EXAMPLES = int(os.environ.get("FUZZ_EXAMPLES", "40"))
 FUZZED = settings(
@@ -41,6 +62,17 @@ FUZZED = settings(
 )
 SEQUENCE = a_sequence(np.random.default_rng(0))
 ARRAYS = {"poses": np.zeros((4, 72)), "trans": np.zeros((4, 3)), "mocap_framerate": np.array(30.0)}
+TRACK, REFERENCE = (make(np.random.default_rng(0)) for make in (a_track, a_reference))
+ROOTS = {"root_pos": np.zeros((4, 3)), "root_rot": np.ones((4, 4))}
+QPOS = {"qpos": np.zeros((4, 9)), "qvel": np.zeros((4, 8))}
+BEYONDMIMIC = {
+    "fps": np.array([50]), "joint_pos": np.zeros((4, 2)),
+    "body_pos_w": np.zeros((4, 3, 3)), "body_quat_w": np.ones((4, 3, 4)),
+}  # fmt: skip
+KEYFRAMES = (
+    b'<mujocoinclude><keyframe><key time="0" qpos="0 0 1" qvel="0 0 0"/>'
+    b'<key time="0.1" qpos="0 0 1" qvel="0 0 0"/></keyframe></mujocoinclude>'
+)
 
 
 def _parquet() -> bytes:
@@ -65,6 +97,17 @@ SEEDS: dict[str, tuple[bytes, Callable[[bytes], object]]] = {
     "torch": (torch_archive.save(ARRAYS), lambda data: torch_archive.load(data, "f")),
     "table": (_parquet(), lambda data: table_door.read_parquet(data, "f")),
     "smpl": (SEQUENCE.to_bytes(), lambda data: SmplSequence.from_bytes(data, "f")),
+    "landmarks": (TRACK.to_bytes(), lambda data: LandmarkTrack.from_bytes(data, "f")),
+    "reference": (REFERENCE.to_bytes(), lambda data: ReferenceMotion.from_bytes(data, "f")),
+    "aist": (aist_file(), aist.read),
+    "gvhmr": (gvhmr.write(SEQUENCE), gvhmr.read),
+    "hybrik": (pickle.dumps(res_pk()), hybrik_output.read),
+    "gmr": (pickle.dumps({**ROOTS, "fps": 30, "dof_pos": np.zeros((4, 2))}), gmr.read),
+    "beyondmimic": (npz_archive.pack(BEYONDMIMIC), beyondmimic.read),
+    "locomujoco": (npz_archive.pack({**QPOS, "frequency": np.array(50.0)}), locomujoco.read),
+    "omniretarget": (npz_archive.pack({**QPOS, "fps": np.array(30)}), omniretarget.read),
+    "unitree csv": (b"0,0,1,0,0,0,1,.5\n" * 4, unitree_csv.read),
+    "keyframes": (KEYFRAMES, keyframes.read),
 }
 edits = st.lists(
     st.tuples(st.floats(0, 1), st.integers(0, 40), st.binary(max_size=12)), min_size=1, max_size=6
@@ -145,6 +188,32 @@ def test_an_altered_policy_is_read_or_refused(
     file.write_bytes(altered(Policy(layers, {"robot": "humanoid"}).to_bytes(), changes))
     try:
         load_policy(file)
+    except RoboJacksonError as cause:
+        assert str(cause)
+
+
+@given(changes=edits)
+@FUZZED
+def test_an_altered_networks_file_is_read_or_refused(
+    changes: list[tuple[float, int, bytes]], tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    arrays = {"actor.0.weight": np.ones((3, 4), np.float32), "actor.0.bias": np.ones(4, np.float32)}
+    file = _scratch(tmp_path_factory) / "n.safetensors"
+    seed = save(arrays, {"robojackson-networks-1": "{}"})
+    file.write_bytes(altered(seed, changes))
+    with pytest.raises(RoboJacksonError):
+        load_networks(file)
+
+
+@given(changes=edits)
+@FUZZED
+def test_an_altered_description_of_a_robot_is_read_or_refused(
+    changes: list[tuple[float, int, bytes]], tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    file = _scratch(tmp_path_factory) / "r.yaml"
+    file.write_bytes(altered(YAML.encode(), changes))
+    try:
+        load(RobotDescription, file)
     except RoboJacksonError as cause:
         assert str(cause)
 

@@ -2,6 +2,7 @@
 
 import os
 import struct
+import wave
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -10,7 +11,7 @@ import av
 import numpy as np
 
 from tests.badinput.base import CLIP
-from tests.badinput.case import Case, Maker, writes
+from tests.badinput.case import Case, Maker, nothing, writes
 
 OUT = ("-o", "out")
 LISTS = {
@@ -75,6 +76,14 @@ def cases() -> Iterator[Case]:
                writes("a.mp4", "text"))  # fmt: skip
     yield Case("video", "escape sequence in the name", ("mocap", "\x1b[31m\x07.mp4", *OUT),
                writes("\x1b[31m\x07.mp4", "text"))  # fmt: skip
+    twice = ("mocap", str(CLIP), str(CLIP), *OUT)
+    yield Case("video", "two clips of one camera", twice, says="from one place")
+    yield Case("video", "second clip black", ("mocap", str(CLIP), "a.mkv", *OUT),
+               _film(320, 240, 90, 30), says="a.mkv: no person")  # fmt: skip
+    yield Case("video", "second clip a pipe", ("mocap", str(CLIP), "a.mp4", *OUT), _fifo)
+    for name, (file, make) in MUSIC.items():
+        words = ("dance", str(CLIP), "--config", "smoke", "--music", file)
+        yield Case("video", f"music {name}", words, make, says="m.")
     yield Case("video", "results in a file", ("mocap", str(CLIP), "-o", "f"), writes("f", ""))
     yield Case("video", "results in /proc", ("mocap", str(CLIP), "-o", "/proc/x"))
 
@@ -106,6 +115,19 @@ def _fifo(here: Path) -> None:
     os.mkfifo(here / "a.mp4")
 
 
+def _silence(here: Path) -> None:
+    with wave.open(str(here / "m.wav"), "wb") as file:
+        file.setparams((1, 2, 8000, 0, "NONE", ""))
+        file.writeframes(bytes(16_000))
+
+
+MUSIC: dict[str, tuple[str, Maker]] = {
+    "a text": ("m.mp3", writes("m.mp3", "text")),
+    "a pipe": ("m.mp3", lambda here: os.mkfifo(here / "m.mp3")),
+    "a playlist": ("m.mp3", writes("m.mp3", "#EXTM3U\nfile:///etc/passwd\n")),
+    "missing": ("m.mp3", nothing),
+    "silent": ("m.wav", _silence),
+}
 LINKS: dict[str, Maker] = {
     "fifo": _fifo,
     "loop of links": lambda here: (here / "a.mp4").symlink_to("a.mp4"),

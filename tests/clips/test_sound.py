@@ -1,5 +1,6 @@
 """Sound: read from a clip, slowed with its pitch and at its pictures, and its beats."""
 
+from fractions import Fraction
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
@@ -167,6 +168,34 @@ def test_a_playlist_is_no_music(tmp_path: Path) -> None:
     (tmp_path / "list.m3u8").write_text("#EXTM3U\nfile:///etc/passwd\n")
     with pytest.raises(UnreadableVideo, match="names other files"):
         require_sound(tmp_path / "list.m3u8")
+
+
+def _tone(path: Path, rate: int, begins_s: float = 0.0) -> Path:
+    """A second of a tone in a file with one picture at its beginning."""
+    with av.open(str(path), "w") as container:
+        picture = container.add_stream("mjpeg", rate=FPS)
+        picture.width, picture.height, picture.pix_fmt = 16, 16, "yuvj420p"
+        stream = container.add_stream("pcm_s16le", rate=rate, layout="mono")
+        container.mux(picture.encode(av.VideoFrame(16, 16, "yuvj420p")))
+        tone = (9000 * np.sin(np.arange(rate))).astype(np.int16)[None]
+        frame = av.AudioFrame.from_ndarray(tone, format="s16", layout="mono")
+        frame.sample_rate = rate
+        for packet in stream.encode(frame):
+            packet.pts = packet.dts = round(begins_s * rate)
+            packet.time_base = Fraction(1, rate)
+            container.mux(packet)
+    return path
+
+
+def test_a_sound_that_begins_hours_late_is_not_filled_with_silence(tmp_path: Path) -> None:
+    found = read_sound(_tone(tmp_path / "a.mkv", 8000, begins_s=2.0))
+    assert found is not None
+    assert len(found.samples) == pytest.approx(3 * RATE, abs=0.1 * RATE)
+    assert read_sound(_tone(tmp_path / "b.mkv", 8000, begins_s=20_000.0)) is None
+
+
+def test_a_rate_of_a_few_samples_a_second_is_no_sound(tmp_path: Path) -> None:
+    assert read_sound(_tone(tmp_path / "a.mkv", 4)) is None
 
 
 def test_music_without_sound_is_refused(tmp_path: Path) -> None:

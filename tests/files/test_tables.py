@@ -148,6 +148,13 @@ def as_column(values: object):
     return change
 
 
+def plain(name: str, values: list, kind: pa.DataType | None = None):
+    def change(table: pa.Table) -> pa.Table:
+        return table.set_column(table.column_names.index(name), name, pa.array(values, kind))
+
+    return change
+
+
 def with_nan(table: pa.Table) -> pa.Table:
     values = np.zeros((5, 3), np.float32)
     values[3, 1] = np.nan
@@ -167,6 +174,11 @@ def with_nan(table: pa.Table) -> pa.Table:
         (with_nan, "'transl' holds NaN"),
         (lambda t: t.append_column("mood", pa.array([1] * 5)), "'mood' is not one of SmplSequence"),
         (lambda t: t.replace_schema_metadata({}), "metadata key 'fps'"),
+        (plain("frame", [4, 3, 2, 1, 0], pa.int32()), "frame does not count the rows"),
+        (plain("frame", [1, 2, 3, 4, 5], pa.int32()), "frame does not count the rows"),
+        (plain("time_s", [0.0, 0.2, 0.1, 0.3, 0.4]), "time_s does not go on"),
+        (plain("time_s", [0.0] * 5), "time_s does not go on"),
+        (plain("valid", [False] * 5), "no frame shows the person"),
     ],
 )
 def test_a_violated_schema_names_column_and_file(change, message) -> None:

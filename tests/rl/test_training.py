@@ -11,7 +11,7 @@ import jax
 import numpy as np
 import pytest
 
-from robojackson.errors import BadConfiguration, BadPolicy, TrainingDiverged
+from robojackson.errors import BadConfiguration, BadPolicy, StoreError, TrainingDiverged
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import (
     EvaluateConfig,
@@ -189,6 +189,19 @@ def test_a_checkpoint_of_another_configuration_is_refused(
     other = dataclasses.replace(brief(name), seed=5)
     with pytest.raises(BadConfiguration, match="another configuration"):
         run(robot, sway, other, result.policy.parent)
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize("part", ["run.json", "networks.*", "environment.npz"])
+def test_a_damaged_checkpoint_is_refused_by_its_name(
+    trained: tuple, robot: Robot, sway: ReferenceMotion, tmp_path: Path, part: str
+) -> None:
+    result, _, _, name = trained
+    shutil.copytree(result.policy.parent, tmp_path / "out")
+    file = next((tmp_path / "out" / "checkpoint").glob(part))
+    file.write_bytes(b"[" * 100_000)
+    with pytest.raises(StoreError, match=r"checkpoint: the checkpoint is damaged .*remove it"):
+        run(robot, sway, brief(name), tmp_path / "out")
 
 
 @pytest.mark.medium

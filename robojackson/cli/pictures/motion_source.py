@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from robojackson.errors import RoboJacksonError
+from robojackson.files.foreign_file import read_json
 from robojackson.files.local_folder import sha256_of_file
 from robojackson.motion.landmark_track import LandmarkTrack
 
@@ -44,7 +46,7 @@ def source_record(video: Path, landmarks: bytes, motions: Mapping[str, bytes]) -
 def source_of(smpl: Path) -> MotionSource | None:
     """Return the clip of a motion, None where it is unknown, missing, or changed."""
     try:
-        facts = json.loads((smpl.parent / FILE).read_text())
+        facts = read_json(smpl.parent / FILE)
         video = Path(facts["video"])
         landmarks = smpl.parent / LANDMARKS
         same = (
@@ -52,6 +54,6 @@ def source_of(smpl: Path) -> MotionSource | None:
             and facts["landmarks"] == sha256_of_file(landmarks)
             and facts["bytes"] == video.stat().st_size
         )
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+    except (RoboJacksonError, OSError, ValueError, KeyError, TypeError, AttributeError):
         return None
     return MotionSource(video, LandmarkTrack.load(landmarks)) if same else None

@@ -43,6 +43,9 @@ def view(
         return CommandResult({"page": str(page), "opened": opened}, text=[f"{word} {page}"])
     if out is None:
         raise BadConfiguration(f"--to {to} writes a file: name it with -o FILE")
+    from robojackson.api.motions import require_another
+
+    require_another(file, out)
     folder = file if file.is_dir() else file.parent
     if to is View.RERUN:
         from robojackson.api.rerun_export import write_rerun

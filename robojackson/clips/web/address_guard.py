@@ -16,6 +16,8 @@ from urllib.parse import urlsplit
 
 from robojackson.errors import DownloadFailed
 
+WITH_IPV4 = (ipaddress.IPv6Network("64:ff9b::/96"), ipaddress.IPv6Network("::/96"))
+"""Networks whose addresses end with an IPv4 address: NAT64 (RFC 6052), and the earliest form."""
 ADVICE = "web.private_addresses=true in the configuration allows it"
 _trusted: ContextVar[frozenset[str] | None] = ContextVar("trusted hosts of the guard", default=None)
 _resolve = socket.getaddrinfo
@@ -55,6 +57,8 @@ def is_public(address: str) -> bool:
     """Return whether an IP address is one of the public web; an embedded IPv4 address counts."""
     found = ipaddress.ip_address(address.partition("%")[0])
     hidden = getattr(found, "ipv4_mapped", None) or getattr(found, "sixtofour", None)
+    if any(found in network for network in WITH_IPV4):
+        hidden = ipaddress.IPv4Address(int(found) & 0xFFFFFFFF)
     return (hidden or found).is_global and not found.is_multicast
 
 

@@ -15,6 +15,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from robojackson.body.forward_kinematics import kabsch
+from robojackson.errors import ViewsDisagree
 from robojackson.mocap.landmarks.refinement import BONES, ORDER
 
 FOCAL_SD, GUESS_SD, LATE_SD_S = 0.1, 0.35, 0.03
@@ -24,6 +25,8 @@ RAY_SD = 0.006
 """Error of a detected joint, share of the focal length."""
 BONE_SD = 0.1
 """Error of a triangulated bone's length, share of its length."""
+NEAREST_M = 0.05
+"""Least distance between the cameras: below it no depth comes from where their rays meet."""
 REPEATED = 5.0
 """Square root of the number of joints and frames with correlated errors."""
 
@@ -60,8 +63,15 @@ def calibrate(
         one, two: Body before each camera with its guessed focal length, metres.
         trust: Least visibility of each joint in both cameras, 0..1.
         fps: Frames a second.
+    Raises:
+        ViewsDisagree: both cameras are at one place.
     """
     rotation, shift = first_guess(one, two, trust)
+    if not np.linalg.norm(shift) > NEAREST_M:
+        raise ViewsDisagree(
+            f"both clips are filmed from one place, within {100 * NEAREST_M:.0f} cm: give one clip "
+            "alone, or two from different sides"
+        )
     rays = [points[..., :2] / points[..., 2:] for points in (one, two)]
     speed = np.gradient(rays[1], axis=0) * fps
     root = np.sqrt(trust).reshape(-1)

@@ -1,11 +1,13 @@
 """Convert a film to an animated picture (GIF or WebP), where no video can be shown."""
 
+import io
 from pathlib import Path
 
 import cv2
 from PIL import Image
 
 from robojackson.clips.video import VideoLimits, probe, read_frames
+from robojackson.files.file_tree import FileTree
 
 FPS, WIDTH_PX = 12, 640
 
@@ -17,6 +19,7 @@ def write_animation(film: Path, out: Path, kind: str) -> Path:
         kind: gif or webp.
     Raises:
         UnreadableVideo: the film cannot be read.
+        StoreError: the file cannot be written.
     """
     info = probe(film, VideoLimits(min_frames=1))
     every = max(1, round(info.fps / FPS))
@@ -26,9 +29,8 @@ def write_animation(film: Path, out: Path, kind: str) -> Path:
         for index, frame in enumerate(read_frames(film))
         if index % every == 0
     ]
-    partial = out.with_name(out.name + ".partial")
-    duration = round(1000 * every / info.fps)
+    duration, made = round(1000 * every / info.fps), io.BytesIO()
     first, rest = pictures[0], pictures[1:]
-    first.save(partial, kind, save_all=True, append_images=rest, duration=duration, loop=0)
-    partial.replace(out)
+    first.save(made, kind, save_all=True, append_images=rest, duration=duration, loop=0)
+    FileTree(out.parent).write(out.name, made.getvalue())
     return out

@@ -38,8 +38,7 @@ def dressed(model: mujoco.MjModel, width: int, height: int, tint: Tint) -> mujoc
     dressed = copy.copy(model)
     simplify(dressed, DETAIL_M)
     dressed.vis.quality.offsamples = 0
-    dressed.vis.global_.offwidth = max(width, dressed.vis.global_.offwidth)
-    dressed.vis.global_.offheight = max(height, dressed.vis.global_.offheight)
+    dressed.vis.global_.offwidth, dressed.vis.global_.offheight = width, height
     dressed.vis.global_.fovy = float(np.degrees(2.0 * np.arctan(0.5 / FOCAL)))
     floors = dressed.geom_type == mujoco.mjtGeom.mjGEOM_PLANE.value
     dressed.geom_matid[floors] = -1

@@ -1,6 +1,6 @@
 """The numbers of TQC (Kuznetsov et al., 2020), with presets of the paper and its released code."""
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
@@ -55,6 +55,10 @@ dances without a policy already (`track.control.feedback_path: sampled`)."""
 NORM_EPSILON = 1e-6
 """Epsilon of layer normalisation: flax's."""
 
+Layers = Annotated[
+    tuple[Annotated[int, Field(ge=1, le=4096)], ...], Field(min_length=1, max_length=16)
+]
+
 
 @config_dataclass
 class TqcConfig:
@@ -92,22 +96,22 @@ class TqcConfig:
     """
 
     preset: Literal["dance", "paper", "released", "polish"] = "dance"
-    n_envs: int = Field(default=32, ge=1)
-    steps_per_round: int = Field(default=8, ge=1)
-    updates_per_round: int = Field(default=24, ge=1)
+    n_envs: int = Field(default=32, ge=1, le=4096)
+    steps_per_round: int = Field(default=8, ge=1, le=10_000)
+    updates_per_round: int = Field(default=24, ge=1, le=10_000)
     learning_rate: float = Field(default=5e-4, gt=0, lt=1)
     buffer: int = Field(default=300_000, ge=1_000, le=1_000_000)
     warmup: int = Field(default=2_000, ge=1)
-    batch: int = Field(default=256, ge=1)
+    batch: int = Field(default=256, ge=1, le=65_536)
     tau: float = Field(default=0.01, gt=0, le=1)
     gamma: float = Field(default=0.985, gt=0, lt=1)
     policy_delay: int = Field(default=2, ge=1)
     critics: Literal[2] = 2
-    quantiles: int = Field(default=25, ge=1)
+    quantiles: int = Field(default=25, ge=1, le=1_000)
     top_quantiles_to_drop: int = Field(default=2, ge=0)
     entropy: str = Field(default="auto_0.02", pattern=r"^auto(_\d*\.?\d+)?$")
-    actor: tuple[int, ...] = (256, 256)
-    critic: tuple[int, ...] = (256, 256)
+    actor: Layers = (256, 256)
+    critic: Layers = (256, 256)
     layer_norm: bool = True
     gsde: bool = False
     log_std_init: float = 0.0

@@ -1,5 +1,6 @@
 """`robojackson mocap` and `retarget` leave a picture beside their result, and a film on request."""
 
+import os
 import shutil
 from pathlib import Path
 
@@ -123,4 +124,12 @@ def test_a_clip_that_is_another_one_by_now_is_not_shown(
 
 
 def test_a_motion_without_a_record_of_its_clip_has_none(tmp_path: Path) -> None:
+    assert source_of(tmp_path / "smpl.parquet") is None
+
+
+def test_a_source_that_cannot_be_read_is_none(tmp_path: Path) -> None:
+    (tmp_path / "source.json").write_text("[" * 100_000)
+    assert source_of(tmp_path / "smpl.parquet") is None
+    (tmp_path / "source.json").unlink()
+    os.mkfifo(tmp_path / "source.json")
     assert source_of(tmp_path / "smpl.parquet") is None

@@ -1,7 +1,9 @@
 """`view`: the folder of a run as films and recordings for other viewers, and its refusals."""
 
 import json
+import os
 import re
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -58,6 +60,23 @@ def test_a_film_becomes_a_picture_that_moves(kind: str, folder: Path, tmp_path: 
         assert (image.format, image.width) == (kind.upper(), 640)
         assert image.n_frames == FRAMES / 2
         assert image.info.get("loop") == 0
+
+
+@pytest.mark.parametrize("to", ["gif", "rerun"])
+def test_a_pipe_in_the_place_of_a_result_stays_one(to: str, folder: Path, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    result = in_process("view", folder, "--to", to, "-o", tmp_path / "pipe")
+    assert (result.code, "a device or a pipe" in result.err) == (1, True)
+    assert (tmp_path / "pipe").is_fifo()
+    assert [path.name for path in tmp_path.iterdir()] == ["pipe"]
+
+
+def test_a_film_is_not_replaced_by_its_own_picture(folder: Path, tmp_path: Path) -> None:
+    film = tmp_path / "a.mp4"
+    shutil.copy(folder / "dance.mp4", film)
+    result = in_process("view", film, "--to", "gif", "-o", film)
+    assert (result.code, film.read_bytes()) == (1, (folder / "dance.mp4").read_bytes())
+    assert "a folder" in in_process("view", film, "--to", "gif", "-o", tmp_path).err
 
 
 def test_a_run_becomes_a_recording_for_rerun(folder: Path, tmp_path: Path) -> None:

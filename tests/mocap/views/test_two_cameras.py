@@ -132,3 +132,10 @@ def test_clips_of_different_motions_are_refused(
     other = second_frame(dancer)[rng.permutation(len(dancer))]
     with pytest.raises(ViewsDisagree, match="same dance"):
         recover_together(filmed(dancer, hip_shake), filmed(other, hip_shake), MocapConfig())
+
+
+@pytest.mark.medium
+def test_two_clips_of_one_camera_are_refused(dancer: np.ndarray, hip_shake: LandmarkTrack) -> None:
+    seen = filmed(dancer, hip_shake)
+    with pytest.raises(ViewsDisagree, match="from one place"):
+        recover_together(seen, seen, MocapConfig(), 0.0)

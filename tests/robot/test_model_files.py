@@ -1,0 +1,64 @@
+"""The door for robot models: what it opens, and which numbers it refuses."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from robojackson.errors import BadConfiguration
+from robojackson.robot.model_files import MOST_PARTS, files_of, read_model
+
+BODY = '<worldbody><body><freejoint/><geom size=".1"/></body></worldbody>'
+
+
+def mjcf(folder: Path, inside: str, name: str = "a.xml") -> Path:
+    path = folder / name
+    path.write_text(f"<mujoco>{inside}</mujoco>")
+    return path
+
+
+@pytest.mark.parametrize(
+    "element", ['<include file="b.xml"/>', '<include file="b.xml" file="b.xml"/>']
+)
+def test_a_pipe_that_a_model_names_is_refused_without_opening_it(
+    tmp_path: Path, element: str
+) -> None:
+    os.mkfifo(tmp_path / "b.xml")
+    with pytest.raises(BadConfiguration, match="a device or a pipe"):
+        read_model(mjcf(tmp_path, element + BODY))
+
+
+def test_files_that_include_one_another_for_ever_are_refused(tmp_path: Path) -> None:
+    for n in range(MOST_PARTS + 1):
+        mjcf(tmp_path, f'<include file="{n + 1}.xml"/>', f"{n}.xml")
+    mjcf(tmp_path, BODY, f"{MOST_PARTS + 1}.xml")
+    with pytest.raises(BadConfiguration, match=f"more than {MOST_PARTS} files"):
+        read_model(tmp_path / "0.xml")
+    assert read_model(tmp_path / "50.xml").nbody == 2
+
+
+def test_what_is_no_strict_xml_names_its_files_all_the_same(tmp_path: Path) -> None:
+    (tmp_path / "b.stl").write_text("")
+    path = mjcf(tmp_path, '<asset><mesh name="m" name="m" file="b.stl"/></asset>')
+    assert files_of(path) == [path, tmp_path / "b.stl"]
+
+
+@pytest.mark.parametrize(
+    "inside",
+    [
+        '<option gravity="nan 0 0"/>',
+        '<option gravity="0 0 1e300"/>',
+        '<option timestep="1e-300"/>',
+        '<option timestep="nan"/>',
+        '<worldbody><body><joint stiffness="1e300"/><geom size=".1"/></body></worldbody>',
+        '<worldbody><geom size=".1" rgba="nan 0 0 1"/></worldbody>',
+        '<worldbody><camera pos="nan 0 0"/></worldbody>',
+    ],
+)
+def test_numbers_with_which_nothing_can_be_computed_are_refused(
+    tmp_path: Path, inside: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)  # where MuJoCo would write its log
+    with pytest.raises(BadConfiguration, match=r"a\.xml: "):
+        read_model(mjcf(tmp_path, inside + BODY))
+    assert os.listdir(tmp_path) == ["a.xml"]
