@@ -72,12 +72,14 @@ class PageSettings:
         render: How the video looks; the page shows the same moments.
         configuration: Configuration of the pass, as YAML.
         candidates: Clips that were scored, the one that is danced among them.
+        minutes: Budget of the pass.
     """
 
     robot: RobotDescription
     render: VideoConfig
     configuration: str = ""
     candidates: tuple[ScoredClip, ...] = ()
+    minutes: float = 0.0
 
 
 def _models(parameters: Mapping[str, Any]) -> list[str]:
@@ -204,6 +206,7 @@ def _results(
         ],
         provenance={name: artifact.sha256[:16] for name, artifact in sorted(made.items())},
         settings=settings.configuration,
+        minutes=settings.minutes,
     )
 
 

@@ -46,8 +46,6 @@ class Shape(StrEnum):
     WIDE = "wide"
 
 
-LONGER_MINUTES = 15
-"""Least that a pass is advised to take whose robot does not dance."""
 INSTANT_MINUTES = 1.0
 """About what an instant dance takes, for its bar."""
 INSTANT = "--instant"
@@ -184,8 +182,9 @@ def _next(kind: str, page: str, minutes: float, seconds: float) -> str:
             return f"{same_command()} --set evaluate.seconds={LONG_ENOUGH_S:g}"
         return "film or choose a range of at least two seconds (--start, --end)"
     from robojackson.cli.lifetime.interruption import with_option
+    from robojackson.rl.evaluation.verdict import longer_minutes
 
-    return with_option("--minutes", f"{max(2 * minutes, LONGER_MINUTES):g}")
+    return with_option("--minutes", f"{longer_minutes(minutes):g}")
 
 
 app = make_app()

@@ -93,19 +93,26 @@ def page_settings(
         settings.render,
         yaml.safe_dump(to_json_types(settings), sort_keys=False),
         tuple(
-            ScoredClip(each.name, each.clip["video"], _reason(each, best), each is best)
+            ScoredClip(
+                each.name,
+                each.clip["video"],
+                _reason(each, best, len(candidates) == 1),
+                each is best,
+            )
             for each in candidates
         ),
+        settings.minutes,
     )
 
 
-def _reason(candidate: Candidate, best: Candidate) -> str:
+def _reason(candidate: Candidate, best: Candidate, alone: bool) -> str:
     score, least = candidate.score.score_per_second, best.score.score_per_second
     if not candidate.score.detected:
         return "no person is visible in it"
     if candidate is best:
-        return f"danced: steadiest, {score:.2f} a second"
-    return f"not danced: {score:.2f} a second, {least:.2f} is steadier"
+        why = "the only clip" if alone else "the steadiest"
+        return f"danced: {why}, stability score {score:.2f} a second"
+    return f"not danced: stability score {score:.2f} a second, {least:.2f} is steadier"
 
 
 def _readable(paths: Sequence[Path]) -> list[tuple[Path, SourceFile]]:

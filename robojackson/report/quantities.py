@@ -86,6 +86,7 @@ _FORMS: Mapping[str, _Form] = {
     "seam_mm": _Form("gap at the seam of a cycle", "mm", 2),
     "seam_speed_rad_s": _Form("change of speed at the seam", "rad/s", 2),
     "speed_over_limit": _Form("fastest joint over its limit", "", 2),
+    "quat_error": _Form("length of quaternions, error", "", 7),
     "planted_slip_p95_cm_s": _Form("slip of planted feet, 95th percentile", "cm/s", 2),
     "contact_gap_mm": _Form("height of planted feet", "mm", 2),
     "unsupported_share": _Form("steps without support", "%", 1, 100.0),

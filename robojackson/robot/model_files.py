@@ -1,7 +1,7 @@
 """The door for robot models: an MJCF or URDF and the files that it names, before MuJoCo opens them.
 
-Every file that it names is a plain file of modest size, and nothing else is opened to find that out;
-what MuJoCo makes of it is finite.
+Every file that it names is a plain file of modest size, and nothing else is opened to find that
+out; what MuJoCo makes of it is finite.
 """
 
 import re

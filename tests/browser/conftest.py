@@ -4,7 +4,7 @@ import shutil
 import subprocess
 import tarfile
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,6 +37,10 @@ FRAMES, FPS, STEPS = 60, 30.0, 128
 SIZE = 96, 64
 LEVEL, CYCLE = 30, 7
 """Grey of the clip's first picture and by how much the next is brighter, until it starts again."""
+FALLEN = 50
+"""Picture at which the rollout of a page ends."""
+LYING = np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0
+"""Quaternion wxyz of a body that lies on its face."""
 TITLE = "<script>alert(1)</script> \u202emosnart"
 ARGUMENTS = [
     "--no-sandbox",
@@ -112,10 +116,8 @@ def run() -> RecordedRun:
     return RecordedRun(robot, track, sequence, reference, reference.qpos, made_policy(robot))
 
 
-@pytest.fixture(scope="session")
-def page_file(run: RecordedRun, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Write a page whose clip gets brighter with each frame, so that a picture shows its number."""
-    folder = tmp_path_factory.mktemp("page")
+def page_of(run: RecordedRun, folder: Path) -> Path:
+    """Write a page whose clip gets brighter with each frame, so that the grey is its number."""
     pictures = [
         np.full((SIZE[1], SIZE[0], 3), LEVEL + LEVEL * (k % CYCLE), np.uint8) for k in range(FRAMES)
     ]
@@ -131,6 +133,20 @@ def page_file(run: RecordedRun, tmp_path_factory: pytest.TempPathFactory) -> Pat
     file = folder / "index.html"
     file.write_text(render(page_content(results, "dance.mp4")), encoding="utf-8")
     return file
+
+
+@pytest.fixture(scope="session")
+def page_file(run: RecordedRun, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return page_of(run, tmp_path_factory.mktemp("page"))
+
+
+@pytest.fixture(scope="session")
+def fallen_page(run: RecordedRun, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A page whose robot lies on the floor for the last fifth of a second of its rollout."""
+    qpos = np.array(run.reference.qpos[: round(FALLEN / FPS / run.reference.dt)])
+    lies = round(0.2 / run.reference.dt)
+    qpos[-lies:, 2:7] = 0.15, *LYING
+    return page_of(replace(run, rollout_qpos=qpos), tmp_path_factory.mktemp("fallen"))
 
 
 @pytest.fixture(scope="session")

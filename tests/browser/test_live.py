@@ -28,6 +28,15 @@ ROLLOUTS = """steps => { const { dancer, dance } = robojackson; robojackson.stat
     return [dancer.danced, error / Math.max(1, count)];
   }); }"""  # noqa: E501
 
+FELL = """() => { const { dancer, view, show } = robojackson, [pane] = view.panes, place = new THREE.Vector3();
+  dancer.mode = 'statue'; dancer.start(0); dancer.push(0.8, 0);
+  for (let k = 0; k < 400; k++) { dancer.advance(); show(); }
+  view.aim(pane); pane.camera.updateMatrixWorld();
+  const at = Array.from(dancer.data.xpos);
+  let most = 0;
+  for (let b = 3; b < at.length; b += 3) most = Math.max(most, ...place.set(...at.slice(b, b + 3)).project(pane.camera).toArray().slice(0, 2).map(Math.abs));
+  return most; }"""  # noqa: E501
+"""How far a fallen robot's bodies are from the middle of the pane; 1 is the edge."""
 ROOT_ON_SCREEN = """() => { const { dancer, view } = robojackson, [pane] = view.panes, at = dancer.data.xpos;
   view.aim(pane); pane.camera.updateMatrixWorld();
   const place = new THREE.Vector3(at[3], at[4], at[5]).project(pane.camera), box = pane.element.getBoundingClientRect();
@@ -63,6 +72,15 @@ def test_every_recorded_state_ends_within_5_mm_of_python(opened: Open, live_file
     apart = page.evaluate("robojackson.dance.records.map((r) => robojackson.dancer.deviation(r))")
     assert len(apart) == RECORDS
     assert max(apart) <= 5.0
+
+
+def test_the_badge_reports_physics_that_differs(opened: Open, live_file: Path) -> None:
+    page = opened(live_file).page
+    page.wait_for_selector("[data-checked=yes]")
+    page.evaluate(PAUSE)
+    page.evaluate("() => { robojackson.dancer.setFriction(0.01); robojackson.check(4); }")
+    assert "physics differs from Python's" in page.inner_text("#badge")
+    assert page.get_attribute("#badge", "class") == "badge bad"
 
 
 def test_a_drag_moves_the_robot_as_far_as_a_push_of_the_same_impulse(
@@ -133,6 +151,17 @@ def test_policy_off_and_statue_are_other_dancers(opened: Open, live_file: Path) 
     ends = [page.evaluate(script, mode) for mode in ("policy", "reference", "statue", "policy")]
     assert ends[0] == ends[3]
     assert ends[0] != ends[1] != ends[2]
+
+
+def test_a_robot_that_fell_is_in_view_and_can_start_again(opened: Open, live_file: Path) -> None:
+    page = opened(live_file).page
+    page.wait_for_selector("[data-checked=yes]")
+    page.evaluate(PAUSE)
+    assert page.evaluate(FELL) < 1
+    assert "primary" in (page.get_attribute("#again", "class") or "")
+    page.click("#again")
+    assert page.evaluate("robojackson.dancer.fallen") is False
+    assert "primary" not in (page.get_attribute("#again", "class") or "")
 
 
 def test_axe_finds_nothing_serious_in_a_live_dance(opened: Open, live_file: Path, axe: str) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.browser.conftest import CYCLE, LEVEL, Opened
+from tests.browser.conftest import CYCLE, FALLEN, LEVEL, Opened
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(900)]
 Open = Callable[..., Opened]
@@ -18,6 +18,13 @@ SHOWN = """() => {
 }"""
 DRAWN = "k => new Promise(done => { const wait = () => robojackson.state.drawn === k ? done() : setTimeout(wait, 20); wait(); })"  # noqa: E501
 """Playwright's own wait_for_function evaluates text, which the page's security policy forbids."""
+OUTSIDE = """() => { const { view, data, state } = robojackson, pane = view.panes[2], row = data.trained.row;
+  view.aim(pane); pane.camera.updateMatrixWorld();
+  const place = (at) => new THREE.Vector3(...data.trained.values.slice(at, at + 3)).project(pane.camera);
+  let most = 0;
+  for (let at = state.picture * row + 7; at < (state.picture + 1) * row; at += 7) most = Math.max(most, ...place(at).toArray().slice(0, 2).map(Math.abs));
+  return most; }"""  # noqa: E501
+"""How far the bodies of the robot are from the middle of its pane; 1 is the edge."""
 GO = "k => { robojackson.video.pause(); robojackson.go(k); }"
 
 
@@ -91,6 +98,35 @@ def test_keyboard_slows_and_shows_the_ghost(opened: Open, page_file: Path) -> No
     page.keyboard.press("g")
     assert page.evaluate("robojackson.video.playbackRate") == 0.25
     assert page.get_attribute("#ghost", "aria-pressed") == "true"
+
+
+def test_sound_begins_with_its_button(opened: Open, page_file: Path) -> None:
+    page = opened(page_file).page
+    button = page.locator("#sound")
+    assert (button.inner_text(), page.evaluate("robojackson.video.muted")) == ("Sound on", True)
+    button.click()
+    assert (button.inner_text(), page.evaluate("robojackson.video.muted")) == ("Sound off", False)
+
+
+def test_a_dance_that_ended_has_no_curve_after_its_end(opened: Open, fallen_page: Path) -> None:
+    page = opened(fallen_page).page
+    found = page.evaluate("robojackson.curves.map((curve) => curve.data.slice(1))")
+    angles, _, error = found
+    assert [values.index(None) for values in (angles[1], error[0])] == [FALLEN, FALLEN]
+    assert None not in angles[0]
+
+
+def test_the_robot_that_fell_is_in_its_pane(opened: Open, fallen_page: Path) -> None:
+    """It is as large as its reference before, and shown whole when it lies."""
+    page = opened(fallen_page).page
+    page.evaluate(GO, 2)
+    page.evaluate(DRAWN, 2)
+    sizes = page.evaluate("robojackson.view.panes.map((pane) => pane.width)")
+    assert sizes[1] == pytest.approx(sizes[2])
+    page.evaluate(GO, FALLEN + 5)
+    page.evaluate(DRAWN, FALLEN + 5)
+    assert page.evaluate("robojackson.view.panes[2].width") > 1.2 * sizes[2]
+    assert page.evaluate(OUTSIDE) < 1
 
 
 def test_axe_finds_nothing_serious(opened: Open, page_file: Path, axe: str) -> None:

@@ -12,11 +12,13 @@ from robojackson.clips.quality.stability import Stability
 from robojackson.clips.video import VideoInfo
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
-from robojackson.report.pages.evaluation_text import beat_rows
-from robojackson.report.pages.page_content import Results, page_content, versions
+from robojackson.report.pages.evaluation_text import beat_rows, next_step
+from robojackson.report.pages.page_content import Results, limb_rows, page_content, versions
 from robojackson.report.pages.run_page import PageContent, render, write_page
 from robojackson.report.plots import run_plots
 from robojackson.report.quantities import format_value, quantity
+from robojackson.report.video.timeline import Timeline
+from robojackson.report.web.player_data import Player
 
 POLICIES = ("trained", "statue")
 SUMMARY = {
@@ -108,6 +110,47 @@ def test_headline_says_when_learning_gained_nothing(success: float, message: str
     baselines = {"statue": {**SUMMARY["baselines"]["statue"], "success": success}}
     html = render(PageContent(title="x", evaluation={**SUMMARY, "baselines": baselines}))
     assert message in html
+
+
+@pytest.mark.parametrize(
+    ("evaluation", "option"),
+    [
+        ({"verdict": {"kind": "falls"}}, "--minutes 24"),
+        ({"verdict": {"kind": "falls"}, "tracker": "regulator"}, "--instant"),
+        ({"verdict": {"kind": "too_short"}}, "--start, --end"),
+        ({"verdict": {"kind": "dances"}}, ""),
+        ({}, ""),
+    ],
+)
+def test_a_robot_that_does_not_dance_has_its_next_step(
+    evaluation: dict[str, object], option: str
+) -> None:
+    assert next_step(evaluation, 12.0)[1] == option
+
+
+def test_the_next_step_is_below_the_verdict() -> None:
+    verdict = {"verdict": {"kind": "falls", "sentence": "The robot falls after 1 s."}}
+    html = render(PageContent(title="x", evaluation=verdict, next_step=("Train", "--minutes 15")))
+    lead = re.search(r'<p class="lead">(.*?)</p>', html)
+    assert lead is not None
+    assert lead.group(1).startswith("The robot falls after 1 s.")
+    assert "Train <code>--minutes 15</code>" in lead.group(1)
+
+
+def test_the_robot_is_named_above_the_dance_and_in_the_window() -> None:
+    html = render(PageContent(title="hip shake", robot="g1"))
+    assert "<title>hip shake, g1 · RoboJackson</title>" in html
+    assert '<p class="kicker">RoboJackson · g1</p>' in html
+
+
+@pytest.mark.medium
+def test_errors_by_limb_end_with_the_rollout(results: Results) -> None:
+    error = np.linspace(0.0, 0.9, 10)
+    when = Timeline(*np.zeros((5, 10), int), ended=np.arange(10) >= 5)
+    shown = Player({}, [], when, dict.fromkeys(("head", "left_hand"), error), {})
+    rows = {row.title: row.values for row in limb_rows(replace(results, player=shown))}
+    assert rows["head"][2] == "200 mm"
+    assert rows["left foot"][2] == "–"
 
 
 @pytest.mark.parametrize("figure", ["lean_deg", "keypoint_leaned_mm"])

@@ -7,7 +7,7 @@ from typing import Any
 from robojackson.report.quantities import POLICY_TITLES, Quantity, format_value, quantities
 from robojackson.report.web.beats import TITLES
 from robojackson.rl.config.evaluate_config import TRAINED
-from robojackson.rl.evaluation.verdict import NEEDS_FULL_LENGTH
+from robojackson.rl.evaluation.verdict import NEEDS_FULL_LENGTH, longer_minutes
 
 Evaluation = Mapping[str, Any]
 """The content of evaluation.json."""
@@ -38,6 +38,12 @@ def dancer_of(evaluation: Evaluation) -> str:
     return POLICY_TITLES[TRAINED][0] if name is None else f"tracker {name}"
 
 
+def dancer_title(evaluation: Evaluation) -> str:
+    """Return the title of the dancer's pane."""
+    title = dancer_of(evaluation)
+    return f"Robot, {title}" if "tracker" in evaluation else title.capitalize()
+
+
 def headline(evaluation: Evaluation) -> str:
     """Return one sentence about the result, beside the best of the baselines."""
     if not evaluation:
@@ -63,13 +69,30 @@ def headline(evaluation: Evaluation) -> str:
     return f"{text}; a baseline that learnt nothing ({best}) does {how}: {figure}."
 
 
+def next_step(evaluation: Evaluation, minutes: float) -> tuple[str, str]:
+    """Return what to do about a robot that does not dance, and the option of `dance` that does it;
+    empty texts for one that dances.
+
+    Args:
+        minutes: Budget of the pass.
+    """
+    kind = evaluation.get("verdict", {}).get("kind")
+    if kind in (None, "dances"):
+        return "", ""
+    if kind == "too_short":
+        return "Film or choose a range of at least two seconds:", "--start, --end"
+    if "tracker" in evaluation:
+        return "Train the robot on this dance: the same command without", "--instant"
+    return "Train longer: the same command with", f"--minutes {longer_minutes(minutes):g}"
+
+
 def tiles(evaluation: Evaluation) -> list[Quantity]:
     """Return the headline figures of an evaluation."""
     meanings = {
         "success": "no fall in a whole rollout",
         "survived_s": "mean time before a fall",
         "skill": "1 is perfect, 0 is the best frozen pose",
-        "site_error_m": "mean distance of 14 points",
+        "site_error_m": "mean distance from the reference",
         "limb_gain": "1 is the whole amplitude",
     }
     found = {key: evaluation[key] for key in meanings if evaluation.get(key) is not None}

@@ -23,7 +23,7 @@
     const follows = worst <= dance.tolerance;
     $('badge').textContent = follows ? `physics as in Python: ${worst.toFixed(2)} mm apart after ${dance.substeps * dance.records[0].steps} steps`
       : `physics differs from Python's by ${worst.toFixed(0)} mm: not what was evaluated`;
-    $('badge').classList.add(follows ? 'good' : 'bad');
+    $('badge').classList.toggle('good', follows); $('badge').classList.toggle('bad', !follows);
     return worst;
   }
 
@@ -83,9 +83,11 @@
     const { qpos } = dancer.data, target = state.follow ? qpos : dancer.qpos;
     const ease = clock === 0 ? 1 : 0.12;
     pane.target.x += ease * (target[0] - pane.target.x); pane.target.y += ease * (target[1] - pane.target.y);
-    pane.target.z = pane.height * 0.5 - 0.06;
+    /* Where the robot lies, the camera looks down to it. */
+    const level = pane.height * 0.5 - 0.06, low = state.follow && !ghost.group.visible ? Math.max(0, dancer.qpos[2] - qpos[2]) : 0;
+    pane.target.z += ease * (Math.max(level / 3, level - low) - pane.target.z);
     $('danced').textContent = seconds(dancer.danced); $('error').textContent = `${Math.round(1000 * dancer.error)} mm`;
-    $('fallen').hidden = !dancer.fallen;
+    $('fallen').hidden = !dancer.fallen; $('again').classList.toggle('primary', dancer.fallen);
     view.draw();
   }
   let clock = 0, before = 0, behind = 0, since = 0, danced = 0;
@@ -145,5 +147,5 @@
   view.measure(); again();
   node.dataset.ready = 'yes';
   requestAnimationFrame((now) => { before = since = now; check(dance.checked); again(); node.dataset.checked = 'yes'; requestAnimationFrame(loop); });
-  window.robojackson = { dancer, dance, state, view, check, again, push, held, drag };
+  window.robojackson = { dancer, dance, state, view, check, again, push, held, drag, show };
 })();

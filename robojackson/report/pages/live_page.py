@@ -4,6 +4,7 @@ import numpy as np
 
 from robojackson.report.pages import inline
 from robojackson.report.web.live_data import live_data
+from robojackson.report.web.pane_camera import MARGIN_M
 from robojackson.report.web.shown_run import RecordedRun
 from robojackson.rl.policy import Policy
 
@@ -18,7 +19,7 @@ PULL = 6.0
 STRONGEST = 5.0
 """Largest acceleration of the whole robot by the pointer, m/s^2."""
 ROOM = 1.35
-"""Margin of the pane around the dance, height and width."""
+"""Margin of the pane around the dance, of its height."""
 
 
 def live_page(run: RecordedRun, title: str) -> str | None:
@@ -32,9 +33,10 @@ def live_page(run: RecordedRun, title: str) -> str | None:
     if not isinstance(run.policy, Policy):
         dancer = f"tracker {run.policy.description.name}"
     points, mass = np.asarray(run.reference.keypoints_w), float(run.robot.model.body_mass.sum())
+    around = np.linalg.norm(points[..., :2] - run.reference.qpos[:, None, :2], axis=-1)
     data |= {
         "height": ROOM * float(points[..., 2].max()),
-        "width": ROOM * float(np.ptp(points[..., :2], axis=(0, 1)).max()),
+        "width": 2 * (float(around.max()) + MARGIN_M),
         "tolerance": TOLERANCE_MM,
         "checked": CHECKED,
         "stiffness": PULL * mass,
@@ -50,6 +52,7 @@ def live_page(run: RecordedRun, title: str) -> str | None:
         scripts,
         security=inline.policy(scripts, styles, wasm=True),
         title=title,
+        robot=run.reference.robot,
         data=inline.json_text(data),
         steps=len(run.reference),
         dancer=dancer,

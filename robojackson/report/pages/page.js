@@ -21,10 +21,11 @@
     track.at = Stage.floats(track.target);
     track.values = Stage.floats(track.poses ?? track.points);
     track.row = track.values.length / count;
+    track.wide = Stage.floats(track.widths);
     figures[name] = name === 'body' ? Stage.person(data.person, materials, materials.shadow, view.software)
       : Stage.robot(data.robot, materials[name], materials.shadow, view.software);
     pane.scene.add(figures[name].group);
-    Object.assign(pane, { track, height: track.height, width: track.width });
+    Object.assign(pane, { track, height: track.height, width: track.wide[0] });
     if (name === 'trained') pane.scene.add(ghost.group);
   });
   if (ghost) ghost.group.visible = false;
@@ -36,6 +37,7 @@
       const pane = view.panes[i], { track } = pane, at = follow ? picture : 0;
       figures[name].pose(track.values, picture * track.row);
       pane.target.set(track.at[2 * at], track.at[2 * at + 1], track.height * 0.5 - 0.06);
+      pane.width = track.wide[picture];
     });
     if (ghost?.group.visible) ghost.pose(data.reference.values, picture * data.reference.row);
     if (document.activeElement !== seek || video.paused) seek.value = picture;
@@ -84,7 +86,11 @@
       if (!ghost) return;
       ghost.group.visible = !ghost.group.visible; press('ghost', ghost.group.visible); show(state.picture);
     },
-    sound() { video.muted = !video.muted; press('sound', !video.muted); },
+    sound() {
+      if (!$('sound')) return;
+      video.muted = !video.muted; $('sound').classList.toggle('primary', video.muted);
+      $('sound').textContent = video.muted ? 'Sound on' : 'Sound off';
+    },
   };
   video.addEventListener('play', () => { $('play').textContent = 'Pause'; });
   video.addEventListener('pause', () => { $('play').textContent = 'Play'; });
@@ -112,7 +118,9 @@
 
   /* Curves over time with a cursor that follows. */
   const seconds = Float64Array.from({ length: count }, (_, i) => i / fps), curves = [];
-  const column = (text, index, width) => { const all = Stage.floats(text); return Float64Array.from(seconds, (_, i) => all[i * width + index]); };
+  const column = (text, index, width) => { const all = Stage.floats(text); return Array.from(seconds, (_, i) => all[i * width + index]); };
+  /* What a rollout has after its end is its last pose: not shown. */
+  const danced = (values) => values.map((value, i) => (i < data.ended ? value : null));
   function plot(id, label, unit, series) {
     const host = $(id);
     if (!host) return null;
@@ -132,13 +140,13 @@
     curves.splice(0).forEach((curve) => curve.destroy());
     const joint = Number($('joint').value), n = data.joints.length, name = data.joints[joint];
     const angles = [{ name: 'reference', stroke: '--curve-reference', values: column(data.angles, joint, n), dash: [6, 4] }];
-    if (data.trained) angles.push({ name: 'robot', stroke: '--accent', values: column(data.trained_angles, joint, n) });
+    if (data.trained) angles.push({ name: 'robot', stroke: '--accent', values: danced(column(data.trained_angles, joint, n)) });
     curves.push(plot('plot-angle', `Angle of ${name} over time, degrees`, '°', angles));
     if (data.torque) curves.push(plot('plot-torque', `Torque that the reference asks of ${name}, per cent of the limit`, '%', [
       { name: 'torque', stroke: '--warm', values: column(data.torque, joint, n) },
       { name: 'limit', stroke: '--curve-reference', values: seconds.map(() => 100), dash: [3, 5] }]));
     if (data.error) curves.push(plot('plot-error', 'Mean distance of the robot from the reference over time, millimetres', 'mm', [
-      { name: 'error', stroke: '--accent', values: column(data.error, 0, 1) }]));
+      { name: 'error', stroke: '--accent', values: danced(column(data.error, 0, 1)) }]));
     curves.splice(0, curves.length, ...curves.filter(Boolean));
     show(state.picture);
   }
@@ -155,5 +163,5 @@
   if (matchMedia('(prefers-reduced-motion: reduce)').matches) go(0);
   else video.play().catch(() => go(0));
   node.dataset.ready = 'yes';
-  window.robojackson = { state, video, view, go, step, data };
+  window.robojackson = { state, video, view, go, step, data, curves };
 })();

@@ -13,7 +13,7 @@ from robojackson.clips.quality.stability import Stability
 from robojackson.clips.video import VideoInfo
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import AIR, PLANTED, SmplSequence
-from robojackson.report.pages.evaluation_text import Verdict, dancer_of
+from robojackson.report.pages.evaluation_text import Verdict, dancer_of, next_step
 from robojackson.report.pages.run_page import PageCandidate, PageContent, Plot
 from robojackson.report.plots import run_plots
 from robojackson.report.plots.feasibility_plot import feasibility_strip
@@ -24,6 +24,8 @@ PROGRAMS = ("robojackson", "mujoco", "gymnasium", "mediapipe", "torch", "jax", "
             "sb3-contrib", "prefect", "numpy")  # fmt: skip
 
 SHOWN_FINDINGS = 3
+NOTHING = 0.01
+"""Slack that is too small to be seen, tolerances."""
 LIMBS = {
     "head": ("pelvis", "head"),
     "left_hand": ("left_shoulder", "left_hand"),
@@ -57,6 +59,7 @@ class Results:
         beats: Beats of motions and music.
         provenance: Digests of the results, by name.
         settings: The configuration, as YAML.
+        minutes: Budget of the pass.
     """
 
     title: str
@@ -78,12 +81,14 @@ class Results:
     beats: Sequence[Verdict] = ()
     provenance: Mapping[str, str] = field(default_factory=dict)
     settings: str = ""
+    minutes: float = 0.0
 
 
 def page_content(results: Results, video: str | None) -> PageContent:
     """Return the page of a run; `video` is the mp4's address relative to the page."""
     return PageContent(
         title=results.title,
+        robot=results.reference.robot,
         source=_source(results.info),
         stability=asdict(results.stability) if results.stability else {},
         mocap=_mocap(results.sequence),
@@ -105,13 +110,14 @@ def page_content(results: Results, video: str | None) -> PageContent:
         beats=results.beats,
         provenance=results.provenance,
         settings=results.settings,
+        next_step=next_step(results.evaluation, results.minutes),
     )
 
 
 def limb_rows(results: Results) -> list[Verdict]:
     """Return figures of head, hands and feet: capture, retargeting, the rollout shown, the
     evaluation."""
-    errors = results.player.error_m if results.player else {}
+    errors = results.player.error_while_up if results.player else {}
     directions = limb_directions(results.sequence, results.reference)
     rows = []
     for limb, (_, end) in LIMBS.items():
@@ -206,15 +212,22 @@ def _dynamics(reference: ReferenceMotion) -> list[Plot]:
     if reference.certificate is not None:
         caption = (
             "Force that neither feet nor motors can supply, in tolerances: feasible up to "
-            "the dashed line. Below, the tempo beside the clip."
+            "the dashed line (green), beyond it at a slower tempo (orange) or not at all (red). "
+            "Below, the tempo beside the clip."
         )
+        if float(reference.certificate.slack.max(initial=0.0)) < NOTHING:
+            caption = "Nothing is missing: feet and motors supply all forces. " + caption
         findings = reference.certificate.findings
         if findings:
             caption += " " + "; ".join(str(finding) for finding in findings[:SHOWN_FINDINGS]) + "."
         made.append(_plot("Can the robot do it?", caption, feasibility_strip(reference)))
     if reference.torque_ratio.shape[1] == len(reference.joint_names):
         figure = run_plots.torque_heat_map(reference, reference.joint_names)
-        made.append(_plot("Torques", "Required torque of each motor, over its limit.", figure))
+        caption = (
+            "Required torque of each motor, over its limit; beside the names the share of the time "
+            "over it."
+        )
+        made.append(_plot("Torques", caption, figure))
     return made
 
 

@@ -18,6 +18,7 @@ from robojackson.report.pages.evaluation_text import (
     Verdict,
     beat_tiles,
     dancer_of,
+    dancer_title,
     headline,
     passport_rows,
     tiles,
@@ -58,6 +59,7 @@ class PageContent:
 
     Attributes:
         title: Title of the dance.
+        robot: Name of the robot.
         source: Name of the file, width, height, frames, fps, duration_s.
         stability: Fields of `Stability`.
         mocap: Figures of the recovered motion.
@@ -78,9 +80,11 @@ class PageContent:
         limbs, beats: Rows of figures by limb, and of beats of motions and music.
         provenance: Digests of the results.
         settings: The configuration, as YAML.
+        next_step: What to do about a robot that does not dance and the option for it, or empty.
     """
 
     title: str
+    robot: str = ""
     source: Mapping[str, Any] = field(default_factory=dict)
     stability: Mapping[str, Any] = field(default_factory=dict)
     mocap: Mapping[str, Any] = field(default_factory=dict)
@@ -102,6 +106,7 @@ class PageContent:
     beats: Sequence[Verdict] = ()
     provenance: Mapping[str, str] = field(default_factory=dict)
     settings: str = ""
+    next_step: tuple[str, str] = ("", "")
 
 
 @dataclass(frozen=True)
@@ -161,6 +166,7 @@ def render(content: PageContent) -> str:
         **_player_values(content),
         headline=headline(evaluation),
         dancer=dancer_of(evaluation),
+        dancer_title=dancer_title(evaluation),
         trackers=list(evaluation.get("trackers", {})),
         tiles=tiles(evaluation) + beat_tiles(content.beats),
         columns=[Quantity("", "")] + quantities(dict.fromkeys(VERDICT_COLUMNS)),

@@ -27,7 +27,7 @@ def feasibility_strip(reference: ReferenceMotion) -> Figure:
     bottom.plot(time_s, tempo, color=ACCENT, lw=1.6)
     bottom.set_ylim(0.0, max(1.1, 1.05 * float(tempo.max())))
     bottom.set_ylabel("tempo")
-    bottom.set_xlabel("s      green: feasible, orange: a slower tempo would do, red: it would not")
+    bottom.set_xlabel("time, s")
     return figure
 
 

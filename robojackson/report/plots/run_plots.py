@@ -28,6 +28,8 @@ BASELINE_COLOURS = {
     "statue": "#a78bfa", "mean_pose": "#e879b9", "zero_residual": GOOD, "random": "#9aa3b2",
 }  # fmt: skip
 BINS = 60
+LABEL = 0.12
+"""Width of a bar's figure, as a gain."""
 TORQUE_SHOWN = 2.0
 """Largest torque of the colour scale, as a multiple of the limit."""
 TORQUE_COLOURS = ((0.0, "#8080801a"), (0.5, ACCENT), (0.5, SECOND), (1.0, "#b3123a"))
@@ -89,8 +91,10 @@ def limb_gains(summary: Mapping[str, Any]) -> Figure:
     axes.barh(names, values, color=[_side_colour(name) for name in gains])
     for index, value in enumerate(gains.values()):
         text = decimal(value, 2) if np.isfinite(value) else "does not move in the reference"
-        axes.text(max(value, 0.0) if np.isfinite(value) else 0.0, index, f" {text}", va="center",
-                  color=INK, fontsize=8)  # fmt: skip
+        end = max(value, 0.0) if np.isfinite(value) else 0.0
+        if 1.0 - LABEL < end < 1.0:
+            end = 1.0  # beside the line, not over it
+        axes.text(end, index, f" {text}", va="center", color=INK, fontsize=8)
     axes.axvline(1.0, color=INK, lw=1, ls="--")
     axes.set_xlim(min(0.0, values.min(initial=0.0)), max(1.3, values.max(initial=0.0) * 1.15))
     axes.set_xlabel("velocity gain (1 = as in the reference)")
@@ -113,7 +117,7 @@ def contact_strip(sequence: SmplSequence, reference: ReferenceMotion) -> Figure:
     _strip(robot, reference.contact, contacts, len(reference) * reference.dt)
     human.set_title("person", loc="left", fontsize=9, color=INK)
     robot.set_title("reference robot", loc="left", fontsize=9, color=INK)
-    robot.set_xlabel("s      green: planted, orange: sliding, grey: in the air")
+    robot.set_xlabel("time, s (green: planted, orange: sliding, grey: in the air)")
     return figure
 
 
@@ -137,7 +141,7 @@ def torque_heat_map(reference: ReferenceMotion, motors: Sequence[str]) -> Figure
             for name, share in zip(motors, over, strict=True)
         ],
     )
-    axes.set_xlabel("s      names: share of the time over the limit")
+    axes.set_xlabel("time, s")
     axes.grid(visible=False)
     _torque_bar(figure, picture, bool((ratio > TORQUE_SHOWN).any()))
     return figure

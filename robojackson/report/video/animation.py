@@ -9,11 +9,12 @@ from PIL import Image
 from robojackson.clips.video import VideoLimits, probe, read_frames
 from robojackson.files.file_tree import FileTree
 
-FPS, WIDTH_PX = 12, 640
+FPS, LONGEST_PX = 12, 640
 
 
 def write_animation(film: Path, out: Path, kind: str) -> Path:
-    """Write the pictures of a film, at most 12 a second and 640 pixels wide, endlessly repeated.
+    """Write the pictures of a film, repeated without end: at most 12 a second, longer side 640
+    pixels.
 
     Args:
         kind: gif or webp.
@@ -23,7 +24,7 @@ def write_animation(film: Path, out: Path, kind: str) -> Path:
     """
     info = probe(film, VideoLimits(min_frames=1))
     every = max(1, round(info.fps / FPS))
-    scale = min(1.0, WIDTH_PX / info.width)
+    scale = min(1.0, LONGEST_PX / max(info.width, info.height))
     pictures = [
         Image.fromarray(cv2.resize(frame, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA))
         for index, frame in enumerate(read_frames(film))

@@ -14,9 +14,9 @@ from jaxtyping import Bool, Float, Int
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import AIR, SmplSequence
-from robojackson.report.video.panel_camera import smooth_camera_path
 from robojackson.report.video.reprojection import weak_frames
 from robojackson.report.video.timeline import Timeline, reference_qpos, timeline
+from robojackson.report.web.pane_camera import followed, followed_beside
 from robojackson.report.web.shapes import body_poses, packed, person_shape, robot_shape
 from robojackson.robot.model import Robot
 
@@ -25,7 +25,6 @@ FAINT = 0.5
 FAR_M = 0.15
 """Mean site error above which a stretch is marked, metres: half the limit of strict success."""
 CONTACT_CLASSES = {1: "on", 2: "slide"}
-MARGIN_M = 0.12
 LEAST_SPAN = 2
 """Smallest length of a marked stretch, pictures, so that it is visible."""
 
@@ -72,6 +71,11 @@ class Player:
     error_m: dict[str, Float[np.ndarray, " N"]]
     points: dict[str, Float[np.ndarray, "N K 3"]]
 
+    @property
+    def error_while_up(self) -> dict[str, Float[np.ndarray, " M"]]:
+        """Return the errors of the pictures before the rollout ends."""
+        return {name: error[~self.when.ended] for name, error in self.error_m.items()}
+
 
 def player(
     track: LandmarkTrack,
@@ -89,13 +93,14 @@ def player(
     poses, sites = body_poses(robot.model, target)
     sites = sites[:, robot.keypoint_sites]
     points = np.asarray(sequence.keypoints_w, float)[np.minimum(when.frame, len(sequence) - 1)]
+    seen = followed(sites, target[:, :3], fps)
     data: dict[str, object] = {
         "fps": fps,
         "count": len(when),
         "robot": robot_shape(robot.model),
         "person": person_shape(),
-        "body": {"points": packed(points), **_followed(points, points[:, 0], fps)},
-        "reference": {"poses": packed(poses), **_followed(sites, target[:, :3], fps)},
+        "body": {"points": packed(points), **followed(points, points[:, 0], fps).data},
+        "reference": {"poses": packed(poses), **seen.data},
         "joints": [name.replace("_", " ") for name in reference.joint_names],
         "angles": packed(np.degrees(target[:, 7:])),
         "torque": _torques(reference, when),
@@ -110,24 +115,14 @@ def player(
         apart = np.linalg.norm(own_sites - sites, axis=-1)
         moved["robot"] = own_sites
         errors = dict(zip(robot.keypoint_names, apart.T, strict=True))
-        data["trained"] = {"poses": packed(own_poses), **_followed(own_sites, danced[:, :3], fps)}
+        camera = followed_beside(own_sites, danced[:, :3], fps, seen)
+        data["trained"] = {"poses": packed(own_poses), **camera.data}
         data["trained_angles"] = packed(np.degrees(danced[:, 7:]))
         data["error"] = packed(1000 * apart.mean(1))
         data["ended"] = int(np.argmax(when.ended)) if when.ended.any() else len(when)
     bands = _contact_bands(sequence, reference, when)
     bands.append(Band("look here", attention(sequence, reference, when, errors, track)))
     return Player(data, [band for band in bands if band.spans], when, errors, moved)
-
-
-def _followed(points: np.ndarray, root: np.ndarray, fps: float) -> dict[str, object]:
-    """Return the target of a camera, and the size of its subject, metres."""
-    path = smooth_camera_path(root, fps)
-    around = np.linalg.norm(points[..., :2] - path[:, None], axis=-1).max()
-    return {
-        "target": packed(path),
-        "height": float(points[..., 2].max()) + 2 * MARGIN_M,
-        "width": 2 * float(around + MARGIN_M),
-    }
 
 
 def _torques(reference: ReferenceMotion, when: Timeline) -> str | None:
@@ -151,7 +146,7 @@ def _contact_bands(
         contact = np.asarray(reference.contact)[when.step][:, own]
         if own:
             state = np.where((contact == AIR).all(1), 0, np.where((contact == 1).any(1), 1, 2))
-            bands.append(Band(f"robot, {side} foot", _spans(state)))
+            bands.append(Band(f"reference, {side} foot", _spans(state)))
     return bands
 
 

@@ -15,6 +15,8 @@ DANCES = 0.95
 PARTLY = 0.5
 NO_BETTER = 1.25
 """Factor on the best baseline's survival up to which a robot counts as no better."""
+LONGER_MINUTES = 15.0
+"""Least budget that a pass is advised to take whose robot does not dance, minutes."""
 NEEDS_FULL_LENGTH = ("success", "strict_success", "skill")
 """Figures that are empty where the rollouts are too short to evaluate."""
 TITLES = {
@@ -120,6 +122,11 @@ def _kind(
     if own["strict_success"] >= PARTLY:
         return "partly"
     return "falls" if own["survived_s"] <= NO_BETTER * baseline_s else "learning"
+
+
+def longer_minutes(minutes: float) -> float:
+    """Return the budget that is advised after a pass of `minutes` whose robot does not dance."""
+    return max(2 * minutes, LONGER_MINUTES)
 
 
 def without_short_figures(figures: Mapping[str, Any]) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.rollout import Rollout
 from robojackson.motion.smpl_sequence import SmplSequence
+from robojackson.report.video.animation import write_animation
 from robojackson.report.video.encoder import write_video
 from tests.fixtures.commands import in_process
 
@@ -77,6 +78,15 @@ def test_a_film_is_not_replaced_by_its_own_picture(folder: Path, tmp_path: Path)
     result = in_process("view", film, "--to", "gif", "-o", film)
     assert (result.code, film.read_bytes()) == (1, (folder / "dance.mp4").read_bytes())
     assert "a folder" in in_process("view", film, "--to", "gif", "-o", tmp_path).err
+
+
+def test_a_picture_of_an_upright_film_is_as_high_as_one_of_a_wide_film_is_wide(
+    tmp_path: Path,
+) -> None:
+    upright = [np.full((1280, 720, 3), 8 * k, np.uint8) for k in range(6)]
+    film = write_video(upright, int(FPS), tmp_path / "dance.mp4")
+    with Image.open(write_animation(film, tmp_path / "dance.gif", "gif")) as image:
+        assert image.size == (360, 640)
 
 
 def test_a_run_becomes_a_recording_for_rerun(folder: Path, tmp_path: Path) -> None:
