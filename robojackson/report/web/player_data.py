@@ -11,11 +11,11 @@ from itertools import groupby
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from robojackson.mocap.reprojection import weak_frames
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import AIR, SmplSequence
 from robojackson.report.video.panel_camera import smooth_camera_path
-from robojackson.report.video.reprojection import weak_frames
 from robojackson.report.video.timeline import Timeline, reference_qpos, timeline
 from robojackson.report.web.shapes import body_poses, packed, person_shape, robot_shape
 from robojackson.robot.model import Robot
