@@ -92,7 +92,8 @@ def _reprojection_lines(answer: Answer) -> list[str]:
         return []
     weak = ", ".join(f"{start:.1f}-{end:.1f} s" for start, end in found["weak_s"])
     line = f"overlay   {100 * found['median_m']:.0f} cm off the landmarks (median)"
-    return [line + (f"; weak: {weak}" if weak else "")]
+    advice = "leave them out: --set mocap.leave_out_weak=true"
+    return [line, *([f"weak      {weak} ({advice})"] if weak else [])]
 
 
 def advice_lines(answer: Answer) -> list[str]:

@@ -15,6 +15,7 @@ import numpy as np
 from av.video.frame import VideoFrame
 from pydantic import Field
 
+from robojackson.clips.upright_frame import upright
 from robojackson.clips.video_container import (
     FASTEST,
     declared_rate,
@@ -157,10 +158,6 @@ def read_frames(
     return (image for _, image in timed_frames(path, start_s, end_s))
 
 
-NEARLY = 1.1
-"""Making an image smaller costs more than a tenth of its pixels."""
-
-
 def timed_frames(
     path: Path,
     start_s: float | None = None,
@@ -182,7 +179,7 @@ def timed_frames(
         if end_s is not None and time_s >= end_s - TIME_TOLERANCE_S:
             return
         if start_s is None or time_s >= start_s - TIME_TOLERANCE_S:
-            yield time_s, _upright(frame, short_side)
+            yield time_s, upright(frame, short_side)
 
 
 def _decoded(path: Path) -> Iterator[tuple[float, VideoFrame]]:
@@ -208,18 +205,6 @@ def _decoded(path: Path) -> Iterator[tuple[float, VideoFrame]]:
                 good += 1
                 time_s = good / declared if frame.time is None else float(frame.time)
                 yield time_s, frame
-
-
-def _upright(frame: VideoFrame, short_side: int | None) -> np.ndarray:
-    shortest = min(frame.width, frame.height)
-    if short_side is not None and shortest > NEARLY * short_side:
-        factor = short_side / shortest
-        width, height = round(frame.width * factor), round(frame.height * factor)
-        small = frame.reformat(width, height, format="rgb24", interpolation="AREA")
-        image = small.to_ndarray()
-    else:
-        image = frame.to_ndarray(format="rgb24")
-    return np.ascontiguousarray(np.rot90(image, round(frame.rotation / 90) % 4))
 
 
 def _require_complete(path: Path, frames: int, promised: int) -> None:

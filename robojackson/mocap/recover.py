@@ -25,6 +25,7 @@ from robojackson.mocap.landmarks.bone_lengths import fit_skeleton
 from robojackson.mocap.landmarks.covariance import certainty
 from robojackson.mocap.landmarks.refinement import RefineConfig, gather, refine
 from robojackson.mocap.pose.posed_body import Body, pose_landmarks
+from robojackson.mocap.reprojection import weak_frames, without_weak_frames
 from robojackson.mocap.temporal.temporal_lift import TemporalConfig, lift
 from robojackson.motion.landmark_track import LandmarkTrack, evenly
 from robojackson.motion.smpl_sequence import SmplSequence
@@ -41,6 +42,8 @@ class MocapConfig:
         depth_cutoff_hz: Low-pass of the distance of the body from the camera, hertz.
         bone_trust: Share of the clip's medians in the proportions; the rest is from the rest
             skeleton.
+        leave_out_weak: Whether stretches in which the body lies off the picture are left out: the
+            motion is recovered again without them, and interpolated there.
         temporal: Settings of the network that corrects the detector.
         refine: Settings of the whole-clip refinement.
         gravity: Settings of the direction of up.
@@ -52,6 +55,7 @@ class MocapConfig:
     cutoff_hz: float = Field(default=4.0, gt=0)
     depth_cutoff_hz: float = Field(default=1.5, gt=0)
     bone_trust: float = Field(default=0.6, ge=0, le=1)
+    leave_out_weak: bool = False
     temporal: TemporalConfig = Field(default_factory=TemporalConfig)
     refine: RefineConfig = Field(default_factory=RefineConfig)
     gravity: floor.GravityConfig = Field(default_factory=floor.GravityConfig)
@@ -88,7 +92,12 @@ def recover_motion(track: LandmarkTrack, config: MocapConfig) -> SmplSequence:
     Raises:
         TrackTooShort, NoPersonFound: no motion can be recovered.
     """
-    return finish_motion(view_track(track, config), config)
+    sequence = finish_motion(view_track(track, config), config)
+    if not config.leave_out_weak:
+        return sequence
+    even = evenly(track)
+    kept = without_weak_frames(even, weak_frames(sequence, even))
+    return sequence if kept is even else finish_motion(view_track(kept, config), config)
 
 
 def view_track(track: LandmarkTrack, config: MocapConfig) -> View:

@@ -3,11 +3,19 @@
 from pathlib import Path
 
 import av
+import cv2
 import numpy as np
 import pytest
 
 from robojackson.clips.trim import trim
-from robojackson.clips.video import VideoLimits, list_videos, probe, read_frames, timed_frames
+from robojackson.clips.upright_frame import TURNS
+from robojackson.clips.video import (
+    VideoLimits,
+    list_videos,
+    probe,
+    read_frames,
+    timed_frames,
+)
 from robojackson.errors import (
     RoboJacksonError,
     TrackTooShort,
@@ -45,6 +53,20 @@ def test_every_frame_is_read_in_order(write_video) -> None:
 def test_frames_have_no_padding_between_rows(write_video) -> None:
     image = next(read_frames(write_video(size=(90, 48))))
     assert image.flags.c_contiguous
+
+
+@pytest.mark.parametrize("width", [64, 90])
+def test_pixels_are_those_that_the_decoder_gives(write_video, width: int) -> None:
+    path = write_video(frames=3, size=(width, 48))
+    with av.open(str(path)) as container:
+        decoded = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+    assert np.array_equal(np.array(list(read_frames(path))), np.array(decoded))
+
+
+@pytest.mark.parametrize("quarters", [1, 2, 3])
+def test_each_quarter_turn_is_anticlockwise(quarters: int) -> None:
+    image = np.arange(2 * 3 * 3, dtype=np.uint8).reshape(2, 3, 3)
+    assert np.array_equal(cv2.rotate(image, TURNS[quarters]), np.rot90(image, quarters))
 
 
 def test_rotation_tag_swaps_width_and_height(write_video) -> None:

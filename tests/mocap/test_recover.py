@@ -161,3 +161,24 @@ def test_a_jump_is_as_high_as_it_was(hip_shake: LandmarkTrack, height_m: float) 
     assert (found.contact[top - 1 : top + 2] == AIR).all()
     assert (found.contact[:30] == PLANTED).all()
     assert abs(rise[-1]) < 0.02
+
+
+@pytest.mark.medium
+def test_a_weak_stretch_is_left_out_on_request(
+    hip_shake: LandmarkTrack, motion: SmplSequence
+) -> None:
+    spoilt = slice(50, 58)
+    rng = np.random.default_rng(0)
+    landmarks = np.array(hip_shake.landmarks)
+    landmarks[spoilt, :, :2] += rng.uniform(-0.2, 0.2, size=landmarks[spoilt, :, :2].shape)
+    world = np.array(hip_shake.world_landmarks)
+    world[spoilt] += rng.uniform(-0.4, 0.4, size=world[spoilt].shape)
+    track = replace(hip_shake, landmarks=landmarks, world_landmarks=world)
+    off = []
+    for leave_out_weak in (False, True):
+        found = recover_motion(track, MocapConfig(leave_out_weak=leave_out_weak))
+        apart = (found.joints - found.joints[:, :1]) - (motion.joints - motion.joints[:, :1])
+        off.append(np.linalg.norm(apart, axis=-1)[spoilt].mean())
+    assert any("left out" in note for note in found.notes)
+    assert not found.valid[spoilt].any()
+    assert off[1] < 0.5 * off[0]

@@ -2,8 +2,9 @@
 
 PoseLandmarker reads a zip of two TensorFlow Lite models, each with metadata on how the image
 is normalised. The package `@mediapipe/pose` (Apache-2.0) has the three landmark networks and the
-detector, without that metadata. This tool adds it and zips them; the bytes are reproducible, so
-both the tarball and every bundle are checked by sha256.
+detector, without that metadata. This tool adds it, removes the segmentation head, which nothing
+here reads, and zips them; the bytes are reproducible, so both the tarball and every bundle are
+checked by sha256.
 
     python -m tools.assets.build_pose_models                      lite and full, into the assets
     python -m tools.assets.build_pose_models --size heavy         heavy (30.7 MB, not shipped)
@@ -27,14 +28,16 @@ import flatbuffers
 from mediapipe.tasks.metadata import metadata_schema_py_generated as metadata_schema
 from mediapipe.tasks.metadata import schema_py_generated as tflite_schema
 
+from tools.assets.segmentation_head import remove_segmentation_head
+
 logger = logging.getLogger("build_pose_models")
 
 PACKAGE = "@mediapipe/pose@0.5.1675469404"
 TARBALL_SHA256 = "8bb349a7b3a3ba699df23be804ddd3b3eab810b50b15406894be257859388a84"
 BUNDLE_SHA256: Mapping[str, str] = {
-    "lite": "0156ea1fea927adb76c387f506f252a1f3d187dbd7cccbd71c5a909822e8c6d7",
-    "full": "f49a90edc38606cf4a5c4214438b82a706d462f851a40e8733126e56f1c84d89",
-    "heavy": "b7a62382c5d11fa8b8b131fe4a5892bf8fd5a159409aa349dc7eee69313cb75d",
+    "lite": "fce1ee4c11de7c7b96d283c0433b3adc8acc888fce9563c52b459f35301b253a",
+    "full": "7dac570d4a0609e4c7859214b09b3fc0ed06262e5cb6e16566131f4dc15beeee",
+    "heavy": "2cd084a39dd620ed87cc6e63091840829cc86fdcfa730993ecdc2170e3b7c79c",
 }
 DETECTOR_FILE = "pose_solution_packed_assets.data"
 """The detector's .tflite under another name."""
@@ -57,7 +60,9 @@ def bundle(tarball: Path, size: str) -> bytes:
         landmarks = _member(archive, f"pose_landmark_{size}.tflite")
     parts = {
         "pose_detector.tflite": with_normalization(detector, *DETECTOR_NORMALIZATION),
-        "pose_landmarks_detector.tflite": with_normalization(landmarks, *LANDMARKS_NORMALIZATION),
+        "pose_landmarks_detector.tflite": without_mask(
+            with_normalization(landmarks, *LANDMARKS_NORMALIZATION)
+        ),
     }
     with tempfile.TemporaryFile() as buffer:
         with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as zipped:
@@ -79,6 +84,13 @@ def with_normalization(model: bytes, mean: float, std: float) -> bytes:
     entry.buffer = len(graph.buffers) - 1
     others = [m for m in graph.metadata or [] if m.name not in (METADATA_NAME.encode(),)]
     graph.metadata = [*others, entry]
+    return _finished(graph, b"TFL3", len(model))
+
+
+def without_mask(model: bytes) -> bytes:
+    """Return the same TensorFlow Lite model without its segmentation head."""
+    graph = tflite_schema.ModelT.InitFromObj(tflite_schema.Model.GetRootAsModel(model, 0))
+    remove_segmentation_head(graph)
     return _finished(graph, b"TFL3", len(model))
 
 

@@ -19,10 +19,10 @@ def draw_mocap(
         film: Whether to render a video, too.
     """
     from robojackson.api.progress_bar import bar
+    from robojackson.mocap.reprojection import reprojection_record
     from robojackson.motion.landmark_track import LandmarkTrack
     from robojackson.motion.smpl_sequence import SmplSequence
     from robojackson.pipeline.pipeline_config import PipelineConfig
-    from robojackson.report.video.reprojection import reprojection_record
     from robojackson.report.video.side_by_side import body_video
     from robojackson.report.video.still_picture import body_sheet
 

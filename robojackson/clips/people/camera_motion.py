@@ -65,8 +65,14 @@ class CameraMotion:
 
     def _small(self, image: np.ndarray) -> np.ndarray:
         factor = min(1.0, self._config.short_side / min(image.shape[:2]))
-        grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
-        return cv2.resize(grey, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
+        return cv2.resize(
+            grey_levels(image), None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA
+        )
+
+
+def grey_levels(image: UInt8[np.ndarray, "H W *C"]) -> UInt8[np.ndarray, "H W"]:
+    """Return the grey levels of a picture that is RGB, or grey already."""
+    return image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY))
 
 
 def displacement(

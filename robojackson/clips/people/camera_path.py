@@ -22,6 +22,7 @@ from robojackson.clips.people.camera_motion import (
     CORNER_QUALITY,
     LEAST_TEXTURE,
     PERSON_MARGIN,
+    grey_levels,
 )
 from robojackson.clips.people.person_extent import box
 
@@ -154,9 +155,9 @@ class CameraFollower:
         still = np.broadcast_to(np.eye(3), full.shape).copy()
         return CameraPath(still if stray <= STILL else full, jumps, blind, stray)
 
-    def add_frame(self, image: UInt8[np.ndarray, "H W 3"], xy: Float[np.ndarray, "33 2"]) -> None:
-        """Add the next frame, RGB, and the person in it, 0..1, NaN where no person was found."""
-        grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
+    def add_frame(self, image: UInt8[np.ndarray, "H W *C"], xy: Float[np.ndarray, "33 2"]) -> None:
+        """Add the next frame, RGB or grey, and the person in it, 0..1, NaN where none was found."""
+        grey = grey_levels(image)
         self.size = (grey.shape[1], grey.shape[0])
         step = self._followed(grey)
         last = self.to_first[-1] if self.to_first else np.eye(3)
@@ -189,8 +190,7 @@ class CameraFollower:
         return fit
 
     def _moving(self, now: np.ndarray, start: np.ndarray) -> tuple[np.ndarray | None, np.ndarray]:
-        """Return what most corners did together, if they are spread over the image; and which
-        did."""
+        """Return what most corners did together, if spread over the image; and which did."""
         fit, inlier = cv2.findHomography(now, start, cv2.RANSAC, INLIER)
         if fit is None:
             return None, np.zeros(len(now), bool)

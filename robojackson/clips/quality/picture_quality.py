@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
 
+from robojackson.clips.people.camera_motion import grey_levels
 from robojackson.clips.people.person_extent import box
 
 SAMPLES = 16
@@ -23,8 +24,8 @@ class PictureQuality:
         self._looks: list[tuple[float, float]] = []
         self._step, self._seen = 1, 0
 
-    def add_frame(self, image: UInt8[np.ndarray, "H W 3"], xy: Float[np.ndarray, "33 2"]) -> None:
-        """Add the next picture, RGB, and the person in it, 0..1, NaN where no person was found."""
+    def add_frame(self, image: UInt8[np.ndarray, "H W *C"], xy: Float[np.ndarray, "33 2"]) -> None:
+        """Add the next picture, RGB or grey, and the person in it, 0..1, NaN for no person."""
         if not np.isfinite(xy).all():
             return
         if self._seen % self._step == 0:
@@ -47,7 +48,7 @@ class PictureQuality:
         found = box(xy, MARGIN, image.shape[1], image.shape[0])
         if found is None or min(found[2] - found[0], found[3] - found[1]) < LEAST_PX:
             return
-        grey = cv2.cvtColor(image[found[1] : found[3], found[0] : found[2]], cv2.COLOR_RGB2GRAY)
+        grey = grey_levels(image[found[1] : found[3], found[0] : found[2]])
         self._looks.append((float(grey.mean()) / 255.0, detail_share(grey)))
 
 

