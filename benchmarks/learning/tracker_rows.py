@@ -51,13 +51,15 @@ def main() -> None:
     frozen = sorted(path.stem for path in FROZEN.glob("*.parquet"))
     parser.add_argument("--moves", nargs="*", default=frozen, choices=sorted(MOVES))
     parser.add_argument("--friction", nargs="*", type=float, default=FRICTIONS)
+    parser.add_argument("--trackers", nargs="*", default=tracker_names(), choices=tracker_names())
     parser.add_argument("--folder", type=Path, help="for everything, instead of the usual places")
     given = parser.parse_args()
     folders = Folders.at(given.folder)
     path = folders.results / "trackers.json"
     held = json.loads(path.read_text())["rows"] if path.is_file() else []
     command = f"python -m benchmarks.learning.tracker_rows {' '.join(sys.argv[1:])}".strip()
-    for row in measured(given.moves, held, folders, given.friction):
+    requested = (given.moves, given.trackers, given.friction)
+    for row in measured(*requested, held, folders):
         held.append(row)
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps({"command": command, "rows": held}, indent=1) + "\n")
@@ -65,14 +67,15 @@ def main() -> None:
 
 
 def measured(
-    moves: list[str],
+    moves: Sequence[str],
+    trackers: Sequence[str],
+    frictions: Sequence[float],
     held: list[dict[str, Any]],
     folders: Folders,
-    frictions: Sequence[float] = FRICTIONS,
 ) -> Iterator[dict[str, Any]]:
     """Yield rows that are not held yet, of the trackers that are here."""
     known = {(row["tracker"], row["move"], row["friction"], row["poses"]) for row in held}
-    for name in tracker_names():
+    for name in trackers:
         tracker = present(name)
         for move in moves if tracker is not None else ():
             if tracker is None or MOVES[move].robot != tracker.description.robot:
