@@ -97,7 +97,7 @@ def write_page(
         made: What the other stages made, by name.
         move: Name of the dance, for the folder.
         file: Name of the file that is danced; the same video may be stored under another.
-        settings: What it needs besides.
+        settings: Further inputs of the page.
         folder: Where to, instead of there.
     """
     if not folder:

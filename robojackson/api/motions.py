@@ -47,7 +47,7 @@ class LoadedNetworks:
     """The published networks with weights of the user.
 
     Attributes:
-        config: How they run.
+        config: Configuration of the networks.
         networks: The modules.
     """
 

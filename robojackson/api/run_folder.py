@@ -28,7 +28,7 @@ class RunFolder:
     Attributes:
         robot: The robot that danced.
         track, sequence, reference: Landmarks, person and target.
-        rollout: What was danced.
+        rollout: The recorded dance.
         shown: All of it at the moments of its film.
     """
 
