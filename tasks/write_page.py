@@ -112,7 +112,7 @@ def write_first_page(
     """Write the page that a later `write_page` into the same folder replaces; not a stage.
 
     Returns:
-        Its address; None where there is a page already, which is not replaced by less.
+        Address of the page; None where a page exists already, which is not replaced.
     """
     store = Store.from_environment()
     if store.exists(f"{folder}/{PAGE}"):
