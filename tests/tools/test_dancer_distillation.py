@@ -23,7 +23,7 @@ STEPS = np.array([3, 30, 75])
 
 @pytest.fixture
 def rng() -> np.random.Generator:
-    """Seeded."""
+    """Return a seeded generator."""
     return np.random.default_rng(7)
 
 
@@ -38,7 +38,7 @@ def short(seconds: float = 0.6) -> ReferenceMotion:
 def observed(
     motion: ReferenceMotion, qpos: np.ndarray, qvel: np.ndarray, last: np.ndarray
 ) -> np.ndarray:
-    """Observations `preview` of three states."""
+    """Return observations `preview` of three states."""
     robot = stock()
     observer = Observer(robot, "preview")
     step = Clip(motion, None, preview_of(motion, robot)).at(STEPS)
