@@ -121,7 +121,7 @@ class RejectedReference(RoboJacksonError):
     """A reference motion that the robot cannot follow.
 
     Attributes:
-        remedy: What may repair it.
+        remedy: Change that may repair it.
         figure: Name of the figure of the score card that failed; empty where none did.
         value, limit: The figure and its limit.
         forcible: Whether `--force` goes on anyway.

@@ -27,7 +27,7 @@ class Run:
         seed: Seed of the training.
         finished_at: When, with time zone.
         artifacts: What it made, by name.
-        summary: Its figures.
+        summary: Figures of the run.
     """
 
     run_id: Annotated[str, Field(pattern=r"^[\w.-]+$")]

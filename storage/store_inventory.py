@@ -43,7 +43,7 @@ class Item:
     """Files that stay or go together.
 
     Attributes:
-        kind: What they are.
+        kind: Kind of the files.
         key: Key of the file or folder, relative to the root.
         size: Bytes.
         age_s: Since the newest of them was written, seconds.

@@ -42,7 +42,7 @@ def publish(cell: Cell, run_id: str, made: Mapping[str, Artifact]) -> Result:
 
     Args:
         run_id: Run id of the training.
-        made: What its stages left.
+        made: Artifacts of its stages.
     Returns:
         What the stages left, with the tables under their keys among the metrics.
     """

@@ -97,7 +97,7 @@ def write_page(
         made: What the other stages made, by name.
         move: Name of the dance, for the folder.
         file: Name of the file that is danced; the same video may be stored under another.
-        settings: What it needs besides.
+        settings: Further inputs of the page.
         folder: Where to, instead of there.
     """
     if not folder:
@@ -112,7 +112,7 @@ def write_first_page(
     """Write the page that a later `write_page` into the same folder replaces; not a stage.
 
     Returns:
-        Its address; None where there is a page already, which is not replaced by less.
+        Address of the page; None where a page exists already, which is not replaced.
     """
     store = Store.from_environment()
     if store.exists(f"{folder}/{PAGE}"):

@@ -42,7 +42,7 @@ class HolosomaPolicy:
 
     Args:
         kind: `fastsac` or `ppo`.
-        path: Its ONNX file.
+        path: ONNX file of the policy.
     """
 
     def __init__(self, kind: str, path: Path) -> None:

@@ -66,7 +66,7 @@ class Case:
 
     Attributes:
         source: mocap, truth or paper.
-        clip: Its name.
+        clip: Name of the clip.
         sequence: The human.
     """
 

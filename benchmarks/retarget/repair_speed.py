@@ -2,8 +2,8 @@
 
     python -m benchmarks.retarget.repair_speed --robots humanoid g1 --lengths 2 10 30 60
 
-A clip goes back and forth until it has the length of its row. Each row has a ruler beside it that
-the code under test has no part in: `mj_inverse` calls a CPU second on the robot's model, measured
+A clip goes back and forth until it has the length of its row. Each row has a measure beside it that
+is independent of the code under test: `mj_inverse` calls a CPU second on the robot's model, taken
 just before and after the row on the same core, since a busy machine slows both down.
 """
 

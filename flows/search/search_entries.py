@@ -45,7 +45,7 @@ class SearchResult:
     """Result of a search.
 
     Attributes:
-        dance: What was looked for.
+        dance: The dance of the search.
         run_id: Under which it is in the catalogue.
         entries: The chosen one first, then by rank, rejected and failed ones last.
         selection: Selection of the search.

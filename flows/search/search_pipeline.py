@@ -50,8 +50,8 @@ def search_and_rank(
     """Find, assess and rank the videos of a dance; every one of them goes into the catalogue.
 
     Args:
-        dance: What to look for.
-        settings: How.
+        dance: Query, language and number of videos.
+        settings: Source, filters and ranking.
         run_id: Run id for the catalogue.
         known: Videos that were assessed before and need not be again.
         reigning: Row of the catalogue of the video chosen last, which a new one has to beat.

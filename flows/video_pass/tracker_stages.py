@@ -40,7 +40,7 @@ class TrackedDance:
     """A dance that a tracker has danced.
 
     Attributes:
-        tracker: Which.
+        tracker: Description of the tracker.
         made: What its stages left, by the names that a trained policy's have.
         folder: Folder of the page.
     """

@@ -18,8 +18,8 @@ def hypothesis_files(settings: PipelineConfig, count: int) -> list[str]:
     """
     if count and (settings.network.hybrik or not settings.mocap.temporal.enabled):
         raise BadConfiguration(
-            "--hypotheses samples the embedded temporal network: leave --hybrik away, and "
-            "mocap.temporal.enabled true"
+            "--hypotheses samples the embedded temporal network: omit --hybrik and set "
+            "mocap.temporal.enabled=true"
         )
     return [f"smpl_{number}.parquet" for number in range(1, count + 1)]
 

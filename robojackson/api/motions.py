@@ -47,7 +47,7 @@ class LoadedNetworks:
     """The published networks with weights of the user.
 
     Attributes:
-        config: How they run.
+        config: Configuration of the networks.
         networks: The modules.
     """
 
@@ -99,7 +99,7 @@ def recover_motion(
     loaded = load_weights(networks) if isinstance(networks, NetworkConfig) else networks
     if second is not None:
         if loaded is not None:
-            raise BadConfiguration("HybrIK looks at one camera: leave the second clip away")
+            raise BadConfiguration("HybrIK reads one camera: omit the second clip")
         return recover_with_second(track, video, second, motion, quality, person, progress)
     if loaded is None:
         return recover.recover_motion(track, motion)

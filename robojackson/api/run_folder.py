@@ -28,7 +28,7 @@ class RunFolder:
     Attributes:
         robot: The robot that danced.
         track, sequence, reference: Landmarks, person and target.
-        rollout: What was danced.
+        rollout: The recorded dance.
         shown: All of it at the moments of its film.
     """
 
@@ -60,7 +60,7 @@ def one_of(folder: Path, names: tuple[str, ...]) -> Path:
     """Return the first of these files that is in the folder of a run.
 
     Raises:
-        StoreError: none of them is.
+        StoreError: the folder has none of them.
     """
     found = next((folder / name for name in names if (folder / name).is_file()), None)
     if found is None:

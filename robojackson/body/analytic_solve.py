@@ -99,7 +99,7 @@ def _target_directions(
 
     Args:
         child: Where the bones should end.
-        start: Where they should begin.
+        start: Points at which they should begin.
         end: Where their parents really end.
         bone: Bone in the rest pose.
         method: naive or adaptive.

@@ -51,7 +51,7 @@ def mocap(
     settings = load(PipelineConfig, config, overrides)
     names = hypothesis_files(settings, hypotheses)
     if second and (names or settings.network.hybrik):
-        raise BadConfiguration("two cameras go without --hypotheses and --hybrik: leave them away")
+        raise BadConfiguration("two cameras exclude --hypotheses and --hybrik: omit these options")
     networks = load_weights(settings.network)
     with results_in(out) as files:
         track = _track_of(video, settings)

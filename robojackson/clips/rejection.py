@@ -31,7 +31,7 @@ class Rejection:
     """One reason against a video.
 
     Attributes:
-        kind: What is wrong.
+        kind: Reason of the rejection.
         value: The figure that was measured: seconds, pixels, a count or a share, by the kind.
         limit: What the configuration allows, in the same unit; None where it names no figure.
         other: Name or title of the video that this one is a copy of.

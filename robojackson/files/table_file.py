@@ -41,7 +41,7 @@ class TableFile:
 
         Args:
             data: Content of the file.
-            where: How errors name it.
+            where: Name of the table in errors.
 
         Raises:
             BadTable: not Parquet, another table, or a column or metadata key that is wrong.

@@ -96,7 +96,7 @@ def reprojection_record(sequence: SmplSequence, track: LandmarkTrack) -> dict[st
 
 
 def without_weak_frames(track: LandmarkTrack, weak: Bool[np.ndarray, " T"]) -> LandmarkTrack:
-    """Return a track in which nobody is detected in weak stretches and beside them.
+    """Return a track in which no person is detected in weak stretches and beside them.
 
     The motion of such frames is interpolated between the poses before and after. The track is
     unchanged where no frame would be left.

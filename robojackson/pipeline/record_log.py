@@ -14,7 +14,7 @@ class RecordLog:
     """Rows of one table in one file, kept over a resume.
 
     Attributes:
-        files: Where the file is.
+        files: Tree of files that holds the log.
         key: Key of the file.
         schema: Schema of the table.
         common: Columns that all rows share (run_id, move, setup, seed).

@@ -26,7 +26,7 @@ class Guess:
         body: Name.
         offset: Offset in the body, metres.
         why: What it was guessed from.
-        sure: Whether names give it.
+        sure: Whether it follows from names.
     """
 
     body: str

@@ -80,7 +80,7 @@ def require_model_files(path: Path, place: str) -> None:
     """Refuse a model that names devices, huge files or endless copies.
 
     Args:
-        place: How errors begin.
+        place: First words of its errors.
 
     Raises:
         BadConfiguration: the line names the file.

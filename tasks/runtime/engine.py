@@ -79,7 +79,7 @@ def cached_task(
     """Make a function a Prefect task that is cached in the store.
 
     Args:
-        function: What the task runs.
+        function: Function that the task runs.
         name: Name of the task.
         run_name: Returns the name of a run, when it begins.
         cache_key: Returns the key of a call from its parameters.

@@ -56,7 +56,7 @@ def scalar(name: str, values: object) -> Change:
 
 
 def reversed_(name: str) -> Change:
-    """The table with the values of a column in the opposite order."""
+    """Return the table with the values of a column in the opposite order."""
 
     def change(table: pa.Table) -> pa.Table:
         index = table.column_names.index(name)

@@ -60,7 +60,7 @@ def naive(points: np.ndarray, twists: np.ndarray, safeguard: float) -> np.ndarra
 
 @pytest.fixture(scope="module")
 def skeletons() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points and twists of random poses, and our rotations of them."""
+    """Return points and twists of random poses, and our rotations of them."""
     local = random_rotations(11, (SKELETONS, 24), 1.2)
     points = forward(local, REST_JOINTS[None], np.zeros((SKELETONS, 3))).points
     angles = np.random.default_rng(11).uniform(-np.pi, np.pi, size=(SKELETONS, 23))

@@ -142,7 +142,7 @@ def page_file(run: RecordedRun, tmp_path_factory: pytest.TempPathFactory) -> Pat
 
 @pytest.fixture(scope="session")
 def fallen_page(run: RecordedRun, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A page whose robot lies on the floor for the last fifth of a second of its rollout."""
+    """Return a page whose robot lies on the floor for the last 0.2 s of its rollout."""
     qpos = np.array(run.reference.qpos[: round(FALLEN / FPS / run.reference.dt)])
     lies = round(0.2 / run.reference.dt)
     qpos[-lies:, 2:7] = 0.15, *LYING

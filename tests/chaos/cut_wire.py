@@ -14,8 +14,8 @@ class Proxy:
     """Forwards `port` to `target` on this machine.
 
     Attributes:
-        port: Where it listens.
-        target: Where it forwards to.
+        port: Port that it listens on.
+        target: Port that it forwards to.
         intact: Whether it forwards now.
         refused: Connections that were requested while it was cut.
     """

@@ -52,9 +52,9 @@ class Kill:
     """One of them.
 
     Attributes:
-        number: Which.
+        number: Number of the kill.
         moment_s: After the start of its run, seconds.
-        victim: What was killed.
+        victim: Process that was killed.
         done: Stages whose records were in the store.
         ended: How the command ended: by the signal, by itself with a code, or it went on.
     """

@@ -30,7 +30,7 @@ class Alone:
     """A store on a small disk.
 
     Attributes:
-        store: What is kept.
+        store: Store of the results.
         kinds: What can happen: does it and returns what it hit, or None if it cannot now.
     """
 

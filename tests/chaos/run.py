@@ -54,7 +54,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=RESULTS, help="what has been shown, as JSON")
     parser.add_argument("--hold", type=Path, help="no trial begins while this file is there")
     options = parser.parse_args()
-    for how in (signal.SIGINT, signal.SIGTERM):  # either ends all that was started
+    for how in (signal.SIGINT, signal.SIGTERM):  # each of the two ends all that was started
         signal.signal(how, signal.default_int_handler)
     folder = options.folder or Path(tempfile.mkdtemp(prefix="robojackson-chaos-"))
     given = options.kind or [*Cluster.KINDS, *Alone.KINDS]

@@ -32,7 +32,7 @@ class Cluster:
     """A running stack.
 
     Attributes:
-        store: What it keeps.
+        store: Store of the results.
         kinds: What can happen to it: does it and returns what it hit, or None if it cannot now.
     """
 

@@ -171,7 +171,7 @@ def test_a_playlist_is_no_music(tmp_path: Path) -> None:
 
 
 def _tone(path: Path, rate: int, begins_s: float = 0.0) -> Path:
-    """A second of a tone in a file with one picture at its beginning."""
+    """Return a second of a tone in a file with one picture at its beginning."""
     with av.open(str(path), "w") as container:
         picture = container.add_stream("mjpeg", rate=FPS)
         picture.width, picture.height, picture.pix_fmt = 16, 16, "yuvj420p"

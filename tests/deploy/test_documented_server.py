@@ -50,7 +50,7 @@ class Documented:
 
     Attributes:
         environment: Of that shell, with the address of the server.
-        log: What all commands wrote.
+        log: Output of all commands.
         code: Exit code of the last of them.
     """
 

@@ -12,7 +12,7 @@ REACH, LYING = 0.5, 0.9
 
 
 def body(half: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two points of half a width beside a root, and the root's path."""
+    """Return two points of half a width beside a root, and the root's path."""
     root = np.column_stack([along, np.zeros(COUNT), np.full(COUNT, 0.9)])
     side = np.column_stack([np.zeros(COUNT), half, np.zeros(COUNT)])
     return np.stack([root - side, root + side], 1), root
@@ -25,7 +25,7 @@ def standing() -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.fixture
 def falling() -> tuple[np.ndarray, np.ndarray]:
-    """A body that begins to lie at the middle of the film."""
+    """Return a body that begins to lie at the middle of the film."""
     lies = np.arange(COUNT) >= COUNT // 2
     return body(np.where(lies, LYING, REACH), np.zeros(COUNT))
 

@@ -15,13 +15,13 @@ from robojackson.robot.model import Robot
 
 @pytest.fixture
 def fed(robot: Robot) -> Robot:
-    """A robot whose feedback follows a sampled path."""
+    """Return a robot whose feedback follows a sampled path."""
     named = replace(robot.description, feedback=1.0, feedback_path="sampled")
     return replace(robot, description=named)
 
 
 def configured(**named: object) -> TrainConfig:
-    """A training of 100 steps with some settings."""
+    """Return a training of 100 steps with some settings."""
     return load(TrainConfig, "setups/scratch", {"steps": 100, **named})
 
 

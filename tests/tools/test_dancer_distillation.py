@@ -23,12 +23,12 @@ STEPS = np.array([3, 30, 75])
 
 @pytest.fixture
 def rng() -> np.random.Generator:
-    """Seeded."""
+    """Return a seeded generator."""
     return np.random.default_rng(7)
 
 
 def short(seconds: float = 0.6) -> ReferenceMotion:
-    """The beginning of dance_b, on the stock robot."""
+    """Return the beginning of dance_b, on the stock robot."""
     motion = robot_motion("dance_b")
     rows = slice(0, round(seconds / motion.dt))
     names = ("qpos", "qvel", "body_pos_w", "keypoints_w", "contact", "torque_ratio")
@@ -38,7 +38,7 @@ def short(seconds: float = 0.6) -> ReferenceMotion:
 def observed(
     motion: ReferenceMotion, qpos: np.ndarray, qvel: np.ndarray, last: np.ndarray
 ) -> np.ndarray:
-    """Observations `preview` of three states."""
+    """Return observations `preview` of three states."""
     robot = stock()
     observer = Observer(robot, "preview")
     step = Clip(motion, None, preview_of(motion, robot)).at(STEPS)
@@ -81,7 +81,7 @@ def test_a_rehearsal_returns_what_the_expert_would_do(rng: np.random.Generator) 
 
 
 def made_up_gains(robot: Robot, motion: ReferenceMotion) -> experts.Gains:
-    """An expert that moves every target by the same angle, wherever the robot is."""
+    """Return an expert that moves every target by the same angle, wherever the robot is."""
     steps, motors = len(motion), robot.model.nu
     feet = experts.Feet(robot).places(np.asarray(motion.qpos, float))
     return experts.Gains(

@@ -92,11 +92,11 @@ class Setting:
     """One key.
 
     Attributes:
-        key: Its path.
+        key: Path of the key.
         unit: Unit of a number; empty for all else.
         default: The default as YAML.
         allowed: The range, or the values.
-        meaning: What it is.
+        meaning: Description of the key.
     """
 
     key: str

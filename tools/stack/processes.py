@@ -14,8 +14,8 @@ class Found:
     """A process that is alive.
 
     Attributes:
-        pid: Its number.
-        command: Its words.
+        pid: Process id.
+        command: Words of the command.
         home: The folder that it calls home.
     """
 

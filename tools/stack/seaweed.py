@@ -36,7 +36,7 @@ def service(
     Args:
         words, environment, check: The compose file's command, environment and health check.
         identities: Content of the file that `-s3.config` names.
-        port: Where S3 listens.
+        port: Port of the S3 server.
         folder, log: Where it keeps its data, and its log.
     """
     home = folder / "seaweed"

@@ -37,11 +37,11 @@ class Example:
     """One clip.
 
     Attributes:
-        sight: What was seen.
+        sight: Detected landmarks.
         truth: All landmarks along the rays, NaN where there is none, metres.
         good: Frames that count.
         distance: Distance of the hips from the camera, metres.
-        motion: Its name.
+        motion: Name of the motion.
     """
 
     sight: ClipView

@@ -39,7 +39,7 @@ def film(
 
     Args:
         bank: The motions.
-        rows: Which of them.
+        rows: Rows of the bank.
         frames: Length of a window.
         sizes: Size of each person in the detector's metres.
         rng: Draws windows, tempo and cameras.

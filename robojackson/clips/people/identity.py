@@ -27,7 +27,7 @@ class IdentityConfig:
     """Allowed changes from one detection of a person to the next.
 
     Attributes:
-        tracklets: What a tracklet is.
+        tracklets: Limits of a tracklet.
         shortest_tracklet_s: A tracklet below this is no one, seconds.
         shortest_blend_s: Shortest tracklet that may be either of two people, seconds.
         memory_s: Length of the motion that leads across a gap, seconds.

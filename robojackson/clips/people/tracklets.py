@@ -41,8 +41,8 @@ class Tracklet:
     """A stretch of frames in which one person was followed.
 
     Attributes:
-        frames: Their numbers.
-        time_s: When they were taken.
+        frames: Numbers of the frames.
+        time_s: Times of the frames, seconds.
         rows: Landmarks.
         place: Middle of the trunk, pixels.
         tall: Stature, pixels.

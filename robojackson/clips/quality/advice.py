@@ -42,9 +42,9 @@ class Advice:
     """One piece of advice.
 
     Attributes:
-        kind: What it is about.
+        kind: Subject of the advice.
         value: The figure that was measured, in the unit of its limit.
-        limit: Where the advice begins.
+        limit: Figure from which on the advice is given.
     """
 
     kind: Kind

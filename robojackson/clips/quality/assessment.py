@@ -48,7 +48,7 @@ class Quality:
 
     Attributes:
         frames: Frames in the clip.
-        duration_s: Its length, seconds.
+        duration_s: Length of the clip, seconds.
         detected_share: Share of frames in which a person was found.
         full_body_share: Share of frames with head, trunk and legs in view.
         person_height_px: Median height of the person in the image, pixels; 0 without one.

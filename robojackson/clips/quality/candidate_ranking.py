@@ -119,7 +119,7 @@ def rank(
 
 
 def _too_little(quality: Quality, config: FilterConfig) -> list[Rejection]:
-    """Return what a clip has less of than it needs."""
+    """Return the figures of a clip that are below their limits."""
     measured: tuple[tuple[Kind, float, float | None], ...] = (
         ("person_missing", quality.detected_share, config.detected_share),
         ("body_cut_off", quality.full_body_share, config.full_body_share),

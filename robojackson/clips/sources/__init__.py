@@ -27,9 +27,9 @@ class Source(Protocol):
         Args:
             query: Words to look for; a source that cannot look for words offers all it has.
             address: Address of the folder, list, site or server; empty for the usual one.
-            count: How many at most.
-            config: Manners on the web.
-            now: Noted in the candidates.
+            count: Largest number of videos.
+            config: Rate limits, retries, proxy and cookies.
+            now: Time that the candidates record.
         Raises:
             SearchFailed: the message has the source and the reason.
         """

@@ -24,7 +24,7 @@ def require_reachable(page: str, proxy: str | None = None, patience_s: float = P
     """Connect to the host of a page, or to the proxy in front of it, once.
 
     Args:
-        page: Its address.
+        page: Address of the page.
         proxy: Address of a proxy; without one, what the environment names is used.
         patience_s: Longest wait, seconds.
     Raises:

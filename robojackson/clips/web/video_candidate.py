@@ -60,7 +60,7 @@ def from_info(
     Args:
         info: One entry; https://github.com/yt-dlp/yt-dlp#output-template names its keys.
         query: What was searched for.
-        retrieved_at: When.
+        retrieved_at: Time of the search.
         page: Address of the page that held it, for an entry that has none of its own.
     """
     url = _address(info) or web_address(page)

@@ -51,7 +51,7 @@ class Line:
         move, setup: What was trained, or the name of a baseline.
         seeds: Number of seeds.
         values: Estimates by name of the figure.
-        baseline: Whether nothing was learnt.
+        baseline: Whether it is a baseline, which learns nothing.
     """
 
     move: str

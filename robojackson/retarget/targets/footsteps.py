@@ -58,7 +58,7 @@ class Walk:
     Attributes:
         keypoints_w: Targets of the keypoints, m.
         in_air: Whether the left, the right foot swings.
-        feet: Where they end.
+        feet: Places of the feet at the end.
     """
 
     keypoints_w: Float[np.ndarray, "N K 3"]

@@ -58,7 +58,7 @@ class Performance:
     Attributes:
         programme: The programme.
         length: Number of steps that each was up, at most T.
-        fell: Whether each fell.
+        fell: Whether each run fell.
         step: Step of the programme of each after every step.
         waits: Whether each run has abandoned its part and stands.
         qpos: Their states, world; after the end of a run they repeat.

@@ -125,7 +125,7 @@ class RewardState:
         qpos: MuJoCo positions; root at 0:3 (m), its quaternion wxyz at 3:7, hinges (rad).
         qvel: MuJoCo velocities; root linear (m/s) at 0:3, angular (rad/s) at 3:6, hinges (rad/s).
         points: Keypoint sites, m, in the order of `Robot.keypoint_names`.
-        moved: Their velocities, m/s.
+        moved: Velocities of the points, m/s.
         target: The reference at the same step.
         errors: Errors of each robot.
         action_change: Mean squared change of the action, -1..1.

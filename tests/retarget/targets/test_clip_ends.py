@@ -13,7 +13,7 @@ from tests.fixtures.robots import human, stock
 
 
 def standing(seconds: float = 3.0) -> SmplSequence:
-    """A person who stands still."""
+    """Return a person who stands still."""
     still, frames = human("dance_b"), round(seconds * 30)
     frame = {name: np.repeat(getattr(still, name)[:1], frames, 0)
              for name in ("global_orient", "body_pose", "transl", "joints", "keypoints_w",
@@ -22,7 +22,7 @@ def standing(seconds: float = 3.0) -> SmplSequence:
 
 
 def moved(still: SmplSequence, frames: slice, speed: float, contact: int) -> SmplSequence:
-    """The same person, carried along x over some frames at a speed, m/s."""
+    """Return the same person, carried along x over some frames at a speed, m/s."""
     velocity, states = np.zeros(len(still)), still.contact.copy()
     velocity[frames], states[frames] = speed, contact
     keypoints = still.keypoints_w.copy()
