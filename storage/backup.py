@@ -20,7 +20,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from robojackson.config import config_dataclass
 from robojackson.errors import BackupFailed, StoreError
-from robojackson.files.foreign_file import parse_json
+from robojackson.files.foreign_file import parse_json, read_text
 from robojackson.files.local_folder import TEMPORARY, LocalFolder, sha256_of, sha256_of_file
 from robojackson.pipeline.folder_lock import locked
 
@@ -109,8 +109,8 @@ class Backups:
             raise BackupFailed(f"{self.root} holds no backup {name!r}. Backups: {', '.join(names)}")
         path = self.root / MANIFESTS / f"{name or names[-1]}.json"
         try:
-            return _parsed(path.read_text(encoding="utf-8"))
-        except (ValueError, KeyError, TypeError) as cause:
+            return _parsed(read_text(path, BackupFailed))
+        except (BackupFailed, ValueError, KeyError, TypeError) as cause:
             others = ", ".join(other for other in names if other != path.stem) or "none"
             raise BackupFailed(
                 f"{path} is damaged: {_reason(cause)}. Other backups (--at): {others}"
@@ -234,7 +234,7 @@ def _parsed(text: str) -> Manifest:
     manifest: Manifest = MANIFEST.validate_python(whole["backup"])
     for key in manifest.files:
         parts = PurePosixPath(key).parts
-        if not parts or ".." in parts or PurePosixPath(key).is_absolute():
+        if not parts or {"..", "\0"} & {*parts, *key} or PurePosixPath(key).is_absolute():
             raise ValueError(f"{key!r} is no key of a store")
     return manifest
 
@@ -247,4 +247,6 @@ def _reason(cause: Exception) -> str:
     if isinstance(cause, ValidationError):
         first = cause.errors()[0]
         return f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
+    if isinstance(cause, BackupFailed):
+        return cause.reason
     return f"no {cause}" if isinstance(cause, KeyError) else str(cause)

@@ -55,14 +55,14 @@ def back_up(
         BackupFailed: nothing is there, something cannot be read, or the folder is in the store.
     """
     _require_apart(store, backups)
+    if not database.exists() and not entries(store, database):
+        raise BackupFailed(
+            f"nothing to back up: no file in {store.root}, no database at {database.address}"
+        )
     with backups.held():
         before = _newest(backups)
         dump = _dumped(database, backups)
         found = entries(store, database)
-        if not found and dump is None:
-            raise BackupFailed(
-                f"nothing to back up: no file in {store.root}, no database at {database.address}"
-            )
         progress = Progress("copied", len(found))
 
         def one(key: str) -> Content | None:

@@ -2,11 +2,9 @@
 
 import functools
 import json
-import math
 import os
 import sys
 import time
-import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -22,16 +20,14 @@ from robojackson.cli.library_output import silence_libraries
 from robojackson.cli.lifetime.interruption import INTERRUPTED, conclude, printable
 from robojackson.cli.lifetime.interruption import complain as complain
 from robojackson.cli.lifetime.interruption import same_command as same_command
+from robojackson.cli.unexpected import USAGE_ERROR as USAGE_ERROR
+from robojackson.cli.unexpected import require_finite, unexpected
 from robojackson.errors import RoboJacksonError, StoreError
 from robojackson.files.json_types import to_json_types as to_json_types
 
 P = ParamSpec("P")
-TRACEBACK, LONGEST_CAUSE = "ROBOJACKSON_TRACEBACK", 300
-"""Environment variable that shows the traceback of an unexpected error; length of its line."""
 SECONDS_BETWEEN_LINES = 15.0
 """Interval of progress lines where every line stays, seconds."""
-USAGE_ERROR: Any = typer.BadParameter.__bases__[0]
-"""Exception of typer for arguments that it cannot parse; it has no public name there."""
 
 APP_PACKAGES = ("prefect", "fastapi", "sqlalchemy", "yt_dlp")
 """Line that installs the extra `app`: without it only the commands of one stage work."""
@@ -67,7 +63,7 @@ def command(body: Callable[P, CommandResult]) -> Callable[P, None]:
     @functools.wraps(body)
     def run(*args: P.args, **kwargs: P.kwargs) -> None:
         silence_libraries()
-        _require_finite(kwargs)
+        require_finite(kwargs)
         try:
             with stdout_is_stderr():
                 answer = body(*args, **kwargs)
@@ -88,7 +84,7 @@ def command(body: Callable[P, CommandResult]) -> Callable[P, None]:
         except typer.Exit:
             raise
         except Exception as cause:
-            _leave(1, _unexpected(cause))
+            _leave(1, unexpected(cause))
         try:
             print_result(answer, as_json=bool(kwargs.get("as_json")))
         except BrokenPipeError:  # the reader closed the pipe
@@ -100,14 +96,6 @@ def command(body: Callable[P, CommandResult]) -> Callable[P, None]:
             raise typer.Exit(answer.code)
 
     return run
-
-
-def _require_finite(options: Mapping[str, object]) -> None:
-    """Raise typer's error of usage for NaN and infinity, which it takes as numbers."""
-    for name, value in options.items():
-        if isinstance(value, float) and not math.isfinite(value):
-            option = f"--{name.strip('_').replace('_', '-')}"
-            raise typer.BadParameter(f"{option} is {value}, expected a finite number")
 
 
 def print_result(answer: CommandResult, as_json: bool) -> None:
@@ -208,21 +196,6 @@ def usage_error(cause: Any) -> str:
         given = repr(cause.__cause__.errors()[0]["input"])
         message += "" if given in message else f", given {given}"
     return f"{message} (see --help)"
-
-
-def _unexpected(cause: Exception) -> str:
-    """Return the line about an error that none of our own classes foresees."""
-    if isinstance(cause, USAGE_ERROR):
-        raise cause
-    if TRACEBACK in os.environ:
-        raise cause
-    place = traceback.extract_tb(cause.__traceback__)[-1]
-    message = " ".join(str(cause).split())[:LONGEST_CAUSE]
-    return (
-        f"InternalError: {type(cause).__name__}: {message} ({Path(place.filename).name}:"
-        f"{place.lineno}); the input is unexpected, or this is a bug: "
-        f"{TRACEBACK}=1 shows where, `robojackson doctor --report` is for an issue"
-    )
 
 
 def _leave(code: int, line: str) -> None:

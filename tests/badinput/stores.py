@@ -1,5 +1,6 @@
 """Questions in SQL, addresses of the web, stores, backups and everything else that is named."""
 
+import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -45,6 +46,14 @@ ADDRESSES = (
 def _backup(here: Path) -> None:
     (here / "b").mkdir()
     (here / "b" / "evil.json").write_text("{")
+
+
+def _pipe(name: str) -> Maker:
+    def make(here: Path) -> None:
+        (here / name).parent.mkdir(parents=True, exist_ok=True)
+        os.mkfifo(here / name)
+
+    return make
 
 
 def _fake(content: str) -> Maker:
@@ -113,6 +122,20 @@ def cases() -> Iterator[Case]:
         "dance start nan": (("dance", str(CLIP), "--start", "nan"), nothing),
         "dance minutes 0": (("dance", str(CLIP), "--minutes", "0"), nothing),
         "dance person 99": (("mocap", str(CLIP), "-o", "out", "--person", "99"), nothing),
+        "view a film as a folder": (("view", str(CLIP), "--to", "gif", "-o", "."), nothing),
+        "view a film as a pipe": (("view", str(CLIP), "--to", "gif", "-o", "p"), _pipe("p")),
+        "view a text as gif": (("view", "a.mp4", "--to", "gif", "-o", "x"), writes("a.mp4", "x")),
+        "view a folder of nothing": (("view", ".", "--to", "gltf", "-o", "x.glb"), nothing),
+        "perform for ever": (
+            ("perform", "@/reference.parquet", "-o", "o", "--seconds", "inf"),
+            nothing,
+        ),
+        "clean older than for ever": (("clean", "--older-than", "inf"), nothing),
+        "backup of nothing": (("backup", "b"), nothing),
+        "restore a manifest that is a pipe": (("restore", "b"), _pipe("b/backups/2026.json")),
+        "licences into a folder": (("licences", "--sbom", "."), nothing),
+        "dance for ever": (("dance", str(CLIP), "--minutes", "inf"), nothing),
+        "pretrain a person": (("pretrain", "-o", "w", "--reference", "@/smpl.parquet"), nothing),
         "pretrain nothing": (("pretrain", "-o", "f", "--steps", "0"), nothing),
     }.items():
         yield Case("command", name, words, make)

@@ -274,6 +274,11 @@ def cut(path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-1])
 
 
+def piped(path: Path) -> None:
+    path.unlink()
+    os.mkfifo(path)
+
+
 def flip(path: Path) -> None:
     data = path.read_bytes()
     path.write_bytes(data[:-1] + bytes([data[-1] ^ 1]))
@@ -288,6 +293,7 @@ DAMAGES: dict[str, tuple[Callable[[Backups], object], str]] = {
     "a content is truncated": (lambda b: cut(largest(b)), "truncated or altered: 3,999 bytes"),
     "a bit of a content is flipped": (lambda b: flip(largest(b)), "is altered: its sha256"),
     "the manifest is truncated": (lambda b: cut(manifest(b)), "is damaged"),
+    "the manifest is a pipe": (lambda b: piped(manifest(b)), "is damaged: a device or a pipe"),
     "the manifest is empty": (lambda b: manifest(b).write_text(""), "is damaged"),
     "the manifest is no object": (lambda b: manifest(b).write_text("[]"), "is damaged"),
     "the manifest names another digest": (
@@ -307,6 +313,16 @@ DAMAGES: dict[str, tuple[Callable[[Backups], object], str]] = {
             b,
             lambda m: m["files"].update(  # type: ignore[attr-defined]
                 {"../x": {"sha256": "0" * 64, "size": 0}}
+            ),
+            sign=True,
+        ),
+        "no key of a store",
+    ),
+    "a key is no name of a file": (
+        lambda b: altered(
+            b,
+            lambda m: m["files"].update(  # type: ignore[attr-defined]
+                {"a\0b": {"sha256": "0" * 64, "size": 0}}
             ),
             sign=True,
         ),
@@ -373,6 +389,7 @@ def test_an_empty_store_without_a_database_is_not_backed_up(
 ) -> None:
     with pytest.raises(BackupFailed, match="nothing to back up"):
         backed_up(Store(tmp_path / "empty").create(), backups)
+    assert not backups.root.exists()
 
 
 def test_progress_has_files_bytes_and_rate(local: Store, backups: Backups) -> None:

@@ -57,6 +57,13 @@ def test_a_result_that_nothing_names_is_unused_and_goes(store: Store) -> None:
     assert keys(store) == set()
 
 
+def test_a_pipe_in_the_store_is_not_waited_for(store: Store) -> None:
+    for folder in ("records", "runs"):
+        (Path(store.root) / folder).mkdir()
+        os.mkfifo(Path(store.root) / folder / "a.json")
+    assert plan(store, USUAL, 0.0).old == []
+
+
 def test_a_result_that_a_record_names_stays_unless_the_cache_is_named(store: Store) -> None:
     made = store.save("mocap", "smpl.parquet", b"a motion")
     record = recorded(store, "a.json", {"smpl": [made]})
