@@ -85,7 +85,9 @@ def residual_learning(
     """
     if not polishes(config, robot, reference):
         return config.tqc
-    log.info("the training improves what the feedback alone does (train.polish=no begins with random actions)")
+    log.info(
+        "the training improves what the feedback alone does (train.polish=no begins with random actions)"
+    )
     return replace(config.tqc, **PRESETS["polish"])
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 from pydantic import Field
 
+from robojackson.clips.people.close_up import CloseUpConfig, look_closely
 from robojackson.clips.people.identity import IdentityConfig
 from robojackson.clips.people.person_count import People, PeopleConfig
 from robojackson.clips.people.person_detection import PersonDetectionConfig, paint, silhouette
@@ -40,7 +41,8 @@ class DancerConfig:
     """Configuration of following one dancer among others.
 
     Attributes:
-        number: The person to follow; 1, and None, is the largest steady person.
+        number: The person to follow: 1 is the largest steady person, and so is None.
+        close_up: Configuration of looking closely at a person who is far away.
         scouts: The few frames in which other people are looked for.
         detection, identity: Configurations of detecting and identifying all people in every frame.
         astray: Body heights; a detection further than this from the expected place is another's.
@@ -49,6 +51,7 @@ class DancerConfig:
     """
 
     number: int | None = Field(default=None, ge=1)
+    close_up: CloseUpConfig = Field(default_factory=CloseUpConfig)
     scouts: PeopleConfig = Field(default_factory=PeopleConfig)
     detection: PersonDetectionConfig = Field(default_factory=PersonDetectionConfig)
     identity: IdentityConfig = Field(default_factory=IdentityConfig)
@@ -73,8 +76,8 @@ def track_dancer(
         size: lite, full or heavy.
         config: Which person to follow, and how.
         progress: Called with (frames done, frames in all); others in view make it several passes.
-        watch: Called with every frame and the landmarks of the first pass, which are the track's
-            where it finds no others (`people` 0).
+        watch: Called with every frame and the landmarks of the first pass, which are the track's where
+            it finds no others (`people` 0) and finds the one in nearly all frames.
     Raises:
         NoPersonFound: there is no person of that number; the message lists the people.
         MissingDependency: no model bundle, or no EGL and GLES libraries.
@@ -82,7 +85,8 @@ def track_dancer(
     if config.number is None or config.number == 1:
         single, others = _scouted(path, info, size, config, progress, watch)
         if not others:
-            return single
+            later = _shifted(progress, info.frames, 1, 2)
+            return _closer(path, info, size, single, config.close_up, later)
     passes = 3 if config.number in (None, 1) else 2
     later = _shifted(progress, info.frames, passes - 2, passes)
     cast = track_people(path, info, config.detection, config.identity, later)
@@ -118,6 +122,23 @@ def _scouted(
 
         track = detect(path, info, size, progress, watch)
     return track, max(scouts.counts, default=0) > 1
+
+
+def _closer(
+    path: Path,
+    info: VideoInfo,
+    size: str,
+    single: LandmarkTrack,
+    config: CloseUpConfig,
+    progress: Progress | None,
+) -> LandmarkTrack:
+    """Return the track of a person who is alone, looked at closely where that shows more of him."""
+    depth = (single.landmarks, single.world_landmarks, single.visibility[..., None])
+    rows = look_closely(path, info, size, np.concatenate(depth, -1), config, progress)
+    if rows is None:
+        return single
+    notes = ("the person is small in the picture: looked at closely",)
+    return track_of(rows, single.times, info, notes=notes)
 
 
 def _followed(

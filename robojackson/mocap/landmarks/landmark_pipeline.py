@@ -57,7 +57,7 @@ def detect_landmarks(
         watch = background.add_frame if len(models) == 1 else None
         part = _part(progress, turn, len(models))
         tracks.append(track_dancer(path, info, size, dancer, part, watch))
-    if len(tracks) == 1 and background.frames == len(tracks[0]) and not tracks[0].people:
+    if len(tracks) == 1 and background.saw(tracks[0]):
         return background.applied_to(tracks[0])
     return with_camera(path, fuse_tracks(tracks) if len(tracks) > 1 else tracks[0])
 
@@ -75,17 +75,21 @@ class Background:
     """Facts from the pictures besides the landmarks, collected frame by frame."""
 
     def __init__(self) -> None:
-        self.frames = 0
+        self._people: list[np.ndarray] = []
         self._camera, self._looks = CameraFollower(), PictureQuality()
 
     def add_frame(
         self, index: int, image: UInt8[np.ndarray, "H W 3"], row: Float[np.ndarray, "33 _"]
     ) -> None:
         """Add frame number `index` in RGB, of any size, with the person's landmarks."""
-        self.frames = index + 1
+        self._people.append(row[:, :2])
         small, xy = shrunk(grey_levels(image)), row[:, :2]
         self._camera.add_frame(small, xy)
         self._looks.add_frame(small, xy)
+
+    def saw(self, track: LandmarkTrack) -> bool:
+        """Return whether the person of the frames so far is that of a track."""
+        return np.array_equal(self._people, track.landmarks[..., :2], equal_nan=True)
 
     def applied_to(self, track: LandmarkTrack) -> LandmarkTrack:
         """Return the track of the same frames with all of these facts."""

@@ -1,0 +1,239 @@
+"""A close look at a person whom the whole picture does not show well, because he is far away.
+
+BlazePose looks for people in 224 pixels of the whole picture: a person of 250 pixels in one of
+1920 x 1080 is not found in any frame, in a window around him he is found in all of them down to 60
+pixels. So the person is searched for in windows of some frames, first near the last place, then all
+over the picture; then the detector follows him inside windows of full resolution that stand still
+for as long as he stays in them. Pixels of the upright picture, origin top left.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, UInt8
+from pydantic import Field
+
+from robojackson.clips.people.camera_motion import spread
+from robojackson.clips.people.person_detection import detect_person
+from robojackson.clips.people.person_extent import BODY, indices, stature, trunk
+from robojackson.clips.pose_detector import still_landmarker, video_landmarker
+from robojackson.clips.video import VideoInfo, timed_frames
+from robojackson.config import config_dataclass
+
+Box = tuple[int, int, int, int]
+"""x0, y0, x1, y1."""
+SEARCHER = "lite"
+"""Size of the pose model that searches; the person is then followed with a better one."""
+OVERLAP = 0.5
+"""Share of a tile that the next one covers too."""
+STAYS = 0.25
+"""A window ends when the person is further from its middle than this, sides of the window."""
+ASTRAY = 1.0
+"""Body heights; a detection further than this from the expected place is another's."""
+
+
+@config_dataclass
+class CloseUpConfig:
+    """Configuration of looking closely.
+
+    Attributes:
+        below_share: Clips with a person in a smaller share of their frames are looked at closely.
+        samples_per_s: Frames in which the person is searched for, a second.
+        fewest: Frames in which the person is searched for in a short clip.
+        most_searches: Frames at most that are searched all over.
+        visibility: Least mean visibility of the landmarks of a person, 0..1.
+        window: Side of a window, body heights.
+    """
+
+    below_share: float = Field(default=0.9, ge=0, le=1)
+    samples_per_s: float = Field(default=2.0, gt=0)
+    fewest: int = Field(default=4, ge=1)
+    most_searches: int = Field(default=8, ge=1)
+    visibility: float = Field(default=0.5, ge=0, le=1)
+    window: float = Field(default=2.5, ge=1.5)
+
+
+@dataclass(frozen=True)
+class Sight:
+    """The person in one frame.
+
+    Attributes:
+        frame: Its number.
+        place: Middle of the trunk, pixels.
+        tall: Stature, pixels.
+    """
+
+    frame: int
+    place: Float[np.ndarray, "2"]
+    tall: float
+
+
+def look_closely(
+    path: Path,
+    info: VideoInfo,
+    size: str,
+    rows: Float[np.ndarray, "T 33 7"],
+    config: CloseUpConfig,
+    progress: Callable[[int, int], None] | None = None,
+) -> Float[np.ndarray, "T 33 7"] | None:
+    """Return better rows of a person, NaN where he is not visible; None where there are no better.
+
+    Args:
+        path: Video file.
+        info: What `probe` found in it.
+        size: lite, full or heavy.
+        rows: What the detector found in the whole pictures.
+        config: When and how to look.
+        progress: Called with (frames done, frames in all).
+    """
+    seen = _share(rows)
+    if seen >= config.below_share:
+        return None
+    sights = search(path, info, config)
+    if not sights:
+        return None
+    closer = _followed(path, info, size, sights, len(rows), config.window, progress)
+    return closer if _share(closer) > seen else None
+
+
+def search(path: Path, info: VideoInfo, config: CloseUpConfig) -> list[Sight]:
+    """Return the largest person in some frames, evenly spread over the clip."""
+    chosen = spread(info.frames, info.fps, config.samples_per_s, config.fewest)
+    found: list[Sight] = []
+    searches = 0
+    with still_landmarker(SEARCHER) as landmarker:
+        for index, (_, image) in enumerate(timed_frames(path)):
+            if index not in chosen:
+                continue
+            row = None
+            if found:
+                near = window(found[-1].place, config.window * found[-1].tall, image.shape)
+                row = _best(landmarker, image, [near], config.visibility)
+            if row is None and searches < config.most_searches:
+                searches += 1
+                row = _all_over(landmarker, image, config.visibility)
+            if row is not None:
+                found.append(_sight(index, row, info))
+    return found
+
+
+def tiles(width: int, height: int, side: int) -> list[Box]:
+    """Return square windows that cover a picture and overlap by half."""
+
+    def starts(length: int) -> list[int]:
+        count = int(np.ceil(max(length - side, 0) / (side * (1.0 - OVERLAP)))) + 1
+        return np.linspace(0, max(length - side, 0), count).round().astype(int).tolist()
+
+    return [
+        (x, y, min(x + side, width), min(y + side, height))
+        for y in starts(height)
+        for x in starts(width)
+    ]
+
+
+def window(place: Float[np.ndarray, "2"], side: float, shape: tuple[int, ...]) -> Box:
+    """Return a square window around a place, moved and cut to lie inside a picture."""
+    length = np.minimum(round(side), shape[1::-1])
+    low = np.clip(np.round(place - length / 2.0), 0, np.array(shape[1::-1]) - length).astype(int)
+    high = low + length
+    return int(low[0]), int(low[1]), int(high[0]), int(high[1])
+
+
+def windows(
+    places: Float[np.ndarray, "T 2"], side: float, shape: tuple[int, ...]
+) -> Iterator[tuple[int, Box]]:
+    """Yield windows and the frame at which each ends: when the person has left its middle."""
+    start = 0
+    while start < len(places):
+        low = np.minimum.accumulate(places[start:])
+        high = np.maximum.accumulate(places[start:])
+        leaves = ((high - low) / 2.0 > STAYS * side).any(1)
+        end = start + (int(np.argmax(leaves)) if leaves.any() else len(leaves))
+        last = end - start - 1
+        yield end, window((low[last] + high[last]) / 2.0, side, shape)
+        start = end
+
+
+def in_picture(
+    row: Float[np.ndarray, "33 7"], box: Box, width: int, height: int
+) -> Float[np.ndarray, "33 7"]:
+    """Return landmarks of a window as landmarks of the whole picture; depth is in widths too."""
+    size = np.array([box[2] - box[0], box[3] - box[1], box[2] - box[0]])
+    moved = np.array(row)
+    moved[:, :3] = (row[:, :3] * size + [box[0], box[1], 0]) / [width, height, width]
+    return moved
+
+
+def _all_over(landmarker: Any, image: np.ndarray, visibility: float) -> np.ndarray | None:
+    """Return the largest person in tiles as large as the picture allows, then half and a quarter
+    of that."""
+    height, width = image.shape[:2]
+    for part in (1, 2, 4):
+        boxes = tiles(width, height, min(width, height) // part)
+        row = _best(landmarker, image, boxes, visibility)
+        if row is not None:
+            return row
+    return None
+
+
+def _best(
+    landmarker: Any, image: UInt8[np.ndarray, "H W 3"], boxes: list[Box], visibility: float
+) -> np.ndarray | None:
+    """Return the largest person who is whole in one of some windows; None for no person."""
+    height, width = image.shape[:2]
+    found = []
+    for box in boxes:
+        row = detect_person(landmarker, image[box[1] : box[3], box[0] : box[2]])
+        if row is not None and _whole(row) and row[:, 6].mean() >= visibility:
+            found.append(in_picture(row, box, width, height))
+    size = (width, height)
+    return max(found, key=lambda row: float(stature(row[:, :2] * size)), default=None)
+
+
+def _whole(row: np.ndarray) -> bool:
+    """Return whether head, trunk and legs are inside the window."""
+    points = row[indices(BODY), :2]
+    return bool(((points >= 0.0) & (points <= 1.0)).all())
+
+
+def _sight(index: int, row: np.ndarray, info: VideoInfo) -> Sight:
+    points = row[:, :2] * (info.width, info.height)
+    return Sight(index, points[trunk()].mean(0), float(stature(points)))
+
+
+def _followed(
+    path: Path,
+    info: VideoInfo,
+    size: str,
+    sights: list[Sight],
+    count: int,
+    sides: float,
+    progress: Callable[[int, int], None] | None,
+) -> Float[np.ndarray, "T 33 7"]:
+    """Return what the detector finds inside windows around the places between sights."""
+    known = [sight.frame for sight in sights]
+    points = np.array([sight.place for sight in sights])
+    places = np.stack([np.interp(np.arange(count), known, axis) for axis in points.T], -1)
+    tall = float(np.median([sight.tall for sight in sights]))
+    rows = np.full((count, 33, 7), np.nan)
+    frames = enumerate(timed_frames(path))
+    for end, box in windows(places, sides * tall, (info.height, info.width)):
+        with video_landmarker(size) as detect_frame:
+            for index, (time_s, image) in frames:
+                found = detect_frame(image[box[1] : box[3], box[0] : box[2]], time_s)
+                row = in_picture(found, box, info.width, info.height)
+                place = (row[trunk(), :2] * (info.width, info.height)).mean(0)
+                if np.linalg.norm(place - places[index]) <= ASTRAY * tall:
+                    rows[index] = row
+                if progress:
+                    progress(index + 1, count)
+                if index + 1 == end:
+                    break
+    return rows
+
+
+def _share(rows: Float[np.ndarray, "T 33 7"]) -> float:
+    return float((~np.isnan(rows[:, 0, 0])).mean()) if len(rows) else 1.0
