@@ -85,9 +85,7 @@ def residual_learning(
     """
     if not polishes(config, robot, reference):
         return config.tqc
-    log.info(
-        "the training improves what the feedback alone does (train.polish=no begins with random actions)"
-    )
+    log.info("improving what the feedback alone does (train.polish=no: begin with random actions)")
     return replace(config.tqc, **PRESETS["polish"])
 
 
