@@ -17,6 +17,7 @@ from typing import Any
 
 import pandas as pd
 
+from benchmarks.learning.policies import MOVES as POLICIES
 from benchmarks.learning.policies import Folders
 from benchmarks.learning.tracker_rows import present
 from robojackson.api.robots import load_robot
@@ -26,7 +27,10 @@ from robojackson.rl.config.evaluate_config import EvaluateConfig
 from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
 from robojackson.rl.trackers.tracker import Tracker
 
-MOVES = ("g1_hip_shake", "g1_walk", "g1_dance_b", "g1_dance_a")
+MOVES = (
+    *("g1_hip_shake", "g1_walk", "g1_dance_b", "g1_dance_a", "g1_authors_apt1", "g1_authors_walk"),
+    *("g1_cmu_05_02", "g1_cmu_05_09", "g1_cmu_05_18"),
+)
 OWN_MOTION = "holosoma_dance"
 FIRST, STEPS = {"fastsac": 2100, "ppo": 2000}, 500
 """Of the motion inside their files: the same ten seconds."""
@@ -36,7 +40,6 @@ FIGURES = ("success", "strict_success", "skill", "mpjpe_l_m", "mpjpe_g_alive_m",
            "acceleration_ratio")  # fmt: skip
 FEET = ("excess_speed_left_foot", "excess_speed_right_foot")
 COLUMNS = (*FIGURES, "feet_excess_m_s", "cpu_s", "data", "in_training", "why")
-CPU_MINUTES = {"g1_hip_shake": 10, "g1_walk": 15, "g1_dance_b": 15}
 INSTANT, TRAINED = "ours, instant (regulator)", "ours, regulator polished by training (seed 100)"
 SCRATCH, POLISHED, REPLAY = "ours, from scratch", "ours, twist2 polished", "reference replayed"
 MISSING = {
@@ -101,14 +104,16 @@ def trained(folders: Folders, move: str) -> Iterator[Row]:
     table = pd.read_parquet(path)
     rows = table[table["policy"] == "trained"]
     figures = {name: float(rows[name].mean()) for name in FIGURES}
-    feet, spent = float(rows[list(FEET)].to_numpy().mean()), 60.0 * CPU_MINUTES[move]
+    feet = float(rows[list(FEET)].to_numpy().mean())
+    spent = 60.0 * POLICIES[move].cpu_minutes
     known = {"data": "the clip", "in_training": "seen"}
     yield row(TRAINED, move, figures, feet_excess_m_s=feet, cpu_s=spent, **known)
 
 
 NOTHING = {"data": "none", "in_training": "unseen"}
 TWIST2 = {"data": "AMASS and others, on GPUs", "in_training": "unseen"}
-"""Our references were made here, from videos that no training of theirs has seen."""
+"""Our references were made here, from videos that no training of theirs has seen; CMU's motions are
+a part of AMASS (`of_amass`)."""
 
 
 def tracked(folders: Folders, move: str) -> Iterator[Row]:
@@ -119,9 +124,15 @@ def tracked(folders: Folders, move: str) -> Iterator[Row]:
         found = [r for r in table if (r["tracker"], r["move"], r["friction"]) == (name, move, 1.0)]
         if found:
             figures = {figure: found[-1].get(figure) for figure in FIGURES}
-            yield row(who, move, figures, cpu_s=found[-1]["cpu_s"], **known)
+            seen = {"in_training": "likely"} if name == "twist2" and of_amass(move) else {}
+            yield row(who, move, figures, cpu_s=found[-1]["cpu_s"], **known | seen)
         else:
             yield row(who, move, why="python -m benchmarks.learning.tracker_rows")
+
+
+def of_amass(move: str) -> bool:
+    """Return whether a motion is probably among those of AMASS."""
+    return POLICIES[move].cmu
 
 
 def on_their_own(kind: str, who: str, wheel: Path | None) -> Iterator[Row]:
