@@ -197,10 +197,7 @@ class Backups:
     def prune(self, keep: int) -> int:
         """Remove all backups but the newest ones, and contents that none of these has.
 
-        Contents stay while a manifest is damaged: what it consists of is unknown.
-
-        Returns:
-            Bytes that were freed.
+        Contents stay while a manifest is damaged. Return the number of freed bytes.
         """
         names = self.names()
         for name in names[: max(len(names) - keep, 0)]:

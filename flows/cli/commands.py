@@ -74,9 +74,7 @@ def dance(
     instant: Annotated[
         bool, typer.Option(INSTANT, help="A general tracker dances at once; no training.")
     ] = False,
-    music: Annotated[
-        Path | None, typer.Option(help="A sound file that is heard instead of the clip's sound.")
-    ] = None,
+    music: Annotated[Path | None, typer.Option(help="A sound file instead of the clip's.")] = None,
     shape: Annotated[
         Shape | None, typer.Option("--format", help="Of the video: row, square, vertical or wide.")
     ] = None,

@@ -44,12 +44,7 @@ control step."""
 
 @dataclass(frozen=True)
 class LoadedNetworks:
-    """The published networks with weights of the user.
-
-    Attributes:
-        config: Configuration of the networks.
-        networks: The modules.
-    """
+    """The published networks with weights of the user: their configuration and modules."""
 
     config: NetworkConfig
     networks: "Networks"

@@ -208,8 +208,7 @@ def evaluate(
 
 
 def is_tracker(policy: Path) -> bool:
-    """Return whether a policy is given by the name of a tracker; a file of that name comes
-    first."""
+    """Return whether a policy is the name of a tracker; a file of that name takes precedence."""
     from robojackson.pipeline.tracker_descriptions import tracker_names
 
     return str(policy) in tracker_names() and not policy.is_file()
@@ -220,10 +219,9 @@ VERDICT = ("survived_s", "success", "strict_success", "skill", "site_error_m", "
 
 def verdict_lines(evaluation: Mapping[str, Any]) -> list[str]:
     """Return the table of an evaluation: the policy, then its baselines."""
-    short = evaluation.get("verdict", {}).get("kind") == "too_short"
     name = evaluation.get("tracker", "trained")
     rows = {name: evaluation, **evaluation.get("trackers", {}), **evaluation["baselines"]}
-    if short:
+    if evaluation.get("verdict", {}).get("kind") == "too_short":
         shown = dict.fromkeys(NEEDS_FULL_LENGTH, "too short")
         rows = {name: {**row, **shown} for name, row in rows.items()}
     return console.table(rows, VERDICT)
