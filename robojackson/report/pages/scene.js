@@ -86,6 +86,9 @@ const Stage = (() => {
     return { group, parts, pose };
   }
 
+  /* Corners of the trunk: its thick parts overlap, and fewer would cut into each other. */
+  const TRUNK = [16, 10];
+
   /* A person of rounded parts between points; `pose` takes rows of x y z from an offset. */
   function person(shape, colours, shadowMaterial, simple = false) {
     const group = new T.Group(), up = new T.Vector3(0, 1, 0), a = new T.Vector3(), b = new T.Vector3();
@@ -93,14 +96,14 @@ const Stage = (() => {
     const fine = simple ? [10, 6] : [14, 10], coarse = [6, 4];
     const turn = new T.Quaternion(), matrix = new T.Matrix4(), size = new T.Vector3();
     const sides = ['left', 'right', 'middle'].map((side) => {
-      const bones = shape.bones.filter((bone) => bone.side === side);
+      const bones = shape.bones.filter((bone) => bone.side === side), round = side === 'middle' ? TRUNK : fine;
       const build = (geometry, shadow, count) => {
         const shown = new T.InstancedMesh(geometry, colours[side], count), below = asShadow(new T.InstancedMesh(shadow, shadowMaterial, count));
         below.instanceMatrix = shown.instanceMatrix; shown.frustumCulled = false;
         group.add(shown, below);
         return shown;
       };
-      return { bones, rods: build(stick(fine[0]), stick(coarse[0]), bones.length), balls: build(ball(...fine), ball(...coarse), 2 * bones.length) };
+      return { bones, rods: build(stick(round[0]), stick(coarse[0]), bones.length), balls: build(ball(...round), ball(...coarse), 2 * bones.length) };
     });
     const pose = (values, at = 0) => {
       for (const { bones, rods, balls } of sides) {
