@@ -150,7 +150,7 @@ def windows(
     while start < len(places):
         low = np.minimum.accumulate(places[start:])
         high = np.maximum.accumulate(places[start:])
-        leaves = ((high - low) / 2.0 > STAYS * side).any(1)
+        leaves = np.atleast_1d(((high - low) / 2.0 > STAYS * side).any(1))
         end = start + (int(np.argmax(leaves)) if leaves.any() else len(leaves))
         last = end - start - 1
         yield end, window((low[last] + high[last]) / 2.0, side, shape)
