@@ -150,11 +150,11 @@ def doctor(
     as_json: Json = False,
 ) -> CommandResult:
     """Show what is installed, what is missing, and how to get it."""
-    from robojackson.cli.doctor import doctor_lines, examine
+    from robojackson.cli.diagnosis.doctor import doctor_lines, examine
 
     found = examine()
     if report:
-        from robojackson.cli.issue_report import issue_report
+        from robojackson.cli.diagnosis.issue_report import issue_report
 
         block = issue_report(found)
         return CommandResult({"report": "\n".join(block)}, text=block)

@@ -10,7 +10,6 @@ for as long as he stays in them. Pixels of the upright picture, origin top left.
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -125,7 +124,7 @@ def tiles(width: int, height: int, side: int) -> list[Box]:
 
     def starts(length: int) -> list[int]:
         count = int(np.ceil(max(length - side, 0) / (side * (1.0 - OVERLAP)))) + 1
-        return np.linspace(0, max(length - side, 0), count).round().astype(int).tolist()
+        return [round(float(start)) for start in np.linspace(0, max(length - side, 0), count)]
 
     return [
         (x, y, min(x + side, width), min(y + side, height))
@@ -167,7 +166,7 @@ def in_picture(
     return moved
 
 
-def _all_over(landmarker: Any, image: np.ndarray, visibility: float) -> np.ndarray | None:
+def _all_over(landmarker: object, image: np.ndarray, visibility: float) -> np.ndarray | None:
     """Return the largest person in tiles as large as the picture allows, then half and a quarter
     of that."""
     height, width = image.shape[:2]
@@ -180,7 +179,7 @@ def _all_over(landmarker: Any, image: np.ndarray, visibility: float) -> np.ndarr
 
 
 def _best(
-    landmarker: Any, image: UInt8[np.ndarray, "H W 3"], boxes: list[Box], visibility: float
+    landmarker: object, image: UInt8[np.ndarray, "H W 3"], boxes: list[Box], visibility: float
 ) -> np.ndarray | None:
     """Return the largest person who is whole in one of some windows; None for no person."""
     height, width = image.shape[:2]

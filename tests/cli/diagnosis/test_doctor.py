@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from robojackson.cli.doctor import PYTHONS, doctor_lines, examine, unsupported
+from robojackson.cli.diagnosis.doctor import PYTHONS, doctor_lines, examine, unsupported
 
-PROJECT = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
+PROJECT = tomllib.loads((Path(__file__).parents[3] / "pyproject.toml").read_text())["project"]
 
 
 @pytest.mark.parametrize("version", PYTHONS)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from robojackson.cli.issue_report import server_state, store_state
+from robojackson.cli.diagnosis.issue_report import server_state, store_state
 from tests.fixtures.commands import in_process
 
 SECRET = "hunter2"
