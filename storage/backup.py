@@ -244,6 +244,4 @@ def _reason(cause: Exception) -> str:
     if isinstance(cause, ValidationError):
         first = cause.errors()[0]
         return f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
-    if isinstance(cause, BackupFailed):
-        return cause.reason
-    return f"no {cause}" if isinstance(cause, KeyError) else str(cause)
+    return f"no {cause}" if isinstance(cause, KeyError) else str(getattr(cause, "reason", cause))

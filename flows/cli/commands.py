@@ -83,13 +83,8 @@ def dance(
 ) -> CommandResult:
     """Turn a video, a folder of candidates or the name of a dance into a robot that dances it."""
     from flows.runtime.environment import prepare
-    from flows.search.dance_source import (
-        is_name,
-        load_settings,
-        require_music,
-        require_usable,
-        resolve,
-    )
+    from flows.search import dance_source
+    from flows.search.dance_source import is_name, load_settings, resolve
     from flows.search.requests import require_findable
     from storage.store import Store
 
@@ -107,9 +102,9 @@ def dance(
     if force:
         overrides["gate"] = False
     settings = load_settings(config, overrides)
-    require_music(settings)
+    dance_source.require_music(settings)
     if found is not None:
-        require_usable(found, settings, start, end)
+        dance_source.require_usable(found, settings, start, end)
     else:
         require_findable(str(source), Store.from_environment())
     prepare(Store.from_environment())

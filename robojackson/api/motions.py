@@ -144,18 +144,14 @@ def retarget_motion(
     sequence = motion if isinstance(motion, SmplSequence) else read_motion(motion)
     if not isinstance(sequence, SmplSequence):
         raise BadConfiguration(f"{motion}: a motion of robot {sequence.robot!r} already")
-    if len(sequence) > MOST_FRAMES:
-        raise BadTable(
-            f"{len(sequence):,} frames; at most {MOST_FRAMES:,} are fitted together: cut the motion"
-        )
-    require_person(sequence.keypoints_w, "the motion")
     machine = load_robot(robot)
     seconds, most_s = len(sequence) / sequence.fps, MOST_STEPS * machine.description.control_dt
-    if seconds > most_s:
+    if len(sequence) > MOST_FRAMES or seconds > most_s:
         raise BadTable(
-            f"{seconds:,.0f} s at {sequence.fps:g} frames a second; at most {most_s:,.0f} s are "
-            "fitted together: cut the motion"
+            f"{len(sequence):,} frames, {seconds:,.0f} s; at most {MOST_FRAMES:,} frames and "
+            f"{most_s:,.0f} s are fitted together: cut the motion"
         )
+    require_person(sequence.keypoints_w, "the motion")
     reference = retargeting.retarget_motion(sequence, machine, config or RetargetConfig())
     return replace(reference, robot_file=machine.description.file)
 

@@ -20,8 +20,8 @@ from robojackson.cli.library_output import silence_libraries
 from robojackson.cli.lifetime.interruption import INTERRUPTED, conclude, printable
 from robojackson.cli.lifetime.interruption import complain as complain
 from robojackson.cli.lifetime.interruption import same_command as same_command
-from robojackson.cli.unexpected import USAGE_ERROR as USAGE_ERROR
-from robojackson.cli.unexpected import require_finite, unexpected
+from robojackson.cli.lifetime.unexpected import USAGE_ERROR as USAGE_ERROR
+from robojackson.cli.lifetime.unexpected import require_finite, unexpected
 from robojackson.errors import RoboJacksonError, StoreError
 from robojackson.files.json_types import to_json_types as to_json_types
 

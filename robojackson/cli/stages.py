@@ -105,7 +105,6 @@ def _motion_of(
     """Return the motion of a track, or of it and what a second camera sees."""
     from robojackson.api.motions import recover_motion
     from robojackson.api.second_camera import heard_offset
-    from robojackson.mocap.landmarks.blazepose import MIN_FRAMES
     from robojackson.mocap.views.two_cameras import recover_together
 
     try:
@@ -113,12 +112,11 @@ def _motion_of(
             return recover_motion(
                 track, config=settings.mocap, networks=networks, video=video, progress=True
             )
-        other = _track_of(second, settings)
         heard_s = in_video_process(heard_offset, video, second)
-        return recover_together(track, other, settings.mocap, heard_s)
+        return recover_together(track, _track_of(second, settings), settings.mocap, heard_s)
     except (NoPersonFound, TrackTooShort) as cause:
-        is_first_good = track.detected.sum() >= MIN_FRAMES
-        raise type(cause)(cause.reason, second if second and is_first_good else video) from cause
+        named = second if second and track.detected.sum() > 1 else video
+        raise type(cause)(cause.reason, named) from cause
 
 
 def retarget(smpl: Path, out: Path, config: str, overrides: Overrides) -> Figures:

@@ -16,8 +16,8 @@ TRACEBACK, LONGEST_CAUSE = "ROBOJACKSON_TRACEBACK", 300
 """Environment variable that shows the traceback of an unexpected error; length of its line."""
 USAGE_ERROR: Any = typer.BadParameter.__bases__[0]
 """Exception of typer for arguments that it cannot parse; it has no public name there."""
-IMPORTING = "<frozen importlib"
-"""Beginning of the file names of Python's import system in a traceback."""
+BODY = "<module>"
+"""Name in a traceback of the code that runs while a module is imported."""
 PACKAGES = ("site-packages", "dist-packages")
 OURS = ("robojackson", "flows", "tasks", "storage", "configs")
 
@@ -54,15 +54,13 @@ def unexpected(cause: Exception) -> str:
 
 def _not_loaded(cause: Exception) -> str:
     """Return the library that raised an error while it was imported; empty for any other error."""
-    library, is_importing = "", False
+    library = ""
     for frame in traceback.extract_tb(cause.__traceback__):
         owner = _owner(frame.filename)
-        if frame.filename.startswith(IMPORTING):
-            is_importing = True
-        elif owner in OURS:
-            library, is_importing = "", False
-        elif owner and is_importing:
-            library = library or owner
+        if owner in OURS:
+            library = ""
+        elif owner and frame.name == BODY:
+            library = owner
     return library
 
 
@@ -72,4 +70,4 @@ def _owner(file: str) -> str:
     for folder in PACKAGES:
         if folder in parts:
             return parts[parts.index(folder) + 1].removesuffix(".py")
-    return OURS[0] if Path(file).is_relative_to(Path(__file__).parents[2]) else ""
+    return OURS[0] if Path(file).is_relative_to(Path(__file__).parents[3]) else ""

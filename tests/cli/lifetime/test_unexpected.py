@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import typer
 
-from robojackson.cli.unexpected import require_finite, unexpected
+from robojackson.cli.lifetime.unexpected import require_finite, unexpected
 
 
 def caught(call) -> Exception:
@@ -20,7 +20,7 @@ def caught(call) -> Exception:
 
 @pytest.fixture
 def library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """A library that reads a variable when it is loaded, and a function that fails later."""
+    """Make a library that reads a variable when it is loaded, and one that fails later."""
     folder = tmp_path / "site-packages" / "choosy"
     folder.mkdir(parents=True)
     (folder / "__init__.py").write_text("from choosy.settings import CHOICE\n")
@@ -32,7 +32,7 @@ def library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 
 
 def test_a_library_that_cannot_be_loaded_is_named(library: str) -> None:
-    line = unexpected(caught(lambda: importlib.import_module(library)))
+    line = unexpected(caught(lambda: exec(f"import {library}")))
     assert line.startswith("BadConfiguration: choosy cannot be loaded: ValueError: ")
     assert line.endswith("look at the environment variables that it reads")
 
