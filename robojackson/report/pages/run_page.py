@@ -85,11 +85,11 @@ class PageContent:
 
     title: str
     robot: str = ""
-    source: Mapping[str, Any] = field(default_factory=dict)
-    stability: Mapping[str, Any] = field(default_factory=dict)
-    mocap: Mapping[str, Any] = field(default_factory=dict)
+    source: Mapping[str, object] = field(default_factory=dict)
+    stability: Mapping[str, object] = field(default_factory=dict)
+    mocap: Mapping[str, object] = field(default_factory=dict)
     scorecard: Mapping[str, Any] = field(default_factory=dict)
-    training: Mapping[str, Any] = field(default_factory=dict)
+    training: Mapping[str, object] = field(default_factory=dict)
     evaluation: Mapping[str, Any] = field(default_factory=dict)
     video: str | None = None
     tracker_video: str | None = None
