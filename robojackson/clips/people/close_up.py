@@ -26,6 +26,9 @@ Box = tuple[int, int, int, int]
 """x0, y0, x1, y1."""
 SEARCHER = "lite"
 """Size of the pose model that searches; the person is then followed with a better one."""
+PARTS = (1, 2, 4)
+LEAST_TILE = 160
+"""Tiles are the short side of the picture over these, but no smaller than so many pixels."""
 OVERLAP = 0.5
 """Share of a tile that the next one covers too."""
 STAYS = 0.25
@@ -167,14 +170,13 @@ def in_picture(
 
 
 def _all_over(landmarker: object, image: np.ndarray, visibility: float) -> np.ndarray | None:
-    """Return the largest person in tiles as large as the picture allows, then half and a quarter
-    of that."""
+    """Return the largest person in tiles as large as the picture allows, then in smaller ones."""
     height, width = image.shape[:2]
-    for part in (1, 2, 4):
-        boxes = tiles(width, height, min(width, height) // part)
-        row = _best(landmarker, image, boxes, visibility)
-        if row is not None:
-            return row
+    for side in (min(width, height) // part for part in PARTS):
+        if side >= LEAST_TILE or side == min(width, height):
+            row = _best(landmarker, image, tiles(width, height, side), visibility)
+            if row is not None:
+                return row
     return None
 
 
