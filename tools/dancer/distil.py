@@ -49,7 +49,7 @@ def taught(references: Path, gains: Path, robot: Robot) -> tuple[list[ReferenceM
     """
     names = sorted(path.stem for path in gains.glob("*.npz"))
     split = load_split()
-    refused = [name for name in names if name in (*split.judged, *split.excluded)]
+    refused = [name for name in names if name in (*split.held_out, *split.excluded)]
     if refused:
         raise ValueError(f"not for training: {', '.join(refused)}")
     motions = [ReferenceMotion.load(references / f"{name}.parquet") for name in names]

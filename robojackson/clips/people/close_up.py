@@ -9,6 +9,7 @@ for as long as he stays in them. Pixels of the upright picture, origin top left.
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,8 @@ from robojackson.clips.pose_detector import still_landmarker, video_landmarker
 from robojackson.clips.video import VideoInfo, timed_frames
 from robojackson.config import config_dataclass
 
+Look = Callable[[np.ndarray], np.ndarray | None]
+"""Detects one person in a picture."""
 Box = tuple[int, int, int, int]
 """x0, y0, x1, y1."""
 SEARCHER = "lite"
@@ -107,16 +110,17 @@ def search(path: Path, info: VideoInfo, config: CloseUpConfig) -> list[Sight]:
     found: list[Sight] = []
     searches = 0
     with still_landmarker(SEARCHER) as landmarker:
+        look = partial(detect_person, landmarker)
         for index, (_, image) in enumerate(timed_frames(path)):
             if index not in chosen:
                 continue
             row = None
             if found:
                 near = window(found[-1].place, config.window * found[-1].tall, image.shape)
-                row = _best(landmarker, image, [near], config.visibility)
+                row = _best(look, image, [near], config.visibility)
             if row is None and searches < config.most_searches:
                 searches += 1
-                row = _all_over(landmarker, image, config.visibility)
+                row = _all_over(look, image, config.visibility)
             if row is not None:
                 found.append(_sight(index, row, info))
     return found
@@ -127,7 +131,7 @@ def tiles(width: int, height: int, side: int) -> list[Box]:
 
     def starts(length: int) -> list[int]:
         count = int(np.ceil(max(length - side, 0) / (side * (1.0 - OVERLAP)))) + 1
-        return [round(float(start)) for start in np.linspace(0, max(length - side, 0), count)]
+        return np.linspace(0, max(length - side, 0), count).round().astype(int).tolist()
 
     return [
         (x, y, min(x + side, width), min(y + side, height))
@@ -169,25 +173,25 @@ def in_picture(
     return moved
 
 
-def _all_over(landmarker: object, image: np.ndarray, visibility: float) -> np.ndarray | None:
+def _all_over(look: Look, image: np.ndarray, visibility: float) -> np.ndarray | None:
     """Return the largest person in tiles as large as the picture allows, then in smaller ones."""
     height, width = image.shape[:2]
     for side in (min(width, height) // part for part in PARTS):
         if side >= LEAST_TILE or side == min(width, height):
-            row = _best(landmarker, image, tiles(width, height, side), visibility)
+            row = _best(look, image, tiles(width, height, side), visibility)
             if row is not None:
                 return row
     return None
 
 
 def _best(
-    landmarker: object, image: UInt8[np.ndarray, "H W 3"], boxes: list[Box], visibility: float
+    look: Look, image: UInt8[np.ndarray, "H W 3"], boxes: list[Box], visibility: float
 ) -> np.ndarray | None:
     """Return the largest person who is whole in one of some windows; None for no person."""
     height, width = image.shape[:2]
     found = []
     for box in boxes:
-        row = detect_person(landmarker, image[box[1] : box[3], box[0] : box[2]])
+        row = look(image[box[1] : box[3], box[0] : box[2]])
         if row is not None and _whole(row) and row[:, 6].mean() >= visibility:
             found.append(in_picture(row, box, width, height))
     size = (width, height)
