@@ -131,7 +131,7 @@ def tiles(width: int, height: int, side: int) -> list[Box]:
 
     def starts(length: int) -> list[int]:
         count = int(np.ceil(max(length - side, 0) / (side * (1.0 - OVERLAP)))) + 1
-        return np.linspace(0, max(length - side, 0), count).round().astype(int).tolist()
+        return [round(float(start)) for start in np.linspace(0, max(length - side, 0), count)]
 
     return [
         (x, y, min(x + side, width), min(y + side, height))
