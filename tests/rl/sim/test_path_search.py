@@ -96,6 +96,7 @@ def test_feet_that_stand_decide_how_far_a_robot_is_from_its_place(robot: Robot) 
     assert np.abs(feet.apart(qpos, places)[1]).max() < 0.02
 
 
+@pytest.mark.slow
 def test_the_regulator_that_keeps_robots_up_longer_is_taken(
     robot: Robot,
     sim: Simulation,
@@ -106,6 +107,7 @@ def test_the_regulator_that_keeps_robots_up_longer_is_taken(
     action, feet = residual_scale(robot, ControlConfig()), Feet(robot)
     monkeypatch.setattr(sampled_regulator, "regulator", lambda *given: plain)
     monkeypatch.setattr(sampled_regulator, "PASSES", 1)
+    monkeypatch.setattr(sampled_regulator, "PASSES_A_S", 0.0)
     monkeypatch.setattr(sampled_regulator, "TRIES", 1)
     for shares, anchored in (((1.0,), False), ((0.5, 0.4), False), ((0.5, 0.6), True)):
         held = iter(shares)
@@ -114,3 +116,43 @@ def test_the_regulator_that_keeps_robots_up_longer_is_taken(
         assert bool(np.isfinite(found.places).all()) == anchored
         if not anchored:
             np.testing.assert_array_equal(found.gain, plain[0].gain)
+
+
+class Falls:
+    """A search whose robots always fall after so many steps, wherever they begin."""
+
+    def __init__(self, reach: int) -> None:
+        self.reach, self.breadth, self.tried = reach, 1, list[tuple[int, int]]()
+
+    def run(self, path: Path, law: object, begin: int) -> tuple[Path, bool]:
+        """Return the path up to the fall."""
+        self.tried.append((begin, self.breadth))
+        rows = slice(begin, min(self.reach, len(path)))
+        return Path(path.qpos[rows], path.qvel[rows], path.targets[rows]), False
+
+    def joined(self, path: Path, found: Path, begin: int, kept: int) -> Path:
+        """Return the path itself."""
+        return path
+
+
+def test_a_search_that_does_not_advance_gets_broader_begins_earlier_and_ends(
+    plain: tuple[Gains, Path, Linear], sim: Simulation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, path, linear = plain
+    repeated = Path(*(np.tile(part, (6, 1)) for part in (path.qpos, path.qvel, path.targets)))
+    monkeypatch.setattr(sampled_regulator, "_with", lambda linear, *rest: linear)
+    monkeypatch.setattr(sampled_regulator, "riccati", lambda *given: None)
+    search = Falls(reach=360)
+    sampled_regulator._searched(
+        search,
+        sim,
+        repeated,
+        linear,
+        np.ones(1),
+        0.015,
+        lambda *given: None,  # type: ignore[arg-type]
+    )
+    begins, breadths = zip(*search.tried, strict=True)
+    assert breadths == (1, 1, 2, 3, 4)
+    assert list(begins[1:]) == sorted(begins[1:], reverse=True)
+    assert begins[1] > begins[-1] > 0

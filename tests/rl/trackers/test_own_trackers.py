@@ -39,6 +39,7 @@ def motion() -> ReferenceMotion:
     return robot_motion("dance_b")
 
 
+@pytest.mark.slow
 def test_the_regulator_is_evaluated_like_a_policy(
     robot: Robot, sway: ReferenceMotion, monkeypatch: pytest.MonkeyPatch
 ) -> None:
