@@ -26,6 +26,8 @@ Box = tuple[int, int, int, int]
 """x0, y0, x1, y1."""
 SEARCHER = "lite"
 """Size of the pose model that searches; the person is then followed with a better one."""
+SMALLEST_PX = 32
+"""Least side of a tile."""
 OVERLAP = 0.5
 """Share of a tile that the next one covers too."""
 STAYS = 0.25
@@ -168,11 +170,12 @@ def in_picture(
 
 def _all_over(landmarker: object, image: np.ndarray, visibility: float) -> np.ndarray | None:
     """Return the largest person in tiles as large as the picture allows, then half and a quarter
-    of that."""
+    of that; none in a picture that is smaller than `SMALLEST_PX`."""
     height, width = image.shape[:2]
-    for part in (1, 2, 4):
-        boxes = tiles(width, height, min(width, height) // part)
-        row = _best(landmarker, image, boxes, visibility)
+    for side in (min(width, height) // part for part in (1, 2, 4)):
+        if side < SMALLEST_PX:  # of a strip of pixels there would be thousands
+            break
+        row = _best(landmarker, image, tiles(width, height, side), visibility)
         if row is not None:
             return row
     return None
