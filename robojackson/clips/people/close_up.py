@@ -30,8 +30,9 @@ Box = tuple[int, int, int, int]
 SEARCHER = "lite"
 """Size of the pose model that searches; the person is then followed with a better one."""
 PARTS = (1, 2, 4)
-LEAST_TILE = 160
-"""Tiles are the short side of the picture over these, but no smaller than so many pixels."""
+LEAST_TILE, SMALLEST_PX = 160, 32
+"""Tiles are the short side of the picture over these, but no smaller than so many pixels unless the
+picture is; smaller than the second number it is a strip, whose tiles would be thousands."""
 OVERLAP = 0.5
 """Share of a tile that the next one covers too."""
 STAYS = 0.25
@@ -177,7 +178,7 @@ def _all_over(look: Look, image: np.ndarray, visibility: float) -> np.ndarray | 
     """Return the largest person in tiles as large as the picture allows, then in smaller ones."""
     height, width = image.shape[:2]
     for side in (min(width, height) // part for part in PARTS):
-        if side >= LEAST_TILE or side == min(width, height):
+        if side >= LEAST_TILE or side == min(width, height) >= SMALLEST_PX:
             row = _best(look, image, tiles(width, height, side), visibility)
             if row is not None:
                 return row

@@ -9,6 +9,7 @@ import pytest
 from robojackson.clips.people.close_up import (
     STAYS,
     CloseUpConfig,
+    _all_over,
     in_picture,
     look_closely,
     tiles,
@@ -26,6 +27,12 @@ TRACK = ROOT / "tests" / "golden" / "hip_shake_track.npz"
 WIDTH, HEIGHT = 1280, 720
 SMALL, CORNER = (160, 120), (900, 500)
 FRAMES = 4
+
+
+@pytest.mark.parametrize("shape", [(2, 2), (2, 2048), (1080, 4)])
+def test_a_strip_of_pixels_is_not_searched(shape: tuple[int, int]) -> None:
+    """No landmarker is called: the one given is none."""
+    assert _all_over(None, np.zeros((*shape, 3), np.uint8), 0.5) is None
 
 
 @pytest.mark.parametrize("side", [48, 100, 60, 37])
