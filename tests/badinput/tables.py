@@ -226,7 +226,7 @@ def cases() -> Iterator[Case]:
             ("train", motion, "-o", "out", "--steps", "300"),
             ("evaluate", "@/policy.safetensors", motion),
             ("export", motion, "--to", "beyondmimic", "-o", "out.npz"),
-        )[number % 2 if "rows" in name or name.startswith(("bodies", "torque")) else number % 3]
+        )[number % 2 if "row" in name or name.startswith(("bodies", "torque")) else number % 3]
         yield Case("table", f"reference: {name}", words, changed(motion, change))
     for at in (0.0, 0.2, 0.6, 0.95):
         words = ("retarget", "smpl.parquet", "-o", "out")
