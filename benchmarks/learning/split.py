@@ -52,6 +52,16 @@ class Split:
                 f"{', '.join(self.train)}"
             )
 
+    def require_none_held_out(self, names: Iterable[str]) -> None:
+        """Refuse motions that are held out, or too similar to one that is.
+
+        Raises:
+            ValueError: with the motions.
+        """
+        bad = [name for name in names if name in (*self.held_out, *self.excluded)]
+        if bad:
+            raise ValueError(f"not for training: {', '.join(bad)}")
+
 
 def load_split(path: Path = FILE) -> Split:
     """Read the split."""

@@ -24,6 +24,7 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import TrackConfig
 from robojackson.rl.policy import Policy
 from robojackson.rl.sim.motors import actuation_facts
+from robojackson.rl.sim.nominal_path import Gains
 from robojackson.rl.sim.simulation import resolved
 from robojackson.rl.tqc.network_arrays import Networks
 from robojackson.robot.model import Robot
@@ -41,17 +42,14 @@ MOST_ALONE = 0.9
 HIDDEN = (512, 384, 256)
 
 
-def taught(references: Path, gains: Path, robot: Robot) -> tuple[list[ReferenceMotion], list]:  # type: ignore[type-arg]
+def taught(references: Path, gains: Path) -> tuple[list[ReferenceMotion], list[Gains]]:
     """Return the motions that have an expert, and the experts.
 
     Raises:
         ValueError: one of the motions is held out, or too similar to one that is.
     """
     names = sorted(path.stem for path in gains.glob("*.npz"))
-    split = load_split()
-    refused = [name for name in names if name in (*split.held_out, *split.excluded)]
-    if refused:
-        raise ValueError(f"not for training: {', '.join(refused)}")
+    load_split().require_none_held_out(names)
     motions = [ReferenceMotion.load(references / f"{name}.parquet") for name in names]
     return motions, [experts.load(gains / f"{name}.npz") for name in names]
 
@@ -101,7 +99,7 @@ def main() -> None:
     given = parser.parse_args()
     given.out.mkdir(parents=True, exist_ok=True)
     robot = load_robot(given.robot)
-    motions, gains = taught(given.references, given.experts, robot)
+    motions, gains = taught(given.references, given.experts)
     print(f"{len(motions)} motions, {sum(len(m) * m.dt for m in motions):.0f} s", flush=True)
     lessons_of = Rehearsal(robot, motions, gains, ROBOTS, given.seed)
     size, motors = lessons_of.size

@@ -30,10 +30,7 @@ def collection(folder: Path, robot: Robot) -> list[ReferenceMotion]:
         ValueError: one of them is held out, or too similar to one that is.
     """
     paths = sorted(folder.glob("*.parquet"))
-    split = load_split()
-    refused = [path.stem for path in paths if path.stem in (*split.held_out, *split.excluded)]
-    if refused:
-        raise ValueError(f"not for training: {', '.join(refused)}")
+    load_split().require_none_held_out(path.stem for path in paths)
     plain = [ReferenceMotion.load(path) for path in paths]
     return [image for motion in plain for image in (motion, mirrored(motion, robot))]
 
