@@ -55,10 +55,9 @@ def retarget_motion(
     """
     dt = robot.description.control_dt
     cyclic = config.cyclic if config.method == "optimise" else "no"
-    whole, frames = len(sequence), slice(0, len(sequence))
-    if config.cut_glides and config.method == "optimise":
-        frames = danced_frames(sequence)
-        sequence = sequence.part(frames)
+    whole, cuts = len(sequence), config.cut_glides and config.method == "optimise"
+    frames = danced_frames(sequence) if cuts else slice(0, whole)
+    sequence = sequence.part(frames)
     clip, cycle = human_clip(sequence, dt, cyclic, config.fixed_tempo, config.cycle)
     clip = replace(clip, time_s=clip.time_s + frames.start / sequence.fps)
     extra = _notes(sequence, clip, cycle, config)

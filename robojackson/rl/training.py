@@ -80,8 +80,8 @@ def residual_learning(
     """Return TQC's configuration: that of `polish` where the feedback dances by itself, else the
     given one.
 
-    A motion that repeats is learnt better from falls, by actions that are random at first; one that
-    ends is unlearnt by them (docs/learning.md).
+    A motion that repeats is learnt better from falls, by actions that are random at first; they
+    destroy what the feedback holds of one that ends (docs/learning_g1.md).
     """
     if not polishes(config, robot, reference):
         return config.tqc

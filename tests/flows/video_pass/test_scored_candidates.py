@@ -15,7 +15,7 @@ def candidate(name: str, score: float, detected: int = 12) -> Candidate:
 
 
 BEST, OTHER = candidate("a.mp4", 0.05), candidate("b.mp4", 0.4)
-NOBODY = candidate("c.mp4", 0.0, detected=0)
+NO_PERSON = candidate("c.mp4", 0.0, detected=0)
 
 
 @pytest.mark.parametrize(
@@ -24,7 +24,7 @@ NOBODY = candidate("c.mp4", 0.0, detected=0)
         (BEST, True, "danced: the only clip, stability score 0.05 a second"),
         (BEST, False, "danced: the steadiest, stability score 0.05 a second"),
         (OTHER, False, "not danced: stability score 0.40 a second, 0.05 is steadier"),
-        (NOBODY, False, "no person is visible in it"),
+        (NO_PERSON, False, "no person is visible in it"),
     ],
 )
 def test_every_clip_has_its_reason(clip: Candidate, alone: bool, reason: str) -> None:
