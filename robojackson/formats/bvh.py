@@ -9,6 +9,7 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from robojackson.body import analytic_solve
+from robojackson.body.flat_feet import with_flat_soles
 from robojackson.body.forward_kinematics import apply, unit
 from robojackson.body.skeleton import (
     JOINT_NAMES,
@@ -138,6 +139,10 @@ def _other(tree: Tree) -> ForeignMotion:
     rest = assemble(REST_OFFSETS * (lengths / usual)[:, None])
     metre, notes = _unit(rest)
     points, rest = points * metre, rest * metre
+    if len(points) > 1:
+        points, angles = with_flat_soles(points, tree.fps)
+        if (turned := np.degrees(angles).round()).any():
+            notes = (*notes, "feet turned by {:.0f} and {:.0f} degrees to flat soles".format(*turned))
     for _ in range(ROUNDS):
         rotations = analytic_solve.solve_with(points, rest[None], _chest_twist(points, rest))
         rest = skeleton_under(rotations, points)
