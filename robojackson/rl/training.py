@@ -30,6 +30,8 @@ from robojackson.robot.model import Robot
 __all__ = ["Hooks", "TrainResult", "train_policy"]
 
 log = logging.getLogger(__name__)
+WHOLE = 1.0
+"""Share of the time upright by the feedback alone from which a motion that repeats is polished."""
 
 
 def train_policy(
@@ -56,7 +58,7 @@ def train_policy(
     run = Run(out, config, core, Task.of(reference, robot), hooks)
     env = TrackingVecEnv(core, run.episodes)
     if networks is None:
-        tqc = residual_learning(config, robot, reference)
+        tqc = residual_learning(config, robot, reference, core.clip.held_alone)
     else:
         tqc = _shaped(networks, core, config)
     seen = core.actor_size if core.actor_size < core.observation_size else None
@@ -75,31 +77,43 @@ def train_policy(
 
 
 def residual_learning(
-    config: TrainConfig, robot: Robot, reference: ReferenceMotion | Sequence[ReferenceMotion]
+    config: TrainConfig,
+    robot: Robot,
+    reference: ReferenceMotion | Sequence[ReferenceMotion],
+    held: float,
 ) -> TqcConfig:
     """Return TQC's configuration: that of `polish` where the feedback dances by itself, else the
     given one.
 
-    A motion that repeats is learnt better from falls, by actions that are random at first; they
-    destroy what the feedback holds of one that ends (docs/learning_g1.md).
+    A motion that repeats is learnt better from falls, by actions that are random at first, unless
+    the feedback holds it whole; they destroy what it holds of one that ends (docs/learning_g1.md).
+
+    Args:
+        config: The training.
+        robot: The robot.
+        reference: Its motion or motions.
+        held: Share of the time that the feedback alone keeps robots upright, 0..1, or NaN.
     """
-    if not polishes(config, robot, reference):
+    if not polishes(config, robot, reference, held):
         return config.tqc
     log.info("improving what the feedback alone does (train.polish=no: begin with random actions)")
     return replace(config.tqc, **PRESETS["polish"])
 
 
 def polishes(
-    config: TrainConfig, robot: Robot, reference: ReferenceMotion | Sequence[ReferenceMotion]
+    config: TrainConfig,
+    robot: Robot,
+    reference: ReferenceMotion | Sequence[ReferenceMotion],
+    held: float,
 ) -> bool:
-    """Return whether a training begins with what the feedback alone does."""
+    """Return whether a training begins with what the feedback alone does (`residual_learning`)."""
     track, motions = config.track, motions_of(reference)
     control = control_of(track)
     usual = config.mode == "track" and config.trainer == "sbx" and config.start == "scratch"
     fed = feedback_share(robot, control) > 0 and feedback_path(robot, control) == "sampled"
-    ends = len(motions) == 1 and not motions[0].cyclic
+    better = len(motions) == 1 and (held >= WHOLE or not motions[0].cyclic)
     chosen = config.polish == "auto" and config.tqc.preset == "dance" and not track.random.pushes
-    return usual and chosen and control.law == "pd" and fed and ends
+    return usual and chosen and control.law == "pd" and fed and better
 
 
 def _shaped(networks: Networks, core: TrackingCore, config: TrainConfig) -> TqcConfig:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from robojackson.motion.reference_motion import ReferenceMotion
@@ -27,7 +28,7 @@ def configured(**named: object) -> TrainConfig:
 
 def test_a_motion_that_ends_is_polished(fed: Robot, sway: ReferenceMotion) -> None:
     ending = replace(sway, cyclic=False)
-    tqc = residual_learning(configured(), fed, ending)
+    tqc = residual_learning(configured(), fed, ending, 0.5)
     assert {name: getattr(tqc, name) for name in PRESETS["polish"]} == PRESETS["polish"]
     assert replace(tqc, **{n: getattr(configured().tqc, n) for n in PRESETS["polish"]}) == (
         configured().tqc
@@ -36,7 +37,13 @@ def test_a_motion_that_ends_is_polished(fed: Robot, sway: ReferenceMotion) -> No
 
 def test_a_motion_that_repeats_is_learnt_from_falls(fed: Robot, sway: ReferenceMotion) -> None:
     repeating = replace(sway, cyclic=True)
-    assert residual_learning(configured(), fed, repeating) == configured().tqc
+    for held in (0.99, np.nan):
+        assert residual_learning(configured(), fed, repeating, held) == configured().tqc
+
+
+def test_what_the_feedback_holds_whole_is_polished(fed: Robot, sway: ReferenceMotion) -> None:
+    assert polishes(configured(), fed, replace(sway, cyclic=True), 1.0)
+    assert not polishes(configured(), fed, [replace(sway, cyclic=True)] * 2, 1.0), "several motions"
 
 
 @pytest.mark.parametrize(
@@ -57,8 +64,8 @@ def test_a_motion_that_repeats_is_learnt_from_falls(fed: Robot, sway: ReferenceM
 def test_other_trainings_are_not(
     fed: Robot, sway: ReferenceMotion, named: Mapping[str, object]
 ) -> None:
-    assert not polishes(configured(**named), fed, replace(sway, cyclic=False))
+    assert not polishes(configured(**named), fed, replace(sway, cyclic=False), 1.0)
 
 
 def test_a_robot_without_feedback_is_not(robot: Robot, sway: ReferenceMotion) -> None:
-    assert not polishes(configured(), robot, replace(sway, cyclic=False))
+    assert not polishes(configured(), robot, replace(sway, cyclic=False), 1.0)

@@ -51,8 +51,9 @@ class TrainConfig:
             an SB3 zip, or a repository of the hub (`owner/name`).
         start_critics: Whether the critics come from the same source.
         polish: Whether the training starts from what the feedback alone does and improves it
-            (preset `polish` of TQC). `auto`: on a motion that does not repeat, from scratch, on a
-            robot whose feedback follows a sampled path (`track.control.feedback_path`).
+            (preset `polish` of TQC). `auto`: from scratch, on a robot whose feedback follows a
+            sampled path (`track.control.feedback_path`), where the motion does not repeat or the
+            feedback alone keeps the robot upright from every start.
         curiosity: Which of the paper's three weights the curiosity bonus gets.
         checkpoint_seconds: Time between two checkpoints, s.
         progress_seconds: Time between two progress rows, s.

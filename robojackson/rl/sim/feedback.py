@@ -64,8 +64,9 @@ def feedback_of(
                      for name in ARRAYS))  # fmt: skip
     action = residual_scale(robot, ControlConfig())
     scaled = Gains(
-        share * joined.gain, share * joined.offset, joined.qpos, joined.qvel, joined.places
-    )
+        share * joined.gain, share * joined.offset, joined.qpos, joined.qvel, joined.places,
+        joined.held,
+    )  # fmt: skip
     most = (
         LARGEST if feedback_path(robot, control) == "reference" else sampled_regulator.LARGEST_MOVE
     )
@@ -107,7 +108,8 @@ def _fits(gains: Gains, robot: Robot, motion: ReferenceMotion) -> bool:
 def _keep(path: Path, gains: Gains) -> None:
     content = io.BytesIO()
     arrays = {name: getattr(gains, name).astype(np.float32) for name in ("gain", "offset")}
-    np.savez_compressed(content, qpos=gains.qpos, qvel=gains.qvel, places=gains.places, **arrays)
+    exact = {name: getattr(gains, name) for name in ("qpos", "qvel", "places", "held")}
+    np.savez_compressed(content, **exact, **arrays)
     with suppress(StoreError):  # a read-only store: computed again next time
         FileTree(path.parent).write(path.name, content.getvalue())
 

@@ -49,6 +49,12 @@ class Feedback:
     limit: Float[np.ndarray, " nu"]
     feet: Feet
 
+    @property
+    def held(self) -> float:
+        """Share of the time that it keeps robots upright by itself, 0..1, of the motion that falls
+        most; NaN where that was not tried."""
+        return float(np.min(self.gains.held))
+
     def at(self, row: Int[np.ndarray, " N"], shift: Float[np.ndarray, "N 3"]) -> StepFeedback:
         """Return the feedback at rows of the joined motions, whose cycles have moved them by
         `shift`, m."""

@@ -1,7 +1,7 @@
 """A path for a regulator, and the system along it. Metres, radians, seconds."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Float
@@ -20,6 +20,8 @@ class Gains:
         qpos, qvel: Nominal state.
         places: Feet of the nominal state, which is moved along the floor to the robot's own feet.
             NaN where the nominal state stays in the world.
+        held: Share of the time that it keeps robots upright without a policy, over several starts,
+            one number for each motion; NaN where that was not tried.
     """
 
     gain: Float[np.ndarray, "S nu X"]
@@ -27,6 +29,7 @@ class Gains:
     qpos: Float[np.ndarray, "S nq"]
     qvel: Float[np.ndarray, "S nv"]
     places: Float[np.ndarray, "S F 3"]
+    held: Float[np.ndarray, " M"] = field(default_factory=lambda: np.full(1, np.nan))
 
 
 @dataclass(frozen=True)

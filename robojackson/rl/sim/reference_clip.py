@@ -35,6 +35,10 @@ class Law(Protocol):
     def at(self, row: Int[np.ndarray, " N"], shift: Float[np.ndarray, "N 3"]) -> StepLaw:
         """Return the feedback at rows whose cycles have moved them by `shift`, m."""
 
+    @property
+    def held(self) -> float:
+        """Share of the time that it keeps robots upright by itself, 0..1; NaN where unknown."""
+
 
 @dataclass(frozen=True)
 class ClipStep:
@@ -110,6 +114,12 @@ class Clip:
         self._moved = np.concatenate([_velocities(motion) for motion in motions])
         self._lead, self._preview, self._law = lead, preview, law
         self._last: ClipStep | None = None
+
+    @property
+    def held_alone(self) -> float:
+        """Share of the time that the feedback alone keeps robots upright, 0..1; NaN where unknown
+        or without one."""
+        return np.nan if self._law is None else self._law.held
 
     def starts(self) -> Int[np.ndarray, " R"]:
         """Return the steps from which a motion can be followed: all but the end of one that

@@ -1,5 +1,7 @@
 """The regulator along a path beside a motion, where the motion itself cannot be held."""
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Float, Int
 
@@ -63,7 +65,7 @@ def sampled_regulator(
     best, motion, linear = regulator(sim, clip, action, feet.count, progress)
     held = _held_share(sim, clip, action, feet, best, motion)
     if held == 1.0:
-        return best
+        return replace(best, held=np.ones(1))
     cycles = max(3, int(np.ceil(CYCLES_S / (clip.steps * clip.dt)))) if clip.cyclic else 1
     reference = reference_path(sim, clip, cycles * clip.steps)
     linear = _repeated(linear, cycles)
@@ -78,7 +80,7 @@ def sampled_regulator(
             best, held = found, share
         if held == 1.0:
             break
-    return best
+    return replace(best, held=np.array([held]))
 
 
 def _searched(

@@ -113,6 +113,7 @@ def test_gains_are_computed_once_and_again_where_the_file_is_damaged(
     assert kept is not None
     assert again is not None
     np.testing.assert_allclose(again.gains.gain, kept.gains.gain, rtol=1e-5, atol=1e-6)
+    np.testing.assert_equal(again.held, kept.held)
     for file in (store / feedback.FOLDER).glob("*.npz"):
         file.write_bytes(file.read_bytes()[:100])
     assert feedback.feedback_of(robot, [sway], FED) is not None

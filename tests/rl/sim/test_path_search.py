@@ -114,6 +114,7 @@ def test_the_regulator_that_keeps_robots_up_longer_is_taken(
         monkeypatch.setattr(sampled_regulator, "_held_share", lambda *given, held=held: next(held))
         found = sampled_regulator.sampled_regulator(sim, clip, action, feet)
         assert bool(np.isfinite(found.places).all()) == anchored
+        assert found.held == max(shares)
         if not anchored:
             np.testing.assert_array_equal(found.gain, plain[0].gain)
 
