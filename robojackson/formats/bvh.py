@@ -142,7 +142,8 @@ def _other(tree: Tree) -> ForeignMotion:
     if len(points) > 1:
         points, angles = with_flat_soles(points, tree.fps)
         if (turned := np.degrees(angles).round()).any():
-            notes = (*notes, "feet turned by {:.0f} and {:.0f} degrees to flat soles".format(*turned))
+            by = " and ".join(f"{angle:.0f}" for angle in turned)
+            notes = (*notes, f"feet turned by {by} degrees to flat soles")
     for _ in range(ROUNDS):
         rotations = analytic_solve.solve_with(points, rest[None], _chest_twist(points, rest))
         rest = skeleton_under(rotations, points)
