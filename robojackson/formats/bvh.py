@@ -21,6 +21,7 @@ from robojackson.body.skeleton import (
     pair,
 )
 from robojackson.errors import BadTable
+from robojackson.formats.containers.bvh_faults import mended
 from robojackson.formats.containers.bvh_names import keypoints_of
 from robojackson.formats.containers.bvh_tree import WHERE, Node, Tree, parse
 from robojackson.formats.foreign_motion import (
@@ -139,6 +140,8 @@ def _other(tree: Tree) -> ForeignMotion:
     rest = assemble(REST_OFFSETS * (lengths / usual)[:, None])
     metre, notes = _unit(rest)
     points, rest = points * metre, rest * metre
+    points, faults = mended(points, tree.fps)
+    notes = (*notes, *faults)
     if len(points) > 1:
         points, angles = with_flat_soles(points, tree.fps)
         if (turned := np.degrees(angles).round()).any():
