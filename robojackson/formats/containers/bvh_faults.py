@@ -2,6 +2,8 @@
 back. Both are in CMU's BVH files. Metres, seconds.
 """
 
+from itertools import pairwise
+
 import numpy as np
 from jaxtyping import Float
 
@@ -52,7 +54,7 @@ def without_spikes(
     for joint in np.flatnonzero((speed > JUMP_M_S).any(0)):
         good = 0  # frames before this one are known
         jumps = np.flatnonzero(speed[:, joint] > JUMP_M_S)
-        for before, last in zip(jumps, jumps[1:], strict=False):
+        for before, last in pairwise(jumps):
             away = relative[last + 1, joint] - relative[before, joint]
             calm = np.linalg.norm(away) < CALM * JUMP_M_S * (last + 1 - before) / fps
             if before >= good and calm and last - before <= max(1, SPIKE_S * fps):
