@@ -19,7 +19,7 @@ _STILL_FOOT = 0.20  # m/s: a foot near the floor that is slower stands, with or 
 _HEEL_OFF_M = 0.07  # m over the lowest foot: a ball follows the ankle and leaves with the heel
 _WANDER_M = 0.06  # m: a planted foot stays this near to where it stands
 _NEAR_FLOOR = 0.03  # m over the lowest foot
-_FREE_FALL = 0.5  # share of gravity that the hips must be falling with to count as airborne
+_FREE_FALL = 0.8  # share of gravity that the hips must be falling with to count as airborne
 _SHORTEST_FLIGHT = 0.08  # s
 
 
