@@ -74,12 +74,12 @@ def test_a_body_that_does_not_fall_stands_on_something_whatever_the_labels_say(r
     assert (targets(bare, robot).contact != AIR).any(axis=1).all()
 
 
-def _jump(cycles: bool = False) -> HumanClip:
-    """Return two seconds of which steps 20 to 34 are a leap."""
+def _jump(cycles: bool = False, fall: float = 9.81) -> HumanClip:
+    """Return two seconds of which steps 20 to 34 are a leap, m/s^2 downward."""
     clip = _clip("hip_shake")
     time = np.arange(15) * clip.dt
     points = np.repeat(clip.keypoints_w[:1], 60, axis=0)
-    points[20:35, :, 2] += (4.905 * time * (time[-1] - time))[:, None]
+    points[20:35, :, 2] += (fall / 2 * time * (time[-1] - time))[:, None]
     contact = np.ones((60, 4), int)
     contact[21:34] = AIR
     cycle_offset = np.zeros(3) if cycles else None
@@ -110,6 +110,13 @@ def test_a_jump_is_airborne_where_it_falls(robot: Robot):
     assert (aims.contact[23:32] == AIR).all()
     sole = aims.keypoints_w[:, robot.contact_keypoints, 2].min(axis=1) - robot.contact_radii[0]
     assert sole[27] == pytest.approx(4.905 * 0.233**2, abs=0.03)
+
+
+def test_a_bouncing_step_is_no_jump(robot: Robot):
+    """A foot carries what does not fall as fast as gravity, whatever the labels say."""
+    aims = targets(_jump(fall=0.65 * 9.81), robot)
+    assert not aims.airborne.any()
+    assert (aims.contact != AIR).any(axis=1).all()
 
 
 def test_frames_without_a_person_weigh_less(robot: Robot):
