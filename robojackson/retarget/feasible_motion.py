@@ -125,9 +125,10 @@ def _slacks(
     robot: Robot, motion: Feasible, config: RetargetConfig, grid: np.ndarray
 ) -> Float[np.ndarray, "K S"]:
     if len(grid) not in motion._slack:
-        aims, tolerance = motion.aims, config.weights.tolerance
+        aims, tolerance, own = motion.aims, config.weights.tolerance, motion._slack.get(1)
+        known = None if own is None else own[0]
         motion._slack[len(grid)] = tempo.slacks(
-            robot, motion.qpos, aims.dt, aims.cycle_offset, tolerance, grid
+            robot, motion.qpos, aims.dt, aims.cycle_offset, tolerance, grid, known
         )
     return motion._slack[len(grid)]
 

@@ -104,15 +104,19 @@ class Relaxed:
         pushes: Along the edges, body weights.
         value: Half the square of what is left over, and the barrier.
         slope: Derivative of the value in the force.
-        root: Rows R with R^T R the second derivative.
         point: Where the solver has arrived; the start of a problem nearby.
     """
 
     pushes: Float[np.ndarray, "S E"]
     value: Float[np.ndarray, " S"]
     slope: Float[np.ndarray, "S nv"]
-    root: "Root"
     point: Point
+    _box: Box
+    _scale: Float[np.ndarray, " nv"]
+
+    def root(self) -> "Root":
+        """Return rows R with R^T R the second derivative."""
+        return _root(self._box, self.point, self._scale)
 
 
 @dataclass(frozen=True)
@@ -128,6 +132,10 @@ class Root:
     size: Float[np.ndarray, "S nv"]
     wrench: Float[np.ndarray, "S nv W"]
     mix: Float[np.ndarray, "S W W"]
+
+    def at(self, rows: slice) -> "Root":
+        """Return those of some of the steps."""
+        return Root(self.size[rows], self.wrench[rows], self.mix[rows])
 
     def __matmul__(self, matrix: Float[np.ndarray, "S nv M"]) -> Float[np.ndarray, "S nv M"]:
         """Return R times a matrix a step."""
@@ -160,9 +168,7 @@ def relaxed(demand: Demand, barrier: float, start: Point | None = None) -> Relax
     point = solve_box(box, start)
     left = left_over(box, point.x)
     pushes = point.x[:, : box.edges] * demand.usable
-    return Relaxed(
-        pushes, value(box, point), left * demand.scale, _root(box, point, demand.scale), point
-    )
+    return Relaxed(pushes, value(box, point), left * demand.scale, point, box, demand.scale)
 
 
 def _root(box: Box, point: Point, scale: Float[np.ndarray, " nv"]) -> Root:

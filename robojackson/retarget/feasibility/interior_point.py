@@ -8,9 +8,10 @@ distance) belongs to the cost.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 _ITERATIONS = 40
 _CENTRING = 0.1
@@ -57,10 +58,19 @@ class Box:
         """Return A transposed times rows."""
         return _times(self.spread.swapaxes(1, 2), _times(self.feet.swapaxes(1, 2), rows))
 
+    @cached_property
+    def bounded(self) -> tuple[np.ndarray, np.ndarray]:
+        """Where there is a lower bound, and an upper one."""
+        return np.isfinite(self.lower), np.isfinite(self.upper)
+
+    @cached_property
+    def bounds(self) -> Int[np.ndarray, " S"]:
+        """Number of bounds of each row, at least one."""
+        below, above = self.bounded
+        return np.asarray(np.maximum(below.sum(axis=1) + above.sum(axis=1), 1))
+
     def at(self, rows: np.ndarray) -> "Box":
         """Return some of the problems."""
-        if len(rows) == len(self.target):
-            return self
         parts = ("feet", "spread", "target", "lower", "upper")
         return replace(self, **{name: getattr(self, name)[rows] for name in parts})
 
@@ -75,11 +85,11 @@ class Point:
 
     def above(self, box: Box) -> np.ndarray:
         """Return the distance to the lower bounds."""
-        return np.where(np.isfinite(box.lower), self.x - box.lower, _FAR)
+        return np.where(box.bounded[0], self.x - box.lower, _FAR)
 
     def below(self, box: Box) -> np.ndarray:
         """Return the distance to the upper bounds."""
-        return np.where(np.isfinite(box.upper), box.upper - self.x, _FAR)
+        return np.where(box.bounded[1], box.upper - self.x, _FAR)
 
     def barrier(self, box: Box) -> Float[np.ndarray, "S n"]:
         """Return the curvature of the bounds' barrier."""
@@ -95,17 +105,21 @@ def solve_box(box: Box, start: Point | None = None) -> Point:
     """
     found = _first(box) if start is None else _begun(box, start)
     x, low, high = found.x, found.low, found.high
-    open_rows = np.arange(len(x))
+    open_rows, part, here = np.arange(len(x)), box, found
     for _ in range(_ITERATIONS):
-        part, here = box.at(open_rows), Point(x[open_rows], low[open_rows], high[open_rows])
-        gaps = _gaps(here, part)
-        there, moved = _advanced(here, part, gaps)
-        x[open_rows], low[open_rows], high[open_rows] = there.x, there.low, there.high
+        walls = here.above(part), here.below(part)
+        gaps = _gaps(here, part, walls)
+        here, moved = _advanced(here, part, gaps, walls)
         arrived = moved < _STILL if box.relax > 0.0 else gaps < _ARRIVED
         arrived &= gaps < max(_ARRIVED, 1.01 * box.relax)
-        open_rows = open_rows[~arrived]
+        if arrived.any():
+            done, going = open_rows[arrived], ~arrived
+            x[done], low[done], high[done] = here.x[arrived], here.low[arrived], here.high[arrived]
+            open_rows, part = open_rows[going], part.at(going)
+            here = Point(here.x[going], here.low[going], here.high[going])
         if not len(open_rows):
             break
+    x[open_rows], low[open_rows], high[open_rows] = here.x, here.low, here.high
     return Point(x, low, high)
 
 
@@ -144,23 +158,29 @@ def value(box: Box, point: Point) -> Float[np.ndarray, " S"]:
     return np.asarray(squares / 2 - box.relax * walls.sum(axis=1))
 
 
-def _gaps(point: Point, box: Box) -> Float[np.ndarray, " S"]:
+_Walls = tuple[np.ndarray, np.ndarray]
+"""Distances to the lower and to the upper bounds."""
+
+
+def _gaps(point: Point, box: Box, walls: _Walls) -> Float[np.ndarray, " S"]:
     """Return the mean complementarity of each row."""
-    products = point.above(box) * point.low + point.below(box) * point.high
-    bounds = np.isfinite(box.lower).sum(axis=1) + np.isfinite(box.upper).sum(axis=1)
-    return np.asarray(products.sum(axis=1) / np.maximum(bounds, 1))
+    above, below = walls
+    products = above * point.low + below * point.high
+    return np.asarray(products.sum(axis=1) / box.bounds)
 
 
-def _advanced(point: Point, box: Box, gaps: np.ndarray) -> tuple[Point, Float[np.ndarray, " S"]]:
+def _advanced(
+    point: Point, box: Box, gaps: np.ndarray, walls: _Walls
+) -> tuple[Point, Float[np.ndarray, " S"]]:
     """Return every row after one primal-dual step, and the length of the full step."""
-    above, below = point.above(box), point.below(box)
+    (above, below), (bounded_low, bounded_high) = walls, box.bounded
     centre = np.maximum(_CENTRING * gaps, box.relax)[:, None]
-    push_low = np.isfinite(box.lower) * (centre / above)
-    push_high = np.isfinite(box.upper) * (centre / below)
-    barrier = point.low / above + point.high / below
-    dx = _newton(box, barrier, push_low - push_high - _gradient(box, point.x))
-    d_low = push_low - point.low - point.low / above * dx
-    d_high = push_high - point.high + point.high / below * dx
+    push_low = bounded_low * (centre / above)
+    push_high = bounded_high * (centre / below)
+    pull_low, pull_high = point.low / above, point.high / below
+    dx = _newton(box, pull_low + pull_high, push_low - push_high - _gradient(box, point.x))
+    d_low = push_low - point.low - pull_low * dx
+    d_high = push_high - point.high + pull_high * dx
     share = np.minimum.reduce(
         [_room(above, dx), _room(below, -dx), _room(point.low, d_low), _room(point.high, d_high)]
     )[:, None]

@@ -48,30 +48,51 @@ class Slopes:
     acceleration: Float[np.ndarray, "N nv nv"]
 
 
-def slopes(
+@dataclass(frozen=True)
+class Dynamics:
+    """Inverse dynamics of many steps: the force, and what its derivatives are computed from.
+
+    Attributes:
+        force: In free space (`mj_inverse` without constraints).
+    """
+
+    force: Float[np.ndarray, "N nv"]
+    _model: ForceModel
+    _parts: list[tuple[slice, "_Moving", "_Load"]]
+
+    def slopes(self) -> Slopes:
+        """Return the force and its derivatives."""
+        model, (count, unknowns) = self._model, self.force.shape
+        square = (count, unknowns, unknowns)
+        out = Slopes(self.force, np.empty(square), np.empty(square), np.empty(square))
+        for rows, moving, load in self._parts:
+            _differentiate(model, moving, load, out, rows)
+        unit = np.arange(unknowns)
+        out.position[:, unit, unit] += model.stiffness
+        out.velocity[:, unit, unit] += model.damping
+        out.acceleration[:, unit, unit] += model.armature
+        return out
+
+
+def dynamics(
     model: ForceModel,
     posed: Posed,
     hinges: Float[np.ndarray, "N J"],
     speed: Float[np.ndarray, "N nv"],
     rate: Float[np.ndarray, "N nv"],
-) -> Slopes:
-    """Return the force in free space (`mj_inverse` without constraints), and its derivatives."""
-    count, unknowns = speed.shape
-    force, square = np.empty((count, unknowns)), (count, unknowns, unknowns)
-    out = Slopes(force, np.empty(square), np.empty(square), np.empty(square))
-    for start in range(0, count, _CHUNK):
-        rows = slice(start, min(start + _CHUNK, count))
+) -> Dynamics:
+    """Return the inverse dynamics of steps at generalised velocities and accelerations."""
+    force = np.empty(speed.shape)
+    parts = []
+    for start in range(0, len(speed), _CHUNK):
+        rows = slice(start, min(start + _CHUNK, len(speed)))
         moving = _moving(model, posed, rows, speed[rows], rate[rows])
         load = _loads(model, _bodies(model, posed, rows, moving))
         force[rows] = (dot(moving.axis, load.moment) + dot(moving.arm, load.push)).T
-        _differentiate(model, moving, load, out, rows)
-    unit = np.arange(unknowns)
-    out.position[:, unit, unit] += model.stiffness
-    out.velocity[:, unit, unit] += model.damping
-    out.acceleration[:, unit, unit] += model.armature
+        parts.append((rows, moving, load))
     force += model.damping * speed + model.armature * rate
     force[:, 6:] += model.stiffness[6:] * (hinges - model.spring)
-    return out
+    return Dynamics(force, model, parts)
 
 
 class _Moving(NamedTuple):

@@ -35,16 +35,21 @@ def slacks(
     cycle_offset: np.ndarray | None,
     tolerance: Tolerance,
     grid: Float[np.ndarray, " K"] = GRID,
+    known: Float[np.ndarray, " S"] | None = None,
 ) -> Float[np.ndarray, "K S"]:
     """Return the slack at every tempo of the grid, in tolerances.
 
     A step that is feasible at the first one is tried at no other.
+
+    Args:
+        known: The slack at the first tempo, where it has been computed.
     """
     forces = inverse_dynamics.free_space(robot, qpos, dt, cycle_offset)
     posed = pose(inverse_dynamics.linkage(robot), qpos)
     near = inverse_dynamics.touching(robot, posed)
     needs = inverse_dynamics.demand(robot, qpos, forces.at(grid[0]), near, tolerance, posed)
-    return slower_slacks(needs, forces, contact_wrench.supply(needs).slack, grid)
+    slack = contact_wrench.supply(needs).slack if known is None else known
+    return slower_slacks(needs, forces, slack, grid)
 
 
 def slower_slacks(

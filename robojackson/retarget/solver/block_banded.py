@@ -4,7 +4,8 @@ Block (k, t) couples frame t with frame t + k, k = 0, 1, 2. A ring (a cyclic cli
 ordered 0, N-1, 1, N-2, ..., so that its corner blocks come back into a band twice as wide.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -18,11 +19,17 @@ _CHUNK = 64
 
 @dataclass
 class Normal:
-    """Cost, gradient and Gauss-Newton blocks of N frames with nv unknowns each."""
+    """Cost, gradient and Gauss-Newton blocks of N frames with nv unknowns each.
+
+    Terms add their cost at once and what their derivatives take as parts that are computed, in the
+    order in which they were added, when the gradient or the blocks are first read: a trial that
+    does not lower the cost needs neither.
+    """
 
     cost: float
-    gradient: Float[np.ndarray, "N nv"]
-    blocks: Float[np.ndarray, "3 N nv nv"]
+    _gradient: Float[np.ndarray, "N nv"]
+    _blocks: Float[np.ndarray, "3 N nv nv"]
+    _parts: list[Callable[[], None]] = field(default_factory=list)
 
     @classmethod
     def empty(cls, frames: int, unknowns: int) -> "Normal":
@@ -30,29 +37,71 @@ class Normal:
         blocks = np.zeros((_REACH, frames, unknowns, unknowns))
         return cls(0.0, np.zeros((frames, unknowns)), blocks)
 
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Frames and unknowns."""
+        frames, unknowns = self._gradient.shape
+        return frames, unknowns
+
+    @property
+    def gradient(self) -> Float[np.ndarray, "N nv"]:
+        """Derivative of the cost."""
+        self._compute()
+        return self._gradient
+
+    @property
+    def blocks(self) -> Float[np.ndarray, "3 N nv nv"]:
+        """Gauss-Newton blocks (k, t) of frames t and t + k."""
+        self._compute()
+        return self._blocks
+
+    def later(self, part: Callable[[], None]) -> None:
+        """Leave a part that adds to the gradient and the blocks until they are read."""
+        self._parts.append(part)
+
+    def _compute(self) -> None:
+        parts, self._parts = self._parts, []
+        for part in parts:
+            part()
+
     def add_rows(
-        self, residual: Float[np.ndarray, "N R"], jacobian: Float[np.ndarray, "N R nv"]
+        self,
+        residual: Float[np.ndarray, "N R"],
+        jacobian: Callable[[], Float[np.ndarray, "N R nv"]],
     ) -> None:
         """Add residuals that depend on their own frame only."""
-        transposed = jacobian.swapaxes(1, 2)
         self.cost += 0.5 * float(np.sum(residual**2))
-        self.gradient += (transposed @ residual[..., None])[..., 0]
-        self.blocks[0] += transposed @ jacobian
+
+        def add() -> None:
+            rows = jacobian()
+            transposed = rows.swapaxes(1, 2)
+            self.gradient[:] += (transposed @ residual[..., None])[..., 0]
+            self.blocks[0] += transposed @ rows
+
+        self.later(add)
 
     def add_chained(
+        self,
+        residual: Float[np.ndarray, "M R"],
+        jacobians: Callable[[], tuple[Float[np.ndarray, "M R nv"], ...]],
+        first: Int[np.ndarray, " M"],
+    ) -> None:
+        """Add residuals of successive frames; jacobians()[k] is that of frame first + k."""
+        self.cost += 0.5 * float(np.sum(residual**2))
+        self.later(lambda: self._chain(residual, jacobians(), first))
+
+    def _chain(
         self,
         residual: Float[np.ndarray, "M R"],
         jacobians: tuple[Float[np.ndarray, "M R nv"], ...],
         first: Int[np.ndarray, " M"],
     ) -> None:
-        """Add residuals of successive frames; jacobians[k] is that of frame first + k."""
-        self.cost += 0.5 * float(np.sum(residual**2))
         for i, left in enumerate(jacobians):
-            row = _rows((first + i) % len(self.gradient))
+            row = as_rows((first + i) % len(self._gradient))
             transposed = left.swapaxes(1, 2)
-            self.gradient[row] += (transposed @ residual[..., None])[..., 0]
+            self._gradient[row] += (transposed @ residual[..., None])[..., 0]
             for j in range(i, len(jacobians)):
-                self.blocks[j - i][row] += transposed @ jacobians[j]
+                self._blocks[j - i][row] += transposed @ jacobians[j]
 
     def add_square(
         self,
@@ -61,17 +110,17 @@ class Normal:
         first: Int[np.ndarray, " M"],
     ) -> None:
         """Add gradient and squared rows in the unknowns of three successive frames at once."""
-        unknowns = self.gradient.shape[1]
+        unknowns = self.shape[1]
         square = rows.swapaxes(1, 2) @ rows
         part = [slice(k * unknowns, (k + 1) * unknowns) for k in range(_REACH)]
         for i in range(_REACH):
-            row = _rows((first + i) % len(self.gradient))
-            self.gradient[row] += gradient[:, part[i]]
+            row = as_rows((first + i) % len(self._gradient))
+            self._gradient[row] += gradient[:, part[i]]
             for j in range(i, _REACH):
-                self.blocks[j - i][row] += square[:, part[i], part[j]]
+                self._blocks[j - i][row] += square[:, part[i], part[j]]
 
 
-def _rows(frames: Int[np.ndarray, " M"]) -> Int[np.ndarray, " M"] | slice:
+def as_rows(frames: Int[np.ndarray, " M"]) -> Int[np.ndarray, " M"] | slice:
     """Return a slice where possible: it is faster than an index array."""
     if len(frames) and (np.diff(frames) == 1).all():
         return slice(int(frames[0]), int(frames[-1]) + 1)

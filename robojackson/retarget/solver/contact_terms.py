@@ -3,6 +3,9 @@
 Each adds squared residuals to the normal equations of a clip. Metres, radians, seconds.
 """
 
+from collections.abc import Callable
+from functools import cache
+
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import distance_transform_edt
@@ -29,7 +32,11 @@ def add_contacts(problem: Problem, posed: Posed, out: Normal) -> None:
     robot, weights, contact = problem.robot, problem.weights, problem.targets.contact
     ground = posed.ball_pos.copy()
     ground[..., 2] -= robot.contact_radii
-    jacobian = point_jacobian(problem.tree, posed, ground, robot.contact_bodies)
+
+    @cache
+    def jacobian() -> Float[np.ndarray, "N C 3 nv"]:
+        return point_jacobian(problem.tree, posed, ground, robot.contact_bodies)
+
     height = ground[..., 2]
     touching = contact != AIR
     inside = ~touching & (height < weights.clearance)
@@ -37,11 +44,16 @@ def add_contacts(problem: Problem, posed: Posed, out: Normal) -> None:
     factor = np.where(touching, weights.height, np.where(inside, weights.penetration, 0.0))
     factor = np.sqrt(np.where(sunk, np.maximum(weights.height, weights.penetration), factor))
     depth = np.where(inside, height - weights.clearance, height)
-    out.add_rows(factor * depth, factor[..., None] * jacobian[:, :, 2])
-    _no_slip(problem, posed, jacobian[:, :, :2], out)
+    out.add_rows(factor * depth, lambda: factor[..., None] * jacobian()[:, :, 2])
+    _no_slip(problem, posed, lambda: jacobian()[:, :, :2], out)
 
 
-def _no_slip(problem: Problem, posed: Posed, rows: np.ndarray, out: Normal) -> None:
+def _no_slip(
+    problem: Problem,
+    posed: Posed,
+    jacobian: Callable[[], Float[np.ndarray, "N C 2 nv"]],
+    out: Normal,
+) -> None:
     """Add the no-slip term: motion of a planted ball's centre beyond its rolling costs.
 
     The derivative of the slip is the Jacobian of the ground point, at each of the two steps its
@@ -57,15 +69,15 @@ def _no_slip(problem: Problem, posed: Posed, rows: np.ndarray, out: Normal) -> N
     factor = np.sqrt(problem.weights.slip) * both[now]
     speed = sole_velocities(problem.robot, posed, dt, problem.targets.cycle_offset)[now]
     residual = factor[..., None] * speed
-    before = factor[..., None, None] * rows[now] / -dt
-    after = factor[..., None, None] * rows[following] / dt
-    flat = (len(now), -1, rows.shape[-1])
-    residual, before, after = (
-        residual.reshape(len(now), -1),
-        before.reshape(flat),
-        after.reshape(flat),
-    )
-    out.add_chained(residual, (before, after), now)
+
+    def rows() -> tuple[Float[np.ndarray, "M R nv"], ...]:
+        each = jacobian()
+        before = factor[..., None, None] * each[now] / -dt
+        after = factor[..., None, None] * each[following] / dt
+        flat = (len(now), -1, each.shape[-1])
+        return before.reshape(flat), after.reshape(flat)
+
+    out.add_chained(residual.reshape(len(now), -1), rows, now)
 
 
 def add_collisions(problem: Problem, posed: Posed, touches: Touches, out: Normal) -> None:
@@ -77,15 +89,18 @@ def add_collisions(problem: Problem, posed: Posed, touches: Touches, out: Normal
     frame, bodies, floor = touches.frame[keep], touches.bodies[keep], touches.floor[keep]
     weights = problem.weights
     factor = np.sqrt(np.where(floor, weights.penetration, weights.self_penetration))
-    at = posed[frame]
-    points = np.repeat(touches.position[keep][:, None], 2, axis=1)
-    jacobian = point_jacobian(problem.tree, at, points, bodies)
-    apart = jacobian[:, 1] - jacobian[:, 0]
-    rows = factor[:, None] * np.einsum("mi,mij->mj", touches.normal[keep], apart)
     residual = factor * (touches.distance[keep] - weights.clearance)
     out.cost += 0.5 * float(np.sum(residual**2))
-    np.add.at(out.gradient, frame, rows * residual[:, None])
-    np.add.at(out.blocks[0], frame, rows[:, :, None] * rows[:, None, :])
+
+    def add() -> None:
+        points = np.repeat(touches.position[keep][:, None], 2, axis=1)
+        jacobian = point_jacobian(problem.tree, posed[frame], points, bodies)
+        apart = jacobian[:, 1] - jacobian[:, 0]
+        rows = factor[:, None] * np.einsum("mi,mij->mj", touches.normal[keep], apart)
+        np.add.at(out.gradient, frame, rows * residual[:, None])
+        np.add.at(out.blocks[0], frame, rows[:, :, None] * rows[:, None, :])
+
+    out.later(add)
 
 
 def add_balance(problem: Problem, posed: Posed, out: Normal) -> None:
@@ -98,7 +113,6 @@ def add_balance(problem: Problem, posed: Posed, out: Normal) -> None:
     robot, dt = problem.robot, problem.targets.dt
     inner, before, after = _neighbours(len(posed.axis), problem.ring)
     com = centre_of_mass(problem.tree, posed)
-    com_rows = com_jacobian(problem.tree, posed)[:, :2]
     pull = com[:, 2:].mean() / GRAVITY / dt**2
     flat = com[:, :2]
     ahead, behind = flat[after].copy(), flat[before].copy()
@@ -112,10 +126,14 @@ def add_balance(problem: Problem, posed: Posed, out: Normal) -> None:
     share, away = found.weights, zmp - found.nearest
     settled = _settled(touching, dt, problem.ring)[inner]
     weight = _robust_weight(problem, away, settled, out) * (away != 0).any(axis=1)
-    feet_rows = point_jacobian(problem.tree, posed, feet, robot.contact_bodies)[inner, :, :2]
-    here = (1 + 2 * pull) * com_rows[inner] - np.einsum("nc,ncij->nij", share, feet_rows)
-    scale = weight[:, None, None]
-    rows = (-pull * scale * com_rows[before], scale * here, -pull * scale * com_rows[after])
+
+    def rows() -> tuple[Float[np.ndarray, "M 2 nv"], ...]:
+        com_rows = com_jacobian(problem.tree, posed)[:, :2]
+        feet_rows = point_jacobian(problem.tree, posed, feet, robot.contact_bodies)[inner, :, :2]
+        here = (1 + 2 * pull) * com_rows[inner] - np.einsum("nc,ncij->nij", share, feet_rows)
+        scale = weight[:, None, None]
+        return -pull * scale * com_rows[before], scale * here, -pull * scale * com_rows[after]
+
     out.add_chained(weight[:, None] * away, rows, before)
 
 

@@ -14,8 +14,9 @@ from scipy.special import expit
 
 from robojackson.motion.smpl_sequence import AIR
 from robojackson.retarget.feasibility import contact_wrench, inverse_dynamics
+from robojackson.retarget.feasibility.contact_wrench import Relaxed
 from robojackson.retarget.feasibility.force_model import force_model, once_a_robot, unconstrained
-from robojackson.retarget.feasibility.rigid_dynamics import Slopes, slopes
+from robojackson.retarget.feasibility.rigid_dynamics import Dynamics, Slopes, dynamics
 from robojackson.retarget.solver.block_banded import Normal
 from robojackson.retarget.solver.clip_problem import Problem, Weights
 from robojackson.robot.model import Robot
@@ -24,6 +25,7 @@ from robojackson.robot.tree_kinematics import Posed, pose
 
 _NUDGE = 1e-6
 _PROBES = 3
+_CHUNK = 16  # steps whose matrices stay in the cache
 _SOFTNESS = 0.15  # of the corner of the hinge, squared tolerances
 
 
@@ -40,37 +42,72 @@ def add_dynamics(
         accelerations(qpos, dt, cycle_offset)[inner],
     )
     at = posed[inner]
-    found_slopes = force_slopes(problem, at, qpos[inner], speed, rate)
+    forces = _dynamics(problem, at, qpos[inner], speed, rate)
     touching = problem.targets.contact[inner] != AIR
     needs = inverse_dynamics.demand(
-        problem.robot, qpos[inner], found_slopes.force, touching, problem.weights.tolerance, at
+        problem.robot, qpos[inner], forces.force, touching, problem.weights.tolerance, at
     )
     found = contact_wrench.relaxed(needs, problem.weights.dynamics_barrier, problem.warm.point)
     problem.warm.point = found.point
     loss = _loss(problem.weights, found.value)
-    here = found_slopes.position - 2 / dt**2 * found_slopes.acceleration
-    _take_pushes(problem, at, found.pushes, here)
-    aside, turn = found_slopes.acceleration / dt**2, found_slopes.velocity / (2 * dt)
-    columns = np.concatenate([aside - turn, here, aside + turn], axis=2)
-    gradient = (found.slope[:, None] @ columns)[:, 0]
-    rows = np.concatenate([found.root @ columns, np.empty((len(inner), 1, columns.shape[2]))], 1)
-    rows[:, :-1] *= np.sqrt(loss.slope)[:, None, None]
-    rows[:, -1] = np.sqrt(loss.bend)[:, None] * gradient
     out.cost += loss.cost
-    out.add_square(loss.slope[:, None] * gradient, rows, (inner - 1) % len(qpos))
+    out.later(lambda: _add_slopes(problem, at, forces.slopes(), found, loss, out))
 
 
-def force_slopes(
+def _add_slopes(
+    problem: Problem, at: Posed, force: Slopes, found: Relaxed, loss: "_Loss", out: Normal
+) -> None:
+    """Add gradient and curvature, a few steps at a time.
+
+    The last steps come first: then every frame adds its terms in the order in which all steps at
+    once would, and the sums are the same to the last bit.
+    """
+    dt, count = problem.targets.dt, len(force.force)
+    here = force.position - 2 / dt**2 * force.acceleration
+    _take_pushes(problem, at, found.pushes, here)
+    root, firsts = found.root(), np.arange(count)
+    if problem.ring:
+        firsts = (firsts - 1) % count
+    part = count if problem.ring else _CHUNK
+    for start in range((count - 1) // part * part, -1, -part):
+        steps = slice(start, min(start + part, count))
+        aside, turn = force.acceleration[steps] / dt**2, force.velocity[steps] / (2 * dt)
+        columns = np.concatenate([aside - turn, here[steps], aside + turn], axis=2)
+        gradient = (found.slope[steps, None] @ columns)[:, 0]
+        rows = np.empty((len(columns), columns.shape[1] + 1, columns.shape[2]))
+        rows[:, :-1] = root.at(steps) @ columns
+        rows[:, :-1] *= np.sqrt(loss.slope[steps])[:, None, None]
+        rows[:, -1] = np.sqrt(loss.bend[steps])[:, None] * gradient
+        out.add_square(loss.slope[steps, None] * gradient, rows, firsts[steps])
+
+
+def _dynamics(
     problem: Problem, posed: Posed, qpos: np.ndarray, speed: np.ndarray, rate: np.ndarray
-) -> Slopes:
-    """Return the force and its derivatives in the tangent space of each step: analytic where the
+) -> "Dynamics | _Differences":
+    """Return the force, and its derivatives in the tangent space of each step: analytic where the
     model has nothing but rigid bodies, springs and damping, by finite differences of MuJoCo's
     otherwise.
     """
     robot = problem.robot
     if rigid(robot):
-        return slopes(force_model(robot), posed, qpos[:, 7:], speed, rate)
-    return inverse_slopes(unconstrained(robot), qpos, speed, rate)
+        return dynamics(force_model(robot), posed, qpos[:, 7:], speed, rate)
+    return _Differences(inverse_slopes(unconstrained(robot), qpos, speed, rate))
+
+
+@dataclass(frozen=True)
+class _Differences:
+    """Inverse dynamics whose derivatives come with the force."""
+
+    found: Slopes
+
+    @property
+    def force(self) -> Float[np.ndarray, "N nv"]:
+        """Force in free space."""
+        return self.found.force
+
+    def slopes(self) -> Slopes:
+        """Return the force and its derivatives."""
+        return self.found
 
 
 @once_a_robot
@@ -83,7 +120,7 @@ def rigid(robot: Robot) -> bool:
     speed, rate = rng.normal(size=(2, _PROBES, robot.model.nv))
     expected = inverse_dynamics.inverse(unconstrained(robot), qpos, speed, rate)
     at = pose(inverse_dynamics.linkage(robot), qpos)
-    found = slopes(force_model(robot), at, qpos[:, 7:], speed, rate).force
+    found = dynamics(force_model(robot), at, qpos[:, 7:], speed, rate).force
     return bool(np.allclose(found, expected, rtol=1e-6, atol=1e-6))
 
 

@@ -9,6 +9,7 @@ from scipy.optimize import lsq_linear
 from robojackson.retarget.feasibility import contact_wrench, inverse_dynamics
 from robojackson.retarget.feasibility.contact_wrench import Demand, Tolerance
 from robojackson.retarget.feasibility.force_model import unconstrained
+from robojackson.retarget.feasibility.interior_point import solve_box
 from robojackson.robot.model import Robot
 from robojackson.robot.tree_kinematics import integrate, pose, tree
 from tests.fixtures.robots import robot_motion
@@ -86,7 +87,7 @@ def test_the_roots_square_is_the_second_derivative(robot: Robot, rng: np.random.
         for s in (1, -1)
     )
     unit = np.broadcast_to(np.eye(len(demand.scale)), (len(demand.force), *[len(demand.scale)] * 2))
-    root = contact_wrench.relaxed(demand, BARRIER).root @ unit
+    root = contact_wrench.relaxed(demand, BARRIER).root() @ unit
     bend = (root.swapaxes(1, 2) @ (root @ way[..., None]))[..., 0]
     np.testing.assert_allclose((ahead - back) / 2e-4 / demand.scale, bend / demand.scale, atol=2e-3)
 
@@ -99,6 +100,16 @@ def test_a_start_nearby_leads_to_the_same_place(robot: Robot, rng: np.random.Gen
     warm = contact_wrench.relaxed(there, BARRIER, start)
     np.testing.assert_allclose(warm.value, cold.value, atol=1e-6)
     np.testing.assert_allclose(warm.pushes, cold.pushes, atol=1e-4)
+
+
+@pytest.mark.parametrize("barrier", [0.0, BARRIER])
+def test_a_step_is_solved_the_same_alone_and_beside_others(robot: Robot, barrier: float):
+    """Steps arrive after different numbers of iterations, and leave the others then."""
+    demand = _demand(robot, 2.0)
+    together = solve_box(contact_wrench._box(demand, barrier)).x
+    for step in (0, 17, 40):
+        alone = solve_box(contact_wrench._box(demand.at(np.array([step])), barrier)).x
+        np.testing.assert_allclose(alone[0], together[step], rtol=1e-9, atol=1e-12)
 
 
 def test_a_start_of_another_problem_is_not_taken(robot: Robot):

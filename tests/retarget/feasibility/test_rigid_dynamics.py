@@ -8,7 +8,7 @@ import pytest
 
 from robojackson.retarget.feasibility.force_model import force_model, unconstrained
 from robojackson.retarget.feasibility.inverse_dynamics import inverse
-from robojackson.retarget.feasibility.rigid_dynamics import Slopes, slopes
+from robojackson.retarget.feasibility.rigid_dynamics import Slopes, dynamics
 from robojackson.robot.model import Robot, load_robot
 from robojackson.robot.tree_kinematics import pose, tree
 from tests.fixtures import machine
@@ -35,7 +35,7 @@ def _moving(robot: Robot) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _found(robot: Robot, qpos: np.ndarray, speed: np.ndarray, rate: np.ndarray) -> Slopes:
-    return slopes(force_model(robot), pose(tree(robot), qpos), qpos[:, 7:], speed, rate)
+    return dynamics(force_model(robot), pose(tree(robot), qpos), qpos[:, 7:], speed, rate).slopes()
 
 
 def test_the_force_is_mujocos(any_robot: Robot):

@@ -12,7 +12,7 @@ def _random_system(frames: int, ring: bool, rng: np.random.Generator):
     first = np.arange(frames if ring else frames - 2)
     rows = tuple(rng.normal(size=(len(first), 6, unknowns)) for _ in range(3))
     residual = rng.normal(size=(len(first), 6))
-    normal.add_chained(residual, rows, first)
+    normal.add_chained(residual, lambda: rows, first)
     dense = np.zeros((len(first), 6, frames, unknowns))
     for k, row in enumerate(rows):
         for t in first:
@@ -43,3 +43,19 @@ def test_held_unknowns_stay_and_the_others_are_optimal(ring: bool, rng):
 def test_the_cost_is_half_the_sum_of_squares(rng):
     normal, _, residual = _random_system(9, True, rng)
     assert normal.cost == pytest.approx(0.5 * residual @ residual)
+
+
+def test_derivatives_wait_until_they_are_read(rng):
+    normal, computed = Normal.empty(3, 4), []
+
+    def jacobian():
+        computed.append("rows")
+        return np.ones((3, 2, 4))
+
+    normal.add_rows(np.ones((3, 2)), jacobian)
+    normal.later(lambda: computed.append("later"))
+    assert normal.cost == 3.0
+    assert not computed
+    np.testing.assert_array_equal(normal.gradient, 2.0)
+    np.testing.assert_array_equal(normal.blocks[0], 2.0)
+    assert computed == ["rows", "later"]

@@ -10,10 +10,10 @@ from robojackson.retarget.retarget_config import RetargetConfig
 from robojackson.retarget.retargeting import retarget_motion
 from robojackson.retarget.solver import dynamics_term
 from robojackson.retarget.solver.block_banded import Normal
-from robojackson.retarget.solver.clip_problem import Problem
+from robojackson.retarget.solver.clip_problem import Problem, Warm
 from robojackson.retarget.solver.levenberg_marquardt import solve
 from robojackson.retarget.targets.cycle import human_clip
-from robojackson.retarget.targets.keypoint_targets import targets
+from robojackson.retarget.targets.keypoint_targets import select_steps, targets
 from robojackson.retarget.whole_clip import faults
 from robojackson.robot.model import Robot
 from robojackson.robot.tree_kinematics import integrate, pose
@@ -52,6 +52,22 @@ def test_the_terms_gradient_is_that_of_its_cost(robot: Robot, rng: np.random.Gen
         slope = float(np.sum(here.gradient * way))
         usual = np.linalg.norm(here.gradient)  # of the slope along a random way
         assert (ahead - back) / 2e-7 == pytest.approx(slope, abs=0.05 * usual)
+
+
+@pytest.mark.parametrize("steps", [1, 7])
+def test_the_term_is_the_same_to_the_last_bit_in_parts_of_any_length(
+    robot: Robot, steps: int, monkeypatch: pytest.MonkeyPatch
+):
+    problem, qpos = _problem(robot), robot_motion("walk").qpos[:30]
+    aims = replace(select_steps(problem.targets, slice(0, 30)), cycle_offset=None)
+    problem = replace(problem, targets=aims, warm=Warm())
+    monkeypatch.setattr(dynamics_term, "_CHUNK", 1000)
+    whole = _term(problem, qpos)
+    monkeypatch.setattr(dynamics_term, "_CHUNK", steps)
+    parts = _term(replace(problem, warm=Warm()), qpos)
+    assert parts.cost == whole.cost
+    np.testing.assert_array_equal(parts.gradient, whole.gradient)
+    np.testing.assert_array_equal(parts.blocks, whole.blocks)
 
 
 def test_the_slopes_of_inverse_dynamics_are_its_differences(robot: Robot):
