@@ -52,14 +52,14 @@ def without_spikes(
     speed = np.linalg.norm(np.diff(relative, axis=0), axis=-1) * fps
     bad = np.zeros(points.shape[:2], bool)
     for joint in np.flatnonzero((speed > JUMP_M_S).any(0)):
-        good = 0  # frames before this one are known
-        jumps = np.flatnonzero(speed[:, joint] > JUMP_M_S)
+        mended_to = 0
+        jumps = np.flatnonzero(speed[:, joint] > JUMP_M_S).tolist()
         for before, last in pairwise(jumps):
             away = relative[last + 1, joint] - relative[before, joint]
             calm = np.linalg.norm(away) < CALM * JUMP_M_S * (last + 1 - before) / fps
-            if before >= good and calm and last - before <= max(1, SPIKE_S * fps):
+            if before >= mended_to and calm and last - before <= max(1, SPIKE_S * fps):
                 bad[before + 1 : last + 1, joint] = True
-                good = last + 1
+                mended_to = last + 1
     frames, result = np.arange(len(points)), relative.copy()
     for joint in np.flatnonzero(bad.any(0)):
         good = ~bad[:, joint]
