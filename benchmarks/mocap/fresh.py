@@ -44,15 +44,10 @@ def seed_of(weights: Path) -> int:
 
 def make(number: int, seed: int, files: dict[str, Path], tools: tuple[Any, Any]) -> dict[str, Any]:
     """Make the clip of one stratum."""
-    from tools.pairs import clips, cmu_bvh, scenery, sources
-    from tools.render import deepmimic
+    from tools.pairs import clips, scenery
 
     rng = np.random.default_rng([seed, number])
-    path = files[MOTIONS[number % len(MOTIONS)]]
-    bvh = ".bvh" in path.suffixes
-    whole = deepmimic.resampled(cmu_bvh.read(path), 30.0) if bvh else deepmimic.read(path, 30.0)
-    part = sources.window(whole, int(rng.integers(1, max(len(whole) - FRAMES, 2))), FRAMES)
-    motion = clips.facing(sources.gathered(replace(part, fps=30.0), clips.REACH), rng)
+    motion = part_of(files[MOTIONS[number % len(MOTIONS)]], rng)
     quarter = number * 7 % 4
     angles = scenery.Angles(
         yaw=float(np.radians(rng.uniform(90.0 * quarter, 90.0 * quarter + 90.0))),
@@ -66,16 +61,37 @@ def make(number: int, seed: int, files: dict[str, Path], tools: tuple[Any, Any])
     )
 
 
-def measure(path: Path) -> tuple[str, float, dict[str, float], dict[str, float]]:
-    """Name, share of detected frames, figures of raw and of ours."""
+def part_of(path: Path, rng: np.random.Generator) -> Any:
+    """Return `FRAMES` frames from anywhere in a held-out motion, turned to the camera."""
+    from tools.pairs import clips, cmu_bvh, sources
+    from tools.render import deepmimic
+
+    bvh = ".bvh" in path.suffixes
+    whole = deepmimic.resampled(cmu_bvh.read(path), 30.0) if bvh else deepmimic.read(path, 30.0)
+    part = sources.window(whole, int(rng.integers(1, max(len(whole) - FRAMES, 2))), FRAMES)
+    return clips.facing(sources.gathered(replace(part, fps=30.0), clips.REACH), rng)
+
+
+def read(path: Path) -> tuple[LandmarkTrack, Truth]:
+    """Return what was seen of a rendered clip, and what is true.
+
+    Raises:
+        NoPersonFound: fewer than two frames with a person.
+    """
     with np.load(path) as pair:
         stride, (width, height) = int(pair["stride"]), pair["size"].tolist()
         seen, name = pair["seen"][::stride].astype(float), str(pair["motion"])
         truth = Truth(name, pair["truth"][::stride][:, LANDMARKS].astype(float), pair["up"])
-    fps = 30.0 / stride
-    track = LandmarkTrack(fps, width, height, seen[..., :3], seen[..., 3:6], seen[..., 6])
+    track = LandmarkTrack(30.0 / stride, width, height, seen[..., :3], seen[..., 3:6], seen[..., 6])
     if track.detected.sum() < 2:
         raise NoPersonFound("no person detected")
+    return track, truth
+
+
+def measure(path: Path) -> tuple[str, float, dict[str, float], dict[str, float]]:
+    """Name, share of detected frames, figures of raw and of ours."""
+    track, truth = read(path)
+    name, fps = truth.clip, track.fps
     raw = fill_gaps(track.world_landmarks, track.detected)[:, LANDMARKS]
     sequence = recover_motion(track, MocapConfig())
     ours = sequence.joints[:, [keypoint(name) for name in JOINTS]]

@@ -244,5 +244,6 @@ def _contact_share(sequence: "SmplSequence") -> dict[str, float]:
 def _floor(sequence: "SmplSequence") -> Figures:
     """Return the source of the floor and the distance of the lowest keypoint from it, metres."""
     lowest = sequence.keypoints_w[:, :, 2].min(1)
-    known = {key: sequence.camera[key] for key in ("gravity", "tilt_deg") if key in sequence.camera}
+    keys = ("gravity", "tilt_deg", "gravity_sd_deg")
+    known = {key: sequence.camera[key] for key in keys if key in sequence.camera}
     return {"lowest_keypoint_m": lowest.min(), "median_m": np.median(lowest), **known}

@@ -26,6 +26,7 @@ from robojackson.mocap.landmarks.covariance import certainty
 from robojackson.mocap.landmarks.refinement import RefineConfig, gather, refine
 from robojackson.mocap.pose.posed_body import Body, pose_landmarks
 from robojackson.mocap.reprojection import weak_frames, without_weak_frames
+from robojackson.mocap.temporal.ground_evidence import GroundEvidence
 from robojackson.mocap.temporal.temporal_lift import TemporalConfig, lift
 from robojackson.motion.landmark_track import LandmarkTrack, evenly
 from robojackson.motion.smpl_sequence import SmplSequence
@@ -72,6 +73,7 @@ class View:
         pinhole: The camera.
         points: Landmarks in the camera frame, metres.
         depth_m: Standard deviation of the depths of the body, metres; None where they are unknown.
+        ground: What the temporal network found of gravity.
     """
 
     track: LandmarkTrack
@@ -79,6 +81,7 @@ class View:
     pinhole: pinhole_camera.Pinhole
     points: Float[np.ndarray, "T 33 3"]
     depth_m: Float[np.ndarray, "T 12"] | None
+    ground: GroundEvidence | None = None
 
     def in_image(self) -> Float[np.ndarray, "T 33 3"]:
         """Return the points at their depths on the rays of the detected landmarks."""
@@ -111,11 +114,12 @@ def view_track(track: LandmarkTrack, config: MocapConfig) -> View:
     focal_px = config.focal_px or pinhole_camera.guess_focal(track.width, track.height)
     pinhole = pinhole_camera.Pinhole(focal_px, track.width, track.height)
     seen = pinhole_camera.place(landmarks, pinhole, track.fps, config.depth_cutoff_hz)
-    depth_m = None
+    depth_m = ground = None
     if config.temporal.enabled:
         found = lift(seen, landmarks.local, landmarks.visibility, track.fps, config.temporal)
         seen, depth_m = found.points, found.depth_sd(config.temporal.depth_floor_m)
-    return View(track, landmarks, pinhole, seen, depth_m)
+        ground = found.ground
+    return View(track, landmarks, pinhole, seen, depth_m, ground)
 
 
 def finish_motion(view: View, config: MocapConfig) -> SmplSequence:
@@ -132,7 +136,9 @@ def finish_motion(view: View, config: MocapConfig) -> SmplSequence:
     def posed(marks: np.ndarray) -> Body:
         return pose_landmarks(marks, sure, rest, config.method)
 
-    sequence = recover_points(seen, posed, landmarks.valid, view.pinhole, track.fps, config)
+    sequence = recover_points(
+        seen, posed, landmarks.valid, view.pinhole, track.fps, config, view.ground
+    )
     notes = (*track.notes, *sequence.notes, *_swaps(landmarks))
     return replace(
         sequence, person=track.person, notes=notes, camera=camera_facts(sequence.camera, track)
@@ -151,6 +157,7 @@ def recover_points(
     pinhole: pinhole_camera.Pinhole,
     fps: float,
     config: MocapConfig,
+    ground: GroundEvidence | None = None,
 ) -> SmplSequence:
     """Return the motion of points before the camera, from any detector.
 
@@ -161,9 +168,10 @@ def recover_points(
         pinhole: The camera.
         fps: Frames a second.
         config: Settings of the floor and the feet.
+        ground: What the temporal network found of gravity.
     """
     body = posed(points)
-    gravity = floor.find_up(body.pose.points, body.feet, fps, config.gravity)
+    gravity = floor.find_up(body.pose.points, body.feet, fps, config.gravity, ground)
     to_world = floor.camera_to_world(gravity.up)
     body = posed(apply(to_world, points))
     start = body.pose.points.mean((0, 1))
@@ -189,6 +197,7 @@ def _camera(
         "position_w": origin.tolist(),
         "gravity": gravity.source,
         "tilt_deg": gravity.tilt_deg,
+        **({} if gravity.sd_deg is None else {"gravity_sd_deg": gravity.sd_deg}),
     }
 
 

@@ -38,6 +38,7 @@ class Camera(TypedDict, total=False):
     height: Pixels
     gravity: Text
     tilt_deg: Number
+    gravity_sd_deg: Number
     position_w: Point | list[Point]
     rotation_w: Matrix | list[Matrix]
 

@@ -5,18 +5,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from scipy.spatial.transform import Rotation
 
 from robojackson.mocap.temporal import error_flow, features, temporal_network
 from robojackson.mocap.temporal.features import ClipView
+from robojackson.motion.smpl_sequence import AIR, PLANTED, SLIDING
 from tools.pairs.sources import RefusedMotion
 from tools.temporal import batches, train_temporal
 from tools.temporal.batches import Batch
-from tools.temporal.depth_errors import Change, misjudged
+from tools.temporal.depth_errors import Change, body_offsets, misjudged
 from tools.temporal.examples import Example, flattened
-from tools.temporal.filming import HIPS, film, with_constants
+from tools.temporal.filming import HIPS
 from tools.temporal.fit_flow import discrepancy
 from tools.temporal.net import Flow, Lifter
-from tools.temporal.truths import FRAMES, Bank
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +44,9 @@ def person(frames: int = 60, motion: str = "jump") -> Example:
         axes=np.tile(np.eye(3), (frames, 1, 1)),
         root=np.outer(distance, [0.0, 0.0, 1.0]),
     )
-    return Example(sight, truth, np.ones(frames, bool), distance, motion)
+    up = np.tile([0.0, -1.0, 0.0], (frames, 1))
+    contact = np.tile([PLANTED, AIR, SLIDING, AIR], (frames, 1))
+    return Example(sight, truth, np.ones(frames, bool), distance, motion, up, contact)
 
 
 def batch_of(example: Example) -> Batch:
@@ -56,12 +59,14 @@ def test_torch_and_numpy_are_the_same_lifter(
 ) -> None:
     lifter, _, weights = twins
     sight = person().sight
-    change, spread, _ = temporal_network.run(sight, weights)
+    ours = temporal_network.run(sight, weights)
     numbers = torch.from_numpy(features.numbers(sight)[None].astype(np.float32))
     with torch.no_grad():
-        correction, log_spread = lifter(numbers)
-    assert np.abs(correction[0].numpy() - change).max() < 1e-3
-    assert np.abs(log_spread[0].numpy() - np.log(spread)).max() < 1e-3
+        found = lifter(numbers)
+    assert np.abs(found.correction[0].numpy() - ours.correction).max() < 1e-3
+    assert np.abs(found.log_spread[0].numpy() - np.log(ours.spread)).max() < 1e-3
+    assert np.abs(found.up[0].numpy() - ours.up).max() < 1e-3
+    assert np.abs(found.log_tilt[0].numpy() - np.log(ours.tilt)).max() < 1e-3
 
 
 def test_torch_and_numpy_are_the_same_flow(twins: tuple[Lifter, Flow, error_flow.Weights]) -> None:
@@ -95,6 +100,7 @@ def test_batches_give_the_numbers_that_the_stage_gives() -> None:
 def test_changed_windows_are_still_seen_as_they_are() -> None:
     how = Change(
         40, shift_m=0.0, tilt_deg=(0.0, 0.0), depth=0.0, depth_shift_m=0.0, shake_m=0.0,
+        body_m=0.0, body_limb_m=0.0,
         hidden=0.0, metre=0.0, bad_depth=0.0, no_depth=0.0, strides=(1.0, 0.0, 0.0),
     )  # fmt: skip
     changed = batches.change(batch_of(person()), how, np.random.default_rng(4))
@@ -104,34 +110,25 @@ def test_changed_windows_are_still_seen_as_they_are() -> None:
     assert np.allclose(changed.local, changed.truth, atol=1e-4)
 
 
-def bank() -> Bank:
-    """Return one motion of a person who sways."""
-    rng = np.random.default_rng(8)
-    still = rng.uniform(-0.1, 0.1, (len(features.INPUT_LANDMARKS), 3))
-    sway = 0.02 * np.sin(np.arange(FRAMES) / 7.0)[:, None, None] * [1.0, 0.0, 0.0]
-    return Bank((still + sway)[None].astype(np.float32), np.array([FRAMES]))
+def test_errors_in_body_axes_turn_with_the_body() -> None:
+    still = np.repeat(batch_of(person()).truth[:1, :1], 30, axis=1)
+    turns = Rotation.from_rotvec(np.outer(np.arange(30) / 10.0, [0.3, 0.8, 0.1])).as_matrix()
+    turning = still @ np.swapaxes(turns, -1, -2)[:, :].astype(np.float32)
+    wrong = body_offsets(turning, Change(), np.random.default_rng(2))
+    back = wrong @ turns.astype(np.float32)
+    assert np.abs(back - back[:, :1]).max() < 1e-5
+    assert np.abs(wrong - wrong[:, :1]).max() > 0.01
+    assert np.abs(wrong[:, :, HIPS].mean(2)).max() < 1e-6
 
 
-def test_filmed_windows_are_seen_exactly() -> None:
-    """From any camera: the image is that of the truth, the bones keep their lengths."""
-    rows, sizes = np.zeros(6, int), np.full(6, 4.0)
-    filmed = film(bank(), rows, 30, sizes, np.random.default_rng(3))
-    hips = filmed.truth[:, :, HIPS].mean(2)
-    assert np.abs(hips).max() < 1e-4
-    bones = np.linalg.norm(filmed.truth[:, :, 3] - filmed.truth[:, :, 5], axis=-1)
-    still = bank().points[0]
-    assert np.allclose(bones, 4.0 * np.linalg.norm(still[0, 3] - still[0, 5]), rtol=1e-3)
-    assert np.ptp(filmed.truth[:, 0, 3], axis=0).min() > 0.05  # the cameras stand elsewhere
-
-
-def test_filmed_constants_are_those_of_the_stage() -> None:
-    filmed = film(bank(), np.zeros(2, int), 30, np.ones(2), np.random.default_rng(4))
-    sight = person(30).sight
-    sight.flat[:, features.INPUT_LANDMARKS] = filmed.flat[1]
-    sight.local[:, features.INPUT_LANDMARKS] = filmed.local[1]
-    sight.root[:] = np.outer(filmed.distance[1], [0.0, 0.0, 1.0])
-    result = with_constants(filmed).constant[1]
-    assert np.allclose(result, features.constants(sight), rtol=1e-3)
+def test_a_mirrored_window_exchanges_the_feet() -> None:
+    whole = batch_of(person())
+    changed = batches.change(whole, Change(40, roll_deg=0.0), np.random.default_rng(6))
+    same = (changed.contact == whole.contact).all((1, 2))
+    other = (changed.contact == whole.contact[..., [2, 3, 0, 1]]).all((1, 2))
+    assert (same ^ other).all()
+    assert same.any()
+    assert other.any()
 
 
 def test_a_detector_without_depth_sees_the_image_alone() -> None:

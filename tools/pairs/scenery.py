@@ -66,11 +66,13 @@ class View:
 
 @dataclass(frozen=True)
 class Angles:
-    """From where a camera looks: radians, and how much of the picture the motion fills."""
+    """From where a camera looks: radians, and how much of the picture the motion fills; a roll of
+    None is drawn."""
 
     yaw: float
     pitch: float
     fills: float
+    roll: float | None = None
 
 
 def draw_angles(rng: np.random.Generator) -> Angles:
@@ -91,7 +93,8 @@ def film(posed: Posed, rng: np.random.Generator, angles: Angles) -> View:
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
     rotation = np.stack([right, np.cross(forward, right), forward])
-    roll = np.radians(rng.normal(0.0, 5.0))
+    drawn = np.radians(rng.normal(0.0, 5.0))
+    roll = drawn if angles.roll is None else angles.roll
     turn = np.array([[np.cos(roll), -np.sin(roll), 0], [np.sin(roll), np.cos(roll), 0], [0, 0, 1]])
     rotation = turn @ rotation
     focal = float(np.hypot(width, height) * np.exp(rng.uniform(np.log(0.55), np.log(1.7))))

@@ -12,11 +12,12 @@ import numpy as np
 from robojackson.mocap.landmarks.blazepose import BODY, MIRROR
 from robojackson.mocap.temporal import features
 from robojackson.mocap.temporal.features import FPS, INPUT_LANDMARKS
-from tools.temporal.depth_errors import LIMBS, ORDER, Change, misjudged
+from tools.temporal.depth_errors import LIMBS, ORDER, Change, body_offsets, misjudged
 from tools.temporal.examples import Example
 
 SWAP = [ORDER.index(int(MIRROR[index])) for index in INPUT_LANDMARKS]
 TWELVE = [ORDER.index(int(index)) for index in BODY]
+OTHER_FOOT = (2, 3, 0, 1)
 LONGEST = 150
 """Frames of the longest example that are kept."""
 
@@ -31,6 +32,8 @@ class Batch:
         distance: Distance of the hips as placed, metres.
         truth: Truth of the same landmarks, NaN-free, metres.
         good: 1 in the frames that count, else 0.
+        up: Direction against gravity, unit vectors (B, L, 3).
+        contact: States of the foot points (B, L, 4).
     """
 
     flat: np.ndarray
@@ -40,6 +43,8 @@ class Batch:
     distance: np.ndarray
     truth: np.ndarray
     good: np.ndarray
+    up: np.ndarray
+    contact: np.ndarray
 
     def numbers(self) -> np.ndarray:
         """Return the network's input (B, L, F), as `features.numbers` orders it."""
@@ -66,6 +71,8 @@ def table(examples: Sequence[Example]) -> Batch:
         distance=stack([np.linalg.norm(s.root, axis=-1) for s in sights]),
         truth=stack([np.nan_to_num(e.truth[:, INPUT_LANDMARKS]) for e in examples]),
         good=stack(good),
+        up=stack([e.up for e in examples]),
+        contact=stack([e.contact for e in examples]),
     )
 
 
@@ -106,7 +113,10 @@ def change(batch: Batch, how: Change, rng: np.random.Generator) -> Batch:
     metre = np.exp(rng.normal(0.0, how.metre, count)).astype(np.float32)
     grown = size[:, None, None, None]
     flat = _disturbed(batch.flat @ roll[..., :2, :2] * grown, how, rng)
-    local = batch.local @ roll * grown * metre[:, None, None, None]
+    truth = batch.truth @ roll * grown
+    wrong = body_offsets(truth, how, rng)
+    flat = flat + wrong[..., :2] * how.body_in_image
+    local = batch.local @ roll * grown * metre[:, None, None, None] + wrong
     local = _disturbed(misjudged(local, how, rng), how, rng)
     visibility = np.array(batch.visibility)
     for row in np.flatnonzero(rng.uniform(size=count) < how.hidden):
@@ -122,7 +132,8 @@ def change(batch: Batch, how: Change, rng: np.random.Generator) -> Batch:
         visibility=visibility,
         constant=batch.constant * factors,
         distance=batch.distance * size[:, None],
-        truth=batch.truth @ roll * grown,
+        truth=truth,
+        up=(batch.up[:, :, None] @ roll)[:, :, 0],
     )
 
 
@@ -169,6 +180,8 @@ def _mirrored(batch: Batch, which: np.ndarray) -> Batch:
         local=np.where(pick, batch.local[:, :, SWAP] * flip, batch.local),
         truth=np.where(pick, batch.truth[:, :, SWAP] * flip, batch.truth),
         visibility=np.where(pick[..., 0], batch.visibility[:, :, SWAP], batch.visibility),
+        up=np.where(pick[..., 0], batch.up * flip, batch.up),
+        contact=np.where(pick[..., 0], batch.contact[..., OTHER_FOOT], batch.contact),
     )
 
 

@@ -18,6 +18,7 @@ from robojackson.mocap.recover import MocapConfig
 from robojackson.mocap.temporal import features, temporal_lift
 from robojackson.mocap.temporal.features import ClipView
 from robojackson.motion.landmark_track import LandmarkTrack
+from tools.temporal import foot_states
 
 FOLLOWED_M = 0.25
 """Mean distance across the image over which the detector is not on the person."""
@@ -42,6 +43,8 @@ class Example:
         good: Frames that count.
         distance: Distance of the hips from the camera, metres.
         motion: Name of the motion.
+        up: Direction against gravity in the axes of the rays.
+        contact: States of the foot points.
     """
 
     sight: ClipView
@@ -49,6 +52,8 @@ class Example:
     good: np.ndarray
     distance: np.ndarray
     motion: str
+    up: np.ndarray
+    contact: np.ndarray
 
 
 def along_rays(truth_c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -77,6 +82,8 @@ def read(path: Path) -> Example | None:
         stride = int(pair["stride"])
         seen, (width, height) = pair["seen"][::stride].astype(float), pair["size"].tolist()
         truth_c, motion, fps = pair["truth"].astype(float), str(pair["motion"]), float(pair["fps"])
+        up_c, names = pair["up"].astype(float), pair["bone_names"].tolist()
+        feet = foot_states.soles(foot_states.level(pair["bones"].astype(float), up_c), names)
     track = LandmarkTrack(fps / stride, width, height, seen[..., :3], seen[..., 3:6], seen[..., 6])
     if track.detected.mean() < LEAST_FOUND:
         return None
@@ -92,7 +99,9 @@ def read(path: Path) -> Example | None:
     if good.mean() < LEAST_FOLLOWED:
         return None
     scale = (flat[good] * ideal[good]).sum() / (ideal[good] ** 2).sum()
-    return Example(sight, truth * scale, good, distance * scale, motion)
+    axes = features.axes_along(truth_c[: len(places), features.HIPS].mean(1))
+    contact = foot_states.states(feet, fps)[: len(places)]
+    return Example(sight, truth * scale, good, distance * scale, motion, up_c @ axes, contact)
 
 
 def sight_of(track: LandmarkTrack) -> ClipView:

@@ -30,6 +30,22 @@ LENSES = (0.55, 1.7)
 SWAY = 0.02
 """Of the distance that is found, slowly varying, share."""
 HIPS = [ORDER.index(index) for index in features.HIPS]
+PROPORTION = 0.04
+"""Standard deviation of the logarithm of a bone's length."""
+SIDES = ("left", "right")
+
+
+def _rows(side: str, *names: str) -> list[int]:
+    return [ORDER.index(landmark(f"{side}_{name}")) for name in names]
+
+
+LINKS = (
+    ("hip", "knee", ()), ("knee", "ankle", ("heel", "foot_index")),
+    ("shoulder", "elbow", ()), ("elbow", "wrist", ("index", "pinky")),
+)  # fmt: skip
+"""Start and end of a bone, and what moves with its end; from the trunk outwards."""
+HEAD = [ORDER.index(landmark(name)) for name in ("nose", "left_ear", "right_ear")]
+SHOULDERS = [ORDER.index(landmark(f"{side}_shoulder")) for side in SIDES]
 
 
 def film(
@@ -44,8 +60,9 @@ def film(
         sizes: Size of each person in the detector's metres.
         rng: Draws windows, tempo and cameras.
     """
-    points = _played(bank, rows, frames, rng) * sizes[:, None, None, None]
-    seen = _before_cameras(points, rng)
+    places = _places(bank, rows, frames, rng)
+    points = proportioned(_played(bank.points, rows, places), rng) * sizes[:, None, None, None]
+    seen, up = _before_cameras(points, rng)
     root = seen[:, :, HIPS].mean(2)
     axes = axes_along(root)
     truth = (seen - root[:, :, None]) @ axes
@@ -63,6 +80,8 @@ def film(
         distance=(distance * wrong).astype(np.float32),
         truth=truth.astype(np.float32),
         good=np.ones((count, frames), np.float32),
+        up=(up[:, None, None] @ axes)[:, :, 0].astype(np.float32),
+        contact=bank.contact[rows[:, None], np.round(places).astype(int)].astype(np.float32),
     )
 
 
@@ -90,20 +109,44 @@ def axes_along(root: np.ndarray) -> np.ndarray:
     return np.stack([right, np.cross(forward, right), forward], -1)
 
 
-def _played(bank: Bank, rows: np.ndarray, frames: int, rng: np.random.Generator) -> np.ndarray:
-    """Return windows at any tempo, linear between frames."""
+def proportioned(points: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Return people whose bones are longer or shorter by a few per cent, another for each window;
+    both sides alike, hips where they were."""
+    factors = np.exp(rng.normal(0.0, PROPORTION, (2 + len(LINKS), len(points), 1, 1, 1)))
+    wide, long, *limbs = factors.astype(np.float32)
+    changed, centre = points.copy(), points[:, :, HIPS].mean(2, keepdims=True)
+    for rows, factor in ((HIPS, wide), (SHOULDERS, long)):
+        changed[:, :, rows] = centre + factor * (points[:, :, rows] - centre)
+    shift = (changed - points)[:, :, SHOULDERS].mean(2, keepdims=True)
+    changed[:, :, HEAD] = points[:, :, HEAD] + shift
+    for (start, end, followers), factor in zip(LINKS, limbs, strict=True):
+        for side in SIDES:
+            (first,), (last, *more) = _rows(side, start), _rows(side, end, *followers)
+            bone = points[:, :, last] - points[:, :, first]
+            shift = changed[:, :, first] + factor[:, 0] * bone - points[:, :, last]
+            changed[:, :, [last, *more]] = points[:, :, [last, *more]] + shift[:, :, None]
+    return changed
+
+
+def _places(bank: Bank, rows: np.ndarray, frames: int, rng: np.random.Generator) -> np.ndarray:
+    """Return the fractional frames of windows at any tempo."""
     tempo = rng.uniform(*TEMPO, len(rows))
     spare = np.maximum(bank.lengths[rows] - 1 - tempo * frames, 0.0)
     place = rng.uniform(0.0, 1.0, len(rows))[:, None] * spare[:, None]
-    place = np.minimum(place + tempo[:, None] * np.arange(frames), bank.points.shape[1] - 1.001)
+    place = place + tempo[:, None] * np.arange(frames)
+    return np.asarray(np.minimum(place, bank.points.shape[1] - 1.001))
+
+
+def _played(points: np.ndarray, rows: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Return windows of points, linear between frames."""
     low = place.astype(int)
     part = (place - low)[..., None, None].astype(np.float32)
     each = rows[:, None]
-    return np.asarray(bank.points[each, low] * (1.0 - part) + bank.points[each, low + 1] * part)
+    return np.asarray(points[each, low] * (1.0 - part) + points[each, low + 1] * part)
 
 
-def _before_cameras(points: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Return world points (B, L, N, 3) in the frame of a drawn camera each."""
+def _before_cameras(points: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Return world points (B, L, N, 3), and up (B, 3), in the frame of a drawn camera each."""
     count = len(points)
     yaw = rng.uniform(-np.pi, np.pi, count)
     level = rng.uniform(size=count) < LEVEL_SHARE
@@ -124,4 +167,4 @@ def _before_cameras(points: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     distance = np.maximum(distance, NEAREST_M - seen[..., 2].min((1, 2)))
     aside = rng.normal(0.0, ASIDE, (count, 2)) * distance[:, None]
     shift = np.concatenate([aside, distance[:, None]], -1)
-    return np.asarray(seen + shift[:, None, None])
+    return seen + shift[:, None, None], rotation[:, :, 2]

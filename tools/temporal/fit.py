@@ -8,17 +8,26 @@ import numpy as np
 import torch
 from torch import nn
 
+from robojackson.body.forward_kinematics import unit
 from robojackson.metrics import pose_error
 from robojackson.mocap.landmarks.blazepose import BODY
 from robojackson.mocap.temporal import features
 from robojackson.mocap.temporal.temporal_lift import corrected
-from tools.temporal.batches import TWELVE, Batch, change, joined, table, windows
+from robojackson.motion.smpl_sequence import PLANTED
+from tools.temporal.batches import Batch, change, joined, table, windows
 from tools.temporal.depth_errors import Change
 from tools.temporal.examples import Example
 from tools.temporal.filming import film, with_constants
 from tools.temporal.invented import Detector
-from tools.temporal.net import Lifter
+from tools.temporal.losses import losses_of
+from tools.temporal.net import Found, Lifter
 from tools.temporal.truths import Bank
+
+LOSSES = ("place", "velocity", "speed", "spread", "tilt", "contact")
+VALIDATED = (
+    "pa_detector", "pa_network", "rr_detector", "rr_network", "speed_ratio", "tilt_deg",
+    "planted_f1",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -31,19 +40,22 @@ class FitConfig:
         rate: Learning rate, warmed up over 100 steps, then a cosine.
         decay: Weight decay.
         invented: Share of windows of the invented detector, at the first and the last step.
-        velocity, spread: Weights of these losses beside that of the place.
+        velocity, speed, spread, tilt, contact: Weights of these losses beside that of the place.
         average: Memory of the running mean of the weights, which is what is kept.
         change: Change of the windows.
     """
 
-    steps: int = 6000
+    steps: int = 20000
     batch: int = 32
     rate: float = 1.5e-3
     decay: float = 0.02
-    invented: tuple[float, float] = (0.85, 0.75)
+    invented: tuple[float, float] = (0.85, 0.8)
     velocity: float = 3.0
+    speed: float = 0.02
     spread: float = 0.01
-    average: float = 0.997
+    tilt: float = 0.01
+    contact: float = 0.02
+    average: float = 0.999
     change: Change = field(default_factory=Change)
 
 
@@ -116,36 +128,15 @@ def fit(
         losses.append(_learn(progress, pairs.draw(config, share, rng), config))
         progress.step = step + 1
         if progress.step % 100 == 0 or progress.step == config.steps:
-            names = ("place", "velocity", "spread")
-            means = dict(zip(names, np.mean(losses, 0).tolist(), strict=True))
+            means = dict(zip(LOSSES, np.mean(losses, 0).tolist(), strict=True))
             progress.curve.append({"step": progress.step, **means})
             losses = []
             watch(progress, (time.process_time() - began) / (progress.step - first))
 
 
-def losses_of(
-    correction: torch.Tensor, log_spread: torch.Tensor, batch: Batch
-) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]:
-    """Return the mean distance of joints (m), of their steps (m a frame), likelihood of the spread;
-    errors."""
-    flat, body, good = (torch.from_numpy(np.ascontiguousarray(v, np.float32)) for v in (
-        batch.flat[:, :, TWELVE], batch.truth[:, :, TWELVE], batch.good))  # fmt: skip
-    depth = torch.from_numpy(np.ascontiguousarray(batch.local[:, :, TWELVE, 2], np.float32))
-    distance = torch.from_numpy(batch.distance.astype(np.float32))[..., None]
-    z = depth + correction[..., 2]
-    across = flat * ((distance + z) / distance)[..., None] + correction[..., :2]
-    error = torch.cat([across, z[..., None]], -1) - body
-    both = good[:, 1:] * good[:, :-1]
-    place = _mean(_length(error), good)
-    velocity = _mean(_length(error[:, 1:] - error[:, :-1]), both)
-    off = torch.stack([_length(error[..., :2]) / 2.0, error[..., 2].abs()], -1).detach()
-    spread = _mean((log_spread + off * torch.exp(-log_spread)).sum(-1), good)
-    return place, velocity, spread, error
-
-
 def validate(net: Lifter, examples: Sequence[Example]) -> dict[str, float]:
-    """Return PA-MPJPE and root-relative MPJPE of detector and network on examples, mm, mean of
-    clips."""
+    """Return means over clips of `VALIDATED`: PA-MPJPE and root-relative MPJPE of detector and
+    network, mm, the network's ratio of speeds, error of gravity, degrees, and planted F1."""
     net.eval()
     rows = []
     for example in examples:
@@ -153,18 +144,23 @@ def validate(net: Lifter, examples: Sequence[Example]) -> dict[str, float]:
         body = example.truth[:, BODY].astype(float)
         with torch.no_grad():
             numbers = torch.from_numpy(features.numbers(sight)[None].astype(np.float32))
-            correction = net(numbers)[0][0].numpy()
-        before, after = features.base(sight)[good], corrected(sight, correction)[good]
-        rows.append(
-            [
-                f(x, body[good])
-                for f in (pose_error.pa_mpjpe, pose_error.mpjpe)
-                for x in (before, after)
-            ]
-        )
+            found = Found(*(part[0] for part in net(numbers)))
+        after = corrected(sight, found.correction.numpy())[good]
+        before, right = features.base(sight)[good], body[good]
+        errors = [
+            1e3 * f(x, right) for f in (pose_error.pa_mpjpe, pose_error.mpjpe)
+            for x in (before, after)
+        ]  # fmt: skip
+        speeds = [np.linalg.norm(np.diff(x, axis=0), axis=-1).mean() for x in (after, right)]
+        up, true = (unit(x[good].mean(0)) for x in (found.up.numpy(), example.up))
+        tilt = np.degrees(np.arccos(np.clip(up @ true, -1.0, 1.0)))
+        planted = (found.contact[..., 1].numpy() > 0.0)[good]
+        stands = (example.contact == PLANTED)[good]
+        total = max(planted.sum() + stands.sum(), 1)
+        f1 = 2.0 * (planted & stands).sum() / total
+        rows.append([*errors, speeds[0] / speeds[1], tilt, f1])
     net.train()
-    names = ("pa_detector", "pa_network", "rr_detector", "rr_network")
-    return dict(zip(names, (1e3 * np.mean(rows, 0)).tolist(), strict=True))
+    return dict(zip(VALIDATED, np.mean(rows, 0).tolist(), strict=True))
 
 
 def averaged(progress: Progress) -> Lifter:
@@ -174,10 +170,13 @@ def averaged(progress: Progress) -> Lifter:
     return net
 
 
-def _learn(progress: Progress, batch: Batch, config: FitConfig) -> tuple[float, float, float]:
-    correction, log_spread = progress.net(torch.from_numpy(batch.numbers()))
-    place, velocity, spread, _ = losses_of(correction, log_spread, batch)
-    loss = 10.0 * (place + config.velocity * velocity + config.spread * spread)
+def _learn(progress: Progress, batch: Batch, config: FitConfig) -> tuple[float, ...]:
+    numbers = torch.from_numpy(batch.numbers())
+    with torch.autocast("cpu", torch.bfloat16):
+        h = progress.net.features(numbers)
+    losses, _ = losses_of(progress.net.head(h.float()), batch)
+    weighted = [getattr(config, name, 1.0) * value for name, value in losses.items()]
+    loss = 10.0 * torch.stack(weighted).sum()
     progress.optimiser.zero_grad()
     loss.backward()
     nn.utils.clip_grad_norm_(progress.net.parameters(), 1.0)
@@ -185,16 +184,8 @@ def _learn(progress: Progress, batch: Batch, config: FitConfig) -> tuple[float, 
     memory = min(config.average, progress.step / (progress.step + 10.0))
     for name, value in progress.net.state_dict().items():
         progress.mean[name].lerp_(value, 1.0 - memory)
-    return place.item(), velocity.item(), spread.item()
+    return tuple(value.item() for value in losses.values())
 
 
 def _schedule(step: int, steps: int) -> float:
     return float(min(1.0, (step + 1) / 100.0) * (0.5 * (1.0 + np.cos(np.pi * step / steps)) + 0.01))
-
-
-def _length(x: torch.Tensor) -> torch.Tensor:
-    return torch.sqrt((x**2).sum(-1) + 1e-8)
-
-
-def _mean(values: torch.Tensor, good: torch.Tensor) -> torch.Tensor:
-    return (values * good[..., None]).sum() / good.sum().clamp(min=1.0) / values.shape[-1]

@@ -12,7 +12,8 @@ import numpy as np
 import torch
 
 from tools.temporal.batches import TWELVE, Batch
-from tools.temporal.fit import FitConfig, Source, losses_of
+from tools.temporal.fit import FitConfig, Source
+from tools.temporal.losses import losses_of
 from tools.temporal.net import Flow, Lifter
 
 WEIGHTS = {"inverse": 1.0, "forward": 1.0, "boundary": 0.1, "independence": 1.0}
@@ -99,9 +100,9 @@ def _errors(lifter: Lifter, batch: Batch) -> tuple[torch.Tensor, torch.Tensor]:
     """Return the error over spread (B, T, 36), and features."""
     with torch.no_grad():
         h = lifter.features(torch.from_numpy(batch.numbers()))
-        correction, log_spread = lifter.head(h)
-        error = -losses_of(correction, log_spread, batch)[3]
-        scaled = error * torch.exp(-log_spread[..., [0, 0, 1]])
+        found = lifter.head(h)
+        error = -losses_of(found, batch)[1]
+        scaled = error * torch.exp(-found.log_spread[..., [0, 0, 1]])
     return scaled.flatten(2).clamp(-6.0, 6.0), h
 
 

@@ -2,17 +2,45 @@
 `robojackson.mocap.temporal`.
 """
 
+from typing import NamedTuple
+
 import torch
 from torch import nn
 
 from robojackson.mocap.temporal import error_flow
 from robojackson.mocap.temporal.features import COUNT
-from robojackson.mocap.temporal.temporal_network import DILATIONS, LOG_SPREAD, SPREAD_RANGE
+from robojackson.mocap.temporal.temporal_network import (
+    DILATIONS,
+    GROUND,
+    LOG_SPREAD,
+    LOG_TILT,
+    SPREAD_RANGE,
+    UPRIGHT,
+)
 
 WIDTH = 160
-JOINTS = 12
+JOINTS, FEET = 12, 4
 OUT = JOINTS * 5
 """Correction (3), log spread across the image and in depth (2)."""
+
+
+class Found(NamedTuple):
+    """Output of the network.
+
+    Attributes:
+        correction: Of the detector's positions (B, T, 12, 3), metres.
+        log_spread: Across the image and in depth (B, T, 12, 2).
+        contact: Log odds that heels and toes touch, and that they are planted (B, T, 4, 2): a
+            second task of the training, which the weights file does not keep.
+        up: Direction against gravity in each frame (B, T, 3), not of unit length.
+        log_tilt: Log of the mean absolute error of its roll and pitch (B, T, 2), radians.
+    """
+
+    correction: torch.Tensor
+    log_spread: torch.Tensor
+    contact: torch.Tensor
+    up: torch.Tensor
+    log_tilt: torch.Tensor
 
 
 class Block(nn.Module):
@@ -51,6 +79,10 @@ class Lifter(nn.Module):
         self.leave = nn.Linear(width, OUT)
         nn.init.normal_(self.leave.weight, std=1e-3)
         nn.init.zeros_(self.leave.bias)
+        self.ground, self.feet = nn.Linear(width, GROUND), nn.Linear(width, 2 * FEET)
+        for last in (self.ground, self.feet):
+            nn.init.normal_(last.weight, std=1e-3)
+            nn.init.zeros_(last.bias)
 
     def features(self, x: torch.Tensor) -> torch.Tensor:
         """Return the input (B, T, COUNT) to what the last layer and the flow read, (B, T, C)."""
@@ -59,13 +91,17 @@ class Lifter(nn.Module):
             h = block(h)
         return h
 
-    def head(self, h: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return the correction (B, T, 12, 3) and log spread (B, T, 12, 2)."""
-        out = self.leave(h).unflatten(-1, (JOINTS, 5))
-        return out[..., :3], out[..., 3:].clamp(-SPREAD_RANGE, SPREAD_RANGE) + LOG_SPREAD
+    def head(self, h: torch.Tensor) -> Found:
+        """Return what the last layers read from the features."""
+        out, ground = self.leave(h).unflatten(-1, (JOINTS, 5)), self.ground(h)
+        log_spread = out[..., 3:].clamp(-SPREAD_RANGE, SPREAD_RANGE) + LOG_SPREAD
+        contact = self.feet(h).unflatten(-1, (FEET, 2))
+        up = ground[..., :3] + ground.new_tensor(UPRIGHT)
+        log_tilt = ground[..., 3:].clamp(-SPREAD_RANGE, SPREAD_RANGE) + LOG_TILT
+        return Found(out[..., :3], log_spread, contact, up, log_tilt)
 
-    def forward(self, x: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return the correction and log spread of a clip."""
+    def forward(self, x: torch.Tensor) -> Found:
+        """Return what the network finds in a clip."""
         return self.head(self.features(x))
 
 

@@ -20,6 +20,7 @@ from pathlib import Path
 import torch
 from safetensors.torch import load_file, save_file
 
+from robojackson.errors import BadWeights
 from tools.pairs import sources
 from tools.temporal import fit, truths
 from tools.temporal.examples import Example, load
@@ -51,7 +52,7 @@ def bank_of(folder: Path, motions: list[Path], count: int, seed: int) -> truths.
 
 def train(
     pairs: Path, motions: list[Path], out: Path, config: fit.FitConfig, count: int, seed: int,
-    flow_steps: int, first: Path | None = None,
+    flow_steps: int, first: Path | None = None, first_share: float = 0.0,
 ) -> dict[str, object]:  # fmt: skip
     """Fit lifter and flow; returns the report."""
     training, validation = load(pairs)
@@ -74,6 +75,8 @@ def train(
     where = fit.source(training, bank)
     fit.fit(progress, where, config, seed, watch)
     lifter = fit.averaged(progress)
+    if first:
+        mix_in(lifter, first, first_share)
     flow_curve: list[dict[str, float]] = []
 
     def watch_flow(step: int, losses: dict[str, float]) -> None:
@@ -91,8 +94,9 @@ def train(
 
 
 def save(lifter: Lifter, flow: Flow, path: Path) -> None:
-    """Write both networks to one file, half precision but for the normalisation of the input."""
-    arrays = dict(lifter.state_dict())
+    """Write both networks to one file, half precision but for the normalisation of the input; the
+    head for contacts only trains."""
+    arrays = {n: v for n, v in lifter.state_dict().items() if not n.startswith("feet.")}
     arrays |= {f"flow.{name}": value for name, value in flow.state_dict().items()}
     keep_exact = ("mean", "scale")
     save_file(
@@ -105,10 +109,25 @@ def save(lifter: Lifter, flow: Flow, path: Path) -> None:
 
 
 def begin_with(progress: fit.Progress, path: Path) -> None:
-    """Take the lifter of a weights file as the first one."""
+    """Take the lifter of a weights file as the first one; a file without a head for the ground
+    leaves the fresh one."""
     arrays = {n: v.float() for n, v in load_file(path).items() if not n.startswith("flow.")}
-    progress.net.load_state_dict(arrays)
+    missing, unknown = progress.net.load_state_dict(arrays, strict=False)
+    if unknown or any(not name.startswith(("ground.", "feet.")) for name in missing):
+        raise BadWeights(f"{path}: not the lifter of this version: {[*missing, *unknown]}")
     progress.mean.update({name: value.clone() for name, value in arrays.items()})
+
+
+def mix_in(lifter: Lifter, path: Path, share: float) -> None:
+    """Move the lifter's weights by a share of the way back to those that it began with.
+
+    Weights between the first and the trained ones err less on people unlike those of the training
+    than either (Wortsman et al. 2022). The head for the ground stays as it is if it was fresh.
+    """
+    own = lifter.state_dict()
+    for name, value in load_file(path).items():
+        if name in own:
+            own[name].lerp_(value.float(), share)
 
 
 def keep(progress: fit.Progress, path: Path) -> None:
@@ -167,6 +186,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--steps", type=int, default=fit.FitConfig().steps)
     parser.add_argument("--flow-steps", type=int, default=600)
     parser.add_argument("--first", type=Path, help="weights to begin with, as of a shorter run")
+    parser.add_argument(
+        "--first-share", type=float, default=0.4, help="share of them in the final weights"
+    )
     parser.add_argument("--rate", type=float, default=fit.FitConfig().rate)
     parser.add_argument("--bank", type=int, default=6000)
     parser.add_argument("--seed", type=int, default=7)
@@ -176,7 +198,7 @@ def main(arguments: list[str] | None = None) -> int:
     config = fit.FitConfig(steps=options.steps, rate=options.rate)
     report = train(
         options.pairs, options.motions, options.out, config, options.bank, options.seed,
-        options.flow_steps, options.first,
+        options.flow_steps, options.first, options.first_share,
     )  # fmt: skip
     target = options.report or options.out.with_suffix("")
     target.with_suffix(".json").write_text(json.dumps(report, indent=1) + "\n")

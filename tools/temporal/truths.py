@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from robojackson.mocap.landmarks.blazepose import LANDMARK_NAMES
+from robojackson.mocap.temporal import features
 from robojackson.mocap.temporal.features import INPUT_LANDMARKS
 from tools.temporal.examples import VALIDATION_MOTIONS, body_size
 
@@ -20,10 +21,12 @@ class Bank:
     Attributes:
         points: The landmarks that the network reads.
         lengths: Frames of each motion; the last frame is held up to `FRAMES`.
+        contact: States of the foot points.
     """
 
     points: np.ndarray
     lengths: np.ndarray
+    contact: np.ndarray
 
     def __len__(self) -> int:
         return len(self.points)
@@ -35,6 +38,7 @@ def make(folders: list[Path], count: int, seed: int) -> Bank:
     from tools.pairs.clips import choose_motion
     from tools.render import deepmimic
     from tools.render.anny_body import Body
+    from tools.temporal import foot_states
 
     rng = np.random.default_rng([seed, count])
     files = [
@@ -44,21 +48,25 @@ def make(folders: list[Path], count: int, seed: int) -> Bank:
     body, cache = Body(), dict[Path, deepmimic.Motion]()
     crowd = [people.draw_person(body, rng) for _ in range(PEOPLE)]
     points = np.zeros((count, FRAMES, len(INPUT_LANDMARKS), 3), np.float32)
-    lengths = np.zeros(count, int)
+    lengths, contact = np.zeros(count, int), np.zeros((count, FRAMES, 4), np.int8)
     for row in range(count):
         person = crowd[rng.integers(PEOPLE)]
         posed = person.posed(choose_motion(files, cache, rng)[1])
         marks = person.landmarks(posed, LANDMARK_NAMES)[:FRAMES]
         marks = marks[:, INPUT_LANDMARKS] / body_size(marks)
         lengths[row] = len(marks)
-        points[row] = marks[np.minimum(np.arange(FRAMES), len(marks) - 1)]
-    return Bank(points, lengths)
+        index = np.minimum(np.arange(FRAMES), len(marks) - 1)
+        points[row] = marks[index]
+        feet = foot_states.soles(posed.heads[:FRAMES], person.body.bone_names)
+        contact[row] = foot_states.states(feet, features.FPS)[index]
+    return Bank(points, lengths, contact)
 
 
 def kept(path: Path, folders: list[Path], count: int, seed: int) -> Bank:
     """Return the bank of a file, made if it is not there."""
     if not path.exists():
         bank = make(folders, count, seed)
-        np.savez(path, points=bank.points.astype(np.float16), lengths=bank.lengths)
+        points = bank.points.astype(np.float16)
+        np.savez(path, points=points, lengths=bank.lengths, contact=bank.contact)
     with np.load(path) as data:
-        return Bank(data["points"].astype(np.float32), data["lengths"])
+        return Bank(data["points"].astype(np.float32), data["lengths"], data["contact"])

@@ -1,9 +1,9 @@
 """From the camera to the world: the direction of up, and the height of the floor.
 
-A static camera has one direction of gravity for the whole clip. It is estimated from balance: over
-a clip the centre of mass is, on average, above the points that support it. The result is accepted
-only near the camera's own up. World: x towards the camera, y to its right, z up, floor at z = 0;
-metres.
+A static camera has one direction of gravity for the whole clip. It is estimated from balance (over
+a clip the centre of mass is, on average, above the points that support it) and by the temporal
+network. The result is accepted only near the camera's own up. World: x towards the camera, y to its
+right, z up, floor at z = 0; metres.
 """
 
 import dataclasses
@@ -16,6 +16,7 @@ from robojackson.body.forward_kinematics import unit
 from robojackson.body.skeleton import keypoint, pair
 from robojackson.body.smoothing import lowpass
 from robojackson.config import config_dataclass
+from robojackson.mocap.temporal.ground_evidence import GroundEvidence
 
 GRAVITY = 9.81
 CAMERA_UP = np.array([0.0, -1.0, 0.0])
@@ -37,9 +38,12 @@ class GravityConfig:
         roll_sd_deg, pitch_sd_deg: Spread of the angles of hand-held cameras, degrees; with the
             tails of a Cauchy distribution, so that a camera that balance finds far off level is not
             levelled.
-        least_sd_deg: Least standard deviation of balance, degrees.
+        least_sd_deg: Least standard deviation of balance, degrees, and
+        beside_network_sd_deg: the same where the temporal network estimates gravity too.
+        network_sd_factor: Ratio of the standard deviation of the network's up to the stated one.
         samples_per_s: Independent samples of balance a second.
-        max_tilt_deg: Largest accepted angle between gravity and the camera's vertical, degrees.
+        max_tilt_deg: Largest accepted angle between gravity and the camera's vertical, degrees, and
+        beside_network_max_tilt_deg: the same where the temporal network estimates gravity too.
     """
 
     support_height_m: float = 0.1
@@ -48,8 +52,11 @@ class GravityConfig:
     roll_sd_deg: float = 2.5
     pitch_sd_deg: float = 10.0
     least_sd_deg: float = 1.5
+    beside_network_sd_deg: float = 4.5
+    network_sd_factor: float = 2.0
     samples_per_s: float = 1.0
     max_tilt_deg: float = 45.0
+    beside_network_max_tilt_deg: float = 75.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,11 +67,13 @@ class Gravity:
         up: Unit vector against gravity, camera frame.
         source: Source of the direction.
         tilt_deg: Angle to the camera's own up, degrees.
+        sd_deg: Standard deviation of its error, degrees; None where it is not known.
     """
 
     up: Float[np.ndarray, "3"]
-    source: Literal["balance", "camera"]
+    source: Literal["balance", "network", "camera"]
     tilt_deg: float
+    sd_deg: float | None = None
 
 
 def find_up(
@@ -72,31 +81,69 @@ def find_up(
     feet: Float[np.ndarray, "T 4 3"],
     fps: float,
     config: GravityConfig,
+    network: GroundEvidence | None = None,
 ) -> Gravity:
-    """Return up from balance, or the camera's own if balance gives an implausible direction.
+    """Return up from balance and network, or the camera's own if they give an implausible one.
 
-    Up is the least eigenvector of three information matrices: the mean of the centre of mass above
-    the supporting points is parallel to it; feet that both support differ across it; and the camera
-    is held about level. The weight of the first follows from its spread over the clip: a leaping
-    dancer gives less information on gravity than a standing one.
+    Up is the least eigenvector of information matrices: the mean of the centre of mass above the
+    supporting points is parallel to it; feet that both support differ across it; the camera is held
+    about level; and the network's own up, with its spread. The weight of the first follows from its
+    spread over the clip (a leaping dancer gives less information than a standing one) and from its
+    distance to the network's: it fails more on steep cameras.
 
     Args:
         points: Keypoints, camera frame.
         feet: Heels and toes, camera frame.
         fps: Frames a second.
         config: Weights.
+        network: What the temporal network found.
     """
-    up = CAMERA_UP
-    for _ in range(ROUNDS):
-        up = _refined(up, points, feet, fps, config)
-    tilt = float(np.degrees(np.arccos(np.clip(up @ CAMERA_UP, -1.0, 1.0))))
-    if tilt > config.max_tilt_deg:
+
+    def settled(start: np.ndarray, other: GroundEvidence | None, least_deg: float) -> np.ndarray:
+        for _ in range(ROUNDS):
+            start = _refined(start, points, feet, fps, config, other, least_deg)
+        return start
+
+    up, apart_deg = settled(CAMERA_UP, None, config.least_sd_deg), 0.0
+    if network is not None:
+        apart_deg = _angle_deg(up, network.up)
+        least_deg = float(np.hypot(config.beside_network_sd_deg, apart_deg / 2.0))
+        up = settled(network.up, network, least_deg)
+    tilt = _angle_deg(up, CAMERA_UP)
+    most_deg = config.max_tilt_deg if network is None else config.beside_network_max_tilt_deg
+    if tilt > most_deg:
         return Gravity(CAMERA_UP, "camera", 0.0)
-    return Gravity(up, "balance", tilt)
+    if network is None:
+        return Gravity(up, "balance", tilt)
+    return Gravity(up, "network", tilt, spread_deg(apart_deg, network, config))
+
+
+def spread_deg(apart_deg: float, network: GroundEvidence, config: GravityConfig) -> float:
+    """Return the standard deviation of up, degrees: that of both estimates together, and half of
+    the angle between them, which shows their errors best.
+
+    Args:
+        apart_deg: Angle between the up of balance and that of the network, degrees.
+        network: What the temporal network found.
+        config: Weights.
+    """
+    spreads = config.beside_network_sd_deg, config.network_sd_factor * np.degrees(network.pitch_sd)
+    together = 1.0 / np.hypot(1.0 / spreads[0], 1.0 / spreads[1])
+    return float(np.hypot(together, apart_deg / 2.0))
+
+
+def _angle_deg(one: np.ndarray, other: np.ndarray) -> float:
+    return float(np.degrees(np.arccos(np.clip(one @ other, -1.0, 1.0))))
 
 
 def _refined(
-    up: np.ndarray, points: np.ndarray, feet: np.ndarray, fps: float, config: GravityConfig
+    up: np.ndarray,
+    points: np.ndarray,
+    feet: np.ndarray,
+    fps: float,
+    config: GravityConfig,
+    network: GroundEvidence | None,
+    least_deg: float,
 ) -> Float[np.ndarray, "3"]:
     weight = _carrying(up, feet, fps, config)
     total = weight.sum(1)
@@ -108,10 +155,12 @@ def _refined(
     stray = stray - (stray @ up)[:, None] * up
     samples = max(1.0, len(feet) / fps * config.samples_per_s)
     spread = np.sqrt(share @ np.sum(stray**2, -1) / 2.0 / samples) / length
-    spread = max(float(spread), np.radians(config.least_sd_deg))
+    spread = max(float(spread), np.radians(least_deg))
     information = (np.eye(3) - np.outer(mean, mean) / length**2) / spread**2
     information += _between_feet(weight, feet) / total.sum() / config.floor_sd_m**2
     information += np.diag(_level_prior(up, config))
+    if network is not None:
+        information += network.information() / config.network_sd_factor**2
     least = np.linalg.eigh(information)[1][:, 0]
     result: np.ndarray = least * np.sign(least @ mean)
     return result

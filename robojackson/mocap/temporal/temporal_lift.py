@@ -17,7 +17,8 @@ from robojackson.mocap.landmarks.blazepose import BODY
 from robojackson.mocap.landmarks.refinement import carry_along
 from robojackson.mocap.temporal import error_flow, features
 from robojackson.mocap.temporal.features import ClipView
-from robojackson.mocap.temporal.temporal_network import load, run
+from robojackson.mocap.temporal.ground_evidence import GroundEvidence, ground_evidence
+from robojackson.mocap.temporal.temporal_network import Output, load, run
 
 WEIGHTS = Path(__file__).parents[2] / "assets" / "temporal.safetensors"
 HIDDEN_BELOW = 0.35
@@ -34,6 +35,9 @@ class TemporalConfig:
         detector_m: Spread of the detector's own depth, metres: the less sure the network is, the
             nearer visible joints stay to the detector; hidden joints follow the network alone; 0
             leaves all visible joints to the detector.
+        blind_share: Share of the answer that the network gives without the detector's depth: on
+            real people, whose depth the detector misjudges in other ways than that of rendered
+            ones, that answer is the better one.
         depth_floor_m: Least spread of a corrected depth, metres.
         hypothesis: 0 is the most probable motion; n > 0 the n-th sample of poses of hidden limbs.
         seed: Seed of the samples.
@@ -41,7 +45,8 @@ class TemporalConfig:
 
     enabled: bool = True
     weights: str | None = None
-    detector_m: float = Field(default=0.12, ge=0)
+    detector_m: float = Field(default=0.18, ge=0)
+    blind_share: float = Field(default=0.35, ge=0, le=1)
     depth_floor_m: float = 0.02
     hypothesis: int = 0
     seed: int = 0
@@ -59,10 +64,12 @@ class Lifted:
     Attributes:
         points: All landmarks before the camera, metres.
         spread: Spread of the twelve across the image and in depth, metres: mean absolute error.
+        ground: What the network finds of gravity.
     """
 
     points: Float[np.ndarray, "T 33 3"]
     spread: Float[np.ndarray, "T 12 2"]
+    ground: GroundEvidence
 
     def depth_sd(self, least_m: float) -> Float[np.ndarray, "T 12"]:
         """Return the standard deviation of the depths, metres."""
@@ -91,16 +98,17 @@ def lift(
     sight = features.view_clip(placed, local, visibility)
     places = features.time_grid(len(placed), fps)
     coarse = at(sight, places)
-    change, spread, hidden = correct(coarse, weights)
+    found = blended(coarse, weights, config.blind_share)
+    change, spread = found.correction, found.spread
     if config.hypothesis:
         rng = np.random.default_rng([config.seed, config.hypothesis])
-        change = change + imagine(hidden, spread, coarse.visibility, weights, rng)
+        change = change + imagine(found.features, spread, coarse.visibility, weights, rng)
     back = np.clip(np.arange(len(placed)) * features.FPS / fps, 0.0, len(places) - 1.0)
     spread, change = features.resample(spread, back), features.resample(change, back)
     hidden_share = unseen(visibility)
     share = hidden_share + (1.0 - hidden_share) * believed(spread, config)
     points = features.to_camera(sight, corrected(sight, share[..., None] * change))
-    return Lifted(carry_along(placed, points), spread)
+    return Lifted(carry_along(placed, points), spread, ground_evidence(found, sight, places))
 
 
 def believed(
@@ -127,22 +135,39 @@ def corrected(sight: ClipView, change: Float[np.ndarray, "T 12 3"]) -> Float[np.
     return np.concatenate([across, depth[..., None]], -1)
 
 
-def correct(
-    sight: ClipView, weights: error_flow.Weights
-) -> tuple[np.ndarray, Float[np.ndarray, "T 12 2"], np.ndarray]:
-    """Return correction (T, 12, 3), spread, and the features of the plain view.
+def correct(sight: ClipView, weights: error_flow.Weights) -> Output:
+    """Return the mean of the plain and the mirrored view, and the features of the plain one.
 
     Where plain and mirrored result differ, the network is outside its training data: their distance
     is added to the spread.
     """
-    plain, spread, hidden = run(sight, weights)
-    other, other_spread, _ = run(features.mirror(sight), weights)
+    plain, mirrored = run(sight, weights), run(features.mirror(sight), weights)
     flip = np.array([-1.0, 1.0, 1.0])
-    again = features.mirror_body(other) * flip
-    apart = np.abs(plain - again) / 2.0
+    again = features.mirror_body(mirrored.correction) * flip
+    apart = np.abs(plain.correction - again) / 2.0
     apart = np.stack([apart[..., :2].mean(-1), apart[..., 2]], -1)
-    own_spread = np.sqrt(spread * features.mirror_body(other_spread))
-    return (plain + again) / 2.0, np.hypot(own_spread, apart), hidden
+    own_spread = np.sqrt(plain.spread * features.mirror_body(mirrored.spread))
+    return Output(
+        correction=(plain.correction + again) / 2.0,
+        spread=np.hypot(own_spread, apart),
+        features=plain.features,
+        up=(plain.up + mirrored.up * flip) / 2.0,
+        tilt=np.sqrt(plain.tilt * mirrored.tilt),
+    )
+
+
+def blended(sight: ClipView, weights: error_flow.Weights, blind_share: float) -> Output:
+    """Return the correction, partly that of the same clip without the detector's depth."""
+    found = correct(sight, weights)
+    if blind_share == 0.0:
+        return found
+    blind = correct(replace(sight, local=sight.local * [1.0, 1.0, 0.0]), weights)
+    other = blind.correction - sight.local[:, BODY] * [0.0, 0.0, 1.0]
+    return replace(
+        found,
+        correction=(1.0 - blind_share) * found.correction + blind_share * other,
+        up=(1.0 - blind_share) * found.up + blind_share * blind.up,
+    )
 
 
 def imagine(

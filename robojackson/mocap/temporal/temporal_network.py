@@ -1,14 +1,16 @@
 """The temporal network: dilated convolutions over 81 frames at 30 Hz.
 
 It returns for each of the twelve joints a correction of the detector's position (metres along the
-ray axes) and its spread across the image and in depth. Numpy; `tools/temporal/net.py` is its
-equivalent in torch, for training.
+ray axes) and its spread across the image and in depth, and for each frame the direction of up with
+its spread. Numpy; `tools/temporal/net.py` is its equivalent in torch, for training.
 """
 
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float
 
 from robojackson.errors import BadWeights
 from robojackson.mocap.landmarks.blazepose import BODY
@@ -19,17 +21,48 @@ from robojackson.mocap.temporal.features import ClipView
 DILATIONS = (1, 3, 9, 27)
 LOG_SPREAD, SPREAD_RANGE = -3.0, 3.0
 """Middle of the logarithm of the spread, metres, and its largest change in either direction."""
+GROUND = 5
+"""Length of the head for the ground: up, and its log error in roll and pitch."""
+UPRIGHT = (0.0, -1.0, 0.0)
+LOG_TILT = -2.0
+"""Up without evidence, and the middle of the logarithm of its error, radians."""
 
 
-def run(sight: ClipView, weights: Weights) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Run one pass: correction, spread, features."""
+@dataclass(frozen=True)
+class Output:
+    """What the network finds in each frame of a clip, in the axes of the rays.
+
+    Attributes:
+        correction: Correction of the detector's positions, metres.
+        spread: Mean absolute error across the image and in depth, metres.
+        features: What the flow reads.
+        up: Direction against gravity; not of unit length.
+        tilt: Mean absolute error of its roll and its pitch, radians.
+    """
+
+    correction: Float[np.ndarray, "T 12 3"]
+    spread: Float[np.ndarray, "T 12 2"]
+    features: Float[np.ndarray, "T C"]
+    up: Float[np.ndarray, "T 3"]
+    tilt: Float[np.ndarray, "T 2"]
+
+
+def run(sight: ClipView, weights: Weights) -> Output:
+    """Run one pass over a clip."""
     x = (features.numbers(sight) - weights["mean"]) * weights["scale"]
     h = x @ weights["enter.weight"].T + weights["enter.bias"]
     for block, dilation in enumerate(DILATIONS):
         h = h + _block(h, f"blocks.{block}", dilation, weights)
     out = h @ weights["leave.weight"].T + weights["leave.bias"]
     out = out.reshape(len(out), len(BODY), 5)
-    return out[..., :3], np.exp(np.clip(out[..., 3:], -SPREAD_RANGE, SPREAD_RANGE) + LOG_SPREAD), h
+    ground = h @ weights["ground.weight"].T + weights["ground.bias"]
+    return Output(
+        correction=out[..., :3],
+        spread=_spread(out[..., 3:], LOG_SPREAD),
+        features=h,
+        up=ground[:, :3] + np.array(UPRIGHT),
+        tilt=_spread(ground[:, 3:], LOG_TILT),
+    )
 
 
 @cache
@@ -46,11 +79,20 @@ def load(path: Path) -> Weights:
         arrays = {name: value.astype(np.float32) for name, value in load_file(path).items()}
     except (SafetensorError, OSError) as error:
         raise BadWeights(f"{path}: not a weights file of the temporal network ({error})") from None
-    required = {"mean", "scale", "enter.weight", "leave.weight", "flow.memory", "flow.read.weight"}
+    required = {
+        "mean", "scale", "enter.weight", "leave.weight", "ground.weight",
+        f"blocks.{len(DILATIONS) - 1}.mix.weight", "flow.memory", "flow.read.weight",
+    }  # fmt: skip
     if missing := sorted(required - set(arrays)):
         raise BadWeights(
             f"{path}: not a weights file of the temporal network: {', '.join(missing)} missing; "
-            "leave temporal.weights empty for the shipped one"
+            "leave temporal.weights empty for the shipped one, or train it again: "
+            "python -m tools.temporal.train_temporal"
+        )
+    if arrays["ground.weight"].shape != (GROUND, arrays["leave.weight"].shape[1]):
+        raise BadWeights(
+            f"{path}: ground.weight has {len(arrays['ground.weight'])} rows, this version reads "
+            f"{GROUND}; train it again: python -m tools.temporal.train_temporal"
         )
     if arrays["mean"].shape != (features.COUNT,):
         raise BadWeights(
@@ -58,6 +100,10 @@ def load(path: Path) -> Weights:
             f"{features.COUNT}; train it again: python -m tools.temporal.train_temporal"
         )
     return arrays
+
+
+def _spread(out: np.ndarray, middle: float) -> np.ndarray:
+    return np.asarray(np.exp(np.clip(out, -SPREAD_RANGE, SPREAD_RANGE) + middle))
 
 
 def _block(h: np.ndarray, name: str, dilation: int, weights: Weights) -> np.ndarray:

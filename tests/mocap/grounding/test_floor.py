@@ -11,6 +11,7 @@ from robojackson.body.smoothing import lowpass
 from robojackson.geometry.frames import CAMERA_TO_WORLD
 from robojackson.mocap.grounding import flight as air
 from robojackson.mocap.grounding import floor as ground
+from robojackson.mocap.temporal.ground_evidence import GroundEvidence
 
 FRAMES = 60
 CONFIG = ground.GravityConfig()
@@ -41,6 +42,44 @@ def test_an_absurd_up_gives_way_to_the_camera() -> None:
     found = ground.find_up(points, feet, 30.0, CONFIG)
     assert found.source == "camera"
     assert np.array_equal(found.up, ground.CAMERA_UP)
+
+
+def evidence(degrees: float, sd_deg: float) -> GroundEvidence:
+    """Return a network's up that is pitched by `degrees`."""
+    up = Rotation.from_euler("x", degrees, degrees=True).apply(ground.CAMERA_UP)
+    return GroundEvidence(up, np.radians(sd_deg), np.radians(sd_deg))
+
+
+@pytest.mark.parametrize(("sd_deg", "least", "most"), [(0.3, 28.0, 31.0), (60.0, 0.0, 3.0)])
+def test_the_network_counts_as_much_as_it_is_sure(sd_deg: float, least: float, most: float) -> None:
+    """Balance finds a level camera, the network one that is pitched by 30 degrees."""
+    points, feet = standing_in_camera(Rotation.identity())
+    found = ground.find_up(points, feet, 30.0, CONFIG, evidence(30.0, sd_deg))
+    assert least <= found.tilt_deg <= most
+    assert found.source == "network"
+
+
+def test_the_spread_of_gravity_grows_where_balance_and_network_disagree() -> None:
+    points, feet = standing_in_camera(Rotation.identity())
+    near, far = (
+        ground.find_up(points, feet, 30.0, CONFIG, evidence(angle, 2.0)) for angle in (3.0, 30.0)
+    )
+    assert near.sd_deg is not None
+    assert far.sd_deg is not None
+    assert near.sd_deg < 5.0
+    assert far.sd_deg > 14.0
+    assert ground.find_up(points, feet, 30.0, CONFIG).sd_deg is None
+
+
+def test_a_steep_camera_needs_the_network() -> None:
+    """Balance alone may not find a camera that looks down by 60 degrees; both together may."""
+    tilt = Rotation.from_euler("x", -60, degrees=True)
+    points, feet = standing_in_camera(tilt)
+    up = tilt.apply(ground.CAMERA_UP)
+    network = GroundEvidence(up, np.radians(2.0), np.radians(4.0))
+    assert ground.find_up(points, feet, 30.0, CONFIG).source == "camera"
+    found = ground.find_up(points, feet, 30.0, CONFIG, network)
+    assert np.degrees(np.arccos(np.clip(found.up @ up, -1.0, 1.0))) < 8.0
 
 
 def test_level_camera_gives_the_projects_frame_change() -> None:
