@@ -92,6 +92,7 @@ def recover_together(
         depth_m=np.where(both, TRIANGULATED_SD_M, alone),
         landmarks=replace(views[0].landmarks, visibility=np.maximum(*pair.visibility)),
         pinhole=replace(pinhole, focal_px=pinhole.focal_px * camera.focal[0]),
+        ground=None,  # balance of triangulated points is the better gravity: 2.8 and 4.0 degrees
     )
     note = (
         f"two cameras, {np.linalg.norm(camera.shift):.1f} m apart: the second clip begins at "

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from robojackson.clips.sound import RATE, Sound
 from robojackson.errors import ViewsDisagree
 from robojackson.mocap.landmarks.blazepose import BODY, HIPS
-from robojackson.mocap.recover import MocapConfig, view_track
+from robojackson.mocap.recover import MocapConfig, recover_motion, view_track
 from robojackson.mocap.views.relative_camera import calibrate, sampson, triangulate
 from robojackson.mocap.views.timing import FPS, find_offsets, rates, sound_offset
 from robojackson.mocap.views.two_cameras import recover_together
@@ -122,6 +122,18 @@ def test_two_flat_views_make_a_deep_one(dancer: np.ndarray, hip_shake: LandmarkT
     assert errors[1] < 0.35 * errors[0]
     assert "two cameras" in motion.notes[-1]
     assert len(motion) == len(first)
+
+
+@pytest.mark.medium
+def test_gravity_of_two_cameras_is_that_of_balance(
+    dancer: np.ndarray, hip_shake: LandmarkTrack
+) -> None:
+    """Triangulated points do not lean, one camera's network may err: it has no say here."""
+    first, second = filmed(dancer, hip_shake), filmed(second_frame(dancer)[15:], hip_shake)
+    together = recover_together(first, second, MocapConfig())
+    assert together.camera["gravity"] == "balance"
+    assert "gravity_sd_deg" not in together.camera
+    assert recover_motion(first, MocapConfig()).camera["gravity"] == "network"
 
 
 @pytest.mark.medium
