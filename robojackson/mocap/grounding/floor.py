@@ -39,12 +39,13 @@ class GravityConfig:
             tails of a Cauchy distribution, so that a camera that balance finds far off level is not
             levelled.
         least_sd_deg: Least standard deviation of balance, degrees.
-        beside_network_sd_deg: The same where the temporal network estimates gravity too, degrees.
+        beside_network_sd_deg: Least standard deviation of balance where the temporal network
+            estimates gravity too, degrees.
         network_sd_factor: Ratio of the standard deviation of the network's up to the stated one.
         samples_per_s: Independent samples of balance a second.
         max_tilt_deg: Largest accepted angle between gravity and the camera's vertical, degrees.
-        beside_network_max_tilt_deg: The same where the temporal network estimates gravity too,
-            degrees.
+        beside_network_max_tilt_deg: Largest accepted angle where the temporal network estimates
+            gravity too, degrees.
     """
 
     support_height_m: float = 0.1
