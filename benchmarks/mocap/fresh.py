@@ -10,7 +10,9 @@ detected count for both; PA-MPJPE of twelve joints, mm.
 
 import argparse
 import hashlib
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +44,7 @@ def seed_of(weights: Path) -> int:
     return int.from_bytes(hashlib.sha256(weights.read_bytes()).digest()[:4], "big")
 
 
-def make(number: int, seed: int, files: dict[str, Path], tools: tuple[Any, Any]) -> dict[str, Any]:
+def make(number: int, files: dict[str, Path], tools: tuple[Any, Any], seed: int) -> dict[str, Any]:
     """Make the clip of one stratum."""
     from tools.pairs import clips, scenery
 
@@ -59,6 +61,27 @@ def make(number: int, seed: int, files: dict[str, Path], tools: tuple[Any, Any])
     return clips.shoot(
         MOTIONS[number % 10], motion, stride, body, studio, rng, angles, hidden=False
     )
+
+
+def rendered(
+    paths: list[Path],
+    folders: list[Path],
+    make: Callable[[int, dict[str, Path], tuple[Any, Any]], dict[str, Any]],
+) -> Iterator[Path]:
+    """Yield renders in their order, those that are missing made from the motions of folders."""
+    from tools.pairs import scenery, sources
+    from tools.render.anny_body import Body
+
+    files = {sources.motion_name(path): path for folder in folders for path in folder.iterdir()}
+    tools: tuple[Any, Any] | None = None
+    for number, path in enumerate(paths):
+        if not path.exists():
+            if tools is None:
+                body = Body()
+                tools = body, scenery.Studio(body.triangles, len(body.rest_vertices))
+            path.parent.mkdir(parents=True, exist_ok=True)
+            np.savez(path, **make(number, files, tools))
+        yield path
 
 
 def part_of(path: Path, rng: np.random.Generator) -> Any:
@@ -102,24 +125,16 @@ def measure(path: Path) -> tuple[str, float, dict[str, float], dict[str, float]]
 
 def main() -> None:
     """Make what is missing, measure, print."""
-    from tools.pairs import scenery, sources
-    from tools.render.anny_body import Body
-
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("motions", type=Path, nargs="+")
     parser.add_argument("-o", "--out", type=Path, default=Path("fresh"))
     options = parser.parse_args()
     seed = seed_of(WEIGHTS)
-    files = {sources.motion_name(path): path for f in options.motions for path in f.iterdir()}
-    options.out.mkdir(parents=True, exist_ok=True)
-    body = Body()
-    studio = scenery.Studio(body.triangles, len(body.rest_vertices))
+    paths = [options.out / f"{seed}_{number:02d}.npz" for number in range(CLIPS)]
     table = Table("clip", "detected", "raw", "ours", "speed ratio", "gravity deg")
     totals = []
-    for number in range(CLIPS):
-        path = options.out / f"{seed}_{number:02d}.npz"
-        if not path.exists():
-            np.savez(path, **make(number, seed, files, (body, studio)))
+    renders = rendered(paths, options.motions, partial(make, seed=seed))
+    for number, path in enumerate(renders):
         try:
             name, share, raw, ours = measure(path)
         except NoPersonFound as error:

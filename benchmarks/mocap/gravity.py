@@ -49,19 +49,8 @@ def make(number: int, files: dict[str, Path], tools: tuple[Any, Any]) -> dict[st
 
 def rendered(folders: list[Path], out: Path) -> Iterator[tuple[str, LandmarkTrack, Truth]]:
     """Yield the renders, made where they are missing."""
-    from tools.pairs import scenery, sources
-    from tools.render.anny_body import Body
-
-    files = {sources.motion_name(path): path for folder in folders for path in folder.iterdir()}
-    out.mkdir(parents=True, exist_ok=True)
-    tools: tuple[Any, Any] | None = None
-    for number in range(CLIPS):
-        path = out / f"gravity_{number:02d}.npz"
-        if not path.exists():
-            if tools is None:
-                body = Body()
-                tools = body, scenery.Studio(body.triangles, len(body.rest_vertices))
-            np.savez(path, **make(number, files, tools))
+    paths = [out / f"gravity_{number:02d}.npz" for number in range(CLIPS)]
+    for number, path in enumerate(fresh.rendered(paths, folders, make)):
         try:
             track, truth = fresh.read(path)
         except NoPersonFound:

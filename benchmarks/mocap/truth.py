@@ -16,7 +16,7 @@ CLIPS = Path(__file__).parents[2] / "clips"
 RENDERED = ("hip_shake", "dance_a", "dance_b", "walk")
 REAL = ("person_cam1", "person_cam2", "person_cam3", "person_cam4")
 HELD_OUT = ("kick", "spin", "dance_a_aside", "dance_b_aside", "walk_aside")
-"""Never tuned on: other motions, sides and bodies, in `clips/heldout`."""
+"""Other motions, sides and bodies, in `clips/heldout`; what rests on them: `accuracy.TUNED`."""
 SEAMS = {"dance_a": (49,), "dance_a_aside": (49,), "walk": (39,), "walk_aside": (39,)}
 """First frames of the second cycle of the clips that loop with a jump."""
 JOINTS = tuple(
@@ -68,11 +68,17 @@ def _rendered(clip: str) -> Truth:
         names = [_own_name(name) for name in data["names"].tolist()]
         joints = data["joints"].astype(float)[:, [names.index(name) for name in JOINTS]]
         bones = data["bone_names"].tolist()
-        soles = data["all_bones"].astype(float)[:, [bones.index(name) for name in SOLE_BONES]]
-        length = np.linalg.norm(soles[0, 1] - soles[0, 0])
-        soles[..., 2] -= SOLE_BELOW_BONE * length / SOLE_LENGTH
+        feet = soles(data["all_bones"], bones)
         up = data["view"][:3, 2] * OPENGL_TO_CAMERA
-        return Truth(clip, joints, up, soles, SEAMS.get(clip, ()))
+        return Truth(clip, joints, up, feet, SEAMS.get(clip, ()))
+
+
+def soles(bones: Float[np.ndarray, "T B 3"], names: list[str]) -> Float[np.ndarray, "T 4 3"]:
+    """Return the soles under heels and toes of a drawn body, world z up, metres."""
+    feet = np.array(bones[:, [names.index(name) for name in SOLE_BONES]], float)
+    length = np.linalg.norm(feet[0, 1] - feet[0, 0])
+    feet[..., 2] -= SOLE_BELOW_BONE * length / SOLE_LENGTH
+    return feet
 
 
 def _folder(clip: str) -> Path:

@@ -12,7 +12,10 @@ from scipy.ndimage import distance_transform_edt
 from robojackson.body.forward_kinematics import Pose, apply, rotate_about, unit
 from robojackson.body.skeleton import HEEL_OFFSET, SOLE_BELOW_TOE, keypoint, pair, rest_offset
 
-REST_FOOT = float(np.linalg.norm(rest_offset("left_foot") + rest_offset("left_big_toe")))
+_ALONG = rest_offset("left_foot") + rest_offset("left_big_toe")
+REST_FOOT = float(np.linalg.norm(_ALONG))
+REST_SLOPE = float(np.arctan2(-_ALONG[1], np.hypot(_ALONG[0], _ALONG[2])))
+"""Downward slope from ankle to toe over a flat sole of our own skeleton."""
 LARGEST_BIAS = np.radians(45.0)
 STILL_MPS = 0.3
 CARRIES_M = 0.08
@@ -136,10 +139,20 @@ def turn_feet(
     angle."""
     turned = np.array(points)
     feet = zip(pair("ankle"), pair("foot"), pair("big_toe"), strict=True)
-    for side, (ankle, ball, toe) in enumerate(feet):
-        along = points[:, toe] - points[:, ankle]
-        axis = unit(np.cross(ABOVE, along))
-        turn = rotate_about(axis, np.cos(angles[:, side]), np.sin(angles[:, side]))
-        for index in (ball, toe):
-            turned[:, index] = points[:, ankle] + apply(turn, points[:, index] - points[:, ankle])
+    for side, (ankle, *ends) in enumerate(feet):
+        axis = unit(np.cross(ABOVE, points[:, ends[-1]] - points[:, ankle]))
+        turned[:, ends] = lowered(points, ankle, ends, axis, angles[:, side])
     return turned
+
+
+def lowered(
+    points: Float[np.ndarray, "T 29 3"],
+    ankle: int,
+    ends: list[int],
+    axis: Float[np.ndarray, "T 3"],
+    angle: Float[np.ndarray, " T"],
+) -> Float[np.ndarray, "T E 3"]:
+    """Return keypoints of a foot, turned about its ankle around an axis by an angle."""
+    turn = rotate_about(axis, np.cos(angle), np.sin(angle))
+    centre = points[:, [ankle]]
+    return np.asarray(centre + apply(turn[:, None], points[:, ends] - centre))

@@ -9,8 +9,9 @@ slope of a flat foot is measured where feet stand still and low. Metres, radians
 import numpy as np
 from jaxtyping import Float
 
-from robojackson.body.forward_kinematics import apply, rotate_about, unit
-from robojackson.body.skeleton import keypoint, pair, rest_offset
+from robojackson.body.feet import REST_SLOPE, lowered
+from robojackson.body.forward_kinematics import unit
+from robojackson.body.skeleton import keypoint, pair
 
 STILL_MPS = 0.15
 LOW_M = 0.05
@@ -43,19 +44,15 @@ def with_flat_soles(
         return points, np.zeros(2)
     common = np.percentile(slopes[standing], FLATTEST)
     turned, angles = np.array(points), np.zeros(2)
-    rest = rest_offset("left_foot") + rest_offset("left_big_toe")
-    ours = np.arctan2(-rest[1], np.hypot(rest[0], rest[2]))
     joints = zip(pair("knee"), pair("ankle"), pair("foot"), pair("big_toe"), strict=True)
     for side, (knee, ankle, *ends) in enumerate(joints):
         own = slopes[standing[:, side], side]
         flat = np.percentile(own, FLATTEST) if len(own) >= ENOUGH_S * fps else common
         flat = np.clip(flat, common - SIDES_APART, common + SIDES_APART)
-        angles[side] = max(ours - flat, 0.0)
+        angles[side] = max(REST_SLOPE - flat, 0.0)
         aim = points[:, ends[-1]] - points[:, ankle]
         axis = unit(np.cross(points[:, knee] - points[:, ankle], aim))
-        turn = rotate_about(axis, *(np.full(len(aim), f(angles[side])) for f in (np.cos, np.sin)))
-        for end in ends:
-            turned[:, end] = points[:, ankle] + apply(turn, points[:, end] - points[:, ankle])
+        turned[:, ends] = lowered(points, ankle, ends, axis, np.full(len(aim), angles[side]))
     return turned, angles
 
 

@@ -9,16 +9,18 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.mocap.figures import true_contacts
+from benchmarks.mocap.truth import soles
 from robojackson.body.forward_kinematics import apply
 from robojackson.clips.quality.visibility import weigh_visibility
 from robojackson.errors import NoPersonFound
+from robojackson.mocap.grounding.floor import camera_to_world
 from robojackson.mocap.landmarks import pinhole_camera
 from robojackson.mocap.landmarks.blazepose import BODY, landmark, repair
 from robojackson.mocap.recover import MocapConfig
 from robojackson.mocap.temporal import features, temporal_lift
 from robojackson.mocap.temporal.features import ClipView
 from robojackson.motion.landmark_track import LandmarkTrack
-from tools.temporal import foot_states
 
 FOLLOWED_M = 0.25
 """Mean distance across the image over which the detector is not on the person."""
@@ -83,7 +85,7 @@ def read(path: Path) -> Example | None:
         seen, (width, height) = pair["seen"][::stride].astype(float), pair["size"].tolist()
         truth_c, motion, fps = pair["truth"].astype(float), str(pair["motion"]), float(pair["fps"])
         up_c, names = pair["up"].astype(float), pair["bone_names"].tolist()
-        feet = foot_states.soles(foot_states.level(pair["bones"].astype(float), up_c), names)
+        feet = soles(apply(camera_to_world(up_c), pair["bones"].astype(float)), names)
     track = LandmarkTrack(fps / stride, width, height, seen[..., :3], seen[..., 3:6], seen[..., 6])
     if track.detected.mean() < LEAST_FOUND:
         return None
@@ -100,7 +102,7 @@ def read(path: Path) -> Example | None:
         return None
     scale = (flat[good] * ideal[good]).sum() / (ideal[good] ** 2).sum()
     axes = features.axes_along(truth_c[: len(places), features.HIPS].mean(1))
-    contact = foot_states.states(feet, fps)[: len(places)]
+    contact = true_contacts(feet, fps)[: len(places)]
     return Example(sight, truth * scale, good, distance * scale, motion, up_c @ axes, contact)
 
 

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.mocap.figures import true_contacts
+from benchmarks.mocap.truth import soles
 from robojackson.mocap.landmarks.blazepose import LANDMARK_NAMES
 from robojackson.mocap.temporal import features
 from robojackson.mocap.temporal.features import INPUT_LANDMARKS
@@ -38,7 +40,6 @@ def make(folders: list[Path], count: int, seed: int) -> Bank:
     from tools.pairs.clips import choose_motion
     from tools.render import deepmimic
     from tools.render.anny_body import Body
-    from tools.temporal import foot_states
 
     rng = np.random.default_rng([seed, count])
     files = [
@@ -57,8 +58,8 @@ def make(folders: list[Path], count: int, seed: int) -> Bank:
         lengths[row] = len(marks)
         index = np.minimum(np.arange(FRAMES), len(marks) - 1)
         points[row] = marks[index]
-        feet = foot_states.soles(posed.heads[:FRAMES], person.body.bone_names)
-        contact[row] = foot_states.states(feet, features.FPS)[index]
+        feet = soles(posed.heads[:FRAMES], person.body.bone_names)
+        contact[row] = true_contacts(feet, features.FPS)[index]
     return Bank(points, lengths, contact)
 
 

@@ -12,10 +12,7 @@ from jaxtyping import Float
 
 from robojackson.body.forward_kinematics import apply, unit
 from robojackson.mocap.temporal.features import ClipView
-from robojackson.mocap.temporal.temporal_network import Output
-
-SD_PER_ERROR = 1.25
-"""Standard deviation over mean absolute error of a Gaussian."""
+from robojackson.mocap.temporal.temporal_network import SD_PER_ERROR, Output
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from robojackson.mocap.landmarks.refinement import carry_along
 from robojackson.mocap.temporal import error_flow, features
 from robojackson.mocap.temporal.features import ClipView
 from robojackson.mocap.temporal.ground_evidence import GroundEvidence, ground_evidence
-from robojackson.mocap.temporal.temporal_network import Output, load, run
+from robojackson.mocap.temporal.temporal_network import SD_PER_ERROR, Output, load, run
 
 WEIGHTS = Path(__file__).parents[2] / "assets" / "temporal.safetensors"
 HIDDEN_BELOW = 0.35
@@ -122,9 +122,9 @@ def believed(
 
 
 def depth_sd(spread: Float[np.ndarray, "T 12 2"], least_m: float) -> Float[np.ndarray, "T 12"]:
-    """Return the standard deviation of the depths, metres: 1.25 times a mean absolute error
+    """Return the standard deviation of the depths, metres, from a mean absolute error
     (Gauss)."""
-    return np.maximum(1.25 * spread[..., 1], least_m)
+    return np.maximum(SD_PER_ERROR * spread[..., 1], least_m)
 
 
 def corrected(sight: ClipView, change: Float[np.ndarray, "T 12 3"]) -> Float[np.ndarray, "T 12 3"]:

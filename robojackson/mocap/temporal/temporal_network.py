@@ -21,6 +21,8 @@ from robojackson.mocap.temporal.features import ClipView
 DILATIONS = (1, 3, 9, 27)
 LOG_SPREAD, SPREAD_RANGE = -3.0, 3.0
 """Middle of the logarithm of the spread, metres, and its largest change in either direction."""
+SD_PER_ERROR = 1.25
+"""Standard deviation over mean absolute error of a Gaussian."""
 GROUND = 5
 """Length of the head for the ground: up, and its log error in roll and pitch."""
 UPRIGHT = (0.0, -1.0, 0.0)

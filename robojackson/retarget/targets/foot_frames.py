@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 from jaxtyping import Float
 
-from robojackson.body.skeleton import rest_offset
+from robojackson.body.feet import REST_SLOPE
 from robojackson.motion.smpl_sequence import CONTACT_POINTS, PLANTED
 from robojackson.retarget.targets.human_clip import HumanClip
 
@@ -34,8 +34,7 @@ def _flat_slope(aim: Float[np.ndarray, "N 3"], clip: HumanClip, side: str) -> fl
     own = [index for index, name in enumerate(CONTACT_POINTS) if name.startswith(side)]
     standing = (clip.contact[:, own] == PLANTED).all(axis=1)
     if standing.sum() < _ENOUGH:
-        rest = rest_offset(f"{side}_foot") + rest_offset(f"{side}_big_toe")
-        return float(np.arctan2(-rest[1], np.hypot(rest[0], rest[2])))
+        return REST_SLOPE
     slope = np.arctan2(-aim[standing, 2], np.linalg.norm(aim[standing, :2], axis=1))
     return float(np.median(slope))
 

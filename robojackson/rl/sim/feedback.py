@@ -63,10 +63,7 @@ def feedback_of(
     joined = Gains(*(np.concatenate([getattr(one, name) for one in found])
                      for name in ARRAYS))  # fmt: skip
     action = residual_scale(robot, ControlConfig())
-    scaled = Gains(
-        share * joined.gain, share * joined.offset, joined.qpos, joined.qvel, joined.places,
-        joined.held,
-    )  # fmt: skip
+    scaled = replace(joined, gain=share * joined.gain, offset=share * joined.offset)
     most = (
         LARGEST if feedback_path(robot, control) == "reference" else sampled_regulator.LARGEST_MOVE
     )
@@ -107,9 +104,9 @@ def _fits(gains: Gains, robot: Robot, motion: ReferenceMotion) -> bool:
 
 def _keep(path: Path, gains: Gains) -> None:
     content = io.BytesIO()
-    arrays = {name: getattr(gains, name).astype(np.float32) for name in ("gain", "offset")}
-    exact = {name: getattr(gains, name) for name in ("qpos", "qvel", "places", "held")}
-    np.savez_compressed(content, **exact, **arrays)
+    arrays = {name: getattr(gains, name) for name in ARRAYS}
+    arrays |= {name: arrays[name].astype(np.float32) for name in ("gain", "offset")}
+    np.savez_compressed(content, **arrays)
     with suppress(StoreError):  # a read-only store: computed again next time
         FileTree(path.parent).write(path.name, content.getvalue())
 

@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
+from benchmarks.mocap.figures import true_contacts
+from benchmarks.mocap.truth import SOLE_BELOW_BONE, SOLE_BONES, SOLE_LENGTH, soles
+from robojackson.body.forward_kinematics import apply
+from robojackson.mocap.grounding.floor import camera_to_world
 from robojackson.motion.smpl_sequence import AIR, PLANTED, SLIDING
-from tools.temporal import foot_states
 
 FPS, FRAMES = 30.0, 60
 
@@ -28,25 +31,25 @@ def feet(lifted_m: float, speed_mps: float) -> np.ndarray:
     ],
 )
 def test_states_follow_height_and_speed(lifted_m: float, speed_mps: float, state: int) -> None:
-    found = foot_states.states(feet(lifted_m, speed_mps), FPS)
+    found = true_contacts(feet(lifted_m, speed_mps), FPS)
     assert (found[:, :2] == state).all()
     assert (found[:, 2:] == PLANTED).all()
 
 
 def test_a_floating_body_stands_on_the_floor_under_it() -> None:
-    assert (foot_states.states(feet(0.0, 0.0) + [0.0, 0.0, 0.7], FPS) == PLANTED).all()
+    assert (true_contacts(feet(0.0, 0.0) + [0.0, 0.0, 0.7], FPS) == PLANTED).all()
 
 
 def test_levelled_axes_keep_lengths_and_put_up_on_z() -> None:
     up = np.array([0.36, -0.48, -0.8])
     points = np.random.default_rng(1).normal(size=(5, 7, 3))
-    found = foot_states.level(points, up)
+    found = apply(camera_to_world(up), points)
     assert np.allclose(found[..., 2], points @ up)
     assert np.allclose(np.linalg.norm(found, axis=-1), np.linalg.norm(points, axis=-1))
 
 
 def test_soles_lie_under_their_bones_by_the_size_of_the_foot() -> None:
     bones = np.zeros((3, 4, 3))
-    bones[:, [1, 3], 1] = 2.0 * foot_states.SOLE_LENGTH
-    found = foot_states.soles(bones, list(foot_states.SOLE_BONES))
-    assert np.allclose(found[..., 2], -2.0 * foot_states.SOLE_BELOW_BONE)
+    bones[:, [1, 3], 1] = 2.0 * SOLE_LENGTH
+    found = soles(bones, list(SOLE_BONES))
+    assert np.allclose(found[..., 2], -2.0 * SOLE_BELOW_BONE)
