@@ -17,6 +17,7 @@ from typing import Any
 
 import pandas as pd
 
+from benchmarks.learning.error_line import errors_in_one_line
 from benchmarks.learning.policies import MOVES as POLICIES
 from benchmarks.learning.policies import Folders
 from benchmarks.learning.tracker_rows import present
@@ -206,4 +207,5 @@ def shown(value: Any) -> str:
 
 
 if __name__ == "__main__":
-    main()
+    with errors_in_one_line():
+        main()

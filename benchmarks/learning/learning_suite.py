@@ -30,6 +30,7 @@ from benchmarks.learning import (
 from benchmarks.learning import (
     speed as learning_speed,
 )
+from benchmarks.learning.error_line import errors_in_one_line
 from benchmarks.learning.policies import MOVES, Folders
 from benchmarks.learning.summary import AUTHORS_ROBOT, COLUMNS, EXCESS, GAIN, LIMBS, R2, summary
 
@@ -161,4 +162,5 @@ def _cell(value: object) -> str:
 
 
 if __name__ == "__main__":
-    main()
+    with errors_in_one_line():
+        main()

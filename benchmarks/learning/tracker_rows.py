@@ -19,6 +19,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.learning.error_line import errors_in_one_line
 from benchmarks.learning.policies import FROZEN, MOVES, Folders, reference_of, require_frozen
 from robojackson.api.robots import load_robot
 from robojackson.errors import BadConfiguration, BadPolicy
@@ -135,4 +136,5 @@ def _show(rows: list[dict[str, Any]]) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with errors_in_one_line():
+        main()

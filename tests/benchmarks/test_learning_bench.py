@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.learning import policies, races
+from benchmarks.learning import learning_suite, policies, races
+from benchmarks.learning.error_line import errors_in_one_line
 from benchmarks.learning.policies import MOVES, Folders, source_of
 from benchmarks.learning.summary import LIMBS, bars, cluster_interval, line, summary
 from benchmarks.learning.training_curve import area, first_at
@@ -113,3 +114,18 @@ def test_a_peer_that_does_not_arrive_took_all_of_its_time(
     found = races.survival(Folders.at(tmp_path), 10)
     assert (found["ratio"], found["holds"]) == (pytest.approx(0.1), True)
     assert found["peer_is_lower_bound"]
+
+
+def test_a_truncated_row_is_named_in_one_line_and_nothing_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rows = Folders.at(tmp_path).rows
+    rows.mkdir(parents=True)
+    whole = Folders.at(None).row("g1_walk", 104, 10.0).read_bytes()
+    (rows / "g1_walk-s104.parquet").write_bytes(whole[: len(whole) // 2])
+    monkeypatch.setattr("sys.argv", ["learning_suite", "table", "--folder", str(tmp_path)])
+    with pytest.raises(SystemExit) as left, errors_in_one_line():
+        learning_suite.main()
+    assert "g1_walk-s104.parquet" in str(left.value)
+    assert "\n" not in str(left.value)
+    assert [path.name for path in rows.parent.iterdir()] == ["learning"]
