@@ -92,7 +92,7 @@ def residual_learning(
         config: The training.
         robot: The robot.
         reference: Its motion or motions.
-        held: Share of the time that the feedback alone keeps robots upright, 0..1, or NaN.
+        held: Share of the starts from which the feedback alone keeps robots upright, 0..1, or NaN.
     """
     if not polishes(config, robot, reference, held):
         return config.tqc

@@ -44,14 +44,14 @@ class Node:
 
 
 def read(path: Path) -> deepmimic.Motion:
-    """Return the whole file."""
+    """Return the whole file but its first frame, which is a T-pose beside the motion."""
     content = path.read_bytes()
     text = (gzip.decompress(content) if path.suffix == ".gz" else content).decode()
     header, _, body = text.partition("MOTION")
     nodes = _nodes(header.split())
     lines = body.strip().splitlines()
     fps = 1.0 / float(lines[1].split()[-1])
-    table = np.array([line.split() for line in lines[2:] if line.strip()], float)
+    table = np.array([line.split() for line in lines[2:] if line.strip()], float)[1:]
     world = _rotations(nodes, table)
     leg = sum(float(np.linalg.norm(nodes[name].offset)) for name in ("LeftLeg", "LeftFoot"))
     scale = (deepmimic.THIGH_LENGTH + deepmimic.SHIN_LENGTH) / leg

@@ -51,8 +51,8 @@ class Feedback:
 
     @property
     def held(self) -> float:
-        """Share of the time that it keeps robots upright by itself, 0..1, of the motion that falls
-        most; NaN where that was not tried."""
+        """Share of the starts from which it keeps robots upright by itself, 0..1, of the motion
+        that falls most; NaN where that was not tried."""
         return float(np.min(self.gains.held))
 
     def at(self, row: Int[np.ndarray, " N"], shift: Float[np.ndarray, "N 3"]) -> StepFeedback:

@@ -20,7 +20,7 @@ class Gains:
         qpos, qvel: Nominal state.
         places: Feet of the nominal state, which is moved along the floor to the robot's own feet.
             NaN where the nominal state stays in the world.
-        held: Share of the time that it keeps robots upright without a policy, over several starts,
+        held: Share of noisy starts from which it keeps robots upright to the end without a policy,
             one number for each motion; NaN where that was not tried.
     """
 

@@ -117,8 +117,8 @@ class Clip:
 
     @property
     def held_alone(self) -> float:
-        """Share of the time that the feedback alone keeps robots upright, 0..1; NaN where unknown
-        or without one."""
+        """Share of the starts from which the feedback alone keeps robots upright, 0..1; NaN where
+        unknown or without one."""
         return np.nan if self._law is None else self._law.held
 
     def starts(self) -> Int[np.ndarray, " R"]:

@@ -110,8 +110,8 @@ def test_the_regulator_that_keeps_robots_up_longer_is_taken(
     monkeypatch.setattr(sampled_regulator, "PASSES_A_S", 0.0)
     monkeypatch.setattr(sampled_regulator, "TRIES", 1)
     for shares, anchored in (((1.0,), False), ((0.5, 0.4), False), ((0.5, 0.6), True)):
-        held = iter(shares)
-        monkeypatch.setattr(sampled_regulator, "_held_share", lambda *given, held=held: next(held))
+        held = iter(sampled_regulator.Held(share, share) for share in shares)
+        monkeypatch.setattr(sampled_regulator, "_held", lambda *given, held=held: next(held))
         found = sampled_regulator.sampled_regulator(sim, clip, action, feet)
         assert bool(np.isfinite(found.places).all()) == anchored
         assert found.held == max(shares)
