@@ -20,7 +20,7 @@ from robojackson.api.performances import perform
 from robojackson.files.json_types import to_json_types
 from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
 from robojackson.pipeline.tracker_descriptions import tracker_names
-from robojackson.rl.evaluation.performance import PerformanceConfig
+from robojackson.rl.config.performance_config import PerformanceConfig
 
 DANCES = ("g1_hip_shake", "g1_dance_b", "g1_walk")
 BAR = 0.95

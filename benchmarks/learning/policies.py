@@ -24,6 +24,8 @@ PAPER, CMU = "ROBOJACKSON_PAPER", "ROBOJACKSON_CMU"
 FROZEN = Path(__file__).parent / "references"
 """Reference motions of rows whose motion is ours to keep, `ROW.parquet`."""
 HORIZONS_S = (10.0, 20.0)
+BLAS, BLAS_FLAG = "SkylakeX", "avx512f"
+"""Kernels of OpenBLAS that made the frozen references, and the processor's flag that they need."""
 
 
 @dataclass(frozen=True)
@@ -118,19 +120,24 @@ def budget(minutes: float | None) -> str:
     return "" if minutes is None else f"-{minutes:g}min"
 
 
-def command(*words: object, core: int | None = None) -> int:
-    """Run one of our commands on one thread, pinned to a core where one is named; return its exit
-    status."""
+def command(*words: object, core: int | None = None, blas: str | None = None) -> int:
+    """Run one of our commands on one thread; return its exit status.
+
+    Args:
+        core: The core that it is pinned to.
+        blas: Kernels of OpenBLAS, which it otherwise chooses by the processor.
+    """
     line = [sys.executable, "-m", "robojackson", *map(str, words)]
     if core is not None:
         line = ["taskset", "-c", str(core), *line]
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    environment |= {"OPENBLAS_CORETYPE": blas} if blas else {}
     return subprocess.run(line, check=False, cwd=ROOT, env=environment).returncode
 
 
-def must(*words: object, core: int | None = None) -> None:
+def must(*words: object, core: int | None = None, blas: str | None = None) -> None:
     """Run a command without which the rest cannot go on."""
-    if status := command(*words, core=core):
+    if status := command(*words, core=core, blas=blas):
         raise SystemExit(f"`robojackson {' '.join(map(str, words))}` ended with {status}")
 
 
@@ -172,8 +179,8 @@ def require_frozen(name: str, reference: Path) -> None:
     if frozen_reference is not None and frozen_reference != found:
         raise SystemExit(
             f"{name}: {reference} has the poses {found[:12]}, the row is measured on "
-            f"{frozen_reference[:12]}: another mocap or retargeting made it; freeze it again or "
-            "use the old one"
+            f"{frozen_reference[:12]}: another mocap or retargeting made it, or a processor without "
+            f"{BLAS_FLAG}, which rounds differently; freeze it again or use the old one"
         )
 
 
@@ -186,9 +193,19 @@ def _made(move: Move, work: Path) -> int:
     """Make the motion of a move from its source; return the exit status of the gate."""
     source = source_of(move)
     assert source is not None
-    must("import" if move.is_foreign else "mocap", source, "-o", work)
+    blas = frozen_kernels()
+    must("import" if move.is_foreign else "mocap", source, "-o", work, blas=blas)
     options = ["--set", "retarget.cyclic=no"] if move.authors else []
-    return command("retarget", work / "smpl.parquet", "-o", work, "--robot", move.robot, *options)
+    words = ("retarget", work / "smpl.parquet", "-o", work, "--robot", move.robot, *options)
+    return command(*words, blas=blas)
+
+
+def frozen_kernels() -> str | None:
+    """Return the kernels of OpenBLAS that the frozen references were made with, where this
+    processor runs them: others round differently, and a repair may come out at another tempo."""
+    processor = Path("/proc/cpuinfo")
+    known = processor.read_text() if processor.is_file() else ""
+    return BLAS if BLAS_FLAG in known else None
 
 
 def forced(name: str, folders: Folders) -> bool:

@@ -22,8 +22,8 @@ from robojackson.pipeline.run_names import motion_name
 from robojackson.pipeline.tracker_descriptions import require_tracker, usual_robot
 from robojackson.retarget.performance.programme import Programme, ProgrammeConfig, plan
 from robojackson.retarget.retarget_config import RetargetConfig
+from robojackson.rl.config.performance_config import PerformanceConfig
 from robojackson.rl.evaluation import performance
-from robojackson.rl.evaluation.performance import PerformanceConfig
 from robojackson.rl.evaluation.performance_record import PartRow, RunRow, Summary
 from robojackson.rl.trackers.tracker import Tracker
 from robojackson.robot.model import Robot

@@ -171,7 +171,12 @@ def _require_same(schema: TableSchema, table: pa.Table, where: str) -> None:
     if found != schema.name:
         maker = MAKERS.get(schema.name)
         hint = f"; `robojackson {maker}` writes one" if maker else ""
-        raise BadTable(f"holds a {str(found)[:80]}, expected a {schema.name}{hint}", where)
+        held, wanted = _with_article(str(found)[:80]), _with_article(schema.name)
+        raise BadTable(f"holds {held}, expected {wanted}{hint}", where)
+
+
+def _with_article(name: str) -> str:
+    return f"{'an' if name[:1] in 'AEIO' else 'a'} {name}"
 
 
 def _check_column(column: Column, table: pa.Table, where: str) -> None:

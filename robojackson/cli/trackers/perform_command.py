@@ -48,7 +48,7 @@ def perform(
     from robojackson.cli.trackers import performance_files
     from robojackson.pipeline.tracker_descriptions import usual_robot
     from robojackson.retarget.performance.programme import ProgrammeConfig
-    from robojackson.rl.evaluation.performance import PerformanceConfig
+    from robojackson.rl.config.performance_config import PerformanceConfig
 
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     log_to_stderr()

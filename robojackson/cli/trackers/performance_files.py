@@ -14,7 +14,7 @@ from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.yaml_loader import load
 from robojackson.report.pages.performance_page import performance_page
 from robojackson.retarget.performance.programme import ProgrammeConfig
-from robojackson.rl.evaluation.performance import PerformanceConfig
+from robojackson.rl.config.performance_config import PerformanceConfig
 from robojackson.rl.evaluation.performance_record import PartRow, RunRow, Summary
 
 FILM, PAGE = "performance.mp4", "index.html"

@@ -7,8 +7,11 @@ import pytest
 
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.retarget.performance.programme import Part, Programme
+from robojackson.rl.config.performance_config import PerformanceConfig
 from robojackson.rl.config.train_config import ControlConfig
-from robojackson.rl.evaluation.performance import PerformanceConfig, _Stage, perform
+from robojackson.rl.evaluation.foresight import Foresight
+from robojackson.rl.evaluation.performance import perform
+from robojackson.rl.evaluation.performers import Moment, Stage
 from robojackson.rl.sim.motors import Motors
 from robojackson.rl.trackers.tracker import TrackerInput
 from robojackson.rl.trackers.tracker_description import TrackerDescription
@@ -81,29 +84,65 @@ def test_who_is_not_pushed_and_does_not_fall_finishes_and_has_danced_all(robot: 
     assert 0.0 < float(row["mpjpe_l_m"]) < 0.1  # type: ignore[arg-type]
 
 
-def test_a_robot_that_leans_gives_the_part_up_and_goes_on_when_it_is_calm() -> None:
-    stage = _Stage(1, CONFIG, programme())
-    upright = qpos_of(0.0)
+def test_a_robot_that_gives_up_waits_and_goes_on_when_it_is_calm() -> None:
+    stage = Stage(1, CONFIG, programme())
     for _ in range(25):
         stage.advance()
-    stage.watch(qpos_of(0.4), upright, np.ones(1, bool))
-    assert not stage.waits[0], "a dance may lean"
-    stage.watch(qpos_of(0.6), upright, np.ones(1, bool))
+    stage.give_up(np.ones(1, bool))
     assert (bool(stage.waits[0]), int(stage.step[0])) == (True, 39)
     assert stage.given_up == [["dance"]]
     stage.advance()
-    stage.watch(qpos_of(0.6), upright, np.ones(1, bool))
+    stage.rest(np.array([0.6]))
     assert (bool(stage.waits[0]), int(stage.step[0])) == (True, 39)
     for _ in range(2):
         stage.advance()
-        stage.watch(upright, upright, np.ones(1, bool))
+        stage.rest(np.zeros(1))
     assert not stage.waits[0]
     stage.advance()
     assert stage.step[0] == 40
 
 
+def test_what_a_twin_does_does_not_happen_to_the_robot() -> None:
+    stage = Stage(2, CONFIG, programme())
+    twin = stage.copied()
+    twin.give_up(np.ones(2, bool))
+    twin.advance()
+    assert not stage.waits.any()
+    assert stage.given_up == [[], []]
+    np.testing.assert_array_equal(stage.step, [0, 0])
+
+
+class Choice:
+    """Twins that fall after so many steps: of those that go on, and of those that give up."""
+
+    def __init__(self, on: list[int], off: list[int]) -> None:
+        self.on, self.off, self.gave_up = on, off, np.zeros(len(on), bool)
+        self.stage, self.now = self, 0
+
+    def copied(self, sim: object, rows: np.ndarray) -> "Choice":
+        return Choice(self.on, self.off)
+
+    def give_up(self, which: np.ndarray) -> None:
+        self.gave_up = which
+
+    def step(self, up: np.ndarray) -> Moment:
+        self.now += 1
+        down = self.now > np.where(self.gave_up, self.off, self.on)
+        return Moment(np.zeros((len(up), 7)), np.zeros((len(up), 1, 3)), np.zeros(len(up)), down)
+
+
+def test_a_robot_gives_up_only_where_that_keeps_it_up_longer(robot: Robot) -> None:
+    foresight = Foresight(robot, Replay(), replace(CONFIG, runs=5, ahead_s=0.15))
+    never = 99
+    twins = Choice(on=[never, 4, 4, 4, 4], off=[never, never, 6, 4, never])
+    doubted = np.array([True, True, True, True, False])
+    found = foresight.lost(twins, doubted)  # type: ignore[arg-type]
+    foresight.close()
+    assert found.tolist() == [False, True, True, False, False]
+
+
 def test_the_programme_is_put_under_a_robot_that_was_carried_off() -> None:
-    stage = _Stage(1, CONFIG, programme())
+    stage = Stage(1, CONFIG, programme())
     for _ in range(25):
         stage.advance()
     near, far, now = qpos_of(0.0), qpos_of(0.0), qpos_of(0.0)
