@@ -3,7 +3,7 @@
     python -m benchmarks.learning.learning_suite PART ... [--folder FOLDER]
 
 `speed`, `threads`: our parts beside their peers (`speed`). `policies`: one row a move
-and a seed, trained for the row's CPU minutes and evaluated on stock physics (`policies`).
+and a seed, trained for the row's CPU minutes and evaluated on stock physics (`training_rows`).
 `survival`, `pretraining`: races (`races`). `checkpoints`: what they cost a training
 (`checkpoint_cost`). `table` only prints what there is. What exists is not computed again, so
 that all of it may take several sittings. The authors' clips are measured where ROBOJACKSON_PAPER
@@ -20,16 +20,8 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.learning import (
-    checkpoint_cost,
-    races,
-)
-from benchmarks.learning import (
-    policies as learning_policies,
-)
-from benchmarks.learning import (
-    speed as learning_speed,
-)
+from benchmarks.learning import checkpoint_cost, races, training_rows
+from benchmarks.learning import speed as learning_speed
 from benchmarks.learning.error_line import errors_in_one_line
 from benchmarks.learning.policies import MOVES, Folders
 from benchmarks.learning.summary import AUTHORS_ROBOT, COLUMNS, EXCESS, GAIN, LIMBS, R2, summary
@@ -63,7 +55,7 @@ def main() -> None:
         _write(speed, [checkpoint_cost.checkpoints(folders)], command)
     if "policies" in parts:
         minutes, jobs = given.cpu_minutes, given.jobs
-        learning_policies.policies(given.moves, given.seeds, minutes, jobs, folders)
+        training_rows.policies(given.moves, given.seeds, minutes, jobs, folders)
     if {"policies", "table"} & set(parts) and (rows := summary(folders)):
         held = {"command": command, "authors_robot": AUTHORS_ROBOT, "rows": rows}
         (folders.results / "learning.json").write_text(json.dumps(held, indent=1) + "\n")

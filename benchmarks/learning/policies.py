@@ -1,19 +1,11 @@
-"""Policies of the bundled dances and of the authors' clips, trained and evaluated: one cached row a
-move and a seed, so that it may take several sittings.
-
-A row's training is pinned to a core of its own and ended by the CPU minutes of its bar. A motion
-that the gate refuses is trained on anyway, and the row is marked.
-"""
+"""The moves of the learning benchmark, their files and their frozen reference motions."""
 
 import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from queue import SimpleQueue
 
 from benchmarks.learning.split import load_split
 from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
@@ -179,8 +171,8 @@ def require_frozen(name: str, reference: Path) -> None:
     if frozen_reference is not None and frozen_reference != found:
         raise SystemExit(
             f"{name}: {reference} has the poses {found[:12]}, the row is measured on "
-            f"{frozen_reference[:12]}: another mocap or retargeting made it, or a processor without "
-            f"{BLAS_FLAG}, which rounds differently; freeze it again or use the old one"
+            f"{frozen_reference[:12]}: another mocap or retargeting made it, or a processor "
+            f"without {BLAS_FLAG}, which rounds otherwise; freeze it again or use the old one"
         )
 
 
@@ -212,55 +204,3 @@ def forced(name: str, folders: Folders) -> bool:
     """Return whether the gate refused the move's motion, so that it was forced."""
     gate = folders.work / name / "gate.json"
     return gate.is_file() and bool(json.loads(gate.read_text())["forced"])
-
-
-def train_and_judge(
-    name: str, seed: int, minutes: float | None, folders: Folders, core: int
-) -> None:
-    """Train one move with one seed and keep the rows of its evaluation; nothing if they exist."""
-    kept = {s: folders.row(name, seed, s, minutes) for s in MOVES[name].horizons_s}
-    if all(path.exists() for path in kept.values()):
-        return
-    work = folders.work / name
-    reference, out = work / "reference.parquet", work / f"s{seed}{budget(minutes)}"
-    spent = minutes or MOVES[name].cpu_minutes
-    options = ["--seed", seed, "--set", f"cpu_minutes={spent}", "--move", name, "--force"]
-    must("train", reference, "-o", out, *options, core=core)
-    folders.rows.mkdir(parents=True, exist_ok=True)
-    for seconds, path in kept.items():
-        evaluated = out / f"evaluated-{seconds:g}s"
-        policy = out / "policy.safetensors"
-        must("evaluate", policy, reference, "-o", evaluated, "--seconds", seconds, core=core)
-        part = path.with_suffix(".part")
-        part.write_bytes((evaluated / "evaluations.parquet").read_bytes())
-        part.replace(path)
-
-
-def policies(
-    names: Iterable[str], seeds: Iterable[int], minutes: float | None, jobs: int, folders: Folders
-) -> None:
-    """Train and evaluate all rows, `jobs` at a time, each on a core of its own; Ctrl-C keeps
-    checkpoints."""
-    present = [name for name in names if source_of(MOVES[name]) is not None]
-    for name in present:
-        reference_of(name, folders)
-    cores: SimpleQueue[int] = SimpleQueue()
-    for core in sorted(os.sched_getaffinity(0))[:jobs]:
-        cores.put(core)
-
-    def row(name: str, seed: int) -> None:
-        core = cores.get()
-        try:
-            train_and_judge(name, seed, minutes, folders, core)
-        finally:
-            cores.put(core)
-
-    jobs = max(1, cores.qsize())
-    with ThreadPoolExecutor(jobs) as pool:
-        work = [pool.submit(row, name, seed) for name in present for seed in seeds]
-        try:
-            for job in work:
-                job.result()
-        except BaseException:
-            pool.shutdown(wait=True, cancel_futures=True)
-            raise

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.learning import learning_suite, policies, races
+from benchmarks.learning import learning_suite, policies, races, training_rows
 from benchmarks.learning.error_line import errors_in_one_line
 from benchmarks.learning.policies import MOVES, Folders, source_of
 from benchmarks.learning.summary import LIMBS, bars, cluster_interval, line, summary
@@ -86,7 +86,7 @@ def test_without_the_authors_files_their_rows_are_left_out(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.delenv(policies.PAPER, raising=False)
-    policies.policies(["authors_apt1"], [0], None, 1, Folders.at(tmp_path))
+    training_rows.policies(["authors_apt1"], [0], None, 1, Folders.at(tmp_path))
     assert source_of(MOVES["authors_apt1"]) is None
     assert list(tmp_path.iterdir()) == []
 

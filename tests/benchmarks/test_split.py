@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.learning.motion_distance import contained_share, windows
-from benchmarks.learning.policies import FROZEN, MOVES, require_frozen
+from benchmarks.learning.policies import BLAS, FROZEN, MOVES, frozen_kernels, require_frozen
 from benchmarks.learning.split import DUPLICATE_SHARE, load_split, shares
 from robojackson.geometry.rotations import quat_to_matrix
 from robojackson.motion.reference_motion import ReferenceMotion
@@ -76,3 +76,12 @@ def test_another_movement_is_none(motion: SmplSequence) -> None:
         motion, joints=np.repeat(motion.joints[:1] * [1.0, 1.0, 0.4], len(motion.joints), 0)
     )
     assert contained_share(windows(motion), windows(still)) == 0.0
+
+
+@pytest.mark.parametrize("flag", ["avx512f", "avx2"])
+def test_references_are_made_with_the_kernels_of_the_frozen_ones_where_they_run(
+    flag: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Path, "is_file", lambda path: True)
+    monkeypatch.setattr(Path, "read_text", lambda path: f"flags : fpu {flag} sse2")
+    assert frozen_kernels() == (BLAS if flag == "avx512f" else None)

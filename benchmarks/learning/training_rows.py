@@ -1,0 +1,65 @@
+"""Policies of the bundled dances and of the authors' clips, trained and evaluated: one cached row a
+move and a seed, so that it may take several sittings.
+
+A row's training is pinned to a core of its own and ended by the CPU minutes of its bar. A motion
+that the gate refuses is trained on anyway, and the row is marked.
+"""
+
+import os
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from queue import SimpleQueue
+
+from benchmarks.learning.policies import MOVES, Folders, budget, must, reference_of, source_of
+
+
+def train_and_judge(
+    name: str, seed: int, minutes: float | None, folders: Folders, core: int
+) -> None:
+    """Train one move with one seed and keep the rows of its evaluation; nothing if they exist."""
+    kept = {s: folders.row(name, seed, s, minutes) for s in MOVES[name].horizons_s}
+    if all(path.exists() for path in kept.values()):
+        return
+    work = folders.work / name
+    reference, out = work / "reference.parquet", work / f"s{seed}{budget(minutes)}"
+    spent = minutes or MOVES[name].cpu_minutes
+    options = ["--seed", seed, "--set", f"cpu_minutes={spent}", "--move", name, "--force"]
+    must("train", reference, "-o", out, *options, core=core)
+    folders.rows.mkdir(parents=True, exist_ok=True)
+    for seconds, path in kept.items():
+        evaluated = out / f"evaluated-{seconds:g}s"
+        policy = out / "policy.safetensors"
+        must("evaluate", policy, reference, "-o", evaluated, "--seconds", seconds, core=core)
+        part = path.with_suffix(".part")
+        part.write_bytes((evaluated / "evaluations.parquet").read_bytes())
+        part.replace(path)
+
+
+def policies(
+    names: Iterable[str], seeds: Iterable[int], minutes: float | None, jobs: int, folders: Folders
+) -> None:
+    """Train and evaluate all rows, `jobs` at a time, each on a core of its own; Ctrl-C keeps
+    checkpoints."""
+    present = [name for name in names if source_of(MOVES[name]) is not None]
+    for name in present:
+        reference_of(name, folders)
+    cores: SimpleQueue[int] = SimpleQueue()
+    for core in sorted(os.sched_getaffinity(0))[:jobs]:
+        cores.put(core)
+
+    def row(name: str, seed: int) -> None:
+        core = cores.get()
+        try:
+            train_and_judge(name, seed, minutes, folders, core)
+        finally:
+            cores.put(core)
+
+    jobs = max(1, cores.qsize())
+    with ThreadPoolExecutor(jobs) as pool:
+        work = [pool.submit(row, name, seed) for name in present for seed in seeds]
+        try:
+            for job in work:
+                job.result()
+        except BaseException:
+            pool.shutdown(wait=True, cancel_futures=True)
+            raise
