@@ -24,7 +24,7 @@ from robojackson.motion.landmark_track import LandmarkTrack
 
 FOLLOWED_M = 0.25
 """Mean distance across the image over which the detector is not on the person."""
-LEAST_FOUND, LEAST_FOLLOWED = 0.85, 0.6
+LEAST_FOUND, LEAST_FOLLOWED = 0.6, 0.4
 VALIDATION_MOTIONS = ("long_walk2", "punch", "stealthy_walk1", "01_03", "05_15")
 VALIDATION_EACH = 12
 """Besides these motions, every clip whose number divides by this is kept for validation."""

@@ -49,7 +49,7 @@ class FitConfig:
     batch: int = 32
     rate: float = 1.5e-3
     decay: float = 0.02
-    invented: tuple[float, float] = (0.85, 0.8)
+    invented: tuple[float, float] = (0.5, 0.35)
     velocity: float = 3.0
     speed: float = 0.02
     spread: float = 0.01

@@ -29,7 +29,7 @@ class PerformanceConfig:
     carried_m: float = Field(default=0.3, gt=0)
     turned_rad: float = Field(default=0.5, gt=0)
     doubt_rad: float = Field(default=0.15, gt=0)
-    ahead_s: float = Field(default=1.5, gt=0)
+    ahead_s: float = Field(default=3.0, gt=0)
     look_s: float = Field(default=0.1, gt=0)
     calm_rad: float = Field(default=0.15, gt=0)
     calm_s: float = Field(default=1.0, gt=0)

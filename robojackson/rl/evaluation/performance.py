@@ -60,7 +60,7 @@ def perform(
         stage.rest(now.tilt)
         doubted = up & ~stage.waits & (now.tilt > config.doubt_rad)
         if len(record) % look == 0 and doubted.any():
-            stage.give_up(foresight.lost(robots, doubted))
+            foresight.choose(robots, doubted)
         progress(min(int(stage.step.max()), total), total)
     for simulation in (sim, foresight):
         simulation.close()

@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, Int
 
 from robojackson.geometry.rotations import heading, wrapped
 from robojackson.motion.floor_move import FloorMove
-from robojackson.retarget.performance.programme import Programme
+from robojackson.retarget.performance.programme import Part, Programme
 from robojackson.rl.config.performance_config import PerformanceConfig
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.simulation import Simulation
@@ -33,6 +33,7 @@ class Stage:
         self._last = len(programme.motion) - 1
         self._calm, self._needed = np.zeros(n, int), round(config.calm_s / programme.motion.dt)
         self.step, self.waits = np.zeros(n, int), np.zeros(n, bool)
+        self._jumped = np.zeros(n, bool)
         self.placed, self.carried = FloorMove.none(n), np.zeros(n, int)
         self.given_up: list[list[str]] = [[] for _ in range(n)]
 
@@ -40,6 +41,7 @@ class Stage:
         """Return a stage that goes on by itself; what robots give up there is not recorded."""
         other = copy.copy(self)
         other.step, other.waits = self.step.copy(), self.waits.copy()
+        other._jumped = self._jumped.copy()
         other.carried, other.given_up = self.carried.copy(), [[] for _ in self.given_up]
         return other
 
@@ -57,7 +59,8 @@ class Stage:
         there, config = self.placed.qpos(now), self._config
         apart = np.linalg.norm(qpos[:, :2] - there[:, :2], axis=-1)
         turned = np.abs(wrapped(heading(qpos[:, 3:7]) - heading(there[:, 3:7])))
-        begins = np.isin(self.step, self._starts) | self.waits
+        begins = np.isin(self.step, self._starts) | self.waits | self._jumped
+        self._jumped[:] = False
         off = ((apart > config.carried_m) | (turned > config.turned_rad)) & ~begins
         self.carried += off
         new, old, which = FloorMove.onto(now, qpos), self.placed, begins | off
@@ -73,9 +76,19 @@ class Stage:
     def give_up(self, which: Bool[np.ndarray, " N"]) -> None:
         """Let robots stand instead of the rest of their part."""
         for i in np.flatnonzero(which & ~self.waits):
-            part = next(part for part in self._parts if self.step[i] < part.end)
+            part = self._part(i)
             self.waits[i], self.step[i] = True, part.end - 1
             self.given_up[i].append(part.name)
+
+    def jump(self, which: Bool[np.ndarray, " N"], steps: int) -> None:
+        """Let robots go on so many steps further on, or back, in the same part."""
+        for i in np.flatnonzero(which & ~self.waits):
+            part = self._part(i)
+            self.step[i] = np.clip(self.step[i] + steps, part.start, part.end - 1)
+            self._jumped[i] = True
+
+    def _part(self, robot: int | np.integer) -> Part:
+        return next(part for part in self._parts if self.step[robot] < part.end)
 
 
 @dataclass(frozen=True)
