@@ -9,7 +9,7 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.retarget.performance.programme import Part, Programme
 from robojackson.rl.config.performance_config import PerformanceConfig
 from robojackson.rl.config.train_config import ControlConfig
-from robojackson.rl.evaluation.foresight import Foresight
+from robojackson.rl.evaluation.foresight import JUMPS_S, Foresight
 from robojackson.rl.evaluation.performance import perform
 from robojackson.rl.evaluation.performers import Moment, Stage
 from robojackson.rl.sim.motors import Motors
@@ -18,7 +18,7 @@ from robojackson.rl.trackers.tracker_description import TrackerDescription
 from robojackson.robot.model import Robot
 from tests.fixtures.robots import robot_motion
 
-STEPS = 60
+STEPS, DT = 60, 0.015
 CONFIG = PerformanceConfig(threads=1, calm_s=0.03)
 
 
@@ -112,33 +112,62 @@ def test_what_a_twin_does_does_not_happen_to_the_robot() -> None:
     np.testing.assert_array_equal(stage.step, [0, 0])
 
 
-class Choice:
-    """Twins that fall after so many steps: of those that go on, and of those that give up."""
+class Twins:
+    """Robots whose twins fall after so many steps, a row for each choice: to go on, each of the
+    jumps, to give up."""
 
-    def __init__(self, on: list[int], off: list[int]) -> None:
-        self.on, self.off, self.gave_up = on, off, np.zeros(len(on), bool)
-        self.stage, self.now = self, 0
+    def __init__(self, falls: np.ndarray) -> None:
+        self.falls, self.now = falls, 0
+        self.stage = Stage(falls.shape[1], CONFIG, programme())
+        for _ in range(25):
+            self.stage.advance()
 
-    def copied(self, sim: object, rows: np.ndarray) -> "Choice":
-        return Choice(self.on, self.off)
-
-    def give_up(self, which: np.ndarray) -> None:
-        self.gave_up = which
+    def copied(self, sim: object, rows: np.ndarray) -> "Twins":
+        twin = Twins(self.falls)
+        twin.stage = self.stage.copied()
+        return twin
 
     def step(self, up: np.ndarray) -> Moment:
         self.now += 1
-        down = self.now > np.where(self.gave_up, self.off, self.on)
+        jumps = [round(seconds / DT) for seconds in JUMPS_S]
+        reached = np.clip(25 + np.array(jumps), 20, 39)
+        choice = np.where(self.stage.waits, 1 + len(jumps), 0)
+        for number, step in enumerate(reached):
+            choice[~self.stage.waits & (self.stage.step == step)] = 1 + number
+        down = self.now > self.falls[choice, np.arange(len(up))]
         return Moment(np.zeros((len(up), 7)), np.zeros((len(up), 1, 3)), np.zeros(len(up)), down)
 
 
-def test_a_robot_gives_up_only_where_that_keeps_it_up_longer(robot: Robot) -> None:
-    foresight = Foresight(robot, Replay(), replace(CONFIG, runs=5, ahead_s=0.15))
+def test_a_robot_that_would_fall_does_what_keeps_it_up_longest(robot: Robot) -> None:
     never = 99
-    twins = Choice(on=[never, 4, 4, 4, 4], off=[never, never, 6, 4, never])
-    doubted = np.array([True, True, True, True, False])
-    found = foresight.lost(twins, doubted)  # type: ignore[arg-type]
+    falls = np.array([
+        [never, 4, 4, 4, 4, 4],
+        [never, never, 3, 3, 4, never],
+        [never, never, 3, 3, 4, never],
+        [never, never, 3, 3, 4, never],
+        [never, never, 3, 3, 4, never],
+        [never, never, never, 6, 4, never],
+    ])  # fmt: skip
+    foresight = Foresight(robot, Replay(), replace(CONFIG, runs=6, ahead_s=0.15))
+    twins = Twins(falls)
+    foresight.choose(twins, np.array([True] * 5 + [False]))  # type: ignore[arg-type]
     foresight.close()
-    assert found.tolist() == [False, True, True, False, False]
+    assert twins.stage.step.tolist() == [25, 25 + round(JUMPS_S[0] / DT), 39, 39, 25, 25]
+    assert twins.stage.waits.tolist() == [False, False, True, True, False, False]
+    assert twins.stage.given_up == [[], [], ["dance"], ["dance"], [], []]
+
+
+def test_a_robot_that_jumps_goes_on_from_where_it_is() -> None:
+    stage = Stage(1, CONFIG, programme())
+    for _ in range(25):
+        stage.advance()
+    stage.jump(np.ones(1, bool), 99)
+    assert stage.step[0] == 39
+    near, now = qpos_of(0.0), qpos_of(0.0)
+    near[0, 0] = 0.1
+    stage.place(near, now)
+    np.testing.assert_allclose(stage.placed.qpos(now)[:, :2], near[:, :2])
+    assert stage.carried[0] == 0
 
 
 def test_the_programme_is_put_under_a_robot_that_was_carried_off() -> None:
