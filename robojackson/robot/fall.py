@@ -47,10 +47,18 @@ class Fall:
             upright = up_axis(qpos[:, 3:7])[:, 2]
             found: np.ndarray = (qpos[:, 2] < self.height) | (upright < np.cos(self.tilt))
             return found
-        along = np.sum(up_axis(qpos[:, 3:7]) * up_axis(target[:, 3:7]), -1)
+        along = alignment(qpos, target)
         off = np.abs(qpos[:, 2] - target[:, 2])
         result: np.ndarray = (off > self.height) | (along < np.cos(self.tilt))
         return result
+
+
+def alignment(
+    qpos: Float[np.ndarray, "N nq"], other: Float[np.ndarray, "N nq"]
+) -> Float[np.ndarray, " N"]:
+    """Return the cosines of the angles between the up axes of roots."""
+    result: np.ndarray = np.sum(up_axis(qpos[:, 3:7]) * up_axis(other[:, 3:7]), -1)
+    return result
 
 
 def up_axis(quaternion: Float[np.ndarray, "N 4"]) -> Float[np.ndarray, "N 3"]:

@@ -6,6 +6,7 @@ part up and stand (a monitor that switches between controllers by prediction: Sh
 2001).
 """
 
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -19,6 +20,8 @@ from robojackson.robot.model import Robot
 
 JUMPS_S = (0.2, -0.2, 0.5, -0.5)
 """How much further on a robot may go on, seconds, in the order in which they are preferred."""
+Choice = Callable[[Stage, Bool[np.ndarray, " N"]], None]
+"""What robots of a stage may do."""
 
 
 class Foresight:
@@ -28,29 +31,28 @@ class Foresight:
         self._sim = Simulation(robot, tracker.control, config.runs, config.threads)
         self._steps = round(config.ahead_s / self._sim.dt)
         jumps = [round(seconds / self._sim.dt) for seconds in JUMPS_S]
-        self._choices = [partial(Stage.jump, steps=steps) for steps in jumps] + [Stage.give_up]
+        leaps = [partial(Stage.jump, steps=steps) for steps in jumps]
+        self._choices: list[Choice] = [_go_on, *leaps, Stage.give_up]
 
     def choose(self, performers: Performers, doubted: Bool[np.ndarray, " N"]) -> None:
         """Let robots that would fall do what keeps them up longest, the first of what does."""
-        nobody = np.zeros_like(doubted)
-        lasts = self._lasts(performers, doubted, partial(Stage.give_up, which=nobody))
-        best: Int[np.ndarray, " N"] = np.full(len(doubted), -1)
+        best, lasts = np.zeros(len(doubted), int), np.where(doubted, -1, self._steps)
         for number, choice in enumerate(self._choices):
-            falls: Bool[np.ndarray, " N"] = doubted & (lasts < self._steps)
+            falls: Bool[np.ndarray, " N"] = lasts < self._steps
             if not falls.any():
                 break
-            now = self._lasts(performers, falls, partial(choice, which=falls))
-            best = np.where(falls & (now > lasts), number, best)
-            lasts = np.where(falls, np.maximum(now, lasts), lasts)
+            now = self._lasts(performers, falls, choice)
+            better = falls & (now > lasts)
+            best[better], lasts[better] = number, now[better]
         for number, choice in enumerate(self._choices):
-            choice(performers.stage, which=best == number)
+            choice(performers.stage, best == number)
 
     def _lasts(
-        self, performers: Performers, rows: Bool[np.ndarray, " N"], choice: partial[None]
+        self, performers: Performers, rows: Bool[np.ndarray, " N"], choice: Choice
     ) -> Int[np.ndarray, " N"]:
         """Return for how many steps robots stay up after a choice."""
         twins, up = performers.copied(self._sim, rows), rows.copy()
-        choice(twins.stage)
+        choice(twins.stage, rows)
         lasted = np.zeros(len(rows), int)
         for _ in range(self._steps):
             if not up.any():
@@ -62,3 +64,7 @@ class Foresight:
     def close(self) -> None:
         """Stop the threads."""
         self._sim.close()
+
+
+def _go_on(stage: Stage, which: Bool[np.ndarray, " N"]) -> None:
+    """Let robots follow the programme as they do."""

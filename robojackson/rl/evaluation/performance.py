@@ -58,12 +58,11 @@ def perform(
         record.append(tuple(array.copy() for array in arrays))
         up = up & (stage.waits | (stage.step < total))
         stage.rest(now.tilt)
-        doubted = up & ~stage.waits & (now.tilt > config.doubt_rad)
-        if len(record) % look == 0 and doubted.any():
-            foresight.choose(robots, doubted)
+        if len(record) % look == 0:
+            foresight.choose(robots, up & ~stage.waits & (now.tilt > config.doubt_rad))
         progress(min(int(stage.step.max()), total), total)
-    for simulation in (sim, foresight):
-        simulation.close()
+    sim.close()
+    foresight.close()
     fell |= up  # one that never comes to rest again
     step, waits, own_qpos, points, roots = (np.stack(one) for one in zip(*record, strict=True))
     given_up = tuple(map(tuple, stage.given_up))

@@ -13,7 +13,7 @@ from robojackson.rl.config.performance_config import PerformanceConfig
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.rl.trackers.tracker import Follower, Tracker, TrackerInput
-from robojackson.robot.fall import Fall, up_axis
+from robojackson.robot.fall import Fall, alignment
 
 
 class Stage:
@@ -130,19 +130,11 @@ class Performers:
         stage.advance()
         following, there = clip.at(stage.step).qpos, own.qpos(sim.qpos)
         down = self.fall.has_fallen(there, following) | sim.broken
-        return Moment(there, own.points(sim.points), tilt_between(there, following), down)
+        tilt: np.ndarray = np.arccos(np.clip(alignment(there, following), -1.0, 1.0))
+        return Moment(there, own.points(sim.points), tilt, down)
 
     def copied(self, sim: Simulation, rows: Bool[np.ndarray, " N"]) -> "Performers":
         """Return these robots as they are now, some of them simulated by another simulation."""
         (which,) = np.nonzero(rows)
         sim.place(which, self.sim.qpos[which], self.sim.qvel[which])
         return replace(self, sim=sim, follower=copy.copy(self.follower), stage=self.stage.copied())
-
-
-def tilt_between(
-    qpos: Float[np.ndarray, "N nq"], other: Float[np.ndarray, "N nq"]
-) -> Float[np.ndarray, " N"]:
-    """Return the angles between the up axes of roots, rad."""
-    along = np.sum(up_axis(qpos[:, 3:7]) * up_axis(other[:, 3:7]), -1)
-    tilt: np.ndarray = np.arccos(np.clip(along, -1.0, 1.0))
-    return tilt

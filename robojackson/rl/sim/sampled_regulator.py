@@ -78,13 +78,13 @@ def sampled_regulator(
     """
     best, motion, linear = regulator(sim, clip, action, feet.count, progress)
     held = _held(sim, clip, action, feet, best, motion)
+    if held.to_end == 1.0:
+        return replace(best, held=np.ones(1))
     cycles = max(3, int(np.ceil(CYCLES_S / (clip.steps * clip.dt)))) if clip.cyclic else 1
     reference = reference_path(sim, clip, cycles * clip.steps)
     linear = _repeated(linear, cycles)
     tries = int(np.clip(TRIED_S / (len(reference) * clip.dt), 1, most_tries or TRIES))
     for number in range(tries):
-        if held.to_end == 1.0:
-            break
         rng = np.random.default_rng([seed, number])
         search = PathSearch(sim, action, feet, reference, rng)
         path, along = _searched(search, sim, reference, linear, action, clip.dt, progress)
@@ -92,6 +92,8 @@ def sampled_regulator(
         now = _held(sim, clip, action, feet, found, motion)
         if now > held:
             best, held = found, now
+        if held.to_end == 1.0:
+            break
     return replace(best, held=np.array([held.to_end]))
 
 
