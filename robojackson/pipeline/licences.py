@@ -17,6 +17,9 @@ NAME = re.compile(r"[A-Za-z0-9._-]+")
 UNKNOWN = "not in its metadata"
 LONGEST = 60
 """Characters; longer, the field holds the text of the licence itself."""
+STATED = {"cuda-toolkit": "NVIDIA CUDA Toolkit EULA"}
+"""Licences by the publisher's documentation of packages whose metadata has none: torch's builds for
+CUDA require them."""
 FIELDS = ("License-Expression", "License")
 CLASSIFIER = "License :: "
 Row = dict[str, str]
@@ -41,14 +44,17 @@ def packages() -> list[Row]:
 
 
 def licence_of(package: Distribution) -> str:
-    """Return what the metadata of a package says: its expression, its field, or its classifiers."""
+    """Return what the metadata of a package says: its expression, its field, or its classifiers;
+    what `STATED` has where it says nothing."""
     facts = package.metadata
     licence = next((facts[key] for key in FIELDS if key in facts), "")
     line = " ".join(licence.split())
     if line and len(line) <= LONGEST and line.upper() != "UNKNOWN":
         return line
     named = [c.split(" :: ")[-1] for c in facts.get_all("Classifier") or () if CLASSIFIER in c]
-    return "; ".join(named) or (f"{line[:LONGEST]}..." if line else UNKNOWN)
+    if named or line:
+        return "; ".join(named) or f"{line[:LONGEST]}..."
+    return STATED.get(package.name.lower(), UNKNOWN)
 
 
 def data() -> list[Row]:

@@ -2,6 +2,7 @@
 
 import json
 import re
+from importlib.metadata import PathDistribution
 from pathlib import Path
 
 import pytest
@@ -41,6 +42,15 @@ def test_every_package_has_a_licence_and_stands_in_the_bill(tmp_path: Path) -> N
     assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
     bill = json.loads((tmp_path / "a.json").read_text())
     assert {part["name"] for part in bill["components"] if part["type"] == "library"} == names
+
+
+@pytest.mark.parametrize(
+    ("name", "result"),
+    [("cuda-toolkit", "NVIDIA CUDA Toolkit EULA"), ("stranger", licences.UNKNOWN)],
+)
+def test_a_licence_that_no_metadata_states(name: str, result: str, tmp_path: Path) -> None:
+    (tmp_path / "METADATA").write_text(f"Metadata-Version: 2.4\nName: {name}\nVersion: 1.0\n")
+    assert licences.licence_of(PathDistribution(tmp_path)) == result
 
 
 def test_the_data_that_ships_has_a_licence() -> None:
