@@ -6,6 +6,10 @@ from fnmatch import fnmatchcase
 from robojackson.errors import UnknownName
 from robojackson.robot.description import RobotDescription
 
+PELVIS = "pelvis"
+FEET, HANDS = ("left_foot", "right_foot"), ("left_hand", "right_hand")
+"""Keypoints that every robot has."""
+
 
 def where(description: RobotDescription, key: str) -> str:
     """Return the place in the configuration that an error message names."""

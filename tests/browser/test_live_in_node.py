@@ -27,6 +27,7 @@ from robojackson.rl.sim.regulator import regulator
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.rl.sim.standing_feet import Feet
 from robojackson.robot.fall import Fall
+from robojackson.robot.model import Robot
 from tests.browser.conftest import made_policy
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(900)]
@@ -55,9 +56,10 @@ def steadied(policy: Policy) -> Policy:
 
 
 def anchored(
-    sim: Simulation, clip: Clip, action: np.ndarray, feet: Feet, progress: Progress
+    robot: Robot, sim: Simulation, clip: Clip, action: np.ndarray, progress: Progress
 ) -> Gains:
     """Return a regulator whose nominal states stand where the robot's feet stand."""
+    feet = Feet(robot)
     gains = regulator(sim, clip, action, feet.count, progress)[0]
     return replace(gains, places=feet.places(gains.qpos))
 

@@ -39,7 +39,7 @@ def expert(robot: Robot, motion: ReferenceMotion, tries: int) -> Gains:
     sim, feet = Simulation(robot, CONTROL, 1), Feet(robot)
     clip = Clip(motion, lead_of(robot, motion, CONTROL))
     action = residual_scale(robot, ControlConfig())
-    found = sampled_regulator(sim, clip, action, feet, most_tries=tries)
+    found = sampled_regulator(robot, sim, clip, action, most_tries=tries)
     return replace(found, places=feet.places(found.qpos))
 
 

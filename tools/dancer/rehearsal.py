@@ -24,9 +24,9 @@ from robojackson.rl.sim.feedback_law import Feedback
 from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.motors import residual_scale
 from robojackson.rl.sim.nominal_path import Gains
+from robojackson.rl.sim.path_trial import LARGEST_MOVE
 from robojackson.rl.sim.preview import preview_of
 from robojackson.rl.sim.reference_clip import Clip
-from robojackson.rl.sim.sampled_regulator import LARGEST_MOVE
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.rl.sim.standing_feet import Feet
 from robojackson.robot.fall import Fall

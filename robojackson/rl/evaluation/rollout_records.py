@@ -18,8 +18,9 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import EvaluateConfig
 from robojackson.rl.evaluation.rollouts import Rollouts
 from robojackson.rl.evaluation.strict_success import StrictEvaluator
-from robojackson.rl.modes.rewards import EXTREMITIES, FEET, PELVIS
+from robojackson.rl.modes.rewards import EXTREMITIES
 from robojackson.robot.model import KEYPOINTS, Robot
+from robojackson.robot.names import FEET, PELVIS
 
 LIMB_ENDS = (*FEET, *EXTREMITIES)
 SITES = len(KEYPOINTS)

@@ -12,10 +12,9 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.retarget.solver.collision import Detector
 from robojackson.rl.config.train_config import EvaluateConfig
 from robojackson.rl.evaluation.rollouts import Rollouts
-from robojackson.rl.modes.rewards import FEET
 from robojackson.robot.model import Robot
+from robojackson.robot.names import FEET, HANDS
 
-HANDS = ("left_hand", "right_hand")
 KNEES = ("left_knee", "right_knee")
 FLOOR_M = 0.005
 """Height below which a body counts as on the floor."""

@@ -16,15 +16,14 @@ from robojackson.errors import BadConfiguration
 from robojackson.geometry.rotations import quat_angle
 from robojackson.rl.config.train_config import RewardConfig, TerminationConfig
 from robojackson.rl.sim.reference_clip import ClipStep
+from robojackson.robot.names import FEET, HANDS, PELVIS
 
 RewardFunction = Callable[["RewardState"], Float[np.ndarray, " N"]]
 """A reward term of a user: one number a robot."""
 BELLS = RewardConfig.terms()
 """Terms of the reward for small errors: each has the same name in `TrackingErrors`."""
-PELVIS = "pelvis"
-FEET = ("left_foot", "right_foot")
 SOLES = (*FEET, "left_toe", "right_toe")
-EXTREMITIES = ("left_hand", "right_hand", "head")
+EXTREMITIES = (*HANDS, "head")
 
 
 @dataclass(frozen=True)

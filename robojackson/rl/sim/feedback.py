@@ -29,6 +29,7 @@ from robojackson.rl.sim.motors import (
     residual_scale,
 )
 from robojackson.rl.sim.nominal_path import Gains, Progress, no_progress
+from robojackson.rl.sim.path_trial import LARGEST_MOVE
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.regulator import regulator, settings
 from robojackson.rl.sim.simulation import Simulation, resolved
@@ -64,9 +65,7 @@ def feedback_of(
                      for name in ARRAYS))  # fmt: skip
     action = residual_scale(robot, ControlConfig())
     scaled = replace(joined, gain=share * joined.gain, offset=share * joined.offset)
-    most = (
-        LARGEST if feedback_path(robot, control) == "reference" else sampled_regulator.LARGEST_MOVE
-    )
+    most = LARGEST if feedback_path(robot, control) == "reference" else LARGEST_MOVE
     return Feedback(scaled, most * action, Feet(robot))
 
 
@@ -122,10 +121,9 @@ def regulator_of(
     sim = Simulation(robot, plain, 1)
     clip = Clip(motion, lead_of(robot, motion, control))
     action = residual_scale(robot, ControlConfig())
-    feet = Feet(robot)
     if feedback_path(robot, control) == "reference":
-        return regulator(sim, clip, action, feet.count, progress)[0]
-    return sampled_regulator.sampled_regulator(sim, clip, action, feet, progress=progress)
+        return regulator(sim, clip, action, Feet(robot).count, progress)[0]
+    return sampled_regulator.sampled_regulator(robot, sim, clip, action, progress=progress)
 
 
 def _digest(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> str:

@@ -20,8 +20,8 @@ class Gains:
         qpos, qvel: Nominal state.
         places: Feet of the nominal state, which is moved along the floor to the robot's own feet.
             NaN where the nominal state stays in the world.
-        held: Share of noisy starts from which it keeps robots upright to the end without a policy,
-            one number for each motion; NaN where that was not tried.
+        held: Share of noisy starts from which it brings robots to the end by the strict rule,
+            without a policy, one number for each motion; NaN where that was not tried.
     """
 
     gain: Float[np.ndarray, "S nu X"]

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from robojackson.rl.sim.keypoint_rule import KeypointRule
 from robojackson.rl.sim.nominal_path import Path, Recursion
 from robojackson.rl.sim.regulator import advance, weights
 from robojackson.rl.sim.simulation import Simulation
@@ -36,6 +37,8 @@ ELSEWHERE_SPEED = 0.15
 OFFSET_COST, PLACE_COST = 0.3, 20.0
 """Share of the regulator's cost of an offset; cost of a squared distance from the place, m-2."""
 LOST_RAD = 0.8
+RULE_SHARE = 0.8
+"""Share of the limits of the strict rule beyond which a robot goes on only if all others do."""
 
 
 @dataclass
@@ -67,6 +70,7 @@ class PathSearch:
         sim: One robot under the control law, without disturbances.
         action: Radians that a full action moves each target.
         feet: The robot's feet.
+        rule: What the keypoints of the robots must keep.
         reference: The motion as a path.
         rng: Draws the offsets.
 
@@ -79,11 +83,13 @@ class PathSearch:
         sim: Simulation,
         action: np.ndarray,
         feet: Feet,
+        rule: KeypointRule,
         reference: Path,
         rng: np.random.Generator,
     ) -> None:
         self._sim, self._action, self._feet = sim, action, feet
-        self._reference, self._rng = reference, rng
+        self._reference, self._rng, self._rule = reference, rng, rule
+        self._points = rule.points(reference.qpos)
         self._places = feet.places(reference.qpos)
         self.breadth = 1
 
@@ -131,7 +137,7 @@ class PathSearch:
         now = beam.of(parent)
         aim = self._offsets(now, law.gain[t + steps // 2])
         state_cost, effort = (np.diag(matrix) for matrix in weights(action, law.slope.shape[1]))
-        states = []
+        states, broken = [], np.zeros(len(parent))
         for k in range(steps):
             offset = now.offset + (aim - now.offset) * min(1.0, (k + 1) / (0.6 * steps))
             apart = _apart(now, path, aside, t + k)
@@ -140,6 +146,7 @@ class PathSearch:
             targets = path.targets[t + k] + moved
             now.qpos, now.qvel = advance(self._sim, now.qpos, now.qvel, targets)
             states.append((now.qpos, now.qvel, targets))
+            broken += self._breaks(now.qpos, t + k + 1)
             apart = _apart(now, path, aside, t + k + 1)
             now.cost = now.cost + apart**2 @ state_cost + OFFSET_COST * offset**2 @ effort
         last = t + steps
@@ -148,10 +155,14 @@ class PathSearch:
         )
         away = now.qpos[:, :2] - self._reference.qpos[last, :2]
         score = now.cost + ahead + PLACE_COST * (away**2).sum(1)
-        rows = _best(np.where(np.isfinite(score), score, np.inf), parent)
+        rows = _best(np.where(np.isfinite(score), score, np.inf), parent, broken)
         now.offset = aim
         chosen = [(qpos[rows], qvel[rows], targets[rows]) for qpos, qvel, targets in states]
         return now.of(rows), _Window(parent[rows], chosen)
+
+    def _breaks(self, qpos: Float[np.ndarray, "N nq"], t: int) -> Bool[np.ndarray, " N"]:
+        """Return which robots break the rule at a step of the motion."""
+        return ~self._rule.keeps(qpos, self._reference.qpos[t], self._points[t])
 
     def _offsets(self, beam: _Beam, gain: Float[np.ndarray, "nu X"]) -> Float[np.ndarray, "N nu"]:
         """Draw the offsets of a window; the first robots have none."""
@@ -186,10 +197,15 @@ def _apart(
     return apart
 
 
-def _best(score: Float[np.ndarray, " N"], parent: Int[np.ndarray, " N"]) -> Int[np.ndarray, " M"]:
-    """Return the surviving robots, best first, few of them from the same parent."""
+def _best(
+    score: Float[np.ndarray, " N"],
+    parent: Int[np.ndarray, " N"],
+    broken: Float[np.ndarray, " N"],
+) -> Int[np.ndarray, " M"]:
+    """Return the surviving robots, few of them from the same parent: those that broke the rule in
+    the fewest steps, of these the ones of least score first."""
     found, children = [], np.zeros(len(score), int)
-    for row in np.argsort(score):
+    for row in np.lexsort((score, broken)):
         if children[parent[row]] < CHILDREN:
             children[parent[row]] += 1
             found.append(row)
@@ -211,4 +227,4 @@ def settings() -> list[float]:
     """Return the numbers of the search: other numbers give another path."""
     counts = [WINDOW, SAMPLES, KEPT, CHILDREN, *OFFSET_SCALES, *OFFSET_SHARES, LARGEST_OFFSET]
     costs = [LARGEST_FEEDBACK, GOES_ON, ALONG, *ELSEWHERE.tolist(), ELSEWHERE_SPEED]
-    return [*counts, *costs, OFFSET_COST, PLACE_COST, LOST_RAD]
+    return [*counts, *costs, OFFSET_COST, PLACE_COST, LOST_RAD, RULE_SHARE]

@@ -1,18 +1,17 @@
 """The regulator along a path beside a motion, where the motion itself cannot be held."""
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from robojackson.rl.sim import path_search
-from robojackson.rl.sim.feedback_law import Feedback
+from robojackson.rl.sim import path_search, path_trial
+from robojackson.rl.sim.keypoint_rule import KeypointRule
 from robojackson.rl.sim.nominal_path import Gains, Linear, Path, Progress, no_progress
-from robojackson.rl.sim.path_search import LOST_RAD, PathSearch
+from robojackson.rl.sim.path_search import RULE_SHARE, PathSearch
+from robojackson.rl.sim.path_trial import Trial
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.regulator import (
-    advance,
     following,
     linearised,
     reference_path,
@@ -21,7 +20,7 @@ from robojackson.rl.sim.regulator import (
 )
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.rl.sim.standing_feet import Feet
-from robojackson.rl.sim.tangent import state_difference, state_plus
+from robojackson.robot.model import Robot
 
 PASSES, PASSES_A_S = 6, 2.0
 """Searches at most: so many, and so many for every second of the motion."""
@@ -33,32 +32,15 @@ and begins earlier."""
 TRIES, TRIED_S = 6, 45.0
 """Searches from the beginning, of which the best is taken: at most so many, and of so long a motion
 in all."""
-STARTS, RESETS, HELD_S = 24, 2, 10.0
-"""Where the regulator alone is tried, how often from each of them, and for how long on a motion
-that repeats."""
-NOISE = (0.02, 0.1, 0.02)
-"""Standard deviations of these starts from the motion: hinges, rad; their speeds, rad/s; the root's
-velocities, m/s and rad/s. Without noise a path that only exact states follow seems as good as one
-that bears errors."""
-LARGEST_MOVE = 6.0
-"""Full actions that the feedback moves a target at most: a path is up to four off the motion."""
 CYCLES_S = 4.0
 """A motion that repeats is simulated for so long at least; the last cycle but one is kept."""
 
 
-class Held(NamedTuple):
-    """How long a regulator alone keeps robots upright: the share of the starts that come to the
-    end, which decides, and the share of the time."""
-
-    to_end: float
-    of_the_time: float
-
-
 def sampled_regulator(
+    robot: Robot,
     sim: Simulation,
     clip: Clip,
     action: Float[np.ndarray, " nu"],
-    feet: Feet,
     seed: int = 0,
     progress: Progress = no_progress,
     most_tries: int | None = None,
@@ -71,14 +53,15 @@ def sampled_regulator(
         sim: One robot under the control law, without disturbances.
         clip: One motion.
         action: Radians that a full action moves each target.
-        feet: The robot's feet.
         seed: Seed of the samples.
         progress: Called with a name, the steps that are done, and all.
         most_tries: Searches from the beginning at most; `TRIES` when None.
     """
+    feet, rule = Feet(robot), KeypointRule(robot, RULE_SHARE)
     best, motion, linear = regulator(sim, clip, action, feet.count, progress)
-    held = _held(sim, clip, action, feet, best, motion)
-    if held.to_end == 1.0:
+    trial = Trial(robot, sim, clip, action, motion)
+    held = trial.held(best)
+    if held.strictly == 1.0:
         return replace(best, held=np.ones(1))
     cycles = max(3, int(np.ceil(CYCLES_S / (clip.steps * clip.dt)))) if clip.cyclic else 1
     reference = reference_path(sim, clip, cycles * clip.steps)
@@ -86,15 +69,15 @@ def sampled_regulator(
     tries = int(np.clip(TRIED_S / (len(reference) * clip.dt), 1, most_tries or TRIES))
     for number in range(tries):
         rng = np.random.default_rng([seed, number])
-        search = PathSearch(sim, action, feet, reference, rng)
+        search = PathSearch(sim, action, feet, rule, reference, rng)
         path, along = _searched(search, sim, reference, linear, action, clip.dt, progress)
         found = _gains(sim, clip, action, feet, path, along, reference)
-        now = _held(sim, clip, action, feet, found, motion)
+        now = trial.held(found)
         if now > held:
             best, held = found, now
-        if held.to_end == 1.0:
+        if held.strictly == 1.0:
             break
-    return replace(best, held=np.array([held.to_end]))
+    return replace(best, held=np.array([held.strictly]))
 
 
 def _searched(
@@ -124,43 +107,6 @@ def _searched(
             break
         begin = max(0, kept - round(AGAIN_S / dt))
     return path, linear
-
-
-def _held(
-    sim: Simulation, clip: Clip, action: np.ndarray, feet: Feet, gains: Gains, path: Path
-) -> Held:
-    """Try a regulator alone from several starts, with noise.
-
-    Args:
-        path: The motion, whose targets the regulator moves.
-    """
-    last = clip.steps if clip.cyclic else max(1, clip.steps // 4)
-    start = np.repeat(np.linspace(0, last, STARTS, endpoint=False).astype(int), RESETS)
-    at, upright = clip.at(start), np.ones(len(start), bool)
-    qpos, qvel = state_plus(at.qpos, at.qvel, _disturbed(len(start), sim.model.nv))
-    ends = np.full(len(start), round(HELD_S / clip.dt))
-    ends = ends if clip.cyclic else clip.steps - 1 - start
-    held, law = np.zeros(len(start)), Feedback(gains, LARGEST_MOVE * action, feet)
-    for k in range(int(ends.max())):
-        (now,) = np.nonzero(upright & (k < ends))
-        if not len(now):
-            break
-        row = (start[now] + k) % clip.steps
-        there = clip.at(start[now] + k).qpos
-        step = law.at(row, there[:, :3] - clip.at(row).qpos[:, :3])
-        targets = path.targets[row] + step.targets(qpos[now], qvel[now])
-        qpos[now], qvel[now] = advance(sim, qpos[now], qvel[now], targets)
-        tilt = state_difference(qpos[now], qvel[now], there, qvel[now])[:, 3:6]
-        upright[now] = np.linalg.norm(tilt, axis=1) < LOST_RAD
-        held[now] += upright[now]
-    return Held(float(upright.mean()), float((held / ends).mean()))
-
-
-def _disturbed(robots: int, nv: int) -> Float[np.ndarray, "N X"]:
-    """Return the noise of the starts, the same in every trial."""
-    hinges, speeds, root = NOISE
-    spread = np.repeat([0.0, hinges, root, speeds], [6, nv - 6, 6, nv - 6])
-    return spread * np.random.default_rng(0).normal(size=(robots, 2 * nv))
 
 
 def _repeated(linear: Linear, cycles: int) -> Linear:
@@ -211,11 +157,7 @@ def settings() -> list[float]:
         STALLS,
         ADVANCE_S,
         AGAIN_S,
-        STARTS,
-        RESETS,
-        HELD_S,
-        *NOISE,
-        LARGEST_MOVE,
         CYCLES_S,
         *path_search.settings(),
+        *path_trial.settings(),
     ]

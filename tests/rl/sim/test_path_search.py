@@ -6,9 +6,11 @@ import pytest
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.sim import path_search, sampled_regulator
+from robojackson.rl.sim.keypoint_rule import KeypointRule
 from robojackson.rl.sim.motors import residual_scale
 from robojackson.rl.sim.nominal_path import Gains, Linear, Path
 from robojackson.rl.sim.path_search import PathSearch
+from robojackson.rl.sim.path_trial import Held, Trial
 from robojackson.rl.sim.preview import driven_clip
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.regulator import advance, regulator, riccati
@@ -50,7 +52,8 @@ def searched(
     _, path, linear = plain
     path = Path(path.qpos[:STEPS], path.qvel[:STEPS], path.targets[:STEPS])
     law = riccati(linear, action, cyclic=True)
-    search = PathSearch(sim, action, feet, path, np.random.default_rng(seed))
+    rule = KeypointRule(robot)
+    search = PathSearch(sim, action, feet, rule, path, np.random.default_rng(seed))
     return path, search.run(path, law, 0)[0]
 
 
@@ -72,7 +75,7 @@ def test_a_path_is_joined_to_the_motion(
 ) -> None:
     path, found = searched(robot, sim, plain, 0)
     feet = Feet(robot)
-    search = PathSearch(sim, np.ones(17), feet, path, np.random.default_rng(0))
+    search = PathSearch(sim, np.ones(17), feet, KeypointRule(robot), path, np.random.default_rng(0))
     joined = search.joined(path, found, 0, 10)
     np.testing.assert_array_equal(joined.qpos[:10], found.qpos[:10])
     np.testing.assert_array_equal(joined.qpos[10:], path.qpos[10:])
@@ -80,9 +83,16 @@ def test_a_path_is_joined_to_the_motion(
 
 def test_few_robots_go_on_from_one_parent() -> None:
     score = np.arange(40.0)
-    rows = path_search._best(score, np.repeat([0, 1], 20))
+    rows = path_search._best(score, np.repeat([0, 1], 20), np.zeros(40))
     assert (rows < path_search.CHILDREN).sum() <= path_search.CHILDREN
     assert list(rows) == sorted(rows)
+
+
+def test_robots_that_broke_the_rule_go_on_only_if_too_few_kept_it() -> None:
+    score, broken = np.arange(40.0), np.where(np.arange(40) < 36, 2.0, 0.0)
+    broken[0] = 1.0
+    rows = path_search._best(score, np.arange(40), broken)
+    np.testing.assert_array_equal(rows, [36, 37, 38, 39, 0, 1][: path_search.KEPT])
 
 
 def test_feet_that_stand_decide_how_far_a_robot_is_from_its_place(robot: Robot) -> None:
@@ -97,22 +107,22 @@ def test_feet_that_stand_decide_how_far_a_robot_is_from_its_place(robot: Robot) 
 
 
 @pytest.mark.slow
-def test_the_regulator_that_keeps_robots_up_longer_is_taken(
+def test_the_regulator_that_brings_more_robots_to_the_end_by_the_rule_is_taken(
     robot: Robot,
     sim: Simulation,
     clip: Clip,
     plain: tuple[Gains, Path, Linear],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    action, feet = residual_scale(robot, ControlConfig()), Feet(robot)
+    action = residual_scale(robot, ControlConfig())
     monkeypatch.setattr(sampled_regulator, "regulator", lambda *given: plain)
     monkeypatch.setattr(sampled_regulator, "PASSES", 1)
     monkeypatch.setattr(sampled_regulator, "PASSES_A_S", 0.0)
     monkeypatch.setattr(sampled_regulator, "TRIES", 1)
     for shares, anchored in (((1.0,), False), ((0.5, 0.4), False), ((0.5, 0.6), True)):
-        held = iter(sampled_regulator.Held(share, share) for share in shares)
-        monkeypatch.setattr(sampled_regulator, "_held", lambda *given, held=held: next(held))
-        found = sampled_regulator.sampled_regulator(sim, clip, action, feet)
+        held = iter(Held(share, 1.0, 1.0) for share in shares)
+        monkeypatch.setattr(Trial, "held", lambda *given, held=held: next(held))
+        found = sampled_regulator.sampled_regulator(robot, sim, clip, action)
         assert bool(np.isfinite(found.places).all()) == anchored
         assert found.held == max(shares)
         if not anchored:
