@@ -1,8 +1,9 @@
 """Policies of the bundled dances and of the authors' clips, trained and evaluated: one cached row a
 move and a seed, so that it may take several sittings.
 
-A row's training is pinned to a core of its own and ended by the CPU minutes of its bar. A motion
-that the gate refuses is trained on anyway, and the row is marked.
+A row's training is pinned to a core of its own and ended by the CPU minutes of its bar, or by the
+control steps that these are worth, so that a faster machine learns no longer. A motion that the
+gate refuses is trained on anyway, and the row is marked.
 """
 
 import os
@@ -11,6 +12,9 @@ from concurrent.futures import ThreadPoolExecutor
 from queue import SimpleQueue
 
 from benchmarks.learning.policies import MOVES, Folders, budget, must, reference_of, source_of
+
+STEPS_A_MINUTE = 50_000
+"""Control steps that a CPU minute of one core is worth."""
 
 
 def train_and_judge(
@@ -23,7 +27,9 @@ def train_and_judge(
     work = folders.work / name
     reference, out = work / "reference.parquet", work / f"s{seed}{budget(minutes)}"
     spent = minutes or MOVES[name].cpu_minutes
-    options = ["--seed", seed, "--set", f"cpu_minutes={spent}", "--move", name, "--force"]
+    budgets = (f"cpu_minutes={spent}", f"steps={round(STEPS_A_MINUTE * spent)}")
+    options = ["--seed", seed, "--move", name, "--force"]
+    options += [word for one in budgets for word in ("--set", one)]
     must("train", reference, "-o", out, *options, core=core)
     folders.rows.mkdir(parents=True, exist_ok=True)
     for seconds, path in kept.items():
