@@ -93,7 +93,8 @@ def test_an_answer_without_depth_does_not_depend_on_the_detectors(
 def test_a_hidden_limb_is_less_certain(seen: Landmarks, placed: np.ndarray) -> None:
     wrist = list(BODY).index(landmark("left_wrist"))
     hidden = lifted(masked(seen), placed).spread[45:55, wrist]
-    assert (hidden.mean(0) > 1.1 * lifted(seen, placed).spread[45:55, wrist].mean(0)).all()
+    plain = lifted(seen, placed).spread[45:55, wrist]
+    assert (hidden.mean(0) > [1.5, 1.05] * plain.mean(0)).all()
 
 
 def test_hypotheses_differ_only_where_a_limb_is_hidden(seen: Landmarks, placed: np.ndarray) -> None:
