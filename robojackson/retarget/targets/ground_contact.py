@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.ndimage import gaussian_filter1d, median_filter
+from scipy.ndimage import gaussian_filter1d, maximum_filter1d, median_filter
 
 from robojackson.motion.smpl_sequence import AIR, CONTACT_POINTS, PLANTED, SLIDING
 from robojackson.retarget.targets.human_clip import HumanClip
@@ -21,6 +21,8 @@ _WANDER_M = 0.06  # m: a planted foot stays this near to where it stands
 _NEAR_FLOOR = 0.03  # m over the lowest foot
 _FREE_FALL = 0.8  # share of gravity that the hips must be falling with to count as airborne
 _SHORTEST_FLIGHT = 0.08  # s
+_STEPS_M, _STEPS_S = 0.20, 0.16  # a hop that is no flight is a step: feet so low, so long around it
+_HOP_M = 0.05  # rise of the lowest sole in a hop
 
 
 def free_fall(human: Mapping[str, np.ndarray], clip: HumanClip) -> Bool[np.ndarray, " N"]:
@@ -68,19 +70,21 @@ def ball_contact(
     """Return the states of the robot's balls: those of the human points they follow, planted where
     slow.
 
-    A foot that stands still near the floor is planted with any label; a body that touches
-    nothing and does not fall stands on its lowest foot.
+    A foot that stands still near the floor is planted with any label. A body that touches nothing
+    and does not fall as fast as in flight takes a step there instead of a hop: the foot that takes
+    off stays and the one that lands is down already, where both are low.
     """
     mode = clip.edges
     above = balls[..., 2] - balls[..., 2].min(axis=1, keepdims=True)
     bare = (clip.contact == AIR).all(axis=1) & ~airborne
+    stepped = _around_hops(bare, balls[..., 2].min(axis=1), clip)
     window = 2 * round(0.045 / clip.dt) + 1
     out = np.zeros(balls.shape[:2], int)
     for column, point in enumerate(robot.description.contacts.values()):
         own = [i for i, name in enumerate(CONTACT_POINTS) if follows(point, name)]
         speed = _speed(balls[:, column], clip)
         stands = (above[:, column] < _NEAR_FLOOR) & (speed < _STILL_FOOT) & ~airborne
-        stands |= bare & (above[:, column] < 0.01)
+        stands |= (bare & (above[:, column] < 0.01)) | (stepped & (above[:, column] < _STEPS_M))
         reaches = above[:, column] < _HEEL_OFF_M
         touching = ((clip.contact[:, own] != AIR).any(axis=1) & reaches) | stands
         touching = median_filter(touching.astype(int), window, mode=mode) > 0
@@ -90,6 +94,19 @@ def ball_contact(
         still = _standing_runs(still & touching, balls[:, column])
         out[:, column] = np.where(touching, np.where(still, PLANTED, SLIDING), AIR)
     return out
+
+
+def _around_hops(
+    bare: Bool[np.ndarray, " N"], lowest: Float[np.ndarray, " N"], clip: HumanClip
+) -> Bool[np.ndarray, " N"]:
+    """Return the steps of hops, stretches without contact in which the feet leave the floor, and
+    those around them."""
+    hops = np.zeros(len(bare), bool)
+    floor = np.median(lowest[~bare]) if not bare.all() else lowest.min()
+    for steps in stretches(bare, clip.cycle_offset is not None):
+        hops[steps] = lowest[steps].max() - floor > _HOP_M
+    around = 2 * round(_STEPS_S / clip.dt) + 1
+    return np.asarray(maximum_filter1d(hops, around, mode=clip.edges))
 
 
 def follows(point: ContactPoint, human: str) -> bool:

@@ -16,6 +16,7 @@ HUMAN_END = {"hip": "hip", "knee": "knee", "foot": "ankle", "shoulder": "shoulde
     "elbow": "elbow",
     "hand": "wrist",
 }
+RIGHT_FOOT = ("right_ankle", "right_foot", "right_big_toe")
 
 
 def _clip(name: str = "walk", **changes: object) -> HumanClip:
@@ -117,6 +118,21 @@ def test_a_bouncing_step_is_no_jump(robot: Robot):
     aims = targets(_jump(fall=0.65 * 9.81), robot)
     assert not aims.airborne.any()
     assert (aims.contact != AIR).any(axis=1).all()
+
+
+@pytest.mark.parametrize(("fall", "both"), [(0.65 * 9.81, True), (0.5, False)])
+def test_a_leap_that_does_not_fall_is_a_step_with_both_feet_down(
+    robot: Robot, fall: float, both: bool
+):
+    """A foot that is raised where the labels say air, but the body does not rise, stays raised."""
+    clip = _jump(fall=fall)
+    points = clip.keypoints_w.copy()
+    raised = [i for i, name in enumerate(KEYPOINT_NAMES) if name in RIGHT_FOOT]
+    points[15:40, raised] += [-0.25, 0.0, 0.12]
+    aims = targets(replace(clip, keypoints_w=points), robot)
+    sides = np.array([point.side for point in robot.description.contacts.values()])
+    assert (aims.contact[22:33][:, sides == "left"] != AIR).any(axis=1).all()
+    assert (aims.contact[22:33][:, sides == "right"] != AIR).any(axis=1).all() == both
 
 
 def test_frames_without_a_person_weigh_less(robot: Robot):
