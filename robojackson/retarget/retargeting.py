@@ -7,7 +7,7 @@ same with the axes and signs of the hinges corrected.
 
 import logging
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -20,7 +20,7 @@ from robojackson.retarget import paper_mapping
 from robojackson.retarget.feasibility.certification import certify
 from robojackson.retarget.feasibility.contact_wrench import Tolerance
 from robojackson.retarget.feasibility.tempo import times_at, warped
-from robojackson.retarget.feasible_motion import Feasible, make_feasible
+from robojackson.retarget.feasible_motion import Feasible, feasible_share, make_feasible
 from robojackson.retarget.retarget_config import RetargetConfig
 from robojackson.retarget.scorecard import hovers, score
 from robojackson.retarget.scorecard_gate import BARS, failures
@@ -62,24 +62,11 @@ def retarget_motion(
     clip = replace(clip, time_s=clip.time_s + frames.start / sequence.fps)
     extra = _notes(sequence, clip, cycle, config)
     extra["trimmed_s"] += (whole - len(sequence)) / sequence.fps
-    plain = targets(clip, robot)
     danced: Bool[np.ndarray, " S"] | None = None
-    tailed = Tailed(plain, slice(0, len(plain)))
-    upright = aims = plain
     if config.method == "optimise":
-        tailed = with_tails(plain, robot, config.tails)
-        upright = aims = tailed.aims
+        tailed, upright, able, floor_mm, lean_deg = _danced(clip, robot, config)
         extra |= _tail_seconds(tailed)
-        found, floor_mm = optimise(aims, robot, config)
-        hovering = hovers(robot, found.qpos, aims.dt)
-        if hovering.mean() > BARS["unsupported_share"] / 2 and aims.airborne.any():
-            _log.info("removed a flight that does not fall: solving again")
-            upright = with_tails(
-                targets(clip, robot, hovering[tailed.clip]), robot, config.tails
-            ).aims
-            found = polished(upright, found.qpos, found.shift, robot, config)
-        able = make_feasible(robot, found.qpos, found.aims, config, tailed.clip)
-        extra |= {"keypoint_floor_mm": floor_mm, "lean_deg": found.lean_deg}
+        extra |= {"keypoint_floor_mm": floor_mm, "lean_deg": lean_deg}
         extra |= _slowing(able, upright, robot)
         qpos, aims, upright = able.qpos, able.aims, warped(upright, able.steps)
         time_s = times_at(tailed.source_time(clip.time_s), able.steps)
@@ -90,8 +77,59 @@ def retarget_motion(
         qpos = paper_mapping.mapped(
             sequence, robot, clip.time_s, corrected=config.method == "framefix"
         )
-        time_s = clip.time_s
+        time_s, upright = clip.time_s, targets(clip, robot)
+        aims = upright
     return assemble(qpos, time_s, aims, upright, robot, extra, config.weights.tolerance, danced)
+
+
+class _Dance(NamedTuple):
+    """A solved motion.
+
+    Attributes:
+        tailed: Targets with stands around the clip.
+        upright: The dancer's own motion, not leaned.
+        able: The motion after repair.
+        floor_mm: Mean error of every frame solved by itself, mm.
+        lean_deg: Lean that puts the body over its feet, degrees.
+    """
+
+    tailed: Tailed
+    upright: Targets
+    able: Feasible
+    floor_mm: float
+    lean_deg: float
+
+
+def _danced(clip: HumanClip, robot: Robot, config: RetargetConfig) -> _Dance:
+    """Return the motion with hops that are no flights as steps; as hops where the robot can do
+    these better."""
+    stepped, hopped = (targets(clip, robot, hops=hops) for hops in (False, True))
+    found = _solved(clip, robot, config, stepped, hops=False)
+    if np.array_equal(stepped.contact, hopped.contact):
+        return found
+    share = feasible_share(robot, found.able, config)
+    if share >= 1.0 - BARS["infeasible_share"]:
+        return found
+    _log.info("hops as steps: %.0f %% feasible; solving with hops", 100 * share)
+    other = _solved(clip, robot, config, hopped, hops=True)
+    return other if feasible_share(robot, other.able, config) > share else found
+
+
+def _solved(
+    clip: HumanClip, robot: Robot, config: RetargetConfig, plain: Targets, hops: bool
+) -> _Dance:
+    """Solve the targets of a clip, with stands around it, and repair the motion."""
+    tailed = with_tails(plain, robot, config.tails)
+    upright = aims = tailed.aims
+    found, floor_mm = optimise(aims, robot, config)
+    hovering = hovers(robot, found.qpos, aims.dt)
+    if hovering.mean() > BARS["unsupported_share"] / 2 and aims.airborne.any():
+        _log.info("removed a flight that does not fall: solving again")
+        grounded = targets(clip, robot, hovering[tailed.clip], hops)
+        upright = with_tails(grounded, robot, config.tails).aims
+        found = polished(upright, found.qpos, found.shift, robot, config)
+    able = make_feasible(robot, found.qpos, found.aims, config, tailed.clip)
+    return _Dance(tailed, upright, able, floor_mm, found.lean_deg)
 
 
 def assemble(

@@ -65,19 +65,24 @@ def runs(flags: Bool[np.ndarray, " N"]) -> list[tuple[int, int]]:
 
 
 def ball_contact(
-    clip: HumanClip, robot: Robot, balls: Float[np.ndarray, "N C 3"], airborne: np.ndarray
+    clip: HumanClip,
+    robot: Robot,
+    balls: Float[np.ndarray, "N C 3"],
+    airborne: np.ndarray,
+    hops: bool = False,
 ) -> Int[np.ndarray, "N C"]:
     """Return the states of the robot's balls: those of the human points they follow, planted where
     slow.
 
     A foot that stands still near the floor is planted with any label. A body that touches nothing
     and does not fall as fast as in flight takes a step there instead of a hop: the foot that takes
-    off stays and the one that lands is down already, where both are low.
+    off stays and the one that lands is down already, where both are low. With `hops` it stands on
+    its lowest foot.
     """
     mode = clip.edges
     above = balls[..., 2] - balls[..., 2].min(axis=1, keepdims=True)
     bare = (clip.contact == AIR).all(axis=1) & ~airborne
-    stepped = _around_hops(bare, balls[..., 2].min(axis=1), clip)
+    stepped = _around_hops(bare & (not hops), balls[..., 2].min(axis=1), clip)
     window = 2 * round(0.045 / clip.dt) + 1
     out = np.zeros(balls.shape[:2], int)
     for column, point in enumerate(robot.description.contacts.values()):

@@ -60,7 +60,10 @@ class Targets:
 
 
 def targets(
-    clip: HumanClip, robot: Robot, hovering: Bool[np.ndarray, " N"] | None = None
+    clip: HumanClip,
+    robot: Robot,
+    hovering: Bool[np.ndarray, " N"] | None = None,
+    hops: bool = False,
 ) -> Targets:
     """Return the bone-direction targets, contact states of the soles and the ground refit.
 
@@ -69,6 +72,7 @@ def targets(
         robot: The robot.
         hovering: Steps of an earlier solution that claimed to fly and did not fall: their flights
             are taken back.
+        hops: Whether a hop that is no flight stays one; else it is a step (`ball_contact`).
     """
     human = {name: clip.keypoints_w[:, index] for name, index in _HUMAN.items()}
     scale = leg_ratio(human, robot)
@@ -84,7 +88,7 @@ def targets(
     airborne = free_fall(human, clip)
     if hovering is not None:
         airborne = without(airborne, hovering, clip.cycle_offset is not None)
-    contact = ball_contact(clip, robot, balls, airborne)
+    contact = ball_contact(clip, robot, balls, airborne, hops)
     soles = balls[..., 2] - robot.contact_radii
     keypoints[..., 2] += ground_shift(soles, contact, clip)[:, None]
     trust = np.where(clip.valid, 1.0, 0.2)[:, None]
