@@ -61,10 +61,15 @@ def require_robot(reference: ReferenceMotion, robot: Robot) -> Robot:
         RejectedReference: it was made for another.
     """
     if robot.sha256 != reference.model_sha256:
+        own = robot.description.name
+        other = f"robot {reference.robot!r}, not for {own!r}"
+        if own == reference.robot:
+            other = (
+                f"another model of {own!r} (sha256 {reference.model_sha256[:12]}..., here "
+                f"{robot.sha256[:12]}...)"
+            )
         raise RejectedReference(
-            f"the reference motion was made for another model of {reference.robot!r} "
-            f"(sha256 {reference.model_sha256[:12]}..., here {robot.sha256[:12]}...)",
-            "retarget the motion again",
+            f"the reference motion was made for {other}", "retarget the motion again"
         )
     for kind in ("joint_names", "body_names", "keypoint_names", "contact_names"):
         said, known = getattr(reference, kind), getattr(robot, kind)

@@ -86,6 +86,8 @@ def test_another_model_than_the_motions_is_refused(made: Made, tmp_path: Path) -
     model.write_text(model.read_text().replace('size="0.07"', 'size="0.08"', 1))
     with pytest.raises(RejectedReference, match="another model of 'mine'"):
         made.train("other", str(other))
+    with pytest.raises(RejectedReference, match="made for robot 'mine', not for 'humanoid'"):
+        made.train("other", "humanoid")
 
 
 @pytest.mark.medium
