@@ -86,8 +86,9 @@ def test_another_model_than_the_motions_is_refused(made: Made, tmp_path: Path) -
     model.write_text(model.read_text().replace('size="0.07"', 'size="0.08"', 1))
     with pytest.raises(RejectedReference, match="another model of 'mine'"):
         made.train("other", str(other))
-    with pytest.raises(RejectedReference, match="made for robot 'mine', not for 'humanoid'"):
-        made.train("other", "humanoid")
+    other.write_text(other.read_text().replace("name: mine", "name: other"))
+    with pytest.raises(RejectedReference, match="made for robot 'mine', not for 'other'"):
+        made.train("other", str(other))
 
 
 @pytest.mark.medium
