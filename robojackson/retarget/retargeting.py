@@ -101,17 +101,15 @@ class _Dance(NamedTuple):
 
 
 def _danced(clip: HumanClip, robot: Robot, config: RetargetConfig) -> _Dance:
-    """Return the motion with hops that are no flights as steps; as hops where the robot can do
-    these better."""
-    stepped, hopped = (targets(clip, robot, hops=hops) for hops in (False, True))
-    found = _solved(clip, robot, config, stepped, hops=False)
-    if np.array_equal(stepped.contact, hopped.contact):
-        return found
+    """Return the motion with its hops; with steps in place of hops that are no flights where the
+    robot can do only these."""
+    hopped, stepped = (targets(clip, robot, hops=hops) for hops in (True, False))
+    found = _solved(clip, robot, config, hopped, hops=True)
     share = feasible_share(robot, found.able, config)
-    if share >= 1.0 - BARS["infeasible_share"]:
+    if share >= 1.0 - BARS["infeasible_share"] or np.array_equal(stepped.contact, hopped.contact):
         return found
-    _log.info("hops as steps: %.0f %% feasible; solving with hops", 100 * share)
-    other = _solved(clip, robot, config, hopped, hops=True)
+    _log.info("%.0f %% feasible: solving with steps in place of hops", 100 * share)
+    other = _solved(clip, robot, config, stepped, hops=False)
     return other if feasible_share(robot, other.able, config) > share else found
 
 
