@@ -69,15 +69,15 @@ def ball_contact(
     robot: Robot,
     balls: Float[np.ndarray, "N C 3"],
     airborne: np.ndarray,
-    hops: bool = False,
+    hops: bool = True,
 ) -> Int[np.ndarray, "N C"]:
     """Return the states of the robot's balls: those of the human points they follow, planted where
     slow.
 
-    A foot that stands still near the floor is planted with any label. A body that touches nothing
-    and does not fall as fast as in flight takes a step there instead of a hop: the foot that takes
-    off stays and the one that lands is down already, where both are low. With `hops` it stands on
-    its lowest foot.
+    A foot that stands still near the floor is planted with any label; a body that touches nothing
+    and does not fall as fast as in flight stands on its lowest foot. Without `hops` it takes a step
+    where its feet leave the floor: the foot that takes off stays and the one that lands is down
+    already, where both are low.
     """
     mode = clip.edges
     above = balls[..., 2] - balls[..., 2].min(axis=1, keepdims=True)

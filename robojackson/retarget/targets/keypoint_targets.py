@@ -63,7 +63,7 @@ def targets(
     clip: HumanClip,
     robot: Robot,
     hovering: Bool[np.ndarray, " N"] | None = None,
-    hops: bool = False,
+    hops: bool = True,
 ) -> Targets:
     """Return the bone-direction targets, contact states of the soles and the ground refit.
 
