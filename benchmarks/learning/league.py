@@ -45,7 +45,7 @@ INSTANT, TRAINED = "ours, instant (regulator)", "ours, regulator polished by tra
 SCRATCH, POLISHED, REPLAY = "ours, from scratch", "ours, twist2 polished", "reference replayed"
 MISSING = {
     SCRATCH: "no rows kept of trainings without feedback; figures of them: docs/learning.md",
-    POLISHED: "no training of ours begins from a downloaded tracker yet",
+    POLISHED: "tried on cmu_05_11, worse than the tracker (docs/learning_g1.md)",
     REPLAY: "kept rows replay it with feedback, which is the regulator",
 }
 Row = dict[str, Any]
