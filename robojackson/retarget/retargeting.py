@@ -103,10 +103,13 @@ class _Dance(NamedTuple):
 def _danced(clip: HumanClip, robot: Robot, config: RetargetConfig) -> _Dance:
     """Return the motion with its hops; with steps in place of hops that are no flights where the
     robot can do only these."""
-    hopped, stepped = (targets(clip, robot, hops=hops) for hops in (True, False))
+    hopped = targets(clip, robot, hops=True)
     found = _solved(clip, robot, config, hopped, hops=True)
     share = feasible_share(robot, found.able, config)
-    if share >= 1.0 - BARS["infeasible_share"] or np.array_equal(stepped.contact, hopped.contact):
+    if share >= 1.0 - BARS["infeasible_share"]:
+        return found
+    stepped = targets(clip, robot, hops=False)
+    if np.array_equal(stepped.contact, hopped.contact):
         return found
     _log.info("%.0f %% feasible: solving with steps in place of hops", 100 * share)
     other = _solved(clip, robot, config, stepped, hops=False)

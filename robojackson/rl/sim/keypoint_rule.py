@@ -1,10 +1,10 @@
 """The part of a robot's strict rule that concerns its keypoints, as a path is searched; metres."""
 
-import mujoco
 import numpy as np
 from jaxtyping import Bool, Float
 
 from robojackson.metrics.rollout_score import heading_frame, site_error
+from robojackson.rl.sim.standing_feet import Sites
 from robojackson.robot.model import Robot
 from robojackson.robot.names import FEET, HANDS, PELVIS
 
@@ -18,18 +18,12 @@ class KeypointRule:
 
     def __init__(self, robot: Robot, share: float = 1.0) -> None:
         names, self._rule, self._share = robot.keypoint_names, robot.description.strict, share
-        self._model, self._data = robot.model, mujoco.MjData(robot.model)
-        self._sites, self._pelvis = robot.keypoint_sites, names.index(PELVIS)
+        self._sites, self._pelvis = Sites(robot, robot.keypoint_sites), names.index(PELVIS)
         self._ends = [names.index(name) for name in (*FEET, *HANDS)]
 
     def points(self, qpos: Float[np.ndarray, "N nq"]) -> Float[np.ndarray, "N K 3"]:
         """Return the keypoints of robots in poses, world."""
-        found = np.empty((len(qpos), len(self._sites), 3))
-        for row, pose in enumerate(qpos):
-            self._data.qpos[:] = pose
-            mujoco.mj_kinematics(self._model, self._data)
-            found[row] = self._data.site_xpos[self._sites]
-        return found
+        return self._sites.at(qpos)
 
     def keeps(
         self,

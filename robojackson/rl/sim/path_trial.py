@@ -87,8 +87,8 @@ class Trial:
             qpos[now], qvel[now] = advance(sim, qpos[now], qvel[now], targets)
             tilt = state_difference(qpos[now], qvel[now], there.qpos, qvel[now])[:, 3:6]
             upright[now] = np.linalg.norm(tilt, axis=1) < LOST_RAD
-            there = clip.at(start[now] + k + 1)
-            strict[now] &= self._rule.keeps(qpos[now], there.qpos, there.points)
+            then = clip.at(start[now] + k + 1)
+            strict[now] &= self._rule.keeps(qpos[now], then.qpos, then.points)
             time[now] += upright[now]
         share = float((upright & strict).mean())
         return Held(share, float(upright.mean()), float((time / ends).mean()))

@@ -2,12 +2,28 @@
 
 import mujoco
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from robojackson.robot.model import Robot
 
 LOW_M = 0.02
 """Height above the lowest foot that reduces a foot's weight by a factor of e, metres."""
+
+
+class Sites:
+    """Sites of a robot in many poses, world frame, metres."""
+
+    def __init__(self, robot: Robot, sites: Int[np.ndarray, " P"]) -> None:
+        self._model, self._data, self._sites = robot.model, mujoco.MjData(robot.model), sites
+
+    def at(self, qpos: Float[np.ndarray, "N nq"]) -> Float[np.ndarray, "N P 3"]:
+        """Return the sites of robots in poses."""
+        found = np.empty((len(qpos), len(self._sites), 3))
+        for row, pose in enumerate(qpos):
+            self._data.qpos[:] = pose
+            mujoco.mj_kinematics(self._model, self._data)
+            found[row] = self._data.site_xpos[self._sites]
+        return found
 
 
 class Feet:
@@ -18,18 +34,12 @@ class Feet:
     """
 
     def __init__(self, robot: Robot) -> None:
-        self._model, self._data = robot.model, mujoco.MjData(robot.model)
-        self._sites = robot.keypoint_sites[np.unique(robot.contact_keypoints)]
-        self.count = len(self._sites)
+        sites = robot.keypoint_sites[np.unique(robot.contact_keypoints)]
+        self._sites, self.count = Sites(robot, sites), len(sites)
 
     def places(self, qpos: Float[np.ndarray, "N nq"]) -> Float[np.ndarray, "N F 3"]:
         """Return the feet of robots in poses."""
-        found = np.empty((len(qpos), len(self._sites), 3))
-        for row, pose in enumerate(qpos):
-            self._data.qpos[:] = pose
-            mujoco.mj_kinematics(self._model, self._data)
-            found[row] = self._data.site_xpos[self._sites]
-        return found
+        return self._sites.at(qpos)
 
     def apart(
         self, qpos: Float[np.ndarray, "N nq"], places: Float[np.ndarray, "*N F 3"]
