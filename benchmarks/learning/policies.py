@@ -4,8 +4,9 @@ import json
 import os
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 from benchmarks.learning.split import load_split
 from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
@@ -34,6 +35,8 @@ class Move:
         robot: Name of the robot.
         mpjpe_mm: Largest mpjpe_l, fallen robots counted to the horizon; none for Humanoid-v5.
         cmu: Whether it is a BVH file of CMU.
+        same_as: Row whose reference motion it has; its own when empty.
+        observation: Inputs of the policy.
     """
 
     clip: str
@@ -46,6 +49,8 @@ class Move:
     robot: str = "humanoid"
     mpjpe_mm: float | None = None
     cmu: bool = False
+    same_as: str = ""
+    observation: Literal["full", "onboard"] = "full"
 
     @property
     def horizons_s(self) -> tuple[float, ...]:
@@ -74,6 +79,29 @@ MOVES = {
         f"g1_cmu_{take}": Move(take, 25, 0.93, 0.8, 0.6, False, robot="g1", mpjpe_mm=42, cmu=True)
         for take in ("05_02", "05_09", "05_18")
     },
+}
+
+
+def onboard(name: str, move: Move) -> Move:
+    """Return the row of the same move for a policy that sees a robot's own sensors: twice the time,
+    lower bars."""
+    assert move.mpjpe_mm is not None
+    return replace(
+        move,
+        cpu_minutes=2 * move.cpu_minutes,
+        success=0.9,
+        worst=0.75,
+        skill=round(move.skill - 0.1, 2),
+        mpjpe_mm=move.mpjpe_mm + 10,
+        same_as=name,
+        observation="onboard",
+    )
+
+
+MOVES |= {
+    f"{name}_onboard": onboard(name, move)
+    for name, move in list(MOVES.items())
+    if move.robot == "g1"
 }
 
 
@@ -146,6 +174,7 @@ def reference_of(name: str, folders: Folders) -> Path:
     """Return the motion of a move for the robot, made once; `gate.json` beside it has the
     verdict."""
     move, work = MOVES[name], folders.work / name
+    name = move.same_as or name
     reference = work / "reference.parquet"
     if (work / "gate.json").is_file():
         return reference

@@ -12,10 +12,11 @@ import json
 import os
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 
@@ -25,7 +26,7 @@ from robojackson.api.robots import load_robot
 from robojackson.errors import BadConfiguration, BadPolicy
 from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
 from robojackson.pipeline.tracker_descriptions import describe_tracker, tracker_names
-from robojackson.rl.config.evaluate_config import EvaluateConfig
+from robojackson.rl.config.evaluate_config import TRAINED, EvaluateConfig
 from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
 from robojackson.rl.sim.variation import Variation, varied
 from robojackson.rl.trackers.tracker import Tracker
@@ -41,7 +42,9 @@ FIGURES = (
     *("survived_s", "success", "strict_success", "skill", "site_error_m", "mpjpe_l_m"),
     *("mpjpe_l_alive_m", "mpjpe_g_alive_m", "drift_m", "limb_gain", "acceleration_ratio"),
 )
-SHOWN = ("tracker", "move", "friction", *FIGURES, "cpu_s")
+SHOWN = ("tracker", "move", "friction", *FIGURES, "survived_10_s", "cpu_s")
+SURVIVED_S = 10.0
+"""Time of the share of starts that survive so long, or to the end of a shorter motion."""
 
 
 def main() -> None:
@@ -111,8 +114,14 @@ def evaluated(tracker: Tracker, motion: ReferenceMotion, friction: float) -> dic
     figures = {name: found.summary[name] for name in FIGURES}
     pinned = tracker.description.file
     facts = {"sha256": pinned.sha256 if pinned else "", "steps": len(motion), "dt": motion.dt}
-    starts = sum(row["policy"] == "trained" for row in found.rows)
-    return {**facts, "starts": starts, **figures, "cpu_s": time.process_time() - began}
+    own = [row for row in found.rows if row["policy"] == TRAINED]
+    lasted = {"survived_10_s": float(np.mean([lasts(row, SURVIVED_S) for row in own]))}
+    return {**facts, "starts": len(own), **figures, **lasted, "cpu_s": time.process_time() - began}
+
+
+def lasts(row: Mapping[str, Any], seconds: float) -> bool:
+    """Return whether a robot stayed up for so long, or to the end of a shorter motion."""
+    return not row["fell"] or row["survived_s"] >= seconds
 
 
 def present(name: str) -> Tracker | None:
@@ -130,7 +139,7 @@ def present(name: str) -> Tracker | None:
 def _show(rows: list[dict[str, Any]]) -> None:
     table = Table(*SHOWN, title="Trackers, not trained on these motions")
     for row in rows:
-        cells = [row[key] for key in SHOWN]
+        cells = [row.get(key, "") for key in SHOWN]
         table.add_row(*(f"{c:.3g}" if isinstance(c, float) else str(c) for c in cells))
     Console(width=200).print(table)
 

@@ -28,8 +28,9 @@ def train_and_judge(
     reference, out = work / "reference.parquet", work / f"s{seed}{budget(minutes)}"
     spent = minutes or MOVES[name].cpu_minutes
     budgets = (f"cpu_minutes={spent}", f"steps={round(STEPS_A_MINUTE * spent)}")
+    observed = f"track.observation={MOVES[name].observation}"
     options = ["--seed", seed, "--move", name, "--force"]
-    options += [word for one in budgets for word in ("--set", one)]
+    options += [word for one in (*budgets, observed) for word in ("--set", one)]
     must("train", reference, "-o", out, *options, core=core)
     folders.rows.mkdir(parents=True, exist_ok=True)
     for seconds, path in kept.items():

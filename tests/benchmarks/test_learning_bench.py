@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.learning import learning_suite, policies, races, training_rows
+from benchmarks.learning import learning_suite, policies, races, tracker_rows, training_rows
 from benchmarks.learning.error_line import errors_in_one_line
 from benchmarks.learning.policies import MOVES, Folders, source_of
 from benchmarks.learning.summary import LIMBS, bars, cluster_interval, line, summary
@@ -89,6 +89,39 @@ def test_without_the_authors_files_their_rows_are_left_out(
     training_rows.policies(["authors_apt1"], [0], None, 1, Folders.at(tmp_path))
     assert source_of(MOVES["authors_apt1"]) is None
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_row_of_a_robot_s_own_sensors_has_the_same_motion_and_twice_the_time(
+    tmp_path: Path,
+) -> None:
+    own, onboard = MOVES["g1_walk"], MOVES["g1_walk_onboard"]
+    assert (onboard.cpu_minutes, onboard.success, onboard.worst) == (2 * own.cpu_minutes, 0.9, 0.75)
+    assert (onboard.skill, onboard.mpjpe_mm) == (pytest.approx(own.skill - 0.1), 33)
+    made = policies.reference_of("g1_walk_onboard", Folders.at(tmp_path))
+    assert made.read_bytes() == (policies.FROZEN / "g1_walk.parquet").read_bytes()
+
+
+@pytest.mark.parametrize(("name", "seen"), [("g1_walk", "full"), ("g1_walk_onboard", "onboard")])
+def test_a_row_is_trained_on_its_own_inputs(
+    name: str, seen: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    began: list[str] = []
+
+    def stop(*words: object, core: int | None = None) -> None:
+        began.extend(map(str, words))
+        raise SystemExit
+
+    monkeypatch.setattr(training_rows, "must", stop)
+    with pytest.raises(SystemExit):
+        training_rows.train_and_judge(name, 0, None, Folders.at(tmp_path), 0)
+    assert f"track.observation={seen}" in began
+
+
+def test_who_falls_after_ten_seconds_has_lasted_that_long() -> None:
+    falls_late, falls_early = ({"fell": True, "survived_s": s} for s in (10.4, 9.9))
+    assert tracker_rows.lasts(falls_late, 10.0)
+    assert not tracker_rows.lasts(falls_early, 10.0)
+    assert tracker_rows.lasts({"fell": False, "survived_s": 7.3}, 10.0)
 
 
 def test_rows_of_another_budget_are_distinguished(tmp_path: Path) -> None:
