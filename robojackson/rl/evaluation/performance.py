@@ -1,8 +1,9 @@
 """A performance: many robots dance one programme from its first stand to its last, and are pushed.
 
 The programme is planned once (`retarget.performance`). Every part begins at the robot's place and
-heading, and after a push the rest of the part continues from there. A robot that is about to fall
-stands, and continues with the next part. Trackers see everything in the frame of the programme.
+heading, and after a push the rest of the part continues from there. A robot that is about to fall,
+also one that stands, does what keeps it up (`foresight`). Trackers see everything in the frame of
+the programme.
 """
 
 from collections.abc import Callable
@@ -59,7 +60,8 @@ def perform(
         up = up & (stage.waits | (stage.step < total))
         stage.rest(now.tilt)
         if len(record) % look == 0:
-            foresight.choose(robots, up & ~stage.waits & (now.tilt > config.doubt_rad))
+            doubted = up & (now.tilt > config.doubt_rad)
+            foresight.choose(robots, doubted, look)
         progress(min(int(stage.step.max()), total), total)
     sim.close()
     foresight.close()

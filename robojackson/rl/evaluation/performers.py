@@ -10,7 +10,7 @@ from robojackson.geometry.rotations import heading, wrapped
 from robojackson.motion.floor_move import FloorMove
 from robojackson.retarget.performance.programme import Part, Programme
 from robojackson.rl.config.performance_config import PerformanceConfig
-from robojackson.rl.sim.reference_clip import Clip
+from robojackson.rl.sim.reference_clip import Clip, ClipStep
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.rl.trackers.tracker import Follower, Tracker, TrackerInput
 from robojackson.robot.fall import Fall, alignment
@@ -22,6 +22,8 @@ class Stage:
     Attributes:
         step: Current step of the programme of each.
         waits: Whether each has given up its part and stands until it is calm.
+        aside: Velocity that is added to the programme's as trackers see it, in its frame, m/s: a
+            robot that is told to travel steps in that direction.
         placed: Transforms from the programme's frame into the world.
         carried: Number of times that each was carried off within a part.
         given_up: Parts that each gave up.
@@ -34,6 +36,7 @@ class Stage:
         self._calm, self._needed = np.zeros(n, int), round(config.calm_s / programme.motion.dt)
         self.step, self.waits = np.zeros(n, int), np.zeros(n, bool)
         self._jumped = np.zeros(n, bool)
+        self.aside, self._left = np.zeros((n, 2)), np.zeros(n, int)
         self.placed, self.carried = FloorMove.none(n), np.zeros(n, int)
         self.given_up: list[list[str]] = [[] for _ in range(n)]
 
@@ -42,6 +45,7 @@ class Stage:
         other = copy.copy(self)
         other.step, other.waits = self.step.copy(), self.waits.copy()
         other._jumped = self._jumped.copy()
+        other.aside, other._left = self.aside.copy(), self._left.copy()
         other.carried, other.given_up = self.carried.copy(), [[] for _ in self.given_up]
         return other
 
@@ -52,6 +56,8 @@ class Stage:
     def advance(self) -> None:
         """Advance by one control step."""
         self.step = self.ahead(1)
+        self._left = np.maximum(self._left - 1, 0)
+        self.aside = np.where(self._left[:, None] > 0, self.aside, 0.0)
 
     def place(self, qpos: Float[np.ndarray, "N nq"], now: Float[np.ndarray, "N nq"]) -> None:
         """Put the programme, whose states are `now`, under robots that start a part or were carried
@@ -86,6 +92,22 @@ class Stage:
             part = self._part(i)
             self.step[i] = np.clip(self.step[i] + steps, part.start, part.end - 1)
             self._jumped[i] = True
+
+    def step_aside(
+        self, which: Bool[np.ndarray, " N"], velocity: Float[np.ndarray, " 2"], steps: int
+    ) -> None:
+        """Let robots see a programme that travels with another velocity for so many steps."""
+        self.aside = np.where(which[:, None], velocity, self.aside)
+        self._left = np.where(which, steps, self._left)
+
+    def seen(self, clip: Clip, k: int) -> ClipStep:
+        """Return the programme k steps further on, as trackers see it."""
+        step = clip.at(self.ahead(k))
+        if not self.aside.any():
+            return step
+        qvel = step.qvel.copy()
+        qvel[:, :2] += self.aside
+        return replace(step, qvel=qvel)
 
     def _part(self, robot: int | np.integer) -> Part:
         return next(part for part in self._parts if self.step[robot] < part.end)
@@ -123,7 +145,7 @@ class Performers:
         stage, clip, sim = self.stage, self.clip, self.sim
         stage.place(sim.qpos, clip.at(stage.step).qpos)
         own = stage.placed.inverse()
-        window = tuple(clip.at(stage.ahead(k)) for k in self.tracker.window)
+        window = tuple(stage.seen(clip, k) for k in self.tracker.window)
         qpos, qvel = sim.sensed()
         seen = TrackerInput(own.qpos(qpos), own.qvel(qvel), own.points(sim.points), window)
         sim.step(self.follower.targets(seen), up)

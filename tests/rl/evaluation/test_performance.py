@@ -1,6 +1,7 @@
 """Robots that perform: a run depends on its own seed alone, a lost robot stands and goes on."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,10 +10,11 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.retarget.performance.programme import Part, Programme
 from robojackson.rl.config.performance_config import PerformanceConfig
 from robojackson.rl.config.train_config import ControlConfig
-from robojackson.rl.evaluation.foresight import JUMPS_S, Foresight
+from robojackson.rl.evaluation.foresight import ASIDE_M_S, JUMPS_S, Foresight
 from robojackson.rl.evaluation.performance import perform
-from robojackson.rl.evaluation.performers import Moment, Stage
+from robojackson.rl.evaluation.performers import Moment, Performers, Stage
 from robojackson.rl.sim.motors import Motors
+from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.trackers.tracker import TrackerInput
 from robojackson.rl.trackers.tracker_description import TrackerDescription
 from robojackson.robot.model import Robot
@@ -75,8 +77,25 @@ def test_a_run_is_that_of_its_seed_whoever_runs_beside_it(robot: Robot) -> None:
 
 
 @pytest.mark.medium
+def test_a_robot_that_gave_up_and_stands_is_looked_after(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A push while it waited made it fall, because nobody looked."""
+    looked = []
+
+    def choose(self: Foresight, robots: Performers, doubted: np.ndarray, passed: int) -> None:
+        looked.append((bool(robots.stage.waits[0]), bool(doubted[0])))
+        robots.stage.give_up(np.ones(1, bool))
+
+    monkeypatch.setattr(Foresight, "choose", choose)
+    perform(Replay(), programme(), robot, replace(CONFIG, runs=1, pushes=0.0, calm_rad=1e-6))
+    assert (True, True) in looked
+
+
+@pytest.mark.medium
 def test_who_is_not_pushed_and_does_not_fall_finishes_and_has_danced_all(robot: Robot) -> None:
-    done = perform(Replay(), programme(), robot, replace(CONFIG, runs=1, pushes=0.0))
+    certain = replace(CONFIG, runs=1, pushes=0.0, doubt_rad=0.5)
+    done = perform(Replay(), programme(), robot, certain)
     (row,) = done.runs(0)
     assert (row["finished"], row["fell_in"], row["given_up"]) == (True, "", "")
     assert row["danced_share"] == 1.0
@@ -114,15 +133,17 @@ def test_what_a_twin_does_does_not_happen_to_the_robot() -> None:
 
 class Twins:
     """Robots whose twins fall after so many steps, a row for each choice: to go on, each of the
-    jumps, to give up."""
+    jumps, to step aside, to give up, to give up and step aside."""
 
     def __init__(self, falls: np.ndarray) -> None:
-        self.falls, self.now = falls, 0
+        self.falls, self.now, self.copies = falls, 0, list[list[bool]]()
+        self.sim = SimpleNamespace(qvel=np.zeros((falls.shape[1], 6)))
         self.stage = Stage(falls.shape[1], CONFIG, programme())
         for _ in range(25):
             self.stage.advance()
 
     def copied(self, sim: object, rows: np.ndarray) -> "Twins":
+        self.copies.append(rows.tolist())
         twin = Twins(self.falls)
         twin.stage = self.stage.copied()
         return twin
@@ -131,30 +152,67 @@ class Twins:
         self.now += 1
         jumps = [round(seconds / DT) for seconds in JUMPS_S]
         reached = np.clip(25 + np.array(jumps), 20, 39)
-        choice = np.where(self.stage.waits, 1 + len(jumps), 0)
+        waits, aside = self.stage.waits, self.stage.aside[:, 1] > 0.99 * ASIDE_M_S
+        other = np.where(self.stage.aside.any(1) & ~aside, 99, 0)
+        choice = np.where(waits, 6 + aside, 5 * aside)
         for number, step in enumerate(reached):
-            choice[~self.stage.waits & (self.stage.step == step)] = 1 + number
-        down = self.now > self.falls[choice, np.arange(len(up))]
+            choice[~waits & ~aside & (self.stage.step == step)] = 1 + number
+        down = self.now + other > self.falls[choice, np.arange(len(up))]
         return Moment(np.zeros((len(up), 7)), np.zeros((len(up), 1, 3)), np.zeros(len(up)), down)
 
 
 def test_a_robot_that_would_fall_does_what_keeps_it_up_longest(robot: Robot) -> None:
     never = 99
     falls = np.array([
-        [never, 4, 4, 4, 4, 4],
-        [never, never, 3, 3, 4, never],
-        [never, never, 3, 3, 4, never],
-        [never, never, 3, 3, 4, never],
-        [never, never, 3, 3, 4, never],
-        [never, never, never, 6, 4, never],
+        [never, 4, 4, 4, 4, 4, 4, 4],
+        *[[never, never, 3, 3, 4, never, 3, 3]] * len(JUMPS_S),
+        [never, never, 3, 3, 4, never, never, 3],
+        [never, never, never, 6, 4, never, never, 5],
+        [never, never, never, 3, 4, never, never, never],
     ])  # fmt: skip
-    foresight = Foresight(robot, Replay(), replace(CONFIG, runs=6, ahead_s=0.15))
+    foresight = Foresight(robot, Replay(), replace(CONFIG, runs=8, ahead_s=0.15))
     twins = Twins(falls)
-    foresight.choose(twins, np.array([True] * 5 + [False]))  # type: ignore[arg-type]
+    doubted = np.array([True] * 5 + [False] + [True] * 2)
+    foresight.choose(twins, doubted)  # type: ignore[arg-type]
     foresight.close()
-    assert twins.stage.step.tolist() == [25, 25 + round(JUMPS_S[0] / DT), 39, 39, 25, 25]
-    assert twins.stage.waits.tolist() == [False, False, True, True, False, False]
-    assert twins.stage.given_up == [[], [], ["dance"], ["dance"], [], []]
+    stage = twins.stage
+    assert stage.step.tolist() == [25, 25 + round(JUMPS_S[0] / DT), 39, 39, 25, 25, 25, 39]
+    assert stage.waits.tolist() == [False, False, True, True, False, False, False, True]
+    given_up = [number for number, parts in enumerate(stage.given_up) if parts == ["dance"]]
+    assert given_up == [2, 3, 7]
+    np.testing.assert_allclose(stage.aside[6:], [[0.0, ASIDE_M_S]] * 2, atol=1e-9)
+    assert not stage.aside[:6].any()
+
+
+def test_a_robot_that_moves_as_foreseen_is_not_simulated_again_for_a_while(robot: Robot) -> None:
+    foresight = Foresight(robot, Replay(), replace(CONFIG, runs=3, ahead_s=0.3))
+    falls = np.full((8, 3), 99)
+    falls[:, 2] = 4
+    twins, doubted = Twins(falls), np.ones(3, bool)
+    foresight.choose(twins, doubted)  # type: ignore[arg-type]
+    assert twins.copies[0] == [True] * 3
+    first = len(twins.copies)
+    twins.sim.qvel[1, 0] = 0.2
+    foresight.choose(twins, doubted, 4)  # type: ignore[arg-type]
+    assert twins.copies[first] == [False, True, True]
+    twins.sim.qvel[:] = 0.0
+    second = len(twins.copies)
+    foresight.choose(twins, doubted, 7)  # type: ignore[arg-type]
+    foresight.close()
+    assert twins.copies[second] == [True, False, True]
+
+
+def test_a_robot_that_steps_aside_sees_another_velocity_for_a_while() -> None:
+    stage, clip = Stage(2, CONFIG, programme()), Clip(programme().motion)
+    stage.step_aside(np.array([True, False]), np.array([0.0, 1.0]), 2)
+    before, poses = clip.at(stage.ahead(1)).qvel.copy(), clip.at(stage.ahead(1)).qpos.copy()
+    moved = stage.seen(clip, 1)
+    np.testing.assert_allclose(moved.qvel[:, :2] - before[:, :2], [[0.0, 1.0], [0.0, 0.0]])
+    np.testing.assert_array_equal(moved.qvel[:, 2:], before[:, 2:])
+    np.testing.assert_array_equal(moved.qpos, poses)
+    for _ in range(2):
+        stage.advance()
+    assert not stage.aside.any()
 
 
 def test_a_robot_that_jumps_goes_on_from_where_it_is() -> None:

@@ -11,7 +11,7 @@ from robojackson.rl.config.train_config import ControlConfig, RandomConfig, Trac
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.sim.disturbances import PUSH, PUSH_EVERY_S
 from robojackson.rl.sim.simulation import Simulation
-from robojackson.rl.sim.variation import Variation, varied
+from robojackson.rl.sim.variation import Variation, varied, varied_models
 from robojackson.robot.model import Robot
 
 N = 4
@@ -35,6 +35,23 @@ def test_a_heavier_robot_weighs_more_and_the_stock_one_stays(robot: Robot) -> No
     assert robot.model.body_mass.sum() == stock
     ratio = heavy.model.dof_invweight0[0] / robot.model.dof_invweight0[0]
     assert ratio == pytest.approx(1 / 1.1, rel=0.05), "what follows from masses is computed anew"
+
+
+@pytest.mark.parametrize(
+    ("random", "models"),
+    [
+        (RandomConfig(pushes=1.0, sensor_noise=1.0, gains=0.1, delay=0.02), 1),
+        (RandomConfig(friction=0.1), N),
+        (RandomConfig(integrators=("Euler",)), N),
+    ],
+)
+def test_robots_share_a_model_where_nothing_of_it_varies(
+    random: RandomConfig, models: int, robot: Robot
+) -> None:
+    """A copy of the G1's takes 68 MB."""
+    found = varied_models(robot, random, N, np.random.default_rng(0))
+    assert len(found) == N
+    assert len({id(model) for model in found}) == models
 
 
 def test_another_time_step_keeps_the_control_step(robot: Robot) -> None:
