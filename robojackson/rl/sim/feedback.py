@@ -130,8 +130,10 @@ def _digest(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> st
     """Return a digest of the gains' inputs, as a name."""
     law = resolved(replace(control, feedback=0.0), robot)
     named = {name: getattr(law, name) for name in ("substeps", "feedforward", "feedback_path")}
+    motors = actuation_facts(robot, control)
+    del motors["action_scale"]  # of the policy: the feedback is bounded by the robot's own
     facts = [poses_sha256(motion), robot.sha256, named, actuation_facts(robot, ControlConfig()),
-             actuation_facts(robot, control), settings(), asdict(robot.description)]  # fmt: skip
+             motors, settings(), asdict(robot.description)]  # fmt: skip
     if law.feedback_path == "sampled":
         facts.append(sampled_regulator.settings())
     digest = hashlib.sha256(json.dumps(facts, sort_keys=True, default=str).encode())
