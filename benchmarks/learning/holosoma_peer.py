@@ -62,7 +62,8 @@ class HolosomaPolicy:
             control_dt=DT,
         )  # fmt: skip
         self.window: tuple[int, ...] = (0,)
-        self.control, self.sees_ahead = ControlConfig(feedforward=0.0, feedback=0.0), False
+        self.control = ControlConfig(feedforward=0.0, feedback=0.0)
+        self.sees_ahead = self.sees_travel = False
 
     def equip(self, robot: Robot) -> Robot:
         """Return the robot with its gains."""

@@ -44,7 +44,7 @@ class Foresight:
         self._since = np.full(config.runs, self._steps)
         jumps = [round(seconds / self._sim.dt) for seconds in JUMPS_S]
         leaps = [partial(Stage.jump, steps=steps) for steps in jumps]
-        asides = _asides(round(ASIDE_S / self._sim.dt))
+        asides = _asides(round(ASIDE_S / self._sim.dt)) if tracker.sees_travel else []
         gives_up = [partial(_one_after_the_other, Stage.give_up, aside) for aside in asides]
         self._choices: list[Choice] = [_go_on, *leaps, *asides, Stage.give_up, *gives_up]
 

@@ -29,7 +29,8 @@ class PolicyTracker:
         if observation_of(self.policy) != "preview":
             raise BadPolicy(f"{path}: a policy of one motion: it does not see the reference ahead")
         self.window: tuple[int, ...] = (1,)
-        self.control, self.sees_ahead = fact(self.policy, "control", ControlConfig), True
+        self.control = fact(self.policy, "control", ControlConfig)
+        self.sees_ahead, self.sees_travel = True, False
 
     def equip(self, robot: Robot) -> Robot:
         """Return the robot; a policy of ours was trained with its gains."""

@@ -25,7 +25,7 @@ class RegulatorTracker:
         self.description = description
         self.window: tuple[int, ...] = (1,)
         self.control = ControlConfig(feedforward=1.0, feedback=1.0, feedback_path="sampled")
-        self.sees_ahead = False
+        self.sees_ahead = self.sees_travel = False
 
     def equip(self, robot: Robot) -> Robot:
         """Return the robot, whose own gains the feedback uses."""

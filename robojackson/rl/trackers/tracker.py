@@ -47,12 +47,14 @@ class Tracker(Protocol):
         window: Steps of the reference in its input, relative to the present one; 1 is the next.
         control: The control law that follows its targets.
         sees_ahead: Whether a step of the window carries a preview (`sim.preview`).
+        sees_travel: Whether it sees how fast the reference's root travels.
     """
 
     description: TrackerDescription
     window: tuple[int, ...]
     control: ControlConfig
     sees_ahead: bool
+    sees_travel: bool
 
     def equip(self, robot: Robot) -> Robot:
         """Return the robot with the gains of the network's training.

@@ -53,7 +53,7 @@ class Twist2Tracker:
         joints = len(description.joints)
         self.description = description
         self.window: tuple[int, ...] = (1,)
-        self.control, self.sees_ahead = CONTROL, False
+        self.control, self.sees_ahead, self.sees_travel = CONTROL, False, True
         self._network = OnnxNetwork(path, observation_size(joints), joints)
 
     def equip(self, robot: Robot) -> Robot:

@@ -28,7 +28,8 @@ class Replay:
     """A tracker that gives the next step's angles."""
 
     window: tuple[int, ...] = (1,)
-    control, sees_ahead = ControlConfig(feedforward=0.0, feedback=0.0), False
+    control = ControlConfig(feedforward=0.0, feedback=0.0)
+    sees_ahead, sees_travel = False, True
     description = TrackerDescription(
         name="replay", robot="humanoid", network="regulator", licence="ours",
         trained_on="nothing", homepage="http://127.0.0.1:9/", control_dt=0.015,
@@ -182,6 +183,17 @@ def test_a_robot_that_would_fall_does_what_keeps_it_up_longest(robot: Robot) -> 
     assert given_up == [2, 3, 7]
     np.testing.assert_allclose(stage.aside[6:], [[0.0, ASIDE_M_S]] * 2, atol=1e-9)
     assert not stage.aside[:6].any()
+
+
+def test_a_tracker_that_does_not_see_the_velocity_is_not_asked_to_step_aside(robot: Robot) -> None:
+    class Blind(Replay):
+        sees_travel = False
+
+    twins = Twins(np.full((8, 1), 4))
+    foresight = Foresight(robot, Blind(), replace(CONFIG, runs=1, ahead_s=0.3))
+    foresight.choose(twins, np.ones(1, bool))  # type: ignore[arg-type]
+    foresight.close()
+    assert len(twins.copies) == 2 + len(JUMPS_S)
 
 
 def test_a_robot_that_moves_as_foreseen_is_not_simulated_again_for_a_while(robot: Robot) -> None:

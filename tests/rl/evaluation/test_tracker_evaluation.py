@@ -28,7 +28,8 @@ class Replay:
     """A tracker that gives the next step's angles, and keeps what it is shown."""
 
     window: tuple[int, ...] = (1, 4)
-    control, sees_ahead = ControlConfig(feedforward=0.0, feedback=0.0), False
+    control = ControlConfig(feedforward=0.0, feedback=0.0)
+    sees_ahead, sees_travel = False, True
 
     def __init__(self, description: TrackerDescription) -> None:
         self.description = description
