@@ -181,7 +181,7 @@ def evaluate(
     """Evaluate a policy or a tracker; with a folder, also write its tables and the rollout."""
     from robojackson.api.evaluation import evaluate_policy
     from robojackson.api.trackers import load_tracker
-    from robojackson.cli.training_words import train_longer
+    from robojackson.cli.training_words import train_after, train_this
     from robojackson.pipeline.pipeline_config import PipelineConfig
 
     settings = load(PipelineConfig, config, overrides)
@@ -195,13 +195,12 @@ def evaluate(
         verdict.save(out)
     summary = to_json_types(verdict.summary)
     if tracker is not None:
-        training = reference.parent / "training"
-        following = cards.command_line("train", reference, "-o", training)
+        following = train_this(reference)
     elif summary["verdict"]["kind"] == "dances":
         words = ("export", policy, "--to", "onnx", "-o", policy.with_suffix(".onnx"))
         following = cards.command_line(*words)
     else:
-        following = train_longer(reference, policy.parent, LONGER_MINUTES)
+        following = train_after(policy, reference, LONGER_MINUTES)
     return {"policy": str(policy), "reference": str(reference), **summary, "next": following}
 
 

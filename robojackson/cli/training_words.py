@@ -6,8 +6,24 @@ from dataclasses import asdict
 from pathlib import Path
 
 from robojackson.cli import cards
+from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
 from robojackson.rl.checkpoint_folder import newest_checkpoint
 from robojackson.rl.config.train_config import TrainConfig
+from robojackson.rl.policy import load_policy
+
+
+def train_this(reference: Path) -> str:
+    """Return the command that trains a policy of a motion, in a folder beside it."""
+    return cards.command_line("train", reference, "-o", reference.parent / "training")
+
+
+def train_after(policy: Path, reference: Path, minutes: float) -> str:
+    """Return the command after an evaluation of a policy that does not dance: more training, or,
+    if it was trained on another motion, a training on this one."""
+    learnt = load_policy(policy).facts.get("reference_sha256")
+    if learnt not in (None, poses_sha256(ReferenceMotion.load(reference))):
+        return train_this(reference)
+    return train_longer(reference, policy.parent, minutes)
 
 
 def train_longer(reference: Path, folder: Path, minutes: float) -> str:

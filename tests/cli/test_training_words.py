@@ -4,10 +4,14 @@ import json
 from dataclasses import asdict, replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from robojackson.cli.training_words import train_longer
+from robojackson.cli.training_words import train_after, train_longer
+from robojackson.motion.reference_motion import poses_sha256
 from robojackson.rl.config.train_config import TrainConfig
+from robojackson.rl.policy import Policy
+from tests.fixtures.robots import robot_motion
 
 USUAL = TrainConfig()
 
@@ -38,3 +42,16 @@ def test_it_names_every_setting_that_the_checkpoint_insists_on(
 
 def test_a_folder_without_a_checkpoint_is_trained_from_the_start(tmp_path: Path) -> None:
     assert train_longer(Path("r"), tmp_path, 20).endswith("--minutes 20")
+
+
+@pytest.mark.parametrize("same", [True, False])
+def test_a_policy_of_another_motion_is_not_trained_on(same: bool, tmp_path: Path) -> None:
+    """Its folder refuses another motion, so the command that was shown failed."""
+    motion = robot_motion("hip_shake")
+    reference = motion.save(tmp_path / "clip" / "reference.parquet")
+    learnt = poses_sha256(motion) if same else "another"
+    layers = ((np.zeros((2, 1)), np.zeros(1)),)
+    policy = Policy(layers, {"reference_sha256": learnt}).save(tmp_path / "run" / "p.safetensors")
+    folder = tmp_path / "run" if same else tmp_path / "clip" / "training"
+    words = f"train {reference} -o {folder}" + (" --minutes 20" if same else "")
+    assert train_after(policy, reference, 20) == f"robojackson {words}"
