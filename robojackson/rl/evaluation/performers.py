@@ -22,8 +22,8 @@ class Stage:
     Attributes:
         step: Current step of the programme of each.
         waits: Whether each has given up its part and stands until it is calm.
-        aside: Velocity that is added to the programme's as trackers see it, in its frame, m/s: a
-            robot that is told to travel steps in that direction.
+        aside: Velocity that is added to the programme's as trackers see it, in its frame, m/s:
+            robots step in that direction.
         placed: Transforms from the programme's frame into the world.
         carried: Number of times that each was carried off within a part.
         given_up: Parts that each gave up.

@@ -81,7 +81,7 @@ def test_a_run_is_that_of_its_seed_whoever_runs_beside_it(robot: Robot) -> None:
 def test_a_robot_that_gave_up_and_stands_is_looked_after(
     robot: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A push while it waited made it fall, because nobody looked."""
+    """A push while it waited made it fall, because its fall was not foreseen."""
     looked = []
 
     def choose(self: Foresight, robots: Performers, doubted: np.ndarray, passed: int) -> None:
