@@ -6,10 +6,11 @@ from dataclasses import asdict
 from pathlib import Path
 
 from robojackson.cli import cards
-from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
+from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.checkpoint_folder import newest_checkpoint
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.policy import load_policy
+from robojackson.rl.policy_facts import is_of_another_motion
 
 
 def train_this(reference: Path) -> str:
@@ -20,8 +21,7 @@ def train_this(reference: Path) -> str:
 def train_after(policy: Path, reference: Path, minutes: float) -> str:
     """Return the command after an evaluation of a policy that does not dance: more training, or,
     if it was trained on another motion, a training on this one."""
-    learnt = load_policy(policy).facts.get("reference_sha256")
-    if learnt not in (None, poses_sha256(ReferenceMotion.load(reference))):
+    if is_of_another_motion(load_policy(policy), ReferenceMotion.load(reference)):
         return train_this(reference)
     return train_longer(reference, policy.parent, minutes)
 

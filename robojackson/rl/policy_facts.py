@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from robojackson.errors import BadPolicy
+from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
 from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.modes.observation import Kind, Observer
 from robojackson.rl.policy import Policy
@@ -28,6 +29,13 @@ def mode_of(policy: Policy) -> str:
     if mode not in ("track", "paper"):
         raise BadPolicy(f"the policy's file has mode {mode[:40]!r}; known: paper, track")
     return mode
+
+
+def is_of_another_motion(policy: Policy, reference: ReferenceMotion) -> bool:
+    """Return whether a policy's file names another reference motion than this as the one it was
+    trained on."""
+    learnt = policy.facts.get("reference_sha256")
+    return learnt is not None and learnt != poses_sha256(reference)
 
 
 def policy_control(policy: Policy, robot: Robot) -> ControlConfig:

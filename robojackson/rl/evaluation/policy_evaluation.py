@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float
 
-from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
+from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.evaluate_config import TRAINED, VARIANTS
 from robojackson.rl.config.train_config import (
     ControlConfig,
@@ -39,7 +39,7 @@ from robojackson.rl.evaluation.starts import starts_of, summarise
 from robojackson.rl.evaluation.verdict import verdict_on, without_short_figures
 from robojackson.rl.modes.paper_mode import facing_ahead
 from robojackson.rl.policy import Policy
-from robojackson.rl.policy_facts import fact, mode_of
+from robojackson.rl.policy_facts import fact, is_of_another_motion, mode_of
 from robojackson.rl.sim.preview import driven_clip
 from robojackson.rl.sim.simulation import control_step, require_same_clock
 from robojackson.robot.fall import Fall
@@ -172,10 +172,7 @@ def reward_report(
 
 def _warn_about_other_motion(policy: Evaluated, reference: ReferenceMotion) -> None:
     """Warn about an evaluation on another motion than the training's."""
-    if not isinstance(policy, Policy):
-        return
-    learnt = policy.facts.get("reference_sha256")
-    if learnt is not None and learnt != poses_sha256(reference):
+    if isinstance(policy, Policy) and is_of_another_motion(policy, reference):
         log.warning(
             "the policy was trained on another reference motion than the one it is evaluated on"
         )
