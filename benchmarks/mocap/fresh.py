@@ -105,7 +105,9 @@ def read(path: Path) -> tuple[LandmarkTrack, Truth]:
         stride, (width, height) = int(pair["stride"]), pair["size"].tolist()
         seen, name = pair["seen"][::stride].astype(float), str(pair["motion"])
         truth = Truth(name, pair["truth"][::stride][:, LANDMARKS].astype(float), pair["up"])
-    track = LandmarkTrack(30.0 / stride, width, height, seen[..., :3], seen[..., 3:6], seen[..., 6])
+        edges = pair.get("edges")
+    arrays = seen[..., :3], seen[..., 3:6], seen[..., 6]
+    track = LandmarkTrack(30.0 / stride, width, height, *arrays, edges=edges)
     if track.detected.sum() < 2:
         raise NoPersonFound("no person detected")
     return track, truth

@@ -243,6 +243,6 @@ def _contact_share(sequence: "SmplSequence") -> dict[str, float]:
 def _floor(sequence: "SmplSequence") -> Figures:
     """Return the source of the floor and the distance of the lowest keypoint from it, metres."""
     lowest = sequence.keypoints_w[:, :, 2].min(1)
-    keys = ("gravity", "tilt_deg", "gravity_sd_deg")
+    keys = ("gravity", "tilt_deg", "gravity_sd_deg", "gravity_sure")
     known = {key: sequence.camera[key] for key in keys if key in sequence.camera}
     return {"lowest_keypoint_m": lowest.min(), "median_m": np.median(lowest), **known}

@@ -20,6 +20,8 @@ Number = Annotated[float, Strict(), Field(ge=-1e9, le=1e9)]
 Text = Annotated[str, StringConstraints(strict=True, max_length=4096)]
 Texts = Annotated[list[Text], Field(max_length=MOST_NAMES)]
 Point = Annotated[list[Metres], Field(min_length=3, max_length=3)]
+Segment = Annotated[list[Number], Field(min_length=4, max_length=4)]
+"""Ends of a line, x0 y0 x1 y1."""
 Numbers = Annotated[list[Number], Field(max_length=1_000_000)]
 Matrix = Annotated[
     list[Annotated[list[Number], Field(min_length=3, max_length=3)]],

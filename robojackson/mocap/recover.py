@@ -4,20 +4,20 @@ landmarks -> repair -> before the camera -> 29 keypoints -> person's skeleton ->
 floor -> contacts -> root lock -> feet pinned -> solve -> SmplSequence in the world frame.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 from pydantic import Field
-from scipy.spatial.transform import Rotation
 
 from robojackson.body import analytic_solve
 from robojackson.body.forward_kinematics import apply
 from robojackson.body.smoothing import lowpass
 from robojackson.clips.quality.visibility import weigh_visibility
 from robojackson.config import config_dataclass
-from robojackson.mocap.grounding import floor
+from robojackson.mocap.grounding import gravity as up
+from robojackson.mocap.grounding.scene_lines import SceneEvidence, scene_evidence
 from robojackson.mocap.grounding.stance import GroundingConfig, ground_body
 from robojackson.mocap.landmarks import pinhole_camera
 from robojackson.mocap.landmarks.blazepose import BODY, Landmarks, repair
@@ -25,6 +25,12 @@ from robojackson.mocap.landmarks.bone_lengths import fit_skeleton
 from robojackson.mocap.landmarks.covariance import certainty
 from robojackson.mocap.landmarks.refinement import RefineConfig, gather, refine
 from robojackson.mocap.pose.posed_body import Body, pose_landmarks
+from robojackson.mocap.recovered_sequence import (
+    camera_facts,
+    camera_of,
+    sequence_of,
+    swap_notes,
+)
 from robojackson.mocap.reprojection import weak_frames, without_weak_frames
 from robojackson.mocap.temporal.ground_evidence import GroundEvidence
 from robojackson.mocap.temporal.temporal_lift import TemporalConfig, lift
@@ -59,7 +65,7 @@ class MocapConfig:
     leave_out_weak: bool = False
     temporal: TemporalConfig = Field(default_factory=TemporalConfig)
     refine: RefineConfig = Field(default_factory=RefineConfig)
-    gravity: floor.GravityConfig = Field(default_factory=floor.GravityConfig)
+    gravity: up.GravityConfig = Field(default_factory=up.GravityConfig)
     grounding: GroundingConfig = Field(default_factory=GroundingConfig)
 
 
@@ -74,6 +80,7 @@ class View:
         points: Landmarks in the camera frame, metres.
         depth_m: Standard deviation of the depths of the body, metres; None where they are unknown.
         ground: What the temporal network found of gravity.
+        scene: What straight edges of the scene show.
     """
 
     track: LandmarkTrack
@@ -82,6 +89,7 @@ class View:
     points: Float[np.ndarray, "T 33 3"]
     depth_m: Float[np.ndarray, "T 12"] | None
     ground: GroundEvidence | None = None
+    scene: SceneEvidence | None = None
 
     def in_image(self) -> Float[np.ndarray, "T 33 3"]:
         """Return the points at their depths on the rays of the detected landmarks."""
@@ -112,14 +120,44 @@ def view_track(track: LandmarkTrack, config: MocapConfig) -> View:
     track = evenly(weigh_visibility(track))
     landmarks = repair(track)
     focal_px = config.focal_px or pinhole_camera.guess_focal(track.width, track.height)
+    view = _placed(track, landmarks, focal_px, config)
+    scene = scene_of(track, view.ground, config)
+    if scene is not None and (focal_px := focal_of(track, scene, config)) != view.pinhole.focal_px:
+        view = _placed(track, landmarks, focal_px, config)
+    return replace(view, scene=scene)
+
+
+def _placed(
+    track: LandmarkTrack, landmarks: Landmarks, focal_px: float, config: MocapConfig
+) -> View:
+    """Lift landmarks before a camera of a focal length."""
     pinhole = pinhole_camera.Pinhole(focal_px, track.width, track.height)
     seen = pinhole_camera.place(landmarks, pinhole, track.fps, config.depth_cutoff_hz)
-    depth_m = ground = None
-    if config.temporal.enabled:
-        found = lift(seen, landmarks.local, landmarks.visibility, track.fps, config.temporal)
-        seen, depth_m = found.points, found.depth_sd(config.temporal.depth_floor_m)
-        ground = found.ground
-    return View(track, landmarks, pinhole, seen, depth_m, ground)
+    if not config.temporal.enabled:
+        return View(track, landmarks, pinhole, seen, None)
+    found = lift(seen, landmarks.local, landmarks.visibility, track.fps, config.temporal)
+    depth_m = found.depth_sd(config.temporal.depth_floor_m)
+    return View(track, landmarks, pinhole, found.points, depth_m, found.ground)
+
+
+def scene_of(
+    track: LandmarkTrack, ground: GroundEvidence | None, config: MocapConfig
+) -> SceneEvidence | None:
+    """Return what straight edges of the scene show; None without edges."""
+    if track.edges is None or not config.gravity.scene:
+        return None
+    near = up.CAMERA_UP if ground is None else ground.up
+    return scene_evidence(track.edges, track.width, track.height, near)
+
+
+def focal_of(track: LandmarkTrack, scene: SceneEvidence | None, config: MocapConfig) -> float:
+    """Return the focal length: that of the configuration, that of the scene where it is known
+    closely enough, or a typical one; pixels."""
+    if config.focal_px is not None:
+        return config.focal_px
+    if scene is not None and scene.focal_sd <= config.gravity.scene_focal_sd:
+        return scene.focal_px
+    return pinhole_camera.guess_focal(track.width, track.height)
 
 
 def finish_motion(view: View, config: MocapConfig) -> SmplSequence:
@@ -137,17 +175,12 @@ def finish_motion(view: View, config: MocapConfig) -> SmplSequence:
         return pose_landmarks(marks, sure, rest, config.method)
 
     sequence = recover_points(
-        seen, posed, landmarks.valid, view.pinhole, track.fps, config, view.ground
+        seen, posed, landmarks.valid, view.pinhole, track.fps, config, view.ground, view.scene
     )
-    notes = (*track.notes, *sequence.notes, *_swaps(landmarks))
+    notes = (*track.notes, *sequence.notes, *swap_notes(landmarks))
     return replace(
         sequence, person=track.person, notes=notes, camera=camera_facts(sequence.camera, track)
     )
-
-
-def camera_facts(camera: Mapping[str, object], track: LandmarkTrack) -> dict[str, object]:
-    """Return the camera's metadata; of a moving camera that of the first frame."""
-    return {**camera, **({} if track.to_first is None else {"moved": True})}
 
 
 def recover_points(
@@ -158,6 +191,7 @@ def recover_points(
     fps: float,
     config: MocapConfig,
     ground: GroundEvidence | None = None,
+    scene: SceneEvidence | None = None,
 ) -> SmplSequence:
     """Return the motion of points before the camera, from any detector.
 
@@ -169,74 +203,15 @@ def recover_points(
         fps: Frames a second.
         config: Settings of the floor and the feet.
         ground: What the temporal network found of gravity.
+        scene: What straight edges of the scene show.
     """
     body = posed(points)
-    gravity = floor.find_up(body.pose.points, body.feet, fps, config.gravity, ground)
-    to_world = floor.camera_to_world(gravity.up)
+    gravity = up.find_up(body.pose.points, body.feet, fps, config.gravity, ground, scene)
+    to_world = up.camera_to_world(gravity.up)
     body = posed(apply(to_world, points))
     start = body.pose.points.mean((0, 1))
     stance = ground_body(body, fps, config.grounding)
     body = stance.body
     start = body.pose.points.mean((0, 1)) - start
-    camera = _camera(pinhole, gravity, to_world, start)
-    return _sequence(fps, body, valid, stance.contact, camera)
-
-
-def _camera(
-    pinhole: pinhole_camera.Pinhole,
-    gravity: floor.Gravity,
-    to_world: np.ndarray,
-    origin: np.ndarray,
-) -> dict[str, object]:
-    """Return the camera's metadata; point_w = rotation @ point_c + position."""
-    return {
-        "focal_px": pinhole.focal_px,
-        "width": pinhole.width,
-        "height": pinhole.height,
-        "rotation_w": to_world.tolist(),
-        "position_w": origin.tolist(),
-        "gravity": gravity.source,
-        "tilt_deg": gravity.tilt_deg,
-        **({} if gravity.sd_deg is None else {"gravity_sd_deg": gravity.sd_deg}),
-    }
-
-
-def _sequence(
-    fps: float,
-    body: Body,
-    valid: np.ndarray,
-    states: np.ndarray,
-    camera: dict[str, object],
-) -> SmplSequence:
-    vectors = Rotation.from_matrix(body.local.reshape(-1, 3, 3)).as_rotvec().reshape(-1, 24, 3)
-    points = body.pose.points
-    return SmplSequence(
-        fps=fps,
-        global_orient=vectors[:, 0],
-        body_pose=vectors[:, 1:].reshape(-1, 69),
-        transl=points[:, 0] - body.rest[0],
-        joints=points[:, :24],
-        keypoints_w=points,
-        confidence=np.where(valid[:, None], body.targets.confidence, 0.0),
-        contact=states,
-        valid=valid,
-        betas=np.zeros(10),
-        rest_joints=body.rest,
-        camera=camera,
-        notes=_notes(valid, camera),
-    )
-
-
-def _notes(valid: np.ndarray, camera: dict[str, object]) -> tuple[str, ...]:
-    notes = []
-    if missed := int((~valid).sum()):
-        notes.append(f"no person in {missed} of {len(valid)} frames: interpolated")
-    if camera["gravity"] == "camera":
-        notes.append("gravity taken from the camera: the feet contradict it too much")
-    return tuple(notes)
-
-
-def _swaps(landmarks: Landmarks) -> tuple[str, ...]:
-    if not landmarks.swapped:
-        return ()
-    return (f"left and right exchanged in {landmarks.swapped} frames: corrected",)
+    camera = camera_of(pinhole, gravity, to_world, start)
+    return sequence_of(fps, body, valid, stance.contact, camera)

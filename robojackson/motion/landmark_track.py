@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from robojackson.files.fact_types import Count, Matrix, Number, Pixels, Rate, Texts
+from robojackson.files.fact_types import Count, Matrix, Number, Pixels, Rate, Segment, Texts
 from robojackson.files.table_file import Columns, Facts, TableFile, numbered
 from robojackson.files.table_types import F32, F64, I32, Column, TableSchema
 
@@ -29,6 +29,7 @@ LANDMARK_TRACK = TableSchema(
     {
         **{"person": Count, "notes": Texts, "people": Count, "brightness": Number | None},
         **{"sharpness": Number | None, "to_first": list[Matrix]},
+        "edges": list[Segment],
     },
 )
 
@@ -51,6 +52,8 @@ class LandmarkTrack(TableFile):
         people: Number of people that were identified; 0 for a single person.
         brightness: Mean grey level of the person, 0..1; None where it was not measured.
         sharpness: Share of the person's contrast that is fine detail; None as before.
+        edges: Ends (x0, y0, x1, y1) of straight edges of the scene, pixels, of a camera that moved
+            those of the first frame; None where none were sought.
     """
 
     SCHEMA = LANDMARK_TRACK
@@ -68,6 +71,7 @@ class LandmarkTrack(TableFile):
     people: int = 0
     brightness: float | None = None
     sharpness: float | None = None
+    edges: Float[np.ndarray, "N 4"] | None = None
 
     def __len__(self) -> int:
         return len(self.landmarks)
@@ -97,6 +101,8 @@ class LandmarkTrack(TableFile):
         facts = {name: getattr(self, name) for name in FACTS}
         if self.to_first is not None:
             facts["to_first"] = self.to_first.tolist()
+        if self.edges is not None:
+            facts["edges"] = self.edges.tolist()
         return columns, facts
 
     @classmethod
@@ -117,6 +123,7 @@ class LandmarkTrack(TableFile):
             people=int(facts.get("people", 0)),
             brightness=facts.get("brightness"),
             sharpness=facts.get("sharpness"),
+            edges=np.reshape(facts["edges"], (-1, 4)) if "edges" in facts else None,
         )
 
     def nearest(self, time_s: float) -> int:

@@ -12,6 +12,7 @@ from typing_extensions import TypedDict
 
 from robojackson.files.fact_types import (
     Count,
+    Flag,
     Matrix,
     Number,
     Pixels,
@@ -39,6 +40,7 @@ class Camera(TypedDict, total=False):
     gravity: Text
     tilt_deg: Number
     gravity_sd_deg: Number
+    gravity_sure: Flag
     position_w: Point | list[Point]
     rotation_w: Matrix | list[Matrix]
 

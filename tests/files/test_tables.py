@@ -214,6 +214,15 @@ def test_the_path_of_a_camera_survives_with_its_track(moved: bool) -> None:
     assert (found is None) if to_first is None else np.array_equal(found, to_first)
 
 
+@pytest.mark.parametrize("count", [None, 0, 3])
+def test_the_edges_of_the_scene_survive_with_their_track(count: int | None) -> None:
+    rng = np.random.default_rng(2)
+    edges = None if count is None else rng.uniform(0, 500, (count, 4)).round(2)
+    track = replace(a_track(rng), edges=edges)
+    found = tables.decode(LandmarkTrack, tables.encode(track), "here").edges
+    assert (found is None) if edges is None else np.array_equal(found, edges)
+
+
 def test_an_artifact_leads_to_its_value(tmp_path: Path) -> None:
     store, track = Store(tmp_path), a_track(np.random.default_rng(1))
     artifact = artifact_tables.save(store, "landmarks", "landmarks.parquet", track)

@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from robojackson.clips.people.camera_motion import grey_levels
 from robojackson.clips.pose_detector import video_landmarker
 from robojackson.mocap.landmarks.blazepose import LANDMARK_NAMES, landmark
+from robojackson.mocap.landmarks.scene_edges import SceneEdges
 from tools.pairs import gestures, people, scenery, sources
 from tools.render import deepmimic
 from tools.render.anny_body import Body
@@ -108,10 +110,12 @@ def shoot(
     if not hidden:
         boxes[:] = np.nan
     seen = np.full((len(truth), len(LANDMARK_NAMES), 7), np.nan, np.float32)
+    scene = SceneEdges()
     with video_landmarker("full") as detect_frame:
         pictures = studio.frames(person, posed, view, boxes, rng, stride)
-        for index, picture in zip(range(0, len(seen), stride), pictures, strict=True):
-            seen[index] = detect_frame(picture, index / FPS)
+        for number, picture in enumerate(pictures):
+            seen[number * stride] = detect_frame(picture, number * stride / FPS)
+            scene.add_frame(number, grey_levels(picture))
     return {
         "seen": seen,
         "stride": np.array(stride),
@@ -122,5 +126,6 @@ def shoot(
         "size": np.array([view.width, view.height]),
         "up": view.rotation @ np.array([0.0, 0.0, 1.0]),
         "fps": np.array(FPS),
+        "edges": scene.edges(False, view.width, view.height),
         "motion": np.array(name),
     }

@@ -19,6 +19,7 @@ from robojackson.clips.quality.picture_quality import PictureQuality
 from robojackson.clips.upright_frame import NEARLY
 from robojackson.clips.video import VideoInfo, timed_frames
 from robojackson.mocap.landmarks.model_fusion import fuse_tracks
+from robojackson.mocap.landmarks.scene_edges import SceneEdges
 from robojackson.motion.landmark_track import LandmarkTrack
 
 Quality = Literal["lite", "full", "heavy", "best"]
@@ -77,13 +78,16 @@ class Background:
     def __init__(self) -> None:
         self._people: list[np.ndarray] = []
         self._camera, self._looks = CameraFollower(), PictureQuality()
+        self._scene = SceneEdges()
 
     def add_frame(
         self, index: int, image: UInt8[np.ndarray, "H W 3"], row: Float[np.ndarray, "33 _"]
     ) -> None:
         """Add frame number `index` in RGB, of any size, with the person's landmarks."""
         self._people.append(row[:, :2])
-        small, xy = shrunk(grey_levels(image)), row[:, :2]
+        grey, xy = grey_levels(image), row[:, :2]
+        small = shrunk(grey)
+        self._scene.add_frame(index, grey)
         self._camera.add_frame(small, xy)
         self._looks.add_frame(small, xy)
 
@@ -100,6 +104,7 @@ class Background:
             to_first=found.to_first if found.moved else None,
             brightness=self._looks.brightness,
             sharpness=self._looks.sharpness,
+            edges=self._scene.edges(found.moved, track.width, track.height),
         )
 
 

@@ -11,12 +11,13 @@ from jaxtyping import Float
 
 from robojackson.body.smoothing import lowpass
 from robojackson.clips.quality.visibility import weigh_visibility
-from robojackson.mocap.landmarks import pinhole_camera
 from robojackson.mocap.landmarks.blazepose import fill_gaps, repair
+from robojackson.mocap.landmarks.pinhole_camera import Pinhole
 from robojackson.mocap.networks.inference import Estimate, Networks, Progress, estimate
 from robojackson.mocap.networks.network_config import NetworkConfig
 from robojackson.mocap.pose.known_twist import TurnedBody, pose_keypoints
-from robojackson.mocap.recover import MocapConfig, camera_facts, recover_points
+from robojackson.mocap.recover import MocapConfig, focal_of, recover_points, scene_of
+from robojackson.mocap.recovered_sequence import camera_facts
 from robojackson.motion.landmark_track import LandmarkTrack, even_times, evenly
 from robojackson.motion.smpl_sequence import SmplSequence
 
@@ -42,8 +43,8 @@ def network_motion(
         TrackTooShort, NoPersonFound: no motion can be recovered.
     """
     track = weigh_visibility(track)
-    focal = mocap.focal_px or pinhole_camera.guess_focal(track.width, track.height)
-    lens = pinhole_camera.Pinhole(focal, track.width, track.height)
+    scene = scene_of(track, None, mocap)
+    lens = Pinhole(focal_of(track, scene, mocap), track.width, track.height)
     in_frame = repair(replace(track, to_first=None))
     shown = (in_frame, track.to_first, lens, track.fps, mocap.depth_cutoff_hz)
     found = estimate(images, *shown, networks, config, progress)
@@ -51,7 +52,7 @@ def network_motion(
     landmarks = repair(even)
     found = steadied(resampled(found, track), landmarks.valid, even.fps, config.cutoff_hz)
     sequence = recover_points(
-        found.keypoints, poser(found, mocap), landmarks.valid, lens, even.fps, mocap
+        found.keypoints, poser(found, mocap), landmarks.valid, lens, even.fps, mocap, scene=scene
     )
     notes = (*found.notes, *track.notes, *sequence.notes)
     camera = camera_facts(sequence.camera, track)
