@@ -79,12 +79,30 @@ def mocap_lines(answer: Answer) -> list[str]:
         f"planted   {feet} of the time",
         f"floor     lowest point {100 * answer['floor']['lowest_keypoint_m']:.1f} cm above it",
     ]
+    rows += _up_lines(answer["floor"])
     rows += _reprojection_lines(answer)
     rows += [f"note      {note}" for note in answer["notes"]]
     rows += advice_lines(answer)
     rows += [f"motion    {answer['smpl']}"]
     rows += [f"{key:<9} {answer[key]}" for key in ("picture", "film") if key in answer]
     return [*rows, *closing(answer)]
+
+
+SOURCES_OF_UP = {
+    "scene": "straight edges of the room",
+    "network": "the body alone",
+    "balance": "the body alone",
+    "camera": "the camera",
+}
+
+
+def _up_lines(floor: Answer) -> list[str]:
+    """Return the line about the direction of up, and how sure it is."""
+    if "tilt_deg" not in floor:
+        return []
+    source = SOURCES_OF_UP[floor["gravity"]]
+    within = f", to {floor['gravity_sd_deg']:.0f} degrees" if "gravity_sd_deg" in floor else ""
+    return [f"up        from {source}{within}; the camera is tilted by {floor['tilt_deg']:.0f}"]
 
 
 def _reprojection_lines(answer: Answer) -> list[str]:
