@@ -23,7 +23,7 @@ from rich.table import Table
 from benchmarks.learning import checkpoint_cost, races, training_rows
 from benchmarks.learning import speed as learning_speed
 from benchmarks.learning.error_line import errors_in_one_line
-from benchmarks.learning.policies import MOVES, Folders
+from benchmarks.learning.policies import TRAINED, Folders
 from benchmarks.learning.summary import AUTHORS_ROBOT, COLUMNS, EXCESS, GAIN, LIMBS, R2, summary
 
 PARTS = ("speed", "threads", "policies", "survival", "pretraining", "checkpoints", "table")
@@ -68,7 +68,7 @@ def _arguments() -> argparse.Namespace:
     )
     parser.add_argument("what", choices=PARTS, nargs="*", metavar="PART")
     parser.add_argument("--folder", type=Path, help="for everything, instead of the usual places")
-    parser.add_argument("--moves", nargs="*", default=list(MOVES), choices=list(MOVES))
+    parser.add_argument("--moves", nargs="*", default=TRAINED, choices=TRAINED)
     parser.add_argument("--seeds", nargs="*", type=int, default=[0, 1, 2, 3, 4])
     parser.add_argument("--jobs", type=int, default=1, help="trainings at a time, each on a core")
     parser.add_argument(

@@ -37,6 +37,7 @@ class Move:
         cmu: Whether it is a BVH file of CMU.
         same_as: Row whose reference motion it has; its own when empty.
         observation: Inputs of the policy.
+        trained: Whether policies are trained on it; else only trackers are measured there.
     """
 
     clip: str
@@ -51,6 +52,7 @@ class Move:
     cmu: bool = False
     same_as: str = ""
     observation: Literal["full", "onboard"] = "full"
+    trained: bool = True
 
     @property
     def horizons_s(self) -> tuple[float, ...]:
@@ -79,6 +81,12 @@ MOVES = {
         f"g1_cmu_{take}": Move(take, 25, 0.93, 0.8, 0.6, False, robot="g1", mpjpe_mm=42, cmu=True)
         for take in ("05_02", "05_09", "05_18")
     },
+    **{
+        f"g1_person_cam{camera}": Move(
+            f"clips/person_cam{camera}.mp4", 15, 0, 0, 0, False, robot="g1", trained=False
+        )
+        for camera in (1, 2, 3, 4)
+    },
 }
 
 
@@ -101,8 +109,10 @@ def onboard(name: str, move: Move) -> Move:
 MOVES |= {
     f"{name}_onboard": onboard(name, move)
     for name, move in list(MOVES.items())
-    if move.robot == "g1"
+    if move.robot == "g1" and move.trained
 }
+TRAINED = [name for name, move in MOVES.items() if move.trained]
+"""Rows of the table of policies."""
 
 
 @dataclass(frozen=True)

@@ -27,8 +27,8 @@ from robojackson.motion.smpl_sequence import SmplSequence
 
 LARGEST_MISS_M = 0.0185
 """Largest median distance between rays to the same joint: above it the clips differ. Nine pairs of
-clips of the same dance miss by 8 to 18 mm; of 26 pairs of different ones, two with a walk by 15, the
-others by 19.5 to 95."""
+clips of the same dance miss by 8 to 18 mm; of 26 pairs of different ones two with a walk by 15,
+the others by 19.5 to 95."""
 LEAST_FRAMES = 10
 """Least number of frames in which both cameras see the person."""
 SEEN_BY_BOTH = 0.3
