@@ -5,9 +5,8 @@ cheaper one polished at the control rate. paper: Table I of RoboJackson, literal
 same with the axes and signs of the hinges corrected.
 """
 
-import logging
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -17,24 +16,23 @@ from robojackson.motion.certificate import Certificate
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.retarget import paper_mapping
+from robojackson.retarget.danced_motion import danced_motion
 from robojackson.retarget.feasibility.certification import certify
 from robojackson.retarget.feasibility.contact_wrench import Tolerance
 from robojackson.retarget.feasibility.tempo import times_at, warped
-from robojackson.retarget.feasible_motion import Feasible, feasible_share, make_feasible
+from robojackson.retarget.feasible_motion import Feasible
 from robojackson.retarget.retarget_config import RetargetConfig
-from robojackson.retarget.scorecard import hovers, score
-from robojackson.retarget.scorecard_gate import BARS, failures
+from robojackson.retarget.scorecard import score
+from robojackson.retarget.scorecard_gate import failures
 from robojackson.retarget.targets.clip_ends import danced_frames
 from robojackson.retarget.targets.cycle import Cycle, human_clip
 from robojackson.retarget.targets.human_clip import HumanClip
 from robojackson.retarget.targets.keypoint_targets import Targets, select_steps, targets
-from robojackson.retarget.targets.tails import Tailed, settled, with_tails
-from robojackson.retarget.whole_clip import optimise, polished
+from robojackson.retarget.targets.tails import Tailed, settled
 from robojackson.robot.model import Robot
 from robojackson.robot.resampling import velocities
 from robojackson.robot.tree_kinematics import pose, tree
 
-_log = logging.getLogger(__name__)
 A_ROW_A_STEP = (
     "qpos", "qvel", "body_pos_w", "keypoints_w", "contact", "torque_ratio", "source_time_s",
 )  # fmt: skip
@@ -64,7 +62,7 @@ def retarget_motion(
     extra["trimmed_s"] += (whole - len(sequence)) / sequence.fps
     danced: Bool[np.ndarray, " S"] | None = None
     if config.method == "optimise":
-        tailed, upright, able, floor_mm, lean_deg = _danced(clip, robot, config)
+        tailed, upright, able, floor_mm, lean_deg = danced_motion(clip, robot, config)
         extra |= _tail_seconds(tailed)
         extra |= {"keypoint_floor_mm": floor_mm, "lean_deg": lean_deg}
         extra |= _slowing(able, upright, robot)
@@ -80,57 +78,6 @@ def retarget_motion(
         time_s, upright = clip.time_s, targets(clip, robot)
         aims = upright
     return assemble(qpos, time_s, aims, upright, robot, extra, config.weights.tolerance, danced)
-
-
-class _Dance(NamedTuple):
-    """A solved motion.
-
-    Attributes:
-        tailed: Targets with stands around the clip.
-        upright: The dancer's own motion, not leaned.
-        able: The motion after repair.
-        floor_mm: Mean error of every frame solved by itself, mm.
-        lean_deg: Lean that puts the body over its feet, degrees.
-    """
-
-    tailed: Tailed
-    upright: Targets
-    able: Feasible
-    floor_mm: float
-    lean_deg: float
-
-
-def _danced(clip: HumanClip, robot: Robot, config: RetargetConfig) -> _Dance:
-    """Return the motion with its hops; with steps in place of hops that are no flights where the
-    robot can do only these."""
-    hopped = targets(clip, robot, hops=True)
-    found = _solved(clip, robot, config, hopped, hops=True)
-    share = feasible_share(robot, found.able, config)
-    if share >= 1.0 - BARS["infeasible_share"]:
-        return found
-    stepped = targets(clip, robot, hops=False)
-    if np.array_equal(stepped.contact, hopped.contact):
-        return found
-    _log.info("%.0f %% feasible: solving with steps in place of hops", 100 * share)
-    other = _solved(clip, robot, config, stepped, hops=False)
-    return other if feasible_share(robot, other.able, config) > share else found
-
-
-def _solved(
-    clip: HumanClip, robot: Robot, config: RetargetConfig, plain: Targets, hops: bool
-) -> _Dance:
-    """Solve the targets of a clip, with stands around it, and repair the motion."""
-    tailed = with_tails(plain, robot, config.tails)
-    upright = aims = tailed.aims
-    found, floor_mm = optimise(aims, robot, config)
-    hovering = hovers(robot, found.qpos, aims.dt)
-    if hovering.mean() > BARS["unsupported_share"] / 2 and aims.airborne.any():
-        _log.info("removed a flight that does not fall: solving again")
-        grounded = targets(clip, robot, hovering[tailed.clip], hops)
-        upright = with_tails(grounded, robot, config.tails).aims
-        found = polished(upright, found.qpos, found.shift, robot, config)
-    able = make_feasible(robot, found.qpos, found.aims, config, tailed.clip)
-    return _Dance(tailed, upright, able, floor_mm, found.lean_deg)
 
 
 def assemble(

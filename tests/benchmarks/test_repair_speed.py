@@ -3,7 +3,7 @@
 from argparse import Namespace
 
 from benchmarks.retarget import repair_speed
-from robojackson.retarget import retargeting
+from robojackson.retarget import danced_motion
 
 
 def test_a_row_that_the_file_has_is_not_measured_again():
@@ -13,10 +13,10 @@ def test_a_row_that_the_file_has_is_not_measured_again():
 
 
 def test_stages_are_clocked_and_left_as_they_were():
-    own = retargeting.optimise
+    own = danced_motion.optimise
     with repair_speed.clocked() as spent:
-        assert retargeting.optimise is not own
-    assert retargeting.optimise is own
+        assert danced_motion.optimise is not own
+    assert danced_motion.optimise is own
     assert spent == dict.fromkeys(repair_speed.STAGES, 0.0)
 
 
