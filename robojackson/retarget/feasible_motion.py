@@ -30,6 +30,7 @@ _GUARD = 1.03  # a warp ends with a whole step: all tempos fall by less than tha
 _LOOSE = 1e-5  # first damping: repair moves whole bodies over many steps
 _HARDLY_SLOWER = 0.97  # a tempo that is not worth a warp
 _STILL_M = 1e-6  # targets that move less a step are a stand's
+_HOPELESS = 0.5  # share of feasible steps below which a heavier weight has never been enough
 _REACH_S = 0.8  # beside steps that need repair, others may change so far
 
 
@@ -199,12 +200,13 @@ def _holds(robot: Robot, motion: Feasible, config: RetargetConfig) -> bool:
 
 
 def _repaired(robot: Robot, given: Feasible, found: Feasible, config: RetargetConfig) -> Feasible:
-    """Raise the weight until enough steps are feasible or the motion would be bent too far."""
+    """Raise the weight until enough steps are feasible or the motion would be bent too far; not for
+    a motion that is far from feasible."""
     how = config.repair
     dearest = how.max_added_error_mm + _error_mm(robot, given)
     best, good = found, feasible_share(robot, found, config)
     for weight in how.weights[1:]:
-        if good >= how.target_share:
+        if good >= how.target_share or good < _HOPELESS:
             break
         found = _solved(robot, found, weight, config)
         _log.info("weight %g: %.0f %% feasible", weight, 100 * feasible_share(robot, found, config))
