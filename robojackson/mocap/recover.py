@@ -122,20 +122,28 @@ def view_track(track: LandmarkTrack, config: MocapConfig) -> View:
     focal_px = config.focal_px or pinhole_camera.guess_focal(track.width, track.height)
     view = _placed(track, landmarks, focal_px, config)
     scene = scene_of(track, view.ground, config)
-    if scene is not None and (focal_px := focal_of(track, scene, config)) != view.pinhole.focal_px:
-        view = _placed(track, landmarks, focal_px, config)
+    if scene is None:
+        return view
+    known = scene.up if up.shows_up(scene, config.gravity) else None
+    focal_px = focal_of(track, scene, config)
+    if known is not None or focal_px != view.pinhole.focal_px:
+        view = _placed(track, landmarks, focal_px, config, known)
     return replace(view, scene=scene)
 
 
 def _placed(
-    track: LandmarkTrack, landmarks: Landmarks, focal_px: float, config: MocapConfig
+    track: LandmarkTrack,
+    landmarks: Landmarks,
+    focal_px: float,
+    config: MocapConfig,
+    known: Float[np.ndarray, "3"] | None = None,
 ) -> View:
-    """Lift landmarks before a camera of a focal length."""
+    """Lift landmarks before a camera of a focal length, whose up may be known."""
     pinhole = pinhole_camera.Pinhole(focal_px, track.width, track.height)
     seen = pinhole_camera.place(landmarks, pinhole, track.fps, config.depth_cutoff_hz)
     if not config.temporal.enabled:
         return View(track, landmarks, pinhole, seen, None)
-    found = lift(seen, landmarks.local, landmarks.visibility, track.fps, config.temporal)
+    found = lift(seen, landmarks.local, landmarks.visibility, track.fps, config.temporal, known)
     depth_m = found.depth_sd(config.temporal.depth_floor_m)
     return View(track, landmarks, pinhole, found.points, depth_m, found.ground)
 

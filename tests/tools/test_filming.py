@@ -71,7 +71,7 @@ def test_filmed_constants_are_those_of_the_stage() -> None:
     filmed = film(bank(), np.zeros(2, int), 30, np.ones(2), np.random.default_rng(4))
     blank = np.zeros((30, 33, 3))
     root = np.outer(filmed.distance[1], [0.0, 0.0, 1.0])
-    sight = ClipView(blank[..., :2].copy(), blank, blank[..., 0], blank, root)
+    sight = ClipView(blank[..., :2].copy(), blank, blank[..., 0], blank, root, blank[:, 0])
     sight.flat[:, features.INPUT_LANDMARKS] = filmed.flat[1]
     sight.local[:, features.INPUT_LANDMARKS] = filmed.local[1]
     result = with_constants(filmed).constant[1]

@@ -33,6 +33,7 @@ def batch() -> Batch:
         good=np.ones((WINDOWS, FRAMES), np.float32),
         up=np.tile(UP.astype(np.float32), (WINDOWS, FRAMES, 1)),
         contact=np.tile(np.array([PLANTED, AIR, PLANTED, AIR]), (WINDOWS, FRAMES, 1)),
+        shown=np.zeros((WINDOWS, FRAMES, 3), np.float32),
     )
 
 

@@ -5,13 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from safetensors.torch import load_file, save_file
 from scipy.spatial.transform import Rotation
 
+from robojackson.body.forward_kinematics import unit
 from robojackson.mocap.temporal import error_flow, features, temporal_network
 from robojackson.mocap.temporal.features import ClipView
 from robojackson.motion.smpl_sequence import AIR, PLANTED, SLIDING
 from tools.pairs.sources import RefusedMotion
-from tools.temporal import batches, train_temporal
+from tools.temporal import batches, calibration, train_temporal
 from tools.temporal.batches import Batch
 from tools.temporal.depth_errors import Change, body_offsets, misjudged
 from tools.temporal.examples import Example, flattened
@@ -32,8 +34,9 @@ def twins(tmp_path_factory: pytest.TempPathFactory) -> tuple[Lifter, Flow, error
     return lifter, coupled, temporal_network.load(path)
 
 
-def person(frames: int = 60, motion: str = "jump") -> Example:
+def person(frames: int = 60, motion: str = "jump", known: bool = False) -> Example:
     rng = np.random.default_rng(9)
+    up = np.tile([0.0, -1.0, 0.0], (frames, 1))
     truth = rng.normal(0.0, 0.4, (1, 33, 3)) + 0.05 * rng.normal(size=(frames, 33, 3))
     truth[:, features.HIPS] -= truth[:, features.HIPS].mean(1, keepdims=True)
     distance = np.full(frames, 4.0)
@@ -43,8 +46,8 @@ def person(frames: int = 60, motion: str = "jump") -> Example:
         visibility=np.ones((frames, 33)),
         axes=np.tile(np.eye(3), (frames, 1, 1)),
         root=np.outer(distance, [0.0, 0.0, 1.0]),
+        up=up if known else np.zeros((frames, 3)),
     )
-    up = np.tile([0.0, -1.0, 0.0], (frames, 1))
     contact = np.tile([PLANTED, AIR, SLIDING, AIR], (frames, 1))
     return Example(sight, truth, np.ones(frames, bool), distance, motion, up, contact)
 
@@ -212,3 +215,47 @@ def stop_early(progress: object, where: object, config: object, watch: object) -
             group["lr"] = config.rate * fit._schedule(step, config.steps)
         fit._learn(progress, where.draw(config, share, rng), config)
         progress.step = step + 1
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_a_known_up_moves_with_its_window_and_an_unknown_one_stays_nothing(known: bool) -> None:
+    batch = batch_of(person(known=known))
+    found = batches.change(batch, Change(), np.random.default_rng(5))
+    if not known:
+        assert not found.shown.any()
+        return
+    angle = np.degrees(np.arccos(np.clip(np.sum(unit(found.shown) * found.up, -1), -1.0, 1.0)))
+    assert 0.1 < angle.max() < 8.0
+    assert np.ptp(angle, axis=1).max() < 1e-3
+    assert np.abs(np.diff(found.shown, axis=1)).max() < 1e-6
+
+
+def test_a_lifter_that_does_not_read_up_is_widened_and_answers_as_before(
+    twins: tuple[Lifter, Flow, error_flow.Weights], tmp_path: Path
+) -> None:
+    lifter, coupled, _ = twins
+    path, old = tmp_path / "new.safetensors", tmp_path / "old.safetensors"
+    train_temporal.save(lifter, coupled, path)
+    arrays = load_file(path)
+    for name in ("mean", "scale", "enter.weight"):
+        arrays[name] = arrays[name][..., :-3].contiguous()
+    save_file(arrays, old)
+    again = Lifter().eval()
+    again.load_state_dict(train_temporal.widened(old), strict=False)
+    found, result = (
+        net.features(torch.from_numpy(features.numbers(sight)[None].astype(np.float32)))
+        for net, sight in ((lifter, person().sight), (again, person(known=True).sight))
+    )
+    assert torch.allclose(found, result, atol=2e-2)
+
+
+def test_a_calibrated_spread_holds_two_thirds_of_the_errors(
+    twins: tuple[Lifter, Flow, error_flow.Weights],
+) -> None:
+    lifter = Lifter()
+    lifter.load_state_dict(twins[0].state_dict())
+    examples = [person()]
+    calibration.apply(lifter, calibration.factors(lifter, examples))
+    again = calibration.factors(lifter, examples)
+    assert np.abs(np.log(again)).max() < 0.35
+    assert np.median(np.abs(np.log(again))) < 0.02

@@ -18,6 +18,9 @@ from tools.temporal.examples import Example
 SWAP = [ORDER.index(int(MIRROR[index])) for index in INPUT_LANDMARKS]
 TWELVE = [ORDER.index(int(index)) for index in BODY]
 OTHER_FOOT = (2, 3, 0, 1)
+MIRRORED_BODY = [list(BODY).index(MIRROR[index]) for index in BODY]
+UP_SD = 0.025
+"""Standard deviation of the error of a known up, radians."""
 LONGEST = 150
 """Frames of the longest example that are kept."""
 
@@ -34,6 +37,7 @@ class Batch:
         good: 1 in the frames that count, else 0.
         up: Direction against gravity, unit vectors (B, L, 3).
         contact: States of the foot points (B, L, 4).
+        shown: The network's input of up (B, L, 3), zero where it is not known.
     """
 
     flat: np.ndarray
@@ -45,13 +49,14 @@ class Batch:
     good: np.ndarray
     up: np.ndarray
     contact: np.ndarray
+    shown: np.ndarray
 
     def numbers(self) -> np.ndarray:
         """Return the network's input (B, L, F), as `features.numbers` orders it."""
         shape = self.flat.shape[:2]
         constant = np.broadcast_to(self.constant[:, None], (*shape, self.constant.shape[1]))
         parts = (self.flat.reshape(*shape, -1), self.local.reshape(*shape, -1), self.visibility)
-        return np.concatenate([*parts, constant], -1).astype(np.float32)
+        return np.concatenate([*parts, constant, self.shown], -1).astype(np.float32)
 
 
 def table(examples: Sequence[Example]) -> Batch:
@@ -73,6 +78,7 @@ def table(examples: Sequence[Example]) -> Batch:
         good=stack(good),
         up=stack([e.up for e in examples]),
         contact=stack([e.contact for e in examples]),
+        shown=stack([s.up for s in sights]),
     )
 
 
@@ -134,6 +140,7 @@ def change(batch: Batch, how: Change, rng: np.random.Generator) -> Batch:
         distance=batch.distance * size[:, None],
         truth=truth,
         up=(batch.up[:, :, None] @ roll)[:, :, 0],
+        shown=_misread((batch.shown[:, :, None] @ roll)[:, :, 0], rng),
     )
 
 
@@ -181,8 +188,15 @@ def _mirrored(batch: Batch, which: np.ndarray) -> Batch:
         truth=np.where(pick, batch.truth[:, :, SWAP] * flip, batch.truth),
         visibility=np.where(pick[..., 0], batch.visibility[:, :, SWAP], batch.visibility),
         up=np.where(pick[..., 0], batch.up * flip, batch.up),
+        shown=np.where(pick[..., 0], batch.shown * flip, batch.shown),
         contact=np.where(pick[..., 0], batch.contact[..., OTHER_FOOT], batch.contact),
     )
+
+
+def _misread(shown: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Return known directions of up with the same error throughout a window."""
+    known = np.linalg.norm(shown, axis=-1, keepdims=True) > 0.5
+    return np.asarray((shown + rng.normal(0.0, UP_SD, (len(shown), 1, 3))) * known)
 
 
 def _disturbed(values: np.ndarray, how: Change, rng: np.random.Generator) -> np.ndarray:

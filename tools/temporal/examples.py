@@ -78,20 +78,28 @@ def body_size(truth: np.ndarray) -> float:
     return float(np.median(np.sum(lengths, axis=0)))
 
 
-def read(path: Path) -> Example | None:
-    """Return the example of a pair file; None if the detector lost the person too often."""
+def read(path: Path, known: bool = False) -> Example | None:
+    """Return the example of a pair file; None if the detector lost the person too often.
+
+    Args:
+        path: The pair.
+        known: Whether up and the focal length are known.
+    """
     with np.load(path) as pair:
         stride = int(pair["stride"])
         seen, (width, height) = pair["seen"][::stride].astype(float), pair["size"].tolist()
         truth_c, motion, fps = pair["truth"].astype(float), str(pair["motion"]), float(pair["fps"])
         up_c, names = pair["up"].astype(float), pair["bone_names"].tolist()
+        focal_px = float(pair["focal"]) if known else None
         feet = soles(apply(camera_to_world(up_c), pair["bones"].astype(float)), names)
     track = LandmarkTrack(fps / stride, width, height, seen[..., :3], seen[..., 3:6], seen[..., 6])
     if track.detected.mean() < LEAST_FOUND:
         return None
     places = features.time_grid(len(seen), track.fps)
     try:
-        sight = temporal_lift.at(sight_of(weigh_visibility(track)), places)
+        sight = temporal_lift.at(
+            sight_of(weigh_visibility(track), focal_px, up_c if known else None), places
+        )
     except NoPersonFound:
         return None
     truth, distance = along_rays(truth_c[: len(places)])
@@ -106,24 +114,26 @@ def read(path: Path) -> Example | None:
     return Example(sight, truth * scale, good, distance * scale, motion, up_c @ axes, contact)
 
 
-def sight_of(track: LandmarkTrack) -> ClipView:
+def sight_of(
+    track: LandmarkTrack, focal_px: float | None = None, up_c: np.ndarray | None = None
+) -> ClipView:
     """Return the view of the clip, as in `recover_motion`, up to the network."""
     config, landmarks = MocapConfig(), repair(track)
-    focal = pinhole_camera.guess_focal(track.width, track.height)
+    focal = focal_px or pinhole_camera.guess_focal(track.width, track.height)
     lens = pinhole_camera.Pinhole(focal, track.width, track.height)
     placed = pinhole_camera.place(landmarks, lens, track.fps, config.depth_cutoff_hz)
-    return features.view_clip(placed, landmarks.local, landmarks.visibility)
+    return features.view_clip(placed, landmarks.local, landmarks.visibility, up_c)
 
 
 def load(folder: Path) -> tuple[list[Example], list[Example]]:
-    """Return the training and validation examples of a folder of pairs."""
+    """Return the training and validation examples of a folder of pairs: each clip without and with
+    a known up and focal length."""
     training: list[Example] = []
     validation: list[Example] = []
     for path in sorted(folder.glob("[0-9]*_[0-9]*.npz")):
-        number, example = path.stem.split("_")[-1].split(".")[0], read(path)
-        if example is None:
-            continue
-        held = example.motion.split("+")[0] in VALIDATION_MOTIONS
-        keep = validation if held or int(number) % VALIDATION_EACH == 0 else training
-        keep.append(example)
+        number = path.stem.split("_")[-1].split(".")[0]
+        for example in filter(None, (read(path), read(path, known=True))):
+            held = example.motion.split("+")[0] in VALIDATION_MOTIONS
+            keep = validation if held or int(number) % VALIDATION_EACH == 0 else training
+            keep.append(example)
     return training, validation

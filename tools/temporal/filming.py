@@ -27,6 +27,8 @@ ASIDE = 0.2
 """Standard deviation of the person's place beside the axis, in shares of the distance."""
 LENSES = (0.55, 1.7)
 """Focal length over the image's diagonal."""
+KNOWN, KNOWN_FOCAL_SD = 0.5, 0.03
+"""Share of windows of which up and the focal length are known; its relative error then."""
 SWAY = 0.02
 """Of the distance that is found, slowly varying, share."""
 HIPS = [ORDER.index(index) for index in features.HIPS]
@@ -69,7 +71,9 @@ def film(
     distance = np.linalg.norm(root, axis=-1)
     away = distance[..., None, None]
     count = len(rows)
+    known = rng.uniform(size=(count, 1)) < KNOWN
     wrong = FOCAL_PER_DIAGONAL / np.exp(rng.uniform(*np.log(LENSES), (count, 1)))
+    wrong = np.where(known, np.exp(rng.normal(0.0, KNOWN_FOCAL_SD, (count, 1))), wrong)
     wrong = wrong * (1.0 + slow(rng, (count, frames, 1), 1.0)[..., 0] * SWAY)
     flat = truth[..., :2] * away / (away + truth[..., 2:])
     return Batch(
@@ -80,7 +84,8 @@ def film(
         distance=(distance * wrong).astype(np.float32),
         truth=truth.astype(np.float32),
         good=np.ones((count, frames), np.float32),
-        up=(up[:, None, None] @ axes)[:, :, 0].astype(np.float32),
+        up=(above := (up[:, None, None] @ axes)[:, :, 0].astype(np.float32)),
+        shown=above * known[..., None].astype(np.float32),
         contact=bank.contact[rows[:, None], np.round(places).astype(int)].astype(np.float32),
     )
 

@@ -105,6 +105,7 @@ def begin(examples: Sequence[Example], config: FitConfig, seed: int) -> Progress
     numbers = np.concatenate([features.numbers(e.sight)[::10] for e in examples])
     net.mean.copy_(torch.from_numpy(numbers.mean(0)))
     net.scale.copy_(torch.from_numpy(1.0 / (numbers.std(0) + 0.02)))
+    net.mean[-3:], net.scale[-3:] = 0.0, 1.0  # zero where up is not known
     optimiser = torch.optim.AdamW(net.parameters(), lr=config.rate, weight_decay=config.decay)
     mean = {name: value.clone() for name, value in net.state_dict().items()}
     return Progress(0, net, mean, optimiser, [])

@@ -17,12 +17,14 @@ import sys
 from dataclasses import asdict
 from pathlib import Path
 
+import numpy as np
 import torch
 from safetensors.torch import load_file, save_file
 
 from robojackson.errors import BadWeights
+from robojackson.mocap.temporal.features import COUNT
 from tools.pairs import sources
-from tools.temporal import fit, truths
+from tools.temporal import calibration, fit, truths
 from tools.temporal.examples import Example, load
 from tools.temporal.fit_flow import fit_flow
 from tools.temporal.net import Flow, Lifter
@@ -66,7 +68,7 @@ def train(
 
     def watch(now: fit.Progress, step_s: float) -> None:
         if now.step % 300 == 0 or now.step == config.steps:
-            now.curve[-1] |= fit.validate(fit.averaged(now), validation)
+            now.curve[-1] |= validated(fit.averaged(now), validation)
         keep(now, state)
         figures = ", ".join(f"{k} {v:.4g}" for k, v in now.curve[-1].items())
         log.info("%s; %.0f CPU s left", figures, (config.steps - now.step) * step_s)
@@ -77,6 +79,8 @@ def train(
     lifter = fit.averaged(progress)
     if first:
         mix_in(lifter, first, first_share)
+    spreads = calibration.factors(lifter, validation[::2])
+    calibration.apply(lifter, spreads)
     flow_curve: list[dict[str, float]] = []
 
     def watch_flow(step: int, losses: dict[str, float]) -> None:
@@ -88,9 +92,19 @@ def train(
     return {
         "clips": len(training), "frames": sum(len(e.truth) for e in training),
         "validation_clips": len(validation), "bank": len(bank or ()), "seed": seed,
+        "spread_factors": spreads.round(3).tolist(),
         "config": asdict(config), "curve": progress.curve, "flow": flow_curve,
-        "validation": fit.validate(lifter, validation),
+        "validation": validated(lifter, validation),
     }  # fmt: skip
+
+
+def validated(lifter: Lifter, examples: list[Example]) -> dict[str, float]:
+    """Return the figures of clips whose up is not known, and, `_known`, of those whose is."""
+    plain, known = (
+        [e for e in examples if bool(np.any(e.sight.up)) == which] for which in (False, True)
+    )
+    found = {f"{name}_known": value for name, value in fit.validate(lifter, known).items()}
+    return fit.validate(lifter, plain) | found
 
 
 def save(lifter: Lifter, flow: Flow, path: Path) -> None:
@@ -111,11 +125,20 @@ def save(lifter: Lifter, flow: Flow, path: Path) -> None:
 def begin_with(progress: fit.Progress, path: Path) -> None:
     """Take the lifter of a weights file as the first one; a file without a head for the ground
     leaves the fresh one."""
-    arrays = {n: v.float() for n, v in load_file(path).items() if not n.startswith("flow.")}
+    arrays = widened(path)
     missing, unknown = progress.net.load_state_dict(arrays, strict=False)
     if unknown or any(not name.startswith(("ground.", "feet.")) for name in missing):
         raise BadWeights(f"{path}: not the lifter of this version: {[*missing, *unknown]}")
     progress.mean.update({name: value.clone() for name, value in arrays.items()})
+
+
+def widened(path: Path) -> dict[str, torch.Tensor]:
+    """Return the lifter of a weights file; one that does not read up ignores it."""
+    arrays = {n: v.float() for n, v in load_file(path).items() if not n.startswith("flow.")}
+    if extra := COUNT - len(arrays["mean"]):
+        for name, value in (("mean", 0.0), ("scale", 1.0), ("enter.weight", 0.0)):
+            arrays[name] = torch.nn.functional.pad(arrays[name], (0, extra), value=value)
+    return arrays
 
 
 def mix_in(lifter: Lifter, path: Path, share: float) -> None:
@@ -125,9 +148,9 @@ def mix_in(lifter: Lifter, path: Path, share: float) -> None:
     than either (Wortsman et al. 2022). The head for the ground stays as it is if it was fresh.
     """
     own = lifter.state_dict()
-    for name, value in load_file(path).items():
+    for name, value in widened(path).items():
         if name in own:
-            own[name].lerp_(value.float(), share)
+            own[name].lerp_(value, share)
 
 
 def keep(progress: fit.Progress, path: Path) -> None:

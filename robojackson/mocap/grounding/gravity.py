@@ -114,7 +114,7 @@ def find_up(
         network: What the temporal network found.
         scene: What straight edges of the scene show.
     """
-    if scene is not None and scene.sd <= np.radians(config.scene_sd_deg):
+    if scene is not None and shows_up(scene, config):
         tilt = _angle_deg(scene.up, CAMERA_UP)
         return Gravity(scene.up, "scene", tilt, float(np.degrees(scene.sd)))
 
@@ -135,6 +135,11 @@ def find_up(
     if network is None:
         return Gravity(up, "balance", tilt)
     return Gravity(up, "network", tilt, spread_deg(apart_deg, network, config))
+
+
+def shows_up(scene: SceneEvidence, config: GravityConfig) -> bool:
+    """Return whether a scene shows up closely enough to be used."""
+    return bool(scene.sd <= np.radians(config.scene_sd_deg))
 
 
 def spread_deg(apart_deg: float, network: GroundEvidence, config: GravityConfig) -> float:

@@ -31,7 +31,7 @@ INPUT_LANDMARKS = np.array(
        for s in ("left", "right")]
 )  # fmt: skip
 """Landmarks in the network's input."""
-COUNT = len(INPUT_LANDMARKS) * 6 + 2 * (len(CHAINS) + len(WIDTHS)) + 1
+COUNT = len(INPUT_LANDMARKS) * 6 + 2 * (len(CHAINS) + len(WIDTHS)) + 1 + 3
 """Length of the input, numbers a frame."""
 
 
@@ -45,6 +45,7 @@ class ClipView:
         visibility: Visibility of the landmarks, 0..1.
         axes: Rotations from these axes to the camera's.
         root: The middle of the hips before the camera, metres.
+        up: Direction against gravity, zero where it is not known.
     """
 
     flat: Float[np.ndarray, "T 33 2"]
@@ -52,20 +53,24 @@ class ClipView:
     visibility: Float[np.ndarray, "T 33"]
     axes: Float[np.ndarray, "T 3 3"]
     root: Float[np.ndarray, "T 3"]
+    up: Float[np.ndarray, "T 3"]
 
 
 def view_clip(
     placed: Float[np.ndarray, "T 33 3"],
     local: Float[np.ndarray, "T 33 3"],
     visibility: Float[np.ndarray, "T 33"],
+    up: Float[np.ndarray, "3"] | None = None,
 ) -> ClipView:
-    """Return the view from landmarks that the camera stage has placed, and the detector's own."""
+    """Return the view from landmarks that the camera stage has placed, the detector's own, and up
+    in the camera's axes where it is known."""
     rays = placed / placed[..., 2:]
     root = placed[:, HIPS].mean(1)
     axes = axes_along(root)
     seen = apply(np.swapaxes(axes, -1, -2)[:, None], rays)
     flat = seen[..., :2] / seen[..., 2:] * np.linalg.norm(root, axis=-1)[:, None, None]
-    return ClipView(flat, local * METRES_PER_METRE, visibility, axes, root)
+    along = np.zeros(3) if up is None else up
+    return ClipView(flat, local * METRES_PER_METRE, visibility, axes, root, along @ axes)
 
 
 def axes_along(ray: Float[np.ndarray, "T 3"]) -> Float[np.ndarray, "T 3 3"]:
@@ -84,6 +89,7 @@ def numbers(sight: ClipView) -> Float[np.ndarray, "T F"]:
             sight.local[:, INPUT_LANDMARKS].reshape(count, -1),
             sight.visibility[:, INPUT_LANDMARKS],
             np.tile(constants(sight), (count, 1)),
+            sight.up,
         ],
         1,
     )
@@ -137,6 +143,7 @@ def mirror(sight: ClipView) -> ClipView:
         visibility=sight.visibility[:, MIRROR],
         axes=sight.axes * flip[:, None] * flip,
         root=sight.root * flip,
+        up=sight.up * flip,
     )
 
 

@@ -45,7 +45,7 @@ class TemporalConfig:
 
     enabled: bool = True
     weights: str | None = None
-    detector_m: float = Field(default=0.18, ge=0)
+    detector_m: float = Field(default=0.22, ge=0)
     blind_share: float = Field(default=0.35, ge=0, le=1)
     depth_floor_m: float = 0.02
     hypothesis: int = 0
@@ -82,6 +82,7 @@ def lift(
     visibility: Float[np.ndarray, "T 33"],
     fps: float,
     config: TemporalConfig,
+    up: Float[np.ndarray, "3"] | None = None,
 ) -> Lifted:
     """Return the landmarks with the body corrected; face, hands and feet follow their carriers.
 
@@ -91,11 +92,12 @@ def lift(
         visibility: Visibility of the landmarks, 0..1.
         fps: Frames a second.
         config: Settings of the network.
+        up: Direction against gravity in the camera's axes, where the scene shows it.
     Raises:
         BadWeights: the weights file is not of this network.
     """
     weights = load(config.file)
-    sight = features.view_clip(placed, local, visibility)
+    sight = features.view_clip(placed, local, visibility, up)
     places = features.time_grid(len(placed), fps)
     coarse = at(sight, places)
     found = blended(coarse, weights, config.blind_share)
@@ -202,4 +204,5 @@ def at(sight: ClipView, places: Float[np.ndarray, " S"]) -> ClipView:
         visibility=features.resample(sight.visibility, places),
         root=features.resample(sight.root, places),
         axes=sight.axes[nearest],
+        up=sight.up[nearest],
     )

@@ -30,7 +30,7 @@ def found_in(axes: np.ndarray, up_c: np.ndarray) -> GroundEvidence:
         tilt=np.full((FRAMES, 2), [0.02, 0.06]),
     )
     blank = np.zeros((FRAMES, 33, 3))
-    sight = ClipView(blank[..., :2], blank, blank[..., 0], axes, blank[:, 0])
+    sight = ClipView(blank[..., :2], blank, blank[..., 0], axes, blank[:, 0], blank[:, 0])
     return ground_evidence(output, sight, np.arange(FRAMES))
 
 
