@@ -47,6 +47,7 @@ class GravityConfig:
             gravity too, degrees.
         scene: Whether straight edges of the scene show gravity, and the focal length.
         scene_sd_deg: Largest standard deviation of up from the edges that is used, degrees.
+        scene_sure_sd_deg: Largest one that is declared sure, degrees.
         scene_focal_sd: Largest standard deviation of the focal length from the edges that is used,
             a share of it.
     """
@@ -63,7 +64,8 @@ class GravityConfig:
     max_tilt_deg: float = 45.0
     beside_network_max_tilt_deg: float = 75.0
     scene: bool = True
-    scene_sd_deg: float = 6.0
+    scene_sd_deg: float = 12.0
+    scene_sure_sd_deg: float = 6.0
     scene_focal_sd: float = 0.1
 
 
@@ -76,17 +78,14 @@ class Gravity:
         source: Source of the direction.
         tilt_deg: Angle to the camera's own up, degrees.
         sd_deg: Standard deviation of its error, degrees; None where it is not known.
+        sure: Whether it is declared sure: the scene shows it closely.
     """
 
     up: Float[np.ndarray, "3"]
     source: Literal["scene", "balance", "network", "camera"]
     tilt_deg: float
     sd_deg: float | None = None
-
-    @property
-    def sure(self) -> bool:
-        """Whether up is declared sure: the scene shows it."""
-        return self.source == "scene"
+    sure: bool = False
 
 
 def find_up(
@@ -114,9 +113,9 @@ def find_up(
         network: What the temporal network found.
         scene: What straight edges of the scene show.
     """
-    if scene is not None and shows_up(scene, config):
-        tilt = _angle_deg(scene.up, CAMERA_UP)
-        return Gravity(scene.up, "scene", tilt, float(np.degrees(scene.sd)))
+    if scene is not None and scene.sd <= np.radians(config.scene_sd_deg):
+        tilt, sure = _angle_deg(scene.up, CAMERA_UP), shows_up(scene, config)
+        return Gravity(scene.up, "scene", tilt, float(np.degrees(scene.sd)), sure)
 
     def settled(start: np.ndarray, other: GroundEvidence | None, least_deg: float) -> np.ndarray:
         for _ in range(ROUNDS):
@@ -138,8 +137,8 @@ def find_up(
 
 
 def shows_up(scene: SceneEvidence, config: GravityConfig) -> bool:
-    """Return whether a scene shows up closely enough to be used."""
-    return bool(scene.sd <= np.radians(config.scene_sd_deg))
+    """Return whether a scene shows up closely enough to be declared sure."""
+    return bool(scene.sd <= np.radians(config.scene_sure_sd_deg))
 
 
 def spread_deg(apart_deg: float, network: GroundEvidence, config: GravityConfig) -> float:

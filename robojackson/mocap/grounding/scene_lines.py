@@ -17,8 +17,9 @@ from jaxtyping import Float
 from robojackson.body.forward_kinematics import unit
 from robojackson.mocap.landmarks.pinhole_camera import FOCAL_PER_DIAGONAL
 
-FEWEST, MOST, FIRST = 3, 120, 60
-"""Edges that are needed, that are used, and that are used for the coarse grid; the longest ones."""
+FEWEST, MOST, FIRST, SECTORS = 3, 120, 60, 12
+"""Edges that are needed, that are used, and that are used for the coarse grid: the longest ones of
+each sector of directions in turn, since one family of edges alone shows nothing."""
 LONGEST, WEIGHT = 0.15, 30.0
 """Length beyond which an edge counts no more, diagonals; weight for each diagonal of length."""
 OUTLIERS, TEMPER = 0.4, 0.2
@@ -96,7 +97,8 @@ def scene_evidence(
 
 @dataclass(frozen=True)
 class _Edges:
-    """Directions, middles (from the image's middle) and weights of edges, longest first."""
+    """Directions, middles (from the image's middle) and weights of edges, those of each sector in
+    turn, longest first."""
 
     line: Float[np.ndarray, "N 2"]
     middle: Float[np.ndarray, "N 2"]
@@ -108,12 +110,17 @@ class _Edges:
         ends = (edges.reshape(-1, 2, 2) - [width / 2.0, height / 2.0]) / diagonal
         along = ends[:, 1] - ends[:, 0]
         length = np.linalg.norm(along, axis=1)
-        rows = np.argsort(-length)[:MOST]
+        sector = np.arctan2(along[:, 1], along[:, 0]) % np.pi // (np.pi / SECTORS)
+        rank = np.zeros(len(length))
+        for one in np.unique(sector):
+            (members,) = np.nonzero(sector == one)
+            rank[members[np.argsort(-length[members])]] = np.arange(len(members))
+        rows = np.lexsort((-length, rank))[:MOST]
         weight = WEIGHT * np.minimum(length[rows], LONGEST)
         return cls(along[rows] / length[rows, None], ends[rows].mean(1), weight)
 
     def first(self, count: int) -> "_Edges":
-        """Return the longest edges, with the weight of all."""
+        """Return the first edges, with the weight of all."""
         weight = self.weight[:count] * self.weight.sum() / self.weight[:count].sum()
         return _Edges(self.line[:count], self.middle[:count], weight)
 

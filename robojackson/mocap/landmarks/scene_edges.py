@@ -11,11 +11,14 @@ from jaxtyping import Float, UInt8
 PICTURES = 5
 SHORT_SIDE = 480
 """Short side of the pictures in which edges are sought, pixels."""
-LEAST_LENGTH, MOST = 0.03, 160
+LEAST_LENGTH, MOST = 0.03, 300
 """Length of an edge, image diagonals; number of edges, the longest first."""
-OVERLAY_TILT, OVERLAY_LENGTH = np.radians(0.15), 0.12
+OVERLAY_TILT, OVERLAY_LENGTH = np.radians(0.1), 0.4
 """An edge along a row or a column of pixels, as long as this share of a side, is drawn onto the
-picture: the border of a bar or of a caption."""
+picture: the border of a frame around it."""
+PLAIN = 2.0
+"""Standard deviation of the grey levels of a row or a column that belongs to a bar at the border,
+of 255."""
 
 
 class SceneEdges:
@@ -53,9 +56,13 @@ class SceneEdges:
 
 
 def straight_edges(picture: UInt8[np.ndarray, "H W"]) -> Float[np.ndarray, "N 4"]:
-    """Return the longest straight edges of a picture (LSD: von Gioi et al., 2010), pixels."""
-    found = cv2.createLineSegmentDetector().detect(np.ascontiguousarray(picture))[0]
+    """Return the longest straight edges of a picture without plain bars at its borders (LSD: von
+    Gioi et al., 2010), pixels."""
+    rows, columns = _shown(picture.std(1)), _shown(picture.std(0))
+    inside = np.ascontiguousarray(picture[rows, columns])
+    found = cv2.createLineSegmentDetector().detect(inside)[0] if inside.size else None
     lines = np.zeros((0, 4)) if found is None else np.asarray(found, float).reshape(-1, 4)
+    lines = lines + np.tile([columns.start, rows.start], 2)
     along = lines[:, 2:] - lines[:, :2]
     length = np.linalg.norm(along, axis=1)
     tilt = np.abs(along).min(1) / np.maximum(length, 1e-9)
@@ -63,8 +70,15 @@ def straight_edges(picture: UInt8[np.ndarray, "H W"]) -> Float[np.ndarray, "N 4"
     side = np.where(np.abs(along[:, 0]) > np.abs(along[:, 1]), float(width), float(height))
     drawn = (tilt < OVERLAY_TILT) & (length > OVERLAY_LENGTH * side)
     kept = (length > LEAST_LENGTH * float(np.hypot(width, height))) & ~drawn
-    rows = np.flatnonzero(kept)[np.argsort(-length[kept])][:MOST]
-    return lines[rows]
+    longest = np.flatnonzero(kept)[np.argsort(-length[kept])][:MOST]
+    result: np.ndarray = lines[longest]
+    return result
+
+
+def _shown(spread: Float[np.ndarray, " N"]) -> slice:
+    """Return the rows or columns between the plain ones at both borders."""
+    shown = np.flatnonzero(spread > PLAIN)
+    return slice(int(shown[0]), int(shown[-1]) + 1) if len(shown) else slice(0, 0)
 
 
 def _reduced(grey: UInt8[np.ndarray, "H W"]) -> UInt8[np.ndarray, "h w"]:

@@ -26,10 +26,20 @@ def test_the_sides_of_a_beam_are_found_where_they_are() -> None:
     assert slope == pytest.approx(40 / 350, abs=0.01)
 
 
-def test_a_bar_that_is_drawn_onto_the_picture_is_no_edge_of_the_scene() -> None:
+@pytest.mark.parametrize("bar", [np.s_[:70], np.s_[-70:], np.s_[:, :60]])
+def test_a_bar_at_the_border_is_no_edge_of_the_scene(bar: tuple[slice, ...]) -> None:
+    picture = drawn((100, 50, 140, 400), (300, 40, 330, 430))
+    picture[bar] = 0
+    edges = straight_edges(picture)
+    assert len(edges) == 4
+    along = np.abs(edges[:, 2:] - edges[:, :2])
+    assert (along[:, 1] > 5 * along[:, 0]).all()
+
+
+def test_a_frame_that_is_drawn_around_the_picture_is_no_edge_of_the_scene() -> None:
     picture = drawn((100, 50, 140, 400))
     before = len(straight_edges(picture))
-    picture[:60] = 0
+    picture[:, 500:] = np.random.default_rng(0).integers(80, 120, (480, 140))
     assert len(straight_edges(picture)) == before
 
 
