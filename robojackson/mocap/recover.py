@@ -16,7 +16,7 @@ from robojackson.body.forward_kinematics import apply
 from robojackson.body.smoothing import lowpass
 from robojackson.clips.quality.visibility import weigh_visibility
 from robojackson.config import config_dataclass
-from robojackson.mocap.grounding import gravity as up
+from robojackson.mocap.grounding import up_direction as up
 from robojackson.mocap.grounding.scene_lines import SceneEvidence, scene_evidence
 from robojackson.mocap.grounding.stance import GroundingConfig, ground_body
 from robojackson.mocap.landmarks import pinhole_camera

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from robojackson.mocap.grounding.gravity import Gravity
+from robojackson.mocap.grounding.up_direction import Gravity
 from robojackson.mocap.landmarks.blazepose import Landmarks
 from robojackson.mocap.landmarks.pinhole_camera import Pinhole
 from robojackson.mocap.pose.posed_body import Body

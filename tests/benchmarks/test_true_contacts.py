@@ -6,7 +6,7 @@ import pytest
 from benchmarks.mocap.figures import true_contacts
 from benchmarks.mocap.truth import SOLE_BELOW_BONE, SOLE_BONES, SOLE_LENGTH, soles
 from robojackson.body.forward_kinematics import apply
-from robojackson.mocap.grounding.gravity import camera_to_world
+from robojackson.mocap.grounding.up_direction import camera_to_world
 from robojackson.motion.smpl_sequence import AIR, PLANTED, SLIDING
 
 FPS, FRAMES = 30.0, 60

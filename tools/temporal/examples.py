@@ -14,7 +14,7 @@ from benchmarks.mocap.truth import soles
 from robojackson.body.forward_kinematics import apply
 from robojackson.clips.quality.visibility import weigh_visibility
 from robojackson.errors import NoPersonFound
-from robojackson.mocap.grounding.gravity import camera_to_world
+from robojackson.mocap.grounding.up_direction import camera_to_world
 from robojackson.mocap.landmarks import pinhole_camera
 from robojackson.mocap.landmarks.blazepose import BODY, landmark, repair
 from robojackson.mocap.recover import MocapConfig

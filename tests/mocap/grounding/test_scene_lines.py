@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from robojackson.mocap.grounding.gravity import CAMERA_UP
 from robojackson.mocap.grounding.scene_lines import SceneEvidence, scene_evidence
+from robojackson.mocap.grounding.up_direction import CAMERA_UP
 
 WIDTH, HEIGHT = 1280, 720
 DIAGONAL = float(np.hypot(WIDTH, HEIGHT))

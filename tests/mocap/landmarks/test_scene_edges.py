@@ -7,8 +7,8 @@ import pytest
 from benchmarks.mocap.truth import REAL, load_truth, video_path
 from robojackson.clips.people.camera_motion import grey_levels
 from robojackson.clips.video import timed_frames
-from robojackson.mocap.grounding.gravity import CAMERA_UP
 from robojackson.mocap.grounding.scene_lines import scene_evidence
+from robojackson.mocap.grounding.up_direction import CAMERA_UP
 from robojackson.mocap.landmarks.scene_edges import PICTURES, SceneEdges, straight_edges
 
 

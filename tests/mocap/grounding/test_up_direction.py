@@ -8,7 +8,7 @@ from robojackson.body.feet import foot_points
 from robojackson.body.forward_kinematics import forward
 from robojackson.body.skeleton import REST_JOINTS
 from robojackson.geometry.frames import CAMERA_TO_WORLD
-from robojackson.mocap.grounding import gravity as ground
+from robojackson.mocap.grounding import up_direction as ground
 from robojackson.mocap.grounding.scene_lines import SceneEvidence
 from robojackson.mocap.temporal.ground_evidence import GroundEvidence
 
