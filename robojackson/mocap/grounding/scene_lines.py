@@ -65,6 +65,7 @@ def scene_evidence(
         body_up: Direction near which up is sought, camera axes.
     """
     diagonal = float(np.hypot(width, height))
+    edges = edges[(edges[:, :2] != edges[:, 2:]).any(1)]
     if len(edges) < FEWEST:
         return None
     scene = _Edges.of(edges, width, height)

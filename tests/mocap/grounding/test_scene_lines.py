@@ -78,5 +78,6 @@ def test_edges_at_random_show_nothing_and_say_so(seed: int) -> None:
     assert found.focal_sd > 0.1
 
 
-def test_two_edges_are_too_few() -> None:
-    assert scene_evidence(np.ones((2, 4)), WIDTH, HEIGHT, CAMERA_UP) is None
+@pytest.mark.parametrize("edges", [np.eye(4)[:2], np.ones((9, 4)), np.zeros((0, 4))])
+def test_two_edges_are_too_few_and_points_are_none(edges: np.ndarray) -> None:
+    assert scene_evidence(edges, WIDTH, HEIGHT, CAMERA_UP) is None
