@@ -1,8 +1,6 @@
 """Judging a policy is light: the whole command loads no library that trains or orchestrates."""
 
 import dataclasses
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -14,17 +12,7 @@ from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.modes.observation import Observer
 from robojackson.rl.policy import Policy
 from robojackson.robot.model import Robot
-from tests.fixtures.commands import environment
-
-SPY = """
-import sys
-from flows.cli.commands import app
-heavy = {"jax", "torch", "stable_baselines3", "sb3_contrib", "sbx", "prefect"}
-try:
-    app(sys.argv[1:])
-finally:
-    print("loaded:", sorted(heavy & set(sys.modules)), file=sys.stderr)
-"""
+from tests.fixtures.commands import robojackson
 
 
 @pytest.mark.medium
@@ -38,10 +26,7 @@ def test_the_command_evaluate_loads_nothing_that_trains(
     (tmp_path / "reference.parquet").write_bytes(tables.encode(sway))
     words = ["evaluate", tmp_path / "policy.safetensors", tmp_path / "reference.parquet"]
     brief = ["-o", tmp_path / "out", "--seconds=0.3", "--set=evaluate.phases=2"]
-    command = [sys.executable, "-c", SPY, *map(str, [*words, *brief])]
-    done = subprocess.run(
-        command, capture_output=True, text=True, check=False, env=environment(), timeout=280
-    )
-    assert done.returncode == 0, done.stderr
+    done = robojackson(*words, *brief)
+    assert done.code == 0, done.err
     assert (tmp_path / "out" / "evaluations.parquet").is_file()
-    assert "loaded: []" in done.stderr
+    assert done.loaded == []

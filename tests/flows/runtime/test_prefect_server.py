@@ -15,7 +15,7 @@ from flows import ablation, dance, find, refresh
 from flows.runtime.deployments import deploy
 from robojackson.errors import DeploymentFailed
 from robojackson.pipeline.yaml_loader import load
-from tests.fixtures.commands import robojackson
+from tests.fixtures.commands import LOADED, robojackson
 from tools.stack.service import free_port
 
 COMMANDS = {
@@ -81,6 +81,6 @@ def test_the_command_says_it_in_one_line(tmp_path: Path) -> None:
     address = f"http://127.0.0.1:{free_port()}/api"
     environment = {"PREFECT_API_URL": address, "ROBOJACKSON_STORE": str(tmp_path / "store")}
     result = robojackson("ablation", "smoke", **environment)
-    lines = [line for line in result.err.splitlines() if line and "prefect loaded" not in line]
+    lines = [line for line in result.err.splitlines() if line and not line.startswith(LOADED)]
     assert (result.code, len(lines)) == (1, 1)
     assert lines[0].startswith("robojackson: DeploymentFailed: the Prefect server of PREFECT_API_")

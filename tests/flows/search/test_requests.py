@@ -10,7 +10,7 @@ from flows.search.requests import ALL, find_dance, require_findable, require_onl
 from robojackson.errors import SearchFailed
 from storage import candidate_catalogue
 from storage.store import Store
-from tests.fixtures.commands import robojackson
+from tests.fixtures.commands import LOADED, robojackson
 
 
 def test_a_list_of_addresses_needs_no_query(tmp_path: Path) -> None:
@@ -60,6 +60,6 @@ def test_find_without_a_network_is_one_line_and_starts_no_prefect(tmp_path: Path
     assert text.code == 1
     assert not text.loaded_prefect
     assert [line for line in text.err.splitlines() if "SearchFailed" in line] == [
-        line for line in text.err.splitlines() if line and "prefect loaded" not in line
+        line for line in text.err.splitlines() if line and not line.startswith(LOADED)
     ]
     assert not list(tmp_path.iterdir())
