@@ -24,7 +24,7 @@ def start(command: Callable[[], int]) -> NoReturn:
     Args:
         command: Function that imports its dependencies in its body and returns the exit code.
     """
-    end = _End()
+    end = End()
     atexit.register(end.leave)  # first registered, last run
     try:
         check_environment(os.environ)
@@ -36,10 +36,7 @@ def start(command: Callable[[], int]) -> NoReturn:
     if sys.platform == "linux":
         os.environ["MUJOCO_GL"] = os.environ.get("MUJOCO_GL") or "disable"
     end.code = guarded(lambda: _run(command))
-    if NEEDS_ITS_END not in sys.modules:
-        _wait_for_threads()
-        _end_processes()
-        end.leave()
+    end.finish()
     sys.exit(end.code)
 
 
@@ -61,7 +58,7 @@ NEEDS_ITS_END = "prefect"
 """The one library whose exit functions must run: they end its server."""
 
 
-class _End:
+class End:
     """Ends the process without the exit code of C++ libraries: neither the functions that they
     register with Python, as JAX does for its backends, nor their destructors.
 
@@ -74,6 +71,14 @@ class _End:
 
     def __init__(self) -> None:
         self.code: int | None = None
+
+    def finish(self) -> None:
+        """Wait for threads and end the processes for videos, as Python does, and leave; nothing
+        where a library is loaded whose exit functions must run."""
+        if NEEDS_ITS_END not in sys.modules:
+            _wait_for_threads()
+            _end_processes()
+            self.leave()
 
     def leave(self) -> None:
         """Flush the output streams and end; Python itself reports one that cannot be written."""
