@@ -67,7 +67,10 @@ def danced_motion(clip: HumanClip, robot: Robot, config: RetargetConfig) -> Danc
     hops = _solved(clip, robot, config, hopped, hops=True)
     if np.array_equal(stepped.contact, hopped.contact):
         return hops.repaired(robot, config)
-    share = feasible_share(robot, hops.repaired(robot, _first_repair(config)).able, config)
+    tried = hops.repaired(robot, _first_repair(config))
+    share = feasible_share(robot, tried.able, config)
+    if share >= config.repair.target_share:
+        return tried  # nothing more would be repaired
     if share >= _WITHIN_REACH:
         found = hops.repaired(robot, config)
         share = feasible_share(robot, found.able, config)

@@ -48,6 +48,7 @@ class Solver:
 @pytest.mark.parametrize(
     ("shares", "differ", "repaired", "taken"),
     [
+        ((0.96, 0.97, 1.0), True, ["first"], "first"),
         ((0.92, 0.95, 1.0), True, ["first", "hopped"], "hopped"),
         ((0.85, 0.88, 0.97), True, ["first", "hopped", "stepped"], "stepped"),
         ((0.85, 0.88, 0.6), True, ["first", "hopped", "stepped"], "hopped"),
