@@ -68,7 +68,7 @@ def _arguments() -> argparse.Namespace:
     )
     parser.add_argument("what", choices=PARTS, nargs="*", metavar="PART")
     parser.add_argument("--folder", type=Path, help="for everything, instead of the usual places")
-    parser.add_argument("--moves", nargs="*", default=TRAINED, choices=TRAINED)
+    parser.add_argument("--moves", nargs="*", default=list(TRAINED), choices=list(TRAINED))
     parser.add_argument("--seeds", nargs="*", type=int, default=[0, 1, 2, 3, 4])
     parser.add_argument("--jobs", type=int, default=1, help="trainings at a time, each on a core")
     parser.add_argument(

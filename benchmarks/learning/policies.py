@@ -111,7 +111,7 @@ MOVES |= {
     for name, move in list(MOVES.items())
     if move.robot == "g1" and move.trained
 }
-TRAINED = [name for name, move in MOVES.items() if move.trained]
+TRAINED = {name: move for name, move in MOVES.items() if move.trained}
 """Rows of the table of policies."""
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.learning.policies import MOVES, TRAINED, Folders, Move, forced
+from benchmarks.learning.policies import TRAINED, Folders, Move, forced
 from robojackson.files import tables
 from robojackson.metrics.seed_statistics import estimate
 from robojackson.pipeline.table_schemas import EVALUATION_RECORD
@@ -28,8 +28,7 @@ COLUMNS = (
 def summary(folders: Folders) -> Rows:
     """Return one line a move and a horizon, over the seeds that exist."""
     lines = []
-    for name in TRAINED:
-        move = MOVES[name]
+    for name, move in TRAINED.items():
         for seconds in move.horizons_s:
             found = sorted(folders.rows.glob(folders.row(name, "[0-9]*", seconds).name))
             exact = [path for path in found if path == folders.row(name, _seed(path), seconds)]

@@ -4,9 +4,9 @@
 
 The four real cameras, and twelve renders of held-out motions: pitch from -20 to 60 degrees, roll
 within 15, all sides, seed 26. Body: balance and the temporal network, without the scene's edges.
-Spread: the stated standard deviation; what the scene's edges show
-closely enough is declared sure. Bar: among those mean 4 and worst 8 degrees, three quarters
-declared sure. MOTIONS are folders as for `fresh`; renders need `tools/requirements.txt`.
+Spread: the stated standard deviation; what the edges show closely enough is declared sure. Bar:
+among those mean 4 and worst 8 degrees, three quarters declared sure. MOTIONS are folders as for
+`fresh`; renders need `tools/requirements.txt`.
 """
 
 import argparse

@@ -119,8 +119,7 @@ def view_track(track: LandmarkTrack, config: MocapConfig) -> View:
     """
     track = evenly(weigh_visibility(track))
     landmarks = repair(track)
-    focal_px = config.focal_px or pinhole_camera.guess_focal(track.width, track.height)
-    view = _placed(track, landmarks, focal_px, config)
+    view = _placed(track, landmarks, focal_of(track, None, config), config)
     scene = scene_of(track, view.ground, config)
     if scene is None:
         return view

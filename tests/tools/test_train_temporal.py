@@ -19,7 +19,7 @@ from tools.temporal.depth_errors import Change, body_offsets, misjudged
 from tools.temporal.examples import Example, flattened
 from tools.temporal.filming import HIPS
 from tools.temporal.fit_flow import discrepancy
-from tools.temporal.net import Flow, Lifter
+from tools.temporal.net import Flow, Lifter, found_in
 
 
 @pytest.fixture(scope="module")
@@ -63,13 +63,11 @@ def test_torch_and_numpy_are_the_same_lifter(
     lifter, _, weights = twins
     sight = person().sight
     ours = temporal_network.run(sight, weights)
-    numbers = torch.from_numpy(features.numbers(sight)[None].astype(np.float32))
-    with torch.no_grad():
-        found = lifter(numbers)
-    assert np.abs(found.correction[0].numpy() - ours.correction).max() < 1e-3
-    assert np.abs(found.log_spread[0].numpy() - np.log(ours.spread)).max() < 1e-3
-    assert np.abs(found.up[0].numpy() - ours.up).max() < 1e-3
-    assert np.abs(found.log_tilt[0].numpy() - np.log(ours.tilt)).max() < 1e-3
+    found = found_in(lifter, sight)
+    assert np.abs(found.correction.numpy() - ours.correction).max() < 1e-3
+    assert np.abs(found.log_spread.numpy() - np.log(ours.spread)).max() < 1e-3
+    assert np.abs(found.up.numpy() - ours.up).max() < 1e-3
+    assert np.abs(found.log_tilt.numpy() - np.log(ours.tilt)).max() < 1e-3
 
 
 def test_torch_and_numpy_are_the_same_flow(twins: tuple[Lifter, Flow, error_flow.Weights]) -> None:

@@ -18,7 +18,6 @@ from tools.temporal.examples import Example
 SWAP = [ORDER.index(int(MIRROR[index])) for index in INPUT_LANDMARKS]
 TWELVE = [ORDER.index(int(index)) for index in BODY]
 OTHER_FOOT = (2, 3, 0, 1)
-MIRRORED_BODY = [list(BODY).index(MIRROR[index]) for index in BODY]
 UP_SD = 0.025
 """Standard deviation of the error of a known up, radians."""
 LONGEST = 150

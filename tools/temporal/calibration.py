@@ -7,9 +7,8 @@ from robojackson.mocap.landmarks.blazepose import BODY
 from robojackson.mocap.temporal import features
 from robojackson.mocap.temporal.temporal_lift import corrected
 from robojackson.mocap.temporal.temporal_network import SD_PER_ERROR
-from tools.temporal.batches import MIRRORED_BODY
 from tools.temporal.examples import Example
-from tools.temporal.net import JOINTS, Lifter
+from tools.temporal.net import JOINTS, Lifter, found_in
 
 WITHIN = 68.27
 """Percentile of the error over its spread that is one, for a Gauss distribution."""
@@ -21,16 +20,14 @@ def factors(net: Lifter, examples: list[Example]) -> np.ndarray:
     ratios = []
     for example in examples:
         sight, good = example.sight, example.good
-        numbers = torch.from_numpy(features.numbers(sight)[None].astype(np.float32))
-        with torch.no_grad():
-            found = net(numbers)
-        spread = SD_PER_ERROR * np.exp(found.log_spread[0].numpy())[good]
+        found = found_in(net, sight)
+        spread = SD_PER_ERROR * np.exp(found.log_spread.numpy())[good]
         body = example.truth[:, BODY].astype(float)
-        off = np.abs(corrected(sight, found.correction[0].numpy()) - body)[good]
+        off = np.abs(corrected(sight, found.correction.numpy()) - body)[good]
         ratios.append(off / spread[..., [0, 0, 1]])
     net.train()
     ratio = np.concatenate(ratios)
-    ratio = np.concatenate([ratio, ratio[:, MIRRORED_BODY]])
+    ratio = np.concatenate([ratio, features.mirror_body(ratio)])
     across = np.percentile(ratio[..., :2].transpose(1, 0, 2).reshape(JOINTS, -1), WITHIN, axis=1)
     return np.stack([across, np.percentile(ratio[..., 2], WITHIN, axis=0)], -1)
 

@@ -76,6 +76,7 @@ def film(
     wrong = np.where(known, np.exp(rng.normal(0.0, KNOWN_FOCAL_SD, (count, 1))), wrong)
     wrong = wrong * (1.0 + slow(rng, (count, frames, 1), 1.0)[..., 0] * SWAY)
     flat = truth[..., :2] * away / (away + truth[..., 2:])
+    above = (up[:, None, None] @ axes)[:, :, 0].astype(np.float32)
     return Batch(
         flat=flat.astype(np.float32),
         local=truth.astype(np.float32),
@@ -84,7 +85,7 @@ def film(
         distance=(distance * wrong).astype(np.float32),
         truth=truth.astype(np.float32),
         good=np.ones((count, frames), np.float32),
-        up=(above := (up[:, None, None] @ axes)[:, :, 0].astype(np.float32)),
+        up=above,
         shown=above * known[..., None].astype(np.float32),
         contact=bank.contact[rows[:, None], np.round(places).astype(int)].astype(np.float32),
     )

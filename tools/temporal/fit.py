@@ -20,7 +20,7 @@ from tools.temporal.examples import Example
 from tools.temporal.filming import film, with_constants
 from tools.temporal.invented import Detector
 from tools.temporal.losses import losses_of
-from tools.temporal.net import Found, Lifter
+from tools.temporal.net import Lifter, found_in
 from tools.temporal.truths import Bank
 
 LOSSES = ("place", "velocity", "speed", "spread", "tilt", "contact")
@@ -143,9 +143,7 @@ def validate(net: Lifter, examples: Sequence[Example]) -> dict[str, float]:
     for example in examples:
         sight, good = example.sight, example.good
         body = example.truth[:, BODY].astype(float)
-        with torch.no_grad():
-            numbers = torch.from_numpy(features.numbers(sight)[None].astype(np.float32))
-            found = Found(*(part[0] for part in net(numbers)))
+        found = found_in(net, sight)
         after = corrected(sight, found.correction.numpy())[good]
         before, right = features.base(sight)[good], body[good]
         errors = [

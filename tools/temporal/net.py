@@ -4,11 +4,12 @@
 
 from typing import NamedTuple
 
+import numpy as np
 import torch
 from torch import nn
 
-from robojackson.mocap.temporal import error_flow
-from robojackson.mocap.temporal.features import COUNT
+from robojackson.mocap.temporal import error_flow, features
+from robojackson.mocap.temporal.features import COUNT, ClipView
 from robojackson.mocap.temporal.temporal_network import (
     DILATIONS,
     GROUND,
@@ -103,6 +104,13 @@ class Lifter(nn.Module):
     def forward(self, x: torch.Tensor) -> Found:
         """Return what the network finds in a clip."""
         return self.head(self.features(x))
+
+
+def found_in(net: Lifter, sight: ClipView) -> Found:
+    """Return what a network finds in a clip, without gradients and the axis of the batch."""
+    numbers = torch.from_numpy(features.numbers(sight)[None].astype(np.float32))
+    with torch.no_grad():
+        return Found(*(part[0] for part in net(numbers)))
 
 
 class Flow(nn.Module):

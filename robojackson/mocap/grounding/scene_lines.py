@@ -68,13 +68,13 @@ def scene_evidence(
     edges = edges[(edges[:, :2] != edges[:, 2:]).any(1)]
     if len(edges) < FEWEST:
         return None
-    scene = _Edges.of(edges, width, height)
-    body_up = unit(body_up)
+    scene, body_up = _Edges.of(edges, width, height), unit(body_up)
+    few = scene.first(FIRST)
     wide = _around(body_up, REACH, STEP)
     coarse = np.empty((len(FOCALS), len(wide)))
     headings = np.empty_like(coarse)
     for number, focal in enumerate(FOCALS):
-        fit, headings[number] = scene.first(FIRST).fit(wide, HEADINGS, focal, SIGMA)
+        fit, headings[number] = few.fit(wide, HEADINGS, focal, SIGMA)
         coarse[number] = TEMPER * fit + _prior(wide, body_up, focal)
     row, column = np.unravel_index(coarse.argmax(), coarse.shape)
     near, focals = _around(wide[column], NEAR_REACH, NEAR_STEP), FOCALS[row] * NEAR_FOCALS
@@ -82,17 +82,19 @@ def scene_evidence(
     for number, focal in enumerate(focals):
         fit, _ = scene.fit(near, headings[row, column] + NEAR_HEADINGS, focal, NEAR_SIGMA)
         fine[number] = TEMPER * fit + _prior(near, body_up, focal)
-    share = _shares(fine)
+    share, far = _shares(fine), _shares(coarse)
     up = unit(share.sum(0) @ near)
-    spread = [_variance(_shares(coarse), wide, up), _variance(share, near, up)]
+    spread = [_variance(far, wide, up), _variance(share, near, up)]
     log_focal = share.sum(1) @ np.log(focals)
-    focal_sd = float(np.sqrt(share.sum(1) @ (np.log(focals) - log_focal) ** 2))
-    other = _shares(coarse).sum(1) @ (np.log(FOCALS) - log_focal) ** 2
+    focal_spread = [
+        odds.sum(1) @ (np.log(tried) - log_focal) ** 2
+        for odds, tried in ((far, FOCALS), (share, focals))
+    ]
     return SceneEvidence(
         up=up,
         sd=float(np.sqrt(max(spread) + LEAST_SD**2)),
         focal_px=float(np.exp(log_focal)) * diagonal,
-        focal_sd=max(focal_sd, float(np.sqrt(other))),
+        focal_sd=float(np.sqrt(max(focal_spread))),
     )
 
 

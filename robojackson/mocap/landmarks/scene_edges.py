@@ -30,13 +30,10 @@ class SceneEdges:
 
     def add_frame(self, index: int, grey: UInt8[np.ndarray, "H W"]) -> None:
         """Add frame number `index`; few of them are kept, evenly spread."""
-        if index % self._stride:
-            return
-        if len(self._kept) == 2 * PICTURES:
+        if index % self._stride == 0 and len(self._kept) == 2 * PICTURES:
             self._kept, self._stride = self._kept[::2], 2 * self._stride
-            if index % self._stride:
-                return
-        self._kept.append(_reduced(grey))
+        if index % self._stride == 0:
+            self._kept.append(_reduced(grey))
 
     def edges(self, moved: bool, width: int, height: int) -> Float[np.ndarray, "N 4"] | None:
         """Return the ends (x0, y0, x1, y1) of edges, pixels of the upright image; None without a
