@@ -152,6 +152,10 @@ def retarget_lines(answer: Answer) -> list[str]:
         f"{_figure(card, 'bone_deg', 1)} degrees",
         f"joint limits              {card['limit_violations']:.0f} violations",
     ]
+    if sway_cm := card.get("sway_cm"):
+        rows.insert(
+            3, f"sway                      up to {sway_cm:.0f} cm, over the feet that stand"
+        )
     for words, name, unit, digits in ROWS:
         value, limit = card.get(name, math.nan), BARS[name]
         if value is None or not math.isfinite(value):

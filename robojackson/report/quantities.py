@@ -68,6 +68,9 @@ _FORMS: Mapping[str, _Form] = {
         "keypoint error, leaned", "mm", 1, meaning="against leaned targets"
     ),
     "lean_deg": _Form("lean of the targets", "deg", 1, meaning="to bring the body over the feet"),
+    "sway_cm": _Form(
+        "largest sway of the targets", "cm", 1, meaning="over the feet, at the centre of mass"
+    ),
     "keypoint_p95_mm": _Form("keypoint error, 95th percentile", "mm", 1),
     "bone_deg": _Form("bone direction error", "deg", 1),
     "limit_violations": _Form("joint limit violations", meaning="must be 0"),

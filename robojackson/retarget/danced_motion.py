@@ -1,4 +1,7 @@
-"""The motion of a clip for a robot: its hops as they are, or steps in place of them, repaired."""
+"""The motion of a clip for a robot: its hops as they are, or steps in place of them.
+
+It sways over the feet that carry it where it has to, and is repaired.
+"""
 
 import logging
 from dataclasses import replace
@@ -6,10 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robojackson.retarget.feasible_motion import Feasible, feasible_share, make_feasible
+from robojackson.retarget.feasible_motion import Feasible, feasible_share, given, make_feasible
 from robojackson.retarget.retarget_config import RetargetConfig
 from robojackson.retarget.scorecard import hovers
 from robojackson.retarget.scorecard_gate import BARS
+from robojackson.retarget.solver.clip_problem import Problem
+from robojackson.retarget.solver.sway import swayed
 from robojackson.retarget.targets.human_clip import HumanClip
 from robojackson.retarget.targets.keypoint_targets import Targets, targets
 from robojackson.retarget.targets.tails import Tailed, with_tails
@@ -17,6 +22,7 @@ from robojackson.retarget.whole_clip import Optimised, optimise, polished
 from robojackson.robot.model import Robot
 
 _log = logging.getLogger(__name__)
+_LEAST = 1.0 - BARS["infeasible_share"]
 _WITHIN_REACH = 0.8
 """Share of feasible steps after the first repair below which hops are not repaired further before
 steps are tried in their place."""
@@ -30,7 +36,8 @@ class Dance(NamedTuple):
         upright: The dancer's own motion, not leaned.
         able: The motion after repair.
         floor_mm: Mean error of every frame solved by itself, mm.
-        lean_deg: Lean that puts the body over its feet, degrees.
+        lean_deg: Lean that puts a standing body over its feet, degrees.
+        sway_m: Largest sway over the feet, at the height of the centre of mass, metres.
     """
 
     tailed: Tailed
@@ -38,21 +45,34 @@ class Dance(NamedTuple):
     able: Feasible
     floor_mm: float
     lean_deg: float
+    sway_m: float
 
 
 class _Solution(NamedTuple):
-    """A motion before repair: as in `Dance`, and the solution."""
+    """A motion before repair: as in `Dance`, the solution, and the one before it swayed."""
 
     tailed: Tailed
     upright: Targets
     found: Optimised
+    stiff: Optimised
     floor_mm: float
+    sway_m: float
 
     def repaired(self, robot: Robot, config: RetargetConfig) -> Dance:
-        """Return the motion after repair."""
-        clip, found = self.tailed.clip, self.found
-        able = make_feasible(robot, found.qpos, found.aims, config, clip)
-        return Dance(self.tailed, self.upright, able, self.floor_mm, found.lean_deg)
+        """Return the motion after repair; that without sway where the sway is just not enough and
+        more of the other is feasible."""
+        dance = self._repaired(self.found, self.sway_m, robot, config)
+        share = feasible_share(robot, dance.able, config)
+        if self.sway_m == 0.0 or not _WITHIN_REACH <= share < _LEAST:
+            return dance
+        stiff = self._repaired(self.stiff, 0.0, robot, config)
+        return stiff if feasible_share(robot, stiff.able, config) > share else dance
+
+    def _repaired(
+        self, found: Optimised, sway_m: float, robot: Robot, config: RetargetConfig
+    ) -> Dance:
+        able = make_feasible(robot, found.qpos, found.aims, config, self.tailed.clip)
+        return Dance(self.tailed, self.upright, able, self.floor_mm, found.lean_deg, sway_m)
 
 
 def danced_motion(clip: HumanClip, robot: Robot, config: RetargetConfig) -> Dance:
@@ -62,7 +82,6 @@ def danced_motion(clip: HumanClip, robot: Robot, config: RetargetConfig) -> Danc
     A motion whose hops stay out of reach after the first repair is tried with steps before it is
     repaired further: that takes most of the time, and rarely helps.
     """
-    least = 1.0 - BARS["infeasible_share"]
     hopped, stepped = (targets(clip, robot, hops=hops) for hops in (True, False))
     hops = _solved(clip, robot, config, hopped, hops=True)
     if np.array_equal(stepped.contact, hopped.contact):
@@ -74,12 +93,12 @@ def danced_motion(clip: HumanClip, robot: Robot, config: RetargetConfig) -> Danc
     if share >= _WITHIN_REACH:
         found = hops.repaired(robot, config)
         share = feasible_share(robot, found.able, config)
-        if share >= least:
+        if share >= _LEAST:
             return found
     _log.info("%.0f %% feasible: solving with steps in place of hops", 100 * share)
     other = _solved(clip, robot, config, stepped, hops=False).repaired(robot, config)
     other_share = feasible_share(robot, other.able, config)
-    if share < _WITHIN_REACH and other_share < least:
+    if share < _WITHIN_REACH and other_share < _LEAST:
         found = hops.repaired(robot, config)
         share = feasible_share(robot, found.able, config)
     return other if other_share > share else found
@@ -104,4 +123,32 @@ def _solved(
         grounded = targets(clip, robot, hovering[tailed.clip], hops)
         upright = with_tails(grounded, robot, config.tails).aims
         found = polished(upright, found.qpos, found.shift, robot, config)
-    return _Solution(tailed, upright, found, floor_mm)
+    balanced, sway_m = _over_the_feet(tailed, found, robot, config)
+    return _Solution(tailed, upright, balanced, found, floor_mm, sway_m)
+
+
+def _over_the_feet(
+    tailed: Tailed, found: Optimised, robot: Robot, config: RetargetConfig
+) -> tuple[Optimised, float]:
+    """Return the solution of targets that sway over the feet, where more of it is feasible, and
+    the largest sway, metres."""
+
+    def share(motion: Optimised) -> float:
+        return feasible_share(robot, given(motion.qpos, motion.aims, tailed.clip), config)
+
+    best, most, sway_m = found, share(found), 0.0
+    total = np.zeros((len(found.qpos), 2))
+    for _ in range(config.sway.passes):
+        if most >= config.repair.target_share:
+            break
+        problem = Problem.of(robot, best.aims, config.weights)
+        aims, sway = swayed(problem, best.qpos, config.sway)
+        total += sway
+        latest = polished(aims, best.qpos, np.zeros(2), robot, config)
+        reached = share(latest)
+        if reached <= most or latest.faults.any > found.faults.any:
+            break
+        best, most = replace(latest, shift=found.shift), reached
+        sway_m = float(np.linalg.norm(total, axis=1).max())
+        _log.info("swayed by up to %.0f cm: %.0f %% feasible", 100 * sway_m, 100 * most)
+    return best, sway_m

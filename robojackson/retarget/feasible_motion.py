@@ -16,6 +16,7 @@ from scipy.ndimage import maximum_filter1d
 from robojackson.metrics.retarget_error import keypoint_error_mm
 from robojackson.retarget.feasibility import tempo
 from robojackson.retarget.retarget_config import RetargetConfig
+from robojackson.retarget.scorecard_gate import BARS
 from robojackson.retarget.solver.clip_problem import Problem
 from robojackson.retarget.solver.levenberg_marquardt import clip_to_limits, solve
 from robojackson.retarget.targets.keypoint_targets import Targets
@@ -31,6 +32,8 @@ _LOOSE = 1e-5  # first damping: repair moves whole bodies over many steps
 _HARDLY_SLOWER = 0.97  # a tempo that is not worth a warp
 _STILL_M = 1e-6  # targets that move less a step are a stand's
 _HOPELESS = 0.5  # share of feasible steps below which a heavier weight has never been enough
+_ENOUGH = 1.0 - BARS["infeasible_share"]
+"""Share of feasible steps from which a motion is kept where the first repair makes it worse."""
 _REACH_S = 0.8  # beside steps that need repair, others may change so far
 
 
@@ -75,13 +78,30 @@ def make_feasible(
     config: RetargetConfig,
     clip: slice | None = None,
 ) -> Feasible:
-    """Repair a motion; slow it down where its tempo is free and that helps."""
+    """Repair a motion; slow it down where its tempo is free and that helps. What no repair makes
+    more feasible stays as it is."""
+    before, how = given(qpos, aims, clip), config.repair
+    share = feasible_share(robot, before, config)
+    if not how.weights or share >= how.target_share:
+        return before
+    first = _solved(robot, before, how.weights[0], config)
+    if share >= _ENOUGH and feasible_share(robot, first, config) < share:
+        return before
+    after = _best_repair(robot, before, _accepted(robot, before, first, config), config)
+    return after if feasible_share(robot, after, config) > share else before
+
+
+def given(qpos: Float[np.ndarray, "S nq"], aims: Targets, clip: slice | None = None) -> Feasible:
+    """Return a motion before repair."""
     whole = slice(0, len(qpos))
-    given = Feasible(qpos, aims, np.arange(len(qpos), dtype=float), clip or whole)
+    return Feasible(qpos, aims, np.arange(len(qpos), dtype=float), clip or whole)
+
+
+def _best_repair(
+    robot: Robot, before: Feasible, found: Feasible, config: RetargetConfig
+) -> Feasible:
+    """Go on from the first repair of a motion."""
     how = config.repair
-    if not how.weights or feasible_share(robot, given, config) >= how.target_share:
-        return given
-    found = _accepted(robot, given, _solved(robot, given, how.weights[0], config), config)
     rounds = how.slow_rounds if config.tempo == "auto" else 0
     declined = None
     for _ in range(rounds):
@@ -92,11 +112,11 @@ def make_feasible(
             declined = slower
             break
         found = slower
-    best = _repaired(robot, given, found, config)
+    best = _repaired(robot, before, found, config)
     if declined is None or feasible_share(robot, best, config) >= how.target_share:
         return best
     # Slowing alone hardly helped, and neither did repair: together they may.
-    other = _repaired(robot, given, declined, config)
+    other = _repaired(robot, before, declined, config)
     return max(best, other, key=lambda motion: feasible_share(robot, motion, config))
 
 
@@ -199,11 +219,11 @@ def _holds(robot: Robot, motion: Feasible, config: RetargetConfig) -> bool:
     return not bad
 
 
-def _repaired(robot: Robot, given: Feasible, found: Feasible, config: RetargetConfig) -> Feasible:
+def _repaired(robot: Robot, before: Feasible, found: Feasible, config: RetargetConfig) -> Feasible:
     """Raise the weight until enough steps are feasible or the motion would be bent too far; not for
     a motion that is far from feasible."""
     how = config.repair
-    dearest = how.max_added_error_mm + _error_mm(robot, given)
+    dearest = how.max_added_error_mm + _error_mm(robot, before)
     best, good = found, feasible_share(robot, found, config)
     for weight in how.weights[1:]:
         if good >= how.target_share or good < _HOPELESS:

@@ -7,6 +7,7 @@ from pydantic import Field
 from robojackson.config import config_dataclass
 from robojackson.retarget.solver.clip_problem import Weights
 from robojackson.retarget.solver.levenberg_marquardt import SolverConfig
+from robojackson.retarget.solver.sway import SwayConfig
 from robojackson.retarget.targets.cycle import CycleConfig
 from robojackson.retarget.targets.tails import TailConfig
 
@@ -55,7 +56,7 @@ class RetargetConfig:
         cut_glides: Whether a beginning or an end in which the person glides over the floor is left
             out: a cut, a fade or a person who leaves the picture looks like that.
         tails: Stands before and after a motion that does not repeat.
-        cycle, weights, solver, repair: Configurations of the stages.
+        cycle, weights, sway, solver, repair: Configurations of the stages.
     """
 
     method: Literal["optimise", "paper", "framefix"] = "optimise"
@@ -72,6 +73,7 @@ class RetargetConfig:
     tails: TailConfig = Field(default_factory=TailConfig)
     cycle: CycleConfig = Field(default_factory=CycleConfig)
     weights: Weights = Field(default_factory=Weights)
+    sway: SwayConfig = Field(default_factory=SwayConfig)
     solver: SolverConfig = Field(default_factory=SolverConfig)
     repair: RepairConfig = Field(default_factory=RepairConfig)
 

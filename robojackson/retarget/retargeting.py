@@ -62,9 +62,9 @@ def retarget_motion(
     extra["trimmed_s"] += (whole - len(sequence)) / sequence.fps
     danced: Bool[np.ndarray, " S"] | None = None
     if config.method == "optimise":
-        tailed, upright, able, floor_mm, lean_deg = danced_motion(clip, robot, config)
+        tailed, upright, able, floor_mm, lean_deg, sway_m = danced_motion(clip, robot, config)
         extra |= _tail_seconds(tailed)
-        extra |= {"keypoint_floor_mm": floor_mm, "lean_deg": lean_deg}
+        extra |= {"keypoint_floor_mm": floor_mm, "lean_deg": lean_deg, "sway_cm": 100.0 * sway_m}
         extra |= _slowing(able, upright, robot)
         qpos, aims, upright = able.qpos, able.aims, warped(upright, able.steps)
         time_s = times_at(tailed.source_time(clip.time_s), able.steps)

@@ -31,7 +31,7 @@ from robojackson.retarget.scorecard_gate import BARS
 FOLDED = ("Versions", "Files")
 SCORECARD_LINES = (
     "seconds", "cyclic", "keypoint_mm", "keypoint_p95_mm", "keypoint_leaned_mm", "lean_deg",
-    "bone_deg", "limit_violations",
+    "sway_cm", "bone_deg", "limit_violations",
     "nan_count", "floor_penetration_mm", "self_penetration_mm", "planted_slip_cm_s",
     "contact_share", "joint_speed_max_rad_s", "torque_ratio_p95", "torque_over_share", "seam_deg",
     "infeasible_share", "fallen_share", "tempo_mean", "tempo_min",
