@@ -34,6 +34,7 @@ _STILL_M = 1e-6  # targets that move less a step are a stand's
 _HOPELESS = 0.5  # share of feasible steps below which a heavier weight has never been enough
 _ENOUGH = 1.0 - BARS["infeasible_share"]
 """Share of feasible steps from which a motion is kept where the first repair makes it worse."""
+_BEHIND = 0.02  # a slowed motion that is so far behind does not come first by repair
 _REACH_S = 0.8  # beside steps that need repair, others may change so far
 
 
@@ -113,7 +114,10 @@ def _best_repair(
             break
         found = slower
     best = _repaired(robot, before, found, config)
-    if declined is None or feasible_share(robot, best, config) >= how.target_share:
+    share = feasible_share(robot, best, config)
+    if declined is None or share >= how.target_share:
+        return best
+    if feasible_share(robot, declined, config) < share - _BEHIND:
         return best
     # Slowing alone hardly helped, and neither did repair: together they may.
     other = _repaired(robot, before, declined, config)
@@ -220,8 +224,8 @@ def _holds(robot: Robot, motion: Feasible, config: RetargetConfig) -> bool:
 
 
 def _repaired(robot: Robot, before: Feasible, found: Feasible, config: RetargetConfig) -> Feasible:
-    """Raise the weight until enough steps are feasible or the motion would be bent too far; not for
-    a motion that is far from feasible."""
+    """Raise the weight until enough steps are feasible, fewer are, or the motion would be bent too
+    far; not for a motion that is far from feasible."""
     how = config.repair
     dearest = how.max_added_error_mm + _error_mm(robot, before)
     best, good = found, feasible_share(robot, found, config)
@@ -229,10 +233,11 @@ def _repaired(robot: Robot, before: Feasible, found: Feasible, config: RetargetC
         if good >= how.target_share or good < _HOPELESS:
             break
         found = _solved(robot, found, weight, config)
-        _log.info("weight %g: %.0f %% feasible", weight, 100 * feasible_share(robot, found, config))
-        if _error_mm(robot, found) > dearest or not _holds(robot, found, config):
+        share = feasible_share(robot, found, config)
+        _log.info("weight %g: %.0f %% feasible", weight, 100 * share)
+        if share < good or _error_mm(robot, found) > dearest or not _holds(robot, found, config):
             break
-        best, good = found, feasible_share(robot, found, config)
+        best, good = found, share
     return best
 
 
