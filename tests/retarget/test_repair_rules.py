@@ -11,7 +11,7 @@ ROBOT = SimpleNamespace()
 
 
 def motion(name: str) -> SimpleNamespace:
-    """Return something that can be told from other motions."""
+    """Return a motion with a name."""
     return SimpleNamespace(name=name)
 
 
