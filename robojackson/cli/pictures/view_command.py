@@ -12,6 +12,9 @@ from robojackson.cli.options import Json
 from robojackson.errors import BadConfiguration, StoreError
 
 PAGE = "index.html"
+MOVIES = (".mp4", ".mov", ".webm", ".mkv")
+SHOWN = (*MOVIES, ".html", ".gif", ".webp", ".png", ".jpg", ".jpeg", ".svg", ".pdf")
+"""Files that a browser shows."""
 
 
 class View(StrEnum):
@@ -38,6 +41,7 @@ def view(
         page = file / PAGE if file.is_dir() else file
         if not page.is_file():
             raise StoreError(f"{page}: no such file; the folder of a run has its {PAGE}")
+        require_kind(page, SHOWN, "page, picture or video")
         opened = webbrowser.open(page.resolve().as_uri())
         word = "opened" if opened else "no browser here; open"
         return CommandResult({"page": str(page), "opened": opened}, text=[f"{word} {page}"])
@@ -60,6 +64,22 @@ def view(
         from robojackson.report.video.animation import write_animation
 
         is_film = file.is_file() and file.suffix != ".html"
+        if is_film:
+            require_kind(file, (*MOVIES, ".gif"), "video")
         write_animation(file if is_film else one_of(folder, FILMS), out, to.value)
     size = out.stat().st_size
     return CommandResult({"file": str(out), "bytes": size}, text=[f"{out}  {size:,} bytes"])
+
+
+def require_kind(file: Path, endings: tuple[str, ...], kind: str) -> None:
+    """Refuse a file of another kind, such as a table.
+
+    Raises:
+        BadConfiguration: Its name does not end so.
+    """
+    if file.suffix.lower() not in endings:
+        raise BadConfiguration(
+            f"no {kind} ({', '.join(endings)}); name the folder of its run, or write the "
+            "folder's motions for another viewer: --to gltf -o FILE.glb",
+            file,
+        )

@@ -30,6 +30,7 @@ from robojackson.robot.model import Robot
 from robojackson.robot.tree_kinematics import centre_of_mass, pose
 
 _LEAST_FORCE = 0.4  # share of the weight: in free fall no point carries
+_LEAST_HEIGHT_M = 0.2  # of the centre of mass: a body that lies does not sway
 _SAMPLE_S = 0.1  # the distance of the zero moment point is independent after so long
 
 
@@ -114,7 +115,7 @@ def zero_moment_points(
 def _pendulum(problem: Problem, qpos: Float[np.ndarray, "S nq"], config: SwayConfig) -> _Pendulum:
     robot, aims = problem.robot, problem.targets
     posed = pose(problem.tree, qpos)
-    height = centre_of_mass(problem.tree, posed)[:, 2]
+    height = np.maximum(centre_of_mass(problem.tree, posed)[:, 2], _LEAST_HEIGHT_M)
     point, vertical = zero_moment_points(robot, qpos, aims.dt, aims.cycle_offset)
     soles = posed.ball_pos[..., :2].copy()
     for body in np.unique(robot.contact_bodies):

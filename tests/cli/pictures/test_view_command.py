@@ -53,6 +53,18 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
+@pytest.mark.parametrize("options", [(), ("--to", "gif", "-o", "x.gif")])
+@pytest.mark.parametrize("table", ["landmarks", "rollout"])
+def test_a_table_is_refused_with_what_to_do(
+    table: str, options: tuple[str, ...], folder: Path, tmp_path: Path
+) -> None:
+    words = [tmp_path / word if word == "x.gif" else word for word in options]
+    answer = in_process("view", folder / f"{table}.parquet", *words)
+    assert answer.code == 1
+    assert f"{table}.parquet: no " in answer.err
+    assert "name the folder of its run" in answer.err
+
+
 @pytest.mark.parametrize("kind", ["gif", "webp"])
 def test_a_film_becomes_a_picture_that_moves(kind: str, folder: Path, tmp_path: Path) -> None:
     out = tmp_path / f"dance.{kind}"
