@@ -42,6 +42,7 @@ FIGURES = ("seconds", "keypoint_mm", "infeasible_share", "tempo_mean", "passed")
 STAGES = {
     "tails": (danced_motion, "with_tails"),
     "solve": (danced_motion, "optimise"),
+    "sway": (danced_motion, "_over_the_feet"),
     "repair": (danced_motion, "make_feasible"),
     "tempo": (tempo, "slacks"),
     "certificate": (retargeting, "certify"),

@@ -143,6 +143,12 @@ def retarget_lines(answer: Answer) -> list[str]:
     card = answer["scorecard"]
     kind = "cyclic" if answer["cyclic"] else "not cyclic"
     seconds, step_ms = answer["steps"] * answer["dt"], 1000 * answer["dt"]
+    sway_cm = card.get("sway_cm", 0.0)
+    sway = (
+        [f"sway                      up to {sway_cm:.0f} cm, over the feet that stand"]
+        if sway_cm
+        else []
+    )
     rows = [
         f"robot                     {answer['robot']}, {answer['steps']} steps of "
         f"{step_ms:.3g} ms, {seconds:.1f} s, {kind}",
@@ -150,12 +156,9 @@ def retarget_lines(answer: Answer) -> list[str]:
         "dancer's",
         f"keypoints                 {_figure(card, 'keypoint_leaned_mm', 1)} mm off, bones "
         f"{_figure(card, 'bone_deg', 1)} degrees",
+        *sway,
         f"joint limits              {card['limit_violations']:.0f} violations",
     ]
-    if sway_cm := card.get("sway_cm"):
-        rows.insert(
-            3, f"sway                      up to {sway_cm:.0f} cm, over the feet that stand"
-        )
     for words, name, unit, digits in ROWS:
         value, limit = card.get(name, math.nan), BARS[name]
         if value is None or not math.isfinite(value):

@@ -12,17 +12,16 @@ import numpy as np
 from robojackson.retarget.feasible_motion import Feasible, feasible_share, given, make_feasible
 from robojackson.retarget.retarget_config import RetargetConfig
 from robojackson.retarget.scorecard import hovers
-from robojackson.retarget.scorecard_gate import BARS
+from robojackson.retarget.scorecard_gate import BARS, LEAST_FEASIBLE
 from robojackson.retarget.solver.clip_problem import Problem
 from robojackson.retarget.solver.sway import swayed
 from robojackson.retarget.targets.human_clip import HumanClip
 from robojackson.retarget.targets.keypoint_targets import Targets, targets
 from robojackson.retarget.targets.tails import Tailed, with_tails
-from robojackson.retarget.whole_clip import Optimised, optimise, polished
+from robojackson.retarget.whole_clip import optimise, polished
 from robojackson.robot.model import Robot
 
 _log = logging.getLogger(__name__)
-_LEAST = 1.0 - BARS["infeasible_share"]
 _WITHIN_REACH = 0.8
 """Share of feasible steps after the first repair below which hops are not repaired further before
 steps are tried in their place."""
@@ -49,13 +48,15 @@ class Dance(NamedTuple):
 
 
 class _Solution(NamedTuple):
-    """A motion before repair: as in `Dance`, the solution, and the one before it swayed."""
+    """A motion before repair: as in `Dance`, the solution, and the one before it swayed. What a
+    repair computes stays with both for the next."""
 
     tailed: Tailed
     upright: Targets
-    found: Optimised
-    stiff: Optimised
+    found: Feasible
+    stiff: Feasible
     floor_mm: float
+    lean_deg: float
     sway_m: float
 
     def repaired(self, robot: Robot, config: RetargetConfig) -> Dance:
@@ -63,16 +64,16 @@ class _Solution(NamedTuple):
         more of the other is feasible."""
         dance = self._repaired(self.found, self.sway_m, robot, config)
         share = feasible_share(robot, dance.able, config)
-        if self.sway_m == 0.0 or not _WITHIN_REACH <= share < _LEAST:
+        if self.sway_m == 0.0 or not _WITHIN_REACH <= share < LEAST_FEASIBLE:
             return dance
         stiff = self._repaired(self.stiff, 0.0, robot, config)
         return stiff if feasible_share(robot, stiff.able, config) > share else dance
 
     def _repaired(
-        self, found: Optimised, sway_m: float, robot: Robot, config: RetargetConfig
+        self, found: Feasible, sway_m: float, robot: Robot, config: RetargetConfig
     ) -> Dance:
-        able = make_feasible(robot, found.qpos, found.aims, config, self.tailed.clip)
-        return Dance(self.tailed, self.upright, able, self.floor_mm, found.lean_deg, sway_m)
+        able = make_feasible(robot, found, config)
+        return Dance(self.tailed, self.upright, able, self.floor_mm, self.lean_deg, sway_m)
 
 
 def danced_motion(clip: HumanClip, robot: Robot, config: RetargetConfig) -> Dance:
@@ -93,12 +94,12 @@ def danced_motion(clip: HumanClip, robot: Robot, config: RetargetConfig) -> Danc
     if share >= _WITHIN_REACH:
         found = hops.repaired(robot, config)
         share = feasible_share(robot, found.able, config)
-        if share >= _LEAST:
+        if share >= LEAST_FEASIBLE:
             return found
     _log.info("%.0f %% feasible: solving with steps in place of hops", 100 * share)
     other = _solved(clip, robot, config, stepped, hops=False).repaired(robot, config)
     other_share = feasible_share(robot, other.able, config)
-    if share < _WITHIN_REACH and other_share < _LEAST:
+    if share < _WITHIN_REACH and other_share < LEAST_FEASIBLE:
         found = hops.repaired(robot, config)
         share = feasible_share(robot, found.able, config)
     return other if other_share > share else found
@@ -123,32 +124,36 @@ def _solved(
         grounded = targets(clip, robot, hovering[tailed.clip], hops)
         upright = with_tails(grounded, robot, config.tails).aims
         found = polished(upright, found.qpos, found.shift, robot, config)
-    balanced, sway_m = _over_the_feet(tailed, found, robot, config)
-    return _Solution(tailed, upright, balanced, found, floor_mm, sway_m)
+    stiff = given(found.qpos, found.aims, tailed.clip)
+    balanced, sway_m = _over_the_feet(stiff, found.faults.any, robot, config)
+    return _Solution(tailed, upright, balanced, stiff, floor_mm, found.lean_deg, sway_m)
 
 
 def _over_the_feet(
-    tailed: Tailed, found: Optimised, robot: Robot, config: RetargetConfig
-) -> tuple[Optimised, float]:
+    stiff: Feasible, faulty: bool, robot: Robot, config: RetargetConfig
+) -> tuple[Feasible, float]:
     """Return the solution of targets that sway over the feet, where more of it is feasible, and
-    the largest sway, metres."""
+    the largest sway, metres.
 
-    def share(motion: Optimised) -> float:
-        return feasible_share(robot, given(motion.qpos, motion.aims, tailed.clip), config)
-
-    best, most, sway_m = found, share(found), 0.0
-    total = np.zeros((len(found.qpos), 2))
+    Args:
+        stiff: The solution without sway.
+        faulty: Whether it breaks a hard bar; else the other must not, either.
+        robot: The robot.
+        config: Settings.
+    """
+    best, most = stiff, feasible_share(robot, stiff, config)
+    total, sway_m = np.zeros((len(stiff.qpos), 2)), 0.0
     for _ in range(config.sway.passes):
         if most >= config.repair.target_share:
             break
         problem = Problem.of(robot, best.aims, config.weights)
         aims, sway = swayed(problem, best.qpos, config.sway)
-        total += sway
-        latest = polished(aims, best.qpos, np.zeros(2), robot, config)
-        reached = share(latest)
-        if reached <= most or latest.faults.any > found.faults.any:
+        solved = polished(aims, best.qpos, np.zeros(2), robot, config)
+        latest = given(solved.qpos, solved.aims, stiff.clip)
+        reached = feasible_share(robot, latest, config)
+        if reached <= most or solved.faults.any > faulty:
             break
-        best, most = replace(latest, shift=found.shift), reached
+        best, most, total = latest, reached, total + sway
         sway_m = float(np.linalg.norm(total, axis=1).max())
         _log.info("swayed by up to %.0f cm: %.0f %% feasible", 100 * sway_m, 100 * most)
     return best, sway_m

@@ -16,7 +16,7 @@ from scipy.ndimage import maximum_filter1d
 from robojackson.metrics.retarget_error import keypoint_error_mm
 from robojackson.retarget.feasibility import tempo
 from robojackson.retarget.retarget_config import RetargetConfig
-from robojackson.retarget.scorecard_gate import BARS
+from robojackson.retarget.scorecard_gate import LEAST_FEASIBLE
 from robojackson.retarget.solver.clip_problem import Problem
 from robojackson.retarget.solver.levenberg_marquardt import clip_to_limits, solve
 from robojackson.retarget.targets.keypoint_targets import Targets
@@ -32,8 +32,6 @@ _LOOSE = 1e-5  # first damping: repair moves whole bodies over many steps
 _HARDLY_SLOWER = 0.97  # a tempo that is not worth a warp
 _STILL_M = 1e-6  # targets that move less a step are a stand's
 _HOPELESS = 0.5  # share of feasible steps below which a heavier weight has never been enough
-_ENOUGH = 1.0 - BARS["infeasible_share"]
-"""Share of feasible steps from which a motion is kept where the first repair makes it worse."""
 _BEHIND = 0.02  # a slowed motion that is so far behind does not come first by repair
 _REACH_S = 0.8  # beside steps that need repair, others may change so far
 
@@ -54,6 +52,7 @@ class Feasible:
     steps: Float[np.ndarray, " S"]
     clip: slice
     _slack: dict[int, np.ndarray] = field(default_factory=dict, init=False, compare=False)
+    _solutions: dict[float, "Feasible"] = field(default_factory=dict, init=False, compare=False)
 
     @property
     def danced(self) -> Bool[np.ndarray, " S"]:
@@ -72,21 +71,14 @@ class Feasible:
         return (danced, ways) if ways.any() else (danced,)
 
 
-def make_feasible(
-    robot: Robot,
-    qpos: Float[np.ndarray, "S nq"],
-    aims: Targets,
-    config: RetargetConfig,
-    clip: slice | None = None,
-) -> Feasible:
+def make_feasible(robot: Robot, before: Feasible, config: RetargetConfig) -> Feasible:
     """Repair a motion; slow it down where its tempo is free and that helps. What no repair makes
-    more feasible stays as it is."""
-    before, how = given(qpos, aims, clip), config.repair
-    share = feasible_share(robot, before, config)
+    more feasible stays as it is, and what passes the gate where the first repair makes it worse."""
+    how, share = config.repair, feasible_share(robot, before, config)
     if not how.weights or share >= how.target_share:
         return before
     first = _solved(robot, before, how.weights[0], config)
-    if share >= _ENOUGH and feasible_share(robot, first, config) < share:
+    if share >= LEAST_FEASIBLE and feasible_share(robot, first, config) < share:
         return before
     after = _best_repair(robot, before, _accepted(robot, before, first, config), config)
     return after if feasible_share(robot, after, config) > share else before
@@ -159,15 +151,19 @@ def _slacks(
 
 
 def _solved(robot: Robot, motion: Feasible, weight: float, config: RetargetConfig) -> Feasible:
-    """Solve around the steps that need it with the dynamics term; the hard bars hold afterwards
-    where they can."""
+    """Solve around the steps that need it with the dynamics term, once a motion and weight; the
+    hard bars hold afterwards where they can."""
+    if weight in motion._solutions:
+        return motion._solutions[weight]
     problem = Problem.of(robot, motion.aims, replace(config.weights, dynamics=weight))
     loose = replace(config.solver, damping=_LOOSE, tolerance=config.repair.tolerance)
     hard = _slack(robot, motion, config) > config.weights.dynamics_margin
     spans = list(_spans(hard, round(_REACH_S / motion.aims.dt)))
     rough = solve(problem, motion.qpos, loose, config.repair.iterations, spans=spans)
     final = harden(problem, rough, config, spans)
-    return replace(motion, qpos=continuous(clip_to_limits(robot, final.qpos)))
+    found = replace(motion, qpos=continuous(clip_to_limits(robot, final.qpos)))
+    motion._solutions[weight] = found
+    return found
 
 
 def _spans(hard: Bool[np.ndarray, " S"], reach: int) -> Iterator[slice]:

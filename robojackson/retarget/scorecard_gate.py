@@ -26,6 +26,8 @@ BARS: Mapping[str, float] = {
     "fallen_share": 0.0,
 }
 """Largest allowed value of each gated figure (issue 2, stage 4)."""
+LEAST_FEASIBLE = 1.0 - BARS["infeasible_share"]
+"""Least share of feasible steps."""
 
 _FINDINGS = 2  # that an error message lists
 _TRIM = "(`robojackson dance CLIP --start S --end S`)"

@@ -12,8 +12,8 @@ from robojackson.cli.options import Json
 from robojackson.errors import BadConfiguration, StoreError
 
 PAGE = "index.html"
-MOVIES = (".mp4", ".mov", ".webm", ".mkv")
-SHOWN = (*MOVIES, ".html", ".gif", ".webp", ".png", ".jpg", ".jpeg", ".svg", ".pdf")
+SHOWN = (".html", ".mp4", ".m4v", ".mov", ".webm", ".mkv", ".gif", ".webp", ".png", ".jpg", ".jpeg",
+         ".svg", ".pdf")  # fmt: skip
 """Files that a browser shows."""
 
 
@@ -61,11 +61,12 @@ def view(
         write_gltf(folder, out)
     else:
         from robojackson.api.run_folder import FILMS, one_of
+        from robojackson.clips.video import SUFFIXES
         from robojackson.report.video.animation import write_animation
 
         is_film = file.is_file() and file.suffix != ".html"
         if is_film:
-            require_kind(file, (*MOVIES, ".gif"), "video")
+            require_kind(file, SUFFIXES, "video")
         write_animation(file if is_film else one_of(folder, FILMS), out, to.value)
     size = out.stat().st_size
     return CommandResult({"file": str(out), "bytes": size}, text=[f"{out}  {size:,} bytes"])

@@ -14,7 +14,7 @@ from robojackson.geometry.rotations import heading
 from robojackson.motion.floor_move import FloorMove
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import AIR, PLANTED
-from robojackson.retarget.feasible_motion import make_feasible
+from robojackson.retarget.feasible_motion import given, make_feasible
 from robojackson.retarget.retarget_config import RetargetConfig
 from robojackson.retarget.targets.footsteps import (
     SIDES,
@@ -77,7 +77,7 @@ def standing_dance(
     after = len(tailed.aims) - tailed.clip.stop
     start = np.pad(qpos, ((tailed.clip.start, after), (0, 0)), mode="edge")
     found = polished(tailed.aims, start, np.zeros(2), robot, config)
-    able = make_feasible(robot, found.qpos, found.aims, config, tailed.clip)
+    able = make_feasible(robot, given(found.qpos, found.aims, tailed.clip), config)
     stands = (slice(0, tailed.lead), slice(len(able.qpos) - tailed.stand, len(able.qpos)))
     shown = np.flatnonzero(able.danced)
     danced = (int(shown[0]), int(shown[-1]) + 1)
@@ -104,7 +104,7 @@ def way(
     aims = replace(_targets(robot, guess, contact, dt), keypoints_w=keypoints)
     found = polished(aims, _pinned(guess, ends, dt), np.zeros(2), robot, config)
     pinned = _pinned(found.qpos, ends, dt)
-    able = make_feasible(robot, pinned, found.aims, config)
+    able = make_feasible(robot, given(pinned, found.aims), config)
     return Piece(_pinned(able.qpos, ends, dt), able.aims.contact)
 
 

@@ -18,7 +18,9 @@ DT, STEPS = 0.02, 120
 LEFT = np.array([PLANTED, AIR])
 
 
-def _problem(robot: Robot, qpos: np.ndarray, contact: np.ndarray) -> Problem:
+def _problem(
+    robot: Robot, qpos: np.ndarray, contact: np.ndarray, cycle_offset: np.ndarray | None = None
+) -> Problem:
     posed = pose(tree(robot), qpos)
     aims = Targets(
         keypoints_w=posed.site_pos,
@@ -26,7 +28,7 @@ def _problem(robot: Robot, qpos: np.ndarray, contact: np.ndarray) -> Problem:
         contact=np.broadcast_to(contact, (len(qpos), 2)),
         heading=np.tile(np.eye(3), (len(qpos), 1, 1)),
         dt=DT,
-        cycle_offset=None,
+        cycle_offset=cycle_offset,
         airborne=np.zeros(len(qpos), bool),
     )
     return Problem.of(robot, aims, Weights())
@@ -103,9 +105,7 @@ def test_a_cycle_has_no_seam(robot: Robot) -> None:
     later[-turn:, :3] += offset
 
     def sway_of(qpos: np.ndarray, contact: np.ndarray) -> np.ndarray:
-        problem = _problem(robot, qpos, contact)
-        object.__setattr__(problem.targets, "cycle_offset", offset)
-        return swayed(problem, qpos, SwayConfig())[1]
+        return swayed(_problem(robot, qpos, contact, offset), qpos, SwayConfig())[1]
 
     first = sway_of(motion.qpos, motion.contact)
     second = sway_of(later, np.roll(motion.contact, -turn, axis=0))
@@ -150,7 +150,8 @@ def test_a_repair_that_makes_less_feasible_is_not_taken(
     monkeypatch.setattr(feasible_motion, "_solved", lambda *_: motions["first"])
     monkeypatch.setattr(feasible_motion, "_accepted", lambda *_: motions["first"])
     monkeypatch.setattr(feasible_motion, "_best_repair", lambda *_: motions["last"])
-    found = feasible_motion.make_feasible(robot, still, aims, RetargetConfig())
+    before = feasible_motion.given(still, aims)
+    found = feasible_motion.make_feasible(robot, before, RetargetConfig())
     expected = {"given": still, "last": still + 0.02}[kept]
     np.testing.assert_array_equal(found.qpos, expected)
 
