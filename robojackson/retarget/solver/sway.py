@@ -49,14 +49,14 @@ class SwayConfig:
         rounds: Times that the nearest points of the support are computed again in a pass.
     """
 
-    passes: int = Field(default=4, ge=0)
-    spread_m: float = Field(default=0.05, gt=0)
-    correlation_s: float = Field(default=0.3, gt=0)
-    point_sd_m: float = Field(default=0.04, gt=0)
-    margin_m: float = Field(default=0.02, ge=0)
+    passes: int = Field(default=4, ge=0, le=100)
+    spread_m: float = Field(default=0.05, ge=1e-3, le=10)
+    correlation_s: float = Field(default=0.3, ge=0.01, le=10)
+    point_sd_m: float = Field(default=0.04, ge=1e-3, le=10)
+    margin_m: float = Field(default=0.02, ge=0, le=10)
     sole_share: float = Field(default=0.8, gt=0, le=1)
-    reach_m: float = Field(default=0.15, gt=0)
-    rounds: int = Field(default=8, ge=1)
+    reach_m: float = Field(default=0.15, ge=1e-3, le=10)
+    rounds: int = Field(default=8, ge=1, le=100)
 
 
 class _Pendulum(NamedTuple):

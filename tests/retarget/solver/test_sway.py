@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from robojackson.motion.smpl_sequence import AIR, PLANTED
 from robojackson.retarget import feasible_motion
@@ -160,3 +161,10 @@ def test_what_is_feasible_does_not_sway() -> None:
     card = robot_motion("hip_shake").scorecard
     assert card["infeasible_share"] < 0.05
     assert card["sway_cm"] == 0.0
+
+
+@pytest.mark.parametrize("name", ["spread_m", "correlation_s", "point_sd_m", "reach_m"])
+@pytest.mark.parametrize("value", [0.0, 1e-200, 1e200, np.nan])
+def test_a_setting_beyond_all_measure_is_refused_by_name(name: str, value: float) -> None:
+    with pytest.raises(ValidationError, match=name):
+        SwayConfig(**{name: value})
