@@ -11,6 +11,7 @@ cd "$(dirname "$0")/.."
 VENV=.venv
 STAMP=$VENV/.stamp
 EXTRAS=${EXTRAS:-app,fast,s3,dev}
+LEAST_GB=6 # a new environment: 5.2 with torch's CPU build, 8.5 with the one for CUDA
 
 OURS='(3, 11) <= sys.version_info[:2] <= (3, 13)'
 is_python() { "$1" -c "import sys; sys.exit(not $OURS)" 2>/dev/null; }
@@ -87,6 +88,14 @@ pinned() { sed -n "s/^$1==//p" constraints.txt; }
 
 say() { echo "setup: $*" >&2; }
 
+# Refuse a disk that a new environment would fill.
+require_room() {
+    free=$(df -Pk . | awk 'NR == 2 { print int($4 / 1048576) }')
+    [ "${free:-$LEAST_GB}" -ge "$LEAST_GB" ] && return 0
+    say "$VENV takes 5 to 9 GB of disk and $free GB are free here; make room, or work on another disk"
+    exit 1
+}
+
 # Whether the environment is there, of a Python of ours and of PYTHON's version where that is given.
 has_environment() {
     is_python "$VENV/bin/python" || return 1
@@ -99,6 +108,7 @@ install() {
         return 0
     fi
     if ! has_environment; then
+        require_room
         python=$(find_python)
         say "creating $VENV with Python $(version "$python")"
         rm -rf "$VENV"
