@@ -9,23 +9,27 @@ from safetensors.torch import load_file, save_file
 from scipy.spatial.transform import Rotation
 
 from robojackson.body.forward_kinematics import unit
-from robojackson.mocap.temporal import error_flow, features, temporal_network
+from robojackson.mocap.temporal import error_flow, features, temporal_lift, temporal_network
 from robojackson.mocap.temporal.features import ClipView
 from robojackson.motion.smpl_sequence import AIR, PLANTED, SLIDING
 from tools.pairs.sources import RefusedMotion
-from tools.temporal import batches, calibration, train_temporal
+from tools.temporal import batches, calibration, fit, join, train_temporal
 from tools.temporal.batches import Batch
 from tools.temporal.depth_errors import Change, body_offsets, misjudged
 from tools.temporal.examples import Example, flattened
 from tools.temporal.filming import HIPS
 from tools.temporal.fit_flow import discrepancy
-from tools.temporal.net import Flow, Lifter, found_in
+from tools.temporal.lessons import lesson_of, lessons
+from tools.temporal.net import Flow, Lifter, found_in, lifter_of
 
 
-@pytest.fixture(scope="module")
-def twins(tmp_path_factory: pytest.TempPathFactory) -> tuple[Lifter, Flow, error_flow.Weights]:
+@pytest.fixture(scope="module", params=[(160, 4), (96, 6)])
+def twins(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Lifter, Flow, error_flow.Weights]:
     torch.manual_seed(1)
-    lifter, coupled = Lifter().eval(), Flow()
+    width, blocks = request.param
+    lifter, coupled = Lifter(width, blocks).eval(), Flow(width)
     for part in (lifter, coupled):
         for value in part.parameters():
             torch.nn.init.normal_(value, std=0.05)
@@ -73,7 +77,7 @@ def test_torch_and_numpy_are_the_same_lifter(
 def test_torch_and_numpy_are_the_same_flow(twins: tuple[Lifter, Flow, error_flow.Weights]) -> None:
     _, coupled, weights = twins
     rng = np.random.default_rng(3)
-    error, seen = rng.normal(size=(5, 36)), rng.normal(size=(5, 160))
+    error, seen = rng.normal(size=(5, 36)), rng.normal(size=(5, coupled.read.in_features))
     with torch.no_grad():
         z, _ = coupled(torch.from_numpy(error).float(), torch.from_numpy(seen).float())
     assert np.abs(z.numpy() - error_flow.to_embedding(error, seen, weights)).max() < 1e-4
@@ -81,13 +85,13 @@ def test_torch_and_numpy_are_the_same_flow(twins: tuple[Lifter, Flow, error_flow
 
 def test_the_flow_in_torch_can_be_inverted(twins: tuple[Lifter, Flow, error_flow.Weights]) -> None:
     _, coupled, _ = twins
-    error, seen = torch.randn(5, 36), torch.randn(5, 160)
+    error, seen = torch.randn(5, 36), torch.randn(5, coupled.read.in_features)
     assert (coupled.inverse(coupled(error, seen)[0], seen) - error).abs().max() < 1e-5
 
 
 def test_the_volume_is_the_determinant(twins: tuple[Lifter, Flow, error_flow.Weights]) -> None:
     _, coupled, _ = twins
-    error, seen = torch.randn(36), torch.randn(160)
+    error, seen = torch.randn(36), torch.randn(coupled.read.in_features)
     jacobian = torch.autograd.functional.jacobian(lambda x: coupled(x, seen)[0], error)
     assert torch.allclose(torch.logdet(jacobian), coupled(error, seen)[1], atol=1e-4)
 
@@ -170,10 +174,21 @@ def test_discrepancy_detects_another_distribution() -> None:
     assert discrepancy(a, b + 1.0) > 5.0 * discrepancy(a, b).abs()
 
 
+def test_lessons_are_the_same_whoever_draws_them() -> None:
+    where = fit.source([person()], None)
+    config = fit.FitConfig(batch=3, change=Change(frames=20))
+
+    def draw(step: int) -> Batch:
+        return where.draw(config, 0.0, np.random.default_rng(step))
+
+    here, beside = (list(lessons(draw, range(2, 6), workers)) for workers in (0, 2))
+    assert len(here) == len(beside) == 4
+    for one, other in zip(here, beside, strict=True):
+        assert all(torch.equal(a, b) for a, b in zip(one, other, strict=True))
+
+
 @pytest.mark.slow
 def test_a_saved_state_goes_on_where_it_was(tmp_path: Path) -> None:
-    from tools.temporal import fit
-
     config = fit.FitConfig(steps=4, batch=2, change=Change(frames=20))
     where = fit.source([person()], None)
 
@@ -201,18 +216,13 @@ def test_a_saved_state_goes_on_where_it_was(tmp_path: Path) -> None:
 
 def stop_early(progress: object, where: object, config: object, watch: object) -> None:
     """Take two of the four steps of the same schedule."""
-    from tools.temporal import fit
-
     assert isinstance(progress, fit.Progress)
     assert isinstance(where, fit.Source)
     assert isinstance(config, fit.FitConfig)
     for step in range(2):
         rng = np.random.default_rng([1, 2, step])
         share = float(np.interp(step, [0, config.steps], config.invented))
-        for group in progress.optimiser.param_groups:
-            group["lr"] = config.rate * fit._schedule(step, config.steps)
-        fit._learn(progress, where.draw(config, share, rng), config)
-        progress.step = step + 1
+        fit.learn(progress, lesson_of(where.draw(config, share, rng)), config)
 
 
 @pytest.mark.parametrize("known", [False, True])
@@ -238,7 +248,7 @@ def test_a_lifter_that_does_not_read_up_is_widened_and_answers_as_before(
     for name in ("mean", "scale", "enter.weight"):
         arrays[name] = arrays[name][..., :-3].contiguous()
     save_file(arrays, old)
-    again = Lifter().eval()
+    again = lifter_of(lifter.state_dict()).eval()
     again.load_state_dict(train_temporal.widened(old), strict=False)
     found, result = (
         net.features(torch.from_numpy(features.numbers(sight)[None].astype(np.float32)))
@@ -247,10 +257,30 @@ def test_a_lifter_that_does_not_read_up_is_widened_and_answers_as_before(
     assert torch.allclose(found, result, atol=2e-2)
 
 
+def test_joined_networks_answer_with_their_mean(tmp_path: Path) -> None:
+    paths = [tmp_path / "one.safetensors", tmp_path / "two.safetensors"]
+    for path, width in zip(paths, (48, 64), strict=True):
+        lifter = Lifter(width, 5)
+        torch.nn.init.normal_(lifter.leave.weight, std=0.02)
+        train_temporal.save(lifter, Flow(width), path)
+    assert join.main([*map(str, paths), "-o", str(tmp_path / "both.safetensors")]) == 0
+    both = temporal_network.load(tmp_path / "both.safetensors")
+    own = [temporal_network.load(path) for path in paths]
+    sight = person(known=True).sight
+    found = temporal_lift.correct(sight, both)
+    each = [temporal_lift.correct(sight, weights) for weights in own]
+    mean = np.mean([one.correction for one in each], 0)
+    assert np.abs(each[0].correction - each[1].correction).max() > 0.01
+    assert np.abs(found.correction - mean).max() < 1e-5
+    assert np.array_equal(found.features, each[0].features)
+    apart = np.abs(each[0].correction - each[1].correction)[..., 2] / 2.0
+    assert (found.spread[..., 1] > apart - 1e-6).all()
+
+
 def test_a_calibrated_spread_holds_two_thirds_of_the_errors(
     twins: tuple[Lifter, Flow, error_flow.Weights],
 ) -> None:
-    lifter = Lifter()
+    lifter = lifter_of(twins[0].state_dict())
     lifter.load_state_dict(twins[0].state_dict())
     examples = [person()]
     calibration.apply(lifter, calibration.factors(lifter, examples))

@@ -19,8 +19,9 @@ from tools.temporal.depth_errors import Change
 from tools.temporal.examples import Example
 from tools.temporal.filming import film, with_constants
 from tools.temporal.invented import Detector
+from tools.temporal.lessons import Lesson, lessons
 from tools.temporal.losses import losses_of
-from tools.temporal.net import Lifter, found_in
+from tools.temporal.net import BLOCKS, WIDTH, Lifter, found_in, lifter_of
 from tools.temporal.truths import Bank
 
 LOSSES = ("place", "velocity", "speed", "spread", "tilt", "contact")
@@ -35,9 +36,11 @@ class FitConfig:
     """Configuration of fitting the lifter.
 
     Attributes:
+        width, blocks: Channels and residual blocks of the network.
         steps: Steps of the optimiser.
         batch: Windows a step.
-        rate: Learning rate, warmed up over 100 steps, then a cosine.
+        rate: Learning rate, warmed up over `warm_up` steps, then a cosine.
+        warm_up: Steps.
         decay: Weight decay.
         invented: Share of windows of the invented detector, at the first and the last step.
         velocity, speed, spread, tilt, contact: Weights of these losses beside that of the place.
@@ -45,9 +48,12 @@ class FitConfig:
         change: Change of the windows.
     """
 
+    width: int = WIDTH
+    blocks: int = BLOCKS
     steps: int = 20000
     batch: int = 32
     rate: float = 1.5e-3
+    warm_up: int = 100
     decay: float = 0.02
     invented: tuple[float, float] = (0.5, 0.35)
     velocity: float = 3.0
@@ -98,14 +104,17 @@ def source(examples: Sequence[Example], bank: Bank | None) -> Source:
     return Source(real, bank, Detector(real, examples))
 
 
-def begin(examples: Sequence[Example], config: FitConfig, seed: int) -> Progress:
-    """Return a fresh network, its input normalised by the examples."""
+def begin(
+    examples: Sequence[Example], config: FitConfig, seed: int, device: str = "cpu"
+) -> Progress:
+    """Return a fresh network on a device, its input normalised by the examples."""
     torch.manual_seed(seed)
-    net = Lifter()
+    net = Lifter(config.width, config.blocks)
     numbers = np.concatenate([features.numbers(e.sight)[::10] for e in examples])
     net.mean.copy_(torch.from_numpy(numbers.mean(0)))
     net.scale.copy_(torch.from_numpy(1.0 / (numbers.std(0) + 0.02)))
     net.mean[-3:], net.scale[-3:] = 0.0, 1.0  # zero where up is not known
+    net.to(device)
     optimiser = torch.optim.AdamW(net.parameters(), lr=config.rate, weight_decay=config.decay)
     mean = {name: value.clone() for name, value in net.state_dict().items()}
     return Progress(0, net, mean, optimiser, [])
@@ -117,22 +126,27 @@ def fit(
     config: FitConfig,
     seed: int,
     watch: Callable[[Progress, float], None],
+    workers: int = 0,
 ) -> None:
-    """Train from where `progress` stands; `watch` gets it and CPU seconds a step now and then."""
-    began, first = time.process_time(), progress.step
-    losses: list[tuple[float, ...]] = []
-    for step in range(progress.step, config.steps):
+    """Train from where `progress` stands; `watch` gets it and seconds a step now and then.
+
+    Batches are drawn ahead by `workers` processes; they are the same with any number of them.
+    """
+
+    def draw(step: int) -> Batch:
         rng = np.random.default_rng([seed, 2, step])
         share = float(np.interp(step, [0, config.steps], config.invented))
-        for group in progress.optimiser.param_groups:
-            group["lr"] = config.rate * _schedule(step, config.steps)
-        losses.append(_learn(progress, pairs.draw(config, share, rng), config))
-        progress.step = step + 1
+        return pairs.draw(config, share, rng)
+
+    began, first = time.monotonic(), progress.step
+    losses: list[torch.Tensor] = []
+    for lesson in lessons(draw, range(first, config.steps), workers):
+        losses.append(learn(progress, lesson, config))
         if progress.step % 100 == 0 or progress.step == config.steps:
-            means = dict(zip(LOSSES, np.mean(losses, 0).tolist(), strict=True))
+            means = dict(zip(LOSSES, torch.stack(losses).mean(0).tolist(), strict=True))
             progress.curve.append({"step": progress.step, **means})
             losses = []
-            watch(progress, (time.process_time() - began) / (progress.step - first))
+            watch(progress, (time.monotonic() - began) / (progress.step - first))
 
 
 def validate(net: Lifter, examples: Sequence[Example]) -> dict[str, float]:
@@ -163,17 +177,21 @@ def validate(net: Lifter, examples: Sequence[Example]) -> dict[str, float]:
 
 
 def averaged(progress: Progress) -> Lifter:
-    """Return the network with the running mean of its weights."""
-    net = Lifter()
+    """Return the network with the running mean of its weights, on the processor."""
+    net = lifter_of(progress.mean)
     net.load_state_dict(progress.mean)
     return net
 
 
-def _learn(progress: Progress, batch: Batch, config: FitConfig) -> tuple[float, ...]:
-    numbers = torch.from_numpy(batch.numbers())
-    with torch.autocast("cpu", torch.bfloat16):
-        h = progress.net.features(numbers)
-    losses, _ = losses_of(progress.net.head(h.float()), batch)
+def learn(progress: Progress, lesson: Lesson, config: FitConfig) -> torch.Tensor:
+    """Take a step of the optimiser; returns `LOSSES`."""
+    for group in progress.optimiser.param_groups:
+        group["lr"] = config.rate * _schedule(progress.step, config)
+    device = progress.net.mean.device
+    lesson = lesson.on(device)
+    with torch.autocast(device.type, torch.bfloat16):
+        h = progress.net.features(lesson.numbers.float())
+    losses, _ = losses_of(progress.net.head(h.float()), lesson)
     weighted = [getattr(config, name, 1.0) * value for name, value in losses.items()]
     loss = 10.0 * torch.stack(weighted).sum()
     progress.optimiser.zero_grad()
@@ -181,10 +199,12 @@ def _learn(progress: Progress, batch: Batch, config: FitConfig) -> tuple[float, 
     nn.utils.clip_grad_norm_(progress.net.parameters(), 1.0)
     progress.optimiser.step()
     memory = min(config.average, progress.step / (progress.step + 10.0))
-    for name, value in progress.net.state_dict().items():
-        progress.mean[name].lerp_(value, 1.0 - memory)
-    return tuple(value.item() for value in losses.values())
+    means, values = progress.mean, progress.net.state_dict()
+    torch._foreach_lerp_(list(means.values()), [values[name] for name in means], 1.0 - memory)
+    progress.step += 1
+    return torch.stack(list(losses.values())).detach()
 
 
-def _schedule(step: int, steps: int) -> float:
-    return float(min(1.0, (step + 1) / 100.0) * (0.5 * (1.0 + np.cos(np.pi * step / steps)) + 0.01))
+def _schedule(step: int, config: FitConfig) -> float:
+    cosine = 0.5 * (1.0 + np.cos(np.pi * step / config.steps))
+    return float(min(1.0, (step + 1) / config.warm_up) * (cosine + 0.01))

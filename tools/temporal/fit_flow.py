@@ -11,8 +11,9 @@ from dataclasses import replace
 import numpy as np
 import torch
 
-from tools.temporal.batches import TWELVE, Batch
+from tools.temporal.batches import Batch
 from tools.temporal.fit import FitConfig, Source
+from tools.temporal.lessons import Lesson, lesson_of
 from tools.temporal.losses import losses_of
 from tools.temporal.net import Flow, Lifter
 
@@ -32,7 +33,7 @@ def fit_flow(
     """Return a flow for a trained lifter, which stays as it is; fitted to the real pairs alone."""
     torch.manual_seed(seed)
     lifter.eval()
-    flow = Flow()
+    flow = Flow(lifter.enter.out_features)
     optimiser = torch.optim.Adam(flow.parameters(), lr=1e-3)
     config = FitConfig(batch=24)
     for step in range(steps):
@@ -52,11 +53,11 @@ def flow_losses(
     flow: Flow, lifter: Lifter, batch: Batch, rng: np.random.Generator
 ) -> dict[str, torch.Tensor]:
     """Return the four losses."""
-    error, h = _errors(lifter, batch)
-    good = torch.from_numpy(batch.good)
-    body = torch.from_numpy(np.ascontiguousarray(batch.truth[:, :, TWELVE], np.float32))
+    lesson = lesson_of(batch)
+    good, body = lesson.good, lesson.truth
+    error, h = _errors(lifter, lesson)
     z, volume = flow(error, h)
-    clean_z, _ = flow(*_errors(lifter, cleaned(batch)))
+    clean_z, _ = flow(*_errors(lifter, lesson_of(cleaned(batch))))
     return {
         "inverse": -(_log_likelihood(flow, z, good) + (volume * good).sum() / good.sum()) / 36.0,
         "forward": (flow.inverse(torch.zeros_like(error), h) ** 2).mean(),
@@ -96,12 +97,12 @@ def discrepancy(x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
     return kernel[:n, :n].mean() + kernel[n:, n:].mean() - 2.0 * kernel[:n, n:].mean()
 
 
-def _errors(lifter: Lifter, batch: Batch) -> tuple[torch.Tensor, torch.Tensor]:
+def _errors(lifter: Lifter, lesson: Lesson) -> tuple[torch.Tensor, torch.Tensor]:
     """Return the error over spread (B, T, 36), and features."""
     with torch.no_grad():
-        h = lifter.features(torch.from_numpy(batch.numbers()))
+        h = lifter.features(lesson.numbers.float())
         found = lifter.head(h)
-        error = -losses_of(found, batch)[1]
+        error = -losses_of(found, lesson)[1]
         scaled = error * torch.exp(-found.log_spread[..., [0, 0, 1]])
     return scaled.flatten(2).clamp(-6.0, 6.0), h
 

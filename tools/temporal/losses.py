@@ -1,30 +1,26 @@
 """Losses of the lifter: place, velocity, speed, spread of joints, tilt of up, contacts of feet."""
 
-import numpy as np
 import torch
 from torch import nn
 
 from robojackson.motion.smpl_sequence import AIR, PLANTED
-from tools.temporal.batches import TWELVE, Batch
+from tools.temporal.lessons import Lesson
 from tools.temporal.net import Found
 
 LEAST_STEP_M = 0.003
 """Step of a joint that stands still, metres a frame: what is slower has no speed to keep."""
 
 
-def losses_of(found: Found, batch: Batch) -> tuple[dict[str, torch.Tensor], torch.Tensor]:
+def losses_of(found: Found, lesson: Lesson) -> tuple[dict[str, torch.Tensor], torch.Tensor]:
     """Return the losses by name, and the errors of the joints (B, L, 12, 3), metres.
 
     Place: mean distance of joints, m. Velocity: of their steps, m a frame. Speed: log ratio of the
     mean speeds of window and truth, without which uncertain depth makes limbs slow. Spread, tilt:
     Laplace likelihoods. Contact: cross-entropy.
     """
-    flat, body, good = (torch.from_numpy(np.ascontiguousarray(v, np.float32)) for v in (
-        batch.flat[:, :, TWELVE], batch.truth[:, :, TWELVE], batch.good))  # fmt: skip
-    depth = torch.from_numpy(np.ascontiguousarray(batch.local[:, :, TWELVE, 2], np.float32))
-    distance = torch.from_numpy(batch.distance.astype(np.float32))[..., None]
-    z = depth + found.correction[..., 2]
-    across = flat * ((distance + z) / distance)[..., None] + found.correction[..., :2]
+    body, good, distance = lesson.truth, lesson.good, lesson.distance[..., None]
+    z = lesson.depth + found.correction[..., 2]
+    across = lesson.flat * ((distance + z) / distance)[..., None] + found.correction[..., :2]
     place = torch.cat([across, z[..., None]], -1)
     error = place - body
     both = good[:, 1:] * good[:, :-1]
@@ -35,15 +31,15 @@ def losses_of(found: Found, batch: Batch) -> tuple[dict[str, torch.Tensor], torc
         "velocity": _mean(_length(error[:, 1:] - error[:, :-1]), both),
         "speed": (_log_speed(place, both) - _log_speed(body, both)).abs().mean(),
         "spread": _mean(spread, good),
-        "tilt": tilt_loss(found, batch, good),
-        "contact": contact_loss(found.contact, batch, good),
+        "tilt": tilt_loss(found, lesson),
+        "contact": contact_loss(found.contact, lesson),
     }
     return losses, error
 
 
-def tilt_loss(found: Found, batch: Batch, good: torch.Tensor) -> torch.Tensor:
+def tilt_loss(found: Found, lesson: Lesson) -> torch.Tensor:
     """Return the negative log likelihood of the roll and pitch of up, means of each window."""
-    up = torch.from_numpy(np.ascontiguousarray(batch.up, np.float32))
+    up, good = lesson.up, lesson.good
     share = good[..., None] / good.sum(1).clamp(min=1.0)[:, None, None]
     true = nn.functional.normalize((up * share).sum(1), dim=-1)
     mean = nn.functional.normalize((found.up * share).sum(1), dim=-1)
@@ -55,12 +51,11 @@ def tilt_loss(found: Found, batch: Batch, good: torch.Tensor) -> torch.Tensor:
     return (off * torch.exp(-size) + size).sum(-1).mean()
 
 
-def contact_loss(contact: torch.Tensor, batch: Batch, good: torch.Tensor) -> torch.Tensor:
+def contact_loss(contact: torch.Tensor, lesson: Lesson) -> torch.Tensor:
     """Return the cross-entropy of touching and planted foot points, nats."""
-    states = torch.from_numpy(np.ascontiguousarray(batch.contact, np.float32))
-    labels = torch.stack([states != AIR, states == PLANTED], -1).float()
+    labels = torch.stack([lesson.contact != AIR, lesson.contact == PLANTED], -1).float()
     nats = nn.functional.binary_cross_entropy_with_logits(contact, labels, reduction="none")
-    return _mean(nats.flatten(2), good)
+    return _mean(nats.flatten(2), lesson.good)
 
 
 def _log_speed(place: torch.Tensor, both: torch.Tensor) -> torch.Tensor:

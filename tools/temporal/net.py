@@ -2,6 +2,7 @@
 `robojackson.mocap.temporal`.
 """
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -11,15 +12,17 @@ from torch import nn
 from robojackson.mocap.temporal import error_flow, features
 from robojackson.mocap.temporal.features import COUNT, ClipView
 from robojackson.mocap.temporal.temporal_network import (
-    DILATIONS,
     GROUND,
     LOG_SPREAD,
     LOG_TILT,
     SPREAD_RANGE,
     UPRIGHT,
+    block_count,
+    dilation_of,
 )
 
-WIDTH = 160
+WIDTH, BLOCKS = 160, 4
+"""Channels and residual blocks of a lifter, unless told."""
 JOINTS, FEET = 12, 4
 OUT = JOINTS * 5
 """Correction (3), log spread across the image and in depth (2)."""
@@ -71,12 +74,14 @@ class Lifter(nn.Module):
     mean: torch.Tensor
     scale: torch.Tensor
 
-    def __init__(self, width: int = WIDTH, dropout: float = 0.05) -> None:
+    def __init__(self, width: int = WIDTH, blocks: int = BLOCKS, dropout: float = 0.05) -> None:
         super().__init__()
         self.register_buffer("mean", torch.zeros(COUNT))
         self.register_buffer("scale", torch.ones(COUNT))
         self.enter = nn.Linear(COUNT, width)
-        self.blocks = nn.ModuleList(Block(width, d, dropout) for d in DILATIONS)
+        self.blocks = nn.ModuleList(
+            Block(width, dilation_of(number), dropout) for number in range(blocks)
+        )
         self.leave = nn.Linear(width, OUT)
         nn.init.normal_(self.leave.weight, std=1e-3)
         nn.init.zeros_(self.leave.bias)
@@ -104,6 +109,11 @@ class Lifter(nn.Module):
     def forward(self, x: torch.Tensor) -> Found:
         """Return what the network finds in a clip."""
         return self.head(self.features(x))
+
+
+def lifter_of(arrays: Mapping[str, torch.Tensor]) -> Lifter:
+    """Return a fresh lifter of the size of a state."""
+    return Lifter(len(arrays["enter.bias"]), block_count(arrays))
 
 
 def found_in(net: Lifter, sight: ClipView) -> Found:

@@ -55,12 +55,13 @@ def bank_of(folder: Path, motions: list[Path], count: int, seed: int) -> truths.
 def train(
     pairs: Path, motions: list[Path], out: Path, config: fit.FitConfig, count: int, seed: int,
     flow_steps: int, first: Path | None = None, first_share: float = 0.0,
+    device: str = "cpu", workers: int = 0,
 ) -> dict[str, object]:  # fmt: skip
     """Fit lifter and flow; returns the report."""
     training, validation = load(pairs)
     check_motions(training + validation)
     log.info("%d clips to train on, %d to validate", len(training), len(validation))
-    progress = fit.begin(training, config, seed)
+    progress = fit.begin(training, config, seed, device)
     if first:
         begin_with(progress, first)
     state = out.with_suffix(".state.pt")
@@ -71,11 +72,11 @@ def train(
             now.curve[-1] |= validated(fit.averaged(now), validation)
         keep(now, state)
         figures = ", ".join(f"{k} {v:.4g}" for k, v in now.curve[-1].items())
-        log.info("%s; %.0f CPU s left", figures, (config.steps - now.step) * step_s)
+        log.info("%s; %.0f s left", figures, (config.steps - now.step) * step_s)
 
     bank = bank_of(pairs, motions, count, seed) if count else None
     where = fit.source(training, bank)
-    fit.fit(progress, where, config, seed, watch)
+    fit.fit(progress, where, config, seed, watch, workers)
     lifter = fit.averaged(progress)
     if first:
         mix_in(lifter, first, first_share)
@@ -129,7 +130,8 @@ def begin_with(progress: fit.Progress, path: Path) -> None:
     missing, unknown = progress.net.load_state_dict(arrays, strict=False)
     if unknown or any(not name.startswith(("ground.", "feet.")) for name in missing):
         raise BadWeights(f"{path}: not the lifter of this version: {[*missing, *unknown]}")
-    progress.mean.update({name: value.clone() for name, value in arrays.items()})
+    for name, value in arrays.items():
+        progress.mean[name].copy_(value)
 
 
 def widened(path: Path) -> dict[str, torch.Tensor]:
@@ -167,7 +169,7 @@ def resume(progress: fit.Progress, path: Path) -> None:
     """Go on from a kept state, if there is one."""
     if not path.exists():
         return
-    content = torch.load(path, weights_only=True)
+    content = torch.load(path, weights_only=True, map_location=progress.net.mean.device)
     progress.step, progress.curve = content["step"], content["curve"]
     progress.net.load_state_dict(content["net"])
     progress.mean.update(content["mean"])
@@ -212,16 +214,24 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--first-share", type=float, default=0.4, help="share of them in the final weights"
     )
-    parser.add_argument("--rate", type=float, default=fit.FitConfig().rate)
+    for name in ("width", "blocks", "batch", "warm_up", "rate"):
+        default = getattr(fit.FitConfig(), name)
+        flag = "--" + name.replace("_", "-")
+        parser.add_argument(flag, type=type(default), default=default)
+    parser.add_argument("--device", default="cpu", help="cpu or cuda")
+    parser.add_argument("--workers", type=int, default=0, help="processes that draw batches")
     parser.add_argument("--bank", type=int, default=6000)
     parser.add_argument("--seed", type=int, default=7)
     options = parser.parse_args(arguments)
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     torch.set_num_threads(1)
-    config = fit.FitConfig(steps=options.steps, rate=options.rate)
+    config = fit.FitConfig(
+        width=options.width, blocks=options.blocks, steps=options.steps, batch=options.batch,
+        rate=options.rate, warm_up=options.warm_up,
+    )  # fmt: skip
     report = train(
         options.pairs, options.motions, options.out, config, options.bank, options.seed,
-        options.flow_steps, options.first, options.first_share,
+        options.flow_steps, options.first, options.first_share, options.device, options.workers,
     )  # fmt: skip
     target = options.report or options.out.with_suffix("")
     target.with_suffix(".json").write_text(json.dumps(report, indent=1) + "\n")

@@ -67,7 +67,6 @@ def kept(path: Path, folders: list[Path], count: int, seed: int) -> Bank:
     """Return the bank of a file, made if it is not there."""
     if not path.exists():
         bank = make(folders, count, seed)
-        points = bank.points.astype(np.float16)
-        np.savez(path, points=points, lengths=bank.lengths, contact=bank.contact)
+        np.savez(path, points=bank.points, lengths=bank.lengths, contact=bank.contact)
     with np.load(path) as data:
         return Bank(data["points"].astype(np.float32), data["lengths"], data["contact"])

@@ -18,7 +18,7 @@ from robojackson.mocap.landmarks.refinement import carry_along
 from robojackson.mocap.temporal import error_flow, features
 from robojackson.mocap.temporal.features import ClipView
 from robojackson.mocap.temporal.ground_evidence import GroundEvidence, ground_evidence
-from robojackson.mocap.temporal.temporal_network import SD_PER_ERROR, Output, load, run
+from robojackson.mocap.temporal.temporal_network import SD_PER_ERROR, Output, load, networks, run
 
 WEIGHTS = Path(__file__).parents[2] / "assets" / "temporal.safetensors"
 HIDDEN_BELOW = 0.35
@@ -138,23 +138,35 @@ def corrected(sight: ClipView, change: Float[np.ndarray, "T 12 3"]) -> Float[np.
 
 
 def correct(sight: ClipView, weights: error_flow.Weights) -> Output:
-    """Return the mean of the plain and the mirrored view, and the features of the plain one.
+    """Return the mean of all networks' answers to the plain and the mirrored view, and the features
+    of the first to the plain one.
 
-    Where plain and mirrored result differ, the network is outside its training data: their distance
-    is added to the spread.
+    Where they differ, the clip is unlike the training data: their standard deviation is added to
+    the spread.
     """
-    plain, mirrored = run(sight, weights), run(features.mirror(sight), weights)
-    flip = np.array([-1.0, 1.0, 1.0])
-    again = features.mirror_body(mirrored.correction) * flip
-    apart = np.abs(plain.correction - again) / 2.0
+    mirror, each = features.mirror(sight), networks(weights)
+    plain = [run(sight, own) for own in each]
+    found = plain + [mirrored(run(mirror, own)) for own in each]
+    answers = np.stack([one.correction for one in found])
+    apart = answers.std(0)
     apart = np.stack([apart[..., :2].mean(-1), apart[..., 2]], -1)
-    own_spread = np.sqrt(plain.spread * features.mirror_body(mirrored.spread))
     return Output(
-        correction=(plain.correction + again) / 2.0,
-        spread=np.hypot(own_spread, apart),
-        features=plain.features,
-        up=(plain.up + mirrored.up * flip) / 2.0,
-        tilt=np.sqrt(plain.tilt * mirrored.tilt),
+        correction=answers.mean(0),
+        spread=np.hypot(np.exp(np.mean([np.log(one.spread) for one in found], 0)), apart),
+        features=plain[0].features,
+        up=np.mean([one.up for one in found], 0),
+        tilt=np.exp(np.mean([np.log(one.tilt) for one in found], 0)),
+    )
+
+
+def mirrored(found: Output) -> Output:
+    """Return what was found in the mirrored clip as of the plain one; the features stay."""
+    flip = np.array([-1.0, 1.0, 1.0])
+    return replace(
+        found,
+        correction=features.mirror_body(found.correction) * flip,
+        spread=features.mirror_body(found.spread),
+        up=found.up * flip,
     )
 
 

@@ -5,6 +5,7 @@ ray axes) and its spread across the image and in depth, and for each frame the d
 its spread. Numpy; `tools/temporal/net.py` is its equivalent in torch, for training.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -19,6 +20,7 @@ from robojackson.mocap.temporal.error_flow import Weights
 from robojackson.mocap.temporal.features import ClipView
 
 DILATIONS = (1, 3, 9, 27)
+"""Frames between the taps of the first blocks; further blocks repeat them."""
 LOG_SPREAD, SPREAD_RANGE = -3.0, 3.0
 """Middle of the logarithm of the spread, metres, and its largest change in either direction."""
 SD_PER_ERROR = 1.25
@@ -28,6 +30,8 @@ GROUND = 5
 UPRIGHT = (0.0, -1.0, 0.0)
 LOG_TILT = -2.0
 """Up without evidence, and the middle of the logarithm of its error, radians."""
+ALSO = "also."
+"""Beginning of the names of a file's further networks."""
 
 
 @dataclass(frozen=True)
@@ -53,8 +57,8 @@ def run(sight: ClipView, weights: Weights) -> Output:
     """Run one pass over a clip."""
     x = (features.numbers(sight) - weights["mean"]) * weights["scale"]
     h = x @ weights["enter.weight"].T + weights["enter.bias"]
-    for block, dilation in enumerate(DILATIONS):
-        h = h + _block(h, f"blocks.{block}", dilation, weights)
+    for block in range(block_count(weights)):
+        h = h + _block(h, f"blocks.{block}", dilation_of(block), weights)
     out = h @ weights["leave.weight"].T + weights["leave.bias"]
     out = out.reshape(len(out), len(BODY), 5)
     ground = h @ weights["ground.weight"].T + weights["ground.bias"]
@@ -65,6 +69,32 @@ def run(sight: ClipView, weights: Weights) -> Output:
         up=ground[:, :3] + np.array(UPRIGHT),
         tilt=_spread(ground[:, 3:], LOG_TILT),
     )
+
+
+def dilation_of(block: int) -> int:
+    """Return the frames between the taps of a block."""
+    return DILATIONS[block % len(DILATIONS)]
+
+
+def block_count(weights: Mapping[str, object]) -> int:
+    """Return the number of residual blocks of a weights file."""
+    return sum(name.startswith("blocks.") and name.endswith(".mix.weight") for name in weights)
+
+
+def networks(weights: Weights) -> list[Weights]:
+    """Return the arrays of each network of a file: its answer is the mean of theirs.
+
+    Those of the first, which the flow reads, have plain names; of further ones `also.1.enter.bias`.
+    """
+    found: list[Weights] = [{n: v for n, v in weights.items() if not n.startswith(ALSO)}]
+    while own := {
+        name.removeprefix(start): value
+        for start in [f"{ALSO}{len(found)}."]
+        for name, value in weights.items()
+        if name.startswith(start)
+    }:
+        found.append(own)
+    return found
 
 
 @cache
