@@ -263,18 +263,18 @@ def test_joined_networks_answer_with_their_mean(tmp_path: Path) -> None:
         lifter = Lifter(width, 5)
         torch.nn.init.normal_(lifter.leave.weight, std=0.02)
         train_temporal.save(lifter, Flow(width), path)
-    assert join.main([*map(str, paths), "-o", str(tmp_path / "both.safetensors")]) == 0
+    out = ["-o", str(tmp_path / "both.safetensors"), "--shares", "3", "1"]
+    assert join.main([*map(str, paths), *out]) == 0
     both = temporal_network.load(tmp_path / "both.safetensors")
     own = [temporal_network.load(path) for path in paths]
     sight = person(known=True).sight
     found = temporal_lift.correct(sight, both)
     each = [temporal_lift.correct(sight, weights) for weights in own]
-    mean = np.mean([one.correction for one in each], 0)
+    mean = 0.75 * each[0].correction + 0.25 * each[1].correction
     assert np.abs(each[0].correction - each[1].correction).max() > 0.01
     assert np.abs(found.correction - mean).max() < 1e-5
     assert np.array_equal(found.features, each[0].features)
-    apart = np.abs(each[0].correction - each[1].correction)[..., 2] / 2.0
-    assert (found.spread[..., 1] > apart - 1e-6).all()
+    assert np.allclose(found.tilt, each[0].tilt ** 0.75 * each[1].tilt ** 0.25, rtol=1e-5)
 
 
 def test_a_calibrated_spread_holds_two_thirds_of_the_errors(

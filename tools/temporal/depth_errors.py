@@ -75,6 +75,13 @@ class Change:
     strides: tuple[float, float, float] = (0.6, 0.2, 0.2)
 
 
+HARDER = Change(
+    tilt_deg=(15.0, 11.0), depth=0.3, depth_shift_m=0.05, body_m=0.04, body_limb_m=0.045,
+    drift_m=0.09, bad_depth=0.5, no_depth=0.45,
+)  # fmt: skip
+"""A detector that errs more."""
+
+
 def misjudged(local: np.ndarray, how: Change, rng: np.random.Generator) -> np.ndarray:
     """Tilt, flatten or deepen the detector's body and shift each landmark's depth.
 

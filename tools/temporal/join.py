@@ -1,6 +1,7 @@
-"""Join trained networks into one weights file, whose answer is the mean of theirs.
+r"""Join trained networks into one weights file, whose answer is the weighted mean of theirs.
 
-    python -m tools.temporal.join FIRST.safetensors OTHERS.safetensors... -o temporal.safetensors
+    python -m tools.temporal.join FIRST.safetensors OTHERS.safetensors... -o temporal.safetensors \
+        --shares 2 1
 
 The flow is that of the first.
 """
@@ -15,9 +16,12 @@ from safetensors.torch import load_file, save_file
 from robojackson.mocap.temporal.temporal_network import ALSO
 
 
-def joined(files: list[Path]) -> dict[str, torch.Tensor]:
+def joined(files: list[Path], shares: list[float]) -> dict[str, torch.Tensor]:
     """Return the arrays of weights files as one."""
-    first, *others = (load_file(path) for path in files)
+    first, *others = (
+        load_file(path) | {"share": torch.tensor(share)}
+        for path, share in zip(files, shares, strict=True)
+    )
     for number, arrays in enumerate(others, 1):
         first |= {
             f"{ALSO}{number}.{name}": value
@@ -34,8 +38,12 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument("weights", type=Path, nargs="+")
     parser.add_argument("-o", "--out", type=Path, required=True)
+    parser.add_argument("--shares", type=float, nargs="+", help="default: equal ones")
     options = parser.parse_args(arguments)
-    save_file(joined(options.weights), options.out)
+    shares = options.shares or [1.0] * len(options.weights)
+    if len(shares) != len(options.weights):
+        parser.error(f"{len(options.weights)} files need as many shares, not {len(shares)}")
+    save_file(joined(options.weights, shares), options.out)
     return 0
 
 

@@ -25,6 +25,7 @@ from robojackson.errors import BadWeights
 from robojackson.mocap.temporal.features import COUNT
 from tools.pairs import sources
 from tools.temporal import calibration, fit, truths
+from tools.temporal.depth_errors import HARDER, Change
 from tools.temporal.examples import Example, load
 from tools.temporal.fit_flow import fit_flow
 from tools.temporal.net import Flow, Lifter
@@ -218,6 +219,8 @@ def main(arguments: list[str] | None = None) -> int:
         default = getattr(fit.FitConfig(), name)
         flag = "--" + name.replace("_", "-")
         parser.add_argument(flag, type=type(default), default=default)
+    parser.add_argument("--harder", action="store_true", help="a detector that errs more")
+    parser.add_argument("--invented", type=float, nargs=2, default=fit.FitConfig().invented)
     parser.add_argument("--device", default="cpu", help="cpu or cuda")
     parser.add_argument("--workers", type=int, default=0, help="processes that draw batches")
     parser.add_argument("--bank", type=int, default=6000)
@@ -227,7 +230,8 @@ def main(arguments: list[str] | None = None) -> int:
     torch.set_num_threads(1)
     config = fit.FitConfig(
         width=options.width, blocks=options.blocks, steps=options.steps, batch=options.batch,
-        rate=options.rate, warm_up=options.warm_up,
+        rate=options.rate, warm_up=options.warm_up, invented=tuple(options.invented),
+        change=HARDER if options.harder else Change(),
     )  # fmt: skip
     report = train(
         options.pairs, options.motions, options.out, config, options.bank, options.seed,

@@ -138,24 +138,36 @@ def corrected(sight: ClipView, change: Float[np.ndarray, "T 12 3"]) -> Float[np.
 
 
 def correct(sight: ClipView, weights: error_flow.Weights) -> Output:
-    """Return the mean of all networks' answers to the plain and the mirrored view, and the features
-    of the first to the plain one.
+    """Return the weighted mean of all networks' answers to the plain and the mirrored view.
 
-    Where they differ, the clip is unlike the training data: their standard deviation is added to
-    the spread.
+    The features are those of the first to the plain one.
+
+    Where the answers to both views differ, the clip is unlike the training data: their distance is
+    added to the spread.
     """
     mirror, each = features.mirror(sight), networks(weights)
-    plain = [run(sight, own) for own in each]
-    found = plain + [mirrored(run(mirror, own)) for own in each]
-    answers = np.stack([one.correction for one in found])
-    apart = answers.std(0)
+    shares = [float(own.get("share", 1.0)) for own in each]
+    plain = mean_of([run(sight, own) for own in each], shares)
+    again = mean_of([mirrored(run(mirror, own)) for own in each], shares)
+    both = mean_of([plain, again], [0.5, 0.5])
+    apart = np.abs(plain.correction - again.correction) / 2.0
     apart = np.stack([apart[..., :2].mean(-1), apart[..., 2]], -1)
+    return replace(both, spread=np.hypot(both.spread, apart))
+
+
+def mean_of(found: list[Output], shares: list[float]) -> Output:
+    """Return the weighted mean of outputs, of spreads the geometric one; the features of the
+    first."""
+
+    def mean(values: list[np.ndarray]) -> np.ndarray:
+        return np.asarray(np.average(values, axis=0, weights=shares))
+
     return Output(
-        correction=answers.mean(0),
-        spread=np.hypot(np.exp(np.mean([np.log(one.spread) for one in found], 0)), apart),
-        features=plain[0].features,
-        up=np.mean([one.up for one in found], 0),
-        tilt=np.exp(np.mean([np.log(one.tilt) for one in found], 0)),
+        correction=mean([one.correction for one in found]),
+        spread=np.exp(mean([np.log(one.spread) for one in found])),
+        features=found[0].features,
+        up=mean([one.up for one in found]),
+        tilt=np.exp(mean([np.log(one.tilt) for one in found])),
     )
 
 

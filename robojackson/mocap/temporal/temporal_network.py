@@ -82,7 +82,8 @@ def block_count(weights: Mapping[str, object]) -> int:
 
 
 def networks(weights: Weights) -> list[Weights]:
-    """Return the arrays of each network of a file: its answer is the mean of theirs.
+    """Return the arrays of each network of a file: its answer is the mean of theirs, weighted by
+    their `share`.
 
     Those of the first, which the flow reads, have plain names; of further ones `also.1.enter.bias`.
     """
