@@ -68,7 +68,7 @@ class Move:
 MOVES = {
     "hip_shake": Move("clips/hip_shake.mp4", 10, 0.95, 0.85, 0.5),
     "walk": Move("clips/walk.mp4", 20, 0.90, 0.80, 0.6),
-    "dance_b": Move("clips/dance_b.mp4", 40, 0.85, 0.70, 0.5, cyclic=False),
+    "dance_b": Move("clips/dance_b.mp4", 32, 0.85, 0.70, 0.5, cyclic=False),
     "authors_apt1": Move("apt1", 20, 0.85, 0.0, 0.5, cyclic=False, authors=True),
     "authors_walk": Move("walk", 20, 0.85, 0.0, 0.5, cyclic=False, authors=True),
     "g1_hip_shake": Move("clips/hip_shake.mp4", 10, 0.99, 0.95, 0.75, robot="g1", mpjpe_mm=12),

@@ -1,5 +1,7 @@
 """Laws of the training: torch and numpy are one network, batches keep what they must."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +21,10 @@ from tools.temporal.depth_errors import Change, body_offsets, misjudged
 from tools.temporal.examples import Example, flattened
 from tools.temporal.filming import HIPS
 from tools.temporal.fit_flow import discrepancy
-from tools.temporal.lessons import lesson_of, lessons
+from tools.temporal.lessons import lesson_of
 from tools.temporal.net import Flow, Lifter, found_in, lifter_of
+
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module", params=[(160, 4), (96, 6)])
@@ -175,16 +179,26 @@ def test_discrepancy_detects_another_distribution() -> None:
 
 
 def test_lessons_are_the_same_whoever_draws_them() -> None:
-    where = fit.source([person()], None)
-    config = fit.FitConfig(batch=3, change=Change(frames=20))
-
-    def draw(step: int) -> Batch:
-        return where.draw(config, 0.0, np.random.default_rng(step))
-
-    here, beside = (list(lessons(draw, range(2, 6), workers)) for workers in (0, 2))
-    assert len(here) == len(beside) == 4
-    for one, other in zip(here, beside, strict=True):
-        assert all(torch.equal(a, b) for a, b in zip(one, other, strict=True))
+    """In a process of its own: the tests' own has threads of other libraries, which do not fork."""
+    lines = (
+        "import numpy as np",
+        "from tests.tools.test_train_temporal import person",
+        "from tools.temporal import fit",
+        "from tools.temporal.depth_errors import Change",
+        "from tools.temporal.lessons import lessons",
+        "where = fit.source([person()], None)",
+        "config = fit.FitConfig(batch=3, change=Change(frames=20))",
+        "draw = lambda step: where.draw(config, 0.0, np.random.default_rng(step))",
+        "for workers in (0, 2):",
+        "    drawn = [part for one in lessons(draw, range(2, 6), workers) for part in one]",
+        "    print(len(drawn), *(float(part.double().abs().sum()) for part in drawn))",
+    )
+    command = [sys.executable, "-c", "\n".join(lines)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    here, beside = done.stdout.splitlines()
+    assert here == beside
+    assert here.startswith("32 ")
+    assert len(set(here.split())) > 16
 
 
 @pytest.mark.slow
