@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 from robojackson.mocap.temporal.features import INPUT_LANDMARKS
 from robojackson.motion.smpl_sequence import AIR, PLANTED
 from tools.temporal.batches import TWELVE, Batch
-from tools.temporal.lessons import lesson_of
 from tools.temporal.losses import losses_of
 from tools.temporal.net import Found
+from tools.temporal.tensor_batches import to_tensors
 
 WINDOWS, FRAMES = 3, 40
 UP = Rotation.from_euler("xz", [30, 10], degrees=True).apply([0.0, -1.0, 0.0])
@@ -54,7 +54,7 @@ def losses(depth_share: float = 1.0, tilt_deg: float = 0.0, feet: float = 4.0) -
         torch.from_numpy(np.tile(2.0 * up, (WINDOWS, FRAMES, 1)).astype(np.float32)),
         torch.full((WINDOWS, FRAMES, 2), -2.0),
     )
-    return {name: value.item() for name, value in losses_of(found, lesson_of(windows))[0].items()}
+    return {name: value.item() for name, value in losses_of(found, to_tensors(windows))[0].items()}
 
 
 def test_an_exact_answer_costs_nothing() -> None:

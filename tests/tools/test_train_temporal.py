@@ -11,6 +11,7 @@ from safetensors.torch import load_file, save_file
 from scipy.spatial.transform import Rotation
 
 from robojackson.body.forward_kinematics import unit
+from robojackson.errors import BadWeights
 from robojackson.mocap.temporal import error_flow, features, temporal_lift, temporal_network
 from robojackson.mocap.temporal.features import ClipView
 from robojackson.motion.smpl_sequence import AIR, PLANTED, SLIDING
@@ -20,9 +21,9 @@ from tools.temporal.batches import Batch
 from tools.temporal.depth_errors import Change, body_offsets, misjudged
 from tools.temporal.examples import Example, flattened
 from tools.temporal.filming import HIPS
-from tools.temporal.fit_flow import discrepancy
-from tools.temporal.lessons import lesson_of
+from tools.temporal.fit_flow import cleaned, discrepancy, flow_losses
 from tools.temporal.net import Flow, Lifter, found_in, lifter_of
+from tools.temporal.tensor_batches import to_tensors
 
 ROOT = Path(__file__).parents[2]
 
@@ -178,19 +179,19 @@ def test_discrepancy_detects_another_distribution() -> None:
     assert discrepancy(a, b + 1.0) > 5.0 * discrepancy(a, b).abs()
 
 
-def test_lessons_are_the_same_whoever_draws_them() -> None:
+def test_batches_are_the_same_whoever_draws_them() -> None:
     """In a process of its own: the tests' own has threads of other libraries, which do not fork."""
     lines = (
         "import numpy as np",
         "from tests.tools.test_train_temporal import person",
         "from tools.temporal import fit",
         "from tools.temporal.depth_errors import Change",
-        "from tools.temporal.lessons import lessons",
+        "from tools.temporal.tensor_batches import tensor_batches",
         "where = fit.source([person()], None)",
         "config = fit.FitConfig(batch=3, change=Change(frames=20))",
         "draw = lambda step: where.draw(config, 0.0, np.random.default_rng(step))",
         "for workers in (0, 2):",
-        "    drawn = [part for one in lessons(draw, range(2, 6), workers) for part in one]",
+        "    drawn = [part for one in tensor_batches(draw, range(2, 6), workers) for part in one]",
         "    print(len(drawn), *(float(part.double().abs().sum()) for part in drawn))",
     )
     command = [sys.executable, "-c", "\n".join(lines)]
@@ -236,7 +237,7 @@ def stop_early(progress: object, where: object, config: object, watch: object) -
     for step in range(2):
         rng = np.random.default_rng([1, 2, step])
         share = float(np.interp(step, [0, config.steps], config.invented))
-        fit.learn(progress, lesson_of(where.draw(config, share, rng)), config)
+        fit.learn(progress, to_tensors(where.draw(config, share, rng)), config)
 
 
 @pytest.mark.parametrize("known", [False, True])
@@ -301,3 +302,28 @@ def test_a_calibrated_spread_holds_two_thirds_of_the_errors(
     again = calibration.factors(lifter, examples)
     assert np.abs(np.log(again)).max() < 0.35
     assert np.median(np.abs(np.log(again))) < 0.02
+
+
+def test_the_first_network_of_a_joined_file_begins_a_training() -> None:
+    arrays = train_temporal.widened(temporal_lift.WEIGHTS)
+    config = fit.FitConfig(width=len(arrays["enter.bias"]), blocks=8)
+    progress = fit.begin([person()], config, 1)
+    train_temporal.begin_with(progress, temporal_lift.WEIGHTS)
+    assert torch.equal(progress.mean["leave.weight"], arrays["leave.weight"])
+    with pytest.raises(BadWeights, match="another size"):
+        train_temporal.begin_with(fit.begin([person()], fit.FitConfig(), 1), temporal_lift.WEIGHTS)
+
+
+def test_a_joined_file_is_not_joined_again() -> None:
+    with pytest.raises(BadWeights, match="several networks already"):
+        join.joined([temporal_lift.WEIGHTS, temporal_lift.WEIGHTS], [1.0, 1.0])
+
+
+def test_the_losses_of_the_flow_are_finite_and_see_the_clean_clip() -> None:
+    torch.manual_seed(3)
+    lifter, coupled, batch = Lifter(48, 5).eval(), Flow(48), batch_of(person())
+    found = flow_losses(coupled, lifter, batch, np.random.default_rng(1))
+    assert set(found) == {"inverse", "forward", "boundary", "independence"}
+    assert all(torch.isfinite(value) for value in found.values())
+    clean = flow_losses(coupled, lifter, cleaned(batch), np.random.default_rng(1))
+    assert clean["boundary"] == found["boundary"]

@@ -19,9 +19,9 @@ from tools.temporal.depth_errors import Change
 from tools.temporal.examples import Example
 from tools.temporal.filming import film, with_constants
 from tools.temporal.invented import Detector
-from tools.temporal.lessons import Lesson, lessons
 from tools.temporal.losses import losses_of
 from tools.temporal.net import BLOCKS, WIDTH, Lifter, found_in, lifter_of
+from tools.temporal.tensor_batches import TensorBatch, tensor_batches
 from tools.temporal.truths import Bank
 
 LOSSES = ("place", "velocity", "speed", "spread", "tilt", "contact")
@@ -140,8 +140,8 @@ def fit(
 
     began, first = time.monotonic(), progress.step
     losses: list[torch.Tensor] = []
-    for lesson in lessons(draw, range(first, config.steps), workers):
-        losses.append(learn(progress, lesson, config))
+    for batch in tensor_batches(draw, range(first, config.steps), workers):
+        losses.append(learn(progress, batch, config))
         if progress.step % 100 == 0 or progress.step == config.steps:
             means = dict(zip(LOSSES, torch.stack(losses).mean(0).tolist(), strict=True))
             progress.curve.append({"step": progress.step, **means})
@@ -183,15 +183,15 @@ def averaged(progress: Progress) -> Lifter:
     return net
 
 
-def learn(progress: Progress, lesson: Lesson, config: FitConfig) -> torch.Tensor:
+def learn(progress: Progress, batch: TensorBatch, config: FitConfig) -> torch.Tensor:
     """Take a step of the optimiser; returns `LOSSES`."""
     for group in progress.optimiser.param_groups:
         group["lr"] = config.rate * _schedule(progress.step, config)
     device = progress.net.mean.device
-    lesson = lesson.on(device)
+    batch = batch.on(device)
     with torch.autocast(device.type, torch.bfloat16):
-        h = progress.net.features(lesson.numbers.float())
-    losses, _ = losses_of(progress.net.head(h.float()), lesson)
+        h = progress.net.features(batch.numbers.float())
+    losses, _ = losses_of(progress.net.head(h.float()), batch)
     weighted = [getattr(config, name, 1.0) * value for name, value in losses.items()]
     loss = 10.0 * torch.stack(weighted).sum()
     progress.optimiser.zero_grad()

@@ -13,9 +13,9 @@ import torch
 
 from tools.temporal.batches import Batch
 from tools.temporal.fit import FitConfig, Source
-from tools.temporal.lessons import Lesson, lesson_of
 from tools.temporal.losses import losses_of
 from tools.temporal.net import Flow, Lifter
+from tools.temporal.tensor_batches import TensorBatch, to_tensors
 
 WEIGHTS = {"inverse": 1.0, "forward": 1.0, "boundary": 0.1, "independence": 1.0}
 BANDWIDTHS = (0.05, 0.2, 0.9)
@@ -53,11 +53,11 @@ def flow_losses(
     flow: Flow, lifter: Lifter, batch: Batch, rng: np.random.Generator
 ) -> dict[str, torch.Tensor]:
     """Return the four losses."""
-    lesson = lesson_of(batch)
-    good, body = lesson.good, lesson.truth
-    error, h = _errors(lifter, lesson)
+    tensors = to_tensors(batch)
+    good, body = tensors.good, tensors.truth
+    error, h = _errors(lifter, tensors)
     z, volume = flow(error, h)
-    clean_z, _ = flow(*_errors(lifter, lesson_of(cleaned(batch))))
+    clean_z, _ = flow(*_errors(lifter, to_tensors(cleaned(batch))))
     return {
         "inverse": -(_log_likelihood(flow, z, good) + (volume * good).sum() / good.sum()) / 36.0,
         "forward": (flow.inverse(torch.zeros_like(error), h) ** 2).mean(),
@@ -97,12 +97,12 @@ def discrepancy(x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
     return kernel[:n, :n].mean() + kernel[n:, n:].mean() - 2.0 * kernel[:n, n:].mean()
 
 
-def _errors(lifter: Lifter, lesson: Lesson) -> tuple[torch.Tensor, torch.Tensor]:
+def _errors(lifter: Lifter, batch: TensorBatch) -> tuple[torch.Tensor, torch.Tensor]:
     """Return the error over spread (B, T, 36), and features."""
     with torch.no_grad():
-        h = lifter.features(lesson.numbers.float())
+        h = lifter.features(batch.numbers.float())
         found = lifter.head(h)
-        error = -losses_of(found, lesson)[1]
+        error = -losses_of(found, batch)[1]
         scaled = error * torch.exp(-found.log_spread[..., [0, 0, 1]])
     return scaled.flatten(2).clamp(-6.0, 6.0), h
 

@@ -13,15 +13,25 @@ from pathlib import Path
 import torch
 from safetensors.torch import load_file, save_file
 
-from robojackson.mocap.temporal.temporal_network import ALSO
+from robojackson.errors import BadWeights
+from robojackson.mocap.temporal.temporal_network import ALSO, SHARE
 
 
 def joined(files: list[Path], shares: list[float]) -> dict[str, torch.Tensor]:
-    """Return the arrays of weights files as one."""
+    """Return the arrays of weights files as one.
+
+    Raises:
+        BadWeights: a file holds several networks already.
+    """
     first, *others = (
-        load_file(path) | {"share": torch.tensor(share)}
+        load_file(path) | {SHARE: torch.tensor(share)}
         for path, share in zip(files, shares, strict=True)
     )
+    for path, arrays in zip(files, (first, *others), strict=True):
+        if any(name.startswith(ALSO) for name in arrays):
+            raise BadWeights(
+                f"{path}: holds several networks already: join those that it was made of"
+            )
     for number, arrays in enumerate(others, 1):
         first |= {
             f"{ALSO}{number}.{name}": value

@@ -4,23 +4,23 @@ import torch
 from torch import nn
 
 from robojackson.motion.smpl_sequence import AIR, PLANTED
-from tools.temporal.lessons import Lesson
 from tools.temporal.net import Found
+from tools.temporal.tensor_batches import TensorBatch
 
 LEAST_STEP_M = 0.003
 """Step of a joint that stands still, metres a frame: what is slower has no speed to keep."""
 
 
-def losses_of(found: Found, lesson: Lesson) -> tuple[dict[str, torch.Tensor], torch.Tensor]:
+def losses_of(found: Found, batch: TensorBatch) -> tuple[dict[str, torch.Tensor], torch.Tensor]:
     """Return the losses by name, and the errors of the joints (B, L, 12, 3), metres.
 
     Place: mean distance of joints, m. Velocity: of their steps, m a frame. Speed: log ratio of the
     mean speeds of window and truth, without which uncertain depth makes limbs slow. Spread, tilt:
     Laplace likelihoods. Contact: cross-entropy.
     """
-    body, good, distance = lesson.truth, lesson.good, lesson.distance[..., None]
-    z = lesson.depth + found.correction[..., 2]
-    across = lesson.flat * ((distance + z) / distance)[..., None] + found.correction[..., :2]
+    body, good, distance = batch.truth, batch.good, batch.distance[..., None]
+    z = batch.depth + found.correction[..., 2]
+    across = batch.flat * ((distance + z) / distance)[..., None] + found.correction[..., :2]
     place = torch.cat([across, z[..., None]], -1)
     error = place - body
     both = good[:, 1:] * good[:, :-1]
@@ -31,15 +31,15 @@ def losses_of(found: Found, lesson: Lesson) -> tuple[dict[str, torch.Tensor], to
         "velocity": _mean(_length(error[:, 1:] - error[:, :-1]), both),
         "speed": (_log_speed(place, both) - _log_speed(body, both)).abs().mean(),
         "spread": _mean(spread, good),
-        "tilt": tilt_loss(found, lesson),
-        "contact": contact_loss(found.contact, lesson),
+        "tilt": tilt_loss(found, batch),
+        "contact": contact_loss(found.contact, batch),
     }
     return losses, error
 
 
-def tilt_loss(found: Found, lesson: Lesson) -> torch.Tensor:
+def tilt_loss(found: Found, batch: TensorBatch) -> torch.Tensor:
     """Return the negative log likelihood of the roll and pitch of up, means of each window."""
-    up, good = lesson.up, lesson.good
+    up, good = batch.up, batch.good
     share = good[..., None] / good.sum(1).clamp(min=1.0)[:, None, None]
     true = nn.functional.normalize((up * share).sum(1), dim=-1)
     mean = nn.functional.normalize((found.up * share).sum(1), dim=-1)
@@ -51,11 +51,11 @@ def tilt_loss(found: Found, lesson: Lesson) -> torch.Tensor:
     return (off * torch.exp(-size) + size).sum(-1).mean()
 
 
-def contact_loss(contact: torch.Tensor, lesson: Lesson) -> torch.Tensor:
+def contact_loss(contact: torch.Tensor, batch: TensorBatch) -> torch.Tensor:
     """Return the cross-entropy of touching and planted foot points, nats."""
-    labels = torch.stack([lesson.contact != AIR, lesson.contact == PLANTED], -1).float()
+    labels = torch.stack([batch.contact != AIR, batch.contact == PLANTED], -1).float()
     nats = nn.functional.binary_cross_entropy_with_logits(contact, labels, reduction="none")
-    return _mean(nats.flatten(2), lesson.good)
+    return _mean(nats.flatten(2), batch.good)
 
 
 def _log_speed(place: torch.Tensor, both: torch.Tensor) -> torch.Tensor:

@@ -22,7 +22,7 @@ from robojackson.mocap.temporal.temporal_network import (
 )
 
 WIDTH, BLOCKS = 160, 4
-"""Channels and residual blocks of a lifter, unless told."""
+"""Default channels and residual blocks of a lifter."""
 JOINTS, FEET = 12, 4
 OUT = JOINTS * 5
 """Correction (3), log spread across the image and in depth (2)."""

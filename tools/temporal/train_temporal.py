@@ -23,6 +23,7 @@ from safetensors.torch import load_file, save_file
 
 from robojackson.errors import BadWeights
 from robojackson.mocap.temporal.features import COUNT
+from robojackson.mocap.temporal.temporal_network import ALSO, SHARE
 from tools.pairs import sources
 from tools.temporal import calibration, fit, truths
 from tools.temporal.depth_errors import HARDER, Change
@@ -128,6 +129,9 @@ def begin_with(progress: fit.Progress, path: Path) -> None:
     """Take the lifter of a weights file as the first one; a file without a head for the ground
     leaves the fresh one."""
     arrays = widened(path)
+    own = progress.net.state_dict()
+    if other := [n for n, v in arrays.items() if n in own and v.shape != own[n].shape]:
+        raise BadWeights(f"{path}: a lifter of another size ({other[0]}): set --width and --blocks")
     missing, unknown = progress.net.load_state_dict(arrays, strict=False)
     if unknown or any(not name.startswith(("ground.", "feet.")) for name in missing):
         raise BadWeights(f"{path}: not the lifter of this version: {[*missing, *unknown]}")
@@ -136,8 +140,9 @@ def begin_with(progress: fit.Progress, path: Path) -> None:
 
 
 def widened(path: Path) -> dict[str, torch.Tensor]:
-    """Return the lifter of a weights file; one that does not read up ignores it."""
-    arrays = {n: v.float() for n, v in load_file(path).items() if not n.startswith("flow.")}
+    """Return the first lifter of a weights file; one that does not read up ignores it."""
+    first = {n: v for n, v in load_file(path).items() if not n.startswith(("flow.", ALSO))}
+    arrays = {n: v.float() for n, v in first.items() if n != SHARE}
     if extra := COUNT - len(arrays["mean"]):
         for name, value in (("mean", 0.0), ("scale", 1.0), ("enter.weight", 0.0)):
             arrays[name] = torch.nn.functional.pad(arrays[name], (0, extra), value=value)

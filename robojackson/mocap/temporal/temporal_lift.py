@@ -18,7 +18,14 @@ from robojackson.mocap.landmarks.refinement import carry_along
 from robojackson.mocap.temporal import error_flow, features
 from robojackson.mocap.temporal.features import ClipView
 from robojackson.mocap.temporal.ground_evidence import GroundEvidence, ground_evidence
-from robojackson.mocap.temporal.temporal_network import SD_PER_ERROR, Output, load, networks, run
+from robojackson.mocap.temporal.temporal_network import (
+    SD_PER_ERROR,
+    SHARE,
+    Output,
+    load,
+    networks,
+    run,
+)
 
 WEIGHTS = Path(__file__).parents[2] / "assets" / "temporal.safetensors"
 HIDDEN_BELOW = 0.35
@@ -146,7 +153,7 @@ def correct(sight: ClipView, weights: error_flow.Weights) -> Output:
     added to the spread.
     """
     mirror, each = features.mirror(sight), networks(weights)
-    shares = [float(own.get("share", 1.0)) for own in each]
+    shares = [float(own.get(SHARE, 1.0)) for own in each]
     plain = mean_of([run(sight, own) for own in each], shares)
     again = mean_of([mirrored(run(mirror, own)) for own in each], shares)
     both = mean_of([plain, again], [0.5, 0.5])

@@ -30,8 +30,9 @@ GROUND = 5
 UPRIGHT = (0.0, -1.0, 0.0)
 LOG_TILT = -2.0
 """Up without evidence, and the middle of the logarithm of its error, radians."""
-ALSO = "also."
-"""Beginning of the names of a file's further networks."""
+ALSO, SHARE = "also.", "share"
+"""Beginning of the names of a file's further networks, and the name of a network's weight in the
+mean of their answers."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,7 @@ def block_count(weights: Mapping[str, object]) -> int:
 
 def networks(weights: Weights) -> list[Weights]:
     """Return the arrays of each network of a file: its answer is the mean of theirs, weighted by
-    their `share`.
+    their `SHARE`.
 
     Those of the first, which the flow reads, have plain names; of further ones `also.1.enter.bias`.
     """
@@ -112,27 +113,36 @@ def load(path: Path) -> Weights:
         arrays = {name: value.astype(np.float32) for name, value in load_file(path).items()}
     except (SafetensorError, OSError) as error:
         raise BadWeights(f"{path}: not a weights file of the temporal network ({error})") from None
+    for number, own in enumerate(networks(arrays)):
+        _require_complete(path, own, f"{ALSO}{number}." if number else "")
+    return arrays
+
+
+def _require_complete(path: Path, arrays: Weights, start: str) -> None:
+    """Refuse a network that lacks arrays or is of another version; `start` begins its names in the
+    file."""
     required = {
         "mean", "scale", "enter.weight", "leave.weight", "ground.weight",
-        f"blocks.{len(DILATIONS) - 1}.mix.weight", "flow.memory", "flow.read.weight",
+        f"blocks.{len(DILATIONS) - 1}.mix.weight",
     }  # fmt: skip
+    required |= set() if start else {"flow.memory", "flow.read.weight"}
     if missing := sorted(required - set(arrays)):
         raise BadWeights(
-            f"{path}: not a weights file of the temporal network: {', '.join(missing)} missing; "
+            f"{path}: not a weights file of the temporal network: "
+            f"{', '.join(start + name for name in missing)} missing; "
             "leave temporal.weights empty for the shipped one, or train it again: "
             "python -m tools.temporal.train_temporal"
         )
     if arrays["ground.weight"].shape != (GROUND, arrays["leave.weight"].shape[1]):
         raise BadWeights(
-            f"{path}: ground.weight has {len(arrays['ground.weight'])} rows, this version reads "
-            f"{GROUND}; train it again: python -m tools.temporal.train_temporal"
+            f"{path}: {start}ground.weight has {len(arrays['ground.weight'])} rows, this version "
+            f"reads {GROUND}; train it again: python -m tools.temporal.train_temporal"
         )
     if arrays["mean"].shape != (features.COUNT,):
         raise BadWeights(
             f"{path}: reads {arrays['mean'].size} numbers a frame, this version gives "
             f"{features.COUNT}; train it again: python -m tools.temporal.train_temporal"
         )
-    return arrays
 
 
 def _spread(out: np.ndarray, middle: float) -> np.ndarray:

@@ -13,7 +13,7 @@ from torch.utils.data import DataLoader, Dataset
 from tools.temporal.batches import TWELVE, Batch
 
 
-class Lesson(NamedTuple):
+class TensorBatch(NamedTuple):
     """What the losses need of a batch.
 
     Attributes:
@@ -33,18 +33,18 @@ class Lesson(NamedTuple):
     up: torch.Tensor
     contact: torch.Tensor
 
-    def on(self, device: torch.device) -> "Lesson":
-        """Return the lesson on a device."""
-        return Lesson(*(part.to(device, non_blocking=True) for part in self))
+    def on(self, device: torch.device) -> "TensorBatch":
+        """Return the batch on a device."""
+        return TensorBatch(*(part.to(device, non_blocking=True) for part in self))
 
 
-def lesson_of(batch: Batch) -> Lesson:
+def to_tensors(batch: Batch) -> TensorBatch:
     """Return the tensors of a batch."""
 
     def tensor(values: np.ndarray) -> torch.Tensor:
         return torch.from_numpy(np.ascontiguousarray(values, np.float32))
 
-    return Lesson(
+    return TensorBatch(
         torch.from_numpy(batch.numbers().astype(np.float16)),
         tensor(batch.flat[:, :, TWELVE]),
         tensor(batch.local[:, :, TWELVE, 2]),
@@ -53,22 +53,23 @@ def lesson_of(batch: Batch) -> Lesson:
     )
 
 
-class Timetable(Dataset[Lesson]):
-    """The lesson of each step, the same whoever draws it."""
+class StepDataset(Dataset[TensorBatch]):
+    """The batch of each step, the same whoever draws it."""
 
     def __init__(self, draw: Callable[[int], Batch]) -> None:
         self.draw = draw
 
-    def __getitem__(self, step: int) -> Lesson:
-        torch.set_num_threads(1)
-        return lesson_of(self.draw(step))
+    def __getitem__(self, step: int) -> TensorBatch:
+        return to_tensors(self.draw(step))
 
 
-def lessons(draw: Callable[[int], Batch], steps: range, workers: int) -> Iterator[Lesson]:
-    """Return the lessons of steps in order, drawn ahead by a number of processes (0: here)."""
+def tensor_batches(
+    draw: Callable[[int], Batch], steps: range, workers: int
+) -> Iterator[TensorBatch]:
+    """Return the batches of steps in order, drawn ahead by a number of processes (0: here)."""
     return iter(
         DataLoader(
-            Timetable(draw),
+            StepDataset(draw),
             batch_size=None,
             sampler=steps,
             num_workers=workers,
