@@ -1,5 +1,6 @@
 """Laws of what the network finds of gravity: its axes, its mirror image, its weights."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -64,9 +65,10 @@ def test_the_mirrored_person_stands_on_the_mirrored_ground(hip_shake: LandmarkTr
     assert np.abs(plain.up[:, 0]).max() > 1e-4
 
 
-def test_weights_without_the_head_for_the_ground_are_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["ground.weight", "also.1.ground.weight", "also.1.leave.weight"])
+def test_weights_of_which_a_network_lacks_a_head_are_refused(tmp_path: Path, name: str) -> None:
     arrays = load_file(WEIGHTS)
-    del arrays["ground.weight"]
+    del arrays[name]
     save_file(arrays, tmp_path / "old.safetensors")
-    with pytest.raises(BadWeights, match=r"ground\.weight missing.*train_temporal"):
+    with pytest.raises(BadWeights, match=f"{re.escape(name)} missing.*train_temporal"):
         temporal_network.load(tmp_path / "old.safetensors")
