@@ -10,7 +10,6 @@ from robojackson.motion.smpl_sequence import AIR, PLANTED
 from tools.temporal.batches import TWELVE, Batch
 from tools.temporal.losses import losses_of
 from tools.temporal.net import Found
-from tools.temporal.tensor_batches import to_tensors
 
 WINDOWS, FRAMES = 3, 40
 UP = Rotation.from_euler("xz", [30, 10], degrees=True).apply([0.0, -1.0, 0.0])
@@ -24,18 +23,19 @@ def batch() -> Batch:
     truth = (still + swing).astype(np.float32)
     distance = np.full((WINDOWS, FRAMES), 4.0, np.float32)
     away = distance[..., None, None]
-    return Batch(
-        flat=truth[..., :2] * away / (away + truth[..., 2:]),
-        local=truth,
-        visibility=np.ones(truth.shape[:3], np.float32),
-        constant=np.zeros((WINDOWS, 1), np.float32),
-        distance=distance,
-        truth=truth,
-        good=np.ones((WINDOWS, FRAMES), np.float32),
-        up=np.tile(UP.astype(np.float32), (WINDOWS, FRAMES, 1)),
-        contact=np.tile(np.array([PLANTED, AIR, PLANTED, AIR]), (WINDOWS, FRAMES, 1)),
-        shown=np.zeros((WINDOWS, FRAMES, 3), np.float32),
-    )
+    parts = {
+        "flat": truth[..., :2] * away / (away + truth[..., 2:]),
+        "local": truth,
+        "visibility": np.ones(truth.shape[:3], np.float32),
+        "constant": np.zeros((WINDOWS, 1), np.float32),
+        "distance": distance,
+        "truth": truth,
+        "good": np.ones((WINDOWS, FRAMES), np.float32),
+        "up": np.tile(UP.astype(np.float32), (WINDOWS, FRAMES, 1)),
+        "contact": np.tile(np.array([PLANTED, AIR, PLANTED, AIR]), (WINDOWS, FRAMES, 1)),
+        "shown": np.zeros((WINDOWS, FRAMES, 3), np.float32),
+    }
+    return Batch(**{name: torch.from_numpy(values) for name, values in parts.items()})
 
 
 def losses(depth_share: float = 1.0, tilt_deg: float = 0.0, feet: float = 4.0) -> dict[str, float]:
@@ -43,10 +43,10 @@ def losses(depth_share: float = 1.0, tilt_deg: float = 0.0, feet: float = 4.0) -
     tilted and whose contacts are right (positive) or wrong."""
     windows = batch()
     correction = np.zeros((WINDOWS, FRAMES, 12, 3), np.float32)
-    depth = windows.truth[:, :, TWELVE, 2]
+    depth = windows.truth[:, :, TWELVE, 2].numpy()
     correction[..., 2] = (depth_share - 1.0) * (depth - depth.mean(1, keepdims=True))
     up = Rotation.from_euler("x", tilt_deg, degrees=True).apply(UP)
-    right = (windows.contact == PLANTED)[..., None] * np.ones(2)
+    right = (windows.contact.numpy() == PLANTED)[..., None] * np.ones(2)
     found = Found(
         torch.from_numpy(correction),
         torch.full((WINDOWS, FRAMES, 12, 2), -3.0),
@@ -54,7 +54,7 @@ def losses(depth_share: float = 1.0, tilt_deg: float = 0.0, feet: float = 4.0) -
         torch.from_numpy(np.tile(2.0 * up, (WINDOWS, FRAMES, 1)).astype(np.float32)),
         torch.full((WINDOWS, FRAMES, 2), -2.0),
     )
-    return {name: value.item() for name, value in losses_of(found, to_tensors(windows))[0].items()}
+    return {name: value.item() for name, value in losses_of(found, windows)[0].items()}
 
 
 def test_an_exact_answer_costs_nothing() -> None:

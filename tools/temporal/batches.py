@@ -1,5 +1,5 @@
 """Examples as tables, and the batches that are drawn from them: windows mirrored, rolled, scaled,
-shifted, shaken, and with whole limbs hidden for 0.2 to 1 s.
+shifted, shaken, and with whole limbs hidden for 0.2 to 1 s. All on the device of the training.
 
 Axes: B windows, L frames, N landmarks (`features.INPUT_LANDMARKS`), N's truth beside what was seen.
 """
@@ -8,16 +8,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
+import torch
 
 from robojackson.mocap.landmarks.blazepose import BODY, MIRROR
 from robojackson.mocap.temporal import features
 from robojackson.mocap.temporal.features import FPS, INPUT_LANDMARKS
-from tools.temporal.depth_errors import LIMBS, ORDER, Change, body_offsets, misjudged
+from tools.temporal.depth_errors import LIMBS, ORDER, Change, body_offsets, misjudged, of_limbs
 from tools.temporal.examples import Example
+from tools.temporal.random_numbers import RandomNumbers
 
 SWAP = [ORDER.index(int(MIRROR[index])) for index in INPUT_LANDMARKS]
 TWELVE = [ORDER.index(int(index)) for index in BODY]
-OTHER_FOOT = (2, 3, 0, 1)
+OTHER_FOOT = [2, 3, 0, 1]
 UP_SD = 0.025
 """Standard deviation of the error of a known up, radians."""
 LONGEST = 150
@@ -39,39 +41,44 @@ class Batch:
         shown: The network's input of up (B, L, 3), zero where it is not known.
     """
 
-    flat: np.ndarray
-    local: np.ndarray
-    visibility: np.ndarray
-    constant: np.ndarray
-    distance: np.ndarray
-    truth: np.ndarray
-    good: np.ndarray
-    up: np.ndarray
-    contact: np.ndarray
-    shown: np.ndarray
+    flat: torch.Tensor
+    local: torch.Tensor
+    visibility: torch.Tensor
+    constant: torch.Tensor
+    distance: torch.Tensor
+    truth: torch.Tensor
+    good: torch.Tensor
+    up: torch.Tensor
+    contact: torch.Tensor
+    shown: torch.Tensor
 
-    def numbers(self) -> np.ndarray:
+    def numbers(self) -> torch.Tensor:
         """Return the network's input (B, L, F), as `features.numbers` orders it."""
-        shape = self.flat.shape[:2]
-        constant = np.broadcast_to(self.constant[:, None], (*shape, self.constant.shape[1]))
-        parts = (self.flat.reshape(*shape, -1), self.local.reshape(*shape, -1), self.visibility)
-        return np.concatenate([*parts, constant, self.shown], -1).astype(np.float32)
+        constant = self.constant[:, None].expand(-1, self.flat.shape[1], -1)
+        parts = (self.flat.flatten(2), self.local.flatten(2), self.visibility, constant, self.shown)
+        return torch.cat(parts, -1)
+
+    def on(self, device: torch.device | str) -> "Batch":
+        """Return the batch on a device."""
+        return Batch(**{f.name: getattr(self, f.name).to(device) for f in fields(self)})
 
 
 def table(examples: Sequence[Example]) -> Batch:
     """Return whole examples, the last frame held to a common length with no weight."""
 
-    def stack(values: Sequence[np.ndarray]) -> np.ndarray:
+    def stack(values: Sequence[np.ndarray]) -> torch.Tensor:
         index = [np.minimum(np.arange(LONGEST), len(v) - 1) for v in values]
-        return np.stack([v[i] for v, i in zip(values, index, strict=True)]).astype(np.float32)
+        held = np.stack([v[i] for v, i in zip(values, index, strict=True)])
+        return torch.from_numpy(held.astype(np.float32))
 
     sights = [e.sight for e in examples]
     good = [np.append(e.good, False)[: LONGEST + 1].astype(np.float32) for e in examples]
+    constant = np.stack([features.constants(s) for s in sights]).astype(np.float32)
     return Batch(
         flat=stack([s.flat[:, INPUT_LANDMARKS] for s in sights]),
         local=stack([s.local[:, INPUT_LANDMARKS] for s in sights]),
         visibility=stack([s.visibility[:, INPUT_LANDMARKS] for s in sights]),
-        constant=np.stack([features.constants(s) for s in sights]).astype(np.float32),
+        constant=torch.from_numpy(constant),
         distance=stack([np.linalg.norm(s.root, axis=-1) for s in sights]),
         truth=stack([np.nan_to_num(e.truth[:, INPUT_LANDMARKS]) for e in examples]),
         good=stack(good),
@@ -81,16 +88,17 @@ def table(examples: Sequence[Example]) -> Batch:
     )
 
 
-def lengths(good: np.ndarray) -> np.ndarray:
+def lengths(good: torch.Tensor) -> torch.Tensor:
     """Return frames of each row up to the last that counts."""
-    return LONGEST - np.argmax(good[:, ::-1] > 0, axis=1)
+    return LONGEST - torch.argmax((good.flip(1) > 0).to(torch.uint8), dim=1)
 
 
-def windows(whole: Batch, rows: np.ndarray, frames: int, rng: np.random.Generator) -> Batch:
+def windows(whole: Batch, rows: torch.Tensor, frames: int, rng: RandomNumbers) -> Batch:
     """Return a window of each row, anywhere in it."""
-    latest = np.maximum(lengths(whole.good[rows]) - frames, 0)
-    starts = rng.integers(0, latest + 1)
-    index = (rows[:, None], np.minimum(starts[:, None] + np.arange(frames), LONGEST - 1))
+    latest = (lengths(whole.good[rows]) - frames).clamp(min=0)
+    starts = (rng.uniform(0.0, 1.0, len(rows)) * (latest + 1)).long().minimum(latest)
+    frame = starts[:, None] + torch.arange(frames, device=starts.device)
+    index = (rows[:, None], frame.clamp(max=LONGEST - 1))
     cut = {f.name: getattr(whole, f.name)[index] for f in fields(whole) if f.name != "constant"}
     return Batch(**cut, constant=whole.constant[rows])
 
@@ -98,24 +106,17 @@ def windows(whole: Batch, rows: np.ndarray, frames: int, rng: np.random.Generato
 def joined(first: Batch, second: Batch) -> Batch:
     """Return both batches as one."""
     return Batch(
-        **{
-            f.name: np.concatenate([getattr(first, f.name), getattr(second, f.name)])
-            for f in fields(first)
-        }
-    )
+        **{f.name: torch.cat([getattr(first, f.name), getattr(second, f.name)])
+           for f in fields(first)}
+    )  # fmt: skip
 
 
-def change(batch: Batch, how: Change, rng: np.random.Generator) -> Batch:
+def change(batch: Batch, how: Change, rng: RandomNumbers) -> Batch:
     """Return the windows, changed."""
     count = len(batch.flat)
-    batch = _mirrored(batch, rng.uniform(size=count) < 0.5)
-    angle = np.radians(rng.normal(0.0, how.roll_deg, count))
-    roll = np.zeros((count, 1, 3, 3), np.float32)
-    roll[:, 0, 0, 0] = roll[:, 0, 1, 1] = np.cos(angle)
-    roll[:, 0, 0, 1], roll[:, 0, 1, 0] = np.sin(angle), -np.sin(angle)
-    roll[:, 0, 2, 2] = 1.0
-    size = np.exp(rng.normal(0.0, how.size, count)).astype(np.float32)
-    metre = np.exp(rng.normal(0.0, how.metre, count)).astype(np.float32)
+    batch = _mirrored(batch, rng.chance(0.5, count))
+    roll = _rolls(rng.normal(count) * how.roll_deg)
+    size, metre = torch.exp(rng.normal(count) * how.size), torch.exp(rng.normal(count) * how.metre)
     grown = size[:, None, None, None]
     flat = _disturbed(batch.flat @ roll[..., :2, :2] * grown, how, rng)
     truth = batch.truth @ roll * grown
@@ -123,18 +124,15 @@ def change(batch: Batch, how: Change, rng: np.random.Generator) -> Batch:
     flat = flat + wrong[..., :2] * how.body_in_image
     local = batch.local @ roll * grown * metre[:, None, None, None] + wrong
     local = _disturbed(misjudged(local, how, rng), how, rng)
-    visibility = np.array(batch.visibility)
-    for row in np.flatnonzero(rng.uniform(size=count) < how.hidden):
-        for _ in range(rng.integers(1, 3)):
-            hide((flat[row], local[row]), visibility[row], how.hidden_s, rng)
-    _thin((flat, local, visibility), rng.choice(3, count, p=how.strides) + 1)
+    flat, local, visibility = hide((flat, local, batch.visibility), how, rng)
+    strides = rng.choice(how.strides, count) + 1
     half = (batch.constant.shape[1] - 1) // 2
-    factors = np.stack([size] * half + [size * metre] * half + [1.0 / size], -1)
+    factors = torch.stack([size] * half + [size * metre] * half + [1.0 / size], -1)
     return replace(
         batch,
-        flat=flat,
-        local=local,
-        visibility=visibility,
+        flat=_thinned(flat, strides),
+        local=_thinned(local, strides),
+        visibility=_thinned(visibility[..., None], strides)[..., 0],
         constant=batch.constant * factors,
         distance=batch.distance * size[:, None],
         truth=truth,
@@ -144,61 +142,89 @@ def change(batch: Batch, how: Change, rng: np.random.Generator) -> Batch:
 
 
 def hide(
-    seen: Sequence[np.ndarray], visibility: np.ndarray, hidden_s: tuple[float, float],
-    rng: np.random.Generator,
-) -> None:  # fmt: skip
-    """Remove a limb: interpolate it between the frames around, hold it at the ends."""
-    count, limb = len(visibility), LIMBS[rng.integers(len(LIMBS))]
-    onset = int(rng.integers(-3, count - 3))
-    start, end = max(onset, 0), min(onset + int(FPS * rng.uniform(*hidden_s)), count)
-    if end <= start:
-        return
-    share = ((np.arange(start, end) - start + 1) / (end - start + 1))[:, None, None]
-    for values in seen:
-        before, after = values[max(start - 1, 0), limb], values[min(end, count - 1), limb]
-        before = after if start == 0 else before
-        after = before if end == count else after
-        values[start:end, limb] = before * (1.0 - share) + after * share
-    visibility[start:end, limb] = 0.0
+    seen: tuple[torch.Tensor, torch.Tensor, torch.Tensor], how: Change, rng: RandomNumbers
+) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    """Remove one or two limbs of some windows for a while: interpolate them between the frames
+    around, hold them at the ends.
+
+    Args:
+        seen: Landmarks in the image and in space, and their visibility.
+        how: How often, and how long.
+        rng: Draws limbs and times.
+    """
+    flat, local, visibility = seen
+    count, frames = visibility.shape[:2]
+    some, twice = rng.chance(how.hidden, count), rng.chance(0.5, count)
+    for which in (some, some & twice):
+        limb = of_limbs(visibility.device)[rng.integers(len(LIMBS), count)]
+        onset = rng.integers(frames, count) - 3
+        end = (onset + (FPS * rng.uniform(*how.hidden_s, count)).long()).clamp(max=frames)
+        frame = torch.arange(frames, device=onset.device)
+        inside = (frame >= onset[:, None]) & (frame < end[:, None]) & which[:, None]
+        gone = inside[..., None] & limb[:, None]
+        flat, local = (_bridged(v, gone, onset.clamp(min=0), end) for v in (flat, local))
+        visibility = visibility.masked_fill(gone, 0.0)
+    return flat, local, visibility
 
 
-def _thin(seen: Sequence[np.ndarray], strides: np.ndarray) -> None:
-    """Keep each second or third frame, the others between them, in place."""
-    for stride in (2, 3):
-        rows = np.flatnonzero(strides == stride)
-        for values in seen:
-            count = values.shape[1]
-            frames = np.arange(count)
-            low = np.minimum(frames // stride * stride, count - 1)
-            high = np.minimum(low + stride, (count - 1) // stride * stride)
-            part = ((frames - low) / stride).reshape(-1, *[1] * (values.ndim - 2))
-            part = part.astype(values.dtype)
-            chosen = values[rows]
-            values[rows] = chosen[:, low] * (1 - part) + chosen[:, high] * part
+def _bridged(
+    values: torch.Tensor, gone: torch.Tensor, start: torch.Tensor, end: torch.Tensor
+) -> torch.Tensor:
+    """Return values (B, L, N, C) that are linear from frame `start` - 1 to `end` where `gone`."""
+    each, frames = torch.arange(len(values), device=values.device), values.shape[1]
+    before = values[each, (start - 1).clamp(min=0)]
+    after = values[each, end.clamp(min=0, max=frames - 1)]
+    before = torch.where((start == 0)[:, None, None], after, before)
+    after = torch.where((end >= frames)[:, None, None], before, after)
+    place = torch.arange(frames, device=values.device) - start[:, None] + 1
+    share = (place / (end - start + 1).clamp(min=1)[:, None])[..., None, None]
+    return torch.where(gone[..., None], torch.lerp(before[:, None], after[:, None], share), values)
 
 
-def _mirrored(batch: Batch, which: np.ndarray) -> Batch:
-    flip = np.array([-1.0, 1.0, 1.0], np.float32)
-    pick = which[:, None, None, None]
+def _thinned(values: torch.Tensor, strides: torch.Tensor) -> torch.Tensor:
+    """Return values (B, L, N, C) of which each window keeps each `stride`-th frame, the others
+    linear between them."""
+    each = torch.arange(len(values), device=values.device)[:, None]
+    frames, stride = torch.arange(values.shape[1], device=values.device), strides[:, None]
+    last = values.shape[1] - 1
+    low = (frames // stride * stride).clamp(max=last)
+    high = (low + stride).minimum(last // stride * stride)
+    part = ((frames - low) / stride)[..., None, None]
+    return torch.lerp(values[each, low], values[each, high], part)
+
+
+def _rolls(degrees: torch.Tensor) -> torch.Tensor:
+    """Return rotations about z (B, 1, 3, 3), for row vectors."""
+    angle = torch.deg2rad(degrees)
+    roll = torch.zeros((len(angle), 1, 3, 3), device=angle.device)
+    roll[:, 0, 0, 0] = roll[:, 0, 1, 1] = torch.cos(angle)
+    roll[:, 0, 0, 1], roll[:, 0, 1, 0] = torch.sin(angle), -torch.sin(angle)
+    roll[:, 0, 2, 2] = 1.0
+    return roll
+
+
+def _mirrored(batch: Batch, which: torch.Tensor) -> Batch:
+    flip = torch.tensor([-1.0, 1.0, 1.0], device=which.device)
+    three, four = which[:, None, None], which[:, None, None, None]
     return replace(
         batch,
-        flat=np.where(pick, batch.flat[:, :, SWAP] * flip[:2], batch.flat),
-        local=np.where(pick, batch.local[:, :, SWAP] * flip, batch.local),
-        truth=np.where(pick, batch.truth[:, :, SWAP] * flip, batch.truth),
-        visibility=np.where(pick[..., 0], batch.visibility[:, :, SWAP], batch.visibility),
-        up=np.where(pick[..., 0], batch.up * flip, batch.up),
-        shown=np.where(pick[..., 0], batch.shown * flip, batch.shown),
-        contact=np.where(pick[..., 0], batch.contact[..., OTHER_FOOT], batch.contact),
+        flat=torch.where(four, batch.flat[:, :, SWAP] * flip[:2], batch.flat),
+        local=torch.where(four, batch.local[:, :, SWAP] * flip, batch.local),
+        truth=torch.where(four, batch.truth[:, :, SWAP] * flip, batch.truth),
+        visibility=torch.where(three, batch.visibility[:, :, SWAP], batch.visibility),
+        up=torch.where(three, batch.up * flip, batch.up),
+        shown=torch.where(three, batch.shown * flip, batch.shown),
+        contact=torch.where(three, batch.contact[..., OTHER_FOOT], batch.contact),
     )
 
 
-def _misread(shown: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def _misread(shown: torch.Tensor, rng: RandomNumbers) -> torch.Tensor:
     """Return known directions of up with the same error throughout a window."""
-    known = np.linalg.norm(shown, axis=-1, keepdims=True) > 0.5
-    return np.asarray((shown + rng.normal(0.0, UP_SD, (len(shown), 1, 3))) * known)
+    known = torch.linalg.norm(shown, dim=-1, keepdim=True) > 0.5
+    return (shown + rng.normal(len(shown), 1, 3) * UP_SD) * known
 
 
-def _disturbed(values: np.ndarray, how: Change, rng: np.random.Generator) -> np.ndarray:
+def _disturbed(values: torch.Tensor, how: Change, rng: RandomNumbers) -> torch.Tensor:
     count, _, *rest = values.shape
-    shift = rng.standard_normal((count, 1, *rest), np.float32) * how.shift_m
-    return np.asarray(values + shift + rng.standard_normal(values.shape, np.float32) * how.shake_m)
+    shift = rng.normal(count, 1, *rest) * how.shift_m
+    return values + shift + rng.normal(*values.shape) * how.shake_m

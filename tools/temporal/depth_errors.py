@@ -5,14 +5,15 @@ Drawn wide on purpose: a network that has only met the errors of one detector on
 those of real people for motion.
 """
 
+import math
 from dataclasses import dataclass
 
-import numpy as np
-from scipy.spatial.transform import Rotation
+import torch
+from torch.nn.functional import normalize
 
-from robojackson.body.forward_kinematics import unit
 from robojackson.mocap.landmarks.blazepose import landmark
 from robojackson.mocap.temporal.features import FPS, INPUT_LANDMARKS
+from tools.temporal.random_numbers import RandomNumbers
 
 ORDER = [int(index) for index in INPUT_LANDMARKS]
 LIMBS = [
@@ -27,6 +28,8 @@ TRUNK = [
 ]
 REVERSED_S = (0.2, 1.5)
 """How long the depth of a limb is reversed."""
+SHORTEST_S, DRIFT_S = 0.15, (0.15, 0.8)
+"""Shortest time over which noise that is slow changes, and the times of the drift of depth."""
 
 
 @dataclass(frozen=True)
@@ -82,65 +85,84 @@ HARDER = Change(
 """A detector that errs more."""
 
 
-def misjudged(local: np.ndarray, how: Change, rng: np.random.Generator) -> np.ndarray:
+def of_limbs(device: torch.device) -> torch.Tensor:
+    """Return which landmarks belong to each limb (4, N), true or false."""
+    belongs = torch.zeros((len(LIMBS), len(ORDER)), dtype=torch.bool)
+    for row, limb in zip(belongs, LIMBS, strict=True):
+        row[limb] = True
+    return belongs.to(device)
+
+
+def misjudged(local: torch.Tensor, how: Change, rng: RandomNumbers) -> torch.Tensor:
     """Tilt, flatten or deepen the detector's body and shift each landmark's depth.
 
     In some windows it drifts and limbs are reversed, or there is no depth at all.
     """
     count, frames, landmarks = local.shape[:3]
-    angles = np.radians(rng.normal(0.0, 1.0, (count, 2)) * how.tilt_deg)
-    turns = Rotation.from_euler("xy", angles).as_matrix().astype(np.float32)
-    turned = local @ turns[:, None]
-    deep = np.exp(rng.normal(0.0, how.depth, (count, 1, 1))).astype(np.float32)
-    shift = rng.standard_normal((count, 1, landmarks), np.float32) * how.depth_shift_m
-    depth = turned[..., 2] * deep + shift
-    bad = rng.uniform(size=count) < how.bad_depth
-    drift = how.drift_m * rng.uniform(0.2, 1.5, count)[bad]
-    seconds = float(rng.uniform(0.15, 0.8))
-    depth[bad] += slow(rng, (int(bad.sum()), frames, landmarks), seconds) * drift[:, None, None]
-    for row in np.flatnonzero(bad):
-        if rng.uniform() < 0.5:
-            _reverse(depth[row], rng)
-    depth[rng.uniform(size=count) < how.no_depth] = 0.0
-    turned[..., 2] = depth
-    return np.asarray(turned)
+    turned = local @ _tilts(torch.deg2rad(rng.normal(count, 2) * local.new_tensor(how.tilt_deg)))
+    deep = torch.exp(rng.normal(count, 1, 1) * how.depth)
+    depth = turned[..., 2] * deep + rng.normal(count, 1, landmarks) * how.depth_shift_m
+    bad = rng.chance(how.bad_depth, count)
+    drift = bad * how.drift_m * rng.uniform(0.2, 1.5, count)
+    seconds = rng.uniform(*DRIFT_S, count)
+    depth = depth + slow(rng, (count, frames, landmarks), seconds) * drift[:, None, None]
+    depth = torch.where((bad & rng.chance(0.5, count))[:, None, None], _reversed(depth, rng), depth)
+    depth = depth.masked_fill(rng.chance(how.no_depth, count)[:, None, None], 0.0)
+    return torch.cat([turned[..., :2], depth[..., None]], -1)
 
 
-def body_offsets(truth: np.ndarray, how: Change, rng: np.random.Generator) -> np.ndarray:
+def body_offsets(truth: torch.Tensor, how: Change, rng: RandomNumbers) -> torch.Tensor:
     """Return errors (B, L, N, 3) that are constant in the axes of each window's trunk.
 
     On real cameras 44 to 58 of 70 mm are of this kind, another pattern in every clip.
     """
     count, _, landmarks = truth.shape[:3]
     left, right, *shoulders = (truth[:, :, index] for index in TRUNK)
-    x = unit(left - right)
-    spine = sum(shoulders) - left - right
-    y = unit(spine - (spine * x).sum(-1, keepdims=True) * x)
-    axes = np.stack([x, y, np.cross(x, y)], -2).astype(np.float32)
-    offsets = rng.standard_normal((count, landmarks, 3), np.float32) * how.body_m
-    for limb in LIMBS:
-        offsets[:, limb] += rng.standard_normal((count, 1, 3), np.float32) * how.body_limb_m
-    offsets -= offsets[:, TRUNK[:2]].mean(1, keepdims=True)
-    return np.asarray(offsets[:, None] @ axes)
+    x = normalize(left - right, dim=-1)
+    spine = shoulders[0] + shoulders[1] - left - right
+    y = normalize(spine - (spine * x).sum(-1, keepdim=True) * x, dim=-1)
+    axes = torch.stack([x, y, torch.linalg.cross(x, y)], -2)
+    offsets = rng.normal(count, landmarks, 3) * how.body_m
+    shared = rng.normal(count, len(LIMBS), 3) * how.body_limb_m
+    offsets = offsets + torch.einsum("bkc,kn->bnc", shared, of_limbs(truth.device).float())
+    offsets = offsets - offsets[:, TRUNK[:2]].mean(1, keepdim=True)
+    return offsets[:, None] @ axes
 
 
-def slow(rng: np.random.Generator, shape: tuple[int, int, int], seconds: float) -> np.ndarray:
-    """Return noise (B, L, N) of unit size that changes over a number of seconds."""
+def slow(rng: RandomNumbers, shape: tuple[int, int, int], seconds: torch.Tensor) -> torch.Tensor:
+    """Return noise (B, L, N) of unit size; each window's changes over a number of seconds (B)."""
     count, frames, width = shape
-    knots = int(np.ceil(frames / FPS / seconds)) + 3
-    values = rng.standard_normal((count, knots, width), np.float32)
-    place = rng.uniform(0.0, 1.0, (count, 1)) + np.arange(frames) / FPS / seconds
-    low = place.astype(int)
-    part = (place - low)[..., None].astype(np.float32)
+    span = frames / FPS
+    knots = math.ceil(span / SHORTEST_S) + 3
+    values = rng.normal(count, knots, width)
+    frame = torch.arange(frames, device=rng.device)
+    place = rng.uniform(0.0, 1.0, count, 1) + frame / FPS / seconds.clamp(min=SHORTEST_S)[:, None]
+    low = place.long()
+    part = (place - low)[..., None]
     part = part * part * (3.0 - 2.0 * part)
-    each = np.arange(count)[:, None]
-    return np.asarray(values[each, low] * (1.0 - part) + values[each, low + 1] * part)
+    each = torch.arange(count, device=rng.device)[:, None]
+    return torch.lerp(values[each, low], values[each, low + 1], part)
 
 
-def _reverse(depth: np.ndarray, rng: np.random.Generator) -> None:
-    """Bend one limb towards the camera instead of away for a while, or vice versa, in place."""
-    limb = LIMBS[rng.integers(len(LIMBS))]
-    start = int(rng.integers(0, len(depth)))
-    span = slice(start, start + int(FPS * rng.uniform(*REVERSED_S)))
-    joint = depth[span, limb[:1]]
-    depth[span, limb[1:]] = 2.0 * joint - depth[span, limb[1:]]
+def _tilts(angles: torch.Tensor) -> torch.Tensor:
+    """Return rotations about x, then y, by angles (B, 2), radians: (B, 1, 3, 3)."""
+    (cx, cy), (sx, sy) = torch.cos(angles).unbind(-1), torch.sin(angles).unbind(-1)
+    zero = torch.zeros_like(cx)
+    rows = [torch.stack(row, -1) for row in (
+        (cy, sy * sx, sy * cx), (zero, cx, -sx), (-sy, cy * sx, cy * cx))]  # fmt: skip
+    return torch.stack(rows, -2)[:, None]
+
+
+def _reversed(depth: torch.Tensor, rng: RandomNumbers) -> torch.Tensor:
+    """Return depth (B, L, N) of which one limb bends towards the camera instead of away for a
+    while, or vice versa."""
+    count, frames = depth.shape[:2]
+    limb = rng.integers(len(LIMBS), count)
+    start = rng.integers(frames, count)
+    end = start + (FPS * rng.uniform(*REVERSED_S, count)).long()
+    frame = torch.arange(frames, device=depth.device)
+    inside = (frame >= start[:, None]) & (frame < end[:, None])
+    roots = torch.tensor([limb[0] for limb in LIMBS], device=depth.device)[limb]
+    joint = torch.take_along_dim(depth, roots[:, None, None], 2)
+    wrong = inside[..., None] & of_limbs(depth.device)[limb][:, None]
+    return torch.where(wrong, 2.0 * joint - depth, depth)

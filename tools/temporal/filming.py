@@ -4,19 +4,22 @@ All yaws, pitch of -20 to 60 degrees, rolls, lenses from wide to long, a person 
 beside the middle of the image; what is seen is exact, `invented.Detector` makes it a detector's.
 """
 
+import math
 from dataclasses import replace
 
-import numpy as np
+import torch
+from torch.nn.functional import normalize
 
-from robojackson.body.forward_kinematics import unit
 from robojackson.mocap.landmarks.blazepose import landmark
 from robojackson.mocap.landmarks.pinhole_camera import DOWN, FOCAL_PER_DIAGONAL
 from robojackson.mocap.temporal import features
 from tools.temporal.batches import Batch
 from tools.temporal.depth_errors import ORDER, slow
+from tools.temporal.random_numbers import RandomNumbers
 from tools.temporal.truths import Bank
 
-TEMPO = (0.75, 1.35)
+TEMPO = (0.5, 1.35)
+"""Playing speed of a window, times that of the motion."""
 LEVEL_DEG, LEVEL_SHARE = (6.0, 9.0), 0.5
 """Pitch of the cameras that are held level, and their share; the others have any pitch."""
 PITCH_DEG = (-20.0, 60.0)
@@ -51,7 +54,7 @@ SHOULDERS = [ORDER.index(landmark(f"{side}_shoulder")) for side in SIDES]
 
 
 def film(
-    bank: Bank, rows: np.ndarray, frames: int, sizes: np.ndarray, rng: np.random.Generator
+    bank: Bank, rows: torch.Tensor, frames: int, sizes: torch.Tensor, rng: RandomNumbers
 ) -> Batch:
     """Return a window of each row as an exact detector would see it.
 
@@ -62,68 +65,66 @@ def film(
         sizes: Size of each person in the detector's metres.
         rng: Draws windows, tempo and cameras.
     """
+    count = len(rows)
     places = _places(bank, rows, frames, rng)
     points = proportioned(_played(bank.points, rows, places), rng) * sizes[:, None, None, None]
     seen, up = _before_cameras(points, rng)
     root = seen[:, :, HIPS].mean(2)
     axes = axes_along(root)
     truth = (seen - root[:, :, None]) @ axes
-    distance = np.linalg.norm(root, axis=-1)
+    distance = torch.linalg.norm(root, dim=-1)
     away = distance[..., None, None]
-    count = len(rows)
-    known = rng.uniform(size=(count, 1)) < KNOWN
-    wrong = FOCAL_PER_DIAGONAL / np.exp(rng.uniform(*np.log(LENSES), (count, 1)))
-    wrong = np.where(known, np.exp(rng.normal(0.0, KNOWN_FOCAL_SD, (count, 1))), wrong)
-    wrong = wrong * (1.0 + slow(rng, (count, frames, 1), 1.0)[..., 0] * SWAY)
-    flat = truth[..., :2] * away / (away + truth[..., 2:])
-    above = (up[:, None, None] @ axes)[:, :, 0].astype(np.float32)
+    known = rng.chance(KNOWN, count, 1)
+    guessed = FOCAL_PER_DIAGONAL / rng.log_uniform(*LENSES, count, 1)
+    wrong = torch.where(known, torch.exp(rng.normal(count, 1) * KNOWN_FOCAL_SD), guessed)
+    drift = slow(rng, (count, frames, 1), torch.ones(count, device=rng.device))
+    above = (up[:, None, None] @ axes)[:, :, 0]
     return Batch(
-        flat=flat.astype(np.float32),
-        local=truth.astype(np.float32),
-        visibility=np.ones(truth.shape[:3], np.float32),
-        constant=np.zeros((count, 2 * (len(features.CHAINS) + 2) + 1), np.float32),
-        distance=(distance * wrong).astype(np.float32),
-        truth=truth.astype(np.float32),
-        good=np.ones((count, frames), np.float32),
+        flat=truth[..., :2] * away / (away + truth[..., 2:]),
+        local=truth,
+        visibility=torch.ones_like(truth[..., 0]),
+        constant=truth.new_zeros((count, 2 * (len(features.CHAINS) + 2) + 1)),
+        distance=distance * wrong * (1.0 + drift[..., 0] * SWAY),
+        truth=truth,
+        good=torch.ones_like(distance),
         up=above,
-        shown=above * known[..., None].astype(np.float32),
-        contact=bank.contact[rows[:, None], np.round(places).astype(int)].astype(np.float32),
+        shown=above * known[..., None],
+        contact=bank.contact[rows[:, None], torch.round(places).long()].float(),
     )
 
 
 def with_constants(batch: Batch) -> Batch:
     """Add the constants of the clip, computed from its frames."""
-    pairs = [[(f"{s}_{a}", f"{s}_{b}") for s in ("left", "right")]
-             for a, b in features.CHAINS.values()]  # fmt: skip
+    pairs = [[(f"{s}_{a}", f"{s}_{b}") for s in SIDES] for a, b in features.CHAINS.values()]
     pairs += [[(f"left_{name}", f"right_{name}")] for name in features.WIDTHS]
     longest, median = [], []
     for ends in pairs:
         starts, stops = ([ORDER.index(landmark(p[k])) for p in ends] for k in (0, 1))
-        spans = [np.linalg.norm(v[:, :, starts] - v[:, :, stops], axis=-1)
-                 for v in (batch.flat, batch.local)]  # fmt: skip
-        flat, local = (span.reshape(len(span), -1) for span in spans)
-        longest.append(np.percentile(flat, features.LONGEST, axis=1))
-        median.append(np.median(local, axis=1))
-    near = 1.0 / np.maximum(batch.distance.mean(1), 0.5)
-    return replace(batch, constant=np.stack([*longest, *median, near], -1).astype(np.float32))
+        flat, local = (torch.linalg.norm(v[:, :, starts] - v[:, :, stops], dim=-1).flatten(1)
+                       for v in (batch.flat, batch.local))  # fmt: skip
+        longest.append(torch.quantile(flat, features.LONGEST / 100.0, dim=1))
+        median.append(torch.quantile(local, 0.5, dim=1))
+    near = 1.0 / batch.distance.mean(1).clamp(min=0.5)
+    return replace(batch, constant=torch.stack([*longest, *median, near], -1))
 
 
-def axes_along(root: np.ndarray) -> np.ndarray:
+def axes_along(root: torch.Tensor) -> torch.Tensor:
     """Return `features.axes_along` of many windows."""
-    forward = unit(root)
-    right = unit(np.cross(np.broadcast_to(DOWN, forward.shape), forward))
-    return np.stack([right, np.cross(forward, right), forward], -1)
+    forward = normalize(root, dim=-1)
+    down = forward.new_tensor(DOWN).expand_as(forward)
+    right = normalize(torch.linalg.cross(down, forward), dim=-1)
+    return torch.stack([right, torch.linalg.cross(forward, right), forward], -1)
 
 
-def proportioned(points: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def proportioned(points: torch.Tensor, rng: RandomNumbers) -> torch.Tensor:
     """Return people whose bones are longer or shorter by a few per cent, another for each window;
     both sides alike, hips where they were."""
-    factors = np.exp(rng.normal(0.0, PROPORTION, (2 + len(LINKS), len(points), 1, 1, 1)))
-    wide, long, *limbs = factors.astype(np.float32)
-    changed, centre = points.copy(), points[:, :, HIPS].mean(2, keepdims=True)
+    factors = torch.exp(rng.normal(2 + len(LINKS), len(points), 1, 1, 1) * PROPORTION)
+    wide, long, *limbs = factors
+    changed, centre = points.clone(), points[:, :, HIPS].mean(2, keepdim=True)
     for rows, factor in ((HIPS, wide), (SHOULDERS, long)):
         changed[:, :, rows] = centre + factor * (points[:, :, rows] - centre)
-    shift = (changed - points)[:, :, SHOULDERS].mean(2, keepdims=True)
+    shift = (changed - points)[:, :, SHOULDERS].mean(2, keepdim=True)
     changed[:, :, HEAD] = points[:, :, HEAD] + shift
     for (start, end, followers), factor in zip(LINKS, limbs, strict=True):
         for side in SIDES:
@@ -134,43 +135,45 @@ def proportioned(points: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return changed
 
 
-def _places(bank: Bank, rows: np.ndarray, frames: int, rng: np.random.Generator) -> np.ndarray:
+def _places(bank: Bank, rows: torch.Tensor, frames: int, rng: RandomNumbers) -> torch.Tensor:
     """Return the fractional frames of windows at any tempo."""
     tempo = rng.uniform(*TEMPO, len(rows))
-    spare = np.maximum(bank.lengths[rows] - 1 - tempo * frames, 0.0)
-    place = rng.uniform(0.0, 1.0, len(rows))[:, None] * spare[:, None]
-    place = place + tempo[:, None] * np.arange(frames)
-    return np.asarray(np.minimum(place, bank.points.shape[1] - 1.001))
+    spare = (bank.lengths[rows] - 1 - tempo * frames).clamp(min=0.0)
+    place = (rng.uniform(0.0, 1.0, len(rows)) * spare)[:, None]
+    place = place + tempo[:, None] * torch.arange(frames, device=rng.device)
+    return place.clamp(max=bank.points.shape[1] - 1.001)
 
 
-def _played(points: np.ndarray, rows: np.ndarray, place: np.ndarray) -> np.ndarray:
+def _played(points: torch.Tensor, rows: torch.Tensor, place: torch.Tensor) -> torch.Tensor:
     """Return windows of points, linear between frames."""
-    low = place.astype(int)
-    part = (place - low)[..., None, None].astype(np.float32)
-    each = rows[:, None]
-    return np.asarray(points[each, low] * (1.0 - part) + points[each, low + 1] * part)
+    low, each = place.long(), rows[:, None]
+    part = (place - low)[..., None, None]
+    return torch.lerp(points[each, low], points[each, low + 1], part)
 
 
-def _before_cameras(points: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def _before_cameras(points: torch.Tensor, rng: RandomNumbers) -> tuple[torch.Tensor, torch.Tensor]:
     """Return world points (B, L, N, 3), and up (B, 3), in the frame of a drawn camera each."""
     count = len(points)
-    yaw = rng.uniform(-np.pi, np.pi, count)
-    level = rng.uniform(size=count) < LEVEL_SHARE
-    pitch = np.where(level, rng.normal(*LEVEL_DEG, count), rng.uniform(*PITCH_DEG, count))
-    pitch = np.radians(pitch)
-    forward = np.stack(
-        [-np.sin(yaw) * np.cos(pitch), np.cos(yaw) * np.cos(pitch), -np.sin(pitch)], -1
+    yaw = rng.uniform(-math.pi, math.pi, count)
+    mean, deviation = LEVEL_DEG
+    level = mean + deviation * rng.normal(count)
+    pitch = torch.where(rng.chance(LEVEL_SHARE, count), level, rng.uniform(*PITCH_DEG, count))
+    pitch = torch.deg2rad(pitch)
+    forward = torch.stack(
+        [-torch.sin(yaw) * torch.cos(pitch), torch.cos(yaw) * torch.cos(pitch), -torch.sin(pitch)],
+        -1,
     )
-    right = unit(np.cross(forward, [0.0, 0.0, 1.0]))
-    down = np.cross(forward, right)
-    roll = np.radians(rng.normal(0.0, ROLL_DEG, count))[:, None]
-    across = np.cos(roll) * right - np.sin(roll) * down
-    down = np.sin(roll) * right + np.cos(roll) * down
-    rotation = np.stack([across, down, forward], 1)
+    above = forward.new_tensor([0.0, 0.0, 1.0]).expand_as(forward)
+    right = normalize(torch.linalg.cross(forward, above), dim=-1)
+    down = torch.linalg.cross(forward, right)
+    roll = torch.deg2rad(rng.normal(count) * ROLL_DEG)[:, None]
+    across = torch.cos(roll) * right - torch.sin(roll) * down
+    down = torch.sin(roll) * right + torch.cos(roll) * down
+    rotation = torch.stack([across, down, forward], 1)
     centre = points[:, :, HIPS].mean((1, 2))
-    seen = (points - centre[:, None, None]) @ np.swapaxes(rotation, 1, 2)[:, None]
-    distance = np.exp(rng.uniform(*np.log(DISTANCE_M), count))
-    distance = np.maximum(distance, NEAREST_M - seen[..., 2].min((1, 2)))
-    aside = rng.normal(0.0, ASIDE, (count, 2)) * distance[:, None]
-    shift = np.concatenate([aside, distance[:, None]], -1)
+    seen = (points - centre[:, None, None]) @ rotation.mT[:, None]
+    nearest = NEAREST_M - seen[..., 2].amin((1, 2))
+    distance = rng.log_uniform(*DISTANCE_M, count).maximum(nearest)
+    aside = rng.normal(count, 2) * ASIDE * distance[:, None]
+    shift = torch.cat([aside, distance[:, None]], -1)
     return seen + shift[:, None, None], rotation[:, :, 2]

@@ -18,10 +18,10 @@ from tools.temporal.batches import Batch, change, joined, table, windows
 from tools.temporal.depth_errors import Change
 from tools.temporal.examples import Example
 from tools.temporal.filming import film, with_constants
-from tools.temporal.invented import Detector
+from tools.temporal.invented import Detector, sizes_of
 from tools.temporal.losses import losses_of
 from tools.temporal.net import BLOCKS, WIDTH, Lifter, found_in, lifter_of
-from tools.temporal.tensor_batches import TensorBatch, tensor_batches
+from tools.temporal.random_numbers import RandomNumbers
 from tools.temporal.truths import Bank
 
 LOSSES = ("place", "velocity", "speed", "spread", "tilt", "contact")
@@ -84,24 +84,29 @@ class Source:
     bank: Bank | None
     detector: Detector
 
-    def draw(self, config: FitConfig, share: float, rng: np.random.Generator) -> Batch:
+    @property
+    def device(self) -> torch.device:
+        """Return where the batches are drawn."""
+        return self.real.good.device
+
+    def draw(self, config: FitConfig, share: float, rng: RandomNumbers) -> Batch:
         """Return a batch, changed."""
         frames, count = config.change.frames, config.batch
         made = round(count * share) if self.bank else 0
-        rows = rng.integers(0, len(self.real.good), count - made)
+        rows = rng.integers(len(self.real.good), count - made)
         batch = windows(self.real, rows, frames, rng)
         if self.bank and made:
-            rows = rng.integers(0, len(self.bank), made)
-            sizes = rng.choice(self.detector.sizes, made)
+            rows = rng.integers(len(self.bank), made)
+            sizes = self.detector.sizes[rng.integers(len(self.detector.sizes), made)]
             filmed = film(self.bank, rows, frames, sizes, rng)
             batch = joined(batch, with_constants(self.detector.see(filmed, rng)))
         return change(batch, config.change, rng)
 
 
-def source(examples: Sequence[Example], bank: Bank | None) -> Source:
-    """Return the tables of the real pairs and the simulated detector of the bank."""
-    real = table(examples)
-    return Source(real, bank, Detector(real, examples))
+def source(examples: Sequence[Example], bank: Bank | None, device: str = "cpu") -> Source:
+    """Return the tables of the real pairs and the simulated detector of the bank, on a device."""
+    real = table(examples).on(device)
+    return Source(real, bank and bank.on(device), Detector(real, sizes_of(examples)))
 
 
 def begin(
@@ -126,22 +131,14 @@ def fit(
     config: FitConfig,
     seed: int,
     watch: Callable[[Progress, float], None],
-    workers: int = 0,
 ) -> None:
-    """Train from where `progress` stands; `watch` gets it and seconds a step now and then.
-
-    Batches are drawn ahead by `workers` processes; they are the same with any number of them.
-    """
-
-    def draw(step: int) -> Batch:
-        rng = np.random.default_rng([seed, 2, step])
-        share = float(np.interp(step, [0, config.steps], config.invented))
-        return pairs.draw(config, share, rng)
-
+    """Train from where `progress` stands; `watch` gets it and seconds a step now and then."""
     began, first = time.monotonic(), progress.step
     losses: list[torch.Tensor] = []
-    for batch in tensor_batches(draw, range(first, config.steps), workers):
-        losses.append(learn(progress, batch, config))
+    while progress.step < config.steps:
+        rng = RandomNumbers([seed, 2, progress.step], pairs.device)
+        share = float(np.interp(progress.step, [0, config.steps], config.invented))
+        losses.append(learn(progress, pairs.draw(config, share, rng), config))
         if progress.step % 100 == 0 or progress.step == config.steps:
             means = dict(zip(LOSSES, torch.stack(losses).mean(0).tolist(), strict=True))
             progress.curve.append({"step": progress.step, **means})
@@ -183,14 +180,12 @@ def averaged(progress: Progress) -> Lifter:
     return net
 
 
-def learn(progress: Progress, batch: TensorBatch, config: FitConfig) -> torch.Tensor:
+def learn(progress: Progress, batch: Batch, config: FitConfig) -> torch.Tensor:
     """Take a step of the optimiser; returns `LOSSES`."""
     for group in progress.optimiser.param_groups:
         group["lr"] = config.rate * _schedule(progress.step, config)
-    device = progress.net.mean.device
-    batch = batch.on(device)
-    with torch.autocast(device.type, torch.bfloat16):
-        h = progress.net.features(batch.numbers.float())
+    with torch.autocast(progress.net.mean.device.type, torch.bfloat16):
+        h = progress.net.features(batch.numbers())
     losses, _ = losses_of(progress.net.head(h.float()), batch)
     weighted = [getattr(config, name, 1.0) * value for name, value in losses.items()]
     loss = 10.0 * torch.stack(weighted).sum()

@@ -8,14 +8,13 @@ lifter's own answer. Boundary: a clean clip has z = 0. Independence: z carries n
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
 import torch
 
-from tools.temporal.batches import Batch
+from tools.temporal.batches import TWELVE, Batch
 from tools.temporal.fit import FitConfig, Source
 from tools.temporal.losses import losses_of
 from tools.temporal.net import Flow, Lifter
-from tools.temporal.tensor_batches import TensorBatch, to_tensors
+from tools.temporal.random_numbers import RandomNumbers
 
 WEIGHTS = {"inverse": 1.0, "forward": 1.0, "boundary": 0.1, "independence": 1.0}
 BANDWIDTHS = (0.05, 0.2, 0.9)
@@ -37,7 +36,7 @@ def fit_flow(
     optimiser = torch.optim.Adam(flow.parameters(), lr=1e-3)
     config = FitConfig(batch=24)
     for step in range(steps):
-        rng = np.random.default_rng([seed, 3, step])
+        rng = RandomNumbers([seed, 3, step], pairs.device)
         losses = flow_losses(flow, lifter, pairs.draw(config, 0.0, rng), rng)
         total = torch.stack([WEIGHTS[name] * value for name, value in losses.items()]).sum()
         optimiser.zero_grad()
@@ -50,14 +49,13 @@ def fit_flow(
 
 
 def flow_losses(
-    flow: Flow, lifter: Lifter, batch: Batch, rng: np.random.Generator
+    flow: Flow, lifter: Lifter, batch: Batch, rng: RandomNumbers
 ) -> dict[str, torch.Tensor]:
     """Return the four losses."""
-    tensors = to_tensors(batch)
-    good, body = tensors.good, tensors.truth
-    error, h = _errors(lifter, tensors)
+    good, body = batch.good, batch.truth[:, :, TWELVE]
+    error, h = _errors(lifter, batch)
     z, volume = flow(error, h)
-    clean_z, _ = flow(*_errors(lifter, to_tensors(cleaned(batch))))
+    clean_z, _ = flow(*_errors(lifter, cleaned(batch)))
     return {
         "inverse": -(_log_likelihood(flow, z, good) + (volume * good).sum() / good.sum()) / 36.0,
         "forward": (flow.inverse(torch.zeros_like(error), h) ** 2).mean(),
@@ -70,17 +68,16 @@ def cleaned(batch: Batch) -> Batch:
     """Return the windows as a perfect detector would see the person."""
     away = batch.distance[..., None, None]
     flat = batch.truth[..., :2] * away / (away + batch.truth[..., 2:])
-    seen = np.ones_like(batch.visibility)
+    seen = torch.ones_like(batch.visibility)
     return replace(batch, flat=flat, local=batch.truth, visibility=seen)
 
 
-def independence(body: torch.Tensor, z: torch.Tensor, rng: np.random.Generator) -> torch.Tensor:
+def independence(body: torch.Tensor, z: torch.Tensor, rng: RandomNumbers) -> torch.Tensor:
     """Return the discrepancy between pose with z and pose with noise, on some frames."""
-    chosen = torch.from_numpy(rng.permutation(len(z))[:SAMPLE])
+    chosen, other = (rng.normal(len(z)).argsort()[:SAMPLE] for _ in range(2))
     pose = body[chosen].flatten(1)
     pose = pose / (pose.std() + 1e-6)
-    other = torch.from_numpy(rng.permutation(len(z))[:SAMPLE])
-    noise = torch.from_numpy(rng.normal(size=(len(other), z.shape[-1])).astype(np.float32))
+    noise = rng.normal(len(other), z.shape[-1])
     elsewhere = body[other].flatten(1)
     elsewhere = elsewhere / (elsewhere.std() + 1e-6)
     return discrepancy(torch.cat([pose, z[chosen]], 1), torch.cat([elsewhere, noise], 1))
@@ -97,10 +94,10 @@ def discrepancy(x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
     return kernel[:n, :n].mean() + kernel[n:, n:].mean() - 2.0 * kernel[:n, n:].mean()
 
 
-def _errors(lifter: Lifter, batch: TensorBatch) -> tuple[torch.Tensor, torch.Tensor]:
+def _errors(lifter: Lifter, batch: Batch) -> tuple[torch.Tensor, torch.Tensor]:
     """Return the error over spread (B, T, 36), and features."""
     with torch.no_grad():
-        h = lifter.features(batch.numbers.float())
+        h = lifter.features(batch.numbers())
         found = lifter.head(h)
         error = -losses_of(found, batch)[1]
         scaled = error * torch.exp(-found.log_spread[..., [0, 0, 1]])

@@ -4,23 +4,24 @@ import torch
 from torch import nn
 
 from robojackson.motion.smpl_sequence import AIR, PLANTED
+from tools.temporal.batches import TWELVE, Batch
 from tools.temporal.net import Found
-from tools.temporal.tensor_batches import TensorBatch
 
 LEAST_STEP_M = 0.003
 """Step of a joint that stands still, metres a frame: what is slower has no speed to keep."""
 
 
-def losses_of(found: Found, batch: TensorBatch) -> tuple[dict[str, torch.Tensor], torch.Tensor]:
+def losses_of(found: Found, batch: Batch) -> tuple[dict[str, torch.Tensor], torch.Tensor]:
     """Return the losses by name, and the errors of the joints (B, L, 12, 3), metres.
 
     Place: mean distance of joints, m. Velocity: of their steps, m a frame. Speed: log ratio of the
     mean speeds of window and truth, without which uncertain depth makes limbs slow. Spread, tilt:
     Laplace likelihoods. Contact: cross-entropy.
     """
-    body, good, distance = batch.truth, batch.good, batch.distance[..., None]
-    z = batch.depth + found.correction[..., 2]
-    across = batch.flat * ((distance + z) / distance)[..., None] + found.correction[..., :2]
+    body, flat = batch.truth[:, :, TWELVE], batch.flat[:, :, TWELVE]
+    good, distance = batch.good, batch.distance[..., None]
+    z = batch.local[:, :, TWELVE, 2] + found.correction[..., 2]
+    across = flat * ((distance + z) / distance)[..., None] + found.correction[..., :2]
     place = torch.cat([across, z[..., None]], -1)
     error = place - body
     both = good[:, 1:] * good[:, :-1]
@@ -37,7 +38,7 @@ def losses_of(found: Found, batch: TensorBatch) -> tuple[dict[str, torch.Tensor]
     return losses, error
 
 
-def tilt_loss(found: Found, batch: TensorBatch) -> torch.Tensor:
+def tilt_loss(found: Found, batch: Batch) -> torch.Tensor:
     """Return the negative log likelihood of the roll and pitch of up, means of each window."""
     up, good = batch.up, batch.good
     share = good[..., None] / good.sum(1).clamp(min=1.0)[:, None, None]
@@ -51,7 +52,7 @@ def tilt_loss(found: Found, batch: TensorBatch) -> torch.Tensor:
     return (off * torch.exp(-size) + size).sum(-1).mean()
 
 
-def contact_loss(contact: torch.Tensor, batch: TensorBatch) -> torch.Tensor:
+def contact_loss(contact: torch.Tensor, batch: Batch) -> torch.Tensor:
     """Return the cross-entropy of touching and planted foot points, nats."""
     labels = torch.stack([batch.contact != AIR, batch.contact == PLANTED], -1).float()
     nats = nn.functional.binary_cross_entropy_with_logits(contact, labels, reduction="none")

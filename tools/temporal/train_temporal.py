@@ -57,7 +57,7 @@ def bank_of(folder: Path, motions: list[Path], count: int, seed: int) -> truths.
 def train(
     pairs: Path, motions: list[Path], out: Path, config: fit.FitConfig, count: int, seed: int,
     flow_steps: int, first: Path | None = None, first_share: float = 0.0,
-    device: str = "cpu", workers: int = 0,
+    device: str = "cpu",
 ) -> dict[str, object]:  # fmt: skip
     """Fit lifter and flow; returns the report."""
     training, validation = load(pairs)
@@ -77,8 +77,7 @@ def train(
         log.info("%s; %.0f s left", figures, (config.steps - now.step) * step_s)
 
     bank = bank_of(pairs, motions, count, seed) if count else None
-    where = fit.source(training, bank)
-    fit.fit(progress, where, config, seed, watch, workers)
+    fit.fit(progress, fit.source(training, bank, device), config, seed, watch)
     lifter = fit.averaged(progress)
     if first:
         mix_in(lifter, first, first_share)
@@ -90,7 +89,7 @@ def train(
         flow_curve.append({"step": step, **losses})
         log.info("flow %d: %s", step, ", ".join(f"{k} {v:.3g}" for k, v in losses.items()))
 
-    flow = fit_flow(lifter, where, flow_steps, seed, watch_flow)
+    flow = fit_flow(lifter, fit.source(training, None), flow_steps, seed, watch_flow)
     save(lifter, flow, out)
     return {
         "clips": len(training), "frames": sum(len(e.truth) for e in training),
@@ -227,7 +226,6 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--harder", action="store_true", help="a detector that errs more")
     parser.add_argument("--invented", type=float, nargs=2, default=fit.FitConfig().invented)
     parser.add_argument("--device", default="cpu", help="cpu or cuda")
-    parser.add_argument("--workers", type=int, default=0, help="processes that draw batches")
     parser.add_argument("--bank", type=int, default=6000)
     parser.add_argument("--seed", type=int, default=7)
     options = parser.parse_args(arguments)
@@ -240,7 +238,7 @@ def main(arguments: list[str] | None = None) -> int:
     )  # fmt: skip
     report = train(
         options.pairs, options.motions, options.out, config, options.bank, options.seed,
-        options.flow_steps, options.first, options.first_share, options.device, options.workers,
+        options.flow_steps, options.first, options.first_share, options.device,
     )  # fmt: skip
     target = options.report or options.out.with_suffix("")
     target.with_suffix(".json").write_text(json.dumps(report, indent=1) + "\n")

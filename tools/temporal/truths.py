@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import torch
 
 from benchmarks.mocap.figures import true_contacts
 from benchmarks.mocap.truth import soles
@@ -26,12 +27,16 @@ class Bank:
         contact: States of the foot points.
     """
 
-    points: np.ndarray
-    lengths: np.ndarray
-    contact: np.ndarray
+    points: torch.Tensor
+    lengths: torch.Tensor
+    contact: torch.Tensor
 
     def __len__(self) -> int:
         return len(self.points)
+
+    def on(self, device: torch.device | str) -> "Bank":
+        """Return the bank on a device."""
+        return Bank(self.points.to(device), self.lengths.to(device), self.contact.to(device))
 
 
 def make(folders: list[Path], count: int, seed: int) -> Bank:
@@ -60,13 +65,17 @@ def make(folders: list[Path], count: int, seed: int) -> Bank:
         points[row] = marks[index]
         feet = soles(posed.heads[:FRAMES], person.body.bone_names)
         contact[row] = true_contacts(feet, features.FPS)[index]
-    return Bank(points, lengths, contact)
+    return Bank(*map(torch.from_numpy, (points, lengths, contact)))
 
 
 def kept(path: Path, folders: list[Path], count: int, seed: int) -> Bank:
     """Return the bank of a file, made if it is not there."""
     if not path.exists():
         bank = make(folders, count, seed)
-        np.savez(path, points=bank.points, lengths=bank.lengths, contact=bank.contact)
+        np.savez(
+            path, points=bank.points.numpy(), lengths=bank.lengths.numpy(),
+            contact=bank.contact.numpy(),
+        )  # fmt: skip
     with np.load(path) as data:
-        return Bank(data["points"].astype(np.float32), data["lengths"], data["contact"])
+        names = ("points", "lengths", "contact")
+        return Bank(*(torch.from_numpy(data[name]) for name in names))
