@@ -16,6 +16,7 @@ from robojackson.mocap.temporal.features import FPS, INPUT_LANDMARKS
 from tools.temporal.depth_errors import LIMBS, ORDER, Change, body_offsets, misjudged, of_limbs
 from tools.temporal.examples import Example
 from tools.temporal.random_numbers import RandomNumbers
+from tools.temporal.tensors import index_on, numbers_on, turned
 
 SWAP = [ORDER.index(int(MIRROR[index])) for index in INPUT_LANDMARKS]
 TWELVE = [ORDER.index(int(index)) for index in BODY]
@@ -118,11 +119,11 @@ def change(batch: Batch, how: Change, rng: RandomNumbers) -> Batch:
     roll = _rolls(rng.normal(count) * how.roll_deg)
     size, metre = torch.exp(rng.normal(count) * how.size), torch.exp(rng.normal(count) * how.metre)
     grown = size[:, None, None, None]
-    flat = _disturbed(batch.flat @ roll[..., :2, :2] * grown, how, rng)
-    truth = batch.truth @ roll * grown
+    flat = _disturbed(turned(batch.flat, roll[..., :2, :2]) * grown, how, rng)
+    truth = turned(batch.truth, roll) * grown
     wrong = body_offsets(truth, how, rng)
     flat = flat + wrong[..., :2] * how.body_in_image
-    local = batch.local @ roll * grown * metre[:, None, None, None] + wrong
+    local = turned(batch.local, roll) * grown * metre[:, None, None, None] + wrong
     local = _disturbed(misjudged(local, how, rng), how, rng)
     flat, local, visibility = hide((flat, local, batch.visibility), how, rng)
     strides = rng.choice(how.strides, count) + 1
@@ -136,8 +137,8 @@ def change(batch: Batch, how: Change, rng: RandomNumbers) -> Batch:
         constant=batch.constant * factors,
         distance=batch.distance * size[:, None],
         truth=truth,
-        up=(batch.up[:, :, None] @ roll)[:, :, 0],
-        shown=_misread((batch.shown[:, :, None] @ roll)[:, :, 0], rng),
+        up=turned(batch.up, roll[:, 0]),
+        shown=_misread(turned(batch.shown, roll[:, 0]), rng),
     )
 
 
@@ -204,17 +205,18 @@ def _rolls(degrees: torch.Tensor) -> torch.Tensor:
 
 
 def _mirrored(batch: Batch, which: torch.Tensor) -> Batch:
-    flip = torch.tensor([-1.0, 1.0, 1.0], device=which.device)
+    flip = numbers_on(which.device, -1.0, 1.0, 1.0)
+    swap, feet = index_on(which.device, *SWAP), index_on(which.device, *OTHER_FOOT)
     three, four = which[:, None, None], which[:, None, None, None]
     return replace(
         batch,
-        flat=torch.where(four, batch.flat[:, :, SWAP] * flip[:2], batch.flat),
-        local=torch.where(four, batch.local[:, :, SWAP] * flip, batch.local),
-        truth=torch.where(four, batch.truth[:, :, SWAP] * flip, batch.truth),
-        visibility=torch.where(three, batch.visibility[:, :, SWAP], batch.visibility),
+        flat=torch.where(four, batch.flat[:, :, swap] * flip[:2], batch.flat),
+        local=torch.where(four, batch.local[:, :, swap] * flip, batch.local),
+        truth=torch.where(four, batch.truth[:, :, swap] * flip, batch.truth),
+        visibility=torch.where(three, batch.visibility[:, :, swap], batch.visibility),
         up=torch.where(three, batch.up * flip, batch.up),
         shown=torch.where(three, batch.shown * flip, batch.shown),
-        contact=torch.where(three, batch.contact[..., OTHER_FOOT], batch.contact),
+        contact=torch.where(three, batch.contact[..., feet], batch.contact),
     )
 
 

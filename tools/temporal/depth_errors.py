@@ -7,6 +7,7 @@ those of real people for motion.
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import torch
 from torch.nn.functional import normalize
@@ -14,6 +15,7 @@ from torch.nn.functional import normalize
 from robojackson.mocap.landmarks.blazepose import landmark
 from robojackson.mocap.temporal.features import FPS, INPUT_LANDMARKS
 from tools.temporal.random_numbers import RandomNumbers
+from tools.temporal.tensors import index_on, numbers_on, turned
 
 ORDER = [int(index) for index in INPUT_LANDMARKS]
 LIMBS = [
@@ -85,6 +87,7 @@ HARDER = Change(
 """A detector that errs more."""
 
 
+@cache
 def of_limbs(device: torch.device) -> torch.Tensor:
     """Return which landmarks belong to each limb (4, N), true or false."""
     belongs = torch.zeros((len(LIMBS), len(ORDER)), dtype=torch.bool)
@@ -99,16 +102,17 @@ def misjudged(local: torch.Tensor, how: Change, rng: RandomNumbers) -> torch.Ten
     In some windows it drifts and limbs are reversed, or there is no depth at all.
     """
     count, frames, landmarks = local.shape[:3]
-    turned = local @ _tilts(torch.deg2rad(rng.normal(count, 2) * local.new_tensor(how.tilt_deg)))
+    angles = torch.deg2rad(rng.normal(count, 2) * numbers_on(rng.device, *how.tilt_deg))
+    body = turned(local, _tilts(angles))
     deep = torch.exp(rng.normal(count, 1, 1) * how.depth)
-    depth = turned[..., 2] * deep + rng.normal(count, 1, landmarks) * how.depth_shift_m
+    depth = body[..., 2] * deep + rng.normal(count, 1, landmarks) * how.depth_shift_m
     bad = rng.chance(how.bad_depth, count)
     drift = bad * how.drift_m * rng.uniform(0.2, 1.5, count)
     seconds = rng.uniform(*DRIFT_S, count)
     depth = depth + slow(rng, (count, frames, landmarks), seconds) * drift[:, None, None]
     depth = torch.where((bad & rng.chance(0.5, count))[:, None, None], _reversed(depth, rng), depth)
     depth = depth.masked_fill(rng.chance(how.no_depth, count)[:, None, None], 0.0)
-    return torch.cat([turned[..., :2], depth[..., None]], -1)
+    return torch.cat([body[..., :2], depth[..., None]], -1)
 
 
 def body_offsets(truth: torch.Tensor, how: Change, rng: RandomNumbers) -> torch.Tensor:
@@ -124,9 +128,9 @@ def body_offsets(truth: torch.Tensor, how: Change, rng: RandomNumbers) -> torch.
     axes = torch.stack([x, y, torch.linalg.cross(x, y)], -2)
     offsets = rng.normal(count, landmarks, 3) * how.body_m
     shared = rng.normal(count, len(LIMBS), 3) * how.body_limb_m
-    offsets = offsets + torch.einsum("bkc,kn->bnc", shared, of_limbs(truth.device).float())
-    offsets = offsets - offsets[:, TRUNK[:2]].mean(1, keepdim=True)
-    return offsets[:, None] @ axes
+    offsets = offsets + (of_limbs(truth.device).float().T @ shared)
+    offsets = offsets - offsets[:, index_on(rng.device, *TRUNK[:2])].mean(1, keepdim=True)
+    return turned(offsets[:, None], axes)
 
 
 def slow(rng: RandomNumbers, shape: tuple[int, int, int], seconds: torch.Tensor) -> torch.Tensor:
@@ -162,7 +166,7 @@ def _reversed(depth: torch.Tensor, rng: RandomNumbers) -> torch.Tensor:
     end = start + (FPS * rng.uniform(*REVERSED_S, count)).long()
     frame = torch.arange(frames, device=depth.device)
     inside = (frame >= start[:, None]) & (frame < end[:, None])
-    roots = torch.tensor([limb[0] for limb in LIMBS], device=depth.device)[limb]
+    roots = index_on(depth.device, *(limb[0] for limb in LIMBS))[limb]
     joint = torch.take_along_dim(depth, roots[:, None, None], 2)
     wrong = inside[..., None] & of_limbs(depth.device)[limb][:, None]
     return torch.where(wrong, 2.0 * joint - depth, depth)

@@ -16,6 +16,7 @@ from robojackson.mocap.temporal import features
 from tools.temporal.batches import Batch
 from tools.temporal.depth_errors import ORDER, slow
 from tools.temporal.random_numbers import RandomNumbers
+from tools.temporal.tensors import index_on, numbers_on, turned
 from tools.temporal.truths import Bank
 
 TEMPO = (0.5, 1.35)
@@ -69,16 +70,16 @@ def film(
     places = _places(bank, rows, frames, rng)
     points = proportioned(_played(bank.points, rows, places), rng) * sizes[:, None, None, None]
     seen, up = _before_cameras(points, rng)
-    root = seen[:, :, HIPS].mean(2)
+    root = seen[:, :, _index(seen, HIPS)].mean(2)
     axes = axes_along(root)
-    truth = (seen - root[:, :, None]) @ axes
+    truth = turned(seen - root[:, :, None], axes)
     distance = torch.linalg.norm(root, dim=-1)
     away = distance[..., None, None]
     known = rng.chance(KNOWN, count, 1)
     guessed = FOCAL_PER_DIAGONAL / rng.log_uniform(*LENSES, count, 1)
     wrong = torch.where(known, torch.exp(rng.normal(count, 1) * KNOWN_FOCAL_SD), guessed)
     drift = slow(rng, (count, frames, 1), torch.ones(count, device=rng.device))
-    above = (up[:, None, None] @ axes)[:, :, 0]
+    above = turned(up[:, None, None], axes)[:, :, 0]
     return Batch(
         flat=truth[..., :2] * away / (away + truth[..., 2:]),
         local=truth,
@@ -99,7 +100,8 @@ def with_constants(batch: Batch) -> Batch:
     pairs += [[(f"left_{name}", f"right_{name}")] for name in features.WIDTHS]
     longest, median = [], []
     for ends in pairs:
-        starts, stops = ([ORDER.index(landmark(p[k])) for p in ends] for k in (0, 1))
+        starts, stops = (_index(batch.flat, [ORDER.index(landmark(p[k])) for p in ends])
+                         for k in (0, 1))  # fmt: skip
         flat, local = (torch.linalg.norm(v[:, :, starts] - v[:, :, stops], dim=-1).flatten(1)
                        for v in (batch.flat, batch.local))  # fmt: skip
         longest.append(torch.quantile(flat, features.LONGEST / 100.0, dim=1))
@@ -111,7 +113,7 @@ def with_constants(batch: Batch) -> Batch:
 def axes_along(root: torch.Tensor) -> torch.Tensor:
     """Return `features.axes_along` of many windows."""
     forward = normalize(root, dim=-1)
-    down = forward.new_tensor(DOWN).expand_as(forward)
+    down = numbers_on(root.device, *DOWN.tolist()).to(root.dtype).expand_as(forward)
     right = normalize(torch.linalg.cross(down, forward), dim=-1)
     return torch.stack([right, torch.linalg.cross(forward, right), forward], -1)
 
@@ -121,18 +123,24 @@ def proportioned(points: torch.Tensor, rng: RandomNumbers) -> torch.Tensor:
     both sides alike, hips where they were."""
     factors = torch.exp(rng.normal(2 + len(LINKS), len(points), 1, 1, 1) * PROPORTION)
     wide, long, *limbs = factors
-    changed, centre = points.clone(), points[:, :, HIPS].mean(2, keepdim=True)
-    for rows, factor in ((HIPS, wide), (SHOULDERS, long)):
+    hips, shoulders, head = (_index(points, rows) for rows in (HIPS, SHOULDERS, HEAD))
+    changed, centre = points.clone(), points[:, :, hips].mean(2, keepdim=True)
+    for rows, factor in ((hips, wide), (shoulders, long)):
         changed[:, :, rows] = centre + factor * (points[:, :, rows] - centre)
-    shift = (changed - points)[:, :, SHOULDERS].mean(2, keepdim=True)
-    changed[:, :, HEAD] = points[:, :, HEAD] + shift
+    shift = (changed - points)[:, :, shoulders].mean(2, keepdim=True)
+    changed[:, :, head] = points[:, :, head] + shift
     for (start, end, followers), factor in zip(LINKS, limbs, strict=True):
         for side in SIDES:
             (first,), (last, *more) = _rows(side, start), _rows(side, end, *followers)
             bone = points[:, :, last] - points[:, :, first]
             shift = changed[:, :, first] + factor[:, 0] * bone - points[:, :, last]
-            changed[:, :, [last, *more]] = points[:, :, [last, *more]] + shift[:, :, None]
+            moved = _index(points, [last, *more])
+            changed[:, :, moved] = points[:, :, moved] + shift[:, :, None]
     return changed
+
+
+def _index(points: torch.Tensor, rows: list[int]) -> torch.Tensor:
+    return index_on(points.device, *rows)
 
 
 def _places(bank: Bank, rows: torch.Tensor, frames: int, rng: RandomNumbers) -> torch.Tensor:
@@ -163,15 +171,15 @@ def _before_cameras(points: torch.Tensor, rng: RandomNumbers) -> tuple[torch.Ten
         [-torch.sin(yaw) * torch.cos(pitch), torch.cos(yaw) * torch.cos(pitch), -torch.sin(pitch)],
         -1,
     )
-    above = forward.new_tensor([0.0, 0.0, 1.0]).expand_as(forward)
+    above = numbers_on(rng.device, 0.0, 0.0, 1.0).expand_as(forward)
     right = normalize(torch.linalg.cross(forward, above), dim=-1)
     down = torch.linalg.cross(forward, right)
     roll = torch.deg2rad(rng.normal(count) * ROLL_DEG)[:, None]
     across = torch.cos(roll) * right - torch.sin(roll) * down
     down = torch.sin(roll) * right + torch.cos(roll) * down
     rotation = torch.stack([across, down, forward], 1)
-    centre = points[:, :, HIPS].mean((1, 2))
-    seen = (points - centre[:, None, None]) @ rotation.mT[:, None]
+    centre = points[:, :, _index(points, HIPS)].mean((1, 2))
+    seen = turned(points - centre[:, None, None], rotation.mT[:, None])
     nearest = NEAREST_M - seen[..., 2].amin((1, 2))
     distance = rng.log_uniform(*DISTANCE_M, count).maximum(nearest)
     aside = rng.normal(count, 2) * ASIDE * distance[:, None]

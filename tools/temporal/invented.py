@@ -12,6 +12,7 @@ import torch
 from tools.temporal.batches import SWAP, Batch, windows
 from tools.temporal.examples import Example, body_size
 from tools.temporal.random_numbers import RandomNumbers
+from tools.temporal.tensors import index_on, numbers_on
 
 RIDGE = 3e-3
 STRENGTH = ((0.3, 1.3), (-0.2, 1.3))
@@ -45,9 +46,10 @@ class Detector:
         rows = rng.integers(len(self.residuals.good), count)
         drawn = windows(self.residuals, rows, frames, rng)
         mirror = rng.chance(0.5, count)[:, None, None]
-        flip = batch.flat.new_tensor([-1.0, 1.0, 1.0, -1.0, 1.0])
-        errors = torch.where(mirror[..., None], drawn.truth[:, :, SWAP] * flip, drawn.truth)
-        seen = torch.where(mirror, drawn.visibility[:, :, SWAP], drawn.visibility)
+        flip = numbers_on(rng.device, -1.0, 1.0, 1.0, -1.0, 1.0)
+        swap = index_on(rng.device, *SWAP)
+        errors = torch.where(mirror[..., None], drawn.truth[:, :, swap] * flip, drawn.truth)
+        seen = torch.where(mirror, drawn.visibility[:, :, swap], drawn.visibility)
         mapped = (_row(batch.truth) @ self.map).reshape(errors.shape)
         own, general = (rng.uniform(*ends, count, 1, 1, 1) for ends in STRENGTH)
         errors = own * errors + general * mapped

@@ -6,6 +6,7 @@ from torch import nn
 from robojackson.motion.smpl_sequence import AIR, PLANTED
 from tools.temporal.batches import TWELVE, Batch
 from tools.temporal.net import Found
+from tools.temporal.tensors import index_on, numbers_on
 
 LEAST_STEP_M = 0.003
 """Step of a joint that stands still, metres a frame: what is slower has no speed to keep."""
@@ -18,9 +19,10 @@ def losses_of(found: Found, batch: Batch) -> tuple[dict[str, torch.Tensor], torc
     mean speeds of window and truth, without which uncertain depth makes limbs slow. Spread, tilt:
     Laplace likelihoods. Contact: cross-entropy.
     """
-    body, flat = batch.truth[:, :, TWELVE], batch.flat[:, :, TWELVE]
+    twelve = index_on(batch.good.device, *TWELVE)
+    body, flat = batch.truth[:, :, twelve], batch.flat[:, :, twelve]
     good, distance = batch.good, batch.distance[..., None]
-    z = batch.local[:, :, TWELVE, 2] + found.correction[..., 2]
+    z = batch.local[:, :, twelve, 2] + found.correction[..., 2]
     across = flat * ((distance + z) / distance)[..., None] + found.correction[..., :2]
     place = torch.cat([across, z[..., None]], -1)
     error = place - body
@@ -44,7 +46,9 @@ def tilt_loss(found: Found, batch: Batch) -> torch.Tensor:
     share = good[..., None] / good.sum(1).clamp(min=1.0)[:, None, None]
     true = nn.functional.normalize((up * share).sum(1), dim=-1)
     mean = nn.functional.normalize((found.up * share).sum(1), dim=-1)
-    across = nn.functional.normalize(torch.linalg.cross(true, true.new_tensor([[0.0, 0.0, 1.0]])))
+    across = nn.functional.normalize(
+        torch.linalg.cross(true, numbers_on(up.device, 0.0, 0.0, 1.0).to(up.dtype).expand_as(true))
+    )
     off = torch.stack(
         [(mean * across).sum(-1), (mean * torch.linalg.cross(true, across)).sum(-1)], -1
     ).abs()

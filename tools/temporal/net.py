@@ -60,7 +60,7 @@ class Block(nn.Module):
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         """Return (B, T, C) to the same."""
-        normal, count, d = self.norm(x), x.shape[1], self.dilation
+        normal, count, d = self.norm(x).to(x.dtype), x.shape[1], self.dilation
         first, last = normal[:, :1].expand(-1, d, -1), normal[:, -1:].expand(-1, d, -1)
         held = torch.cat([first, normal, last], 1)
         taps = [held[:, k * d : k * d + count] for k in range(3)]
