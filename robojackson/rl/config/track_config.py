@@ -84,6 +84,8 @@ class RewardConfig:
         feet: Weight of the places of feet and toes, unitless.
         feet_width: Width for these, over the floor relative to the pelvis, in height as they are,
             root mean square, m.
+        bodies: Weight of the orientations of all bodies, unitless.
+        bodies_width: Width for these, root mean square, rad.
         orientation: Weight of the root orientation, unitless.
         orientation_width: Width for it, rad.
         velocity: Weight of the root linear velocity, unitless.
@@ -113,6 +115,8 @@ class RewardConfig:
     hands_width: float = Field(default=0.12, gt=0)
     feet: float = 0.0
     feet_width: float = Field(default=0.08, gt=0)
+    bodies: float = 0.0
+    bodies_width: float = Field(default=0.4, gt=0)
     orientation: float = 0.10
     orientation_width: float = Field(default=0.4, gt=0)
     velocity: float = 0.05

@@ -64,6 +64,8 @@ class TrackingErrors:
         hands: The same over hands and head, m.
         feet: Root mean square over feet and toes, over the floor relative to the pelvis, in
             height as they are, m.
+        bodies: Root mean square over bodies of the error of their orientation, rad; 0 where it is
+            not asked for.
         site_mean: Mean distance of the sites relative to the pelvis, m.
         orientation: Error of the root's orientation, rad.
         velocity: Error of the root's velocity, m/s.
@@ -77,6 +79,7 @@ class TrackingErrors:
     sites: Float[np.ndarray, " N"]
     hands: Float[np.ndarray, " N"]
     feet: Float[np.ndarray, " N"]
+    bodies: Float[np.ndarray, " N"]
     site_mean: Float[np.ndarray, " N"]
     orientation: Float[np.ndarray, " N"]
     velocity: Float[np.ndarray, " N"]
@@ -92,8 +95,10 @@ def tracking_errors(
     moved: Float[np.ndarray, "N K 3"],
     target: ClipStep,
     which: TrackedPoints,
+    turned: Float[np.ndarray, " N"] | None = None,
 ) -> TrackingErrors:
-    """Return the errors of states; `moved` is the velocity of the points, m/s."""
+    """Return the errors of states; `moved` is the velocity of the points, m/s, `turned` the error
+    of the bodies' orientations, rad."""
     relative = points - points[:, which.pelvis, None]
     aim = target.points - target.points[:, which.pelvis, None]
     squared = _squares(relative - aim)
@@ -107,6 +112,7 @@ def tracking_errors(
         sites=np.sqrt(_mean(squared)),
         hands=np.sqrt(_mean(squared.take(which.hands, 1))),
         feet=np.sqrt(_mean(_squares(lifted))) if which.feet else np.zeros(len(qpos)),
+        bodies=np.zeros(len(qpos)) if turned is None else turned,
         site_mean=_mean(np.sqrt(squared)),
         orientation=quat_angle(qpos[:, 3:7], target.qpos[:, 3:7]),
         velocity=np.sqrt(_squares(speed[:, :3])),

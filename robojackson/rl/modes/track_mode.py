@@ -36,6 +36,7 @@ from robojackson.rl.modes.rewards import (
     tracked_points,
     tracking_errors,
 )
+from robojackson.rl.sim.body_turns import turn_error
 from robojackson.rl.sim.preview import driven_clip
 from robojackson.rl.sim.reference_clip import ClipStep
 from robojackson.rl.sim.simulation import Simulation
@@ -171,7 +172,8 @@ def evaluate_step(
         moved: Velocity of the points, m/s.
         change: Mean squared change of the action.
     """
-    errors = tracking_errors(sim.qpos, sim.qvel, sim.points, moved, at, which)
+    turned = turn_error(sim.model, sim.qpos, at.qpos) if reward.bodies else None
+    errors = tracking_errors(sim.qpos, sim.qvel, sim.points, moved, at, which, turned)
     terms = reward_terms(errors, change, reward)
     if reward.curiosity != "off":
         beta = BETA[reward.curiosity] * reward.perfect / PERFECT_OF_THE_PAPER

@@ -24,6 +24,7 @@ from robojackson.rl.modes.rewards import (
     tracking_errors,
 )
 from robojackson.rl.modes.track_mode import SETTLED_STATES_NEEDED
+from robojackson.rl.sim.body_turns import turn_error
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
@@ -94,7 +95,7 @@ def test_the_reward_is_greatest_at_the_reference(sway: ReferenceMotion) -> None:
 
 
 @pytest.mark.parametrize("term", RewardConfig.terms())
-def test_an_error_costs_every_term(sway: ReferenceMotion, term: str) -> None:
+def test_an_error_costs_every_term(robot: Robot, sway: ReferenceMotion, term: str) -> None:
     """Paid alone it is its weight at the reference, and next to nothing where all is wrong."""
     config = RewardConfig(**{name: float(name == term) for name in RewardConfig.terms()})
     target, rng = Clip(sway).at(np.array([10])), np.random.default_rng(0)
@@ -102,11 +103,26 @@ def test_an_error_costs_every_term(sway: ReferenceMotion, term: str) -> None:
     wrong = [state + rng.normal(0, 2.0, state.shape) for state in right]
     wrong[0][:, 3:7] /= np.linalg.norm(wrong[0][:, 3:7])
     which = tracked_points(sway.keypoint_names)
-    paid = [
-        reward_terms(tracking_errors(*states, target, which), np.zeros(1), config)[term][0]
-        for states in (right, wrong)
-    ]
+    paid = []
+    for states in (right, wrong):
+        turned = turn_error(robot.model, states[0], target.qpos)
+        errors = tracking_errors(*states, target, which, turned)
+        paid.append(reward_terms(errors, np.zeros(1), config)[term][0])
     assert paid == [pytest.approx(1.0), pytest.approx(0.0, abs=0.5)]
+
+
+def test_a_training_pays_for_the_orientations_of_bodies_where_asked(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    paid = []
+    for weight in (0.0, 0.5):
+        config = TrackConfig(reward=RewardConfig(bodies=weight))
+        env = TrackingCore(robot, sway, config, 4, 0)
+        env.reset()
+        paid.append(env.step(np.zeros((4, robot.model.nu))).terms["bodies"])
+    assert not paid[0].any()
+    assert (paid[1] > 0.05).all()
+    assert (paid[1] < 0.5).all()
 
 
 def test_the_hands_are_compared(sway: ReferenceMotion) -> None:
