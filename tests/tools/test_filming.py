@@ -24,7 +24,7 @@ def bank() -> Bank:
 
 
 def rows(count: int) -> torch.Tensor:
-    """Return the one motion as often as asked."""
+    """Return the index of the one motion, repeated."""
     return torch.zeros(count, dtype=torch.long)
 
 

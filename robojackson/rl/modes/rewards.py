@@ -64,8 +64,8 @@ class TrackingErrors:
         hands: The same over hands and head, m.
         feet: Root mean square over feet and toes, over the floor relative to the pelvis, in
             height as they are, m.
-        bodies: Root mean square over bodies of the error of their orientation, rad; 0 where it is
-            not asked for.
+        bodies: Root mean square over bodies of the error of their orientation, rad; 0 where no
+            term needs it.
         site_mean: Mean distance of the sites relative to the pelvis, m.
         orientation: Error of the root's orientation, rad.
         velocity: Error of the root's velocity, m/s.

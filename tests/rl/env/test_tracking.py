@@ -16,6 +16,7 @@ from robojackson.rl.config.train_config import (
 )
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.env.vec_env import TrackingEnv, TrackingVecEnv
+from robojackson.rl.modes.body_turns import turn_error
 from robojackson.rl.modes.reset_states import StartPhases, default_standing_pose, standing_pose_at
 from robojackson.rl.modes.rewards import (
     TrackedPoints,
@@ -24,7 +25,6 @@ from robojackson.rl.modes.rewards import (
     tracking_errors,
 )
 from robojackson.rl.modes.track_mode import SETTLED_STATES_NEEDED
-from robojackson.rl.sim.body_turns import turn_error
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
@@ -111,7 +111,7 @@ def test_an_error_costs_every_term(robot: Robot, sway: ReferenceMotion, term: st
     assert paid == [pytest.approx(1.0), pytest.approx(0.0, abs=0.5)]
 
 
-def test_a_training_pays_for_the_orientations_of_bodies_where_asked(
+def test_a_training_pays_for_the_orientations_of_bodies_if_weighted(
     robot: Robot, sway: ReferenceMotion
 ) -> None:
     paid = []

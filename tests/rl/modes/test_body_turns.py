@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from robojackson.geometry.rotations import from_rotation, quat_angle, quat_multiply
-from robojackson.rl.sim.body_turns import body_turns, turn_error
+from robojackson.rl.modes.body_turns import body_turns, turn_error
 from robojackson.robot.model import Robot
 
 TURNED_LINK = """
