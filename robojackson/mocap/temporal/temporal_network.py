@@ -15,7 +15,7 @@ from jaxtyping import Float
 
 from robojackson.errors import BadWeights
 from robojackson.mocap.landmarks.blazepose import BODY
-from robojackson.mocap.temporal import features
+from robojackson.mocap.temporal import error_flow, features
 from robojackson.mocap.temporal.error_flow import Weights
 from robojackson.mocap.temporal.features import ClipView
 
@@ -33,6 +33,8 @@ LOG_TILT = -2.0
 ALSO, SHARE = "also.", "share"
 """Beginning of the names of a file's further networks, and the name of a network's weight in the
 mean of their answers."""
+NAMED = 4
+"""Arrays that are missing which an error names."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +106,7 @@ def load(path: Path) -> Weights:
     """Return the arrays of a weights file, in single precision.
 
     Raises:
-        BadWeights: not safetensors, or arrays that are missing.
+        BadWeights: not safetensors, or arrays that are missing, of other shapes or not finite.
     """
     from safetensors import SafetensorError
     from safetensors.numpy import load_file
@@ -119,30 +121,56 @@ def load(path: Path) -> Weights:
 
 
 def _require_complete(path: Path, arrays: Weights, start: str) -> None:
-    """Refuse a network that lacks arrays or is of another version; `start` begins its names in the
-    file."""
-    required = {
-        "mean", "scale", "enter.weight", "leave.weight", "ground.weight",
-        f"blocks.{len(DILATIONS) - 1}.mix.weight",
-    }  # fmt: skip
-    required |= set() if start else {"flow.memory", "flow.read.weight"}
-    if missing := sorted(required - set(arrays)):
+    """Refuse a network that lacks arrays, is of another version or is damaged; `start` begins its
+    names in the file."""
+    again = "train it again: python -m tools.temporal.train_temporal"
+    shapes = _shapes(arrays, not start)
+    if missing := [name for name in shapes if name not in arrays]:
+        shown = ", ".join(start + name for name in missing[:NAMED])
+        more = f" and {len(missing) - NAMED} more" if len(missing) > NAMED else ""
         raise BadWeights(
-            f"{path}: not a weights file of the temporal network: "
-            f"{', '.join(start + name for name in missing)} missing; "
-            "leave temporal.weights empty for the shipped one, or train it again: "
-            "python -m tools.temporal.train_temporal"
-        )
-    if arrays["ground.weight"].shape != (GROUND, arrays["leave.weight"].shape[1]):
-        raise BadWeights(
-            f"{path}: {start}ground.weight has {len(arrays['ground.weight'])} rows, this version "
-            f"reads {GROUND}; train it again: python -m tools.temporal.train_temporal"
+            f"{path}: not a weights file of the temporal network: {shown}{more} missing; "
+            f"leave temporal.weights empty for the shipped one, or {again}"
         )
     if arrays["mean"].shape != (features.COUNT,):
         raise BadWeights(
             f"{path}: reads {arrays['mean'].size} numbers a frame, this version gives "
-            f"{features.COUNT}; train it again: python -m tools.temporal.train_temporal"
+            f"{features.COUNT}; {again}"
         )
+    for name, shape in shapes.items():
+        if arrays[name].shape != shape:
+            raise BadWeights(
+                f"{path}: {start}{name} has the shape {arrays[name].shape}, this version "
+                f"reads {shape}; {again}"
+            )
+        if not np.isfinite(arrays[name]).all():
+            raise BadWeights(f"{path}: {start}{name} holds NaN or infinity; {again}")
+
+
+def _shapes(arrays: Weights, first: bool) -> dict[str, tuple[int, ...]]:
+    """Return the shape of every array of a network as wide and deep as this one; the flow's are
+    those of a file's first network alone."""
+    width = arrays["enter.bias"].size if "enter.bias" in arrays else 1
+    layers = {
+        "enter": (width, features.COUNT),
+        "leave": (5 * len(BODY), width),
+        "ground": (GROUND, width),
+    }
+    shapes: dict[str, tuple[int, ...]] = dict.fromkeys(("mean", "scale"), (features.COUNT,))
+    for block in range(max(block_count(arrays), len(DILATIONS))):
+        layers[f"blocks.{block}.spread"] = (width, 3 * width)
+        layers[f"blocks.{block}.mix"] = (width, width)
+        shapes |= dict.fromkeys((f"blocks.{block}.norm.{n}" for n in ("weight", "bias")), (width,))
+    if first:
+        shapes["flow.memory"] = (error_flow.SIZE,)
+        layers["flow.read"] = (error_flow.CONDITION, width)
+        for layer in range(error_flow.LAYERS):
+            name, hidden = f"flow.couplings.{layer}", error_flow.HIDDEN
+            layers[f"{name}.0"] = (hidden, error_flow.SIZE + error_flow.CONDITION)
+            layers[f"{name}.2"] = (2 * error_flow.SIZE, hidden)
+    for name, shape in layers.items():
+        shapes |= {f"{name}.weight": shape, f"{name}.bias": shape[:1]}
+    return shapes
 
 
 def _spread(out: np.ndarray, middle: float) -> np.ndarray:

@@ -1,5 +1,6 @@
 """Laws of step 3: what goes in, what comes out, what a mirror and a hidden limb do to it."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -172,6 +173,23 @@ def test_weights_for_other_numbers_are_refused(tmp_path: Path) -> None:
     save_file(arrays, tmp_path / "old.safetensors")
     with pytest.raises(BadWeights, match="reads 7 numbers"):
         temporal_network.load(tmp_path / "old.safetensors")
+
+
+@pytest.mark.parametrize(
+    "name", ["blocks.3.spread.weight", "also.1.leave.bias", "flow.couplings.5.2.weight"]
+)
+def test_weights_of_which_an_array_is_cut_or_not_finite_are_refused(
+    tmp_path: Path, name: str
+) -> None:
+    whole = load_file(WEIGHTS)
+    for said, damaged in (
+        ("has the shape", whole[name][1:].copy()),
+        ("holds NaN", np.full_like(whole[name], np.nan)),
+    ):
+        path = tmp_path / f"{said}.safetensors"
+        save_file({**whole, name: damaged}, path)
+        with pytest.raises(BadWeights, match=f"{re.escape(name)} {said}"):
+            temporal_network.load(path)
 
 
 def _rays(placed: np.ndarray) -> np.ndarray:
