@@ -18,6 +18,7 @@ from robojackson.rl.modes.rewards import tracked_points
 from robojackson.rl.modes.track_mode import evaluate_step
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.robot.model import Robot
+from robojackson.robot.tree_kinematics import tree
 
 
 class RewardMeter:
@@ -40,7 +41,8 @@ class RewardMeter:
             configs = [PaperConfig(relative=environment.relative), environment]
         self._papers = [(config, PaperPoints(robot, reference, config)) for config in configs]
         self._track = None if isinstance(environment, PaperConfig) else environment.reward
-        self._which = tracked_points(robot.keypoint_names)
+        turns = self._track is not None and self._track.bodies
+        self._which = tracked_points(robot.keypoint_names, tree(robot) if turns else None)
 
     def __call__(self, moment: Moment) -> Reading:
         """Return terms, errors and returns of every robot at one control step."""

@@ -17,6 +17,7 @@ from robojackson.geometry.rotations import quat_angle
 from robojackson.rl.config.train_config import RewardConfig, TerminationConfig
 from robojackson.rl.sim.reference_clip import ClipStep
 from robojackson.robot.names import FEET, HANDS, PELVIS
+from robojackson.robot.tree_kinematics import Tree, pose
 
 RewardFunction = Callable[["RewardState"], Float[np.ndarray, " N"]]
 """A reward term of a user: one number a robot."""
@@ -35,21 +36,24 @@ class TrackedPoints:
         hands: Hands and head.
         limbs: Feet, hands and head: the limb ends.
         feet: Feet, and toes where the robot has them.
+        tree: Tree of the bodies whose orientations are compared; none are without it.
     """
 
     pelvis: int
     hands: tuple[int, ...]
     limbs: tuple[int, ...]
     feet: tuple[int, ...] = ()
+    tree: Tree | None = None
 
 
-def tracked_points(names: tuple[str, ...]) -> TrackedPoints:
+def tracked_points(names: tuple[str, ...], tree: Tree | None = None) -> TrackedPoints:
     """Return the special points of a robot's keypoints."""
     return TrackedPoints(
         pelvis=names.index(PELVIS),
         hands=tuple(names.index(name) for name in EXTREMITIES),
         limbs=tuple(names.index(name) for name in (*FEET, *EXTREMITIES)),
         feet=tuple(names.index(name) for name in SOLES if name in names),
+        tree=tree,
     )
 
 
@@ -64,8 +68,8 @@ class TrackingErrors:
         hands: The same over hands and head, m.
         feet: Root mean square over feet and toes, over the floor relative to the pelvis, in
             height as they are, m.
-        bodies: Root mean square over bodies of the error of their orientation, rad; 0 where no
-            term needs it.
+        bodies: Root mean square over bodies of the error of their orientation, rad; 0 without
+            a tree.
         site_mean: Mean distance of the sites relative to the pelvis, m.
         orientation: Error of the root's orientation, rad.
         velocity: Error of the root's velocity, m/s.
@@ -95,10 +99,8 @@ def tracking_errors(
     moved: Float[np.ndarray, "N K 3"],
     target: ClipStep,
     which: TrackedPoints,
-    turned: Float[np.ndarray, " N"] | None = None,
 ) -> TrackingErrors:
-    """Return the errors of states; `moved` is the velocity of the points, m/s, `turned` the error
-    of the bodies' orientations, rad."""
+    """Return the errors of states; `moved` is the velocity of the points, m/s."""
     relative = points - points[:, which.pelvis, None]
     aim = target.points - target.points[:, which.pelvis, None]
     squared = _squares(relative - aim)
@@ -112,7 +114,7 @@ def tracking_errors(
         sites=np.sqrt(_mean(squared)),
         hands=np.sqrt(_mean(squared.take(which.hands, 1))),
         feet=np.sqrt(_mean(_squares(lifted))) if which.feet else np.zeros(len(qpos)),
-        bodies=np.zeros(len(qpos)) if turned is None else turned,
+        bodies=turn_error(which.tree, qpos, target.qpos) if which.tree else np.zeros(len(qpos)),
         site_mean=_mean(np.sqrt(squared)),
         orientation=quat_angle(qpos[:, 3:7], target.qpos[:, 3:7]),
         velocity=np.sqrt(_squares(speed[:, :3])),
@@ -120,6 +122,18 @@ def tracking_errors(
         height=place[:, 2],
         drift=np.sqrt(_squares(place[:, :2])),
     )
+
+
+def turn_error(
+    tree: Tree, qpos: Float[np.ndarray, "N nq"], aim: Float[np.ndarray, "N nq"]
+) -> Float[np.ndarray, " N"]:
+    """Return the root mean square, over the bodies that hinges move, of the angle between the
+    orientations of two poses in the world, rad (whole_body_tracking's `body_ori`, Liao et al.,
+    2025, without its turn of the reference about the vertical)."""
+    moved = [body for body, hinges in enumerate(tree.body_hinges) if hinges]
+    own, other = np.split(pose(tree, np.concatenate([qpos, aim])).body_rot[:, moved], 2)
+    cosine = (np.add.reduce(own * other, (-2, -1)) - 1) / 2
+    return np.asarray(np.sqrt(_mean(np.arccos(np.clip(cosine, -1.0, 1.0)) ** 2)))
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,6 @@ from jaxtyping import Float, Int
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.paper_config import BETA
 from robojackson.rl.config.train_config import ControlConfig, RewardConfig, TrackConfig
-from robojackson.rl.modes.body_turns import turn_error
 from robojackson.rl.modes.mode import EpisodeStart, Score
 from robojackson.rl.modes.observation import Observer
 from robojackson.rl.modes.reset_states import (
@@ -42,6 +41,7 @@ from robojackson.rl.sim.reference_clip import ClipStep
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
+from robojackson.robot.tree_kinematics import tree
 
 SETTLED_STATES_NEEDED = 32
 PERFECT_OF_THE_PAPER = 5.0
@@ -66,7 +66,7 @@ class TrackMode:
         ahead, control = config.observation == "preview", control_of(config)
         self.clip = driven_clip(robot, reference, control, ahead)
         names = robot.keypoint_names
-        self._which = tracked_points(names)
+        self._which = tracked_points(names, tree(robot) if config.reward.bodies else None)
         self.sim = Simulation(robot, control, n, config.threads, config.random, seed)
         self.starts = StartPhases(self.clip, config.reset.failure_share)
         self._settled = SettledStates(robot.model.nq, robot.model.nv)
@@ -172,8 +172,7 @@ def evaluate_step(
         moved: Velocity of the points, m/s.
         change: Mean squared change of the action.
     """
-    turned = turn_error(sim.model, sim.qpos, at.qpos) if reward.bodies else None
-    errors = tracking_errors(sim.qpos, sim.qvel, sim.points, moved, at, which, turned)
+    errors = tracking_errors(sim.qpos, sim.qvel, sim.points, moved, at, which)
     terms = reward_terms(errors, change, reward)
     if reward.curiosity != "off":
         beta = BETA[reward.curiosity] * reward.perfect / PERFECT_OF_THE_PAPER

@@ -16,7 +16,6 @@ from robojackson.rl.config.train_config import (
 )
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.env.vec_env import TrackingEnv, TrackingVecEnv
-from robojackson.rl.modes.body_turns import turn_error
 from robojackson.rl.modes.reset_states import StartPhases, default_standing_pose, standing_pose_at
 from robojackson.rl.modes.rewards import (
     TrackedPoints,
@@ -28,6 +27,7 @@ from robojackson.rl.modes.track_mode import SETTLED_STATES_NEEDED
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
+from robojackson.robot.tree_kinematics import tree
 
 WHICH = TrackedPoints(pelvis=0, hands=(11, 12, 13), limbs=(5, 6, 11, 12, 13))
 
@@ -102,12 +102,11 @@ def test_an_error_costs_every_term(robot: Robot, sway: ReferenceMotion, term: st
     right = (target.qpos, target.qvel, target.points, target.moved)
     wrong = [state + rng.normal(0, 2.0, state.shape) for state in right]
     wrong[0][:, 3:7] /= np.linalg.norm(wrong[0][:, 3:7])
-    which = tracked_points(sway.keypoint_names)
-    paid = []
-    for states in (right, wrong):
-        turned = turn_error(robot.model, states[0], target.qpos)
-        errors = tracking_errors(*states, target, which, turned)
-        paid.append(reward_terms(errors, np.zeros(1), config)[term][0])
+    which = tracked_points(sway.keypoint_names, tree(robot))
+    paid = [
+        reward_terms(tracking_errors(*states, target, which), np.zeros(1), config)[term][0]
+        for states in (right, wrong)
+    ]
     assert paid == [pytest.approx(1.0), pytest.approx(0.0, abs=0.5)]
 
 
