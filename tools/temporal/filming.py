@@ -113,7 +113,7 @@ def with_constants(batch: Batch) -> Batch:
 def axes_along(root: torch.Tensor) -> torch.Tensor:
     """Return `features.axes_along` of many windows."""
     forward = normalize(root, dim=-1)
-    down = numbers_on(root.device, *DOWN.tolist()).to(root.dtype).expand_as(forward)
+    down = numbers_on(root.device, *DOWN.tolist()).expand_as(forward)
     right = normalize(torch.linalg.cross(down, forward), dim=-1)
     return torch.stack([right, torch.linalg.cross(forward, right), forward], -1)
 

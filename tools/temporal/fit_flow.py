@@ -29,10 +29,11 @@ def fit_flow(
     seed: int,
     watch: Callable[[int, dict[str, float]], None],
 ) -> Flow:
-    """Return a flow for a trained lifter, which stays as it is; fitted to the real pairs alone."""
+    """Return a flow for a trained lifter, which stays as it is; fitted to the real pairs alone, on
+    their device."""
     torch.manual_seed(seed)
-    lifter.eval()
-    flow = Flow(lifter.enter.out_features)
+    lifter.eval().to(pairs.device)
+    flow = Flow(lifter.enter.out_features).to(pairs.device)
     optimiser = torch.optim.Adam(flow.parameters(), lr=1e-3)
     config = FitConfig(batch=24)
     for step in range(steps):
@@ -45,7 +46,8 @@ def fit_flow(
         optimiser.step()
         if (step + 1) % 50 == 0:
             watch(step + 1, {name: float(value.detach()) for name, value in losses.items()})
-    return flow
+    lifter.cpu()
+    return flow.cpu()
 
 
 def flow_losses(

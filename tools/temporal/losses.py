@@ -47,7 +47,7 @@ def tilt_loss(found: Found, batch: Batch) -> torch.Tensor:
     true = nn.functional.normalize((up * share).sum(1), dim=-1)
     mean = nn.functional.normalize((found.up * share).sum(1), dim=-1)
     across = nn.functional.normalize(
-        torch.linalg.cross(true, numbers_on(up.device, 0.0, 0.0, 1.0).to(up.dtype).expand_as(true))
+        torch.linalg.cross(true, numbers_on(up.device, 0.0, 0.0, 1.0).expand_as(true))
     )
     off = torch.stack(
         [(mean * across).sum(-1), (mean * torch.linalg.cross(true, across)).sum(-1)], -1

@@ -77,7 +77,8 @@ def train(
         log.info("%s; %.0f s left", figures, (config.steps - now.step) * step_s)
 
     bank = bank_of(pairs, motions, count, seed) if count else None
-    fit.fit(progress, fit.source(training, bank, device), config, seed, watch)
+    where = fit.source(training, bank, device)
+    fit.fit(progress, where, config, seed, watch)
     lifter = fit.averaged(progress)
     if first:
         mix_in(lifter, first, first_share)
@@ -89,7 +90,7 @@ def train(
         flow_curve.append({"step": step, **losses})
         log.info("flow %d: %s", step, ", ".join(f"{k} {v:.3g}" for k, v in losses.items()))
 
-    flow = fit_flow(lifter, fit.source(training, None), flow_steps, seed, watch_flow)
+    flow = fit_flow(lifter, where, flow_steps, seed, watch_flow)
     save(lifter, flow, out)
     return {
         "clips": len(training), "frames": sum(len(e.truth) for e in training),
