@@ -1,167 +1,183 @@
-"""Rehearsals: robots that follow many motions, driven by a dancer, corrected by its experts.
+"""Rehearsals: thousands of robots, each on its way through one of the dancer's motions.
 
-DAgger (Ross, Gordon and Bagnell, AISTATS 2011): the dancer visits the states, the experts say what
-they would do there. An expert's advice is an action: the offset of the motors' targets from the
-reference's, in full actions of the dancer, -1..1.
+Half of the episodes begin anywhere, half shortly before a step where robots are often lost.
+Metres, radians, seconds.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+import torch
 
-from robojackson.motion.reference_motion import ReferenceMotion
-from robojackson.rl.config.train_config import ControlConfig, RandomConfig, ResetConfig
-from robojackson.rl.modes.observation import Observer
-from robojackson.rl.modes.reset_states import (
-    StartPhases,
-    default_standing_pose,
-    noisy,
-    standing_pose_at,
-)
-from robojackson.rl.sim.feedback_law import Feedback
-from robojackson.rl.sim.feedforward import lead_of
-from robojackson.rl.sim.motors import residual_scale
-from robojackson.rl.sim.nominal_path import Gains
-from robojackson.rl.sim.path_trial import LARGEST_MOVE
-from robojackson.rl.sim.preview import preview_of
-from robojackson.rl.sim.reference_clip import Clip
-from robojackson.rl.sim.simulation import Simulation
-from robojackson.rl.sim.standing_feet import Feet
-from robojackson.robot.fall import Fall
-from robojackson.robot.model import Robot
+from tools.dancer.mujoco_robots import Robots
+from tools.dancer.rehearsal_reward import Scoring
+from tools.dancer.repertoire import Motions, Steps, heading
+from tools.dancer.sight import Sight
 
-ACTION_FACTOR = 4.0
-"""Full action of the dancer in full actions of the robot: experts move targets by up to six."""
-LOST_TILT, LOST_HEIGHT_M = 0.6, 0.2
-"""Distance of the up axis and of the root's height from the reference at which an episode ends."""
-FORGOTTEN_S = 0.3
-"""Time before an episode's failure whose advice is not used."""
-EPISODE_S = 8.0
-NOISE = 0.04
-"""Standard deviation of the noise on actions, full actions."""
-RESET = ResetConfig(stand_share=0.05)
-WORLD = RandomConfig(friction=0.3, gains=0.1, pushes=0.4)
-CONTROL = ControlConfig(feedforward=1.0, feedback=0.0, action_factor=ACTION_FACTOR)
-Actor = Callable[[Float[np.ndarray, "N D"]], Float[np.ndarray, "N nu"]]
+EPISODE_S, BIN_S, BEFORE_S = 8.0, 0.5, 1.5
+"""Longest episode; length of the bins whose losses are counted; longest time before such a bin
+from which a robot begins again."""
+STAND_SHARE, WEAK_SHARE, FORGET, FIRST_RATE = 0.03, 0.5, 0.002, 0.02
+PUSH = (0.5, 0.5, 0.2, 0.52, 0.52, 0.78)
+"""mjlab's pushes: change of the root's velocity, m/s and rad/s."""
+PUSH_EVERY_S, PUSHES = (1.0, 4.0), 0.5
+FRICTION, STRENGTH = (0.6, 1.3), (0.9, 1.1)
+"""Factors on friction and on the gains, uniform."""
 
 
 @dataclass(frozen=True)
-class Lessons:
-    """Observations with the advice of the experts, float16, and how long episodes lasted.
+class Outcome:
+    """What a control step brought, (N,) each.
 
     Attributes:
-        survived: Share of the started episodes of the dancer alone that did not fail.
+        reward: Reward.
+        lost: Whether the robot was lost.
+        over: Whether the episode ended without that: time or motion are over.
     """
 
-    seen: Float[np.ndarray, "L D"]
-    advice: Float[np.ndarray, "L nu"]
-    survived: float
+    reward: torch.Tensor
+    lost: torch.Tensor
+    over: torch.Tensor
 
 
 class Rehearsal:
-    """Robots side by side, each on its way through one of the motions.
+    """N robots that begin new episodes as soon as theirs end.
 
-    Args:
-        experts: Feedback of every motion.
-        n: Number of robots.
+    Attributes:
+        seen: Present observations, (N, D).
+        action: Last actions, (N, nu).
+        loss_rate: Moving average of the share of robots lost in a step, of every bin.
     """
 
     def __init__(
-        self,
-        robot: Robot,
-        motions: Sequence[ReferenceMotion],
-        experts: Sequence[Gains],
-        n: int,
-        seed: int,
+        self, pack: Mapping[str, np.ndarray], robots: Robots, device: str, seed: int
     ) -> None:
-        leads = [lead_of(robot, motion, CONTROL) for motion in motions]
-        joined = Gains(*(np.concatenate([getattr(one, part.name) for one in experts])
-                         for part in fields(Gains)))  # fmt: skip
-        limit = LARGEST_MOVE * residual_scale(robot, ControlConfig())
-        ahead = np.concatenate([preview_of(motion, robot) for motion in motions])
-        lead = np.concatenate([one for one in leads if one is not None])
-        self._clip = Clip(motions, lead, ahead, Feedback(joined, limit, Feet(robot)))
-        self._sim = Simulation(robot, CONTROL, n, 1, WORLD, seed)
-        self._observer = Observer(robot, "preview")
-        self._fall = Fall.of(robot, LOST_HEIGHT_M, LOST_TILT)
-        self._starts = StartPhases(self._clip, RESET.failure_share)
-        self._stand = default_standing_pose(robot)
-        self._rng = np.random.default_rng(seed)
-        self._limit = round(EPISODE_S / self._clip.dt)
-        self._n, self._share = n, 1.0
-        self._step, self._start, self._age = (np.zeros(n, int) for _ in range(3))
-        self._alone, self._last = np.zeros(n, bool), np.zeros((n, robot.model.nu))
-        self._begin(np.arange(n))
+        self._random = torch.Generator(device).manual_seed(seed)
+        self.robots, self.motions = robots, Motions(pack, device)
+        self.sight = Sight(pack, self.motions.preview.shape[1], self._random)
+        self._scoring, self._device, self.n = Scoring(pack, device), device, robots.n
+        self._standing, self._scale, self._hinge = (
+            torch.as_tensor(pack[name], device=device) for name in ("standing", "scale", "hinge")
+        )
+        self._noise = [float(x) for x in pack["reset"]]
+        self._limit = round(EPISODE_S / self.motions.dt)
+        self._push = PUSHES * torch.tensor(PUSH, device=device)
+        self._motion, self._step, self._age, self._push_at = torch.zeros(
+            (4, self.n), dtype=torch.long, device=device
+        )
+        self.action = torch.zeros_like(robots.targets)
+        rows = torch.arange(len(self.motions.qpos), device=device)
+        self._bin = rows // round(BIN_S / self.motions.dt)
+        self.loss_rate = torch.full((int(self._bin[-1]) + 1,), FIRST_RATE, device=device)
+        heavy = torch.as_tensor(pack["weight"], device=device).repeat_interleave(2)
+        self._weight = heavy * self.motions.length.float()
+        robots.strength.copy_(self._uniform(*STRENGTH, (self.n,)))
+        robots.friction.mul_(self._uniform(*FRICTION, (self.n, 1, 1)))
+        self._begin(torch.ones(self.n, dtype=torch.bool, device=device))
+        self._age = self._whole(self._limit)
+        self.seen = self._observe()
 
-    @property
-    def full_action(self) -> Float[np.ndarray, " nu"]:
-        """Return the radians that a full action of the dancer moves each target."""
-        return np.asarray(self._sim.residual)
+    def step(self, action: torch.Tensor) -> Outcome:
+        """Act for one control step, -1..1; robots whose episodes end begin new ones."""
+        action, robots = action.clamp(-1, 1), self.robots
+        at, before = self._following(), self.robots.points
+        robots.targets.copy_(at.qpos[:, 7:][:, self._hinge] + at.lead + self._scale * action)
+        robots.step()
+        change, self.action = (action - self.action).square().mean(1), action
+        self._step, self._age = self._step + 1, self._age + 1
+        moved = (robots.points - before) / self.motions.dt
+        reward, lost = self._scoring.judge(robots, at, moved, change)
+        ended = self.motions.ended(self._motion, self._step) | (self._age >= self._limit)
+        self._count(lost)
+        if self.sight.noisy:
+            self._push_some()
+        self._begin(lost | ended)
+        self.seen = self._observe()
+        return Outcome(reward, lost, ended & ~lost)
 
-    @property
-    def size(self) -> tuple[int, int]:
-        """Return the lengths of an observation and of an action."""
-        return self._observer.actor_size, self._last.shape[1]
+    def calm(self, rows: torch.Tensor) -> None:
+        """Begin all episodes again at rows of the motions (N,), without pushes and noise of the
+        sensors from now on."""
+        self.sight.noisy = False
+        self._begin(torch.ones(self.n, dtype=torch.bool, device=self._device), rows)
+        self.seen = self._observe()
 
-    def run(self, actor: Actor, share: float, steps: int) -> Lessons:
-        """Rehearse.
+    def anywhere(self) -> torch.Tensor:
+        """Return rows of the motions, (N,), captured ones more often."""
+        chosen = torch.multinomial(self._weight, self.n, replacement=True, generator=self._random)
+        length = self.motions.length[chosen]
+        part = (self._uniform(0.0, 1.0, (self.n,)) * length).long()
+        return self.motions.first[chosen] + torch.minimum(part, length - 1)
 
-        Args:
-            actor: The dancer.
-            share: Share of the episodes that the dancer drives; experts drive the others.
-            steps: Control steps of every robot.
-        """
-        size, motors = self.size
-        self._share = share
-        seen = np.zeros((steps, self._n, size), np.float16)
-        advice = np.zeros((steps, self._n, motors), np.float16)
-        good = np.ones((steps, self._n), bool)
-        ends: list[tuple[int, int]] = []
-        for k in range(steps):
-            seen[k], advice[k] = self._advance(actor)
-            failed = self._failed()
-            for i in np.flatnonzero(failed):
-                good[max(0, k - round(FORGOTTEN_S / self._clip.dt)) : k + 1, i] = False
-            done = failed | self._clip.ended(self._step) | (self._age >= self._limit)
-            alone = done & self._alone
-            ends.append((int((alone & ~failed).sum()), int(alone.sum())))
-            rows = np.flatnonzero(done)
-            self._starts.record(self._start[rows], failed[rows])
-            self._begin(rows)
-        held, all_ends = np.sum(ends, 0)
-        return Lessons(seen[good], advice[good], held / max(1, all_ends))
+    def _following(self) -> Steps:
+        return self.motions.at(self._motion, self._step + 1)
 
-    def _advance(self, actor: Actor) -> tuple[np.ndarray, np.ndarray]:
-        sim, following = self._sim, self._clip.at(self._step + 1)
-        observed = self._observer.observe(*sim.sensed(), sim.points, following, self._last)
-        observed = observed[:, : self._observer.actor_size]
-        assert following.feedback is not None
-        moved = following.feedback(sim.qpos, sim.qvel)
-        advice = np.clip(moved / sim.residual, -1, 1)
-        noise = NOISE * self._rng.normal(size=advice.shape)
-        own = actor(observed) if self._alone.any() else advice
-        action = np.clip(np.where(self._alone[:, None], own, advice) + noise, -1, 1)
-        sim.step(sim.reference_angles(following) + sim.residual * action)
-        self._last, self._step, self._age = action, self._step + 1, self._age + 1
-        return observed, advice
+    def _observe(self) -> torch.Tensor:
+        return self.sight.observe(self.robots, self._following(), self.action)
 
-    def _failed(self) -> Bool[np.ndarray, " N"]:
-        there = self._clip.at(self._step).qpos
-        return self._fall.has_fallen(self._sim.qpos, there) | self._sim.broken
+    def _begin(self, those: torch.Tensor, rows: torch.Tensor | None = None) -> None:
+        """Begin new episodes of the robots of a mask."""
+        row = self._drawn() if rows is None else rows
+        motion = self.motions.motion[row]
+        step = row - self.motions.first[motion]
+        at = self.motions.at(motion, step)
+        hinges, speeds, root = self._noise
+        qpos, qvel = at.qpos.clone(), at.qvel.clone()
+        qpos[:, 7:] += hinges * self._normal(qpos[:, 7:].shape)
+        qvel[:, 6:] += speeds * self._normal(qvel[:, 6:].shape)
+        qvel[:, :6] += root * self._normal(qvel[:, :6].shape)
+        stands = self._uniform(0.0, 1.0, (self.n, 1)) < STAND_SHARE
+        yaw = heading(at.qpos[:, 3:7]) / 2
+        stand = self._standing.repeat(self.n, 1)
+        stand[:, :2] = at.qpos[:, :2]
+        stand[:, 3:7] = torch.stack([torch.cos(yaw), 0 * yaw, 0 * yaw, torch.sin(yaw)], 1)
+        qpos, qvel = torch.where(stands, stand, qpos), torch.where(stands, 0.0, qvel)
+        self.robots.place(those, qpos, qvel, at.points)
+        self._motion = torch.where(those, motion, self._motion)
+        self._step = torch.where(those, step, self._step)
+        self._age = torch.where(those, 0, self._age)
+        self._push_at = torch.where(those, self._waits(), self._push_at)
+        self.action = torch.where(those[:, None], 0.0, self.action)
 
-    def _begin(self, rows: np.ndarray) -> None:
-        """Begin new episodes: somewhere in a motion, or in the stand."""
-        if not len(rows):
-            return
-        rng, start = self._rng, self._starts.draw(len(rows), self._rng)
-        at = self._clip.at(start)
-        qpos, qvel = noisy(at.qpos, at.qvel, RESET, rng)
-        for row in np.flatnonzero(rng.random(len(rows)) < RESET.stand_share):
-            qpos[row], qvel[row] = standing_pose_at(self._stand, at.qpos[row, :7]), 0.0
-        self._sim.place(rows, qpos, qvel)
-        for array, value in ((self._step, start), (self._start, start), (self._age, 0)):
-            array[rows] = value
-        self._alone[rows] = rng.random(len(rows)) < self._share
-        self._last[rows] = 0.0
+    def _drawn(self) -> torch.Tensor:
+        """Return rows of the motions to begin at, never the end of one that ends."""
+        weight = self.loss_rate / self.loss_rate.sum()
+        bins = torch.multinomial(weight, self.n, replacement=True, generator=self._random)
+        size = round(BIN_S / self.motions.dt)
+        weak = (bins * size + self._whole(size)).clamp(max=len(self._bin) - 1)
+        back = self._uniform(0.0, BEFORE_S / self.motions.dt, (self.n,)).long()
+        weak = torch.maximum(weak - back, self.motions.first[self.motions.motion[weak]])
+        rows = torch.where(self._uniform(0.0, 1.0, (self.n,)) < WEAK_SHARE, weak, self.anywhere())
+        motion = self.motions.motion[rows]
+        last = self.motions.first[motion] + self.motions.length[motion] - 1
+        return torch.where(self.motions.cyclic[motion], rows, torch.minimum(rows, last - 1))
+
+    def _count(self, lost: torch.Tensor) -> None:
+        """Record in which bins robots were, and how many were lost there."""
+        bins = self._bin[self.motions.row(self._motion, self._step)]
+        none = torch.zeros_like(self.loss_rate)
+        visits = none.index_add(0, bins, torch.ones(self.n, device=self._device))
+        losses = none.index_add(0, bins, lost.float())
+        share = 1 - (1 - FORGET) ** visits
+        self.loss_rate += share * (losses / visits.clamp(min=1) - self.loss_rate)
+        self.loss_rate.clamp_(min=1e-4)
+
+    def _push_some(self) -> None:
+        due = self._age >= self._push_at
+        kick = self._push * self._uniform(-1.0, 1.0, (self.n, 6))
+        self.robots.qvel[:, :6] += torch.where(due[:, None], kick, 0.0)
+        self._push_at = torch.where(due, self._age + self._waits(), self._push_at)
+
+    def _waits(self) -> torch.Tensor:
+        return (self._uniform(*PUSH_EVERY_S, (self.n,)) / self.motions.dt).long()
+
+    def _whole(self, below: int) -> torch.Tensor:
+        return torch.randint(below, (self.n,), generator=self._random, device=self._device)
+
+    def _uniform(self, low: float, high: float, shape: tuple[int, ...]) -> torch.Tensor:
+        drawn = torch.rand(shape, generator=self._random, device=self._device)
+        return low + (high - low) * drawn
+
+    def _normal(self, shape: torch.Size) -> torch.Tensor:
+        return torch.randn(shape, generator=self._random, device=self._device)

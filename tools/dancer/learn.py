@@ -1,0 +1,103 @@
+"""Teach the dancer: one policy that follows every motion of a pack and its mirror image.
+
+    pip install -r tools/dancer/requirements.txt
+    python -m tools.dancer.learn PACK.npz -o OUT [--seconds 480] [--robots 8192] [--seed 0]
+        [--start OUT/dancer.npz] [--device cuda]
+
+OUT gets `dancer.npz`, which a training goes on from, every minute and at the end, and `curve.csv`,
+a row every ten rounds. `tools.dancer.ship` writes the tracker's file. An H100 does 380,000 control
+steps a second; `--device cpu`, which needs no Warp, a thousand.
+"""
+
+import argparse
+import csv
+import time
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from tools.dancer.mujoco_robots import MujocoRobots, Robots
+from tools.dancer.network import Dancer, restore, save
+from tools.dancer.ppo import Trainer
+from tools.dancer.rehearsal import Rehearsal
+
+HORIZON, REPORT_ROUNDS, SAVE_S, JUDGED_S = 24, 10, 60.0, 8.0
+FIRST_RATE, LATER_RATE = 1e-3, 1e-4
+
+
+def robots_on(device: str, pack: dict[str, np.ndarray], n: int) -> Robots:
+    """Return N robots that a device simulates."""
+    if device == "cpu":
+        return MujocoRobots(pack, n)
+    from tools.dancer.warp_robots import WarpRobots
+
+    return WarpRobots(pack, n, device)
+
+
+@torch.no_grad()
+def survival(rehearsal: Rehearsal, dancer: Dancer, seconds: float) -> float:
+    """Return the share of robots, begun anywhere without pushes, that are not lost within the time
+    or before the end of their motion."""
+    rehearsal.calm(rehearsal.anywhere())
+    done = torch.zeros(rehearsal.n, dtype=torch.bool, device=rehearsal.seen.device)
+    lost = done.clone()
+    for _ in range(round(seconds / rehearsal.motions.dt)):
+        outcome = rehearsal.step(dancer.act(dancer.scale(rehearsal.seen)))
+        lost |= outcome.lost & ~done
+        done |= outcome.lost | outcome.over
+    return 1.0 - float(lost.float().mean())
+
+
+def main() -> None:
+    """Train until the time is over."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("pack", type=Path)
+    parser.add_argument("-o", "--out", type=Path, required=True)
+    parser.add_argument("--seconds", type=float, default=480.0)
+    parser.add_argument("--robots", type=int, default=8192)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--start", type=Path)
+    parser.add_argument("--device", default="cuda")
+    given = parser.parse_args()
+    given.out.mkdir(parents=True, exist_ok=True)
+    torch.manual_seed(given.seed)
+    torch.set_float32_matmul_precision("high")
+    with np.load(given.pack) as file:
+        pack = {name: file[name] for name in file.files}
+    robots = robots_on(given.device, pack, given.robots)
+    rehearsal = Rehearsal(pack, robots, given.device, given.seed)
+    dancer = Dancer(rehearsal.sight.actor_size, rehearsal.seen.shape[1], rehearsal.action.shape[1])
+    steps = restore(dancer, given.start) if given.start else 0
+    rate = LATER_RATE if given.start else FIRST_RATE
+    trainer = Trainer(dancer.to(given.device), rehearsal, HORIZON, rate)
+    steps = learn(trainer, given.out, given.seconds, steps)
+    held = survival(rehearsal, dancer, JUDGED_S)
+    print(f"{steps} steps; of robots begun anywhere {held:.3f} hold {JUDGED_S:g} s", flush=True)
+
+
+def learn(trainer: Trainer, out: Path, seconds: float, steps: int) -> int:
+    """Go on round by round; report and save; return the control steps so far."""
+    began = saved = time.monotonic()
+    number = 0
+    with (out / "curve.csv").open("a", newline="") as file:
+        table = csv.writer(file)
+        while time.monotonic() - began < seconds:
+            figures = trainer.round()
+            steps, number = steps + trainer.round_steps, number + 1
+            if number % REPORT_ROUNDS == 1:
+                row = {"seconds": time.monotonic() - began, "steps": steps, **figures}
+                if file.tell() == 0:
+                    table.writerow(row)
+                table.writerow([f"{value:.5g}" for value in row.values()])
+                file.flush()
+                print(" ".join(f"{key} {value:.4g}" for key, value in row.items()), flush=True)
+            if time.monotonic() - saved > SAVE_S:
+                save(trainer.dancer, out / "dancer.npz", steps)
+                saved = time.monotonic()
+    save(trainer.dancer, out / "dancer.npz", steps)
+    return steps
+
+
+if __name__ == "__main__":
+    main()

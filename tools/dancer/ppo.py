@@ -1,0 +1,157 @@
+"""Proximal policy optimisation (Schulman et al., 2017) of the dancer, on one device.
+
+Generalised advantages (Schulman et al., 2016); the step of Adam follows the divergence of the
+policy, as in rsl_rl.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from torch import nn
+
+from tools.dancer.network import Dancer
+from tools.dancer.rehearsal import Rehearsal
+
+GAMMA, LAMBDA, CLIP = 0.99, 0.95, 0.2
+EPOCHS, PARTS = 5, 4
+ENTROPY, VALUE, MOST_GRADIENT = 0.0005, 1.0, 1.0
+DIVERGENCE, LEAST_RATE, MOST_RATE = 0.014, 2e-5, 2e-3
+
+
+@dataclass
+class Round:
+    """What the robots did for T steps, (T, N, ...) each; `seen` is scaled."""
+
+    seen: torch.Tensor
+    action: torch.Tensor
+    reward: torch.Tensor
+    done: torch.Tensor
+    value: torch.Tensor
+    log_likelihood: torch.Tensor
+    mean: torch.Tensor
+    last_value: torch.Tensor
+    lost: float
+    over: float
+
+
+class Trainer:
+    """Dancer and robots, round by round.
+
+    Args:
+        horizon: Control steps of a round.
+        rate: First step of Adam; a trained dancer needs a small one, because Adam's first steps
+            are as long as its later ones.
+    """
+
+    def __init__(self, dancer: Dancer, rehearsal: Rehearsal, horizon: int, rate: float) -> None:
+        self.dancer, self._rehearsal, self._horizon = dancer, rehearsal, horizon
+        self._rate, on_gpu = rate, rehearsal.seen.is_cuda
+        self._optimiser = torch.optim.Adam(dancer.parameters(), lr=rate, fused=on_gpu)
+
+    @property
+    def round_steps(self) -> int:
+        """Control steps of a round, of all robots together."""
+        return self._horizon * self._rehearsal.n
+
+    def round(self) -> dict[str, float]:
+        """Rehearse and learn; return figures."""
+        done = self._rehearse()
+        advantage = advantages(done)
+        losses = self._learn(done, advantage)
+        steps = done.reward.numel()
+        ends = max(1.0, done.lost + done.over)
+        deviation = float(self.dancer.log_deviation.detach().exp().mean())
+        return {"reward": float(done.reward.mean()), "lost": done.lost / steps,
+                "episode_steps": steps / ends, "deviation": deviation, "rate": self._rate,
+                **losses}  # fmt: skip
+
+    @torch.no_grad()
+    def _rehearse(self) -> Round:
+        dancer, rehearsal = self.dancer, self._rehearsal
+        rows: dict[str, list[torch.Tensor]] = {
+            name: [] for name in ("seen", "action", "reward", "done", "value", "log", "mean")
+        }
+        lost = over = torch.zeros((), device=rehearsal.seen.device)
+        dancer.scale.learn(rehearsal.seen)
+        deviation = dancer.log_deviation.exp()
+        for _ in range(self._horizon):
+            seen = dancer.scale(rehearsal.seen)
+            mean, value = dancer.act(seen), dancer.value(seen)
+            action = mean + deviation * torch.randn_like(mean)
+            outcome = rehearsal.step(action)
+            reward = outcome.reward + GAMMA * value * outcome.over  # as if it went on
+            log = _log_likelihood(action, mean, dancer.log_deviation)
+            values = (seen, action, reward, outcome.lost | outcome.over, value, log, mean)
+            for name, one in zip(rows, values, strict=True):
+                rows[name].append(one)
+            lost, over = lost + outcome.lost.sum(), over + outcome.over.sum()
+        last = dancer.value(dancer.scale(rehearsal.seen))
+        stacked = [torch.stack(rows[name]) for name in rows]
+        return Round(*stacked, last, float(lost), float(over))
+
+    def _learn(self, done: Round, advantage: torch.Tensor) -> dict[str, float]:
+        goal = (advantage + done.value).flatten()
+        scaled = ((advantage - advantage.mean()) / (advantage.std() + 1e-8)).flatten()
+        seen, action, mean = (x.flatten(0, 1) for x in (done.seen, done.action, done.mean))
+        before, log_deviation = (
+            done.log_likelihood.flatten(),
+            self.dancer.log_deviation.detach().clone(),
+        )
+        count = len(goal)
+        figures = torch.zeros(3, device=goal.device)
+        for _ in range(EPOCHS):
+            order = torch.randperm(count, device=goal.device)
+            for rows in order.chunk(PARTS):
+                now = self.dancer.act(seen[rows])
+                log = _log_likelihood(action[rows], now, self.dancer.log_deviation)
+                ratio = torch.exp(log - before[rows])
+                gain = scaled[rows]
+                clipped = ratio.clamp(1 - CLIP, 1 + CLIP)
+                policy = -torch.minimum(ratio * gain, clipped * gain).mean()
+                value = (self.dancer.value(seen[rows]) - goal[rows]).square().mean()
+                loss = policy + VALUE * value - ENTROPY * self.dancer.log_deviation.sum()
+                self._optimiser.zero_grad(set_to_none=True)
+                loss.backward()
+                nn.utils.clip_grad_norm_(self.dancer.parameters(), MOST_GRADIENT)
+                self._optimiser.step()
+                apart = _divergence(
+                    mean[rows], log_deviation, now.detach(), self.dancer.log_deviation.detach()
+                )
+                figures += torch.stack([policy.detach(), value.detach(), apart])
+            self._adapt(float(apart))
+        policy, value, apart = (figures / (EPOCHS * PARTS)).tolist()
+        return {"policy_loss": policy, "value_loss": value, "divergence": apart}
+
+    def _adapt(self, divergence: float) -> None:
+        if divergence > 2 * DIVERGENCE:
+            self._rate = max(LEAST_RATE, self._rate / 1.5)
+        elif divergence < DIVERGENCE / 2:
+            self._rate = min(MOST_RATE, self._rate * 1.5)
+        for group in self._optimiser.param_groups:
+            group["lr"] = self._rate
+
+
+def advantages(done: Round) -> torch.Tensor:
+    """Return the generalised advantages of a round, (T, N); none crosses an episode's end."""
+    advantage = torch.zeros_like(done.reward)
+    coming, next_value = torch.zeros_like(done.last_value), done.last_value
+    for k in range(len(done.reward) - 1, -1, -1):
+        going = 1.0 - done.done[k].float()
+        error = done.reward[k] + GAMMA * next_value * going - done.value[k]
+        coming = error + GAMMA * LAMBDA * going * coming
+        advantage[k], next_value = coming, done.value[k]
+    return advantage
+
+
+def _log_likelihood(
+    action: torch.Tensor, mean: torch.Tensor, log_deviation: torch.Tensor
+) -> torch.Tensor:
+    apart = (action - mean) / log_deviation.exp()
+    return -(0.5 * apart.square() + log_deviation).sum(-1)
+
+
+def _divergence(
+    mean: torch.Tensor, log: torch.Tensor, new: torch.Tensor, new_log: torch.Tensor
+) -> torch.Tensor:
+    ratio = (2 * (log - new_log)).exp() + ((mean - new) / new_log.exp()).square()
+    return (new_log - log + 0.5 * ratio - 0.5).sum(-1).mean()
