@@ -16,7 +16,12 @@ from flows.video_pass.motion_stages import to_reference
 from flows.video_pass.pass_progress import announce
 from flows.video_pass.scored_candidates import Candidate, choose, page_settings, score_all
 from flows.video_pass.time_budget import training_time
-from flows.video_pass.tracker_stages import TrackedDance, chosen_tracker, track
+from flows.video_pass.tracker_stages import (
+    TrackedDance,
+    at_the_tempo_it_holds,
+    chosen_tracker,
+    track,
+)
 from robojackson.clips.quality.advice import advise
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.pipeline.pipeline_config import PipelineConfig
@@ -102,6 +107,8 @@ async def perform(
             check(json.loads(Store.from_environment().read(moved["scorecard"].key)))
         shown = page_settings(best, candidates, robot, settings)
         tracked = None
+        if tracker is not None and settings.instant:
+            moved = at_the_tempo_it_holds(tracker, best.clip, moved, robot, settings, labels)
         if tracker is not None:
             tracked = track(tracker, best, moved, robot, settings, labels, shown)
         if tracked is not None and settings.instant:

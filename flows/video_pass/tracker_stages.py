@@ -7,16 +7,19 @@ the same address.
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from flows.video_pass.motion_stages import to_reference
 from flows.video_pass.pass_progress import announce
 from flows.video_pass.scored_candidates import Candidate
+from flows.video_pass.slower_dance import slower_where_it_falls
 from robojackson.errors import BadPolicy, MissingDependency
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.tracker_descriptions import require_tracker
 from robojackson.rl.trackers.tracker_description import TrackerDescription
 from robojackson.robot.model import RobotDescription
 from storage.artifact import Artifact
+from storage.store import Store
 from tasks.draw_pictures import draw_snapshot
 from tasks.evaluate_dance import evaluate_tracker, first_look
 from tasks.render_video import render_video
@@ -72,6 +75,40 @@ def chosen_tracker(robot: RobotDescription, settings: PipelineConfig) -> Tracker
         return None
     unasked = found is not None and found.fallback and settings.tracker is None
     return None if unasked and not settings.instant else found
+
+
+def at_the_tempo_it_holds(
+    tracker: TrackerDescription,
+    clip: Artifacts,
+    moved: Artifacts,
+    robot: RobotDescription,
+    settings: PipelineConfig,
+    labels: RunLabels,
+) -> Artifacts:
+    """Return the retargeted clip of an instant dance, slowed down where the tracker falls and the
+    tempo is not given.
+
+    Args:
+        clip: `video` and `info`.
+        moved: The clip at its own tempo: `landmarks`, `smpl`, `reference` and `scorecard`.
+    """
+    if settings.retarget.tempo != "auto" or not settings.instant_tempos:
+        return moved
+
+    def retargeted(tempo: float) -> Artifacts:
+        announce(f"retargeting at tempo {tempo:g}")
+        at_once = replace(settings, retarget=replace(settings.retarget, tempo=tempo))
+        return to_reference(clip, robot, at_once)
+
+    def look(motion: Artifacts) -> float:
+        announce("tracking")
+        config = first_look(settings.evaluate)
+        found = evaluate_tracker(tracker, motion["reference"], robot, config, labels)
+        verdict = json.loads(Store.from_environment().read(found["evaluation"].key))
+        strict = verdict["strict_success"]
+        return 1.0 if strict is None else float(strict)  # null: too short an evaluation to tell
+
+    return slower_where_it_falls(moved, settings.instant_tempos, retargeted, look, settings.gate)
 
 
 def track(

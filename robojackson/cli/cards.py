@@ -11,6 +11,7 @@ from typing import Any
 
 from robojackson.cli.console import lines
 from robojackson.cli.lifetime.interruption import program
+from robojackson.motion.reference_motion import tempo_beside_clip
 from robojackson.retarget.scorecard_gate import BARS, failures
 
 Answer = Mapping[str, Any]
@@ -152,8 +153,7 @@ def retarget_lines(answer: Answer) -> list[str]:
     rows = [
         f"robot                     {answer['robot']}, {answer['steps']} steps of "
         f"{step_ms:.3g} ms, {seconds:.1f} s, {kind}",
-        f"tempo                     {card.get('tempo_mean', card.get('tempo', 1.0)):.2f} of the "
-        "dancer's",
+        f"tempo                     {tempo_beside_clip(card):.2f} of the dancer's",
         f"keypoints                 {_figure(card, 'keypoint_leaned_mm', 1)} mm off, bones "
         f"{_figure(card, 'bone_deg', 1)} degrees",
         *sway,
@@ -180,7 +180,7 @@ def retarget_verdict(card: Mapping[str, Any]) -> dict[str, str]:
             "sentence": f"The robot cannot follow this: {failed[0].replace('_', ' ')} is "
             f"{card.get(failed[0], math.nan):.3g}, at most {BARS[failed[0]]:g} is allowed.",
         }
-    tempo = card.get("tempo_mean", card.get("tempo", 1.0))
+    tempo = tempo_beside_clip(card)
     slow = "" if tempo > 0.995 else f" at {tempo:.2f} of the dancer's tempo"
     return {"kind": "feasible", "sentence": f"The robot can do this motion{slow}."}
 

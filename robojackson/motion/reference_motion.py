@@ -132,7 +132,8 @@ class ReferenceMotion(TableFile):
 
     def __repr__(self) -> str:
         kind = "cyclic" if self.cyclic else "not cyclic"
-        slow = f", tempo={self.scorecard['tempo']:.2f}" if "tempo" in self.scorecard else ""
+        known = "tempo" in self.scorecard
+        slow = f", tempo={tempo_beside_clip(self.scorecard):.2f}" if known else ""
         return (
             f"ReferenceMotion(robot={self.robot!r}, {len(self)} steps of {1000 * self.dt:g} ms, "
             f"{len(self) * self.dt:.1f} s, {kind}{slow})"
@@ -183,6 +184,12 @@ def _require_widths(arrays: Mapping[str, np.ndarray], facts: Facts) -> None:
             raise ValueError(f"{name} has a name twice")
     if (abs(np.linalg.norm(arrays["qpos"][:, 3:7], axis=1) - 1.0) > UNIT).any():
         raise ValueError("qpos: the root's quaternion has not length one")
+
+
+def tempo_beside_clip(card: Mapping[str, Any]) -> float:
+    """Return the tempo of a motion beside its clip's by its score card: the given one times what
+    retargeting slowed it down to; 1 where the card has neither."""
+    return float(card.get("tempo", 1.0)) * float(card.get("tempo_mean", 1.0))
 
 
 def motions_of(

@@ -1,5 +1,7 @@
 """Configuration of the whole pipeline: one section a stage, each defined beside its code."""
 
+from typing import Annotated
+
 from pydantic import Field
 
 from robojackson.clips.people.dancer import DancerConfig
@@ -28,6 +30,9 @@ class PipelineConfig:
         detector: Pose model that feeds mocap; best lets two vote.
         dancer: Which of several people to follow.
         instant: Whether a tracker dances at once and nothing is trained.
+        instant_tempos: Tempos, ratio to the clip's, that an instant dance tries one after the other
+            while the tracker falls from half of its starts; none keeps the motion's own, and so
+            does a `retarget.tempo` that is not `auto`.
         tracker: Name of the tracker (`configs/trackers`) whose dance is on the page first; null is
             the first for the robot whose file is here, `none` is no tracker.
         gate: Refuse to train on a reference motion that breaks a hard bar of its score card.
@@ -42,6 +47,7 @@ class PipelineConfig:
     detector: Quality = "full"
     dancer: DancerConfig = Field(default_factory=DancerConfig)
     instant: bool = False
+    instant_tempos: tuple[Annotated[float, Field(ge=0.25, lt=1.0)], ...] = (0.93, 0.87, 0.8)
     tracker: str | None = None
     gate: bool = True
     video: VideoLimits = Field(default_factory=VideoLimits)

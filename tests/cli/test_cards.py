@@ -53,6 +53,11 @@ def test_the_card_has_a_bar_for_every_gated_figure_and_ends_with_the_verdict() -
     assert lines[-1] == "The robot can do this motion at 0.78 of the dancer's tempo."
 
 
+def test_a_tempo_that_was_given_counts() -> None:
+    result = cards.retarget_verdict(CARD | {"tempo": 0.5, "tempo_mean": 1.0})
+    assert result["sentence"].endswith("at 0.50 of the dancer's tempo.")
+
+
 def test_a_motion_over_a_bar_is_refused_by_the_name_of_the_figure() -> None:
     result = cards.retarget_verdict(CARD | {"planted_slip_cm_s": 7.0})
     assert result["kind"] == "refused"

@@ -92,7 +92,7 @@ def page_content(results: Results, video: str | None) -> PageContent:
         source=_source(results.info),
         stability=asdict(results.stability) if results.stability else {},
         mocap=_mocap(results.sequence),
-        scorecard=results.reference.scorecard,
+        scorecard=_scorecard(results.reference.scorecard),
         training=results.training,
         evaluation=results.evaluation,
         video=video,
@@ -233,3 +233,10 @@ def _dynamics(reference: ReferenceMotion) -> list[Plot]:
 
 def _plot(title: str, caption: str, figure: Any) -> Plot:
     return Plot(title, caption, run_plots.png(figure))
+
+
+def _scorecard(card: Mapping[str, float]) -> dict[str, float]:
+    """Return the score card with tempos beside the clip's, whatever tempo was given."""
+    given = card.get("tempo", 1.0)
+    return {**card, **{name: given * card[name] for name in ("tempo_mean", "tempo_min")
+                       if name in card}}  # fmt: skip

@@ -14,7 +14,7 @@ from robojackson.metrics.rollout_score import (
     site_error,
     skill,
 )
-from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.reference_motion import ReferenceMotion, tempo_beside_clip
 from robojackson.rl.config.train_config import EvaluateConfig
 from robojackson.rl.evaluation.rollouts import Rollouts
 from robojackson.rl.evaluation.strict_success import StrictEvaluator
@@ -43,8 +43,7 @@ class RolloutScorer:
         self._strict = StrictEvaluator(robot, reference, config)
         self._limbs = {name: names.index(name) for name in LIMB_ENDS}
         self._model, self._joints = robot.model, robot.joint_names
-        requested, slowed = (reference.scorecard.get(key, 1.0) for key in ("tempo", "tempo_mean"))
-        self._tempo = float(requested * slowed)
+        self._tempo = tempo_beside_clip(reference.scorecard)
 
     def row(
         self, policy: str, label: tuple[int, int], rollouts: Rollouts, i: int
