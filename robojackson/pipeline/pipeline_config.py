@@ -47,7 +47,7 @@ class PipelineConfig:
     detector: Quality = "full"
     dancer: DancerConfig = Field(default_factory=DancerConfig)
     instant: bool = False
-    instant_tempos: tuple[Annotated[float, Field(ge=0.25, lt=1.0)], ...] = (0.93, 0.87, 0.8)
+    instant_tempos: tuple[Annotated[float, Field(ge=0.25, lt=1.0)], ...] = (0.87,)
     tracker: str | None = None
     gate: bool = True
     video: VideoLimits = Field(default_factory=VideoLimits)

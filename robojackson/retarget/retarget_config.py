@@ -44,6 +44,8 @@ class RetargetConfig:
         cyclic: Whether to close the clip to a cycle; auto decides by the seam.
         tempo: Speed of the motion, ratio to the clip's, below 1 slower; auto slows it down where
             that lets the robot do it.
+        slower_tempos: Tempos, ratio to the clip's, that `tempo: auto` tries one after the other
+            where the gate refuses a motion that is nearly feasible.
         seed: Seed of the random starts of the per-frame solver.
         starts: Poses from which every frame is solved.
         lean_deg: Largest lean that puts a body that stays on both feet over them, degrees.
@@ -62,6 +64,7 @@ class RetargetConfig:
     method: Literal["optimise", "paper", "framefix"] = "optimise"
     cyclic: Literal["auto", "yes", "no"] = "auto"
     tempo: Literal["auto"] | Annotated[float, Field(ge=0.25, le=2.0)] = "auto"
+    slower_tempos: tuple[Annotated[float, Field(ge=0.25, lt=1.0)], ...] = (0.93, 0.87, 0.8)
     seed: int = Field(default=0, ge=0)
     starts: int = Field(default=5, ge=1)
     lean_deg: float = Field(default=9.0, ge=0, lt=45)

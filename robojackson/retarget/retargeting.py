@@ -5,6 +5,7 @@ cheaper one polished at the control rate. paper: Table I of RoboJackson, literal
 same with the axes and signs of the hinges corrected.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -39,6 +40,12 @@ A_ROW_A_STEP = (
 OF_THE_CLIP = ("keypoint_", "bone_", "infeasible_", "slack_", "torque_", "contact_", "planted_",
                "unsupported_", "velocity_")  # fmt: skip
 """Beginnings of the figures that stands before and after the clip would flatter."""
+MENDED_BY_TIME = {
+    "infeasible_share", "unsupported_share", "speed_over_limit", "seam_speed_rad_s",
+}  # fmt: skip
+"""Figures of the gate that a slower motion mends."""
+MOST_INFEASIBLE = 0.3
+"""Share of infeasible steps beyond which no slower motion is tried."""
 __all__ = ["RetargetConfig", "assemble", "retarget_motion"]
 
 
@@ -48,9 +55,29 @@ def retarget_motion(
     """Return the reference motion of a human motion, at the robot's control step, score card
     inside.
 
+    With `tempo: auto`, a motion that the gate refuses although it is nearly feasible is solved
+    again as a slower one; the fastest that passes the gate is returned, or else the first.
+
     Raises:
         TrackTooShort: Fewer frames than the solver needs.
     """
+    found = _retargeted(sequence, robot, config)
+    if config.tempo != "auto" or config.method != "optimise" or not _slower_helps(found.scorecard):
+        return found
+    for tempo in config.slower_tempos:
+        slower = _retargeted(sequence, robot, replace(config, tempo=tempo))
+        if not failures(slower.scorecard):
+            return slower
+    return found
+
+
+def _slower_helps(card: Mapping[str, float]) -> bool:
+    """Return whether a motion may pass the gate as a slower one."""
+    failed = set(failures(card))
+    return bool(failed) and failed <= MENDED_BY_TIME and card["infeasible_share"] <= MOST_INFEASIBLE
+
+
+def _retargeted(sequence: SmplSequence, robot: Robot, config: RetargetConfig) -> ReferenceMotion:
     dt = robot.description.control_dt
     cyclic = config.cyclic if config.method == "optimise" else "no"
     whole, cuts = len(sequence), config.cut_glides and config.method == "optimise"

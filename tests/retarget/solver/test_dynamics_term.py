@@ -104,7 +104,7 @@ def test_steps_outside_the_spans_stay_as_they_are(robot: Robot):
 
 @pytest.mark.medium
 def test_repair_makes_a_walk_feasible_that_was_not(robot: Robot):
-    config = RetargetConfig(repair=UNREPAIRED)
+    config = RetargetConfig(repair=UNREPAIRED, slower_tempos=())
     before, after = retarget_motion(human("walk"), robot, config), robot_motion("walk")
     assert before.scorecard["infeasible_share"] > 0.1
     assert after.scorecard["infeasible_share"] <= 0.05
@@ -113,7 +113,7 @@ def test_repair_makes_a_walk_feasible_that_was_not(robot: Robot):
 
 @pytest.mark.medium
 def test_a_motion_that_is_feasible_is_left_alone(robot: Robot):
-    config = RetargetConfig(repair=UNREPAIRED)
+    config = RetargetConfig(repair=UNREPAIRED, slower_tempos=())
     np.testing.assert_array_equal(
         retarget_motion(human("hip_shake"), robot, config).qpos, robot_motion("hip_shake").qpos
     )
