@@ -226,7 +226,8 @@ def _made(move: Move, work: Path) -> int:
     assert source is not None
     blas = frozen_kernels()
     must("import" if move.is_foreign else "mocap", source, "-o", work, blas=blas)
-    options = ["--set", "retarget.cyclic=no"] if move.authors else []
+    options = ["--set", "retarget.slower_tempos=[]"]  # as they were frozen
+    options += ["--set", "retarget.cyclic=no"] if move.authors else []
     words = ("retarget", work / "smpl.parquet", "-o", work, "--robot", move.robot, *options)
     return command(*words, blas=blas)
 
