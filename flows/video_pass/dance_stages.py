@@ -107,9 +107,9 @@ async def perform(
             check(json.loads(Store.from_environment().read(moved["scorecard"].key)))
         shown = page_settings(best, candidates, robot, settings)
         tracked = None
-        if tracker is not None and settings.instant:
-            moved = at_the_tempo_it_holds(tracker, best.clip, moved, robot, settings, labels)
         if tracker is not None:
+            if settings.instant:
+                moved = at_the_tempo_it_holds(tracker, best.clip, moved, robot, settings, labels)
             tracked = track(tracker, best, moved, robot, settings, labels, shown)
         if tracked is not None and settings.instant:
             made = tracked.made

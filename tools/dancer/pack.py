@@ -21,6 +21,7 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import ControlConfig, ResetConfig
 from robojackson.rl.modes.reset_states import default_standing_pose
 from robojackson.rl.modes.rewards import tracked_points
+from robojackson.rl.sim import disturbances
 from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.motors import Motors, gains, residual_scale
 from robojackson.robot.mjcf import described_spec, mjcf_path
@@ -30,6 +31,11 @@ from tools.dancer.mirror import hinge_partners, partners
 ACTION_FACTOR = 4.0
 """Full action of the dancer in full actions of the robot: a robot has to step after a push."""
 CONTROL = ControlConfig(feedforward=1.0, feedback=0.0, action_factor=ACTION_FACTOR)
+SENSORS = (
+    disturbances.GYRO_NOISE, disturbances.ATTITUDE_NOISE,
+    disturbances.HINGE_NOISE, disturbances.HINGE_SPEED_NOISE,
+)  # fmt: skip
+"""mjlab's noise of the sensors, in the order of `sight.Sight`."""
 CAPTURED_WEIGHT = 3
 """How often robots begin in a second of a captured motion, of an invented one."""
 MOST_ITERATIONS = 5
@@ -74,6 +80,7 @@ def pack(robot: Robot, named: Mapping[str, ReferenceMotion]) -> dict[str, np.nda
         "scale": residual_scale(robot, CONTROL), "rest": robot.standing[7:],
         "standing": default_standing_pose(robot), "root_height": robot.standing[2],
         "mirror_sign": sign, "dt": motions[0].dt, "reset": _reset_noise(),
+        "push": disturbances.PUSH, "sensors": SENSORS,
     }  # fmt: skip
     counts = {
         "length": np.array(lengths), "cyclic": np.array([motion.cyclic for motion in motions]),
@@ -81,7 +88,7 @@ def pack(robot: Robot, named: Mapping[str, ReferenceMotion]) -> dict[str, np.nda
                                                   for i in robot.keypoint_sites]),
         "mirror_hinge": partner, "mirror_point": partners(robot.keypoint_names),
         "pelvis": np.array(points.pelvis), "limbs": np.array(points.limbs),
-        "feet": np.array(points.feet), "hands": np.array(points.hands),
+        "feet": np.array(points.feet),
         "substeps": np.array(robot.substeps),
     }  # fmt: skip
     floats = {

@@ -19,9 +19,8 @@ EPISODE_S, BIN_S, BEFORE_S = 8.0, 0.5, 1.5
 """Longest episode; length of the bins whose losses are counted; longest time before such a bin
 from which a robot begins again."""
 STAND_SHARE, WEAK_SHARE, FORGET, FIRST_RATE = 0.03, 0.5, 0.002, 0.02
-PUSH = (0.5, 0.5, 0.2, 0.52, 0.52, 0.78)
-"""mjlab's pushes: change of the root's velocity, m/s and rad/s."""
 PUSH_EVERY_S, PUSHES = (1.0, 4.0), 0.5
+"""Time between pushes; their size, multiples of the pack's."""
 FRICTION, STRENGTH = (0.6, 1.3), (0.9, 1.1)
 """Factors on friction and on the gains, uniform."""
 
@@ -62,7 +61,7 @@ class Rehearsal:
         )
         self._noise = [float(x) for x in pack["reset"]]
         self._limit = round(EPISODE_S / self.motions.dt)
-        self._push = PUSHES * torch.tensor(PUSH, device=device)
+        self._push = PUSHES * torch.as_tensor(pack["push"], device=device)
         self._motion, self._step, self._age, self._push_at = torch.zeros(
             (4, self.n), dtype=torch.long, device=device
         )

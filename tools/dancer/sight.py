@@ -14,9 +14,8 @@ from tools.dancer.repertoire import Steps, matrix
 SPEED_SCALE, HINGE_SPEED_SCALE, POINT_SCALE, ROOT_SCALE, CLIP = 0.3, 0.1, 2.0, 3.0, 10.0
 USUAL_HEIGHT_M = 1.2
 NOISE = 0.25
-"""Of mjlab's sensor noise."""
-SENSORS = (0.2, 0.05, 0.01, 0.5)
-"""That noise: gyroscope, attitude, hinges, speeds of hinges; uniform between plus and minus."""
+"""Of the pack's noise of gyroscope, attitude, hinges and speeds of hinges, uniform between plus and
+minus."""
 
 
 class Sight:
@@ -32,6 +31,7 @@ class Sight:
     ) -> None:
         self._random, self._rest = random, torch.as_tensor(pack["rest"], device=random.device)
         self.actor_size = 9 + 4 * len(pack["rest"]) + len(pack["scale"]) + preview
+        self._widths = [NOISE * float(width) for width in pack["sensors"]]
         self.noisy = True
 
     def observe(self, robots: Robots, at: Steps, action: torch.Tensor) -> torch.Tensor:
@@ -66,5 +66,5 @@ class Sight:
         shape, device = (len(values[0]), count), self._random.device
         drawn = 2 * torch.rand(shape, generator=self._random, device=device) - 1
         noise = drawn.split([value.shape[1] for value in values], 1)
-        return [value + NOISE * width * one
-                for value, width, one in zip(values, SENSORS, noise, strict=True)]  # fmt: skip
+        return [value + width * one
+                for value, width, one in zip(values, self._widths, noise, strict=True)]  # fmt: skip
