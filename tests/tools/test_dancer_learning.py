@@ -130,7 +130,7 @@ def test_observations_are_those_of_the_environment() -> None:
                                                    for x in (qpos, qvel, points)))  # fmt: skip
     observer, every = Observer(robot, "preview"), Motions(packed(), "cpu")
     sight = Sight(packed(), every.preview.shape[1], torch.Generator())
-    sight.noisy = False
+    sight.noise.zero_()
     mine = sight.observe(robots, every.at(MOTION, steps() // 2), torch.tensor(action).float())
     own = observer.observe(qpos, qvel, points, at, action)
     assert sight.actor_size == observer.actor_size

@@ -22,7 +22,7 @@ from tools.dancer.network import Dancer, restore, save
 from tools.dancer.ppo import Trainer
 from tools.dancer.rehearsal import Rehearsal
 
-HORIZON, REPORT_ROUNDS, SAVE_S, JUDGED_S = 24, 10, 60.0, 8.0
+HORIZON, REPORT_ROUNDS, SAVE_S, JUDGED_S = 16, 20, 60.0, 8.0
 FIRST_RATE, LATER_RATE = 1e-3, 1e-4
 
 

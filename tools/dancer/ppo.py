@@ -9,13 +9,14 @@ from dataclasses import dataclass
 import torch
 from torch import nn
 
+from tools.dancer.device_graph import recorded
 from tools.dancer.network import Dancer
 from tools.dancer.rehearsal import Rehearsal
 
 GAMMA, LAMBDA, CLIP = 0.99, 0.95, 0.2
 EPOCHS, PARTS = 5, 4
 ENTROPY, VALUE, MOST_GRADIENT = 0.0005, 1.0, 1.0
-DIVERGENCE, LEAST_RATE, MOST_RATE = 0.014, 2e-5, 2e-3
+DIVERGENCE, LEAST_RATE, MOST_RATE = 0.02, 2e-5, 2e-3
 
 
 @dataclass
@@ -47,6 +48,12 @@ class Trainer:
         self.dancer, self._rehearsal, self._horizon = dancer, rehearsal, horizon
         self._rate, on_gpu = rate, rehearsal.seen.is_cuda
         self._optimiser = torch.optim.Adam(dancer.parameters(), lr=rate, fused=on_gpu)
+        n, motors = rehearsal.n, len(dancer.log_deviation)
+        shapes = {"seen": rehearsal.seen.shape, "action": (n, motors), "mean": (n, motors),
+                  "value": (n,), "log_likelihood": (n,)}  # fmt: skip
+        device = rehearsal.seen.device
+        self._chosen = {name: torch.zeros(shape, device=device) for name, shape in shapes.items()}
+        self._choose = recorded(self._write_choice, device)
 
     @property
     def round_steps(self) -> int:
@@ -69,25 +76,32 @@ class Trainer:
     def _rehearse(self) -> Round:
         dancer, rehearsal = self.dancer, self._rehearsal
         rows: dict[str, list[torch.Tensor]] = {
-            name: [] for name in ("seen", "action", "reward", "done", "value", "log", "mean")
+            name: [] for name in (*self._chosen, "reward", "lost", "over")
         }
-        lost = over = torch.zeros((), device=rehearsal.seen.device)
         dancer.scale.learn(rehearsal.seen)
-        deviation = dancer.log_deviation.exp()
         for _ in range(self._horizon):
-            seen = dancer.scale(rehearsal.seen)
-            mean, value = dancer.act(seen), dancer.value(seen)
-            action = mean + deviation * torch.randn_like(mean)
-            outcome = rehearsal.step(action)
-            reward = outcome.reward + GAMMA * value * outcome.over  # as if it went on
-            log = _log_likelihood(action, mean, dancer.log_deviation)
-            values = (seen, action, reward, outcome.lost | outcome.over, value, log, mean)
-            for name, one in zip(rows, values, strict=True):
-                rows[name].append(one)
-            lost, over = lost + outcome.lost.sum(), over + outcome.over.sum()
+            self._choose()
+            outcome = rehearsal.step(self._chosen["action"])
+            now = (*self._chosen.values(), outcome.reward, outcome.lost, outcome.over)
+            for name, one in zip(rows, now, strict=True):
+                rows[name].append(one.clone())
         last = dancer.value(dancer.scale(rehearsal.seen))
-        stacked = [torch.stack(rows[name]) for name in rows]
-        return Round(*stacked, last, float(lost), float(over))
+        every = {name: torch.stack(many) for name, many in rows.items()}
+        lost, over = every.pop("lost"), every.pop("over")
+        every["reward"] += GAMMA * every["value"] * over  # as if it went on
+        ended = {"done": lost | over, "last_value": last}
+        return Round(**every, **ended, lost=float(lost.sum()), over=float(over.sum()))
+
+    def _write_choice(self) -> None:
+        """Draw the actions of all robots."""
+        dancer = self.dancer
+        seen = dancer.scale(self._rehearsal.seen)
+        mean = dancer.act(seen)
+        action = mean + dancer.log_deviation.exp() * torch.randn_like(mean)
+        log = _log_likelihood(action, mean, dancer.log_deviation)
+        choice = (seen, action, mean, dancer.value(seen), log)
+        for held, one in zip(self._chosen.values(), choice, strict=True):
+            held.copy_(one)
 
     def _learn(self, done: Round, advantage: torch.Tensor) -> dict[str, float]:
         goal = (advantage + done.value).flatten()

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
+from tools.dancer.device_graph import recorded
 from tools.dancer.mujoco_robots import Robots
 from tools.dancer.rehearsal_reward import Scoring
 from tools.dancer.repertoire import Motions, Steps, heading
@@ -18,8 +19,10 @@ from tools.dancer.sight import Sight
 EPISODE_S, BIN_S, BEFORE_S = 8.0, 0.5, 1.5
 """Longest episode; length of the bins whose losses are counted; longest time before such a bin
 from which a robot begins again."""
-STAND_SHARE, WEAK_SHARE, FORGET, FIRST_RATE = 0.03, 0.5, 0.002, 0.02
-PUSH_EVERY_S, PUSHES = (1.0, 4.0), 0.5
+STAND_SHARE, WEAK_SHARE, FORGET, FIRST_RATE = 0.03, 0.35, 0.002, 0.02
+MOST_RATE = 0.03
+"""Loss rate of a bin at most in the draw: a place that no robot passes takes no more starts."""
+PUSH_EVERY_S, PUSHES = (1.0, 4.0), 0.25
 """Time between pushes; their size, multiples of the pack's."""
 FRICTION, STRENGTH = (0.6, 1.3), (0.9, 1.1)
 """Factors on friction and on the gains, uniform."""
@@ -65,7 +68,8 @@ class Rehearsal:
         self._motion, self._step, self._age, self._push_at = torch.zeros(
             (4, self.n), dtype=torch.long, device=device
         )
-        self.action = torch.zeros_like(robots.targets)
+        self.action, self._next = torch.zeros_like(robots.targets), torch.zeros_like(robots.targets)
+        self._before = torch.zeros_like(robots.points)
         rows = torch.arange(len(self.motions.qpos), device=device)
         self._bin = rows // round(BIN_S / self.motions.dt)
         self.loss_rate = torch.full((int(self._bin[-1]) + 1,), FIRST_RATE, device=device)
@@ -74,40 +78,64 @@ class Rehearsal:
         robots.strength.copy_(self._uniform(*STRENGTH, (self.n,)))
         robots.friction.mul_(self._uniform(*FRICTION, (self.n, 1, 1)))
         self._begin(torch.ones(self.n, dtype=torch.bool, device=device))
-        self._age = self._whole(self._limit)
+        self._age.copy_(self._whole(self._limit))
         self.seen = self._observe()
+        none = torch.zeros(self.n, dtype=torch.bool, device=device)
+        self._outcome = Outcome(torch.zeros(self.n, device=device), none, none.clone())
+        self._aim = recorded(self._set_targets, self.seen.device, self._random)
+        self._conclude = recorded(self._take_stock, self.seen.device, self._random)
 
     def step(self, action: torch.Tensor) -> Outcome:
-        """Act for one control step, -1..1; robots whose episodes end begin new ones."""
-        action, robots = action.clamp(-1, 1), self.robots
-        at, before = self._following(), self.robots.points
-        robots.targets.copy_(at.qpos[:, 7:][:, self._hinge] + at.lead + self._scale * action)
-        robots.step()
-        change, self.action = (action - self.action).square().mean(1), action
-        self._step, self._age = self._step + 1, self._age + 1
-        moved = (robots.points - before) / self.motions.dt
-        reward, lost = self._scoring.judge(robots, at, moved, change)
-        ended = self.motions.ended(self._motion, self._step) | (self._age >= self._limit)
-        self._count(lost)
-        if self.sight.noisy:
-            self._push_some()
-        self._begin(lost | ended)
-        self.seen = self._observe()
-        return Outcome(reward, lost, ended & ~lost)
+        """Act for one control step, -1..1; robots whose episodes end begin new ones.
+
+        The next step writes over the tensors of the outcome.
+        """
+        self._next.copy_(action)
+        self._aim()
+        self.robots.step()
+        self._conclude()
+        return self._outcome
 
     def calm(self, rows: torch.Tensor) -> None:
         """Begin all episodes again at rows of the motions (N,), without pushes and noise of the
         sensors from now on."""
-        self.sight.noisy = False
+        self.sight.noise.zero_()
         self._begin(torch.ones(self.n, dtype=torch.bool, device=self._device), rows)
-        self.seen = self._observe()
+        self.seen.copy_(self._observe())
 
     def anywhere(self) -> torch.Tensor:
         """Return rows of the motions, (N,), captured ones more often."""
-        chosen = torch.multinomial(self._weight, self.n, replacement=True, generator=self._random)
+        chosen = self._chosen(self._weight)
         length = self.motions.length[chosen]
         part = (self._uniform(0.0, 1.0, (self.n,)) * length).long()
         return self.motions.first[chosen] + torch.minimum(part, length - 1)
+
+    def _set_targets(self) -> None:
+        """Move the targets of the motors by the next actions."""
+        at = self._following()
+        self._next.clamp_(-1, 1)
+        self._before.copy_(self.robots.points)
+        moved = self._scale * self._next
+        self.robots.targets.copy_(at.qpos[:, 7:][:, self._hinge] + at.lead + moved)
+
+    def _take_stock(self) -> None:
+        """Write the outcome of a control step, begin new episodes and observe."""
+        at, robots = self._following(), self.robots
+        change = (self._next - self.action).square().mean(1)
+        self.action.copy_(self._next)
+        self._step += 1
+        self._age += 1
+        moved = (robots.points - self._before) / self.motions.dt
+        reward, lost = self._scoring.judge(robots, at, moved, change)
+        ended = self.motions.ended(self._motion, self._step) | (self._age >= self._limit)
+        self._count(lost)
+        self._push_some()
+        self._begin(lost | ended)
+        self.seen.copy_(self._observe())
+        results = (reward, lost, ended & ~lost)
+        written = (self._outcome.reward, self._outcome.lost, self._outcome.over)
+        for held, result in zip(written, results, strict=True):
+            held.copy_(result)
 
     def _following(self) -> Steps:
         return self.motions.at(self._motion, self._step + 1)
@@ -133,16 +161,15 @@ class Rehearsal:
         stand[:, 3:7] = torch.stack([torch.cos(yaw), 0 * yaw, 0 * yaw, torch.sin(yaw)], 1)
         qpos, qvel = torch.where(stands, stand, qpos), torch.where(stands, 0.0, qvel)
         self.robots.place(those, qpos, qvel, at.points)
-        self._motion = torch.where(those, motion, self._motion)
-        self._step = torch.where(those, step, self._step)
-        self._age = torch.where(those, 0, self._age)
-        self._push_at = torch.where(those, self._waits(), self._push_at)
-        self.action = torch.where(those[:, None], 0.0, self.action)
+        self._motion.copy_(torch.where(those, motion, self._motion))
+        self._step.copy_(torch.where(those, step, self._step))
+        self._age.masked_fill_(those, 0)
+        self._push_at.copy_(torch.where(those, self._waits(), self._push_at))
+        self.action.masked_fill_(those[:, None], 0.0)
 
     def _drawn(self) -> torch.Tensor:
         """Return rows of the motions to begin at, never the end of one that ends."""
-        weight = self.loss_rate / self.loss_rate.sum()
-        bins = torch.multinomial(weight, self.n, replacement=True, generator=self._random)
+        bins = self._chosen(self.loss_rate.clamp(max=MOST_RATE))
         size = round(BIN_S / self.motions.dt)
         weak = (bins * size + self._whole(size)).clamp(max=len(self._bin) - 1)
         back = self._uniform(0.0, BEFORE_S / self.motions.dt, (self.n,)).long()
@@ -164,12 +191,18 @@ class Rehearsal:
 
     def _push_some(self) -> None:
         due = self._age >= self._push_at
-        kick = self._push * self._uniform(-1.0, 1.0, (self.n, 6))
+        kick = self.sight.noise * self._push * self._uniform(-1.0, 1.0, (self.n, 6))
         self.robots.qvel[:, :6] += torch.where(due[:, None], kick, 0.0)
-        self._push_at = torch.where(due, self._age + self._waits(), self._push_at)
+        self._push_at.copy_(torch.where(due, self._age + self._waits(), self._push_at))
 
     def _waits(self) -> torch.Tensor:
         return (self._uniform(*PUSH_EVERY_S, (self.n,)) / self.motions.dt).long()
+
+    def _chosen(self, weight: torch.Tensor) -> torch.Tensor:
+        """Draw numbers of a weight each, (N,); `torch.multinomial` cannot be recorded."""
+        edges = weight.double().cumsum(0)
+        drawn = self._uniform(0.0, 1.0, (self.n,)).double() * edges[-1]
+        return torch.searchsorted(edges, drawn, right=True).clamp(max=len(weight) - 1)
 
     def _whole(self, below: int) -> torch.Tensor:
         return torch.randint(below, (self.n,), generator=self._random, device=self._device)

@@ -23,7 +23,7 @@ class Sight:
 
     Attributes:
         actor_size: Length of the part that the dancer sees.
-        noisy: Whether sensors are noisy.
+        noise: Factor on the noise of the sensors, a scalar that may be written in place.
     """
 
     def __init__(
@@ -32,7 +32,7 @@ class Sight:
         self._random, self._rest = random, torch.as_tensor(pack["rest"], device=random.device)
         self.actor_size = 9 + 4 * len(pack["rest"]) + len(pack["scale"]) + preview
         self._widths = [NOISE * float(width) for width in pack["sensors"]]
-        self.noisy = True
+        self.noise = torch.ones((), device=random.device)
 
     def observe(self, robots: Robots, at: Steps, action: torch.Tensor) -> torch.Tensor:
         """Return the observations (N, D) of robots whose next reference step is `at`.
@@ -60,11 +60,9 @@ class Sight:
         return torch.nan_to_num(torch.cat(parts, 1)).clamp(-CLIP, CLIP)
 
     def _sensed(self, values: tuple[torch.Tensor, ...]) -> list[torch.Tensor]:
-        if not self.noisy:
-            return list(values)
         count = sum(value.shape[1] for value in values)
         shape, device = (len(values[0]), count), self._random.device
         drawn = 2 * torch.rand(shape, generator=self._random, device=device) - 1
-        noise = drawn.split([value.shape[1] for value in values], 1)
+        noise = (self.noise * drawn).split([value.shape[1] for value in values], 1)
         return [value + width * one
                 for value, width, one in zip(values, self._widths, noise, strict=True)]  # fmt: skip

@@ -74,7 +74,7 @@ class WarpRobots:
             self._advance()
         else:
             wp.capture_launch(self._graph)
-        self.points = self._site_places[:, self._sites].clone()
+        self.points.copy_(self._site_places[:, self._sites])
 
     def place(
         self, rows: torch.Tensor, qpos: torch.Tensor, qvel: torch.Tensor, points: torch.Tensor
@@ -84,7 +84,7 @@ class WarpRobots:
         self.qpos.copy_(torch.where(wide, qpos, self.qpos))
         self.qvel.copy_(torch.where(wide, qvel, self.qvel))
         self._warm.masked_fill_(wide, 0.0)
-        self.points = torch.where(wide[..., None], points, self.points)
+        self.points.copy_(torch.where(wide[..., None], points, self.points))
 
     def _advance(self) -> None:
         data, shape = self._data, self._targets.shape
