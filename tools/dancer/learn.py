@@ -23,7 +23,7 @@ from tools.dancer.ppo import Trainer
 from tools.dancer.rehearsal import Rehearsal
 
 HORIZON, REPORT_ROUNDS, SAVE_S, JUDGED_S = 16, 20, 60.0, 8.0
-FIRST_RATE, LATER_RATE = 1e-3, 1e-4
+FIRST_RATE, LATER_RATE = 1e-3, 2e-5
 
 
 def robots_on(device: str, pack: dict[str, np.ndarray], n: int) -> Robots:
