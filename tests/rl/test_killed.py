@@ -15,7 +15,7 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.pipeline.table_schemas import EPISODE_RECORD
 from tests.fixtures.commands import environment
 
-KILLS = 3
+KILLS = 2
 STEPS = {"sbx": 24_000, "sb3": 4_800}
 """A few seconds of training on one core."""
 OPTIONS = (

@@ -29,9 +29,9 @@ BACK_S, AGAIN_S = 1.2, 0.6
 STALLS, ADVANCE_S = 3, 0.1
 """Searches in a row at most that do not come so much further; each is broader than the one before
 and begins earlier."""
-TRIES, TRIED_S = 6, 45.0
+TRIES, TRIED_S, ENOUGH = 6, 45.0, 0.9
 """Searches from the beginning, of which the best is taken: at most so many, and of so long a motion
-in all."""
+in all; and none after one that holds so great a share of its starts."""
 CYCLES_S = 4.0
 """A motion that repeats is simulated for so long at least; the last cycle but one is kept."""
 
@@ -61,13 +61,13 @@ def sampled_regulator(
     best, motion, linear = regulator(sim, clip, action, feet.count, progress)
     trial = Trial(robot, sim, clip, action, motion)
     held = trial.held(best)
-    if held.strictly == 1.0:
-        return replace(best, held=np.ones(1))
     cycles = max(3, int(np.ceil(CYCLES_S / (clip.steps * clip.dt)))) if clip.cyclic else 1
     reference = reference_path(sim, clip, cycles * clip.steps)
     linear = _repeated(linear, cycles)
     tries = int(np.clip(TRIED_S / (len(reference) * clip.dt), 1, most_tries or TRIES))
     for number in range(tries):
+        if held.strictly >= ENOUGH:
+            break
         rng = np.random.default_rng([seed, number])
         search = PathSearch(sim, action, feet, rule, reference, rng)
         path, along = _searched(search, sim, reference, linear, action, clip.dt, progress)
@@ -75,8 +75,6 @@ def sampled_regulator(
         now = trial.held(found)
         if now > held:
             best, held = found, now
-        if held.strictly == 1.0:
-            break
     return replace(best, held=np.array([held.strictly]))
 
 
@@ -158,6 +156,7 @@ def settings() -> list[float]:
         ADVANCE_S,
         AGAIN_S,
         CYCLES_S,
+        ENOUGH,
         *path_search.settings(),
         *path_trial.settings(),
     ]

@@ -118,8 +118,9 @@ def test_the_regulator_that_brings_more_robots_to_the_end_by_the_rule_is_taken(
     monkeypatch.setattr(sampled_regulator, "regulator", lambda *given: plain)
     monkeypatch.setattr(sampled_regulator, "PASSES", 1)
     monkeypatch.setattr(sampled_regulator, "PASSES_A_S", 0.0)
+    monkeypatch.setattr(sampled_regulator, "CYCLES_S", 0.0)
     monkeypatch.setattr(sampled_regulator, "TRIES", 1)
-    for shares, anchored in (((1.0,), False), ((0.5, 0.4), False), ((0.5, 0.6), True)):
+    for shares, anchored in (((0.9,), False), ((0.5, 0.4), False), ((0.5, 0.6), True)):
         held = iter(Held(share, 1.0, 1.0) for share in shares)
         monkeypatch.setattr(Trial, "held", lambda *given, held=held: next(held))
         found = sampled_regulator.sampled_regulator(robot, sim, clip, action)
@@ -127,6 +128,23 @@ def test_the_regulator_that_brings_more_robots_to_the_end_by_the_rule_is_taken(
         assert found.held == max(shares)
         if not anchored:
             np.testing.assert_array_equal(found.gain, plain[0].gain)
+
+
+def test_no_search_follows_one_that_holds_nearly_all(
+    robot: Robot,
+    sim: Simulation,
+    clip: Clip,
+    plain: tuple[Gains, Path, Linear],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    action, held = residual_scale(robot, ControlConfig()), iter([0.0, 0.5, 0.95, 1.0])
+    monkeypatch.setattr(sampled_regulator, "regulator", lambda *given: plain)
+    monkeypatch.setattr(sampled_regulator, "_searched", lambda *given: plain[1:])
+    monkeypatch.setattr(sampled_regulator, "_gains", lambda *given: plain[0])
+    monkeypatch.setattr(Trial, "held", lambda *given: Held(next(held), 1.0, 1.0))
+    found = sampled_regulator.sampled_regulator(robot, sim, clip, action)
+    assert found.held == 0.95
+    assert next(held) == 1.0, "a search more than needed"
 
 
 class Falls:

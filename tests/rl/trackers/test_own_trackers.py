@@ -12,7 +12,7 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.pipeline.tracker_descriptions import describe_tracker, require_tracker
 from robojackson.rl.config.train_config import EvaluateConfig
 from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
-from robojackson.rl.sim import sampled_regulator
+from robojackson.rl.sim import path_search, path_trial, sampled_regulator
 from robojackson.rl.trackers.policy_tracker import PolicyTracker
 from robojackson.rl.trackers.regulator_tracker import RegulatorTracker
 from robojackson.rl.trackers.tracker_description import TrackerDescription
@@ -43,8 +43,11 @@ def motion() -> ReferenceMotion:
 def test_the_regulator_is_evaluated_like_a_policy(
     robot: Robot, sway: ReferenceMotion, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for name, few in {"TRIES": 1, "PASSES": 4, "PASSES_A_S": 0.0, "STALLS": 0}.items():
-        monkeypatch.setattr(sampled_regulator, name, few)
+    few = {"TRIES": 1, "PASSES": 4, "PASSES_A_S": 0.0, "STALLS": 0, "CYCLES_S": 0.0}
+    for name, value in few.items():
+        monkeypatch.setattr(sampled_regulator, name, value)
+    monkeypatch.setattr(path_search, "SAMPLES", 128)
+    monkeypatch.setattr(path_trial, "HELD_S", 3.0)
     long = replace(SHORT, seconds=4.0)
     found = evaluate_policy(open_tracker(REGULATOR), sway, robot, long).summary
     assert found["tracker"] == "regulator"
