@@ -5,9 +5,11 @@ floor, and are so far away that no subject leaves a panel in the whole film; all
 that sizes can be compared.
 """
 
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -22,14 +24,18 @@ from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.report.video import canvas
 from robojackson.report.video.panel_camera import Framing, Subject, fit, smooth_camera_path, view_of
 from robojackson.report.video.robot_extent import room_of
-from robojackson.report.video.robot_panel import RobotView
 from robojackson.report.video.robot_scene import Tint
 from robojackson.report.video.skeleton_panel import skeleton_panel
 from robojackson.report.video.source_panel import SourceClip
+from robojackson.report.video.threaded_view import ThreadedView
 from robojackson.report.video.timeline import Timeline
 
-Draw = Callable[[int, Framing], canvas.Picture]
-"""Function that draws the picture of a moment, by its index, through a camera."""
+Drawn = Callable[[], canvas.Picture]
+Begin = Callable[[int, Framing], Drawn]
+"""Function that begins to draw the picture of a moment, by its index, through a camera, and returns
+a function that waits for it."""
+AHEAD = 2
+"""Moments that are begun before the present one is encoded."""
 FLOOR = np.array([1.0, 1.0, 0.0])
 SIDE_DEG = 90.0
 """Direction from which the left side is visible."""
@@ -89,9 +95,9 @@ class Film:
     ) -> None:
         self._stack, self._config, self._when, self._still = stack, config, when, still
         self._size = config.panel_width, config.panel_height
-        self._panels: list[Draw] = []
+        self._panels: list[Begin] = []
         self._subjects: list[Subject] = []
-        self._views: dict[tuple[int, Tint], RobotView] = {}
+        self._views: dict[tuple[int, Tint], ThreadedView] = {}
 
     def add_source(
         self, source: Path, track: LandmarkTrack, sequence: SmplSequence | None, plain: bool
@@ -104,10 +110,12 @@ class Film:
         """
         clip = SourceClip(source, track, sequence, self._when.frame, *self._size)
         if plain:
-            self._panels.append(lambda index, framing: self._clip(index, "source", clip.plain))
+            self._panels.append(
+                lambda index, framing: partial(self._clip, index, "source", clip.plain)
+            )
         drawn = clip.with_landmarks if sequence is None else clip.with_skeleton
         title = "source" if sequence is None else "skeleton over source"
-        self._panels.append(lambda index, framing: self._clip(index, title, drawn))
+        self._panels.append(lambda index, framing: partial(self._clip, index, title, drawn))
 
     def add_body(
         self, sequence: SmplSequence, title: str = "motion capture", turn_deg: float = 0.0
@@ -126,7 +134,7 @@ class Film:
             canvas.label(panel, title, "" if sequence.valid[frames[index]] else "(filled in)")
             return panel
 
-        self._panels.append(draw)
+        self._panels.append(lambda index, framing: partial(draw, index, framing))
 
     def add_robot(
         self,
@@ -140,25 +148,33 @@ class Film:
         """Add a robot at every moment; a rollout has an end."""
         key = (id(model), tint)
         if key not in self._views:
-            view = RobotView(model, *self._size, tint)
+            view = ThreadedView(model, *self._size, tint)
             self._views[key] = self._stack.enter_context(view)
         view = self._views[key]
         target, azimuth = self._followed(qpos[:, :3]), self._config.azimuth_deg + turn_deg
         self._subjects.append(Subject(room_of(model, qpos, target), azimuth))
 
-        def draw(index: int, framing: Framing) -> canvas.Picture:
-            panel = view.picture(qpos[index], target[index], azimuth, framing)
+        def labelled(index: int, drawn: Drawn) -> canvas.Picture:
+            panel = drawn()
             over = is_rollout and bool(self._when.ended[index])
             canvas.label(panel, title, "ended" if over else f"{self._when.time_s[index]:.1f} s")
             return panel
 
-        self._panels.append(draw)
+        def begin(index: int, framing: Framing) -> Drawn:
+            drawn = view.begin(qpos[index], target[index], azimuth, framing)
+            return partial(labelled, index, drawn)
+
+        self._panels.append(begin)
 
     def moments(self) -> Iterator[list[canvas.Picture]]:
         """Yield the panels of each moment, in the order in which they were added."""
-        framing = fit(self._subjects, *self._size)
+        framing, begun = fit(self._subjects, *self._size), deque[list[Drawn]]()
         for index in range(len(self._when)):
-            yield [draw(index, framing) for draw in self._panels]
+            begun.append([begin(index, framing) for begin in self._panels])
+            if len(begun) > AHEAD:
+                yield [drawn() for drawn in begun.popleft()]
+        for moment in begun:
+            yield [drawn() for drawn in moment]
 
     def pictures(self) -> Iterator[canvas.Picture]:
         """Yield the panels of each moment in a row; one above the other in a vertical film."""

@@ -5,6 +5,7 @@ them is drawn. Metres; RGB 0..1.
 """
 
 import copy
+from functools import lru_cache
 
 import cv2
 import mujoco
@@ -67,8 +68,12 @@ def furnish(
 
 def on_backdrop(picture: Picture, depth: Float[np.ndarray, "H W"]) -> Picture:
     """Return the picture with our background where nothing was drawn, in place."""
-    ours = np.full_like(picture, BACKDROP)
-    return cv2.copyTo(ours, (depth >= FAR).astype(np.uint8), picture)
+    return cv2.copyTo(_backdrop(picture.shape), (depth >= FAR).astype(np.uint8), picture)
+
+
+@lru_cache
+def _backdrop(shape: tuple[int, ...]) -> Picture:
+    return np.full(shape, BACKDROP, np.uint8)
 
 
 def _light(scene: mujoco.MjvScene) -> None:
