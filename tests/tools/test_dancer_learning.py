@@ -21,7 +21,7 @@ from tests.fixtures.robots import robot_motion, stock
 from tools.dancer import learn, pack, ppo, ship
 from tools.dancer.mujoco_robots import MujocoRobots
 from tools.dancer.network import Dancer, restore, save
-from tools.dancer.rehearsal import Outcome, Rehearsal
+from tools.dancer.rehearsal import MOST_RATE, Outcome, Rehearsal
 from tools.dancer.rehearsal_reward import LOST_HEIGHT_M, LOST_TILT, REWARD_SCALE, Scoring
 from tools.dancer.repertoire import Motions
 from tools.dancer.sight import Sight
@@ -171,6 +171,34 @@ def test_robots_begin_where_others_are_lost() -> None:
     rows = robots._drawn()
     weak = (rows <= torch.nonzero(robots._bin == 2).max()) & (robots.motions.motion[rows] == 0)
     assert 0.4 < weak.float().mean() < 0.8
+
+
+def test_a_place_that_no_robot_passes_takes_no_more_starts_than_a_hard_one() -> None:
+    robots = rehearsal(2048)
+    robots.loss_rate.fill_(1e-4)
+    robots.loss_rate[2], robots.loss_rate[6] = MOST_RATE, 1.0
+    chosen = robots._chosen(robots.loss_rate.clamp(max=MOST_RATE))
+    hard, hopeless = (int((chosen == one).sum()) for one in (2, 6))
+    assert 0.8 < hopeless / hard < 1.25
+    assert hard + hopeless > 0.8 * len(chosen)
+
+
+def test_choices_follow_their_weights_and_none_has_no_weight() -> None:
+    robots = rehearsal(4096)
+    chosen = robots._chosen(torch.tensor([0.0, 3.0, 0.0, 1.0, 0.0]))
+    shares = torch.bincount(chosen, minlength=5) / len(chosen)
+    np.testing.assert_allclose(shares, [0, 0.75, 0, 0.25, 0], atol=0.03)
+
+
+def test_a_calm_rehearsal_has_no_noise_and_no_pushes() -> None:
+    robots = rehearsal()
+    robots.calm(robots.motions.first[MOTION] + 10)
+    robots._push_at.zero_()
+    robots._push_some()
+    before = robots.robots.qvel.clone()
+    robots._push_some()
+    np.testing.assert_array_equal(robots.robots.qvel, before)
+    np.testing.assert_array_equal(robots._observe(), robots._observe())
 
 
 class Guess:
