@@ -15,6 +15,8 @@ ADVERTISEMENT = "\nSee https://docs.prefect.io"
 RETRY = "Retry"
 """In the message of an exception after which the stage is tried again."""
 ENDED = "Finished in state"
+NOT_KEPT = "Failed to write result: Failed to serialize object of type"
+"""Beginning of what Prefect says of a stage's error, which is no result that could be kept."""
 REMEMBERED = 64
 """Errors whose states are still to come."""
 
@@ -42,7 +44,7 @@ class Once:
             self._errors.append(str(error))
             return RETRY in record.getMessage()
         text = record.getMessage()
-        return not (text.startswith(ENDED) and any(known in text for known in self._errors))
+        return not text.startswith(NOT_KEPT) and not (text.startswith(ENDED) and any(known in text for known in self._errors))
 
 
 _once = Once()

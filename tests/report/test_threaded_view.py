@@ -56,3 +56,23 @@ def test_missing_graphics_are_named_and_end_the_thread(
     with pytest.raises(MissingDependency, match="no off-screen graphics"):
         ThreadedView(model, *SIZE, REFERENCE_TINT)
     assert threading.active_count() == before
+
+
+def test_a_backend_that_needs_a_screen_is_named(
+    model: mujoco.MjModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """GLFW gives a context that is none; MuJoCo finds out."""
+
+    class NoContext:
+        def make_current(self) -> None: ...
+
+        def free(self) -> None: ...
+
+    def refuse(*given: object) -> None:
+        raise mujoco.FatalError("an OpenGL platform library has not been loaded")
+
+    monkeypatch.setenv("MUJOCO_GL", "glfw")
+    monkeypatch.setattr(robot_panel, "_gl_context", lambda *size: NoContext())
+    monkeypatch.setattr(mujoco, "MjrContext", refuse)
+    with pytest.raises(MissingDependency, match="MUJOCO_GL=glfw needs a screen: unset it"):
+        RobotView(model, *SIZE, REFERENCE_TINT)

@@ -46,7 +46,7 @@ class RobotView:
         self._data = mujoco.MjData(self.model)
         self._gl = _gl_context(*size)
         self._gl.make_current()
-        self._context = mujoco.MjrContext(self.model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
+        self._context = _renderer(self.model)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
         self._scene = mujoco.MjvScene(self.model, maxgeom=2000)
         flags = mujoco.mjtRndFlag
@@ -103,6 +103,17 @@ class RobotView:
         self._camera.distance = framing.distance
         self._camera.azimuth = 180.0 + azimuth_deg
         self._camera.elevation = -float(np.degrees(PITCH))
+
+
+def _renderer(model: mujoco.MjModel) -> mujoco.MjrContext:
+    """Return MuJoCo's renderer in the present context; GLFW's is none where there is no screen."""
+    try:
+        return mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
+    except mujoco.FatalError as cause:
+        chosen = os.environ.get("MUJOCO_GL")
+        hint = f"MUJOCO_GL={chosen} needs a screen: unset it, or " if chosen else ""
+        message = f"no off-screen graphics ({cause}): {hint}{GRAPHICS_INSTALL}"
+        raise MissingDependency(message) from cause
 
 
 def _gl_context(width: int, height: int) -> Any:

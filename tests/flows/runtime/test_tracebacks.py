@@ -26,6 +26,12 @@ def test_what_the_command_says_at_its_end_is_said_once() -> None:
     assert not any(once(each) for each in result)
 
 
+def test_that_an_error_is_no_result_is_not_said() -> None:
+    reason = "Failed to serialize object of type 'MissingDependency' with serializer 'x'."
+    assert not Once()(record(f"Failed to write result: {reason} Execution will continue"))
+    assert Once()(record("Failed to write result: no space left on device"))
+
+
 @pytest.mark.parametrize(
     "expected_message",
     [
