@@ -44,7 +44,9 @@ class Once:
             self._errors.append(str(error))
             return RETRY in record.getMessage()
         text = record.getMessage()
-        return not text.startswith(NOT_KEPT) and not (text.startswith(ENDED) and any(known in text for known in self._errors))
+        if text.startswith(NOT_KEPT):
+            return False
+        return not (text.startswith(ENDED) and any(known in text for known in self._errors))
 
 
 _once = Once()
