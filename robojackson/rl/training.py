@@ -20,6 +20,7 @@ from robojackson.rl.env.vec_env import TrackingVecEnv
 from robojackson.rl.modes.track_mode import control_of
 from robojackson.rl.pretrained import pretrained
 from robojackson.rl.sim.motors import feedback_path, feedback_share
+from robojackson.rl.sim.sampled_regulator import ENOUGH
 from robojackson.rl.tqc.network_arrays import Networks, chosen, fitted
 from robojackson.rl.tqc.trainers import make_trainer
 from robojackson.rl.training_hooks import BudgetSpent, Hooks
@@ -30,8 +31,9 @@ from robojackson.robot.model import Robot
 __all__ = ["Hooks", "TrainResult", "train_policy"]
 
 log = logging.getLogger(__name__)
-WHOLE = 1.0
-"""Share of the time upright by the feedback alone from which a motion that repeats is polished."""
+POLISHED = ENOUGH
+"""Share of the starts from which the feedback alone holds a motion that repeats, for it to be
+polished; where a path holds so many, no better one is searched."""
 
 
 def train_policy(
@@ -86,7 +88,8 @@ def residual_learning(
     given one.
 
     A motion that repeats is learnt better from falls, by actions that are random at first, unless
-    the feedback holds it whole; they destroy what it holds of one that ends (docs/learning_g1.md).
+    the feedback holds nine tenths; they destroy what it holds of one that ends
+    (docs/learning_g1.md).
 
     Args:
         config: The training.
@@ -111,7 +114,7 @@ def polishes(
     control = control_of(track)
     usual = config.mode == "track" and config.trainer == "sbx" and config.start == "scratch"
     fed = feedback_share(robot, control) > 0 and feedback_path(robot, control) == "sampled"
-    better = len(motions) == 1 and (held >= WHOLE or not motions[0].cyclic)
+    better = len(motions) == 1 and (held >= POLISHED or not motions[0].cyclic)
     chosen = config.polish == "auto" and config.tqc.preset == "dance" and not track.random.pushes
     return usual and chosen and control.law == "pd" and fed and better
 

@@ -37,12 +37,12 @@ def test_a_motion_that_ends_is_polished(fed: Robot, sway: ReferenceMotion) -> No
 
 def test_a_motion_that_repeats_is_learnt_from_falls(fed: Robot, sway: ReferenceMotion) -> None:
     repeating = replace(sway, cyclic=True)
-    for held in (0.99, np.nan):
+    for held in (0.89, np.nan):
         assert residual_learning(configured(), fed, repeating, held) == configured().tqc
 
 
-def test_what_the_feedback_holds_whole_is_polished(fed: Robot, sway: ReferenceMotion) -> None:
-    assert polishes(configured(), fed, replace(sway, cyclic=True), 1.0)
+def test_what_the_feedback_holds_is_polished(fed: Robot, sway: ReferenceMotion) -> None:
+    assert polishes(configured(), fed, replace(sway, cyclic=True), 0.9)
     assert not polishes(configured(), fed, [replace(sway, cyclic=True)] * 2, 1.0), "several motions"
 
 
