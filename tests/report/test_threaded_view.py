@@ -10,7 +10,7 @@ from robojackson.errors import MissingDependency
 from robojackson.report.video import robot_panel, threaded_view
 from robojackson.report.video.panel_camera import Framing
 from robojackson.report.video.robot_panel import REFERENCE_TINT, TRAINED_TINT, RobotView
-from robojackson.report.video.threaded_view import ThreadedView
+from robojackson.report.video.threaded_view import threaded_view as opened
 from tests.fixtures.robots import stock
 
 SIZE = (96, 144)
@@ -33,11 +33,11 @@ def test_two_views_at_once_draw_what_each_draws_alone(
             alone.append([view.picture(qpos, np.zeros(2), 0.0) for qpos in poses])
     before = threading.active_count()
     with (
-        ThreadedView(model, *SIZE, REFERENCE_TINT) as left,
-        ThreadedView(model, *SIZE, TRAINED_TINT) as right,
+        opened(model, *SIZE, REFERENCE_TINT) as left,
+        opened(model, *SIZE, TRAINED_TINT) as right,
     ):
-        begun = [[view.begin(qpos, np.zeros(2), 0.0, Framing()) for qpos in poses]
-                 for view in (left, right)]  # fmt: skip
+        begun = [[begin(qpos, np.zeros(2), 0.0, Framing()) for qpos in poses]
+                 for begin in (left, right)]  # fmt: skip
         pictures = [[wait() for wait in waits] for waits in begun]
         assert threading.active_count() - before == 2 * threads
     np.testing.assert_array_equal(pictures, alone)
@@ -53,8 +53,11 @@ def test_missing_graphics_are_named_and_end_the_thread(
 
     monkeypatch.setattr(robot_panel, "_gl_context", refuse)
     before = threading.active_count()
-    with pytest.raises(MissingDependency, match="no off-screen graphics"):
-        ThreadedView(model, *SIZE, REFERENCE_TINT)
+    with (
+        pytest.raises(MissingDependency, match="no off-screen graphics"),
+        opened(model, *SIZE, REFERENCE_TINT),
+    ):
+        pytest.fail("a view without graphics")
     assert threading.active_count() == before
 
 

@@ -27,7 +27,7 @@ from robojackson.report.video.robot_extent import room_of
 from robojackson.report.video.robot_scene import Tint
 from robojackson.report.video.skeleton_panel import skeleton_panel
 from robojackson.report.video.source_panel import SourceClip
-from robojackson.report.video.threaded_view import ThreadedView
+from robojackson.report.video.threaded_view import BeginPicture, threaded_view
 from robojackson.report.video.timeline import Timeline
 
 Drawn = Callable[[], canvas.Picture]
@@ -97,7 +97,7 @@ class Film:
         self._size = config.panel_width, config.panel_height
         self._panels: list[Begin] = []
         self._subjects: list[Subject] = []
-        self._views: dict[tuple[int, Tint], ThreadedView] = {}
+        self._views: dict[tuple[int, Tint], BeginPicture] = {}
 
     def add_source(
         self, source: Path, track: LandmarkTrack, sequence: SmplSequence | None, plain: bool
@@ -148,9 +148,9 @@ class Film:
         """Add a robot at every moment; a rollout has an end."""
         key = (id(model), tint)
         if key not in self._views:
-            view = ThreadedView(model, *self._size, tint)
+            view = threaded_view(model, *self._size, tint)
             self._views[key] = self._stack.enter_context(view)
-        view = self._views[key]
+        begin_picture = self._views[key]
         target, azimuth = self._followed(qpos[:, :3]), self._config.azimuth_deg + turn_deg
         self._subjects.append(Subject(room_of(model, qpos, target), azimuth))
 
@@ -161,7 +161,7 @@ class Film:
             return panel
 
         def begin(index: int, framing: Framing) -> Drawn:
-            drawn = view.begin(qpos[index], target[index], azimuth, framing)
+            drawn = begin_picture(qpos[index], target[index], azimuth, framing)
             return partial(labelled, index, drawn)
 
         self._panels.append(begin)

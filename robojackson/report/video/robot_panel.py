@@ -33,6 +33,11 @@ FINER = 2
 multisampling and, with a software renderer, twice as fast."""
 
 
+def chosen_backend() -> str:
+    """Return what `MUJOCO_GL` names, in small letters; empty if it names none."""
+    return os.environ.get("MUJOCO_GL", "").lower()
+
+
 class RobotView:
     """An off-screen camera for one model; use it in a `with` block.
 
@@ -110,8 +115,7 @@ def _renderer(model: mujoco.MjModel) -> mujoco.MjrContext:
     try:
         return mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
     except mujoco.FatalError as cause:
-        chosen = os.environ.get("MUJOCO_GL")
-        hint = f"MUJOCO_GL={chosen} needs a screen: unset it, or " if chosen else ""
+        hint = "MUJOCO_GL=glfw needs a screen: unset it, or " if chosen_backend() == "glfw" else ""
         message = f"no off-screen graphics ({cause}): {hint}{GRAPHICS_INSTALL}"
         raise MissingDependency(message) from cause
 
@@ -125,7 +129,7 @@ def _gl_context(width: int, height: int) -> Any:
     """
     with contextlib.suppress(ImportError):
         importlib.import_module("triton")
-    chosen = os.environ.get("MUJOCO_GL", "").lower()
+    chosen = chosen_backend()
     if sys.platform != "linux" or chosen == "glfw":
         return mujoco.GLContext(width, height)
     reasons = []

@@ -61,13 +61,13 @@ def sampled_regulator(
     best, motion, linear = regulator(sim, clip, action, feet.count, progress)
     trial = Trial(robot, sim, clip, action, motion)
     held = trial.held(best)
+    if held.strictly >= ENOUGH:
+        return replace(best, held=np.array([held.strictly]))
     cycles = max(3, int(np.ceil(CYCLES_S / (clip.steps * clip.dt)))) if clip.cyclic else 1
     reference = reference_path(sim, clip, cycles * clip.steps)
     linear = _repeated(linear, cycles)
     tries = int(np.clip(TRIED_S / (len(reference) * clip.dt), 1, most_tries or TRIES))
     for number in range(tries):
-        if held.strictly >= ENOUGH:
-            break
         rng = np.random.default_rng([seed, number])
         search = PathSearch(sim, action, feet, rule, reference, rng)
         path, along = _searched(search, sim, reference, linear, action, clip.dt, progress)
@@ -75,6 +75,8 @@ def sampled_regulator(
         now = trial.held(found)
         if now > held:
             best, held = found, now
+        if held.strictly >= ENOUGH:
+            break
     return replace(best, held=np.array([held.strictly]))
 
 
