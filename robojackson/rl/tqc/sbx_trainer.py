@@ -25,6 +25,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
 from robojackson.rl.config.train_config import TqcConfig
+from robojackson.rl.tqc.compiled_programs import keep_compiled_programs
 from robojackson.rl.tqc.dense_networks import LOG_STD_RANGE, dense_count
 from robojackson.rl.tqc.flax_arrays import dense_layers, filled, tensors_of
 from robojackson.rl.tqc.network_arrays import CRITICS, TARGETS, Tensors
@@ -107,6 +108,7 @@ class SbxTrainer(OffPolicyTrainer):
     """The JAX trainer (`Trainer` protocol)."""
 
     def __init__(self, env: VecEnv, config: TqcConfig, seed: int, seen: int | None = None) -> None:
+        keep_compiled_programs()
         given = arguments(config, seed, env)
         given["policy_kwargs"] |= {"layer_norm": config.layer_norm}
         model = OverlappedTQC(env=env, policy_delay=config.policy_delay, **given)
