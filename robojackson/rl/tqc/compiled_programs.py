@@ -1,4 +1,4 @@
-"""Keep what XLA compiles in the user's cache, so that the next process does not compile it again."""
+"""Keep what XLA compiles in the user's cache, so that the next process need not compile it."""
 
 import hashlib
 import os
@@ -9,6 +9,12 @@ from pathlib import Path
 import jax
 
 _PROCESSOR = Path("/proc/cpuinfo")
+_FOLDER = "jax_compilation_cache_dir"
+_ALL_PROGRAMS: dict[str, float] = {
+    "jax_persistent_cache_min_compile_time_secs": 0.0,
+    "jax_persistent_cache_min_entry_size_bytes": -1,
+}
+"""Small ones, too: JAX keeps only what took a second."""
 
 
 def keep_compiled_programs() -> None:
@@ -18,7 +24,7 @@ def keep_compiled_programs() -> None:
     written or is not this user's alone: who may write there may run code as this user. A broken
     file in it is compiled again.
     """
-    if jax.config.jax_compilation_cache_dir:
+    if jax.config.values[_FOLDER]:
         return
     folder = compiled_folder()
     try:
@@ -29,9 +35,8 @@ def keep_compiled_programs() -> None:
     if not private:
         return
     warnings.filterwarnings("ignore", "Error (reading|writing) persistent compilation cache")
-    jax.config.update("jax_compilation_cache_dir", str(folder))
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
-    jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+    for name, value in {_FOLDER: str(folder), **_ALL_PROGRAMS}.items():
+        jax.config.update(name, value)  # type: ignore[no-untyped-call]
 
 
 def compiled_folder() -> Path:

@@ -1,4 +1,4 @@
-"""Compiled programs outlive the process, change no result, and come from nobody else."""
+"""Compiled programs outlive the process, change no result, and come from this user alone."""
 
 import json
 import os
