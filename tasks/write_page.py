@@ -106,16 +106,25 @@ def write_page(
     return _written(made, file, settings, folder)
 
 
-def write_first_page(
-    made: dict[str, Artifact], move: str, file: str, settings: PageSettings, folder: str
+def write_early_page(
+    made: dict[str, Artifact],
+    file: str,
+    settings: PageSettings,
+    folder: str,
+    again: bool = False,
 ) -> str | None:
-    """Write the page that a later `write_page` into the same folder replaces; not a stage.
+    """Write a page that a later `write_page` into the same folder replaces; not a stage.
+
+    Args:
+        made, file, settings, folder: See `write_page`; without `dance`, the page says that the
+            video is to come.
+        again: Whether a page that exists is written again.
 
     Returns:
-        Address of the page; None where a page exists already, which is not replaced.
+        Address of the page; None where one exists that stays.
     """
     store = Store.from_environment()
-    if store.exists(f"{folder}/{PAGE}"):
+    if store.exists(f"{folder}/{PAGE}") and not again:
         return None
     return store.address(_written(made, file, settings, folder)["page"].key)
 
@@ -136,7 +145,7 @@ def _written(
     if live is not None:
         files["live"] = store.put(f"{folder}/{LIVE}", live.encode())
         results = replace(results, live=LIVE)
-    text = render(page_content(results, made["dance"].name))
+    text = render(page_content(results, made["dance"].name if "dance" in made else None))
     kept = {
         name: store.put(f"{folder}/{artifact.name}", store.read(artifact.key))
         for name, artifact in made.items()

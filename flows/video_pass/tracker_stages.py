@@ -1,7 +1,7 @@
-"""Stages of a tracker's dance: a first look on the page, then the full evaluation.
+"""Stages of a tracker's dance: a first look on the page, then the video and the full evaluation.
 
-The page is written before anything else is evaluated or trained, and again when more is known, at
-the same address.
+The page is written before anything is filmed, evaluated further or trained, and again when more is
+known, at the same address.
 """
 
 import hashlib
@@ -26,7 +26,7 @@ from tasks.render_video import render_video
 from tasks.runtime.run_logger import run_logger
 from tasks.runtime.stage import identity, is_records_only
 from tasks.train_policy import RunLabels
-from tasks.write_page import PageSettings, write_first_page
+from tasks.write_page import PageSettings, write_early_page
 
 Artifacts = dict[str, Artifact]
 FILM = "tracker.mp4"
@@ -120,7 +120,7 @@ def track(
     labels: RunLabels,
     shown_with: PageSettings,
 ) -> TrackedDance:
-    """Dance, film it, show it, then evaluate it from all starts.
+    """Dance, show it, then film it and evaluate it from all starts.
 
     Args:
         moved: `landmarks`, `smpl`, `reference` and `scorecard` of the clip.
@@ -129,20 +129,23 @@ def track(
     reference = moved["reference"]
     announce("tracking")
     look = evaluate_tracker(tracker, reference, robot, first_look(settings.evaluate), labels)
+    made = {**best.clip, "stability": best.stability, **moved, **look}
+    folder = _folder(made, tracker, robot, settings, labels)
+    page = None
+    if not is_records_only():
+        page = write_early_page(made, best.name, shown_with, folder)
+    if page is not None:
+        run_logger().info(FIRST_PAGE, page)
     announce("video")
     shown = (best.clip["video"], moved["landmarks"], moved["smpl"], reference)
     title = TITLE.format(tracker.name)
     film = render_video(*shown, look["rollout"], robot, settings.render, title, FILM)
-    made = {**best.clip, "stability": best.stability, **moved, **look}
-    made |= {"dance": film, "still": draw_snapshot(film)}
-    folder = _folder(made, tracker, robot, settings, labels)
-    if not is_records_only():
-        page = write_first_page(made, labels.move, best.name, shown_with, folder)
-        if page is not None:
-            run_logger().info(FIRST_PAGE, page)
     announce("evaluation")
     whole = evaluate_tracker(tracker, reference, robot, settings.evaluate, labels)
-    return TrackedDance(tracker, {**made, **whole, "rollout": look["rollout"]}, folder)
+    made |= {**whole, "rollout": look["rollout"], "dance": film, "still": draw_snapshot(film)}
+    if page is not None and not settings.instant:  # a training follows, which takes minutes
+        write_early_page(made, best.name, shown_with, folder, again=True)
+    return TrackedDance(tracker, made, folder)
 
 
 def _folder(

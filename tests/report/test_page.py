@@ -13,7 +13,13 @@ from robojackson.clips.video import VideoInfo
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.report.pages.evaluation_text import beat_rows, next_step
-from robojackson.report.pages.page_content import Results, limb_rows, page_content, versions
+from robojackson.report.pages.page_content import (
+    TO_COME,
+    Results,
+    limb_rows,
+    page_content,
+    versions,
+)
 from robojackson.report.pages.run_page import PageContent, render, write_page
 from robojackson.report.plots import run_plots
 from robojackson.report.quantities import format_value, quantity
@@ -66,6 +72,14 @@ def test_page_shows_the_advice_about_the_clip(results: Results) -> None:
     html = render(page_content(advised, "dance.mp4"))
     assert "<li>10 frames a second: film at 30</li>" in html
     assert "advice" not in render(page_content(results, "dance.mp4"))
+
+
+@pytest.mark.medium
+def test_a_page_without_its_video_says_that_it_is_to_come(results: Results) -> None:
+    early = render(page_content(results, None))
+    assert TO_COME in early
+    assert "The video</a>" not in early
+    assert TO_COME not in render(page_content(results, "dance.mp4"))
 
 
 @pytest.mark.medium

@@ -23,6 +23,11 @@ from robojackson.report.web.player_data import Player
 PROGRAMS = ("robojackson", "mujoco", "gymnasium", "mediapipe", "torch", "jax", "sbx-rl",
             "sb3-contrib", "prefect", "numpy")  # fmt: skip
 
+TO_COME = (
+    "This is a first look. The video and the evaluation from all starts are being made; this page "
+    "is then written again: load it again."
+)
+"""Note on a page that has no video yet."""
 SHOWN_FINDINGS = 3
 NOTHING = 0.01
 """Slack that is too small to be seen, tolerances."""
@@ -85,7 +90,11 @@ class Results:
 
 
 def page_content(results: Results, video: str | None) -> PageContent:
-    """Return the page of a run; `video` is the mp4's address relative to the page."""
+    """Return the page of a run.
+
+    Args:
+        video: Address of the mp4 relative to the page; None where it is still to come.
+    """
     return PageContent(
         title=results.title,
         robot=results.reference.robot,
@@ -99,7 +108,7 @@ def page_content(results: Results, video: str | None) -> PageContent:
         tracker_video=results.tracker_video,
         plots=_plots(results),
         versions=versions(),
-        notes=results.sequence.notes,
+        notes=[*([] if video else [TO_COME]), *results.sequence.notes],
         advice=[str(each) for each in results.advice],
         player=results.player,
         film=results.film,

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from robojackson.cli.trackers.tracker_files import add_tracker
+from robojackson.report.pages.page_content import TO_COME
 from tests.fixtures.commands import Said, robojackson
 from tests.fixtures.stand_in_tracker import NAME, stand_in, write_yaml
 
@@ -73,7 +74,9 @@ def test_the_page_names_the_tracker_and_was_there_before_the_whole_evaluation(
     lines = dances.instant.err.splitlines()
     shown = next(i for i, line in enumerate(lines) if f"is on {page}" in line)
     evaluated = [i for i, line in enumerate(lines) if "'evaluate_tracker-hips'" in line]
-    assert evaluated[0] < shown < evaluated[-1]
+    filmed = next(i for i, line in enumerate(lines) if "'render_video-hips'" in line)
+    assert evaluated[0] < shown < filmed < evaluated[-1]
+    assert TO_COME not in text
 
 
 @pytest.mark.slow
@@ -93,6 +96,8 @@ def test_a_trained_robot_joins_the_tracker_on_one_page(dances: Dances) -> None:
     assert "trained robot" in text
     assert f"tracker {NAME}" in text
     assert {"dance.mp4", "tracker.mp4"} <= {p.name for p in Path(result["page"]).parent.iterdir()}
+    lines = first.err.splitlines()
+    assert any(f"is on {result['page']}" in line for line in lines)
     again = dances.run(*TRAINED)
     assert (again.loaded_prefect, json.dumps(again.answer)) == (False, json.dumps(result))
 
