@@ -7,7 +7,7 @@ over the picture; then the detector follows him inside windows of full resolutio
 for as long as he stays in them. Pixels of the upright picture, origin top left.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -18,25 +18,28 @@ from pydantic import Field
 
 from robojackson.clips.people.camera_motion import spread
 from robojackson.clips.people.person_detection import detect_person
-from robojackson.clips.people.person_extent import BODY, indices, stature, trunk
-from robojackson.clips.pose_detector import still_landmarker, video_landmarker
+from robojackson.clips.people.person_extent import stature, trunk
+from robojackson.clips.people.windows import (
+    Box,
+    detect_in_windows,
+    in_picture,
+    is_whole,
+    tiles,
+    window,
+    windows,
+)
+from robojackson.clips.pose_detector import still_landmarker
 from robojackson.clips.video import VideoInfo, timed_frames
 from robojackson.config import config_dataclass
 
 Look = Callable[[np.ndarray], np.ndarray | None]
 """Detects one person in a picture."""
-Box = tuple[int, int, int, int]
-"""x0, y0, x1, y1."""
 SEARCHER = "lite"
 """Size of the pose model that searches; the person is then followed with a better one."""
 PARTS = (1, 2, 4)
 LEAST_TILE, SMALLEST_PX = 160, 32
 """Tiles are the short side of the picture over these, but no smaller than so many pixels unless the
 picture is; smaller than the second number it is a strip, whose tiles would be thousands."""
-OVERLAP = 0.5
-"""Share of a tile that the next one covers too."""
-STAYS = 0.25
-"""A window ends when the person is further from its middle than this, sides of the window."""
 ASTRAY = 1.0
 """Body heights; a detection further than this from the expected place is another's."""
 
@@ -127,53 +130,6 @@ def search(path: Path, info: VideoInfo, config: CloseUpConfig) -> list[Sight]:
     return found
 
 
-def tiles(width: int, height: int, side: int) -> list[Box]:
-    """Return square windows that cover a picture and overlap by half."""
-
-    def starts(length: int) -> list[int]:
-        count = int(np.ceil(max(length - side, 0) / (side * (1.0 - OVERLAP)))) + 1
-        return [round(float(start)) for start in np.linspace(0, max(length - side, 0), count)]
-
-    return [
-        (x, y, min(x + side, width), min(y + side, height))
-        for y in starts(height)
-        for x in starts(width)
-    ]
-
-
-def window(place: Float[np.ndarray, "2"], side: float, shape: tuple[int, ...]) -> Box:
-    """Return a square window around a place, moved and cut to lie inside a picture."""
-    length = np.minimum(round(side), shape[1::-1])
-    low = np.clip(np.round(place - length / 2.0), 0, np.array(shape[1::-1]) - length).astype(int)
-    high = low + length
-    return int(low[0]), int(low[1]), int(high[0]), int(high[1])
-
-
-def windows(
-    places: Float[np.ndarray, "T 2"], side: float, shape: tuple[int, ...]
-) -> Iterator[tuple[int, Box]]:
-    """Yield windows and the frame at which each ends: when the person has left its middle."""
-    start = 0
-    while start < len(places):
-        low = np.minimum.accumulate(places[start:])
-        high = np.maximum.accumulate(places[start:])
-        leaves = np.atleast_1d(((high - low) / 2.0 > STAYS * side).any(1))
-        end = start + (int(np.argmax(leaves)) if leaves.any() else len(leaves))
-        last = end - start - 1
-        yield end, window((low[last] + high[last]) / 2.0, side, shape)
-        start = end
-
-
-def in_picture(
-    row: Float[np.ndarray, "33 7"], box: Box, width: int, height: int
-) -> Float[np.ndarray, "33 7"]:
-    """Return landmarks of a window as landmarks of the whole picture; depth is in widths too."""
-    size = np.array([box[2] - box[0], box[3] - box[1], box[2] - box[0]])
-    moved = np.array(row)
-    moved[:, :3] = (row[:, :3] * size + [box[0], box[1], 0]) / [width, height, width]
-    return moved
-
-
 def _all_over(look: Look, image: np.ndarray, visibility: float) -> np.ndarray | None:
     """Return the largest person in tiles as large as the picture allows, then in smaller ones."""
     height, width = image.shape[:2]
@@ -193,16 +149,10 @@ def _best(
     found = []
     for box in boxes:
         row = look(image[box[1] : box[3], box[0] : box[2]])
-        if row is not None and _whole(row) and row[:, 6].mean() >= visibility:
+        if row is not None and is_whole(row) and row[:, 6].mean() >= visibility:
             found.append(in_picture(row, box, width, height))
     size = (width, height)
     return max(found, key=lambda row: float(stature(row[:, :2] * size)), default=None)
-
-
-def _whole(row: np.ndarray) -> bool:
-    """Return whether head, trunk and legs are inside the window."""
-    points = row[indices(BODY), :2]
-    return bool(((points >= 0.0) & (points <= 1.0)).all())
 
 
 def _sight(index: int, row: np.ndarray, info: VideoInfo) -> Sight:
@@ -224,20 +174,10 @@ def _followed(
     points = np.array([sight.place for sight in sights])
     places = np.stack([np.interp(np.arange(count), known, axis) for axis in points.T], -1)
     tall = float(np.median([sight.tall for sight in sights]))
-    rows = np.full((count, 33, 7), np.nan)
-    frames = enumerate(timed_frames(path))
-    for end, box in windows(places, sides * tall, (info.height, info.width)):
-        with video_landmarker(size) as detect_frame:
-            for index, (time_s, image) in frames:
-                found = detect_frame(image[box[1] : box[3], box[0] : box[2]], time_s)
-                row = in_picture(found, box, info.width, info.height)
-                place = (row[trunk(), :2] * (info.width, info.height)).mean(0)
-                if np.linalg.norm(place - places[index]) <= ASTRAY * tall:
-                    rows[index] = row
-                if progress:
-                    progress(index + 1, count)
-                if index + 1 == end:
-                    break
+    boxes = windows(places, sides * tall, (info.height, info.width))
+    rows = detect_in_windows(path, info, size, boxes, progress=progress)
+    found = (rows[:, trunk(), :2] * (info.width, info.height)).mean(1)
+    rows[np.linalg.norm(found - places, axis=1) > ASTRAY * tall] = np.nan
     return rows
 
 

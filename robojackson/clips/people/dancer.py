@@ -2,11 +2,12 @@
 
 A clip of one person is processed once. Where a few frames show another, all people are detected in
 every frame (`person_detection`) and identified (`identity`); then the dancer is followed as if
-alone, with all others painted over, because the detector is best on the person it follows. The
-largest steady person is number 1 and danced by default.
+alone, with all others painted over, because the detector is best on the person it follows, and
+inside windows where he is small in the picture. The largest steady person is number 1 and danced by
+default.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,15 +21,15 @@ from robojackson.clips.people.person_count import People, PeopleConfig
 from robojackson.clips.people.person_detection import PersonDetectionConfig, paint, silhouette
 from robojackson.clips.people.person_extent import stature, trunk
 from robojackson.clips.people.tracked_people import SCOUT, TrackedPeople, track_people
+from robojackson.clips.people.windows import Box, detect_in_windows, windows
 from robojackson.clips.pose_detector import (
     SHORT_SIDE,
     Watcher,
     detect,
     still_landmarker,
     track_of,
-    video_landmarker,
 )
-from robojackson.clips.video import VideoInfo, timed_frames
+from robojackson.clips.video import VideoInfo
 from robojackson.config import config_dataclass
 from robojackson.errors import NoPersonFound
 from robojackson.motion.landmark_track import LandmarkTrack
@@ -153,19 +154,22 @@ def _followed(
     goes astray."""
     known = cast.rows[chosen]
     others = np.array([rows for number, rows in enumerate(cast.rows) if number != chosen])
+    info, size_px = cast.info, (cast.info.width, cast.info.height)
     needed = near_known(known, cast.time_s, config.longest_gap_s)
-    found = np.full_like(known, np.nan)
-    with video_landmarker(size) as detect_frame:
-        frames = timed_frames(path, short_side=SHORT_SIDE)
-        for index, (time_s, image) in zip(range(len(known)), frames, strict=False):
-            if needed[index]:
-                width = config.detection.limb_width
-                found[index] = detect_frame(
-                    mask_others(image, known[index], others[:, index], width), time_s
-                )
-            if progress:
-                progress(index + 1, len(known))
-    size_px = (cast.info.width, cast.info.height)
+
+    def alone(index: int, image: np.ndarray) -> np.ndarray | None:
+        if not needed[index]:
+            return None
+        return mask_others(image, known[index], others[:, index], config.detection.limb_width)
+
+    course, tall = _course(known, cast.time_s, size_px)
+    side = config.close_up.window * float(np.median(tall))
+    boxes: Iterable[tuple[int, Box]] = [(len(known), (0, 0, *size_px))]
+    is_small = side < min(size_px)
+    if is_small:
+        boxes = windows(course, side, size_px[::-1])
+    short_side = None if is_small else SHORT_SIDE
+    found = detect_in_windows(path, info, size, boxes, alone, progress, short_side)
     return checked(found, cast.rows, chosen, cast.time_s, size_px, config)
 
 

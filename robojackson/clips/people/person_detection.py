@@ -6,6 +6,7 @@ overlap. So each found person is painted over, limb by limb, and the detector ru
 none is left: 94-99 % of two dancers who cross.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +16,7 @@ from jaxtyping import Bool, Float, UInt8
 from pydantic import Field
 
 from robojackson.clips.people.person_extent import indices, stature, trunk
+from robojackson.clips.people.windows import Box, in_picture, is_whole, tiles, window
 from robojackson.clips.pose_detector import first_person
 from robojackson.config import config_dataclass
 
@@ -41,6 +43,13 @@ class PersonDetectionConfig:
         short_side: Pixels of the short side of the pictures that are looked at.
         visibility: Least mean visibility of the landmarks of a person, 0..1.
         smallest: A person below this size is in the background, heights of the largest.
+        window: Side of the window in which a person is looked for who was there before, body
+            heights.
+        tile: Side of the windows all over the picture, of its short side, 0..1.
+        far_below: Windows all over the picture are looked at where no person is taller than this,
+            of its short side, 0..1.
+        search_every_s: Seconds between two frames that are searched all over.
+        memory_s: How long a person who is not found is looked for, seconds.
         apart: Two finds with their trunks nearer than this are one person, body heights.
     """
 
@@ -49,6 +58,11 @@ class PersonDetectionConfig:
     short_side: int = Field(default=720, ge=64)
     visibility: float = Field(default=0.5, ge=0, le=1)
     smallest: float = Field(default=0.25, gt=0)
+    window: float = Field(default=2.0, ge=1.5)
+    tile: float = Field(default=0.4, gt=0, le=1)
+    far_below: float = Field(default=0.5, ge=0, le=1)
+    search_every_s: float = Field(default=1.0, gt=0)
+    memory_s: float = Field(default=1.0, ge=0)
     apart: float = Field(default=0.12, gt=0)
 
 
@@ -66,23 +80,78 @@ class PersonDetection:
 
 
 def detect_people(
-    image: UInt8[np.ndarray, "H W 3"], landmarker: Any, config: PersonDetectionConfig
+    image: UInt8[np.ndarray, "H W 3"],
+    landmarker: Any,
+    config: PersonDetectionConfig,
+    expected: Sequence[np.ndarray] = (),
+    everywhere: bool = False,
 ) -> list[PersonDetection]:
-    """Return all people in a picture, in the detector's order."""
+    """Return all people in a picture, in the detector's order.
+
+    Args:
+        image: RGB.
+        landmarker: For single pictures.
+        config: How to look.
+        expected: Rows of people who were there shortly before: who is not found in the whole
+            picture is looked for in a window there.
+        everywhere: Whether to look in windows all over the picture, too.
+    """
     factor = min(1.0, config.short_side / min(image.shape[:2]))
     small = cv2.resize(image, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
-    painted = np.zeros(small.shape[:2], bool)
-    found: list[PersonDetection] = []
+    crowd = _Crowd(small, config)
     for _ in range(config.most):
-        row = detect_person(landmarker, small)
-        if row is None or row[:, 6].mean() < config.visibility:
+        if not crowd.add(detect_person(landmarker, small)):
             break
-        if not any(_same(row, other.row, small.shape, config.apart) for other in found):
-            found.append(PersonDetection(row, mean_colours(small, row[:, :2], painted)))
-        mask = silhouette(row[:, :2], small.shape[1], small.shape[0], config.limb_width)
-        paint(small, mask)
-        painted |= mask
-    return _near(found, small.shape[1::-1], config.smallest)
+    height, width = small.shape[:2]
+    boxes = [_around(row, config.window, small.shape) for row in expected if crowd.lacks(row)]
+    tallest = max(crowd.statures(), default=0.0)
+    if everywhere and tallest < config.far_below * min(width, height):
+        boxes += tiles(width, height, round(config.tile * min(width, height)))
+    for x0, y0, x1, y1 in boxes:
+        row = detect_person(landmarker, small[y0:y1, x0:x1])
+        if row is not None and is_whole(row) and len(crowd.found) < config.most:
+            crowd.add(in_picture(row, (x0, y0, x1, y1), width, height))
+    limit = config.smallest * max(crowd.statures(), default=0.0)
+    tall_enough = [height >= limit for height in crowd.statures()]
+    return [person for person, kept in zip(crowd.found, tall_enough, strict=True) if kept]
+
+
+class _Crowd:
+    """People who were found in a picture, and the picture with them painted over."""
+
+    def __init__(self, image: np.ndarray, config: PersonDetectionConfig) -> None:
+        self.found: list[PersonDetection] = []
+        self._image, self._config = image, config
+        self._painted = np.zeros(image.shape[:2], bool)
+
+    def add(self, row: np.ndarray | None) -> bool:
+        """Paint a find over, and keep it unless it is known; return whether it is a person."""
+        if row is None or row[:, 6].mean() < self._config.visibility:
+            return False
+        if self.lacks(row):
+            colours = mean_colours(self._image, row[:, :2], self._painted)
+            self.found.append(PersonDetection(row, colours))
+        height, width = self._image.shape[:2]
+        mask = silhouette(row[:, :2], width, height, self._config.limb_width)
+        paint(self._image, mask)
+        self._painted |= mask
+        return True
+
+    def statures(self) -> list[float]:
+        """Return the height of each, pixels."""
+        size = self._image.shape[1::-1]
+        return [float(stature(person.row[:, :2] * size)) for person in self.found]
+
+    def lacks(self, row: np.ndarray) -> bool:
+        """Return whether none of those found is where this row is."""
+        shape, apart = self._image.shape, self._config.apart
+        return not any(_same(row, other.row, shape, apart) for other in self.found)
+
+
+def _around(row: np.ndarray, side: float, shape: tuple[int, ...]) -> Box:
+    """Return a window of `side` body heights around a person."""
+    points = row[:, :2] * shape[1::-1]
+    return window(points[trunk()].mean(0), side * float(stature(points)), shape)
 
 
 def detect_person(landmarker: Any, image: np.ndarray) -> np.ndarray | None:
@@ -140,15 +209,6 @@ def _colour(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
         return np.full(3, np.nan)
     result: np.ndarray = cv2.cvtColor(pixels[None], cv2.COLOR_RGB2LAB)[0].mean(0)
     return result
-
-
-def _near(
-    found: list[PersonDetection], size: tuple[int, ...], smallest: float
-) -> list[PersonDetection]:
-    """Return the detections without the people of the background."""
-    tall = [float(stature(other.row[:, :2] * size)) for other in found]
-    limit = smallest * max(tall, default=0.0)
-    return [other for other, height in zip(found, tall, strict=True) if height >= limit]
 
 
 def _same(a: np.ndarray, b: np.ndarray, shape: tuple[int, ...], apart: float) -> bool:

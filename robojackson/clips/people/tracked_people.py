@@ -20,6 +20,8 @@ from robojackson.clips.video import VideoInfo, timed_frames
 SCOUT = "lite"
 """Size of the pose model that looks for people; the dancer is then followed with a better one."""
 LEFT, RIGHT = 0.4, 0.6
+NEAR = 0.5
+"""Body heights; a person seen nearer than this to an earlier place has left it."""
 
 
 @dataclass(frozen=True)
@@ -95,13 +97,44 @@ def track_people(
     """Return all people in every frame, with their identities."""
     found: list[list[PersonDetection]] = []
     times: list[float] = []
+    memory, search_s = Memory(), 0.0
     with still_landmarker(SCOUT) as landmarker:
         frames = timed_frames(path, short_side=detection.short_side)
         for index, (time_s, image) in enumerate(frames):
-            found.append(detect_people(image, landmarker, detection))
+            everywhere = time_s >= search_s
+            if everywhere:
+                search_s = time_s + detection.search_every_s
+            expected = memory.of(time_s, detection.memory_s)
+            found.append(detect_people(image, landmarker, detection, expected, everywhere))
+            memory.add(time_s, found[-1], info)
             times.append(time_s)
             if progress:
                 progress(index + 1, info.frames)
     when = np.array(times)
     rows = identify(found, when, (info.width, info.height), identity)
     return TrackedPeople(rows, when, info)
+
+
+class Memory:
+    """Where people were seen last."""
+
+    def __init__(self) -> None:
+        self._seen: list[tuple[float, np.ndarray]] = []
+
+    def of(self, time_s: float, memory_s: float) -> list[np.ndarray]:
+        """Return the rows of those who were seen shortly before a moment, and forget the others."""
+        self._seen = [each for each in self._seen if time_s - each[0] <= memory_s]
+        return [row for _, row in self._seen]
+
+    def add(self, time_s: float, people: list[PersonDetection], info: VideoInfo) -> None:
+        """Remember people of a frame; who was seen nearby before is the same for this purpose."""
+        size = (info.width, info.height)
+        for person in people:
+            points = person.row[:, :2] * size
+            place, tall = points[trunk()].mean(0), float(stature(points))
+            self._seen = [
+                each
+                for each in self._seen
+                if np.linalg.norm((each[1][trunk(), :2] * size).mean(0) - place) > NEAR * tall
+            ]
+            self._seen.append((time_s, person.row))
