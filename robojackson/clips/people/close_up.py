@@ -19,7 +19,7 @@ from pydantic import Field
 from robojackson.clips.people.camera_motion import spread
 from robojackson.clips.people.person_detection import detect_person
 from robojackson.clips.people.person_extent import stature, trunk
-from robojackson.clips.people.windows import (
+from robojackson.clips.people.person_windows import (
     Box,
     detect_in_windows,
     in_picture,

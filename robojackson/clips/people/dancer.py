@@ -18,10 +18,11 @@ from pydantic import Field
 from robojackson.clips.people.close_up import CloseUpConfig, look_closely
 from robojackson.clips.people.identity import IdentityConfig
 from robojackson.clips.people.person_count import People, PeopleConfig
-from robojackson.clips.people.person_detection import PersonDetectionConfig, paint, silhouette
+from robojackson.clips.people.person_detection import PersonDetectionConfig
 from robojackson.clips.people.person_extent import stature, trunk
+from robojackson.clips.people.person_silhouette import paint, silhouette
+from robojackson.clips.people.person_windows import Box, detect_in_windows, windows
 from robojackson.clips.people.tracked_people import SCOUT, TrackedPeople, track_people
-from robojackson.clips.people.windows import Box, detect_in_windows, windows
 from robojackson.clips.pose_detector import (
     SHORT_SIDE,
     Watcher,

@@ -12,25 +12,20 @@ from typing import Any
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, UInt8
+from jaxtyping import Bool, UInt8
 from pydantic import Field
 
-from robojackson.clips.people.person_extent import indices, stature, trunk
-from robojackson.clips.people.windows import Box, in_picture, is_whole, tiles, window
+from robojackson.clips.people.person_extent import stature, trunk
+from robojackson.clips.people.person_silhouette import mean_colours, paint, silhouette
+from robojackson.clips.people.person_windows import Box, in_picture, is_whole, tiles, window
 from robojackson.clips.pose_detector import first_person
 from robojackson.config import config_dataclass
 
-CHAINS = (
-    (19, 15, 13, 11), (20, 16, 14, 12), (23, 25, 27, 29, 31), (24, 26, 28, 30, 32), (27, 31),
-    (28, 32), (7, 8),
-)  # fmt: skip
-"""Limbs as chains of landmarks, fingers and toes included."""
-FACE = slice(0, 11)
-HEAD_RADIUS, NECK_WIDTH = 0.09, 0.08
-"""Body heights."""
-COLOUR_VALUES = 6
-SAMPLE_WIDTH = 0.03
-FEWEST_PIXELS = 12
+BLEND = 0.5
+"""Share of a person's silhouette that two others cover where it is made of parts of them."""
+MOST_FAINT = 1
+"""Finds of low visibility, as a person at the edge of the picture, that are painted over before the
+search of the whole picture ends."""
 
 
 @config_dataclass
@@ -99,9 +94,12 @@ def detect_people(
     factor = min(1.0, config.short_side / min(image.shape[:2]))
     small = cv2.resize(image, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
     crowd = _Crowd(small, config)
+    faint = 0
     for _ in range(config.most):
-        if not crowd.add(detect_person(landmarker, small)):
+        row = detect_person(landmarker, small)
+        if row is None or faint > MOST_FAINT:
             break
+        faint += not crowd.add(row)
     height, width = small.shape[:2]
     boxes = [_around(row, config.window, small.shape) for row in expected if crowd.lacks(row)]
     tallest = max(crowd.statures(), default=0.0)
@@ -111,6 +109,7 @@ def detect_people(
         row = detect_person(landmarker, small[y0:y1, x0:x1])
         if row is not None and is_whole(row) and len(crowd.found) < config.most:
             crowd.add(in_picture(row, (x0, y0, x1, y1), width, height))
+    crowd.drop_blends()
     limit = config.smallest * max(crowd.statures(), default=0.0)
     tall_enough = [height >= limit for height in crowd.statures()]
     return [person for person, kept in zip(crowd.found, tall_enough, strict=True) if kept]
@@ -124,23 +123,36 @@ class _Crowd:
         self._image, self._config = image, config
         self._painted = np.zeros(image.shape[:2], bool)
 
-    def add(self, row: np.ndarray | None) -> bool:
-        """Paint a find over, and keep it unless it is known; return whether it is a person."""
-        if row is None or row[:, 6].mean() < self._config.visibility:
-            return False
-        if self.lacks(row):
+    def add(self, row: np.ndarray) -> bool:
+        """Paint a find over, and keep it unless it is faint or known; return whether it is not
+        faint."""
+        is_clear = bool(row[:, 6].mean() >= self._config.visibility)
+        if is_clear and self.lacks(row):
             colours = mean_colours(self._image, row[:, :2], self._painted)
             self.found.append(PersonDetection(row, colours))
-        height, width = self._image.shape[:2]
-        mask = silhouette(row[:, :2], width, height, self._config.limb_width)
+        mask = self._silhouette(row)
         paint(self._image, mask)
         self._painted |= mask
-        return True
+        return is_clear
+
+    def drop_blends(self) -> None:
+        """Drop finds made of parts of two others: those that the others cover, faintest first."""
+        masks = [self._silhouette(person.row) for person in self.found]
+        kept = list(range(len(masks)))
+        for number in sorted(kept, key=lambda each: float(self.found[each].row[:, 6].mean())):
+            others = [masks[each] for each in kept if each != number]
+            if len(others) > 1 and np.any(others, axis=0)[masks[number]].mean() > BLEND:
+                kept.remove(number)
+        self.found = [self.found[each] for each in kept]
 
     def statures(self) -> list[float]:
         """Return the height of each, pixels."""
         size = self._image.shape[1::-1]
         return [float(stature(person.row[:, :2] * size)) for person in self.found]
+
+    def _silhouette(self, row: np.ndarray) -> Bool[np.ndarray, "H W"]:
+        height, width = self._image.shape[:2]
+        return silhouette(row[:, :2], width, height, self._config.limb_width)
 
     def lacks(self, row: np.ndarray) -> bool:
         """Return whether none of those found is where this row is."""
@@ -163,59 +175,7 @@ def detect_person(landmarker: Any, image: np.ndarray) -> np.ndarray | None:
     return first_person(landmarker.detect(picture))
 
 
-def silhouette(
-    xy: Float[np.ndarray, "33 2"], width: int, height: int, limb_width: float
-) -> Bool[np.ndarray, "H W"]:
-    """Return the pixels that a person covers, limbs `limb_width` body heights wide."""
-    points = np.round(xy * [width, height]).astype(np.int32)
-    tall = float(stature(points))
-    thick = max(2, round(limb_width * tall))
-    mask = np.zeros((height, width), np.uint8)
-    hull = cv2.convexHull(points[trunk()])
-    cv2.fillConvexPoly(mask, hull, 1)
-    cv2.polylines(mask, [hull], True, 1, thick)
-    for chain in CHAINS:
-        cv2.polylines(mask, [points[list(chain)]], False, 1, thick)
-    head = points[FACE].mean(0)
-    middle = points[indices(("left_shoulder", "right_shoulder"))].mean(0)
-    cv2.line(mask, _pixel(head), _pixel(middle), 1, max(2, round(NECK_WIDTH * tall)))
-    cv2.circle(mask, _pixel(head), max(2, round(HEAD_RADIUS * tall)), 1, -1)
-    return mask.astype(bool)
-
-
-def paint(image: UInt8[np.ndarray, "H W 3"], mask: Bool[np.ndarray, "H W"]) -> None:
-    """Fill pixels with the mean colour of the picture."""
-    image[mask] = cv2.mean(image)[:3]
-
-
-def mean_colours(
-    image: UInt8[np.ndarray, "H W 3"], xy: Float[np.ndarray, "33 2"], hidden: np.ndarray
-) -> Float[np.ndarray, " 6"]:
-    """Return the mean colour of trunk and thighs where nothing hides them."""
-    height, width = image.shape[:2]
-    points = np.round(xy * [width, height]).astype(np.int32)
-    upper, lower = np.zeros((2, height, width), np.uint8)
-    cv2.fillConvexPoly(upper, cv2.convexHull(points[trunk()]), 1)
-    thick = max(1, round(SAMPLE_WIDTH * float(stature(points))))
-    for side in ("left", "right"):
-        ends = points[indices((f"{side}_hip", f"{side}_knee"))].tolist()
-        cv2.line(lower, ends[0], ends[1], 1, thick)
-    return np.concatenate([_colour(image, (part > 0) & ~hidden) for part in (upper, lower)])
-
-
-def _colour(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    pixels = image[mask]
-    if len(pixels) < FEWEST_PIXELS:
-        return np.full(3, np.nan)
-    result: np.ndarray = cv2.cvtColor(pixels[None], cv2.COLOR_RGB2LAB)[0].mean(0)
-    return result
-
-
 def _same(a: np.ndarray, b: np.ndarray, shape: tuple[int, ...], apart: float) -> bool:
     first, second = (row[:, :2] * shape[1::-1] for row in (a, b))
     gap = np.linalg.norm(first[trunk()].mean(0) - second[trunk()].mean(0))
     return bool(gap < apart * max(stature(first), stature(second)))
-
-
-def _pixel(point: np.ndarray) -> tuple[int, int]:
-    return round(float(point[0])), round(float(point[1]))

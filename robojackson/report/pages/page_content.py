@@ -24,8 +24,7 @@ PROGRAMS = ("robojackson", "mujoco", "gymnasium", "mediapipe", "torch", "jax", "
             "sb3-contrib", "prefect", "numpy")  # fmt: skip
 
 TO_COME = (
-    "This is a first look. The video and the evaluation from all starts are being made; this page "
-    "is then written again: load it again."
+    "This is a first look. Load this page again for the video and the evaluation from all starts."
 )
 """Note on a page that has no video yet."""
 SHOWN_FINDINGS = 3

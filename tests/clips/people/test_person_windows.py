@@ -8,8 +8,15 @@ import numpy as np
 import pytest
 
 from robojackson.clips.people.dancer import DancerConfig, track_dancer
+from robojackson.clips.people.person_windows import (
+    STAYS,
+    in_picture,
+    is_whole,
+    tiles,
+    window,
+    windows,
+)
 from robojackson.clips.people.tracked_people import Memory, track_people
-from robojackson.clips.people.windows import STAYS, in_picture, is_whole, tiles, window, windows
 from robojackson.clips.video import VideoInfo, VideoLimits, probe
 from tests.fixtures import crossing
 from tests.fixtures.difficult_clips import write
