@@ -33,6 +33,8 @@ LIMITS: Mapping[Kind, float] = {
 of all frames, a count, share of the image's diagonal, grey level 0..1, share of fine detail. Under
 two seconds are too short to evaluate; the pixels are those of a search's filter; the last two are
 half of what the bundled clips have at the worst."""
+SHORT_GAP_S = 0.25
+"""A gap that motion capture fills without harm."""
 AT_MOST: tuple[Kind, ...] = ("body_outside", "people", "camera_moves")
 """Figures that are advised against above their limit; the others below it."""
 
@@ -45,11 +47,13 @@ class Advice:
         kind: Subject of the advice.
         value: The figure that was measured, in the unit of its limit.
         limit: Figure from which on the advice is given.
+        range_s: First and last moment of the part that is good, seconds from the first frame.
     """
 
     kind: Kind
     value: float
     limit: float
+    range_s: tuple[float, float] | None = None
 
     def __str__(self) -> str:
         return _WORDS[self.kind](self)
@@ -57,14 +61,17 @@ class Advice:
     @property
     def record(self) -> dict[str, object]:
         """Kind, figures and words, for JSON."""
-        return {"kind": self.kind, "value": self.value, "limit": self.limit, "words": str(self)}
+        figures = {"kind": self.kind, "value": self.value, "limit": self.limit}
+        part = {} if self.range_s is None else {"range_s": list(self.range_s)}
+        return {**figures, "words": str(self), **part}
 
 
 def advise(track: LandmarkTrack) -> tuple[Advice, ...]:
     """Return what to do better, the gravest kinds of a list by hand first; nothing for a good
     clip."""
+    ranges = {"person_missing": visible_range(track)}
     return tuple(
-        Advice(kind, value, LIMITS[kind])
+        Advice(kind, value, LIMITS[kind], ranges.get(kind))
         for kind, value in _figures(track).items()
         if value is not None and (value > LIMITS[kind] if kind in AT_MOST else value < LIMITS[kind])
     )
@@ -88,10 +95,26 @@ def _figures(track: LandmarkTrack) -> dict[Kind, float | None]:
     }
 
 
+def visible_range(track: LandmarkTrack) -> tuple[float, float] | None:
+    """Return the longest part in which the person is never missing for long, seconds; None where it
+    is too short for a dance."""
+    seen = np.flatnonzero(track.detected)
+    if not len(seen):
+        return None
+    parts = np.split(seen, np.flatnonzero(np.diff(seen) > SHORT_GAP_S * track.fps) + 1)
+    first, last = max(((part[0], part[-1]) for part in parts), key=lambda each: each[1] - each[0])
+    begin, end = float(track.times[first]), float(track.times[last])
+    return (begin, end) if end - begin >= LIMITS["too_short"] else None
+
+
 def _outside(track: LandmarkTrack) -> float:
     """Return the share of the frames with a person in which head, trunk or legs leave the image."""
     xy = track.landmarks[track.detected][:, indices(BODY), :2]
     return float(((xy < 0.0) | (xy > 1.0)).any((1, 2)).mean())
+
+
+def _in_sight(range_s: tuple[float, float] | None) -> str:
+    return "" if range_s is None else f" (in sight from {range_s[0]:.1f} to {range_s[1]:.1f} s)"
 
 
 _WORDS: Mapping[Kind, Callable[[Advice], str]] = {
@@ -106,7 +129,7 @@ _WORDS: Mapping[Kind, Callable[[Advice], str]] = {
     ),
     "person_missing": lambda a: (
         f"the person is detected in {a.value:.0%} of the frames: choose a range with --start and "
-        "--end, or film without anything in between"
+        f"--end{_in_sight(a.range_s)}, or film without anything in between"
     ),
     "people": lambda a: (
         f"{a.value:.0f} people in view: film one alone, or choose with --person (mocap --people "

@@ -132,3 +132,23 @@ def test_pictures_are_measured_around_the_person(blur: float, gain: float, found
 def test_sharpness_does_not_depend_on_light() -> None:
     grey = np.random.default_rng(3).integers(0, 200, (192, 100)).astype(np.uint8)
     assert detail_share(grey // 2) == pytest.approx(detail_share(grey), rel=0.02)
+
+
+def test_a_person_who_is_missing_gets_the_range_in_which_he_is_in_sight() -> None:
+    track = good_track()
+    landmarks = track.landmarks.copy()
+    landmarks[:20] = landmarks[50:55] = np.nan
+    (advice,) = advise(replace(track, landmarks=landmarks))
+    assert advice.range_s == pytest.approx((20 / 30, 89 / 30))
+    assert "--end (in sight from 0.7 to 3.0 s)" in str(advice)
+    assert advice.record["range_s"] == list(advice.range_s or ())
+
+
+def test_no_range_is_named_where_none_is_long_enough() -> None:
+    track = good_track()
+    landmarks = track.landmarks.copy()
+    landmarks[30:60] = np.nan
+    (advice,) = advise(replace(track, landmarks=landmarks))
+    assert advice.range_s is None
+    assert "in sight" not in str(advice)
+    assert set(advice.record) == {"kind", "value", "limit", "words"}
