@@ -20,6 +20,7 @@ from robojackson.cli.app import add_stages, make_app
 from robojackson.cli.console import CommandResult, command, table
 from robojackson.cli.options import (
     Config,
+    End,
     Force,
     Json,
     Minutes,
@@ -28,6 +29,7 @@ from robojackson.cli.options import (
     Robot,
     Seed,
     Set,
+    Start,
     Trainer,
     overrides_from,
     yaml_text,
@@ -67,8 +69,8 @@ def dance(
     seed: Seed = None,
     person: Person = None,
     quality: Quality = None,
-    start: Annotated[float | None, typer.Option(min=0, help="Trim: begin here, seconds.")] = None,
-    end: Annotated[float | None, typer.Option(min=0, help="Trim: end here, seconds.")] = None,
+    start: Start = None,
+    end: End = None,
     config: Config = "base",
     force: Force = False,
     instant: Annotated[

@@ -24,13 +24,16 @@ from robojackson.cli.format_commands import ExportCommand, export, import_
 from robojackson.cli.learning_commands import evaluate, pretrain, train
 from robojackson.cli.options import (
     Config,
+    End,
     Folder,
     Force,
     Json,
     Person,
     Quality,
     Robot,
+    SecondVideo,
     Set,
+    Start,
     Verbose,
     Weights,
     overrides_from,
@@ -68,14 +71,13 @@ def score(
 def mocap(
     video: Annotated[Path, typer.Argument(help="A video of one person.")],
     out: Folder,
-    second: Annotated[
-        Path | None,
-        typer.Argument(help="The same dance from another camera; neither may move."),
-    ] = None,
+    second: SecondVideo = None,
     hybrik: Weights = None,
     niki: Weights = None,
     person: Person = None,
     quality: Quality = None,
+    start: Start = None,
+    end: End = None,
     people: Annotated[
         bool, typer.Option("--people", help="Only list the people, with a picture.")
     ] = False,
@@ -90,21 +92,21 @@ def mocap(
     verbose: Verbose = False,
     as_json: Json = False,
 ) -> CommandResult:
-    """Recover the motion of the person in a video: smpl.parquet, landmarks.parquet and a
-    picture."""
+    """Recover the motion of the person in a video: smpl.parquet, landmarks, a picture."""
     from robojackson.cli import cards, stages
     from robojackson.cli.pictures.mocap_pictures import draw_mocap
+    from robojackson.cli.pictures.people_listing import list_people
+    from robojackson.cli.video_range import video_range
 
     log_to_stderr()
-    if people:
-        from robojackson.cli.pictures.people_listing import list_people
-
-        data, lines = list_people(video, out, config, overrides_from(set_))
-        return CommandResult(data, text=lines)
     brought = {"network.hybrik": yaml_text(hybrik), "network.niki": yaml_text(niki)}
     overrides = overrides_from(set_, {**brought, "dancer.number": person, "detector": quality})
-    made = stages.mocap(video, out, config, overrides, hypotheses, second)
-    made |= draw_mocap(video, out, config, overrides, film)
+    with video_range(video, second, out, (start, end), config, overrides) as shown:
+        if people:
+            data, lines = list_people(shown, out, config, overrides)
+            return CommandResult(data, text=lines)
+        made = stages.mocap(shown, out, config, overrides, hypotheses, second)
+        made |= draw_mocap(shown, out, config, overrides, film)
     return CommandResult(made, text=cards.shown(made, cards.mocap_lines(made), verbose))
 
 

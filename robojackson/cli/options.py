@@ -86,6 +86,11 @@ TablesFolder = Annotated[Path | None, _out("Folder for the tables.")]
 Weights = Annotated[
     Path | None, typer.Option(help="Published weights that you bring (docs/official_weights.md).")
 ]
+Start = Annotated[float | None, typer.Option(min=0, help="Trim: begin here, seconds.")]
+End = Annotated[float | None, typer.Option(min=0, help="Trim: end here, seconds.")]
+SecondVideo = Annotated[
+    Path | None, typer.Argument(help="The same dance from another camera; neither may move.")
+]
 Person = Annotated[
     int | None, typer.Option(min=1, help="Number of the person to follow; 1 is the largest.")
 ]

@@ -36,6 +36,8 @@ from robojackson.errors import NoPersonFound
 from robojackson.motion.landmark_track import LandmarkTrack
 
 Progress = Callable[[int, int], None]
+STAYS_AMONG_OTHERS = 0.15
+"""The `stays` of windows that are small, so as to hold no others."""
 
 
 @config_dataclass
@@ -49,6 +51,7 @@ class DancerConfig:
         detection, identity: Configurations of detecting and identifying all people in every frame.
         astray: Body heights; a detection further than this from the expected place is another's.
         crowding: People nearer than this hide one another, body heights.
+        window: Side of the window in which a small person is followed among others, body heights.
         longest_gap_s: Longest gap in which the person is looked for, seconds.
     """
 
@@ -59,6 +62,7 @@ class DancerConfig:
     identity: IdentityConfig = Field(default_factory=IdentityConfig)
     astray: float = Field(default=0.3, gt=0)
     crowding: float = Field(default=0.5, gt=0)
+    window: float = Field(default=1.8, ge=1.5)
     longest_gap_s: float = Field(default=1.0, ge=0)
 
 
@@ -164,11 +168,11 @@ def _followed(
         return mask_others(image, known[index], others[:, index], config.detection.limb_width)
 
     course, tall = _course(known, cast.time_s, size_px)
-    side = config.close_up.window * float(np.median(tall))
+    side = config.window * float(np.median(tall))
     boxes: Iterable[tuple[int, Box]] = [(len(known), (0, 0, *size_px))]
     is_small = side < min(size_px)
     if is_small:
-        boxes = windows(course, side, size_px[::-1])
+        boxes = windows(course, side, size_px[::-1], STAYS_AMONG_OTHERS)
     short_side = None if is_small else SHORT_SIDE
     found = detect_in_windows(path, info, size, boxes, alone, progress, short_side)
     return checked(found, cast.rows, chosen, cast.time_s, size_px, config)

@@ -12,7 +12,7 @@ from typing import Any
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, UInt8
+from jaxtyping import UInt8
 from pydantic import Field
 
 from robojackson.clips.people.person_extent import stature, trunk
@@ -20,12 +20,6 @@ from robojackson.clips.people.person_silhouette import mean_colours, paint, silh
 from robojackson.clips.people.person_windows import Box, in_picture, is_whole, tiles, window
 from robojackson.clips.pose_detector import first_person
 from robojackson.config import config_dataclass
-
-BLEND = 0.5
-"""Share of a person's silhouette that two others cover where it is made of parts of them."""
-MOST_FAINT = 1
-"""Finds of low visibility, as a person at the edge of the picture, that are painted over before the
-search of the whole picture ends."""
 
 
 @config_dataclass
@@ -94,12 +88,9 @@ def detect_people(
     factor = min(1.0, config.short_side / min(image.shape[:2]))
     small = cv2.resize(image, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
     crowd = _Crowd(small, config)
-    faint = 0
     for _ in range(config.most):
-        row = detect_person(landmarker, small)
-        if row is None or faint > MOST_FAINT:
+        if not crowd.add(detect_person(landmarker, small)):
             break
-        faint += not crowd.add(row)
     height, width = small.shape[:2]
     boxes = [_around(row, config.window, small.shape) for row in expected if crowd.lacks(row)]
     tallest = max(crowd.statures(), default=0.0)
@@ -109,7 +100,6 @@ def detect_people(
         row = detect_person(landmarker, small[y0:y1, x0:x1])
         if row is not None and is_whole(row) and len(crowd.found) < config.most:
             crowd.add(in_picture(row, (x0, y0, x1, y1), width, height))
-    crowd.drop_blends()
     limit = config.smallest * max(crowd.statures(), default=0.0)
     tall_enough = [height >= limit for height in crowd.statures()]
     return [person for person, kept in zip(crowd.found, tall_enough, strict=True) if kept]
@@ -123,36 +113,23 @@ class _Crowd:
         self._image, self._config = image, config
         self._painted = np.zeros(image.shape[:2], bool)
 
-    def add(self, row: np.ndarray) -> bool:
-        """Paint a find over, and keep it unless it is faint or known; return whether it is not
-        faint."""
-        is_clear = bool(row[:, 6].mean() >= self._config.visibility)
-        if is_clear and self.lacks(row):
+    def add(self, row: np.ndarray | None) -> bool:
+        """Paint a find over, and keep it unless it is known; return whether it is a person."""
+        if row is None or row[:, 6].mean() < self._config.visibility:
+            return False
+        if self.lacks(row):
             colours = mean_colours(self._image, row[:, :2], self._painted)
             self.found.append(PersonDetection(row, colours))
-        mask = self._silhouette(row)
+        height, width = self._image.shape[:2]
+        mask = silhouette(row[:, :2], width, height, self._config.limb_width)
         paint(self._image, mask)
         self._painted |= mask
-        return is_clear
-
-    def drop_blends(self) -> None:
-        """Drop finds made of parts of two others: those that the others cover, faintest first."""
-        masks = [self._silhouette(person.row) for person in self.found]
-        kept = list(range(len(masks)))
-        for number in sorted(kept, key=lambda each: float(self.found[each].row[:, 6].mean())):
-            others = [masks[each] for each in kept if each != number]
-            if len(others) > 1 and np.any(others, axis=0)[masks[number]].mean() > BLEND:
-                kept.remove(number)
-        self.found = [self.found[each] for each in kept]
+        return True
 
     def statures(self) -> list[float]:
         """Return the height of each, pixels."""
         size = self._image.shape[1::-1]
         return [float(stature(person.row[:, :2] * size)) for person in self.found]
-
-    def _silhouette(self, row: np.ndarray) -> Bool[np.ndarray, "H W"]:
-        height, width = self._image.shape[:2]
-        return silhouette(row[:, :2], width, height, self._config.limb_width)
 
     def lacks(self, row: np.ndarray) -> bool:
         """Return whether none of those found is where this row is."""

@@ -21,7 +21,7 @@ OVERLAP = 0.5
 View = Callable[[int, np.ndarray], np.ndarray | None]
 """Returns what the detector is shown of a frame, of the same size; None passes it over."""
 STAYS = 0.25
-"""A window ends when the person is further from its middle than this, sides of the window."""
+"""Of `windows`, where no others are near."""
 
 
 def window(place: Float[np.ndarray, "2"], side: float, shape: tuple[int, ...]) -> Box:
@@ -33,14 +33,15 @@ def window(place: Float[np.ndarray, "2"], side: float, shape: tuple[int, ...]) -
 
 
 def windows(
-    places: Float[np.ndarray, "T 2"], side: float, shape: tuple[int, ...]
+    places: Float[np.ndarray, "T 2"], side: float, shape: tuple[int, ...], stays: float = STAYS
 ) -> Iterator[tuple[int, Box]]:
-    """Yield windows and the frame at which each ends: when the person has left its middle."""
+    """Yield windows and the frame at which each ends: when the person is further from its middle
+    than `stays`, sides of the window."""
     start = 0
     while start < len(places):
         low = np.minimum.accumulate(places[start:])
         high = np.maximum.accumulate(places[start:])
-        leaves = np.atleast_1d(((high - low) / 2.0 > STAYS * side).any(1))
+        leaves = np.atleast_1d(((high - low) / 2.0 > stays * side).any(1))
         end = start + (int(np.argmax(leaves)) if leaves.any() else len(leaves))
         last = end - start - 1
         yield end, window((low[last] + high[last]) / 2.0, side, shape)

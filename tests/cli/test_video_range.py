@@ -1,0 +1,56 @@
+"""A range of a video is looked at alone; an impossible one leaves nothing."""
+
+from pathlib import Path
+
+import pytest
+
+from robojackson.cli.video_range import video_range
+from robojackson.clips.video import VideoLimits, probe
+from robojackson.errors import BadConfiguration
+
+CLIP = Path(__file__).parents[2] / "clips" / "walk.mp4"
+
+
+def test_without_a_range_the_video_itself_is_taken(tmp_path: Path) -> None:
+    with video_range(CLIP, None, tmp_path / "out", (None, None), "base", {}) as shown:
+        assert shown == CLIP
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.medium
+def test_a_range_is_a_file_beside_the_results(tmp_path: Path) -> None:
+    with video_range(CLIP, None, tmp_path, (0.5, 1.5), "base", {}) as shown:
+        assert shown == tmp_path / "walk-0.5-1.5s.mp4"
+    assert probe(shown, VideoLimits()).duration_s == pytest.approx(1.0, abs=0.05)
+
+
+@pytest.mark.medium
+def test_what_fails_on_a_range_leaves_no_file(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+
+    def fail() -> None:
+        with video_range(CLIP, None, out, (None, 1.0), "base", {}) as shown:
+            assert shown.exists()
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fail()
+    assert not out.exists()
+
+
+def test_two_cameras_have_no_range(tmp_path: Path) -> None:
+    with (
+        pytest.raises(BadConfiguration, match=r"two cameras exclude --start and --end"),
+        video_range(CLIP, CLIP, tmp_path, (1.0, None), "base", {}),
+    ):
+        pass
+
+
+@pytest.mark.medium
+def test_a_range_beyond_the_video_is_one_line(tmp_path: Path) -> None:
+    with (
+        pytest.raises(BadConfiguration, match="no range from 9 s"),
+        video_range(CLIP, None, tmp_path / "out", (9.0, None), "base", {}),
+    ):
+        pass
+    assert not (tmp_path / "out").exists()
