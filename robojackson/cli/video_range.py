@@ -1,4 +1,4 @@
-"""The range of a video that a command is told to look at, as a file beside the results."""
+"""The range of a video that a command is given, as a file beside the results."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
