@@ -10,6 +10,7 @@ from robojackson.cli.lifetime.video_process import in_video_process, probed
 from robojackson.clips.time_range import span
 from robojackson.clips.trim import trim
 from robojackson.errors import BadConfiguration
+from robojackson.files.file_tree import results_in
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.yaml_loader import load
 
@@ -41,7 +42,8 @@ def video_range(
     whole = probed(video, replace(limits, max_duration_s=None))
     begin, end = span(whole, limits, *range_s)
     was_there = out.exists()
-    out.mkdir(parents=True, exist_ok=True)
+    with results_in(out):
+        out.mkdir(parents=True, exist_ok=True)
     target = out / f"{video.stem}-{begin:g}-{end:g}s.mp4"
     try:
         in_video_process(trim, video, begin, end, target, frames=whole.frames)

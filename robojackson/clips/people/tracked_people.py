@@ -129,12 +129,13 @@ class Memory:
     def add(self, time_s: float, people: list[PersonDetection], info: VideoInfo) -> None:
         """Remember people of a frame; who was seen nearby before is the same for this purpose."""
         size = (info.width, info.height)
-        for person in people:
-            points = person.row[:, :2] * size
+        now = [(time_s, person.row) for person in people]
+        for _, row in now:
+            points = row[:, :2] * size
             place, tall = points[trunk()].mean(0), float(stature(points))
             self._seen = [
                 each
                 for each in self._seen
                 if np.linalg.norm((each[1][trunk(), :2] * size).mean(0) - place) > NEAR * tall
             ]
-            self._seen.append((time_s, person.row))
+        self._seen += now

@@ -83,6 +83,8 @@ def test_memory_keeps_where_each_was_last_and_forgets() -> None:
     assert places == pytest.approx([130, 500], abs=2)
     assert len(memory.of(1.2, 1.0)) == 1
     assert memory.of(2.0, 1.0) == []
+    memory.add(3.0, [seen(100), seen(150)], info)  # arm in arm
+    assert len(memory.of(3.0, 1.0)) == 2
 
 
 @pytest.fixture(scope="module")
