@@ -18,7 +18,7 @@ from pydantic import Field
 
 from robojackson.clips.people.camera_motion import spread
 from robojackson.clips.people.person_detection import detect_person
-from robojackson.clips.people.person_extent import stature, trunk
+from robojackson.clips.people.person_extent import place_of, stature, trunk
 from robojackson.clips.people.person_windows import (
     Box,
     detect_in_windows,
@@ -156,8 +156,7 @@ def _best(
 
 
 def _sight(index: int, row: np.ndarray, info: VideoInfo) -> Sight:
-    points = row[:, :2] * (info.width, info.height)
-    return Sight(index, points[trunk()].mean(0), float(stature(points)))
+    return Sight(index, *place_of(row, (info.width, info.height)))
 
 
 def _followed(

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import UInt8
 from pydantic import Field
 
-from robojackson.clips.people.person_extent import stature, trunk
+from robojackson.clips.people.person_extent import place_of
 from robojackson.clips.people.person_silhouette import mean_colours, paint, silhouette
 from robojackson.clips.people.person_windows import Box, in_picture, is_whole, tiles, window
 from robojackson.clips.pose_detector import first_person
@@ -129,7 +129,7 @@ class _Crowd:
     def statures(self) -> list[float]:
         """Return the height of each, pixels."""
         size = self._image.shape[1::-1]
-        return [float(stature(person.row[:, :2] * size)) for person in self.found]
+        return [place_of(person.row, size)[1] for person in self.found]
 
     def lacks(self, row: np.ndarray) -> bool:
         """Return whether none of those found is where this row is."""
@@ -139,8 +139,8 @@ class _Crowd:
 
 def _around(row: np.ndarray, side: float, shape: tuple[int, ...]) -> Box:
     """Return a window of `side` body heights around a person."""
-    points = row[:, :2] * shape[1::-1]
-    return window(points[trunk()].mean(0), side * float(stature(points)), shape)
+    place, tall = place_of(row, shape[1::-1])
+    return window(place, side * tall, shape)
 
 
 def detect_person(landmarker: Any, image: np.ndarray) -> np.ndarray | None:
@@ -153,6 +153,5 @@ def detect_person(landmarker: Any, image: np.ndarray) -> np.ndarray | None:
 
 
 def _same(a: np.ndarray, b: np.ndarray, shape: tuple[int, ...], apart: float) -> bool:
-    first, second = (row[:, :2] * shape[1::-1] for row in (a, b))
-    gap = np.linalg.norm(first[trunk()].mean(0) - second[trunk()].mean(0))
-    return bool(gap < apart * max(stature(first), stature(second)))
+    (first, tall), (second, taller) = (place_of(row, shape[1::-1]) for row in (a, b))
+    return bool(np.linalg.norm(first - second) < apart * max(tall, taller))

@@ -99,3 +99,16 @@ def box(
     x0, y0 = np.clip((low - room) * size, 0, size).astype(int)
     x1, y1 = np.clip(np.ceil((high + room) * size), 0, size).astype(int)
     return int(x0), int(y0), int(x1), int(y1)
+
+
+def place_of(
+    row: Float[np.ndarray, "33 _"], size: tuple[int, ...]
+) -> tuple[Float[np.ndarray, "2"], float]:
+    """Return the middle of the trunk and the stature of a person, pixels.
+
+    Args:
+        row: Landmarks; the first two columns are the place in the image, 0..1.
+        size: Width and height of the picture, pixels.
+    """
+    points = row[:, :2] * size
+    return points[trunk()].mean(0), float(stature(points))

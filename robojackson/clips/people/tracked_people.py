@@ -13,7 +13,7 @@ from robojackson.clips.people.person_detection import (
     PersonDetectionConfig,
     detect_people,
 )
-from robojackson.clips.people.person_extent import stature, trunk
+from robojackson.clips.people.person_extent import place_of, stature, trunk
 from robojackson.clips.pose_detector import still_landmarker
 from robojackson.clips.video import VideoInfo, timed_frames
 
@@ -131,11 +131,10 @@ class Memory:
         size = (info.width, info.height)
         now = [(time_s, person.row) for person in people]
         for _, row in now:
-            points = row[:, :2] * size
-            place, tall = points[trunk()].mean(0), float(stature(points))
+            place, tall = place_of(row, size)
             self._seen = [
                 each
                 for each in self._seen
-                if np.linalg.norm((each[1][trunk(), :2] * size).mean(0) - place) > NEAR * tall
+                if np.linalg.norm(place_of(each[1], size)[0] - place) > NEAR * tall
             ]
         self._seen += now
