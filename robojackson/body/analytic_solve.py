@@ -2,7 +2,9 @@
 
 Down the tree, each joint swings its rest bone onto the target bone and turns it by its twist. NAIVE
 aims along the predicted bone; ADAPTIVE aims from where the parent really ended, so that errors do
-not add up along a limb. Metres; any common frame of keypoints.
+not add up along a limb. HybrIK adds 1e-8 to the denominators of a swing. Next to a half turn that
+moves a bone, and with it all that hangs on it: NAIVE does the same, so that it gives HybrIK's
+rotations; ADAPTIVE does not. Metres; any common frame of keypoints.
 """
 
 from collections.abc import Callable
@@ -18,7 +20,6 @@ from robojackson.body.forward_kinematics import (
     rotate_about,
     swing,
     twist,
-    unit,
 )
 from robojackson.body.skeleton import AIM_CHILD, JOINT_NAMES, PARENTS, keypoint
 
@@ -38,6 +39,8 @@ def _levels() -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
 
 CARRY_OVER_LIMIT = 0.015
 """Metres; an adaptive bone that differs more from the predicted one is not corrected (HybrIK)."""
+SAFEGUARD = 1e-8
+"""What HybrIK adds to denominators, products of two bones in square metres."""
 LEVELS = _levels()
 """(joints, their parents, the children that they aim at) by distance from the pelvis."""
 ROOT_CHILDREN = (keypoint("spine1"), keypoint("left_hip"), keypoint("right_hip"))
@@ -82,7 +85,7 @@ def solve_with(
         ends = position[:, parents] + apply(above, rest[:, joints] - rest[:, parents])
         bone = rest[:, children] - rest[:, joints]
         target = _target_directions(goal[:, children], goal[:, joints], ends, bone, method)
-        swung = swing(bone, apply(np.swapaxes(above, -1, -2), target))
+        swung = _swing(bone, apply(np.swapaxes(above, -1, -2), target), method)
         ahead = above @ swung
         turns = [twist_rule(int(joint), ahead[:, k]) for k, joint in enumerate(joints)]
         turn = twist(bone, np.stack(turns, 1))
@@ -122,16 +125,30 @@ def _root(goal: np.ndarray, rest: np.ndarray, method: Method) -> np.ndarray:
     target = goal[:, children] - goal[:, :1]
     if method == "adaptive":
         return kabsch(bones, target)
-    swung = swing(bones[:, 0], target[:, 0])
-    axis = unit(target[:, 0])
+    swung = _swing(bones[:, 0], target[:, 0], method)
+    spine = target[:, 0]
+    axis = spine / (np.linalg.norm(spine, axis=-1, keepdims=True) + SAFEGUARD)
     before = _across(apply(swung, bones[:, 1:].mean(1)), axis)
     after = _across(target[:, 1:].mean(1), axis)
-    cosine = np.sum(before * after, -1)
-    sine = np.sum(np.cross(before, after) * axis, -1)
-    size = np.hypot(cosine, sine)
-    cosine = np.where(size < TINY, 1.0, cosine / np.maximum(size, TINY))
-    result: np.ndarray = rotate_about(axis, cosine, sine / np.maximum(size, TINY)) @ swung
+    result: np.ndarray = _swing(before, after, method) @ swung
     return result
+
+
+def _swing(start: np.ndarray, end: np.ndarray, method: Method) -> np.ndarray:
+    """Return the shortest rotation from one direction to another.
+
+    With HybrIK's safeguard it is a little less than a rotation next to a half turn; at exactly half
+    a turn it is none at all.
+    """
+    if method == "adaptive":
+        return swing(start, end)
+    start, end = np.broadcast_arrays(start, end)
+    normal = np.cross(start, end)
+    sine = np.linalg.norm(normal, axis=-1)
+    size = np.linalg.norm(start, axis=-1) * np.linalg.norm(end, axis=-1) + SAFEGUARD
+    axis = normal / (sine + SAFEGUARD)[..., None]
+    turned: np.ndarray = rotate_about(axis, np.sum(start * end, -1) / size, sine / size)
+    return turned
 
 
 def _across(vector: np.ndarray, axis: np.ndarray) -> np.ndarray:

@@ -102,17 +102,26 @@ def _up_lines(floor: Answer) -> list[str]:
     if "tilt_deg" not in floor:
         return []
     source = SOURCES_OF_UP[floor["gravity"]]
-    within = f", to {floor['gravity_sd_deg']:.0f} degrees" if "gravity_sd_deg" in floor else ""
-    return [f"up        from {source}{within}; the camera is tilted by {floor['tilt_deg']:.0f}"]
+    sure = ", sure" if floor.get("gravity_sure") else ", not sure"
+    within = f": within {floor['gravity_sd_deg']:.0f} degrees" if "gravity_sd_deg" in floor else ""
+    tilt = f"the camera is tilted by {floor['tilt_deg']:.0f}"
+    return [f"up        from {source}{sure}{within}; {tilt}"]
 
 
 def _reprojection_lines(answer: Answer) -> list[str]:
     if (found := answer.get("reprojection")) is None:
         return []
-    weak = ", ".join(f"{start:.1f}-{end:.1f} s" for start, end in found["weak_s"])
-    line = f"overlay   {100 * found['median_m']:.0f} cm off the landmarks (median)"
-    advice = "leave them out: --set mocap.leave_out_weak=true"
-    return [line, *([f"weak      {weak} ({advice})"] if weak else [])]
+    rows = [f"overlay   {100 * found['median_m']:.0f} cm off the landmarks (median)"]
+    advice = "" if found["left_out"] else " (leave them out: --set mocap.leave_out_weak=true)"
+    if weak := _parts(found["weak_s"]):
+        rows.append(f"weak      {weak}{advice}")
+    if filled := _parts(found["filled_s"]):
+        rows.append(f"filled in {filled}")
+    return rows
+
+
+def _parts(parts: Sequence[tuple[float, float]]) -> str:
+    return ", ".join(f"{start:.1f}-{end:.1f} s" for start, end in parts)
 
 
 def advice_lines(answer: Answer) -> list[str]:

@@ -31,7 +31,7 @@ from robojackson.mocap.recovered_sequence import (
     sequence_of,
     swap_notes,
 )
-from robojackson.mocap.reprojection import weak_frames, without_weak_frames
+from robojackson.mocap.reprojection import leaving_out_weak
 from robojackson.mocap.temporal.ground_evidence import GroundEvidence
 from robojackson.mocap.temporal.temporal_lift import TemporalConfig, lift
 from robojackson.motion.landmark_track import LandmarkTrack, evenly
@@ -103,12 +103,11 @@ def recover_motion(track: LandmarkTrack, config: MocapConfig) -> SmplSequence:
     Raises:
         TrackTooShort, NoPersonFound: no motion can be recovered.
     """
-    sequence = finish_motion(view_track(track, config), config)
-    if not config.leave_out_weak:
-        return sequence
-    even = evenly(track)
-    kept = without_weak_frames(even, weak_frames(sequence, even))
-    return sequence if kept is even else finish_motion(view_track(kept, config), config)
+
+    def recovered(given: LandmarkTrack) -> SmplSequence:
+        return finish_motion(view_track(given, config), config)
+
+    return leaving_out_weak(recovered, track, config.leave_out_weak)
 
 
 def view_track(track: LandmarkTrack, config: MocapConfig) -> View:

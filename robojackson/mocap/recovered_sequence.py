@@ -79,6 +79,10 @@ def _notes(valid: np.ndarray, camera: dict[str, object]) -> tuple[str, ...]:
         notes.append(f"no person in {missed} of {len(valid)} frames: interpolated")
     if camera["gravity"] == "camera":
         notes.append("gravity taken from the camera: the feet contradict it too much")
+    elif not camera["gravity_sure"]:
+        spread = camera.get("gravity_sd_deg")
+        within = "" if spread is None else f", to about {spread:.0f} degrees"
+        notes.append(f"gravity is not sure{within}: no straight edges of the scene show it")
     return tuple(notes)
 
 

@@ -5,6 +5,7 @@ frame and the movement of the background since. Pixels, origin top left; distanc
 distance, metres.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -15,13 +16,15 @@ from robojackson.body.feet import stretches
 from robojackson.body.skeleton import keypoint
 from robojackson.clips.people.camera_path import warp
 from robojackson.mocap.landmarks.blazepose import BODY, LANDMARK_NAMES, MIRROR
-from robojackson.motion.landmark_track import LandmarkTrack
+from robojackson.motion.landmark_track import LandmarkTrack, evenly
 from robojackson.motion.smpl_sequence import SmplSequence
 
 CAMERA = {"focal_px", "width", "height", "rotation_w", "position_w"}
 """Camera metadata that a motion needs to be drawn over the source."""
 OFF_M = 0.15
 """Mean distance above which a frame counts as badly recovered: the width of a head."""
+LEFT_OUT = "left out"
+"""Words of the note on weak frames that were left out."""
 SEEN = 0.5
 BESIDE_S = 0.1
 """Time on each side of a weak stretch that is left out with it, seconds."""
@@ -74,25 +77,47 @@ def reprojection_error(
 
 
 def weak_frames(sequence: SmplSequence, track: LandmarkTrack) -> np.ndarray:
-    """Return the frames without a detected person, or whose body is far off the picture."""
+    """Return the frames with a detected person whose body is far off the picture."""
     error = reprojection_error(sequence, track)
     off = np.zeros(len(sequence), bool) if error is None else np.nan_to_num(error) > OFF_M
-    return np.asarray(off | ~np.asarray(sequence.valid, bool))
+    return np.asarray(off & np.asarray(sequence.valid, bool))
 
 
 def reprojection_record(sequence: SmplSequence, track: LandmarkTrack) -> dict[str, object]:
-    """Return the median and the largest error, metres, and the weak stretches, seconds."""
+    """Return the median and the largest error, metres; the weak stretches and those that are filled
+    in, seconds; and whether weak ones were left out."""
     error = reprojection_error(sequence, track)
     if error is None or np.isnan(error).all():
         return {}
     weak = stretches(weak_frames(sequence, track))
+    filled = stretches(~np.asarray(sequence.valid, bool))
     return {
         "reprojection": {
             "median_m": float(np.nanmedian(error)),
             "largest_m": float(np.nanmax(error)),
             "weak_s": [[start / sequence.fps, end / sequence.fps] for start, end in weak],
+            "filled_s": [[start / sequence.fps, end / sequence.fps] for start, end in filled],
+            "left_out": any(LEFT_OUT in note for note in sequence.notes),
         }
     }
+
+
+def leaving_out_weak(
+    recover: Callable[[LandmarkTrack], SmplSequence], track: LandmarkTrack, leave_out: bool
+) -> SmplSequence:
+    """Return the motion of a track; on request again without the frames that were weak.
+
+    Args:
+        recover: Function that recovers the motion of a track.
+        track: Landmarks of the person.
+        leave_out: Whether weak frames are left out.
+    """
+    sequence = recover(track)
+    if not leave_out:
+        return sequence
+    even = evenly(track)
+    kept = without_weak_frames(even, weak_frames(sequence, even))
+    return sequence if kept is even else recover(kept)
 
 
 def without_weak_frames(track: LandmarkTrack, weak: Bool[np.ndarray, " T"]) -> LandmarkTrack:
@@ -107,7 +132,7 @@ def without_weak_frames(track: LandmarkTrack, weak: Bool[np.ndarray, " T"]) -> L
     left = int((track.detected & ~out).sum())
     if not out.any() or not left:
         return track
-    note = f"{int(out.sum())} frames left out: the body lay off the picture"
+    note = f"{int(out.sum())} frames {LEFT_OUT}: the body lay off the picture"
     return replace(
         track,
         landmarks=np.where(out[:, None, None], np.nan, track.landmarks),

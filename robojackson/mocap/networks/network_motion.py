@@ -18,6 +18,7 @@ from robojackson.mocap.networks.network_config import NetworkConfig
 from robojackson.mocap.pose.known_twist import TurnedBody, pose_keypoints
 from robojackson.mocap.recover import MocapConfig, focal_of, recover_points, scene_of
 from robojackson.mocap.recovered_sequence import camera_facts
+from robojackson.mocap.reprojection import leaving_out_weak
 from robojackson.motion.landmark_track import LandmarkTrack, even_times, evenly
 from robojackson.motion.smpl_sequence import SmplSequence
 
@@ -48,15 +49,21 @@ def network_motion(
     in_frame = repair(replace(track, to_first=None))
     shown = (in_frame, track.to_first, lens, track.fps, mocap.depth_cutoff_hz)
     found = estimate(images, *shown, networks, config, progress)
-    even = evenly(track)
-    landmarks = repair(even)
-    found = steadied(resampled(found, track), landmarks.valid, even.fps, config.cutoff_hz)
-    sequence = recover_points(
-        found.keypoints, poser(found, mocap), landmarks.valid, lens, even.fps, mocap, scene=scene
-    )
-    notes = (*found.notes, *track.notes, *sequence.notes)
-    camera = camera_facts(sequence.camera, track)
-    return replace(sequence, betas=found.betas, person=track.person, notes=notes, camera=camera)
+    found = resampled(found, track)
+
+    def recovered(given: LandmarkTrack) -> SmplSequence:
+        even = evenly(given)
+        valid = repair(even).valid
+        steady = steadied(found, valid, even.fps, config.cutoff_hz)
+        turned = poser(steady, mocap)
+        sequence = recover_points(
+            steady.keypoints, turned, valid, lens, even.fps, mocap, scene=scene
+        )
+        notes = (*found.notes, *even.notes, *sequence.notes)
+        camera = camera_facts(sequence.camera, even)
+        return replace(sequence, betas=found.betas, person=even.person, notes=notes, camera=camera)
+
+    return leaving_out_weak(recovered, track, mocap.leave_out_weak)
 
 
 def resampled(found: Estimate, track: LandmarkTrack) -> Estimate:

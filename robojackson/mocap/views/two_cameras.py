@@ -12,6 +12,7 @@ from jaxtyping import Float
 from robojackson.errors import ViewsDisagree
 from robojackson.mocap.landmarks.blazepose import BODY, HIPS
 from robojackson.mocap.recover import MocapConfig, View, finish_motion, view_track
+from robojackson.mocap.reprojection import leaving_out_weak
 from robojackson.mocap.temporal.features import resample
 from robojackson.mocap.views.relative_camera import (
     RAY_SD,
@@ -78,6 +79,16 @@ def recover_together(
     """
     if first.to_first is not None or second.to_first is not None:
         raise ViewsDisagree("a camera moved: two cameras that are calibrated by the dancer stand")
+
+    def recovered(given: LandmarkTrack) -> SmplSequence:
+        return _recovered(given, second, config, heard_s)
+
+    return leaving_out_weak(recovered, first, config.leave_out_weak)
+
+
+def _recovered(
+    first: LandmarkTrack, second: LandmarkTrack, config: MocapConfig, heard_s: float | None
+) -> SmplSequence:
     views = view_track(first, config), view_track(second, config)
     offsets = [heard_s] if heard_s is not None else [o.seconds for o in _by_motion(*views)]
     found = [made for began in offsets if (made := _calibrated(*views, began))]

@@ -170,8 +170,7 @@ def attention(
     frames = np.minimum(when.frame, len(sequence) - 1)
     marks: dict[str, Bool[np.ndarray, " N"]] = {
         "body filled in": ~np.asarray(sequence.valid)[frames],
-        "body off the picture": weak_frames(sequence, track)[frames]
-        & np.asarray(sequence.valid)[frames],
+        "body off the picture": weak_frames(sequence, track)[frames],
         "body uncertain": np.asarray(sequence.confidence)[frames].mean(1) < FAINT,
     }
     if reference.certificate is not None:

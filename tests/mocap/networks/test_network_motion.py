@@ -62,13 +62,15 @@ def dancer(track: LandmarkTrack) -> SmplSequence:
 
 @pytest.fixture(scope="module")
 def truth(dancer: SmplSequence) -> Truth:
-    """Return the dancer before the camera: local rotations and points on our rest skeleton."""
+    """Return the dancer before the camera: local rotations, and points on our rest skeleton where
+    the landmarks are."""
     rows = np.concatenate([dancer.global_orient, dancer.body_pose], 1).reshape(-1, 3)
     local = Rotation.from_rotvec(rows).as_matrix().reshape(FRAMES, 24, 3, 3)
     to_world = np.array(dancer.camera["rotation_w"])
     local[:, 0] = to_world.T @ local[:, 0]
     points = forward(local, dancer.rest_joints[None], np.zeros((FRAMES, 3))).points
-    return local, points + np.array([0.2, 0.1, 4.0])
+    place = (dancer.keypoints_w[:, 0] - np.array(dancer.camera["position_w"])) @ to_world
+    return local, points + place[:, None]
 
 
 @pytest.fixture(scope="module")
@@ -134,6 +136,24 @@ def test_frames_without_a_person_are_bridged(
     error = np.linalg.norm(found.joints[8:16] - dancer.joints[8:16], axis=-1)
     assert error.mean() < 0.1
     assert not found.valid[10:14].any()
+
+
+def test_weak_frames_of_a_network_are_left_out_on_request(
+    truth: Truth, track: LandmarkTrack, lens: Pinhole, dancer: SmplSequence
+) -> None:
+    """Frames whose network puts the body beside the landmarks are bridged, too."""
+    off = []
+    for leave_out in (False, True):
+        network = exact_network(truth, track, lens, dancer.rest_joints)
+        assert isinstance(network, Exact)
+        network.rows[0][10:14, :, :2] += np.random.default_rng(0).normal(0.0, 0.3, size=(29, 2))
+        networks = Networks(network, None, None, ())
+        mocap = MocapConfig(leave_out_weak=leave_out)
+        found = network_motion(track, images(track), networks, mocap, CONFIG)
+        off.append(np.linalg.norm(found.joints - dancer.joints, axis=-1)[10:14].mean())
+    assert not found.valid[10:14].any()
+    assert any("left out" in note for note in found.notes)
+    assert off[1] < 0.5 * off[0]
 
 
 def test_a_variable_frame_rate_is_made_even(

@@ -137,6 +137,23 @@ def test_gravity_of_two_cameras_is_that_of_balance(
 
 
 @pytest.mark.medium
+def test_weak_frames_of_the_first_camera_are_left_out_on_request(
+    dancer: np.ndarray, hip_shake: LandmarkTrack
+) -> None:
+    first, second = filmed(dancer, hip_shake), filmed(second_frame(dancer)[15:], hip_shake)
+    spoilt = np.array(first.landmarks)
+    rng = np.random.default_rng(0)
+    spoilt[40:46, :, :2] += rng.uniform(-0.25, 0.25, size=spoilt[40:46, :, :2].shape)
+    first = replace(first, landmarks=spoilt)
+    found = [
+        recover_together(first, second, MocapConfig(leave_out_weak=leave_out))
+        for leave_out in (False, True)
+    ]
+    assert found[0].valid[40:46].all()
+    assert not found[1].valid[40:46].any()
+
+
+@pytest.mark.medium
 def test_clips_of_different_motions_are_refused(
     dancer: np.ndarray, hip_shake: LandmarkTrack
 ) -> None:
