@@ -25,10 +25,11 @@ from benchmarks.mocap.truth import HELD_OUT, JOINTS, REAL, RENDERED, Truth, load
 from robojackson.body import analytic_solve
 from robojackson.body.skeleton import REST_JOINTS, keypoint
 from robojackson.body.smoothing import lowpass
+from robojackson.clips.people.dancer import DancerConfig
 from robojackson.clips.pose_detector import ASSETS, detect
 from robojackson.clips.video import VideoLimits, probe
 from robojackson.mocap.landmarks.blazepose import fill_gaps, landmark
-from robojackson.mocap.landmarks.landmark_pipeline import with_camera
+from robojackson.mocap.landmarks.landmark_pipeline import detect_landmarks
 from robojackson.mocap.landmarks.model_fusion import fuse_tracks
 from robojackson.mocap.landmarks.refinement import RefineConfig
 from robojackson.mocap.pose.twist import prior
@@ -59,11 +60,13 @@ class Seen:
 
     Attributes:
         truth: What is true of it.
-        tracks: What each pose model saw, by size.
+        raw: What the full model saw in the order of the clip, in one pass.
+        tracks: What is detected by each quality.
         detect_fps: Frames a CPU second of the full model.
     """
 
     truth: Truth
+    raw: LandmarkTrack
     tracks: Mapping[str, LandmarkTrack]
     detect_fps: float
 
@@ -72,13 +75,14 @@ def look(clip: str) -> Seen:
     """Return both pose models over a clip."""
     path = video_path(clip)
     info = probe(path, VideoLimits())
+    raw = detect(path, info, "full")
     began = time.process_time()
-    tracks = {"full": with_camera(path, detect(path, info, "full"))}
+    tracks = {"full": detect_landmarks(path, info, "full", DancerConfig())}
     spent = time.process_time() - began
     if heavy_installed():
         heavy = detect(path, info, "heavy")
         tracks["best"] = fuse_tracks([tracks["full"], heavy])
-    return Seen(load_truth(clip), tracks, len(tracks["full"]) / spent)
+    return Seen(load_truth(clip), raw, tracks, len(tracks["full"]) / spent)
 
 
 def heavy_installed() -> bool:
@@ -110,10 +114,13 @@ def with_temporal(config: MocapConfig, enabled: bool) -> MocapConfig:
 def measure(clip: str) -> Row:
     """Return all rows of one clip."""
     seen = look(clip)
-    track = seen.tracks["full"]
+    track = seen.raw
     raw = fill_gaps(track.world_landmarks, track.detected)[:, [landmark(n) for n in JOINTS]]
     rows: dict[str, figures.Figures] = {
-        "raw": figures.joint_errors(raw, seen.truth, track.fps),
+        "raw": {
+            **figures.joint_errors(raw, seen.truth, track.fps),
+            **figures.knee_figures(raw, seen.truth),
+        },
         "filtered": figures.joint_errors(lowpass(raw, track.fps, FILTER_HZ), seen.truth, track.fps),
     }
     for name, (source, config) in configurations().items():
@@ -135,6 +142,8 @@ def motion_figures(track: LandmarkTrack, config: MocapConfig, truth: Truth) -> f
     joints = sequence.joints[:, [keypoint(n) for n in JOINTS]]
     return {
         **figures.joint_errors(joints, truth, sequence.fps),
+        **figures.velocity_score(joints, truth),
+        **figures.knee_figures(joints, truth),
         **figures.path_error_share(sequence, truth),
         **figures.floor_figures(sequence),
         **figures.contact_figures(sequence, truth),

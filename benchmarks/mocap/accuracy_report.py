@@ -11,9 +11,13 @@ JOINTS = {
     "rr_mpjpe_mm": ("RR-MPJPE mm", "{:.0f}"),
     "mpjve_mm_s": ("MPJVE mm/s", "{:.0f}"),
     "speed_ratio": ("speed ratio", "{:.2f}"),
+    "velocity_gain": ("velocity gain", "{:.2f}"),
     "acceleration_ratio": ("acceleration ratio", "{:.2f}"),
 }
 GROUND = {
+    "velocity_score": ("velocity score", "{:.2f}", 1.0),
+    "knee_bias_deg": ("bent knees off", "{:+.0f}°", 1.0),
+    "knee_gain": ("knees' gain", "{:.2f}", 1.0),
     "tilt_deg": ("gravity error", "{:.1f}°", 1.0),
     "path_error": ("root path error", "{:.1f} %", 100.0),
     "touching_f1": ("touching F1", "{:.2f}", 1.0),
@@ -79,10 +83,14 @@ def _official(found: Mapping[str, Mapping[str, Any]]) -> str:
     lines = []
     for name, figures in found.items():
         agreed = figures.get("agreement", {})
-        ours = f"{agreed['ours']['mpjpe_mm']:.0f}" if agreed else "-"
-        cells = [f"{figures['solve_mm']:.1f}", f"{figures['constant_twist_deg']:.1f}", ours]
+        pairs = [
+            " / ".join(f"{agreed[row][key]:.0f}" for row in ("raw landmarks", "ours")) if agreed
+            else "-" for key in ("mpjpe_mm", "pa_mpjpe_12_mm")
+        ]  # fmt: skip
+        cells = [f"{figures['solve_mm']:.1f}", f"{figures['constant_twist_deg']:.1f}", *pairs]
         lines.append(_cells([name, *cells]))
-    head = ["official output", "our solve mm", "constant twist deg", "our motion mm"]
+    head = ["official output", "our solve mm", "constant twist deg",
+            "raw / our motion mm", "twelve joints, PA-MPJPE mm"]  # fmt: skip
     return _table(head, lines)
 
 

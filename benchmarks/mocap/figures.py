@@ -11,9 +11,9 @@ from jaxtyping import Float, Int
 
 from benchmarks.mocap.truth import HIPS, JOINTS, Truth
 from robojackson.body.feet import foot_points
-from robojackson.body.forward_kinematics import kabsch
+from robojackson.body.forward_kinematics import kabsch, unit
 from robojackson.body.skeleton import keypoint
-from robojackson.metrics import motion_quality, pose_error
+from robojackson.metrics import dance_score, motion_quality, pose_error, world_error
 from robojackson.mocap.grounding import floor as ground
 from robojackson.mocap.pose.posed_body import pose_sequence
 from robojackson.motion.smpl_sequence import AIR, PLANTED, SLIDING, SmplSequence
@@ -24,6 +24,8 @@ SEAM_MASK = 3
 DOWN_M, UP_M = 0.045, 0.075
 STILL_MPS, MOVING_MPS = 0.20, 0.35
 SHORTEST_S = 0.1
+BENT_DEG, FEWEST_BENT = 30.0, 10
+"""Flexion above which a knee is bent; fewest states of bent knees that are measured."""
 FLOOR_HZ = 3.0
 FLOATS_M = 0.03
 """Of the truth's contacts: hysteresis of height over its floor and of speed along the floor."""
@@ -40,7 +42,7 @@ def counted(truth: Truth, count: int) -> np.ndarray:
 
 def joint_errors(joints: Float[np.ndarray, "T 12 3"], truth: Truth, fps: float) -> Figures:
     """Return PA-MPJPE and RR-MPJPE in mm, MPJVE in mm/s, ratios of mean joint speed and
-    acceleration."""
+    acceleration, and the gain along the true velocities (sum v v* / sum v*^2)."""
     count = min(len(joints), len(truth.joints))
     keep = counted(truth, count)
     mine, right = joints[:count], truth.joints[:count]
@@ -51,8 +53,38 @@ def joint_errors(joints: Float[np.ndarray, "T 12 3"], truth: Truth, fps: float) 
         "rr_mpjpe_mm": 1e3 * pose_error.mpjpe(aligned[keep], goal[keep]),
         "mpjve_mm_s": 1e3 * pose_error.mpjpe(*velocity),
         "speed_ratio": _size(velocity[0]) / _size(velocity[1]),
+        "velocity_gain": _gain(*velocity),
         "acceleration_ratio": _size(acceleration[0]) / _size(acceleration[1]),
     }
+
+
+def velocity_score(joints: Float[np.ndarray, "T 12 3"], truth: Truth) -> Figures:
+    """Return the score of the velocities, path included, after one rigid motion a clip."""
+    count = min(len(joints), len(truth.joints))
+    keep = counted(truth, count)
+    goal = truth.joints[:count]
+    aligned = world_error.align_world(joints[:count], goal, scaled=False)
+    return {"velocity_score": dance_score.moving_score(*_differences(aligned, goal, keep, 1.0, 1))}
+
+
+def knee_figures(joints: Float[np.ndarray, "T 12 3"], truth: Truth) -> Figures:
+    """Return how far truly bent knees are off, degrees (less than 0: too straight), and the slope
+    of their flexion on the true one; nothing where no knee bends."""
+    count = min(len(joints), len(truth.joints))
+    keep = counted(truth, count)
+    ours, goal = (flexion_deg(points[:count])[keep] for points in (joints, truth.joints))
+    bent = goal > BENT_DEG
+    if bent.sum() < FEWEST_BENT:
+        return {}
+    gain = np.polyfit(goal.ravel(), ours.ravel(), 1)[0]
+    return {"knee_bias_deg": float((ours - goal)[bent].mean()), "knee_gain": float(gain)}
+
+
+def flexion_deg(joints: Float[np.ndarray, "T 12 3"]) -> Float[np.ndarray, "T 2"]:
+    """Return the flexion of the left and the right knee, degrees; 0 is straight."""
+    hip, knee, ankle = (joints[:, list(pair)] for pair in ((0, 1), (2, 3), (4, 5)))
+    thigh, shank = unit(knee - hip), unit(ankle - knee)
+    return np.asarray(np.degrees(np.arccos(np.clip(np.sum(thigh * shank, -1), -1.0, 1.0))))
 
 
 def path_error_share(sequence: SmplSequence, truth: Truth) -> Figures:
@@ -181,6 +213,11 @@ def _differences(
     whole = np.lib.stride_tricks.sliding_window_view(keep, order + 1).all(1)
     ours, right = (np.diff(points, order, axis=0)[whole] for points in (mine, goal))
     return ours * fps**order, right * fps**order
+
+
+def _gain(mine: np.ndarray, right: np.ndarray) -> float:
+    """Return the share of the true vectors that ours have along them."""
+    return float(np.sum(mine * right) / np.sum(right**2))
 
 
 def _size(vectors: np.ndarray) -> float:

@@ -17,12 +17,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 from rich.console import Console
 from rich.table import Table
 
 from benchmarks.mocap import figures
 from benchmarks.mocap.truth import JOINTS, Truth
 from robojackson.body.skeleton import keypoint
+from robojackson.clips.people.reverse_pass import ReversePassConfig
 from robojackson.errors import NoPersonFound
 from robojackson.mocap.landmarks.blazepose import fill_gaps, landmark
 from robojackson.mocap.recover import MocapConfig, recover_motion
@@ -59,7 +61,7 @@ def make(number: int, files: dict[str, Path], tools: tuple[Any, Any], seed: int)
     stride = STRIDES[number % len(STRIDES)]
     body, studio = tools
     return clips.shoot(
-        MOTIONS[number % 10], motion, stride, body, studio, rng, angles, hidden=False
+        MOTIONS[number % 10], motion, stride, body, studio, rng, angles, False, ReversePassConfig()
     )
 
 
@@ -95,15 +97,18 @@ def part_of(path: Path, rng: np.random.Generator) -> Any:
     return clips.facing(sources.gathered(replace(part, fps=30.0), clips.REACH), rng)
 
 
-def read(path: Path) -> tuple[LandmarkTrack, Truth]:
+def read(path: Path, key: str = "seen") -> tuple[LandmarkTrack, Truth]:
     """Return what was seen of a rendered clip, and what is true.
 
+    Args:
+        path: File of a render.
+        key: "seen", or "first" for what the pass in the order of the clip saw.
     Raises:
         NoPersonFound: fewer than two frames with a person.
     """
     with np.load(path) as pair:
         stride, (width, height) = int(pair["stride"]), pair["size"].tolist()
-        seen, name = pair["seen"][::stride].astype(float), str(pair["motion"])
+        seen, name = pair[key][::stride].astype(float), str(pair["motion"])
         truth = Truth(name, pair["truth"][::stride][:, LANDMARKS].astype(float), pair["up"])
         edges = pair.get("edges")
     arrays = seen[..., :3], seen[..., 3:6], seen[..., 6]
@@ -113,11 +118,18 @@ def read(path: Path) -> tuple[LandmarkTrack, Truth]:
     return track, truth
 
 
+def raw_joints(path: Path) -> Float[np.ndarray, "T 12 3"]:
+    """Return the twelve joints of raw BlazePose in the order of a rendered clip, gaps filled,
+    metres."""
+    track, _ = read(path, "first")
+    return fill_gaps(track.world_landmarks, track.detected)[:, LANDMARKS]
+
+
 def measure(path: Path) -> tuple[str, float, dict[str, float], dict[str, float]]:
     """Name, share of detected frames, figures of raw and of ours."""
     track, truth = read(path)
     name, fps = truth.clip, track.fps
-    raw = fill_gaps(track.world_landmarks, track.detected)[:, LANDMARKS]
+    raw = raw_joints(path)
     sequence = recover_motion(track, MocapConfig())
     ours = sequence.joints[:, [keypoint(name) for name in JOINTS]]
     found = figures.joint_errors(ours, truth, fps)

@@ -13,10 +13,11 @@ import numpy as np
 from benchmarks.mocap.agreement import rows
 from robojackson.body import analytic_solve
 from robojackson.body.forward_kinematics import forward
-from robojackson.clips.pose_detector import detect
+from robojackson.clips.people.dancer import DancerConfig
 from robojackson.clips.video import VideoLimits, probe
 from robojackson.formats import hybrik_output
 from robojackson.formats.foreign_motion import HybrikMotion
+from robojackson.mocap.landmarks.landmark_pipeline import detect_landmarks
 from robojackson.mocap.networks.network_config import NetworkConfig
 from robojackson.mocap.networks.smpl_body import measured_rest
 from robojackson.mocap.pose.twist import prior
@@ -35,7 +36,8 @@ def _compared(file: Path) -> dict[str, object]:
     found: dict[str, object] = {"frames": len(theirs), **_solved(theirs)}
     videos = [file.with_suffix(suffix) for suffix in VIDEOS if file.with_suffix(suffix).is_file()]
     for video in videos:
-        track = detect(video, probe(video, VideoLimits()), "full")
+        info = probe(video, VideoLimits())
+        track = detect_landmarks(video, info, "full", DancerConfig())
         found["agreement"] = rows(video, track, theirs, NetworkConfig())
     return found
 

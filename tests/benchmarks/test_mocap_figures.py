@@ -44,6 +44,27 @@ def test_the_truth_has_no_error_and_its_own_speed(walk: Truth) -> None:
     assert found["acceleration_ratio"] == pytest.approx(1.0)
 
 
+def test_half_the_amplitude_has_half_the_gain_and_jitter_none(walk: Truth) -> None:
+    """Noise raises the speed and not the gain along the truth."""
+    middle = walk.joints.mean(0)
+    half = middle + (walk.joints - middle) / 2.0
+    assert figures.joint_errors(half, walk, FPS)["velocity_gain"] == pytest.approx(0.5, abs=0.05)
+    assert figures.velocity_score(half, walk)["velocity_score"] == pytest.approx(0.75, abs=0.05)
+    shaken = half + np.random.default_rng(0).normal(scale=0.02, size=half.shape)
+    found = figures.joint_errors(shaken, walk, FPS)
+    assert found["velocity_gain"] < 0.6
+    assert found["speed_ratio"] > 1.0
+
+
+def test_knees_that_stay_straight_are_found(walk: Truth) -> None:
+    joints = walk.joints.copy()
+    joints[:, 2:4] = (joints[:, 0:2] + joints[:, 4:6]) / 2.0
+    found = figures.knee_figures(joints, walk)
+    assert found["knee_bias_deg"] < -30.0
+    assert found["knee_gain"] == pytest.approx(0.0, abs=1e-6)
+    assert figures.knee_figures(walk.joints, walk)["knee_gain"] == pytest.approx(1.0)
+
+
 def test_frames_around_a_seam_do_not_count(walk: Truth) -> None:
     broken = walk.joints.copy()
     broken[36:42] += np.random.default_rng(0).normal(size=(6, 12, 3))

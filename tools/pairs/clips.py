@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from robojackson.clips.people.camera_motion import grey_levels
+from robojackson.clips.people.reverse_pass import ReversePassConfig, track_in_reverse
 from robojackson.clips.pose_detector import video_landmarker
 from robojackson.mocap.landmarks.blazepose import LANDMARK_NAMES, landmark
 from robojackson.mocap.landmarks.scene_edges import SceneEdges
@@ -96,8 +97,10 @@ def make_clip(
 def shoot(
     name: str, motion: deepmimic.Motion, stride: int, body: Body, studio: scenery.Studio,
     rng: np.random.Generator, angles: scenery.Angles | None = None, hidden: bool = True,
+    reverse: ReversePassConfig | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """Return what BlazePose sees of a motion and what is true; occluded if `hidden`."""
+    """Return what BlazePose sees of a motion and what is true; occluded if `hidden`, tracked in
+    reverse order too if `reverse` says how (`first` is then what the first pass saw)."""
     person = people.draw_person(body, rng)
     posed = person.posed(motion)
     low = posed.heads[..., 2].min(1)
@@ -110,14 +113,21 @@ def shoot(
     if not hidden:
         boxes[:] = np.nan
     seen = np.full((len(truth), len(LANDMARK_NAMES), 7), np.nan, np.float32)
-    scene = SceneEdges()
+    scene, kept = SceneEdges(), []
     with video_landmarker("full") as detect_frame:
         pictures = studio.frames(person, posed, view, boxes, rng, stride)
         for number, picture in enumerate(pictures):
             seen[number * stride] = detect_frame(picture, number * stride / FPS)
             scene.add_frame(number, grey_levels(picture))
+            kept += [picture] if reverse else []
+    first = np.array(seen)
+    if reverse:
+        size = (view.width, view.height)
+        shown = first[::stride].astype(float)
+        seen[::stride], _ = track_in_reverse(kept, FPS / stride, size, "full", shown, reverse)
     return {
         "seen": seen,
+        "first": first,
         "stride": np.array(stride),
         "truth": truth.astype(np.float32),
         "bones": view.see(posed.heads).astype(np.float32),

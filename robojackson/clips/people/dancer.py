@@ -15,13 +15,15 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 from pydantic import Field
 
-from robojackson.clips.people.close_up import CloseUpConfig, look_closely
+from robojackson.clips.people.close_up import CloseUpConfig
 from robojackson.clips.people.identity import IdentityConfig
 from robojackson.clips.people.person_count import People, PeopleConfig
 from robojackson.clips.people.person_detection import PersonDetectionConfig
 from robojackson.clips.people.person_extent import stature, trunk
 from robojackson.clips.people.person_silhouette import paint, silhouette
 from robojackson.clips.people.person_windows import Box, detect_in_windows, windows
+from robojackson.clips.people.reverse_pass import ReversePassConfig
+from robojackson.clips.people.second_look import look_again
 from robojackson.clips.people.tracked_people import SCOUT, TrackedPeople, track_people
 from robojackson.clips.pose_detector import (
     SHORT_SIDE,
@@ -47,6 +49,7 @@ class DancerConfig:
     Attributes:
         number: The person to follow: 1 is the largest steady person, and so is None.
         close_up: Configuration of looking closely at a person who is far away.
+        reverse: Configuration of tracking a person who is alone in reverse order, too.
         scouts: The few frames in which other people are looked for.
         detection, identity: Configurations of detecting and identifying all people in every frame.
         astray: Body heights; a detection further than this from the expected place is another's.
@@ -57,6 +60,7 @@ class DancerConfig:
 
     number: int | None = Field(default=None, ge=1)
     close_up: CloseUpConfig = Field(default_factory=CloseUpConfig)
+    reverse: ReversePassConfig = Field(default_factory=ReversePassConfig)
     scouts: PeopleConfig = Field(default_factory=PeopleConfig)
     detection: PersonDetectionConfig = Field(default_factory=PersonDetectionConfig)
     identity: IdentityConfig = Field(default_factory=IdentityConfig)
@@ -92,7 +96,7 @@ def track_dancer(
         single, others = _scouted(path, info, size, config, progress, watch)
         if not others:
             later = _shifted(progress, info.frames, 1, 2)
-            return _closer(path, info, size, single, config.close_up, later)
+            return look_again(path, info, size, single, config.close_up, config.reverse, later)
     passes = 3 if config.number in (None, 1) else 2
     later = _shifted(progress, info.frames, passes - 2, passes)
     cast = track_people(path, info, config.detection, config.identity, later)
@@ -128,23 +132,6 @@ def _scouted(
 
         track = detect(path, info, size, progress, watch)
     return track, max(scouts.counts, default=0) > 1
-
-
-def _closer(
-    path: Path,
-    info: VideoInfo,
-    size: str,
-    single: LandmarkTrack,
-    config: CloseUpConfig,
-    progress: Progress | None,
-) -> LandmarkTrack:
-    """Return the track of a person who is alone, looked at closely where that shows more of him."""
-    depth = (single.landmarks, single.world_landmarks, single.visibility[..., None])
-    rows = look_closely(path, info, size, np.concatenate(depth, -1), config, progress)
-    if rows is None:
-        return single
-    notes = ("the person is small in the picture: looked at closely",)
-    return track_of(rows, single.times, info, notes=notes)
 
 
 def _followed(
