@@ -15,7 +15,7 @@ from pydantic import Field
 from scipy.ndimage import binary_dilation, binary_propagation
 
 from robojackson.body.feet import stretches
-from robojackson.clips.people.person_extent import POINTS, stature, trunk
+from robojackson.clips.people.person_extent import MIRROR, POINTS, stature, trunk
 from robojackson.clips.pose_detector import video_landmarker
 from robojackson.config import config_dataclass
 
@@ -121,14 +121,16 @@ def choose(
     size: tuple[int, int],
     config: ReversePassConfig,
 ) -> Bool[np.ndarray, " T"]:
-    """Return the frames that the second pass shows better: where it is apart from the first, and
-    the path with the least motion from frame to frame goes through it."""
+    """Return the frames that the second pass shows better: where it is apart from the first by
+    more than an exchange of sides, which is put right later, and the path with the least motion
+    from frame to frame goes through it."""
     points = np.stack([rows[:, JOINTS, :2] * size for rows in (first, second)])
     seen = ~np.isnan(points[..., 0, 0])
     if not seen[0].any():
         return np.asarray(seen[1])
     tall = _tall(first[..., :2] * size)
-    apart = np.linalg.norm(points[0] - points[1], axis=-1).mean(1) / tall
+    exchanged = second[:, list(MIRROR)][:, JOINTS, :2] * size
+    apart = np.minimum(*(_distance(points[0], other) for other in (points[1], exchanged))) / tall
     apart = np.where(seen.all(0), apart, np.where(seen.any(0), np.inf, 0.0))
     differ = binary_propagation(apart > config.apart, mask=apart > config.near)
     return np.asarray(differ & (steadiest(points / tall, seen) == 1) & seen[1])
@@ -156,6 +158,10 @@ def steadiest(
     for frame in range(count - 1, 0, -1):
         path[frame - 1] = came[frame, path[frame]]
     return path
+
+
+def _distance(one: Float[np.ndarray, "T K 2"], other: Float[np.ndarray, "T K 2"]) -> np.ndarray:
+    return np.asarray(np.linalg.norm(one - other, axis=-1).mean(1))
 
 
 def _standing(seen: Bool[np.ndarray, "2"]) -> Float[np.ndarray, "2"]:
