@@ -26,11 +26,12 @@ from robojackson.body.skeleton import keypoint
 from robojackson.body.smoothing import lowpass
 from robojackson.clips.quality.visibility import weigh_visibility
 from robojackson.metrics.pose_error import procrustes
+from robojackson.mocap.grounding.up_direction import shows_up
 from robojackson.mocap.landmarks.blazepose import BODY, LANDMARK_NAMES, fill_gaps, landmark, repair
 from robojackson.mocap.landmarks.bone_lengths import fit_skeleton
-from robojackson.mocap.landmarks.pinhole_camera import Pinhole, guess_focal, place
+from robojackson.mocap.landmarks.pinhole_camera import place
 from robojackson.mocap.landmarks.refinement import refine
-from robojackson.mocap.recover import MocapConfig, recover_motion
+from robojackson.mocap.recover import MocapConfig, recover_motion, view_track
 from robojackson.mocap.temporal.temporal_lift import depth_sd, lift
 from robojackson.motion.landmark_track import LandmarkTrack, evenly
 
@@ -48,10 +49,12 @@ def stages(track: LandmarkTrack, config: MocapConfig) -> tuple[Stages, Float[np.
     seen = evenly(weigh_visibility(track))
     marks = repair(seen)
     found["repair"] = marks.local[:, MARKS]
-    camera = Pinhole(guess_focal(track.width, track.height), track.width, track.height)
-    placed = place(marks, camera, track.fps, config.depth_cutoff_hz)
+    view = view_track(track, config)
+    placed = place(marks, view.pinhole, track.fps, config.depth_cutoff_hz)
     found["before the camera"] = placed[:, MARKS]
-    lifted = lift(placed, marks.local, marks.visibility, track.fps, config.temporal)
+    scene = view.scene
+    known = scene.up if scene is not None and shows_up(scene, config.gravity) else None
+    lifted = lift(placed, marks.local, marks.visibility, track.fps, config.temporal, known)
     found["network"] = lifted.points[:, MARKS]
     depth_m = lifted.depth_sd(config.temporal.depth_floor_m)
     for name, start, depth in (

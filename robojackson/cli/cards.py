@@ -121,7 +121,14 @@ def _reprojection_lines(answer: Answer) -> list[str]:
 
 
 def _parts(parts: Sequence[tuple[float, float]]) -> str:
-    return ", ".join(f"{start:.1f}-{end:.1f} s" for start, end in parts)
+    """Return the stretches, those that are closer than can be read as one."""
+    joined: list[list[float]] = []
+    for start, end in parts:
+        if joined and start - joined[-1][1] < 0.15:
+            joined[-1][1] = end
+        else:
+            joined.append([start, end])
+    return ", ".join(f"{start:.1f}-{end:.1f} s" for start, end in joined)
 
 
 def advice_lines(answer: Answer) -> list[str]:

@@ -56,7 +56,12 @@ def test_a_motion_says_how_sure_it_is_of_gravity() -> None:
 
 
 def test_weak_stretches_are_advised_against_until_they_are_left_out() -> None:
-    found = {"median_m": 0.02, "weak_s": [(1.0, 1.5)], "filled_s": [(2.0, 2.5)], "left_out": False}
+    found = {
+        "median_m": 0.02,
+        "weak_s": [(1.0, 1.2), (1.3, 1.5)],
+        "filled_s": [(2.0, 2.5)],
+        "left_out": False,
+    }
     told = "\n".join(cards.mocap_lines(MOTION | {"reprojection": found}))
     assert "weak      1.0-1.5 s (leave them out: --set mocap.leave_out_weak=true)" in told
     assert "filled in 2.0-2.5 s" in told
