@@ -4,8 +4,8 @@
 
 The strata are fixed here: held-out motions (`tools/pairs/sources.py: REPORTED`), four pitches, all
 sides, three sizes of the person, 30, 15 and 10 frames a second. MOTIONS are folders with their
-files; needs `tools/requirements.txt`. Rows: raw BlazePose, our default. Frames without a person
-detected count for both; PA-MPJPE of twelve joints, mm.
+files; needs `tools/requirements.txt`. Rows: raw BlazePose in one pass, our default. Frames without
+a person count for both; PA-MPJPE of twelve joints, mm.
 """
 
 import argparse
@@ -142,8 +142,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("motions", type=Path, nargs="+")
     parser.add_argument("-o", "--out", type=Path, default=Path("fresh"))
+    parser.add_argument("--seed", type=int, help="another one than the weights'")
     options = parser.parse_args()
-    seed = seed_of(WEIGHTS)
+    seed = seed_of(WEIGHTS) if options.seed is None else options.seed
     paths = [options.out / f"{seed}_{number:02d}.npz" for number in range(CLIPS)]
     table = Table("clip", "detected", "raw", "ours", "speed ratio", "gravity deg")
     totals = []
