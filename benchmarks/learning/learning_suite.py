@@ -24,7 +24,8 @@ from benchmarks.learning import checkpoint_cost, races, training_rows
 from benchmarks.learning import speed as learning_speed
 from benchmarks.learning.error_line import errors_in_one_line
 from benchmarks.learning.policies import TRAINED, Folders
-from benchmarks.learning.summary import AUTHORS_ROBOT, COLUMNS, EXCESS, GAIN, LIMBS, R2, summary
+from benchmarks.learning.row_bars import LIMBS, USUAL
+from benchmarks.learning.summary import AUTHORS_ROBOT, COLUMNS, summary
 
 PARTS = ("speed", "threads", "policies", "survival", "pretraining", "checkpoints", "table")
 SPEED = ("what", "ours", "peer", "ratio", "bar", "holds", "load_average")
@@ -117,9 +118,9 @@ def _table(title: str, columns: tuple[str, ...], rows: list[dict[str, Any]]) -> 
 
 def _limbs(rows: list[dict[str, Any]]) -> Table:
     """Return the gain, R2 and excess speed of every limb, with a mark where the bar is missed."""
-    table = Table(
-        "move", *LIMBS, title=f"gain {GAIN[0]}-{GAIN[1]} / R2 >= {R2} / excess <= {EXCESS}"
-    )
+    (low, high), r2, excess = USUAL.gain, USUAL.r2, USUAL.excess
+    title = f"gain {low}-{high} / R2 >= {r2} / excess <= {excess}, where a limb has a bar"
+    table = Table("move", *LIMBS, title=title)
     for row in rows:
         cells = []
         for limb in LIMBS:

@@ -28,10 +28,11 @@ class Move:
     Attributes:
         clip: A video of the repository, or the name of a file in a folder of others'.
         cpu_minutes: Minutes of one core.
-        success, worst: Least strict success, of the mean over seeds and of the worst seed.
+        success, worst: Least strict success, of the mean over seeds and of the worst seed (0: no
+            bar).
         skill: Least skill.
         cyclic: Whether it is danced for a time; else to its end.
-        authors: Whether it is a file of the authors': limbs are reported without a bar.
+        authors: Whether it is a file of the authors'.
         robot: Name of the robot.
         mpjpe_mm: Largest mpjpe_l, fallen robots counted to the horizon; none for Humanoid-v5.
         cmu: Whether it is a BVH file of CMU.

@@ -1,19 +1,18 @@
 """Trained policies as one table: means over seeds, every bar, and those that do not dance."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from benchmarks.learning.policies import TRAINED, Folders, Move, forced
+from benchmarks.learning.row_bars import LIMBS, bars
 from robojackson.files import tables
 from robojackson.metrics.seed_statistics import estimate
 from robojackson.pipeline.table_schemas import EVALUATION_RECORD
 
 Rows = list[dict[str, Any]]
-LIMBS = ("left_foot", "right_foot", "left_hand", "right_hand", "head")
-GAIN, R2, EXCESS = (0.8, 1.2), 0.5, 0.15
 AUTHORS_ROBOT = {
     "survived_s": 1.63,
     "note": "at best: 27 steps of 0.06 s in the authors' own logs; nothing else is known of it",
@@ -59,7 +58,7 @@ def line(name: str, move: Move, seconds: float, seeds: Sequence[Rows]) -> dict[s
             limb: mean(mean(r.get(f"{kind}_{limb}") for r in rows) for rows in trained)
             for limb in LIMBS
         }
-    found["bars"] = bars(found, move)
+    found["bars"] = bars(found, name, move)
     found["holds"] = all(found["bars"].values())
     found["beside"] = {
         policy: {
@@ -69,31 +68,6 @@ def line(name: str, move: Move, seconds: float, seeds: Sequence[Rows]) -> dict[s
         for policy in BESIDE
     }
     return found
-
-
-def bars(found: Mapping[str, Any], move: Move) -> dict[str, bool]:
-    """Return each bar by name; a limb that the dance does not move has none."""
-    held = {
-        f"strict success >= {move.success:g}": found["strict_success"] >= move.success,
-        f"worst seed >= {move.worst:g}": found["worst_seed"] >= move.worst,
-        f"skill >= {move.skill:g}": found["skill"] >= move.skill,
-    }
-    if move.authors:
-        del held[f"worst seed >= {move.worst:g}"]
-        return held
-    if move.mpjpe_mm is not None and found["mpjpe_l_m"] is not None:
-        held[f"mpjpe_l <= {move.mpjpe_mm:g} mm"] = 1e3 * found["mpjpe_l_m"] <= move.mpjpe_mm
-    low, high = GAIN
-    for limb in LIMBS:
-        gain, r2 = found["limb_gain"][limb], found["limb_r2"][limb]
-        excess = found["excess_speed"][limb]
-        if gain is not None:
-            held[f"gain {limb} {low:g}-{high:g}"] = low <= gain <= high
-        if r2 is not None:
-            held[f"R2 {limb} >= {R2:g}"] = r2 >= R2
-        if excess is not None:
-            held[f"excess {limb} <= {EXCESS:g}"] = excess <= EXCESS
-    return held
 
 
 def cluster_interval(by_seed: Sequence[float] | np.ndarray) -> tuple[float, float]:

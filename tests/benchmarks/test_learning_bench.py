@@ -8,7 +8,8 @@ import pytest
 from benchmarks.learning import learning_suite, policies, races, tracker_rows, training_rows
 from benchmarks.learning.error_line import errors_in_one_line
 from benchmarks.learning.policies import MOVES, Folders, source_of
-from benchmarks.learning.summary import LIMBS, bars, cluster_interval, line, summary
+from benchmarks.learning.row_bars import LIMBS, bars
+from benchmarks.learning.summary import cluster_interval, line, summary
 from benchmarks.learning.training_curve import area, first_at
 
 
@@ -72,10 +73,41 @@ def test_a_limb_that_flails_misses_its_own_bar_alone() -> None:
     assert [bar for bar, held in result["bars"].items() if not held] == ["gain left_hand 0.8-1.2"]
 
 
-def test_of_the_authors_clips_limbs_are_reported_and_not_requested() -> None:
-    result = line("authors_apt1", MOVES["authors_apt1"], 10.0, [rollouts(1.0, 3.0)])
-    assert not any("gain" in bar for bar in bars(result, MOVES["authors_apt1"]))
+def test_of_the_authors_walk_on_the_humanoid_limbs_are_reported_and_have_no_bar() -> None:
+    result = line("authors_walk", MOVES["authors_walk"], 10.0, [rollouts(1.0, 3.0)])
+    assert not any("gain" in bar for bar in result["bars"])
     assert result["limb_gain"]["head"] == 3.0
+
+
+@pytest.mark.parametrize("name", ["dance_b", "authors_apt1"])
+def test_the_humanoid_s_feet_have_a_bar_of_their_own(name: str) -> None:
+    rows = rollouts(1.0, 1.0)
+    rows[0] |= {"limb_gain_left_foot": 0.76, "limb_r2_left_foot": 0.41}
+    rows[0] |= {"limb_gain_right_foot": 0.74, "limb_r2_right_foot": 0.39}
+    found = line(name, MOVES[name], 10.0, [rows])["bars"]
+    feet = {bar: held for bar, held in found.items() if "foot" in bar and "excess" not in bar}
+    assert feet == {
+        "gain left_foot 0.75-1.2": True,
+        "R2 left_foot >= 0.4": True,
+        "gain right_foot 0.75-1.2": False,
+        "R2 right_foot >= 0.4": False,
+    }
+
+
+def test_the_authors_clips_on_the_g1_have_every_bar_of_its_rows() -> None:
+    rows = rollouts(1.0, 0.78)
+    rows[0] |= {"mpjpe_l_m": 0.05, "acceleration_ratio": 2.17}
+    row = line("g1_authors_apt1_onboard", MOVES["g1_authors_apt1_onboard"], 10.0, [rows])
+    missed = [bar for bar, held in row["bars"].items() if not held]
+    gains = [f"gain {limb} 0.8-1.2" for limb in LIMBS if limb != "head"]
+    assert missed == ["mpjpe_l <= 22 mm", "acceleration <= 1.5", *gains]
+    assert "worst seed >= 0.75" in row["bars"]
+    assert not any("head" in bar for bar in row["bars"])
+
+
+def test_accelerations_that_were_not_recorded_have_no_bar() -> None:
+    row = line("g1_walk", MOVES["g1_walk"], 10.0, [rollouts(1.0, 1.0)])
+    assert not any("acceleration" in bar for bar in bars(row, "g1_walk", MOVES["g1_walk"]))
 
 
 def test_the_interval_of_equal_seeds_is_a_point() -> None:
