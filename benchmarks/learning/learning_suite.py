@@ -5,7 +5,8 @@
 `speed`, `threads`: our parts beside their peers (`speed`). `policies`: one row a move
 and a seed, trained for the row's CPU minutes and evaluated on stock physics (`training_rows`).
 `survival`, `pretraining`: races (`races`). `checkpoints`: what they cost a training
-(`checkpoint_cost`). `table` only prints what there is. What exists is not computed again, so
+(`checkpoint_cost`). `table` only prints what there is, and
+writes the G1's rows into `docs/benchmarks_learning.md`. What exists is not computed again, so
 that all of it may take several sittings. The authors' clips are measured where ROBOJACKSON_PAPER
 names their folder.
 """
@@ -23,6 +24,7 @@ from rich.table import Table
 from benchmarks.learning import checkpoint_cost, races, training_rows
 from benchmarks.learning import speed as learning_speed
 from benchmarks.learning.error_line import errors_in_one_line
+from benchmarks.learning.g1_rows_table import update_document
 from benchmarks.learning.policies import TRAINED, Folders
 from benchmarks.learning.row_bars import LIMBS, USUAL
 from benchmarks.learning.summary import AUTHORS_ROBOT, COLUMNS, summary
@@ -31,7 +33,7 @@ PARTS = ("speed", "threads", "policies", "survival", "pretraining", "checkpoints
 SPEED = ("what", "ours", "peer", "ratio", "bar", "holds", "load_average")
 POLICY = (
     *("move", "horizon_s", "seeds", "steps", "strict_success", "strict_success_95", "worst_seed"),
-    *("skill", "velocity_score", "survived_s", "forced", "holds"),
+    *("skill", "velocity_score", "survived_s", "reference", "forced", "holds"),
 )
 
 
@@ -60,6 +62,8 @@ def main() -> None:
     if {"policies", "table"} & set(parts) and (rows := summary(folders)):
         held = {"command": command, "authors_robot": AUTHORS_ROBOT, "rows": rows}
         (folders.results / "learning.json").write_text(json.dumps(held, indent=1) + "\n")
+        if given.folder is None:
+            update_document(rows)
     _show(folders, Console())
 
 
@@ -144,8 +148,9 @@ def _beside(rows: list[dict[str, Any]]) -> Table:
 
 
 def _name(row: Mapping[str, Any]) -> str:
-    seconds = row["horizon_s"]
-    return f"{row['move']} {seconds:g} s" if seconds else f"{row['move']} to its end"
+    seconds, stale = row["horizon_s"], row.get("stale_seeds")
+    name = f"{row['move']} {seconds:g} s" if seconds else f"{row['move']} to its end"
+    return name + (f" (on an older reference: seeds {stale})" if stale else "")
 
 
 def _cell(value: object) -> str:

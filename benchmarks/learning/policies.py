@@ -188,6 +188,7 @@ def reference_of(name: str, folders: Folders) -> Path:
     name = move.same_as or name
     reference = work / "reference.parquet"
     if (work / "gate.json").is_file():
+        require_frozen(name, reference)
         return reference
     frozen = FROZEN / f"{name}.parquet"
     refused = 0

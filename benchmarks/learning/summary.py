@@ -8,6 +8,7 @@ import numpy as np
 
 from benchmarks.learning.policies import TRAINED, Folders, Move, forced
 from benchmarks.learning.row_bars import LIMBS, bars
+from benchmarks.learning.row_references import standing
 from robojackson.files import tables
 from robojackson.metrics.seed_statistics import estimate
 from robojackson.pipeline.table_schemas import EVALUATION_RECORD
@@ -22,6 +23,8 @@ COLUMNS = (
     "survived_s", "strict_success", "skill", "velocity_score", "mpjpe_l_m", "mpjpe_g_m",
     "acceleration_ratio",
 )  # fmt: skip
+FURTHER = ("success", "mpjpe_l_alive_m", "mpjpe_g_alive_m")
+"""Figures of the policy alone: without a fall, and the distances until one."""
 
 
 def summary(folders: Folders) -> Rows:
@@ -33,14 +36,18 @@ def summary(folders: Folders) -> Rows:
             exact = [path for path in found if path == folders.row(name, _seed(path), seconds)]
             if exact:
                 seeds = [_read(path) for path in exact]
-                lines.append({**line(name, move, seconds, seeds), "forced": forced(name, folders)})
+                lines.append(
+                    line(name, move, seconds, seeds)
+                    | {"forced": forced(name, folders), **standing(name, exact, folders)}
+                )
     return lines
 
 
 def line(name: str, move: Move, seconds: float, seeds: Sequence[Rows]) -> dict[str, Any]:
     """Return the figures of a move and whether each of its bars holds."""
     trained = [of_policy(rows, "trained") for rows in seeds]
-    by_seed = {key: [mean(r.get(key) for r in rows) for rows in trained] for key in COLUMNS}
+    all_keys = (*COLUMNS, *FURTHER)
+    by_seed = {key: [mean(r.get(key) for r in rows) for rows in trained] for key in all_keys}
     success = [value or 0.0 for value in by_seed["strict_success"]]
     taken = [row.get("step") for rows in trained for row in rows]
     found: dict[str, Any] = {
@@ -52,6 +59,7 @@ def line(name: str, move: Move, seconds: float, seeds: Sequence[Rows]) -> dict[s
         **{key: mean(values) for key, values in by_seed.items()},
         "strict_success_95": list(cluster_interval(success)),
         "worst_seed": min(success),
+        "whole_phases": mean(whole_phases(rows) for rows in trained),
     }
     for kind in ("limb_gain", "limb_r2", "excess_speed"):
         found[kind] = {
@@ -68,6 +76,12 @@ def line(name: str, move: Move, seconds: float, seeds: Sequence[Rows]) -> dict[s
         for policy in BESIDE
     }
     return found
+
+
+def whole_phases(rows: Rows) -> float:
+    """Return the share of starts (phases and the stand) whose resets all succeed strictly."""
+    lost = {row.get("phase") for row in rows if not row["strict_success"]}
+    return 1.0 - len(lost) / len({row.get("phase") for row in rows})
 
 
 def cluster_interval(by_seed: Sequence[float] | np.ndarray) -> tuple[float, float]:

@@ -12,6 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from queue import SimpleQueue
 
 from benchmarks.learning.policies import MOVES, Folders, budget, must, reference_of, source_of
+from benchmarks.learning.row_references import record_reference
 
 STEPS_A_MINUTE = 50_000
 """Control steps that a CPU minute of one core is worth."""
@@ -39,6 +40,7 @@ def train_and_judge(
         must("evaluate", policy, reference, "-o", evaluated, "--seconds", seconds, core=core)
         part = path.with_suffix(".part")
         part.write_bytes((evaluated / "evaluations.parquet").read_bytes())
+        record_reference(path, reference, folders)
         part.replace(path)
 
 

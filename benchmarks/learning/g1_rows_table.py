@@ -1,0 +1,89 @@
+"""All rows of the G1 as one Markdown table, each figure with whether its bar holds.
+
+It stands in `docs/benchmarks_learning.md` between two comments and is replaced there by
+`python -m benchmarks.learning.learning_suite table`.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from benchmarks.learning.policies import MOVES, ROOT
+from benchmarks.learning.row_bars import FEET, HANDS
+from benchmarks.learning.row_references import OLDER
+
+DOCUMENT = ROOT / "docs" / "benchmarks_learning.md"
+BEGIN, END = "<!-- G1 rows: begin -->", "<!-- G1 rows: end -->"
+MISSED = " ✗"
+COLUMNS = (
+    *("move", "horizon", "seeds", "strict %, mean", "worst", "success %", "whole phases %"),
+    *("skill", "mpjpe_l mm", "to a fall", "mpjpe_g mm", "to a fall", "accelerations"),
+    *("gain of feet, hands", "R²", "excess m/s"),
+)
+Row = Mapping[str, Any]
+
+
+def g1_rows_table(rows: Iterable[Row]) -> str:
+    """Return the table of the G1's rows of `learning.json`."""
+    lines = [_line(COLUMNS), "|---" * len(COLUMNS) + "|"]
+    lines += [_line(_cells(row)) for row in rows if MOVES[row["move"]].robot == "g1"]
+    return "\n".join(lines) + "\n"
+
+
+def written_into(text: str, rows: Iterable[Row]) -> str:
+    """Return a document's text with the table between its two comments replaced."""
+    before, rest = text.split(BEGIN)
+    return f"{before}{BEGIN}\n\n{g1_rows_table(rows)}\n{END}{rest.split(END)[1]}"
+
+
+def update_document(rows: Iterable[Row], path: Path = DOCUMENT) -> None:
+    """Replace the table of a document."""
+    path.write_text(written_into(path.read_text(encoding="utf-8"), rows), encoding="utf-8")
+
+
+def _cells(row: Row) -> list[str]:
+    stale = " (older reference)" if row["reference"] == OLDER else ""
+    seconds = row["horizon_s"]
+    return [
+        row["move"] + stale,
+        f"{seconds:g} s" if seconds else "its end",
+        str(row["seeds"]),
+        _percent(row["strict_success"]) + _mark(row, "strict success"),
+        _percent(row["worst_seed"]) + _mark(row, "worst seed"),
+        _percent(row["success"]),
+        _percent(row["whole_phases"]),
+        f"{row['skill']:.2f}" + _mark(row, "skill"),
+        _mm(row["mpjpe_l_m"]) + _mark(row, "mpjpe_l"),
+        *(_mm(row[name]) for name in ("mpjpe_l_alive_m", "mpjpe_g_m", "mpjpe_g_alive_m")),
+        f"{row['acceleration_ratio']:.2f}" + _mark(row, "acceleration"),
+        _limbs(row, "limb_gain", "gain"),
+        _limbs(row, "limb_r2", "R2"),
+        _limbs(row, "excess_speed", "excess"),
+    ]
+
+
+def _limbs(row: Row, figures: str, bar: str) -> str:
+    """Return a figure of both feet and both hands."""
+    found = ((limb, row[figures][limb]) for limb in (*FEET, *HANDS))
+    return ", ".join(
+        "-" if figure is None else f"{figure:.2f}{_mark(row, f'{bar} {limb}')}"
+        for limb, figure in found
+    )
+
+
+def _mark(row: Row, bar: str) -> str:
+    """Return a mark where the bar whose name begins so is missed."""
+    held = next((held for name, held in row["bars"].items() if name.startswith(bar)), True)
+    return "" if held else MISSED
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.1f}"
+
+
+def _mm(metres: float | None) -> str:
+    return "-" if metres is None else f"{1e3 * metres:.0f}"
+
+
+def _line(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(cells)} |"
