@@ -15,6 +15,7 @@ import mujoco
 import numpy as np
 
 from robojackson.errors import BadConfiguration
+from robojackson.robot.beside_reference import rule_lines
 from robojackson.robot.contact_guess import guess_contacts, toe_of
 from robojackson.robot.description import KEYPOINTS, TOES, ContactPoint
 from robojackson.robot.keypoint_guess import Guess, guess_keypoints
@@ -92,6 +93,7 @@ def first_description(path: Path, folder: Path, name: str) -> Draft:
         *_torque_lines(undriven),
         "max_joint_speed: 12.0 # rad/s; of the motors, where you know it",
         *_clock_lines(model.opt.timestep),
+        *rule_lines(),
     ]
     return Draft(name, "\n".join(lines) + "\n", tuple(guessed), tuple(left))
 

@@ -12,6 +12,9 @@ from robojackson.errors import BadConfiguration
 from robojackson.pipeline.robot_descriptions import read_description
 from robojackson.retarget.retarget_config import RetargetConfig
 from robojackson.retarget.retargeting import retarget_motion
+from robojackson.retarget.targets.tails import TailConfig
+from robojackson.rl.config.train_config import EvaluateConfig
+from robojackson.rl.evaluation.strict_success import StrictEvaluator
 from robojackson.robot.description import RobotDescription
 from robojackson.robot.description_check import problems
 from robojackson.robot.first_description import Draft, first_description, name_of_model
@@ -43,6 +46,15 @@ def test_humanoid_v5_is_described_as_the_shipped_file_does(tmp_path: Path) -> No
     assert (draft.left, draft.guessed, problems(found)) == ((), (), [])
     for part in ("root_body", "sites", "weights", "contacts", "rest_pose", "control_dt"):
         assert getattr(found, part) == getattr(shipped, part), part
+
+
+def test_a_drafted_robot_is_evaluated_as_the_g1_is(tmp_path: Path) -> None:
+    _, found = drafted(gymnasium_model(), tmp_path)
+    g1 = description("g1")
+    assert (found.fall, found.strict) == (g1.fall, g1.strict)
+    robot = load_robot(found)
+    assert TailConfig().applies_to(robot)
+    assert StrictEvaluator(robot, robot_motion("hip_shake"), EvaluateConfig())
 
 
 @pytest.mark.medium
