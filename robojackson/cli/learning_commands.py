@@ -136,6 +136,7 @@ def evaluate(
 ) -> CommandResult:
     """Evaluate a policy or a tracker on stock physics from many starts, beside simple baselines."""
     from robojackson.cli import cards, stages
+    from robojackson.cli.passport_text import passport_lines
     from robojackson.cli.training_process import end_with
 
     if parent:
@@ -145,6 +146,6 @@ def evaluate(
     given = {"evaluate.seconds": seconds, "evaluate.passport": passport or None}
     overrides = overrides_from(set_, given)
     evaluated = stages.evaluate(policy, reference, out, config, overrides, robot)
-    lines = [*stages.verdict_lines(evaluated), *stages.passport_lines(evaluated)]
+    lines = [*stages.verdict_lines(evaluated), *passport_lines(evaluated)]
     table = [*lines, *cards.closing(evaluated)]
     return CommandResult(evaluated, text=cards.shown(evaluated, table, verbose))

@@ -224,15 +224,6 @@ def verdict_lines(evaluation: Mapping[str, Any]) -> list[str]:
     return console.table(rows, VERDICT)
 
 
-PASSPORT = ("strict_success", "success", "skill", "survived_s", "kept")
-
-
-def passport_lines(evaluation: Mapping[str, Any]) -> list[str]:
-    """Return the table of a passport; nothing where none was made."""
-    rows = evaluation.get("passport", [])
-    return console.table({row["case"]: row for row in rows}, PASSPORT) if rows else []
-
-
 def _contact_share(sequence: "SmplSequence") -> dict[str, float]:
     from robojackson.motion.smpl_sequence import CONTACT_POINTS, PLANTED
 

@@ -104,6 +104,7 @@ _FORMS: Mapping[str, _Form] = {
     "drift_m": _Form("drift", "m", 2),
     "heading_error_deg": _Form("heading error", "deg", 1),
     "kept": _Form("kept", "%", 0, 100.0),
+    "robust": _Form("robust"),
     "rollouts": _Form("rollouts"),
 }
 _FLAGS = ("cyclic",)

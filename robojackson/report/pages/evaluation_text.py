@@ -30,6 +30,7 @@ class Verdict:
     meaning: str
     values: Sequence[str]
     trained: bool
+    failed: bool = False
 
 
 def dancer_of(evaluation: Evaluation) -> str:
@@ -126,14 +127,18 @@ def verdicts(evaluation: Evaluation) -> list[Verdict]:
 
 F1 = 3
 """Place of F1 in the values of a row of beats."""
-PASSPORT_COLUMNS = ("strict_success", "skill", "survived_s", "kept")
+PASSPORT_COLUMNS = ("strict_success", "skill", "survived_s", "kept", "robust")
 
 
 def passport_rows(evaluation: Evaluation) -> list[Verdict]:
     """Return the figures of the policy under other physics, formatted."""
     return [
         Verdict(
-            row["case"], "", [format_value(key, row[key]) for key in PASSPORT_COLUMNS], index == 0
+            row["case"],
+            "",
+            [format_value(key, row.get(key)) for key in PASSPORT_COLUMNS],
+            index == 0,
+            failed=row.get("robust") is False,
         )
         for index, row in enumerate(evaluation.get("passport", []))
     ]

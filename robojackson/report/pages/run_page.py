@@ -173,6 +173,7 @@ def render(content: PageContent) -> str:
         verdicts=verdicts(evaluation),
         passport_columns=[Quantity("", "")] + quantities(dict.fromkeys(PASSPORT_COLUMNS)),
         passport=passport_rows(evaluation),
+        least_kept=format_value("kept", evaluation.get("passport_least_kept")),
         limb_columns=[Quantity(name, "") for name in LIMB_COLUMNS],
         beat_columns=[Quantity(name, "") for name in BEAT_COLUMNS],
         bars=_bars(content.scorecard),

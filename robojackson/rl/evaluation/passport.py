@@ -30,6 +30,7 @@ ROBUST_FIELDS = ("friction", "gains", "mass", "com", "delay", "sensor_noise", "p
 NOMINAL = "nominal"
 LEAST_SHARE = 0.9
 """Share of the nominal strict success that a robust policy keeps in every case."""
+ROUNDING = 1e-9
 FIGURES = ("strict_success", "success", "skill", "survived_s", "site_error_m")
 TIMESTEPS_S = (0.0015, 0.002, 0.004, 0.005)
 INTEGRATORS = ("Euler", "implicitfast", "RK4")
@@ -96,8 +97,8 @@ def passport(
     """Evaluate a policy under every case.
 
     Returns:
-        A row a case: `case`, the figures of `FIGURES`, and `kept`, the share of the nominal
-        strict success (None where that is zero).
+        A row a case: `case`, the figures of `FIGURES`, `kept`, the share of the nominal strict
+        success (None where that is zero), and `robust`, whether that is at least `LEAST_SHARE`.
 
     Raises:
         BadPolicy: the policy's observation does not fit this robot.
@@ -114,6 +115,7 @@ def passport(
     nominal = rows[0]["strict_success"]
     for row in rows:
         row["kept"] = row["strict_success"] / nominal if nominal else None
+        row["robust"] = row["kept"] is not None and row["kept"] >= LEAST_SHARE - ROUNDING
     return rows
 
 

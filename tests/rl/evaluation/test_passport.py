@@ -1,12 +1,23 @@
 """The passport: one line a case, each of which changes what it says."""
 
 import numpy as np
+import pytest
 
+from robojackson.cli.passport_text import passport_lines
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.pipeline.yaml_loader import load
 from robojackson.report.pages.evaluation_text import passport_rows
 from robojackson.rl.config.train_config import EvaluateConfig, TrainConfig
-from robojackson.rl.evaluation.passport import NOMINAL, ROBUST, cases, passport, robust_settings
+from robojackson.rl.evaluation import passport as passport_module
+from robojackson.rl.evaluation.passport import (
+    FIGURES,
+    LEAST_SHARE,
+    NOMINAL,
+    ROBUST,
+    cases,
+    passport,
+    robust_settings,
+)
 from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
 from robojackson.rl.modes.observation import Observer
 from robojackson.rl.policy import Policy
@@ -45,6 +56,47 @@ def test_an_evaluation_with_a_passport_has_a_row_a_case(
     shown = passport_rows(verdict.summary)
     assert len(shown) == len(rows)  # type: ignore[arg-type]
     assert shown[0].trained
+    assert [one.failed for one in shown] == [not row["robust"] for row in rows]  # type: ignore[attr-defined]
+    assert verdict.summary["robust"] == all(row["robust"] for row in rows)  # type: ignore[attr-defined]
+    assert verdict.summary["passport_least_kept"] == LEAST_SHARE
+
+
+@pytest.mark.parametrize(
+    ("pushed", "robust"), [(0.9, True), (0.72 / 0.8, True), (0.88, False), (None, False)]
+)
+def test_a_case_is_robust_that_keeps_nine_tenths(
+    pushed: float | None,
+    robust: bool,
+    robot: Robot,
+    sway: ReferenceMotion,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    nominal = 0.0 if pushed is None else 1.0
+    strict = iter([nominal, *(pushed or 0.0 for _ in cases(robot, 0)[1:])])
+    figures = dict.fromkeys(FIGURES, 0.0)
+    monkeypatch.setattr(
+        passport_module,
+        "_evaluate_case",
+        lambda *given: {**figures, "strict_success": next(strict)},
+    )
+    rows = passport(idle(robot), sway, robot, BRIEF)
+    assert {row["robust"] for row in rows[1:]} == {robust}
+
+
+def test_the_terminal_and_the_page_name_the_cases_that_fail() -> None:
+    figures = {"strict_success": 1.0, "success": 1.0, "skill": 0.5, "survived_s": 10.0, "kept": 1.0}
+    pushed = {"case": "pushes", **figures, "kept": 0.76, "robust": False}
+    rows = [{"case": NOMINAL, **figures, "robust": True}, pushed]
+    evaluation = {"passport": rows, "passport_least_kept": LEAST_SHARE}
+    assert passport_lines(evaluation)[-1] == (
+        "Not robust: 1 of 2 cases keep 90 % of the nominal strict success, not: pushes."
+    )
+    assert passport_lines(evaluation | {"passport": rows[:1]})[-1].startswith("Robust: each of 1")
+    assert [(one.failed, one.values[-1]) for one in passport_rows(evaluation)] == [
+        (False, "yes"),
+        (True, "no"),
+    ]
+    assert passport_lines({"passport": []}) == []
 
 
 def test_slippery_floor_and_late_actions_change_the_outcome(
