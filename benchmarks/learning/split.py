@@ -31,12 +31,15 @@ class Split:
         held_out: Motions that no training, pretraining or tuning may see.
         train: Motions that trainings may see.
         excluded: Near-duplicates of evaluated ones, with the motion and the share of it.
+        exceptions: What sees a motion that it may not, with these motions and those on which
+            nothing is claimed of it therefore.
         references: sha256 of the poses of frozen references, by row.
     """
 
     held_out: tuple[str, ...]
     train: tuple[str, ...]
     excluded: Mapping[str, Mapping[str, Any]]
+    exceptions: Mapping[str, Mapping[str, list[str]]]
     references: Mapping[str, str]
 
     def require_trainable(self, names: Iterable[str]) -> None:
@@ -52,16 +55,6 @@ class Split:
                 f"{', '.join(self.train)}"
             )
 
-    def require_none_held_out(self, names: Iterable[str]) -> None:
-        """Refuse motions that are held out, or too similar to one that is.
-
-        Raises:
-            ValueError: with the motions.
-        """
-        bad = [name for name in names if name in (*self.held_out, *self.excluded)]
-        if bad:
-            raise ValueError(f"not for training: {', '.join(bad)}")
-
 
 def load_split(path: Path = FILE) -> Split:
     """Read the split."""
@@ -70,6 +63,7 @@ def load_split(path: Path = FILE) -> Split:
         held_out=tuple(result["held_out"]),
         train=tuple(result["train"]),
         excluded=result["excluded"],
+        exceptions=result["exceptions"],
         references=result["references"],
     )
 

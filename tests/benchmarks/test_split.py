@@ -9,6 +9,7 @@ import pytest
 from benchmarks.learning.motion_distance import contained_share, windows
 from benchmarks.learning.policies import BLAS, FROZEN, MOVES, frozen_kernels, require_frozen
 from benchmarks.learning.split import DUPLICATE_SHARE, load_split, shares
+from robojackson.cli import walker_training
 from robojackson.geometry.rotations import quat_to_matrix
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
@@ -49,6 +50,18 @@ def test_every_near_duplicate_is_one_of_a_evaluated_motion() -> None:
     for found in SPLIT.excluded.values():
         assert found["of"] in SPLIT.held_out
         assert found["share"] >= DUPLICATE_SHARE
+
+
+def test_what_sees_a_motion_that_it_may_not_is_named_with_what_is_not_claimed() -> None:
+    for found in SPLIT.exceptions.values():
+        for name in found["sees"]:
+            assert name in (*SPLIT.held_out, *SPLIT.excluded)
+            assert SPLIT.excluded.get(name, {"of": name})["of"] in found["nothing_claimed_on"]
+        assert set(found["nothing_claimed_on"]) <= set(SPLIT.held_out)
+
+
+def test_the_walk_that_pretrain_imitates_is_a_named_exception() -> None:
+    assert SPLIT.exceptions["pretrain"]["sees"] == [Path(walker_training.WALK).stem]
 
 
 def test_a_evaluated_motion_is_refused_for_training() -> None:

@@ -51,3 +51,21 @@ def test_the_dancer_trains_on_no_motion_that_evaluates_it(tmp_path: Path) -> Non
     robot_motion("dance_b").save(tmp_path / "dance_b.parquet")
     with pytest.raises(ValueError, match="not for training: dance_b"):
         collection(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["long_walk1_0", "cmu_05_07", "unheard_of"])
+def test_the_dancer_s_pack_takes_captured_motions_of_the_training_list_alone(
+    name: str, tmp_path: Path
+) -> None:
+    for trainable in ("jog_0", "stealthy_walk1_1", "cmu_05_01", "invented_007"):
+        robot_motion("hip_shake").save(tmp_path / f"{trainable}.parquet")
+    assert len(collection(tmp_path)) == 4
+    robot_motion("hip_shake").save(tmp_path / f"{name}.parquet")
+    with pytest.raises(ValueError, match="not for training: "):
+        collection(tmp_path)
+
+
+def test_a_walk_that_contains_the_evaluated_walk_is_passed_over(tmp_path: Path) -> None:
+    for name in load_split().excluded:
+        (tmp_path / f"humanoid3d_{name}.txt.gz").touch()
+    assert [name for name, *_ in sequences(tmp_path, 0)] == []

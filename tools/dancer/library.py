@@ -9,6 +9,7 @@ refused or passed over. OUT gets one reference motion each; those that are there
 
 import argparse
 import gzip
+import re
 import tempfile
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -29,8 +30,10 @@ from tools.dancer.smpl_motion import smpl_sequence
 from tools.pairs import gestures, sources
 
 FPS, SECONDS = 30.0, 8.0
-CAPTURED = ("jog", "long_walk1", "long_walk2", "long_walk3", "stealthy_walk0", "stealthy_walk1")
-"""Of DeepMimic; the near-duplicates of held-out motions are not among them."""
+INVENTED = "invented_"
+"""How the name of an invented dance begins."""
+PART = re.compile(r"_\d$")
+"""The end of the name of a part of one of DeepMimic's motions."""
 TAILED = 3
 """Every third invented dance begins and ends standing; captured dances do."""
 MOST_INFEASIBLE = 0.25
@@ -47,7 +50,7 @@ def sequences(folder: Path, invented: int) -> Iterator[tuple[str, Maker, bool]]:
         if path.is_file():
             yield name, partial(_bvh, path), True
     for path in sorted(folder.glob("humanoid3d_*.txt.gz")):
-        if (name := sources.motion_name(path)) in CAPTURED:
+        if (name := sources.motion_name(path)) in load_split().train:
             motion = sources.read(path, FPS)
             count = round(FPS * SECONDS)
             for part in range(max(1, min(2, len(motion) // count))):
@@ -56,7 +59,12 @@ def sequences(folder: Path, invented: int) -> Iterator[tuple[str, Maker, bool]]:
     for seed in range(invented):
         rng = np.random.default_rng([seed, 24])
         dance = gestures.invent(rng, round(FPS * SECONDS), FPS)
-        yield f"invented_{seed:03}", partial(smpl_sequence, dance), seed % TAILED == 0
+        yield f"{INVENTED}{seed:03}", partial(smpl_sequence, dance), seed % TAILED == 0
+
+
+def source_of(name: str) -> str | None:
+    """Return the captured motion that a reference is of; none for an invented dance."""
+    return None if name.startswith(INVENTED) else PART.sub("", name)
 
 
 def make(name: str, maker: Maker, tails: bool, robot: Robot, out: Path) -> str:

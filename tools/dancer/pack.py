@@ -2,10 +2,10 @@
 
     python -m tools.dancer.pack REFERENCES -o PACK.npz [--robot g1]
 
-REFERENCES holds reference motions (`tools.dancer.library`); one that the split file
-(`benchmarks/learning/split.yaml`) holds out is refused. The model in the file has no meshes and no
-sensors, and five of the seven capsules of each sole, which keep its outline: keypoints are .05 mm
-beside the whole model's after a control step.
+REFERENCES holds reference motions (`tools.dancer.library`); a captured one that the split file
+(`benchmarks/learning/split.yaml`) does not list for training is refused. The model in the file has
+no meshes and no sensors, and five of the seven capsules of each sole, which keep its outline:
+keypoints are .05 mm beside the whole model's after a control step.
 """
 
 import argparse
@@ -26,6 +26,7 @@ from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.motors import Motors, gains, residual_scale
 from robojackson.robot.mjcf import described_spec, mjcf_path
 from robojackson.robot.model import Robot
+from tools.dancer.library import source_of
 from tools.dancer.mirror import hinge_partners, partners
 
 ACTION_FACTOR = 4.0
@@ -103,10 +104,11 @@ def collection(folder: Path) -> dict[str, ReferenceMotion]:
     """Read the reference motions of a folder.
 
     Raises:
-        ValueError: one of them is held out, or too similar to one that is.
+        ValueError: a captured one is not in the split's training list.
     """
     paths = sorted(folder.glob("*.parquet"))
-    load_split().require_none_held_out(path.stem for path in paths)
+    sources = [source_of(path.stem) for path in paths]
+    load_split().require_trainable(name for name in sources if name is not None)
     return {path.stem: ReferenceMotion.load(path) for path in paths}
 
 
