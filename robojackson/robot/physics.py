@@ -83,7 +83,9 @@ def _step_as(spec: mujoco.MjSpec, description: RobotDescription) -> None:
     if stepping.friction is not None:
         soles = {point.body for point in description.contacts.values()}
         floors = [geom for geom in spec.worldbody.geoms if is_plane(geom)]
-        for geom in floors + [geom for body in soles for geom in _rigid_geoms(spec.body(body))]:
+        # A body that the model has not is refused by name where contacts are bound.
+        bodies = [body for name in sorted(soles) if (body := spec.body(name)) is not None]
+        for geom in floors + [geom for body in bodies for geom in _rigid_geoms(body)]:
             geom.friction = [stepping.friction, *geom.friction[1:]]
 
 

@@ -44,6 +44,13 @@ def stock_model() -> mujoco.MjModel:
     return mujoco.MjModel.from_xml_path(str(folder / "envs/mujoco/assets/humanoid.xml"))
 
 
+def saved(model: mujoco.MjModel) -> bytes:
+    """Return a compiled model as MuJoCo saves it."""
+    content = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, content)
+    return content.tobytes()
+
+
 def test_the_humanoids_yaml_says_what_its_model_has(robot: Robot) -> None:
     stock, ours = stock_model(), robot.model
     assert (ours.opt.timestep, ours.opt.integrator) == (stock.opt.timestep, stock.opt.integrator)
@@ -53,6 +60,16 @@ def test_the_humanoids_yaml_says_what_its_model_has(robot: Robot) -> None:
     np.testing.assert_array_equal(ours.geom_friction, stock.geom_friction)
     motors = dataclasses.replace(HUMANOID, torque_limits={})
     np.testing.assert_allclose(load_robot(motors).torque_limit, robot.torque_limit)
+
+
+def test_the_humanoids_physics_is_its_model_s_to_the_bit(robot: Robot) -> None:
+    said = describe_robot("humanoid")
+    assert said.armature
+    assert said.simulation.friction is not None
+    silent = load_robot(
+        dataclasses.replace(said, torque_limits={}, armature={}, simulation=SimulationDescription())
+    )
+    assert saved(robot.model) == saved(silent.model)
 
 
 def test_the_humanoids_gains_are_those_of_the_rule_without_a_yaml(robot: Robot) -> None:

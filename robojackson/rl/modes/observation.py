@@ -22,6 +22,11 @@ from robojackson.robot.model import Robot
 
 SPEED_SCALE, HINGE_SPEED_SCALE, POINT_SCALE, ROOT_SCALE, CLIP = 0.3, 0.1, 2.0, 3.0, 10.0
 USUAL_HEIGHT_M = 1.2
+"""Height of the root that is observed as zero, for every robot: about that of Humanoid-v5's torso.
+
+A robot of another size observes an offset, which the bias of the first layer takes up. A height of
+its own would change the inputs of every saved policy.
+"""
 Kind = Literal["full", "onboard", "preview"]
 """Kinds of the policy's inputs."""
 
