@@ -119,6 +119,12 @@ def passport(
     return rows
 
 
+def passport_facts(rows: list[dict[str, Any]]) -> dict[str, object]:
+    """Return a passport with its verdict, as it stands in an evaluation."""
+    robust = all(row["robust"] for row in rows)
+    return {"passport": rows, "passport_least_kept": LEAST_SHARE, "robust": robust}
+
+
 def _evaluate_case(
     driver: Driver,
     clip: Clip,

@@ -30,7 +30,7 @@ from robojackson.rl.evaluation.controllers import (
     equipped,
     sees_ahead,
 )
-from robojackson.rl.evaluation.passport import LEAST_SHARE, passport
+from robojackson.rl.evaluation.passport import passport, passport_facts
 from robojackson.rl.evaluation.reward_audit import RewardAudit, audit_both_readings, audit_record
 from robojackson.rl.evaluation.reward_meter import RewardMeter, without_curiosity
 from robojackson.rl.evaluation.rollout_records import RolloutScorer
@@ -126,9 +126,7 @@ def evaluate_policy(
     if not isinstance(policy, Policy):
         facts["tracker"] = policy.description.name
     if config.passport:
-        facts["passport"] = cases = passport(policy, reference, robot, config, progress)
-        facts["passport_least_kept"] = LEAST_SHARE
-        facts["robust"] = all(case["robust"] for case in cases)
+        facts |= passport_facts(passport(policy, reference, robot, config, progress))
     return Evaluation({**shown, **facts, "verdict": verdict.as_facts()}, rows, qpos)
 
 
