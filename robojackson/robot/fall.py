@@ -1,4 +1,9 @@
-"""Fall detection: the rule of the robot's description, bound to its size. Metres, radians."""
+"""Fall detection: the rule of the robot's description, bound to its size. Metres, radians.
+
+`BESIDE` and `STRICT` are the rules that a first description gets, the G1's: differences to the
+reference at every step, so that a bow or a knee on the floor is no fault where the dancer bows or
+kneels, and a motion that ends gets tails.
+"""
 
 from dataclasses import dataclass
 
@@ -6,12 +11,15 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float
 
+from robojackson.robot.description import FallRule, StrictRule
 from robojackson.robot.model import Robot
 
 FALL_HEIGHT_M = 0.7
 """The paper's fall rule for Humanoid-v5: a lower torso has fallen."""
 FALL_SHARE = 0.55
 """Of the height at which a smaller robot's root stands: lower, it has fallen."""
+BESIDE = FallRule(frame="reference", height=0.25, tilt=0.8)
+STRICT = StrictRule(sites=0.20, ends=0.25, knees=None, floor=True)
 
 
 @dataclass(frozen=True)
@@ -75,6 +83,21 @@ def standing_height(robot: Robot) -> float:
     feet = data.site_xpos[robot.keypoint_sites[robot.contact_keypoints], 2]
     soles = feet + robot.contact_arms[:, 2] - robot.contact_radii
     return float(data.qpos[2] - soles.min())
+
+
+def rule_lines() -> list[str]:
+    """Return the blocks `fall` and `strict` of a description."""
+    return [
+        "fall: # it has fallen where its root is so far from the reference's",
+        f"  frame: {BESIDE.frame} # a motion that ends begins and ends standing, too",
+        f"  height: {BESIDE.height} # metres; less for a robot much smaller than a person",
+        f"  tilt: {BESIDE.tilt} # radians between the up axes",
+        "strict: # strict success, at every step; metres",
+        f"  sites: {STRICT.sites} # mean distance of the keypoints from the reference's",
+        f"  ends: {STRICT.ends} # in height, of feet and hands",
+        "  knees: null # the line below is the rule for them",
+        f"  floor: {str(STRICT.floor).lower()} # nothing on it that the reference has not there",
+    ]
 
 
 def _least(robot: Robot) -> float:

@@ -15,9 +15,9 @@ import mujoco
 import numpy as np
 
 from robojackson.errors import BadConfiguration
-from robojackson.robot.beside_reference import rule_lines
 from robojackson.robot.contact_guess import guess_contacts, toe_of
 from robojackson.robot.description import KEYPOINTS, TOES, ContactPoint
+from robojackson.robot.fall import rule_lines
 from robojackson.robot.keypoint_guess import Guess, guess_keypoints
 from robojackson.robot.limbs import SIDES, Skeleton, skeleton_of
 from robojackson.robot.model_files import read_model
