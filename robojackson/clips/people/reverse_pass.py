@@ -87,7 +87,7 @@ def track_in_reverse(
 def suspect(
     rows: Float[np.ndarray, "T 33 7"], size: tuple[int, int], config: ReversePassConfig
 ) -> Bool[np.ndarray, " T"]:
-    """Return frames in which the joints jump, nobody is seen between others, or the trunk lies or
+    """Return frames in which joints jump, no person is seen between others, or the trunk lies or
     hangs."""
     seen = ~np.isnan(rows[:, 0, 0])
     if seen.sum() < 2:
