@@ -55,7 +55,7 @@ def _cells(row: Row) -> list[str]:
         f"{row['skill']:.2f}" + _mark(row, "skill"),
         _mm(row["mpjpe_l_m"]) + _mark(row, "mpjpe_l"),
         *(_mm(row[name]) for name in ("mpjpe_l_alive_m", "mpjpe_g_m", "mpjpe_g_alive_m")),
-        f"{row['acceleration_ratio']:.2f}" + _mark(row, "acceleration"),
+        _ratio(row["acceleration_ratio"]) + _mark(row, "acceleration"),
         _limbs(row, "limb_gain", "gain"),
         _limbs(row, "limb_r2", "R2"),
         _limbs(row, "excess_speed", "excess"),
@@ -79,6 +79,10 @@ def _mark(row: Row, bar: str) -> str:
 
 def _percent(share: float) -> str:
     return f"{100 * share:.1f}"
+
+
+def _ratio(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2f}"
 
 
 def _mm(metres: float | None) -> str:

@@ -82,7 +82,8 @@ def _notes(valid: np.ndarray, camera: dict[str, object]) -> tuple[str, ...]:
     elif not camera["gravity_sure"]:
         spread = camera.get("gravity_sd_deg")
         within = "" if spread is None else f", to about {spread:.0f} degrees"
-        notes.append(f"gravity is not sure{within}: no straight edges of the scene show it")
+        few = "few" if camera["gravity"] == "scene" else "no"
+        notes.append(f"gravity is not sure{within}: {few} straight edges of the scene show it")
     return tuple(notes)
 
 

@@ -6,6 +6,7 @@ distance, metres.
 """
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from scipy.ndimage import binary_dilation
 from robojackson.body.feet import stretches
 from robojackson.body.skeleton import keypoint
 from robojackson.clips.people.camera_path import warp
+from robojackson.errors import NoPersonFound, TrackTooShort, ViewsDisagree
 from robojackson.mocap.landmarks.blazepose import BODY, LANDMARK_NAMES, MIRROR
 from robojackson.motion.landmark_track import LandmarkTrack, evenly
 from robojackson.motion.smpl_sequence import SmplSequence
@@ -23,7 +25,7 @@ CAMERA = {"focal_px", "width", "height", "rotation_w", "position_w"}
 """Camera metadata that a motion needs to be drawn over the source."""
 OFF_M = 0.15
 """Mean distance above which a frame counts as badly recovered: the width of a head."""
-LEFT_OUT = "left out"
+LEFT_OUT = "left out: the body lay off the picture"
 """Words of the note on weak frames that were left out."""
 SEEN = 0.5
 BESIDE_S = 0.1
@@ -105,7 +107,8 @@ def reprojection_record(sequence: SmplSequence, track: LandmarkTrack) -> dict[st
 def leaving_out_weak(
     recover: Callable[[LandmarkTrack], SmplSequence], track: LandmarkTrack, leave_out: bool
 ) -> SmplSequence:
-    """Return the motion of a track; on request again without the frames that were weak.
+    """Return the motion of a track; on request again without the frames that were weak, where
+    enough others are left.
 
     Args:
         recover: Function that recovers the motion of a track.
@@ -117,7 +120,9 @@ def leaving_out_weak(
         return sequence
     even = evenly(track)
     kept = without_weak_frames(even, weak_frames(sequence, even))
-    return sequence if kept is even else recover(kept)
+    with suppress(TrackTooShort, NoPersonFound, ViewsDisagree):  # too little would be left
+        return sequence if kept is even else recover(kept)
+    return sequence
 
 
 def without_weak_frames(track: LandmarkTrack, weak: Bool[np.ndarray, " T"]) -> LandmarkTrack:
@@ -132,7 +137,7 @@ def without_weak_frames(track: LandmarkTrack, weak: Bool[np.ndarray, " T"]) -> L
     left = int((track.detected & ~out).sum())
     if not out.any() or not left:
         return track
-    note = f"{int(out.sum())} frames {LEFT_OUT}: the body lay off the picture"
+    note = f"{int(out.sum())} frames {LEFT_OUT}"
     return replace(
         track,
         landmarks=np.where(out[:, None, None], np.nan, track.landmarks),

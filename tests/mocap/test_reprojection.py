@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from robojackson.body.skeleton import REST_JOINTS, keypoint
+from robojackson.errors import NoPersonFound
 from robojackson.mocap.landmarks.blazepose import BODY, LANDMARK_NAMES, MIRROR
 from robojackson.mocap.reprojection import (
+    leaving_out_weak,
     reprojection_error,
     reprojection_record,
     weak_frames,
@@ -94,6 +96,32 @@ def test_a_track_of_weak_frames_alone_is_left_as_it_is(
     clip: tuple[SmplSequence, LandmarkTrack],
 ) -> None:
     assert without_weak_frames(clip[1], np.ones(FRAMES, bool)) is clip[1]
+
+
+def test_damaged_frames_are_not_taken_for_weak_ones(
+    clip: tuple[SmplSequence, LandmarkTrack],
+) -> None:
+    notes = ("3 of 15 frames are damaged and were left out",)
+    found = reprojection_record(replace(clip[0], notes=notes), clip[1])["reprojection"]
+    assert isinstance(found, dict)
+    assert not found["left_out"]
+
+
+def test_the_first_motion_stands_where_too_little_would_be_left(
+    clip: tuple[SmplSequence, LandmarkTrack],
+) -> None:
+    sequence, track = clip
+    moved = np.array(track.landmarks)
+    moved[1:, :, 0] += 0.3 * FOCAL / 4.0 / WIDTH
+    calls = []
+
+    def recover(given: LandmarkTrack) -> SmplSequence:
+        calls.append(int(given.detected.sum()))
+        if calls[-1] < 2:
+            raise NoPersonFound("no person found")
+        return sequence
+
+    assert leaving_out_weak(recover, replace(track, landmarks=moved), True) is sequence
 
 
 def test_a_track_without_weak_frames_is_left_as_it_is(

@@ -86,8 +86,8 @@ def track_dancer(
         size: lite, full or heavy.
         config: Which person to follow, and how.
         progress: Called with (frames done, frames in all); others in view make it several passes.
-        watch: Called with every frame and the landmarks of the first pass: the track's where it
-            finds no others (`people` 0) and finds the one in nearly all frames.
+        watch: Called with every frame and the landmarks of the first pass: the track's where no
+            further one was made.
     Raises:
         NoPersonFound: there is no person of that number; the message lists the people.
         MissingDependency: no model bundle, or no EGL and GLES libraries.

@@ -26,7 +26,9 @@ LONGEST = 150
 UNSEEN = 0.15
 """What a frame without a person costs on a path, and a step from or to one, body heights."""
 PREFERENCE = 0.002
-"""What a frame of the second pass costs on a path: the first one wins where both are the same."""
+"""What a frame of the second pass costs on a path where both are the same, body heights."""
+ASTRAY = 1.0
+"""Body heights; a person of the second pass further than this from the first one's is another."""
 JOINTS = list(POINTS.values())
 
 
@@ -35,7 +37,7 @@ class ReversePassConfig:
     """When a clip is tracked in reverse order, too.
 
     Attributes:
-        enabled: Whether it is.
+        enabled: Whether doubtful stretches are tracked in reverse order.
         jump: Mean step of the joints from frame to frame that is suspect, body heights.
         tilt_deg: Tilt of the trunk in the picture that is suspect, degrees.
         reach_s: Time on each side of suspect frames that is tracked with them, seconds.
@@ -46,7 +48,7 @@ class ReversePassConfig:
     enabled: bool = True
     jump: float = Field(default=0.15, gt=0)
     tilt_deg: float = Field(default=60.0, gt=0, le=180)
-    reach_s: float = Field(default=1.0, ge=0)
+    reach_s: float = Field(default=1.0, ge=0, le=5)
     apart: float = Field(default=0.15, gt=0)
     near: float = Field(default=0.05, gt=0)
 
@@ -74,14 +76,18 @@ def track_in_reverse(
     doubtful = suspect(rows, size, config)
     if not config.enabled or not doubtful.any():
         return rows, 0
-    reach = round(config.reach_s * fps)
+    reach = min(round(config.reach_s * fps), LONGEST)
     near = binary_dilation(doubtful, iterations=reach) if reach else doubtful
-    result, used = np.array(rows), 0
-    for part, second in _second_pass(images, fps, model, parts(near, reach), progress):
-        better = choose(result[part], second, size, config)
-        result[part] = np.where(better[:, None, None], second, result[part])
-        used += int(better.sum())
-    return result, used
+    second = np.array(rows)
+    for part, found in _second_pass(images, fps, model, parts(near, reach)):
+        second[part] = found
+        if progress:
+            progress(int(len(rows) * near[: part.stop].sum() / near.sum()), len(rows))
+    better = np.zeros(len(rows), bool)
+    for start, end in stretches(near):
+        whole = slice(max(start - 1, 0), end + 1)  # begins and ends in the first pass
+        better[whole] |= choose(rows[whole], second[whole], size, config)
+    return np.where(better[:, None, None], second, rows), int(better.sum())
 
 
 def suspect(
@@ -129,20 +135,46 @@ def choose(
     if not seen[0].any():
         return np.asarray(seen[1])
     tall = _tall(first[..., :2] * size)
+    seen[1] &= _near_first(first, second, size, ASTRAY * tall)
     exchanged = second[:, list(MIRROR)][:, JOINTS, :2] * size
     apart = np.minimum(*(_distance(points[0], other) for other in (points[1], exchanged))) / tall
     apart = np.where(seen.all(0), apart, np.where(seen.any(0), np.inf, 0.0))
     differ = binary_propagation(apart > config.apart, mask=apart > config.near)
-    return np.asarray(differ & (steadiest(points / tall, seen) == 1) & seen[1])
+    path = steadiest(points / tall, seen, PREFERENCE * ~differ)
+    return np.asarray(differ & (path == 1) & seen[1])
+
+
+def _near_first(
+    first: Float[np.ndarray, "T 33 7"],
+    second: Float[np.ndarray, "T 33 7"],
+    size: tuple[int, int],
+    reach: float,
+) -> Bool[np.ndarray, " T"]:
+    """Return frames in which the second pass has the trunk near that of the first one, which moves
+    straight where no person is seen."""
+    places = [(rows[:, trunk(), :2] * size).mean(1) for rows in (first, second)]
+    frames, seen = np.arange(len(first)), ~np.isnan(places[0][:, 0])
+    course = np.stack([np.interp(frames, frames[seen], axis[seen]) for axis in places[0].T], -1)
+    return np.asarray(np.linalg.norm(places[1] - course, axis=-1) <= reach)
 
 
 def steadiest(
-    points: Float[np.ndarray, "2 T K 2"], seen: Bool[np.ndarray, "2 T"]
+    points: Float[np.ndarray, "2 T K 2"],
+    seen: Bool[np.ndarray, "2 T"],
+    prefer: Float[np.ndarray, " T"],
 ) -> Int[np.ndarray, " T"]:
     """Return for each frame the pass, 0 or 1, through which the path with the least motion goes
-    (dynamic programming); points in body heights."""
+    (dynamic programming).
+
+    Args:
+        points: Joints of both passes, body heights.
+        seen: Whether a person was detected.
+        prefer: What the second pass costs more, body heights.
+    """
     count = points.shape[1]
-    came, cost = np.zeros((count, 2), int), _standing(seen[:, 0])
+    standing = np.where(seen, 0.0, UNSEEN).T
+    standing[:, 1] += prefer
+    came, cost = np.zeros((count, 2), int), standing[0]
     for frame in range(1, count):
         step = np.full((2, 2), UNSEEN)
         for before in range(2):
@@ -152,7 +184,7 @@ def steadiest(
                     step[before, after] = np.linalg.norm(moved, axis=-1).mean()
         total = cost[:, None] + step
         came[frame] = total.argmin(0)
-        cost = total.min(0) + _standing(seen[:, frame])
+        cost = total.min(0) + standing[frame]
     path = np.empty(count, int)
     path[-1] = cost.argmin()
     for frame in range(count - 1, 0, -1):
@@ -162,10 +194,6 @@ def steadiest(
 
 def _distance(one: Float[np.ndarray, "T K 2"], other: Float[np.ndarray, "T K 2"]) -> np.ndarray:
     return np.asarray(np.linalg.norm(one - other, axis=-1).mean(1))
-
-
-def _standing(seen: Bool[np.ndarray, "2"]) -> Float[np.ndarray, "2"]:
-    return np.where(seen, 0.0, UNSEEN) + [0.0, PREFERENCE]
 
 
 def _tall(points: Float[np.ndarray, "T 33 2"]) -> float:
@@ -178,7 +206,6 @@ def _second_pass(
     fps: float,
     model: str,
     chosen: list[tuple[slice, int]],
-    progress: Callable[[int, int], None] | None,
 ) -> Iterator[tuple[slice, Float[np.ndarray, "T 33 7"]]]:
     """Yield each part with what the detector finds in it in reverse order."""
     frames = enumerate(images)
@@ -197,6 +224,4 @@ def _second_pass(
                 index: detect_frame(held[index], place / fps)
                 for place, index in enumerate(sorted(held, reverse=True))
             }
-        if progress:
-            progress(part.stop, chosen[-1][0].stop)
         yield part, np.array([found.get(i, nobody) for i in range(part.start, part.stop)])

@@ -19,6 +19,7 @@ from robojackson.clips.quality.picture_quality import PictureQuality
 from robojackson.clips.upright_frame import NEARLY
 from robojackson.clips.video import VideoInfo, timed_frames
 from robojackson.mocap.landmarks.model_fusion import fuse_tracks
+from robojackson.mocap.landmarks.scene_edges import SHORT_SIDE as EDGES_SIDE
 from robojackson.mocap.landmarks.scene_edges import SceneEdges
 from robojackson.motion.landmark_track import LandmarkTrack
 
@@ -66,7 +67,7 @@ def detect_landmarks(
 def with_camera(path: Path, track: LandmarkTrack) -> LandmarkTrack:
     """Return the track with the path of the camera, notes on it, and the person's visibility."""
     background = Background()
-    images = (image for _, image in timed_frames(path, short_side=SHORT_SIDE))
+    images = (image for _, image in timed_frames(path, short_side=EDGES_SIDE))
     for index, (image, row) in enumerate(zip(images, track.landmarks, strict=False)):
         background.add_frame(index, image, row)
     return background.applied_to(track)

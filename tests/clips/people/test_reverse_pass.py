@@ -82,7 +82,7 @@ def test_where_both_fail_the_shorter_failure_is_left(rows: np.ndarray) -> None:
     first, second = lost(rows, slice(20, 30)), lost(rows, slice(18, 23))
     chosen = np.where(choose(first, second, SIZE, CONFIG)[:, None, None], second, first)
     off = np.abs(chosen - rows)[:, JOINTS].max((1, 2)) > 0.1
-    assert off.sum() <= 3
+    assert off.sum() < 6
 
 
 def test_a_person_whom_only_the_second_pass_found_is_taken(rows: np.ndarray) -> None:
@@ -91,6 +91,13 @@ def test_a_person_whom_only_the_second_pass_found_is_taken(rows: np.ndarray) -> 
     assert np.flatnonzero(choose(first, rows, SIZE, CONFIG)).tolist() == list(range(25))
     assert choose(np.full_like(rows, np.nan), rows, SIZE, CONFIG).all()
     assert not choose(rows, np.full_like(rows, np.nan), SIZE, CONFIG).any()
+
+
+def test_a_still_person_elsewhere_is_not_taken_for_the_dancer(rows: np.ndarray) -> None:
+    """A poster moves less than any dancer."""
+    poster = np.repeat(rows[:1], len(rows), axis=0)
+    poster[..., 0] += 0.45
+    assert not choose(lost(rows, slice(20, 30)), poster, SIZE, CONFIG).any()
 
 
 def test_long_stretches_are_tracked_in_parts_that_begin_before_they_end() -> None:

@@ -14,6 +14,7 @@ from robojackson.mocap.landmarks.blazepose import (
     fill_gaps,
     landmark,
     repair,
+    swapped_frames,
     track_landmarks,
 )
 from robojackson.motion.landmark_track import LandmarkTrack
@@ -136,3 +137,16 @@ def test_a_turn_at_eight_frames_a_second_is_not_taken_for_an_exchange(
     slow = replace(hip_shake, fps=8.0, landmarks=mirrored)
     assert repair(slow).swapped == 0
     assert repair(replace(slow, fps=30.0)).swapped > 0
+
+
+def test_a_face_towards_the_camera_outweighs_a_majority_from_behind(
+    hip_shake: LandmarkTrack,
+) -> None:
+    """Sides jump once in the clip. The part whose face was detected from behind is the wrong one,
+    even if it is the longer one."""
+    frames = list(range(40, len(hip_shake)))
+    track = swapped(hip_shake, frames)
+    world = np.array(track.world_landmarks)
+    world[frames, : landmark("left_shoulder"), 2] *= -1.0
+    lm = track_landmarks(replace(track, world_landmarks=world))
+    assert np.flatnonzero(swapped_frames(lm, track.fps)).tolist() == frames
