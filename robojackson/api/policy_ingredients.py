@@ -2,12 +2,19 @@
 
 import hashlib
 import re
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 from robojackson.errors import StoreError
 from robojackson.files.foreign_file import read_json, read_text
-from robojackson.formats.deploy.licence_passport import UNKNOWN, Ingredient, robot_ingredient
+from robojackson.formats.deploy.licence_passport import (
+    UNKNOWN,
+    Ingredient,
+    robot_ingredient,
+    runner_ingredients,
+)
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.rl.policy import Policy
 from robojackson.robot.model import Robot
@@ -34,27 +41,63 @@ def policy_ingredients(
     return [
         clip_ingredient(reference),
         *_body_models(reference),
-        Ingredient("motion", "reference motion", "own", "made here, from the clip", digest),
+        motion_ingredient(reference, digest),
         Ingredient("weights", "the policy", "own", "trained here", _sha256(path)),
         *_start(str(policy.facts.get("start", UNKNOWN))),
         robot_ingredient(robot.description, robot.sha256),
-        *_tracker(policy),
         Ingredient("software", "run.py and the texts of the pack", "Apache-2.0", "RoboJackson"),
+        *runner_ingredients(),
     ]
 
 
 def clip_ingredient(reference: Path) -> Ingredient:
-    """Return the clip of a motion, with the licence that a file beside the clip states: REUSE's
-    `CLIP.license`, or the `.info.json` of a download."""
+    """Return the clip of a motion, or the file that it was imported from, with the licence that a
+    file beside it states: REUSE's `CLIP.license`, or the `.info.json` of a download."""
     name, note = "the video or recording that is danced", "declare it with --licence clip=LICENCE"
-    for folder in (reference.parent, reference.parent.parent):
-        with suppress(StoreError, OSError, ValueError, KeyError, TypeError):
-            clip = Path(read_json(folder / SOURCE)["video"])
-            licence, where = stated_licence(clip)
-            if licence:
-                return Ingredient("clip", clip.name, licence, f"stated by {where}")
-            return Ingredient("clip", clip.name, UNKNOWN, f"not stated beside it: {note}")
-    return Ingredient("clip", name, UNKNOWN, f"not stated: {note}")
+    record = _record_of(reference)
+    path = record.get("video") or record.get("imported")
+    if not path:
+        return Ingredient("clip", name, UNKNOWN, f"not stated: {note}")
+    clip = Path(str(path))
+    kind = f"imported, {record.get('format')}: " if "imported" in record else ""
+    digest = str(record.get("sha256", ""))
+    licence, where = stated_licence(clip)
+    if licence:
+        return Ingredient("clip", clip.name, licence, f"{kind}stated by {where}", digest)
+    return Ingredient("clip", clip.name, UNKNOWN, f"{kind}not stated beside it: {note}", digest)
+
+
+def motion_ingredient(reference: Path, digest: str) -> Ingredient:
+    """Return the reference motion: our own where it was recovered from a video here; as its file's
+    where it was imported.
+
+    Args:
+        digest: Of the motion's file.
+    """
+    name, record = "reference motion", _record_of(reference)
+    if "imported" in record:
+        clip = clip_ingredient(reference)
+        note = f"retargeted here from {clip.name}, whose licence it has"
+        return Ingredient("motion", name, clip.licence, note, digest)
+    if "video" in record or _folder_with(reference, LANDMARKS):
+        return Ingredient("motion", name, "own", "made here, from the clip", digest)
+    note = f"no {SOURCE} or {LANDMARKS} is beside it: declare it with --licence motion=LICENCE"
+    return Ingredient("motion", name, UNKNOWN, note, digest)
+
+
+def _record_of(reference: Path) -> Mapping[str, Any]:
+    """Return what `mocap` or `import` recorded of a motion's source; empty where nothing is."""
+    folder = _folder_with(reference, SOURCE)
+    with suppress(StoreError):
+        found = read_json(folder / SOURCE) if folder else {}
+        return found if isinstance(found, dict) else {}
+    return {}
+
+
+def _folder_with(reference: Path, name: str) -> Path | None:
+    """Return the folder of the motion, or the one above, that has a file of that name."""
+    folders = reference.parent, reference.parent.parent
+    return next((folder for folder in folders if (folder / name).is_file()), None)
 
 
 def stated_licence(clip: Path) -> tuple[str, str]:
@@ -76,8 +119,7 @@ def stated_licence(clip: Path) -> tuple[str, str]:
 
 def _body_models(reference: Path) -> list[Ingredient]:
     """Return the networks that recovered the motion, if it is of a video."""
-    folders = reference.parent, reference.parent.parent
-    folder = next((folder for folder in folders if (folder / LANDMARKS).is_file()), None)
+    folder = _folder_with(reference, LANDMARKS)
     if folder is None or not (folder / PERSON).is_file():
         note = "no landmarks and motion of a person are beside it: declare them"
         return [Ingredient("body models", "what recovered the motion", UNKNOWN, note)]
@@ -99,15 +141,6 @@ def _start(start: str) -> list[Ingredient]:
         note = "RoboJackson's walker (assets/PROVENANCE.md)"
         return [Ingredient("weights", "start: walker", "Apache-2.0", note)]
     return [Ingredient("weights", f"start: {Path(start).name}", UNKNOWN, "the training began so")]
-
-
-def _tracker(policy: Policy) -> list[Ingredient]:
-    """Return the general tracker that a training polished."""
-    tracker = policy.facts.get("tracker")
-    if not tracker:
-        return []
-    note = "its motions' licences count, too: declare them"
-    return [Ingredient("tracker", f"tracker {tracker}", UNKNOWN, note)]
 
 
 def _sha256(path: Path) -> str:

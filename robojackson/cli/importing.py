@@ -10,6 +10,8 @@ import numpy as np
 
 from robojackson.api.foreign_files import Up, read_foreign
 from robojackson.cli import cards
+from robojackson.cli.pictures.motion_source import FILE as SOURCE
+from robojackson.cli.pictures.motion_source import import_record
 from robojackson.cli.stages import Overrides
 from robojackson.files.file_tree import results_in
 from robojackson.motion.smpl_sequence import SmplSequence
@@ -28,7 +30,7 @@ def import_motion(
     config: str,
     overrides: Overrides,
 ) -> dict[str, Any]:
-    """Write smpl.parquet from a file of another project.
+    """Write smpl.parquet from a file of another project, and source.json, which names the file.
 
     Raises:
         StoreError: the file cannot be read, or the folder not written.
@@ -42,6 +44,7 @@ def import_motion(
     read = read_foreign(file, fps, up, settings.mocap)
     with results_in(out) as files:
         files.write("smpl.parquet", read.motion.to_bytes())
+        files.write(SOURCE, import_record(file, read.format))
     facts = {"smpl": str(out / "smpl.parquet"), "file": str(file), "format": read.format}
     figures = _figures(read.motion)
     following = cards.command_line("retarget", out / "smpl.parquet", "-o", out)

@@ -49,7 +49,8 @@ def test_the_command_writes_the_pack_and_reports_what_is_unknown(folder: Path) -
 
 def test_an_evaluation_beside_the_policy_brings_its_passport(folder: Path) -> None:
     (folder / "evaluation.json").write_text(json.dumps({"success": 1.0, "passport": cases(0.75)}))
-    inputs = PackInputs(licences={"clip": "own", "body models": "Apache-2.0"})
+    own = {"clip": "own", "motion": "own", "body models": "Apache-2.0"}
+    inputs = PackInputs(licences=own)
     made = export(folder / "policy.safetensors", "deploy", folder / "pack", pack=inputs)
     assert json.loads((folder / "pack" / "passport.json").read_text()) == cases(0.75)
     assert "| gains x 0.8 | 75 | 80 | 0.4 | 30 | - |" in (folder / "pack" / "README.md").read_text()

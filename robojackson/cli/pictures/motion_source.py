@@ -1,4 +1,4 @@
-"""The video that a motion was recovered from: source.json, written by `robojackson mocap`."""
+"""The file that a motion comes from: source.json, written by `robojackson mocap` and `import`."""
 
 import hashlib
 import json
@@ -39,6 +39,20 @@ def source_record(video: Path, landmarks: bytes, motions: Mapping[str, bytes]) -
         "bytes": video.stat().st_size,
         "landmarks": hashlib.sha256(landmarks).hexdigest(),
         "motions": {name: hashlib.sha256(data).hexdigest() for name, data in motions.items()},
+    }
+    return json.dumps(facts, indent=1).encode()
+
+
+def import_record(file: Path, layout: str) -> bytes:
+    """Return the content of source.json of an imported motion.
+
+    Args:
+        layout: Name of the file's format.
+    """
+    facts = {
+        "imported": str(file.absolute()),
+        "format": layout,
+        "sha256": sha256_of_file(file),
     }
     return json.dumps(facts, indent=1).encode()
 

@@ -40,6 +40,12 @@ ALLOWS: Mapping[str, tuple[Answer, Answer, Answer, Answer]] = {
 """Rights that a licence grants, in the order of `RIGHTS`; a licence that is not listed is
 unknown."""
 KINDS = ("clip", "body models", "motion", "weights", "robot model", "tracker", "software")
+RUNNER_NEEDS: Mapping[str, str] = {
+    "mujoco": "Apache-2.0",
+    "numpy": "BSD-3-Clause",
+    "onnxruntime": "MIT",
+}
+"""Packages that run.py imports, with the licences of their projects."""
 WORDS = {
     "yes": "yes",
     "notice": "yes, with its notice",
@@ -109,6 +115,12 @@ def robot_ingredient(description: RobotDescription, sha256: str) -> Ingredient:
     if not colon or not package.isidentifier():
         return Ingredient("robot model", name, UNKNOWN, "a file of the user's own", sha256)
     return Ingredient("robot model", name, _of_package(package), f"bundled with {package}", sha256)
+
+
+def runner_ingredients() -> list[Ingredient]:
+    """Return the packages that run.py needs: installed beside a pack, no part of it."""
+    note = "run.py imports it; installed beside the pack, no part of it; bundles works of others"
+    return [Ingredient("software", name, licence, note) for name, licence in RUNNER_NEEDS.items()]
 
 
 def licence_texts(description: RobotDescription) -> dict[str, bytes]:

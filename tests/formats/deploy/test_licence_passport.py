@@ -1,16 +1,26 @@
 """The licence passport: the strictest licence counts, and what no one recorded is unknown."""
 
+import ast
+import hashlib
 import json
+import sys
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from robojackson.api.policy_ingredients import clip_ingredient, policy_ingredients
+from robojackson.api.policy_ingredients import (
+    clip_ingredient,
+    motion_ingredient,
+    policy_ingredients,
+)
+from robojackson.cli.exporting import export
+from robojackson.cli.importing import import_motion
 from robojackson.errors import BadConfiguration
 from robojackson.formats.deploy.licence_passport import (
     KINDS,
     RIGHTS,
+    RUNNER_NEEDS,
     Ingredient,
     robot_ingredient,
     together,
@@ -18,6 +28,7 @@ from robojackson.formats.deploy.licence_passport import (
 )
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.rl.policy import Policy
+from tests.fixtures.person import person
 from tests.fixtures.robots import description, human
 from tests.formats.deploy.conftest import Pack
 
@@ -74,6 +85,12 @@ def test_the_pack_names_the_clip_as_unknown_and_brings_the_robots_licence(pack: 
     assert table.count("\n| ") == len(found["inputs"]) + 2
 
 
+def person_file(folder: Path) -> Path:
+    path = folder / "smpl.parquet"
+    path.write_bytes(person(legs=0.1, speed=0.0).to_bytes())
+    return path
+
+
 def ingredients(pack: Pack, folder: Path, **facts: object) -> dict[str, str]:
     file = folder / "reference.parquet"
     if not file.exists():
@@ -94,21 +111,56 @@ def test_the_weights_that_a_training_began_with_are_listed(
     assert not any(one.startswith("start") for one in ingredients(pack, tmp_path, start="scratch"))
 
 
-def test_a_tracker_that_was_polished_is_listed_as_unknown(pack: Pack, tmp_path: Path) -> None:
-    assert ingredients(pack, tmp_path, tracker="twist2")["tracker twist2"] == "unknown"
+def test_what_the_runner_imports_is_listed_and_nothing_else(pack: Pack) -> None:
+    tree = ast.parse((pack.folder / "run.py").read_text())
+    names = {n.name for each in ast.walk(tree) if isinstance(each, ast.Import) for n in each.names}
+    names |= {each.module for each in ast.walk(tree) if isinstance(each, ast.ImportFrom)}
+    packages = {name.split(".")[0] for name in names if name} - sys.stdlib_module_names
+    assert packages == set(RUNNER_NEEDS)
+    found = json.loads((pack.folder / "licences.json").read_text())["inputs"]
+    software = {one["name"]: one["licence"] for one in found if one["kind"] == "software"}
+    assert {name: software[name] for name in packages} == dict(RUNNER_NEEDS)
+    assert "unknown" not in RUNNER_NEEDS.values()
+
+
+@pytest.mark.parametrize("licence", ["", "CC-BY-NC-4.0"])
+def test_an_imported_motion_has_the_licence_of_its_file(tmp_path: Path, licence: str) -> None:
+    file = tmp_path / "theirs.bvh"
+    export(person_file(tmp_path), "bvh", file)
+    if licence:
+        file.with_name("theirs.bvh.license").write_text(f"SPDX-License-Identifier: {licence}")
+    import_motion(file, tmp_path / "in", None, None, "base", {})
+    reference = tmp_path / "in" / "reference.parquet"
+    clip, motion = clip_ingredient(reference), motion_ingredient(reference, "0")
+    assert (clip.name, clip.licence) == ("theirs.bvh", licence or "unknown")
+    assert clip.sha256 == hashlib.sha256(file.read_bytes()).hexdigest()
+    assert "imported, bvh" in clip.note
+    assert motion.licence == clip.licence
+    assert "theirs.bvh" in motion.note
+
+
+def test_a_motion_is_our_own_where_a_video_is_recorded_and_unknown_where_nothing_is(
+    tmp_path: Path,
+) -> None:
+    reference = tmp_path / "run" / "reference.parquet"
+    assert motion_ingredient(reference, "0").licence == "unknown"
+    (tmp_path / "source.json").write_text("[1]")
+    assert motion_ingredient(reference, "0").licence == "unknown"
+    (tmp_path / "source.json").write_text(json.dumps({"video": "dance.mp4"}))
+    assert motion_ingredient(reference, "0").licence == "own"
 
 
 def test_networks_of_a_users_own_that_recovered_the_motion_are_unknown(
     pack: Pack, tmp_path: Path
 ) -> None:
     (tmp_path / "landmarks.parquet").touch()
-    person: SmplSequence = human("hip_shake")
-    person.save(tmp_path / "smpl.parquet")
+    found_person: SmplSequence = human("hip_shake")
+    found_person.save(tmp_path / "smpl.parquet")
     found = ingredients(pack, tmp_path)
     assert found["MediaPipe's pose landmarker"] == "Apache-2.0"
     assert found["temporal network and skeleton of RoboJackson"] == "Apache-2.0"
     note = "pose by the network HybrIK (theirs.pth)"
-    replace(person, notes=(note,)).save(tmp_path / "smpl.parquet")
+    replace(found_person, notes=(note,)).save(tmp_path / "smpl.parquet")
     assert ingredients(pack, tmp_path)[note] == "unknown"
 
 
