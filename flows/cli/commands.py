@@ -48,8 +48,9 @@ class Shape(StrEnum):
     WIDE = "wide"
 
 
-INSTANT_MINUTES = 1.0
-"""About what an instant dance takes, for its bar."""
+INSTANT_MINUTES, SEARCH_MINUTES = 1.0, 3.5
+"""About what an instant dance takes until its page, for its bar: with a network, and the search of
+`regulator` besides (24 to 371 CPU-seconds, 201 in the mean of thirteen motions: trackers.md)."""
 INSTANT = "--instant"
 BEATS = ("beats", "precision", "recall", "f1", "bas")
 """How a dance meets its music."""
@@ -135,10 +136,20 @@ def _danced(
         quiet_prefect()
         from flows.dance import run
 
-        minutes = INSTANT_MINUTES if settings.instant else settings.minutes
+        minutes = instant_minutes(settings) if settings.instant else settings.minutes
         with dance_bar(minutes, Store.from_environment().here):
             made = run(str(source), config, overrides, start, end)
     return made
+
+
+def instant_minutes(settings: "PipelineConfig") -> float:
+    """Return about how long an instant dance takes with its tracker, minutes."""
+    from robojackson.pipeline.robot_descriptions import describe_robot
+    from robojackson.pipeline.tracker_descriptions import require_tracker
+
+    tracker = require_tracker(describe_robot(settings.robot).name, settings.tracker)
+    searches = tracker is not None and tracker.network == "regulator"
+    return INSTANT_MINUTES + (SEARCH_MINUTES if searches else 0.0)
 
 
 def _concluded(made: dict[str, Any], minutes: float, seconds: float) -> CommandResult:

@@ -1,6 +1,7 @@
 """Performances: several dances in a row by one robot, with a tracker that follows them."""
 
 import json
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -29,7 +30,13 @@ from robojackson.rl.trackers.tracker import Tracker
 from robojackson.robot.model import Robot
 
 Dance = FilePath | SmplSequence | ReferenceMotion
+SEARCHES = (
+    "%s computes gains for all %.0f s of the programme first: minutes of a processor, and it may "
+    "find no path for so long a motion; a network needs no search (robojackson trackers lists them)"
+)
 PROGRAMME, ROLLOUT, RESULT = "programme.parquet", "rollout.parquet", "performance.json"
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, repr=False)
@@ -111,6 +118,8 @@ def perform(
     motions = [_motion(dance, i, machine, solving) for i, dance in enumerate(dances)]
     planned = plan(motions, machine, programme or ProgrammeConfig(), solving)
     how = config or PerformanceConfig()
+    if who.description.network == "regulator":
+        log.warning(SEARCHES, who.description.name, len(planned.motion) * planned.motion.dt)
     with counter(progress, "performance") as count:
         done = performance.perform(who, planned, machine, how, count or (lambda step, total: None))
     runs = done.runs(how.seed)
