@@ -3,6 +3,7 @@
 import logging
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -27,9 +28,11 @@ def lines_before(
     def begin(*given: object) -> None:
         raise Begun
 
+    motion = robot_motion("hip_shake")
+    monkeypatch.setattr(performances, "plan", lambda *given: SimpleNamespace(motion=motion))
     monkeypatch.setattr(performances.performance, "perform", begin)
     with caplog.at_level(logging.WARNING), pytest.raises(Begun):
-        performances.perform([robot_motion("hip_shake")], "humanoid", tracker=tracker)
+        performances.perform([motion], "humanoid", tracker=tracker)
     return caplog.messages
 
 
