@@ -73,7 +73,7 @@ bench-pages: setup
 	@$(PY) -m benchmarks.report.page_speed $(ARGS)
 
 bench-league: setup
-	@$(PY) -m benchmarks.learning.tracker_rows
+	@$(PY) -m benchmarks.learning.tracker_rows --friction 1
 	@$(PY) -m benchmarks.learning.performance_rows
 	@$(PY) -m benchmarks.learning.league $(ARGS)
 

@@ -1,26 +1,40 @@
 """The league: who dances the G1's references how well, by one judge on one robot.
 
-    python -m benchmarks.learning.league [--holosoma FOLDER] [--rows N]
+    python -m benchmarks.learning.league [--holosoma FOLDER] [--folder F]
 
-`make bench-league`. Resumable: a row that is there stays. Rows of our trainings and of trackers are
-read from their own tables (`benchmarks.learning.policies`, `tracker_rows`); holosoma's policies are
-run here, on ten seconds of their own motion, where FOLDER holds the unpacked wheel
-(`pip download --no-deps holosoma-inference==0.1.3`). A row that cannot be had says why.
+`make bench-league`. Rows of our trainings and of trackers are read from their own tables
+(`league_rows`); holosoma's policies are run here, on ten seconds of their own motion, where FOLDER
+holds the unpacked wheel (`pip download --no-deps holosoma-inference==0.1.3`); a row of theirs that
+is there stays. A row that cannot be had gives its reason.
 """
 
 import argparse
 import json
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
 from benchmarks.learning.error_line import errors_in_one_line
-from benchmarks.learning.policies import MOVES as POLICIES
+from benchmarks.learning.league_rows import (
+    COLUMNS,
+    FIGURES,
+    INSTANT,
+    OF_MOTION,
+    OF_OTHERS,
+    ONBOARD,
+    POLISHED,
+    REPLAY,
+    SCRATCH,
+    TRAINED,
+    TWIST2,
+    Row,
+    kept_rows,
+    row,
+)
 from benchmarks.learning.policies import Folders
-from benchmarks.learning.tracker_rows import present
+from benchmarks.learning.tracker_rows import FEET, present
 from robojackson.api.robots import load_robot
 from robojackson.errors import MissingDependency
 from robojackson.files.json_types import to_json_types
@@ -28,31 +42,42 @@ from robojackson.rl.config.evaluate_config import EvaluateConfig
 from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
 from robojackson.rl.trackers.tracker import Tracker
 
-MOVES = (
-    *("g1_hip_shake", "g1_walk", "g1_dance_b", "g1_dance_a", "g1_authors_apt1", "g1_authors_walk"),
-    *("g1_cmu_05_02", "g1_cmu_05_09", "g1_cmu_05_18"),
-)
 OWN_MOTION = "holosoma_dance"
 FIRST, STEPS = {"fastsac": 2100, "ppo": 2000}, 500
 """Of the motion inside their files: the same ten seconds."""
 MODELS = "holosoma_inference/models/wbt"
 EVALUATION = EvaluateConfig(resets=1)
-FIGURES = ("success", "strict_success", "skill", "mpjpe_l_m", "mpjpe_g_alive_m", "velocity_score",
-           "acceleration_ratio")  # fmt: skip
-FEET = ("excess_speed_left_foot", "excess_speed_right_foot")
-COLUMNS = (*FIGURES, "feet_excess_m_s", "cpu_s", "data", "in_training", "why")
-INSTANT, TRAINED = "ours, instant (regulator)", "ours, regulator polished by training (seed 100)"
-SCRATCH, POLISHED, REPLAY = "ours, from scratch", "ours, twist2 polished", "reference replayed"
+NOT_OURS = "we trained nothing on holosoma's motion, which comes with its wheel alone"
 MISSING = {
-    SCRATCH: "no rows kept of trainings without feedback; figures of them: docs/learning.md",
-    POLISHED: "tried on cmu_05_11, worse than the tracker (docs/learning_g1.md)",
-    REPLAY: "kept rows replay it with feedback, which is the regulator",
+    INSTANT: "gains not computed for this motion",
+    TRAINED: NOT_OURS,
+    SCRATCH: NOT_OURS,
+    ONBOARD: NOT_OURS,
+    POLISHED: NOT_OURS,
 }
-Row = dict[str, Any]
+"""Why rows of holosoma's motion cannot be had."""
+TEXT = """# The league
+
+`make bench-league`; [what it is](../../docs/trackers.md#the-league). Friction 1, tempo of the
+reference; figures are means over all starts, those of trainings over all seeds, too.
+
+- **starts**: trackers 24 phases and the stand (25); policies of a training each phase three times,
+  with three noises (73).
+- **cpu_s** of a training is its nominal budget, without the search for a sampled path, which is
+  minutes (`regulator`'s row); of a tracker it is the whole evaluation, gains, search and baselines
+  included.
+- **`regulator`** is no pretrained network: its gains and its path are computed for the judged
+  motion itself, with the robot's model, for up to minutes, and it sees the full state, also the
+  place and velocity that no real robot measures. So its motion is `seen`.
+- **reference replayed**: its angles as targets, led by its torques, with the robot's own gains and
+  without feedback (on holosoma's motion: with the gains of its PPO policy).
+- Trained rows of the authors' walk and of CMU 05_18 are on references of 25 November, before they
+  swayed; that of 05_18 is at .93 of its tempo. All other rows of these motions are on today's.
+"""
 
 
 def main() -> None:
-    """Add the rows that are missing, and write both tables."""
+    """Compose the rows of our references, add holosoma's that are missing, and write both files."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -61,104 +86,49 @@ def main() -> None:
     given = parser.parse_args()
     folders = Folders.at(given.folder)
     path = folders.results / "league.json"
-    held = json.loads(path.read_text())["rows"] if path.is_file() else []
-    rows = {(row["who"], row["motion"]): row for row in held if not row["why"]}
-    for row in every_row(folders, given.holosoma, lambda key: key in rows):
-        key = (row["who"], row["motion"])
-        if key not in rows or rows[key]["why"] or not row["why"]:
-            rows[key] = row
-        save(list(rows.values()), path)
+    save([*kept_rows(folders), *on_holosomas(held_in(path), given.holosoma)], path)
     print(path.with_suffix(".md").read_text())
 
 
-def every_row(
-    folders: Folders, wheel: Path | None, known: Callable[[tuple[str, str]], bool]
-) -> Iterator[Row]:
-    """Yield all rows; those that are known and dear to compute are left out."""
-    for move in MOVES:
-        yield from trained(folders, move)
-        yield from tracked(folders, move)
-        for who, why in MISSING.items():
-            yield row(who, move, why=why)
-    for kind in FIRST:
-        who = f"holosoma {kind}"
-        if not known((who, OWN_MOTION)):
-            yield from on_their_own(kind, who, wheel)
-    for who in ("twist2", REPLAY):
-        if not known((who, OWN_MOTION)):
-            yield from others_on_theirs(who, wheel)
-    yield row(INSTANT, OWN_MOTION, why="gains not computed for this motion")
+def held_in(path: Path) -> dict[str, Row]:
+    """Return the measured rows of holosoma's motion by dancer."""
+    rows = json.loads(path.read_text())["rows"] if path.is_file() else []
+    return {one["who"]: one for one in rows if one["motion"] == OWN_MOTION and not one["why"]}
 
 
-def row(who: str, motion: str, figures: Row | None = None, **known: Any) -> Row:
-    """Return one line of the league."""
-    found = {"who": who, "motion": motion, **dict.fromkeys(COLUMNS), "why": ""}
-    return {**found, **(figures or {}), **known}
+def on_holosomas(held: Mapping[str, Row], wheel: Path | None) -> Iterator[Row]:
+    """Yield every row of holosoma's motion; what is held is not measured again."""
+    measurements: dict[str, Callable[[], Row]] = {
+        **{f"holosoma {kind}": partial(on_its_own, kind, wheel) for kind in FIRST},
+        **{who: partial(other_on_theirs, who, wheel) for who in (TWIST2, REPLAY)},
+    }
+    for who, measure in measurements.items():
+        yield held[who] if who in held else measure()
+    for who, why in MISSING.items():
+        yield row(who, OWN_MOTION, why=why)
 
 
-def trained(folders: Folders, move: str) -> Iterator[Row]:
-    """Yield what our training of a move has left."""
-    path = folders.row(move, 100, 10.0)
-    if not path.is_file():
-        yield row(TRAINED, move, why="no row of seed 100: make bench-learning")
-        return
-    table = pd.read_parquet(path)
-    rows = table[table["policy"] == "trained"]
-    figures = {name: float(rows[name].mean()) for name in FIGURES}
-    feet = float(rows[list(FEET)].to_numpy().mean())
-    spent = 60.0 * POLICIES[move].cpu_minutes
-    known = {"data": "the clip", "in_training": "seen"}
-    yield row(TRAINED, move, figures, feet_excess_m_s=feet, cpu_s=spent, **known)
-
-
-NOTHING = {"data": "none", "in_training": "unseen"}
-TWIST2 = {"data": "AMASS and others, on GPUs", "in_training": "unseen"}
-"""Our references were made here, from videos that no training of theirs has seen; CMU's motions are
-a part of AMASS (`of_amass`)."""
-
-
-def tracked(folders: Folders, move: str) -> Iterator[Row]:
-    """Yield the rows of trackers at friction 1."""
-    path = folders.results / "trackers.json"
-    table = json.loads(path.read_text())["rows"] if path.is_file() else []
-    for who, name, known in ((INSTANT, "regulator", NOTHING), ("twist2", "twist2", TWIST2)):
-        found = [r for r in table if (r["tracker"], r["move"], r["friction"]) == (name, move, 1.0)]
-        if found:
-            figures = {figure: found[-1].get(figure) for figure in FIGURES}
-            seen = {"in_training": "likely"} if name == "twist2" and of_amass(move) else {}
-            yield row(who, move, figures, cpu_s=found[-1]["cpu_s"], **known | seen)
-        else:
-            yield row(who, move, why="python -m benchmarks.learning.tracker_rows")
-
-
-def of_amass(move: str) -> bool:
-    """Return whether a motion is probably among those of AMASS."""
-    return POLICIES[move].cmu
-
-
-def on_their_own(kind: str, who: str, wheel: Path | None) -> Iterator[Row]:
-    """Yield one of holosoma's policies on its own motion."""
-    policy = peer(kind, wheel)
+def on_its_own(kind: str, wheel: Path | None) -> Row:
+    """Return the row of one of holosoma's policies on its own motion."""
+    who, policy = f"holosoma {kind}", peer(kind, wheel)
     if policy is None:
-        yield row(who, OWN_MOTION, why="holosoma-inference is not here: --holosoma FOLDER")
-        return
+        return row(who, OWN_MOTION, why="holosoma-inference is not here: --holosoma FOLDER")
     known = {"data": "its motion, on a GPU", "in_training": "seen"}
-    yield row(who, OWN_MOTION, judged(policy, policy, kind)[0], **known)
+    return row(who, OWN_MOTION, evaluated(policy, policy, kind)[0], **known)
 
 
-def others_on_theirs(who: str, wheel: Path | None) -> Iterator[Row]:
-    """Yield TWIST2, or the replay, on holosoma's motion."""
+def other_on_theirs(who: str, wheel: Path | None) -> Row:
+    """Return the row of TWIST2, or of the replay, on holosoma's motion."""
     policy = peer("ppo", wheel)
     try:
         tracker = policy if who == REPLAY else present(who)
     except MissingDependency:
         tracker = None
     if policy is None or tracker is None:
-        yield row(who, OWN_MOTION, why="holosoma-inference or the tracker is not here")
-        return
-    mine, replayed = judged(tracker, policy, "ppo")
-    known = NOTHING if who == REPLAY else {**TWIST2, "in_training": "likely"}
-    yield row(who, OWN_MOTION, replayed if who == REPLAY else mine, **known)
+        return row(who, OWN_MOTION, why="holosoma-inference or the tracker is not here")
+    mine, replayed = evaluated(tracker, policy, "ppo")
+    known = OF_MOTION if who == REPLAY else {**OF_OTHERS, "in_training": "likely"}
+    return row(who, OWN_MOTION, replayed if who == REPLAY else mine, **known)
 
 
 def peer(kind: str, wheel: Path | None) -> Any:
@@ -171,7 +141,7 @@ def peer(kind: str, wheel: Path | None) -> Any:
     return HolosomaPolicy(kind, path)
 
 
-def judged(tracker: Tracker, owner: Any, kind: str) -> tuple[Row, Row]:
+def evaluated(tracker: Tracker, owner: Any, kind: str) -> tuple[Row, Row]:
     """Return the figures of a tracker on holosoma's motion, and of the replay with its gains."""
     robot = load_robot("g1")
     motion = owner.reference(robot, FIRST[kind], STEPS)
@@ -179,24 +149,30 @@ def judged(tracker: Tracker, owner: Any, kind: str) -> tuple[Row, Row]:
     found = evaluate_policy(tracker, motion, robot, EVALUATION)
     spent = time.process_time() - began
     replay = found.summary["baselines"]["zero_residual"]  # type: ignore[index]
-    return _row(found.summary, spent), _row(replay, spent)
+    return _figures(found.summary, spent), _figures(replay, spent)
 
 
-def _row(figures: Mapping[str, Any], spent: float) -> Row:
+def _figures(summary: Mapping[str, Any], spent: float) -> Row:
     """Return the figures of the league, and the processor time that they took."""
-    feet = sum(float(figures[name]) for name in FEET) / 2
-    return {**{name: figures[name] for name in FIGURES}, "cpu_s": spent, "feet_excess_m_s": feet}
+    feet = sum(float(summary[name]) for name in FEET) / 2
+    facts = {"cpu_s": spent, "feet_excess_m_s": feet, "starts": int(summary["rollouts"])}
+    return {**{name: summary[name] for name in FIGURES}, **facts}
 
 
-def save(rows: list[Row], path: Path) -> None:
+def save(rows: Sequence[Row], path: Path) -> None:
     """Write league.json and league.md."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(to_json_types({"rows": rows}), indent=1) + "\n")
+    path.with_suffix(".md").write_text(f"{TEXT}\n{table(rows)}\n")
+
+
+def table(rows: Sequence[Row]) -> str:
+    """Return the rows as a table in Markdown."""
     lines = [f"| {' | '.join(('motion', 'who', *COLUMNS))} |", "|---" * (len(COLUMNS) + 2) + "|"]
     for one in sorted(rows, key=lambda r: (r["motion"], r["who"])):
         cells = [one["motion"], one["who"], *(shown(one[name]) for name in COLUMNS)]
         lines.append(f"| {' | '.join(cells)} |")
-    path.with_suffix(".md").write_text("\n".join(lines) + "\n")
+    return "\n".join(lines)
 
 
 def shown(value: Any) -> str:

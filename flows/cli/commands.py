@@ -50,7 +50,7 @@ class Shape(StrEnum):
 
 INSTANT_MINUTES, SEARCH_MINUTES = 1.0, 3.5
 """About what an instant dance takes until its page, for its bar: with a network, and the search of
-`regulator` besides (24 to 371 CPU-seconds, 201 in the mean of thirteen motions: trackers.md)."""
+`regulator` besides (24 to 371 CPU-seconds on quiet cores, mean of thirteen motions 201)."""
 INSTANT = "--instant"
 BEATS = ("beats", "precision", "recall", "f1", "bas")
 """How a dance meets its music."""
