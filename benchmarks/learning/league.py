@@ -66,7 +66,7 @@ reference; figures are means over all starts, those of trainings over all seeds,
 - **cpu_s** of a training is its nominal budget, without the search for a sampled path, which is
   minutes (`regulator`'s row); of a tracker it is the whole evaluation, gains, search and baselines
   included.
-- **`regulator`** is no pretrained network: its gains and its path are computed for the judged
+- **`regulator`** is no pretrained network: its gains and its path are computed for the evaluated
   motion itself, with the robot's model, for up to minutes, and it sees the full state, also the
   place and velocity that no real robot measures. So its motion is `seen`.
 - **reference replayed**: its angles as targets, led by its torques, with the robot's own gains and
