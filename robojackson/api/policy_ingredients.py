@@ -5,7 +5,6 @@ import re
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 from robojackson.errors import StoreError
 from robojackson.files.foreign_file import read_json, read_text
@@ -85,7 +84,7 @@ def motion_ingredient(reference: Path, digest: str) -> Ingredient:
     return Ingredient("motion", name, UNKNOWN, note, digest)
 
 
-def _record_of(reference: Path) -> Mapping[str, Any]:
+def _record_of(reference: Path) -> Mapping[str, object]:
     """Return what `mocap` or `import` recorded of a motion's source; empty where nothing is."""
     folder = _folder_with(reference, SOURCE)
     with suppress(StoreError):
