@@ -26,7 +26,7 @@ from robojackson.body.skeleton import keypoint
 from robojackson.body.smoothing import lowpass
 from robojackson.clips.quality.visibility import weigh_visibility
 from robojackson.metrics.pose_error import procrustes
-from robojackson.mocap.grounding.up_direction import shows_up
+from robojackson.mocap.grounding.up_direction import known_up
 from robojackson.mocap.landmarks.blazepose import BODY, LANDMARK_NAMES, fill_gaps, landmark, repair
 from robojackson.mocap.landmarks.bone_lengths import fit_skeleton
 from robojackson.mocap.landmarks.pinhole_camera import place
@@ -52,8 +52,7 @@ def stages(track: LandmarkTrack, config: MocapConfig) -> tuple[Stages, Float[np.
     view = view_track(track, config)
     placed = place(marks, view.pinhole, track.fps, config.depth_cutoff_hz)
     found["before the camera"] = placed[:, MARKS]
-    scene = view.scene
-    known = scene.up if scene is not None and shows_up(scene, config.gravity) else None
+    known = known_up(view.scene, config.gravity)
     lifted = lift(placed, marks.local, marks.visibility, track.fps, config.temporal, known)
     found["network"] = lifted.points[:, MARKS]
     depth_m = lifted.depth_sd(config.temporal.depth_floor_m)

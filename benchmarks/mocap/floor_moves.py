@@ -24,8 +24,8 @@ from rich.table import Table
 from safetensors.numpy import load_file, save_file
 
 from benchmarks.mocap import figures, fresh
-from benchmarks.mocap.truth import JOINTS, Truth
-from robojackson.body.skeleton import keypoint
+from benchmarks.mocap.steadiness import joints
+from benchmarks.mocap.truth import Truth
 from robojackson.clips.people.reverse_pass import ReversePassConfig
 from robojackson.errors import NoPersonFound
 from robojackson.mocap.recover import MocapConfig, recover_motion
@@ -74,13 +74,12 @@ def measure(path: Path, first: Path) -> dict[str, float]:
         ("first network", track, alone),
         ("ours", track, ours),
     ):
-        joints = recover_motion(seen, config).joints[:, [keypoint(joint) for joint in JOINTS]]
-        found[name] = _error(joints, truth, track.fps)
+        found[name] = _error(joints(recover_motion(seen, config)), truth, track.fps)
     return found
 
 
-def _error(joints: np.ndarray, truth: Truth, fps: float) -> float:
-    return figures.joint_errors(joints, truth, fps)["pa_mpjpe_mm"]
+def _error(points: np.ndarray, truth: Truth, fps: float) -> float:
+    return figures.joint_errors(points, truth, fps)["pa_mpjpe_mm"]
 
 
 def main() -> None:

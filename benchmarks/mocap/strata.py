@@ -22,9 +22,9 @@ from rich.table import Table
 from benchmarks.mocap import fresh
 from benchmarks.mocap.breakdown import GROUP_OF, GROUPS, MARKS, errors
 from benchmarks.mocap.camera_pairs import detected
+from benchmarks.mocap.steadiness import joints
 from benchmarks.mocap.truth import HELD_OUT, JOINTS, REAL, Truth, load_truth, video_path
 from robojackson.body.forward_kinematics import unit
-from robojackson.body.skeleton import keypoint
 from robojackson.clips.people.person_extent import heights_px
 from robojackson.clips.pose_detector import detect
 from robojackson.clips.video import VideoLimits, probe
@@ -48,8 +48,7 @@ Columns = dict[str, np.ndarray]
 
 def columns(track: LandmarkTrack, truth: Truth, raw: Float[np.ndarray, "T 12 3"]) -> Columns:
     """Return errors and strata of every joint of every frame, each of shape (T, 12)."""
-    sequence = recover_motion(track, MocapConfig())
-    ours = sequence.joints[:, [keypoint(name) for name in JOINTS]]
+    ours = joints(recover_motion(track, MocapConfig()))
     count = min(len(ours), len(raw), len(truth.joints))
     goal = truth.joints[:count]
     before_camera = procrustes(goal, raw[:count])(goal)

@@ -122,7 +122,7 @@ def view_track(track: LandmarkTrack, config: MocapConfig) -> View:
     scene = scene_of(track, view.ground, config)
     if scene is None:
         return view
-    known = scene.up if up.shows_up(scene, config.gravity) else None
+    known = up.known_up(scene, config.gravity)
     focal_px = focal_of(track, scene, config)
     if known is not None or focal_px != view.pinhole.focal_px:
         view = _placed(track, landmarks, focal_px, config, known)

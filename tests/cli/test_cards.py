@@ -48,11 +48,11 @@ MOTION = {
 
 
 def test_a_motion_says_how_sure_it_is_of_gravity() -> None:
-    told = "\n".join(cards.mocap_lines(MOTION))
-    assert "from the body alone, not sure: within 6 degrees; the camera is tilted by 12" in told
+    text = "\n".join(cards.mocap_lines(MOTION))
+    assert "from the body alone, not sure: within 6 degrees; the camera is tilted by 12" in text
     known = MOTION["floor"] | {"gravity": "scene", "gravity_sd_deg": 1.4, "gravity_sure": True}  # type: ignore[operator]
-    told = "\n".join(cards.mocap_lines(MOTION | {"floor": known}))
-    assert "from straight edges of the room, sure: within 1 degrees" in told
+    text = "\n".join(cards.mocap_lines(MOTION | {"floor": known}))
+    assert "from straight edges of the room, sure: within 1 degrees" in text
 
 
 def test_weak_stretches_are_advised_against_until_they_are_left_out() -> None:
@@ -62,12 +62,12 @@ def test_weak_stretches_are_advised_against_until_they_are_left_out() -> None:
         "filled_s": [(2.0, 2.5)],
         "left_out": False,
     }
-    told = "\n".join(cards.mocap_lines(MOTION | {"reprojection": found}))
-    assert "weak      1.0-1.5 s (leave them out: --set mocap.leave_out_weak=true)" in told
-    assert "filled in 2.0-2.5 s" in told
-    told = "\n".join(cards.mocap_lines(MOTION | {"reprojection": found | {"left_out": True}}))
-    assert "weak      1.0-1.5 s" in told
-    assert "--set" not in told
+    text = "\n".join(cards.mocap_lines(MOTION | {"reprojection": found}))
+    assert "weak      1.0-1.5 s (leave them out: --set mocap.leave_out_weak=true)" in text
+    assert "filled in 2.0-2.5 s" in text
+    text = "\n".join(cards.mocap_lines(MOTION | {"reprojection": found | {"left_out": True}}))
+    assert "weak      1.0-1.5 s" in text
+    assert "--set" not in text
 
 
 @pytest.mark.parametrize(

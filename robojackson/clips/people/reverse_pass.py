@@ -73,8 +73,7 @@ def track_in_reverse(
         config: When and how to look.
         progress: Called with (frames done, frames in all).
     """
-    doubtful = suspect(rows, size, config)
-    if not config.enabled or not doubtful.any():
+    if not config.enabled or not (doubtful := suspect(rows, size, config)).any():
         return rows, 0
     reach = min(round(config.reach_s * fps), LONGEST)
     near = binary_dilation(doubtful, iterations=reach) if reach else doubtful
@@ -210,7 +209,7 @@ def _second_pass(
     """Yield each part with what the detector finds in it in reverse order."""
     frames = enumerate(images)
     held: dict[int, UInt8[np.ndarray, "H W 3"]] = {}
-    nobody = np.full((33, 7), np.nan)
+    absent = np.full((33, 7), np.nan)
     for part, begin in chosen:
         held = {index: image for index, image in held.items() if index >= part.start}
         if max(held, default=-1) < begin - 1:
@@ -224,4 +223,4 @@ def _second_pass(
                 index: detect_frame(held[index], place / fps)
                 for place, index in enumerate(sorted(held, reverse=True))
             }
-        yield part, np.array([found.get(i, nobody) for i in range(part.start, part.stop)])
+        yield part, np.array([found.get(i, absent) for i in range(part.start, part.stop)])

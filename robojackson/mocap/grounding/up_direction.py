@@ -141,6 +141,11 @@ def shows_up(scene: SceneEvidence, config: GravityConfig) -> bool:
     return bool(scene.sd <= np.radians(config.scene_sure_sd_deg))
 
 
+def known_up(scene: SceneEvidence | None, config: GravityConfig) -> Float[np.ndarray, "3"] | None:
+    """Return up where a scene shows it closely enough to be declared sure; None otherwise."""
+    return scene.up if scene is not None and shows_up(scene, config) else None
+
+
 def spread_deg(apart_deg: float, network: GroundEvidence, config: GravityConfig) -> float:
     """Return the standard deviation of up, degrees: that of both estimates together, and half of
     the angle between them, which shows their errors best.
