@@ -67,6 +67,7 @@ HIPS = [landmark("left_hip"), landmark("right_hip")]
 SHOULDERS = [landmark("left_shoulder"), landmark("right_shoulder")]
 NOSE, EARS = landmark("nose"), [landmark("left_ear"), landmark("right_ear")]
 NECK_DOWN = np.arange(landmark("left_shoulder"), len(LANDMARK_NAMES))
+FACE = np.arange(landmark("left_shoulder"))
 
 
 @dataclass(frozen=True)
@@ -153,10 +154,33 @@ def unswap(landmarks: Landmarks, fps: float) -> Landmarks:
     return replace(
         landmarks,
         image=np.where(swap[:, None, None], landmarks.image[:, MIRROR], landmarks.image),
-        local=np.where(swap[:, None, None], landmarks.local[:, MIRROR], landmarks.local),
+        local=exchanged(landmarks.local, swap),
         visibility=np.where(swap[:, None], landmarks.visibility[:, MIRROR], landmarks.visibility),
         swapped=int(swap.sum()),
     )
+
+
+def exchanged(
+    local: Float[np.ndarray, "T 33 3"], swap: Bool[np.ndarray, " T"]
+) -> Float[np.ndarray, "T 33 3"]:
+    """Return local landmarks with left and right exchanged in some frames, and the face turned.
+
+    Who is taken for a person seen from the other side has the face on that side. The image says
+    nothing of it: the face with its depth reversed about the ears looks the same (Necker, 1832).
+    It is reversed where it looks to the back of the trunk.
+    """
+    sides = np.array(local[:, MIRROR])
+    turned = 2.0 * sides[:, EARS, 2].mean(1, keepdims=True) - sides[:, FACE, 2]
+    backward = _trunk_depth(sides) * (sides[:, NOSE, 2] - sides[:, EARS, 2].mean(1)) < 0.0
+    sides[:, FACE, 2] = np.where(backward[:, None], turned, sides[:, FACE, 2])
+    return np.where(swap[:, None, None], sides, local)
+
+
+def _trunk_depth(local: Float[np.ndarray, "T 33 3"]) -> Float[np.ndarray, " T"]:
+    """Return the share of the trunk's forward direction that points away from the camera."""
+    across = sum(local[:, left] - local[:, right] for left, right in (SHOULDERS, HIPS))
+    up = local[:, SHOULDERS].mean(1) - local[:, HIPS].mean(1)
+    return np.asarray(unit(np.cross(across, up))[:, 2])
 
 
 def swapped_frames(landmarks: Landmarks, fps: float) -> np.ndarray:

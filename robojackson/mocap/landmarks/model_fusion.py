@@ -15,6 +15,7 @@ from robojackson.body.forward_kinematics import swing
 from robojackson.mocap.landmarks.blazepose import (
     MIRROR,
     SHOULDERS,
+    exchanged,
     landmark,
     swapped_frames,
     track_landmarks,
@@ -57,7 +58,7 @@ def _unswapped(track: LandmarkTrack) -> LandmarkTrack:
     return replace(
         track,
         landmarks=track.landmarks[frames, pick],
-        world_landmarks=track.world_landmarks[frames, pick],
+        world_landmarks=exchanged(track.world_landmarks, swap),
         visibility=track.visibility[frames, pick],
     )
 

@@ -7,6 +7,8 @@ import pytest
 
 from robojackson.errors import NoPersonFound, TrackTooShort, UnknownName
 from robojackson.mocap.landmarks.blazepose import (
+    EARS,
+    FACE,
     HIPS,
     LANDMARK_NAMES,
     MIRROR,
@@ -150,3 +152,17 @@ def test_a_face_towards_the_camera_outweighs_a_majority_from_behind(
     world[frames, : landmark("left_shoulder"), 2] *= -1.0
     lm = track_landmarks(replace(track, world_landmarks=world))
     assert np.flatnonzero(swapped_frames(lm, track.fps)).tolist() == frames
+
+
+def test_a_face_taken_for_one_seen_from_the_other_side_is_turned(hip_shake: LandmarkTrack) -> None:
+    """Front and back of a person look alike in outline: the detector has both the sides and the
+    depth of the face reversed. The repair gives both back, and moves nothing else."""
+    frames = [20, 21, 40]
+    track = swapped(hip_shake, frames)
+    world = np.array(track.world_landmarks)
+    ears = world[frames][:, EARS, 2].mean(1, keepdims=True)
+    world[np.ix_(frames, FACE, [2])] = (2.0 * ears - world[frames][:, FACE, 2])[..., None]
+    found = repair(replace(track, world_landmarks=world))
+    assert found.swapped == len(frames)
+    np.testing.assert_allclose(found.local, repair(hip_shake).local, atol=1e-9)
+    np.testing.assert_allclose(found.image, repair(hip_shake).image, atol=1e-9)
