@@ -25,15 +25,20 @@ Row = Mapping[str, Any]
 
 def g1_rows_table(rows: Iterable[Row]) -> str:
     """Return the table of the G1's rows of `learning.json`."""
-    lines = [_line(COLUMNS), "|---" * len(COLUMNS) + "|"]
-    lines += [_line(_cells(row)) for row in rows if MOVES[row["move"]].robot == "g1"]
+    lines = [markdown_line(COLUMNS), "|---" * len(COLUMNS) + "|"]
+    lines += [markdown_line(_cells(row)) for row in rows if MOVES[row["move"]].robot == "g1"]
     return "\n".join(lines) + "\n"
 
 
 def written_into(text: str, rows: Iterable[Row]) -> str:
-    """Return a document's text with the table between its two comments replaced."""
-    before, rest = text.split(BEGIN)
-    return f"{before}{BEGIN}\n\n{g1_rows_table(rows)}\n{END}{rest.split(END)[1]}"
+    """Return a document's text with the table of the G1's rows replaced."""
+    return written_between(text, BEGIN, END, g1_rows_table(rows))
+
+
+def written_between(text: str, begin: str, end: str, table: str) -> str:
+    """Return a document's text with what stands between two comments replaced by a table."""
+    before, rest = text.split(begin)
+    return f"{before}{begin}\n\n{table}\n{end}{rest.split(end)[1]}"
 
 
 def update_document(rows: Iterable[Row], path: Path = DOCUMENT) -> None:
@@ -89,5 +94,6 @@ def _mm(metres: float | None) -> str:
     return "-" if metres is None else f"{1e3 * metres:.0f}"
 
 
-def _line(cells: Sequence[str]) -> str:
+def markdown_line(cells: Sequence[str]) -> str:
+    """Return cells as a line of a Markdown table."""
     return f"| {' | '.join(cells)} |"

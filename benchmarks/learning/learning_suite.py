@@ -58,7 +58,7 @@ def main() -> None:
         _write(speed, [checkpoint_cost.checkpoints(folders)], command)
     if "policies" in parts:
         minutes, jobs = given.cpu_minutes, given.jobs
-        training_rows.policies(given.moves, given.seeds, minutes, jobs, folders)
+        training_rows.policies(given.moves, given.seeds, minutes, jobs, folders, given.by_steps)
     if {"policies", "table"} & set(parts) and (rows := summary(folders)):
         held = {"command": command, "authors_robot": AUTHORS_ROBOT, "rows": rows}
         (folders.results / "learning.json").write_text(json.dumps(held, indent=1) + "\n")
@@ -79,7 +79,12 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument(
         "--cpu-minutes",
         type=float,
-        help="not the row's own; such policies are in no table",
+        help="not the row's own; such policies are in no table but that of polish_rows",
+    )
+    parser.add_argument(
+        "--by-steps",
+        action="store_true",
+        help="budget of policies in steps alone, where a CPU minute is fewer than 50,000",
     )
     parser.add_argument("--walker-cpu-seconds", type=float, help="what the walker took to train")
     parser.add_argument("--repeats", type=int, default=5)

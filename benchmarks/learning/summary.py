@@ -35,7 +35,7 @@ def summary(folders: Folders) -> Rows:
             found = sorted(folders.rows.glob(folders.row(name, "[0-9]*", seconds).name))
             exact = [path for path in found if path == folders.row(name, _seed(path), seconds)]
             if exact:
-                seeds = [_read(path) for path in exact]
+                seeds = [read_rows(path) for path in exact]
                 lines.append(
                     line(name, move, seconds, seeds)
                     | {"forced": forced(name, folders), **standing(name, exact, folders)}
@@ -102,7 +102,8 @@ def mean(values: Any) -> float | None:
     return float(np.mean(finite)) if finite else None
 
 
-def _read(path: Path) -> Rows:
+def read_rows(path: Path) -> Rows:
+    """Return the rollouts of a kept row."""
     return tables.decode_rows(EVALUATION_RECORD, path.read_bytes(), str(path))
 
 

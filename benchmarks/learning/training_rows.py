@@ -2,8 +2,8 @@
 move and a seed, so that it may take several sittings.
 
 A row's training is pinned to a core of its own and ended by the CPU minutes of its bar, or by the
-control steps that these are worth, so that a faster machine learns no longer. A motion that the
-gate refuses is trained on anyway, and the row is marked.
+control steps that these are worth, so that a faster machine learns no longer; on request by the
+steps alone. A motion that the gate refuses is trained on anyway, and the row is marked.
 """
 
 import os
@@ -19,7 +19,12 @@ STEPS_A_MINUTE = 50_000
 
 
 def train_and_judge(
-    name: str, seed: int, minutes: float | None, folders: Folders, core: int
+    name: str,
+    seed: int,
+    minutes: float | None,
+    folders: Folders,
+    core: int,
+    by_steps: bool = False,
 ) -> None:
     """Train one move with one seed and keep the rows of its evaluation; nothing if they exist."""
     kept = {s: folders.row(name, seed, s, minutes) for s in MOVES[name].horizons_s}
@@ -28,7 +33,8 @@ def train_and_judge(
     work = folders.work / name
     reference, out = work / "reference.parquet", work / f"s{seed}{budget(minutes)}"
     spent = minutes or MOVES[name].cpu_minutes
-    budgets = (f"cpu_minutes={spent}", f"steps={round(STEPS_A_MINUTE * spent)}")
+    clock = () if by_steps else (f"cpu_minutes={spent}",)
+    budgets = (*clock, f"steps={round(STEPS_A_MINUTE * spent)}")
     observed = f"track.observation={MOVES[name].observation}"
     options = ["--seed", seed, "--move", name, "--force"]
     options += [word for one in (*budgets, observed) for word in ("--set", one)]
@@ -45,10 +51,20 @@ def train_and_judge(
 
 
 def policies(
-    names: Iterable[str], seeds: Iterable[int], minutes: float | None, jobs: int, folders: Folders
+    names: Iterable[str],
+    seeds: Iterable[int],
+    minutes: float | None,
+    jobs: int,
+    folders: Folders,
+    by_steps: bool = False,
 ) -> None:
     """Train and evaluate all rows, `jobs` at a time, each on a core of its own; Ctrl-C keeps
-    checkpoints."""
+    checkpoints.
+
+    Args:
+        minutes: Budget of every row, CPU minutes; the row's own when None.
+        by_steps: Whether the steps that the budget is worth end a training, however long they take.
+    """
     present = [name for name in names if source_of(MOVES[name]) is not None]
     for name in present:
         reference_of(name, folders)
@@ -59,7 +75,7 @@ def policies(
     def row(name: str, seed: int) -> None:
         core = cores.get()
         try:
-            train_and_judge(name, seed, minutes, folders, core)
+            train_and_judge(name, seed, minutes, folders, core, by_steps)
         finally:
             cores.put(core)
 

@@ -11,15 +11,7 @@ from benchmarks.learning.policies import MOVES, Folders, source_of
 from benchmarks.learning.row_bars import LIMBS, bars
 from benchmarks.learning.summary import cluster_interval, line, summary
 from benchmarks.learning.training_curve import area, first_at
-
-
-def rollouts(strict: float, gain: float) -> list[dict[str, object]]:
-    common = {"survived_s": 10.0, "strict_success": strict, "skill": 0.7, "velocity_score": 0.6}
-    limbs = {f"limb_gain_{limb}": gain for limb in LIMBS} | {
-        f"limb_r2_{limb}": 0.8 for limb in LIMBS
-    }
-    speeds = {f"excess_speed_{limb}": 0.1 for limb in LIMBS}
-    return [{"policy": "trained", **common, **limbs, **speeds}, {"policy": "statue", **common}]
+from tests.fixtures.row_rollouts import rollouts
 
 
 def test_the_area_of_a_straight_rise_is_its_mean() -> None:
@@ -147,6 +139,25 @@ def test_a_row_is_trained_on_its_own_inputs(
     with pytest.raises(SystemExit):
         training_rows.train_and_judge(name, 0, None, Folders.at(tmp_path), 0)
     assert f"track.observation={seen}" in began
+
+
+@pytest.mark.parametrize(
+    ("by_steps", "expected"),
+    [(False, ["cpu_minutes=5.0", "steps=250000"]), (True, ["steps=250000"])],
+)
+def test_a_slow_machine_trains_by_steps_alone(
+    by_steps: bool, expected: list[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    began: list[str] = []
+
+    def stop(*words: object, core: int | None = None) -> None:
+        began.extend(map(str, words))
+        raise SystemExit
+
+    monkeypatch.setattr(training_rows, "must", stop)
+    with pytest.raises(SystemExit):
+        training_rows.train_and_judge("g1_walk", 0, 5.0, Folders.at(tmp_path), 0, by_steps)
+    assert [word for word in began if "steps=" in word or "cpu_minutes=" in word] == expected
 
 
 def test_who_falls_after_ten_seconds_has_lasted_that_long() -> None:
