@@ -39,6 +39,8 @@ from robojackson.robot.model import Robot
 
 FOLDER = "feedback"
 ARRAYS = tuple(one.name for one in fields(Gains))
+ROUNDED, SINGLE = ("gain", "offset"), np.float32
+"""Arrays that are kept in single precision."""
 VARIED = ("body_mass", "body_ipos", "body_inertia", "geom_friction", "dof_armature")
 """Arrays of a model that `variation` changes."""
 LARGEST = 2.0
@@ -80,9 +82,16 @@ def _cached(
             found = Gains(*(arrays[name].astype(float) for name in ARRAYS))
             if _fits(found, robot, motion):
                 return found
-    gains = regulator_of(robot, motion, control, progress)
+    gains = _single(regulator_of(robot, motion, control, progress))
     _keep(path, gains)
     return gains
+
+
+def _single(gains: Gains) -> Gains:
+    """Return gains rounded as they are kept, so that the run that computes them and those that read
+    them are the same to the bit."""
+    rounded = {name: getattr(gains, name).astype(SINGLE).astype(float) for name in ROUNDED}
+    return replace(gains, **rounded)
 
 
 def _fits(gains: Gains, robot: Robot, motion: ReferenceMotion) -> bool:
@@ -104,7 +113,7 @@ def _fits(gains: Gains, robot: Robot, motion: ReferenceMotion) -> bool:
 def _keep(path: Path, gains: Gains) -> None:
     content = io.BytesIO()
     arrays = {name: getattr(gains, name) for name in ARRAYS}
-    arrays |= {name: arrays[name].astype(np.float32) for name in ("gain", "offset")}
+    arrays |= {name: arrays[name].astype(SINGLE) for name in ROUNDED}
     np.savez_compressed(content, **arrays)
     with suppress(StoreError):  # a read-only store: computed again next time
         FileTree(path.parent).write(path.name, content.getvalue())
