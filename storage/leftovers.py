@@ -86,7 +86,7 @@ def _finished(store: Store) -> set[str]:
     """Return the digests of the trainings whose cells are in the tables."""
     tables = [
         {_digest(key) for key in store.list(f"{study_tables.FOLDER}/{t}")}
-        for t in study_tables.TABLES
+        for t in study_tables.CELL
     ]
     return set.intersection(*tables)
 

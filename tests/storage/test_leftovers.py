@@ -13,7 +13,7 @@ from robojackson.files import local_folder
 from robojackson.pipeline.folder_lock import locked
 from storage.leftovers import sweep
 from storage.store import Store
-from storage.study_tables import TABLES, Place
+from storage.study_tables import CELL, Place
 
 ROOT = Path(__file__).parents[2]
 DIES = """
@@ -53,7 +53,7 @@ def work(store: Store, name: str) -> Path:
 
 def finish(store: Store) -> None:
     place = Place("study", "walk", "scratch", 0, RUN)
-    for table in TABLES:
+    for table in CELL:
         store.put(place.key(table), b"rows")
 
 
