@@ -62,7 +62,9 @@ LONG_ENOUGH_S = 10.0
 def dance(
     source: Annotated[
         str | None,
-        typer.Argument(help="A video, a folder of candidates, or the name of a dance to look for."),
+        typer.Argument(
+            help="A video or its address, a folder of candidates, or the name of a dance."
+        ),
     ] = None,
     minutes: Minutes = None,
     robot: Robot = None,
@@ -87,11 +89,11 @@ def dance(
     """Turn a video, a folder of candidates or the name of a dance into a robot that dances it."""
     from flows.runtime.environment import prepare
     from flows.search import dance_source
-    from flows.search.dance_source import is_name, load_settings, resolve
+    from flows.search.dance_source import is_on_the_web, load_settings, resolve
     from flows.search.requests import require_findable
     from storage.store import Store
 
-    found = None if is_name(source) else resolve(source)
+    found = None if is_on_the_web(source) else resolve(source)
     given = {
         "minutes": minutes,
         "robot": yaml_text(robot),

@@ -1,4 +1,4 @@
-"""Resolve the SOURCE of a dance: a file, a folder, or the name of a dance."""
+"""Resolve the SOURCE of a dance: a file, a folder, an address, or the name of a dance."""
 
 import os
 from collections.abc import Mapping
@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robojackson.clips.video import SUFFIXES
+from robojackson.clips.web.untrusted_text import web_address
 from robojackson.errors import RoboJacksonError, UnreadableVideo
 from robojackson.pipeline.robot_descriptions import describe_robot
 
@@ -48,6 +49,11 @@ def is_name(source: str | None) -> bool:
     if Path(source).exists():
         return False
     return os.sep not in source and Path(source).suffix.lower() not in SUFFIXES
+
+
+def is_on_the_web(source: str | None) -> bool:
+    """Return whether a SOURCE has to be downloaded: the name of a dance, or a video's address."""
+    return is_name(source) or bool(web_address(source))
 
 
 def _require_name(source: str) -> None:

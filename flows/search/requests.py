@@ -10,7 +10,7 @@ from configs.find_config import FindConfig
 from robojackson.clips.sources import folder, is_local, page_of
 from robojackson.clips.sources import source as source_of
 from robojackson.clips.web.reachability import require_reachable
-from robojackson.clips.web.untrusted_text import clean_text
+from robojackson.clips.web.untrusted_text import clean_text, web_address
 from robojackson.errors import SearchFailed
 from robojackson.pipeline.yaml_loader import build, load
 from storage import candidate_catalogue
@@ -53,14 +53,19 @@ def require_online(dance: Dance, config: FindConfig) -> None:
 
 
 def require_findable(words: str, store: Store) -> None:
-    """Raise where a dance that is given by its name can neither be searched nor was found before.
+    """Raise where a dance that is given by its name can neither be searched nor was found before,
+    or the site of a video that is given by its address cannot be reached.
 
     Raises:
         SearchFailed: as `require_online`.
     """
+    settings = load(FindConfig, "finding")
+    if address := web_address(words):
+        require_reachable(address, settings.web.proxy)
+        return
     dance = load(DanceBook, "dances").find(words.strip())
     try:
-        require_online(dance, load(FindConfig, "finding"))
+        require_online(dance, settings)
     except SearchFailed:
         if candidate_catalogue.champion(store, dance.name) is None:
             raise

@@ -20,7 +20,7 @@ from configs.find_config import FindConfig
 from flows.find import best, of_candidate
 from flows.search.dance_source import is_name, resolve
 from robojackson.clips.sources import urls
-from robojackson.clips.video import list_videos
+from robojackson.clips.video import SUFFIXES, list_videos
 from robojackson.clips.web.untrusted_text import web_address
 from robojackson.config import config_dataclass
 from robojackson.pipeline.run_names import run_name, slug_of
@@ -77,7 +77,7 @@ async def of_name(words: str, search: Search) -> tuple[str, Artifact]:
 
 
 def of_address(address: str, search: Search) -> tuple[str, Artifact]:
-    """Return a video of the web in good quality, and its name.
+    """Return a video of the web in good quality, and the name of its file or that of its page.
 
     Raises:
         SearchFailed: it cannot be found or downloaded; the message has the reason.
@@ -85,7 +85,9 @@ def of_address(address: str, search: Search) -> tuple[str, Artifact]:
     settings = load(FindConfig, search.config)
     (candidate,) = urls.search("", address, 1, settings.web, datetime.now(UTC))
     get_run_logger().info("bringing %s", candidate.url)
-    return slug_of(Path(candidate.title).stem), of_candidate(candidate, None, settings)
+    file = Path(candidate.title)
+    name = file.stem if file.suffix.lower() in SUFFIXES else name_of(address)
+    return slug_of(name), of_candidate(candidate, None, settings)
 
 
 def name_of(source: str) -> str:

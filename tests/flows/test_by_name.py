@@ -1,6 +1,7 @@
 """From the source that a user names to files, and what happens without a network."""
 
 import asyncio
+import logging
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -12,9 +13,11 @@ from prefect.utilities.callables import parameter_schema
 from prefect.utilities.schema_tools.validation import validate
 
 from flows.dance import dance
+from flows.video_pass import inputs
 from flows.video_pass.inputs import Search, videos_of
 from robojackson.errors import NoPersonFound, RejectedReference, SearchFailed
 from storage import candidate_catalogue
+from storage.artifact import Artifact
 from storage.store import Store
 from tests.fixtures.web_server import serving
 
@@ -120,6 +123,22 @@ def test_an_address_is_downloaded_without_a_search(
     with serving(short_clip.read_bytes()) as web:
         found = files(f"{web.url}/good/my-dance.mp4", near(tmp_path))
     assert found == {"my-dance.mp4": short_clip.read_bytes()}
+
+
+@pytest.mark.parametrize(
+    ("address", "name"),
+    [
+        ("https://host/good/my-dance.mp4?token=x", "my-dance"),
+        ("https://www.youtube.com/watch?v=abc_123", "v-abc-123"),
+        ("https://host/shorts/xyz", "shorts-xyz"),
+    ],
+)
+def test_two_videos_of_one_page_have_two_names(
+    address: str, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(inputs, "get_run_logger", lambda: logging.getLogger(__name__))
+    monkeypatch.setattr(inputs, "of_candidate", lambda *_: Artifact("video/a.mp4", 64 * "0"))
+    assert inputs.of_address(address, Search())[0] == name
 
 
 @pytest.mark.medium

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from flows.search.dance_source import is_name
+from flows.search.dance_source import is_name, is_on_the_web
 from tests.fixtures.commands import Said, in_process, robojackson
 from tests.fixtures.difficult_clips import black, write
 
@@ -74,3 +74,11 @@ def test_an_unknown_source_is_one_line(store: Path) -> None:
 )
 def test_what_is_no_path_is_the_name_of_a_dance(source: str | None, name: bool) -> None:
     assert is_name(source) is name
+
+
+@pytest.mark.parametrize(
+    ("source", "web"),
+    [("APT dance", True), ("https://host/v?id=1", True), ("a.mp4", False), ("x/y", False)],
+)
+def test_a_name_and_an_address_are_downloaded_and_a_path_is_not(source: str, web: bool) -> None:
+    assert is_on_the_web(source) is web

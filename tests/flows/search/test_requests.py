@@ -10,7 +10,7 @@ from flows.search.requests import ALL, find_dance, require_findable, require_onl
 from robojackson.errors import SearchFailed
 from storage import candidate_catalogue
 from storage.store import Store
-from tests.fixtures.commands import LOADED, robojackson
+from tests.fixtures.commands import LOADED, in_process, robojackson
 
 
 def test_a_list_of_addresses_needs_no_query(tmp_path: Path) -> None:
@@ -51,6 +51,21 @@ def test_without_a_network_a_name_is_refused_unless_it_was_found_before(
         require_findable("apt", store)
     monkeypatch.setattr(candidate_catalogue, "champion", lambda *_: {"video_key": "video/a.mp4"})
     require_findable("apt", store)
+
+
+def test_of_an_address_its_own_site_has_to_answer(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(requests, "require_reachable", offline)
+    with pytest.raises(SearchFailed, match="no connection to https://host/clip"):
+        require_findable(" https://host/clip ", Store(tmp_path))
+
+
+@pytest.mark.medium
+def test_the_address_that_find_advises_is_a_source_of_dance(tmp_path: Path) -> None:
+    text = in_process("dance", "http://127.0.0.1:9/watch?v=x", ROBOJACKSON_STORE=str(tmp_path))
+    assert text.code == 1
+    assert "SearchFailed: no connection to 127.0.0.1" in text.err
 
 
 @pytest.mark.medium
