@@ -14,6 +14,7 @@ from robojackson.errors import BadConfiguration
 GRAPHICS = ("", "disable", "disabled", "off", "false", "0", "egl", "osmesa", "glfw", "on", "true")
 PLATFORMS = ("", "cpu", "cuda", "gpu", "rocm", "tpu", "metal")
 STORES = ("file", "s3", "s3a", "gs", "gcs", "abfs", "az", "memory")
+OSMESA = "osmesa"
 LOG_LEVELS = ("DEBUG", "INFO", "WARNING", "ERROR", "CRITICAL")
 MOST_THREADS = 4096
 SECRET = re.compile(r"//[^/@]*@")
@@ -43,7 +44,31 @@ def _one_of(*allowed: str) -> Callable[[str], str]:
 
 def _backend(value: str) -> str:
     """Return the fault of a graphics backend: MuJoCo takes one word, not a list."""
-    return _one_of(*GRAPHICS)(value.replace(",", " "))
+    return _one_of(*GRAPHICS)(value.replace(",", " ")) or _without_library(value)
+
+
+def _platform(value: str) -> str:
+    return _one_of("", "egl", OSMESA, "glx", "x11", "linux")(value) or _without_library(value)
+
+
+def _without_library(value: str) -> str:
+    """Return the fault of OSMesa where its library is missing, which PyOpenGL does not name."""
+    if value.lower() != OSMESA or _has_osmesa():
+        return ""
+    return (
+        "OSMesa's library is not installed: unset the variable (EGL needs no screen either), or "
+        "apt-get install libosmesa6"
+    )
+
+
+def _has_osmesa() -> bool:
+    import ctypes.util
+
+    try:
+        ctypes.CDLL(ctypes.util.find_library("OSMesa") or "libOSMesa.so")
+    except OSError:
+        return False
+    return True
 
 
 def _level(value: str) -> str:
@@ -109,7 +134,7 @@ CHECKS: Mapping[str, Callable[[str], str]] = {
     "ROBOJACKSON_STORE": _store,
     "ROBOJACKSON_CONFIGS": _existing,
     "MUJOCO_GL": _backend,
-    "PYOPENGL_PLATFORM": _one_of("", "egl", "osmesa", "glx", "x11", "linux"),
+    "PYOPENGL_PLATFORM": _platform,
     "JAX_PLATFORMS": _one_of(*PLATFORMS),
     "JAX_PLATFORM_NAME": _one_of(*PLATFORMS),
     "JAX_ENABLE_X64": _flag,

@@ -2,6 +2,7 @@
 
 import pytest
 
+from robojackson.cli.lifetime import variables
 from robojackson.cli.lifetime.variables import check_environment
 from robojackson.errors import BadConfiguration
 
@@ -44,6 +45,17 @@ def test_a_store_that_can_be_none_is_refused(store: str) -> None:
 )
 def test_usual_values_pass(given: dict[str, str]) -> None:
     check_environment(given)
+
+
+@pytest.mark.parametrize("name", ["MUJOCO_GL", "PYOPENGL_PLATFORM"])
+def test_osmesa_without_its_library_is_named_with_what_to_do(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(variables, "_has_osmesa", lambda: False)
+    with pytest.raises(BadConfiguration, match=f"^{name} is 'OSMesa': .*unset .*libosmesa6$"):
+        check_environment({name: "OSMesa"})
+    monkeypatch.setattr(variables, "_has_osmesa", lambda: True)
+    check_environment({name: "osmesa"})
 
 
 def test_a_password_in_an_address_is_not_shown() -> None:
