@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar, Literal
-from urllib.parse import parse_qs, unquote, urlsplit
+from urllib.parse import SplitResult, parse_qs, unquote, urlsplit
 
 from robojackson.errors import BackupFailed, MissingDependency
 
@@ -43,8 +43,12 @@ class PostgreSQL:
 
     @classmethod
     def of(cls, url: str) -> "PostgreSQL":
-        """Return the database of a URL as SQLAlchemy takes it."""
-        parts = urlsplit(url)
+        """Return the database of a URL as SQLAlchemy takes it.
+
+        Raises:
+            BackupFailed: it is no address; the message does not have the password.
+        """
+        parts = _parts(url)
         options = {key: values[-1] for key, values in parse_qs(parts.query).items()}
         access = {
             "PGHOST": options.get("host") or parts.hostname or "localhost",
@@ -123,6 +127,19 @@ class PostgreSQL:
             lines = " ".join(run.stderr.split()) or f"exit code {run.returncode}"
             raise BackupFailed(f"{self.address}: {lines}{_advice(lines)}")
         return run.stdout
+
+
+def _parts(url: str) -> SplitResult:
+    """Return the parts of an address, of which the port has to be a number."""
+    try:
+        parts = urlsplit(url)
+        parts.port  # noqa: B018 (raises for a port that is none)
+    except ValueError:
+        raise BackupFailed(
+            f"{CONNECTION_URL} is no address postgresql+asyncpg://USER:PASSWORD@HOST:PORT/NAME; in "
+            "a user or password write / as %2F, # as %23, ? as %3F, [ as %5B, @ as %40"
+        ) from None  # the cause holds a part of the password
+    return parts
 
 
 def _advice(message: str) -> str:
