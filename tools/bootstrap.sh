@@ -11,6 +11,8 @@ cd "$(dirname "$0")/.."
 VENV=.venv
 STAMP=$VENV/.stamp
 EXTRAS=${EXTRAS:-app,fast,s3,dev}
+CUDA="4.7 GB of it for CUDA, which nothing here uses, where pip's index has no other build; 0.8 GB with \
+TORCH_INDEX=ADDRESS, the address of PyTorch's wheels for CPUs"
 LEAST_GB=6 # a new environment: 5.2 with torch's CPU build, 8.5 with the one for CUDA
 
 OURS='(3, 11) <= sys.version_info[:2] <= (3, 13)'
@@ -115,7 +117,7 @@ install() {
         "$python" -m venv "$VENV"
     fi
     pip="$VENV/bin/python -m pip --disable-pip-version-check --quiet"
-    say "torch $(pinned torch) (some minutes, some gigabytes)"
+    say "torch $(pinned torch) (some minutes$([ -n "${TORCH_INDEX:-}" ] || echo "; $CUDA"))"
     # First and alone: later packages would install a CUDA build of several gigabytes.
     $pip install ${TORCH_INDEX:+--index-url "$TORCH_INDEX"} "torch==$(pinned torch)"
     say "the rest"

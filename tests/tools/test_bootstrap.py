@@ -3,6 +3,7 @@
 import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -35,3 +36,31 @@ def test_a_full_disk_is_refused_in_one_line_before_any_work(tmp_path: Path, free
     assert done.stderr.count("\n") == 1
     assert f"and {free_gb} GB are free here" in done.stderr
     assert not (project / ".venv").exists()
+
+
+@pytest.mark.parametrize(("index", "told"), [("", True), ("https://host/cpu", False)])
+def test_the_size_of_torch_is_named_before_it_is_installed(
+    tmp_path: Path, index: str, told: bool
+) -> None:
+    """pip is replaced by one that fails."""
+    project = tmp_path / "project"
+    python = project / ".venv" / "bin" / "python"
+    python.parent.mkdir(parents=True)
+    python.write_text(f'#!/bin/sh\n[ "$1" = -m ] && exit 1\nexec {sys.executable} "$@"\n')
+    python.chmod(0o755)
+    (project / "tools").mkdir()
+    for name in ("tools/bootstrap.sh", "pyproject.toml", "constraints.txt"):
+        shutil.copy(ROOT / name, project / name)
+    done = subprocess.run(
+        ["sh", "tools/bootstrap.sh", "install"],
+        cwd=project,
+        env={**os.environ, "TORCH_INDEX": index, "PYTHON": ""},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    assert done.returncode == 1
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("setup: torch 2.")
+    assert ("TORCH_INDEX=ADDRESS" in line) == told

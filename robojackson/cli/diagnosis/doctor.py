@@ -5,12 +5,13 @@ import ctypes
 import shutil
 import sys
 from collections.abc import Mapping
-from importlib.metadata import PackageNotFoundError, distributions, version
+from importlib.metadata import PackageNotFoundError, distributions, requires, version
 from typing import Any
 
 from robojackson.cli.console import lines
 from robojackson.cli.lifetime.interruption import program
 from robojackson.clips.web import javascript_runtimes
+from robojackson.pipeline.app_folder import is_checkout
 
 PYTHONS = ((3, 11), (3, 12), (3, 13))
 """The versions that pyproject.toml allows and the tests run on."""
@@ -37,12 +38,10 @@ REQUIRED = (
     "yt-dlp",
     "duckdb",
 )
-OPTIONAL = {
-    "sbx-rl": ".venv/bin/pip install -e '.[fast]'",
-    "s3fs": ".venv/bin/pip install -e '.[s3]'",
-    "prefect-dask": ".venv/bin/pip install -e '.[dask]'",
-    "prefect-ray": ".venv/bin/pip install -e '.[ray]'",
-}
+OPTIONAL = {"sbx-rl": "fast", "s3fs": "s3", "prefect-dask": "dask", "prefect-ray": "ray"}
+"""Packages to the extras that install them."""
+CUDA = ("nvidia-", "cuda-")
+"""Beginnings of what torch requires in its build for CUDA."""
 OTHER_OPENCV = ("opencv-python", "opencv-contrib-python", "opencv-contrib-python-headless")
 MODELS = ("lite", "full", "heavy")
 NEEDED_MODELS = ("lite", "full")
@@ -55,7 +54,7 @@ def examine() -> dict[str, Any]:
     models = {size: model(size) for size in MODELS}
     missing = unsupported(sys.version_info[:2])
     python_supported = not missing
-    missing += [f"{name}: run `make` again" for name in REQUIRED if packages[name] is None]
+    missing += [f"{name}: {_again()}" for name in REQUIRED if packages[name] is None]
     missing += _system_line(libraries)
     missing += [words for size, words in models.items() if words and size in NEEDED_MODELS]
     missing += [
@@ -64,7 +63,8 @@ def examine() -> dict[str, Any]:
         for name in OTHER_OPENCV
         if installed(name)
     ]
-    optional = [f"{name}: {how}" for name, how in OPTIONAL.items() if packages[name] is None]
+    optional = [f"{name}: {_extra(of)}" for name, of in OPTIONAL.items() if packages[name] is None]
+    optional += _torch_line()
     optional += [words for size, words in models.items() if words and size not in NEEDED_MODELS]
     engine = javascript_runtimes.usable()
     optional += [] if engine else [javascript_runtimes.ADVICE]
@@ -110,6 +110,30 @@ def installed(name: str) -> str | None:
         return version(name)
     except PackageNotFoundError:
         return None
+
+
+def _extra(name: str) -> str:
+    """Return the command that installs an extra: into a checkout's environment, or beside a
+    wheel."""
+    if is_checkout():
+        return f".venv/bin/pip install -e '.[{name}]'"
+    return f"pip install 'robojackson[{name}]'"
+
+
+def _again() -> str:
+    return "run `make` again" if is_checkout() else _extra("app,fast")
+
+
+def _torch_line() -> list[str]:
+    """Return how to replace torch's build for CUDA by the small one; nothing where it is small."""
+    needed = requires("torch") or [] if installed("torch") else []
+    if not any(each.startswith(CUDA) for each in needed):
+        return []
+    how = "`make clean`, then `make setup` with TORCH_INDEX set to their address"
+    return [
+        "torch is its build for CUDA, 4 GB larger than PyTorch's wheels for CPUs, and nothing here "
+        f"uses CUDA: {how if is_checkout() else 'install torch from their index'}"
+    ]
 
 
 def opencv_builds() -> list[str]:
