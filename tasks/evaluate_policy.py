@@ -43,7 +43,7 @@ async def evaluate_policy(
     name = f"evaluate-{digest.hexdigest()[:12]}"
     work = store.work(name)
     with (
-        locked(work, "task.lock", A_MOMENT),
+        locked(work, "task.lock", A_MOMENT, "the same evaluation"),
         store.local(policy) as learnt,
         store.local(reference) as motion,
     ):

@@ -16,6 +16,12 @@ def test_a_second_holder_is_reported_in_one_line(tmp_path: Path) -> None:
         raise AssertionError("two hold it")
 
 
+def test_the_message_names_what_holds_the_folder(tmp_path: Path) -> None:
+    held = pytest.raises(StoreError, match=f"^{tmp_path}: another download is running there; wait")
+    with locked(tmp_path), held, locked(tmp_path, holder="another download"):
+        raise AssertionError("two hold it")
+
+
 def test_a_refused_holder_does_not_let_a_third_one_in(tmp_path: Path) -> None:
     with locked(tmp_path):
         for _ in range(2):

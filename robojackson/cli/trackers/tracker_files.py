@@ -59,7 +59,7 @@ def add_tracker(name: str, file: Path | None = None) -> Entry:
         _require_pinned(name, pinned, file)
     with in_one_line(f"cannot write {path.parent}"):
         path.parent.mkdir(parents=True, exist_ok=True)
-    with locked(path.parent, LOCK, A_MOMENT):
+    with locked(path.parent, LOCK, A_MOMENT, "another download of a tracker"):
         if path.is_file() and sha256_of_file(path) == pinned.sha256:
             return {**entry, "added": False}
         if file is not None:
