@@ -26,12 +26,17 @@ def gallery(
     as_json: Json = False,
 ) -> CommandResult:
     """Show all dances of the store on one page; existing thumbnails are not made again."""
+    from robojackson.errors import UnknownName
+    from robojackson.pipeline.run_names import slug_of
     from robojackson.report.pages.gallery import render_gallery
     from storage.run_catalogue import list_runs
     from storage.store import Store
 
     store = Store.from_environment()
-    runs = [run for run in list_runs(store) if dance in (None, run.move)]
+    known = list_runs(store)
+    runs = [run for run in known if dance is None or slug_of(run.move) == slug_of(dance)]
+    if known and not runs:
+        raise UnknownName("dance", str(dance), store.root, {run.move for run in known})
     made = [_entry(store, run) for run in runs if "evaluation" in run.artifacts]
     page = store.put(GALLERY, render_gallery(made).encode())
     answer = {"page": store.address(page.key), "runs": len(made)}

@@ -57,3 +57,22 @@ def test_a_run_that_was_not_evaluated_is_left_out(store: Store) -> None:
     )  # fmt: skip
     record(store, unfinished)
     assert in_process("gallery", "--json").answer["runs"] == 1
+
+
+@pytest.mark.parametrize("name", ["hip_shake", "Hip shake", "HIP-SHAKE"])
+def test_a_dance_is_found_by_the_name_that_a_person_gives_it(store: Store, name: str) -> None:
+    publish(store, "one", "hip_shake", 10)
+    assert in_process("gallery", "--dance", name, "--json").answer["runs"] == 1
+
+
+def test_a_dance_that_was_never_danced_leaves_the_page_as_it_is(
+    store: Store, tmp_path: Path
+) -> None:
+    publish(store, "one", "hip_shake", 10)
+    in_process("gallery")
+    before = (tmp_path / "gallery.html").read_bytes()
+    refused = in_process("gallery", "--dance", "moonwalk")
+    assert refused.code == 1
+    assert "unknown dance 'moonwalk'" in refused.err
+    assert "Known: hip_shake" in refused.err
+    assert (tmp_path / "gallery.html").read_bytes() == before
