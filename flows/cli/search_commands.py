@@ -97,9 +97,8 @@ def catalogue(
     if sql is not None:
         found = candidate_catalogue.query(store, sql)
         named = {str(number): row for number, row in enumerate(found, 1)}
-        return CommandResult(
-            {"rows": found}, text=console.table(named, list(found[0]) if found else [])
-        )
+        text = console.table(named, list(found[0])) if found else ["no rows"]
+        return CommandResult({"rows": found}, text=text)
     rows = candidate_catalogue.records(store, dance)
     if not rows:
         return CommandResult({"candidates": rows}, text=[empty_catalogue_text(dance)])

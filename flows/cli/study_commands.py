@@ -64,7 +64,8 @@ def metrics(
 
     rows = study_tables.query(Store.from_environment(), sql or OVERVIEW)
     if not rows:
-        return CommandResult({"rows": []}, text=["no rows; `robojackson ablation` makes some"])
+        words = "no rows; `robojackson ablation` makes some" if sql is None else "no rows"
+        return CommandResult({"rows": []}, text=[words])
     text = table({str(n): row for n, row in enumerate(rows, 1)}, tuple(rows[0]))
     if sql is not None:
         return CommandResult({"rows": rows}, text=text)

@@ -23,7 +23,7 @@ def find_verdict(found: Facts) -> dict[str, Any]:
     """Return `verdict` and `next` of a search.
 
     Args:
-        found: `chosen`, `candidates` and `summary` of the flow `find`.
+        found: `chosen`, `candidates`, `dropped` and `source` of the flow `find`.
     """
     candidates, chosen = found["candidates"], found["chosen"]
     if chosen is not None:
@@ -34,14 +34,19 @@ def find_verdict(found: Facts) -> dict[str, Any]:
         )
         return _closing("found", sentence, command_line("dance", chosen["url"]))
     if not candidates:
+        dropped = len(found["dropped"])
         sentence = "The search found no video: other words may."
+        if dropped:
+            sentence = f"None of the {dropped} videos found was worth a download: other words may."
         return _closing("none", sentence, command_line("find", f"{found['dance']} tutorial"))
     reasons = Counter(clean_text(row["reason"], REASON) for row in candidates)
     reason, count = reasons.most_common(1)[0]
     sentence = (
         f"None of {len(candidates)} videos may be danced; of {count} the reason is: {reason}."
     )
-    return _closing("none", sentence, with_option("--top", str(2 * len(candidates))))
+    more = bool(found["dropped"])  # else all that there are were assessed
+    following = with_option("--top", str(2 * len(candidates))) if more else ""
+    return _closing("none", sentence, following)
 
 
 def catalogue_verdict(rows: Sequence[Facts]) -> dict[str, Any]:
@@ -49,8 +54,8 @@ def catalogue_verdict(rows: Sequence[Facts]) -> dict[str, Any]:
     dances = sorted({row["dance"] for row in rows})
     fit = [row for row in rows if row["decision"] in ("chosen", "accepted")]
     sentence = (
-        f"{len(rows)} videos of {len(dances)} dance{'' if len(dances) == 1 else 's'} "
-        f"were assessed, {len(fit)} may be danced."
+        f"{_videos(rows)} videos of {len(dances)} dance{'' if len(dances) == 1 else 's'} "
+        f"were assessed, {_videos(fit)} may be danced."
     )
     if not fit:
         return _closing("none", sentence, command_line("find", dances[0]))
@@ -132,6 +137,11 @@ def ablation_verdict(made: Facts, steps: int, seeds: int, least_steps: int) -> d
 
 def _closing(kind: str, sentence: str, following: str) -> dict[str, Any]:
     return {"verdict": {"kind": kind, "sentence": sentence}, "next": following}
+
+
+def _videos(rows: Sequence[Facts]) -> int:
+    """Return the number of videos; one may have been assessed several times."""
+    return len({(row["source"], row["video_id"]) for row in rows})
 
 
 def _title(row: Facts) -> str:

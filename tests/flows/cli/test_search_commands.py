@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import pytest
+
 from tests.fixtures.commands import in_process
 
 
@@ -20,3 +22,10 @@ def test_a_dance_that_was_never_assessed_says_how_to_look_for_it(tmp_path: Path)
 def test_an_empty_catalogue_is_an_empty_list_for_programs(tmp_path: Path) -> None:
     text = in_process("catalogue", "--json", ROBOJACKSON_STORE=str(tmp_path / "store"))
     assert text.answer == {"candidates": []}
+
+
+@pytest.mark.parametrize("command", ["catalogue", "metrics"])
+def test_a_question_without_an_answer_says_so_and_no_more(command: str, tmp_path: Path) -> None:
+    sql = "SELECT 1 AS one WHERE false"
+    text = in_process(command, "--sql", sql, ROBOJACKSON_STORE=str(tmp_path / "store"))
+    assert (text.code, text.out) == (0, "no rows\n")

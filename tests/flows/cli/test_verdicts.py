@@ -18,12 +18,14 @@ from flows.cli.verdicts import (
 
 def row(decision: str, **more: Any) -> dict[str, Any]:
     usual = {"title": "APT cover", "url": "https://example.org/a b", "reason": "two people"}
+    usual |= {"source": "youtube", "video_id": decision}
     return {**usual, "decision": decision, "score_per_second": 3.456, **more}
 
 
-def found(*rows: dict[str, Any]) -> dict[str, Any]:
+def found(*rows: dict[str, Any], dropped: int = 0) -> dict[str, Any]:
     chosen = next((each for each in rows if each["decision"] == "chosen"), None)
-    return {"dance": "APT", "chosen": chosen, "candidates": list(rows)}
+    left_out = [{"title": "x", "reason": "not among the 3 most watched"}] * dropped
+    return {"dance": "APT", "chosen": chosen, "candidates": list(rows), "dropped": left_out}
 
 
 def refreshed(**made: bool) -> dict[str, Any]:
@@ -46,13 +48,21 @@ def test_a_search_without_a_dance_names_the_commonest_reason(
 ) -> None:
     monkeypatch.setattr("sys.argv", ["robojackson", "find", "APT", "--top", "3"])
     rows = [row("rejected"), row("rejected"), row("failed", reason="no video")]
-    result = find_verdict(found(*rows))
+    result = find_verdict(found(*rows, dropped=9))
     assert result["verdict"]["sentence"].endswith("of 2 the reason is: two people.")
     assert result["next"] == "robojackson find APT --top 6"
+    assert find_verdict(found(*rows))["next"] == ""  # there is no more to assess
 
 
 def test_a_search_that_finds_nothing_says_what_to_type() -> None:
-    assert find_verdict(found())["next"] == "robojackson find 'APT tutorial'"
+    result = find_verdict(found())
+    assert result["verdict"]["sentence"] == "The search found no video: other words may."
+    assert result["next"] == "robojackson find 'APT tutorial'"
+
+
+def test_a_search_whose_videos_were_all_dropped_does_not_say_that_there_was_none() -> None:
+    sentence = find_verdict(found(dropped=40))["verdict"]["sentence"]
+    assert sentence == "None of the 40 videos found was worth a download: other words may."
 
 
 def test_the_words_of_a_title_are_no_words_of_ours() -> None:
@@ -100,6 +110,8 @@ def test_a_catalogue_counts_what_may_be_danced_and_dances_the_first() -> None:
     result = catalogue_verdict(rows)
     assert result["verdict"]["sentence"] == "2 videos of 2 dances were assessed, 1 may be danced."
     assert shlex.split(result["next"]) == ["robojackson", "dance", "https://x.org/m"]
+    again = catalogue_verdict([*rows, *rows])  # another search assessed the same two
+    assert again["verdict"] == result["verdict"]
     none = catalogue_verdict([row("rejected", dance="APT")])
     assert shlex.split(none["next"]) == ["robojackson", "find", "APT"]
 
