@@ -158,9 +158,12 @@ def test_while_a_process_uses_the_store_only_work_goes(
     assert len(keys(store)) == 1
 
 
+@pytest.mark.parametrize("url", ["", "file://"])
 @pytest.mark.parametrize(("words", "used"), [("dance clip.mp4", True), ("server", False)])
-def test_a_command_that_works_with_the_store_is_found(words: str, used: bool, store: Store) -> None:
-    environment = {**os.environ, "ROBOJACKSON_STORE": store.root}
+def test_a_command_that_works_with_the_store_is_found(
+    words: str, used: bool, url: str, store: Store
+) -> None:
+    environment = {**os.environ, "ROBOJACKSON_STORE": f"{url}{store.root}"}
     waits = "print(flush=True); input()"  # the first line: the process is what it was started as
     sleeps = [sys.executable, "-c", waits, "robojackson", *words.split()]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
