@@ -128,20 +128,14 @@ def champion(store: Store, dance: str, kind: str = "") -> dict[str, Any] | None:
     Args:
         kind: Beginning of the ids of the runs that count, such as `refresh`.
     """
-    gone: set[tuple[str, str]] = set()
-    for row in reversed(_of(store, dance, kind)):
-        if row["decision"] == "failed":
-            gone.add(_key_of(row))
-        is_chosen = row["decision"] == "chosen" and _key_of(row) not in gone
-        if is_chosen and row["video_key"] and store.exists(row["video_key"]):
-            return dict(row)
-    return None
+    return _reigning(store, _of(store, dance, kind))[0]
 
 
 def known(store: Store, dance: str, kind: str = "") -> set[tuple[str, str]]:
     """Return source and id of every video that was assessed for a dance; a failed one may be tried
-    again."""
-    return _assessed(_of(store, dance, kind))
+    again, and so may a choice whose file was removed, as by `robojackson clean`."""
+    found = _of(store, dance, kind)
+    return _assessed(found) - _reigning(store, found)[1]
 
 
 def failed(store: Store, dance: str, kind: str = "") -> set[tuple[str, str]]:
@@ -152,6 +146,25 @@ def failed(store: Store, dance: str, kind: str = "") -> set[tuple[str, str]]:
 
 def _of(store: Store, dance: str, kind: str) -> list[dict[str, Any]]:
     return [row for row in records(store, dance) if row["run_id"].startswith(kind)]
+
+
+def _reigning(
+    store: Store, found: Sequence[Row]
+) -> tuple[dict[str, Any] | None, set[tuple[str, str]]]:
+    """Return the last choice whose file exists, and the later ones whose files do not."""
+    failed: set[tuple[str, str]] = set()
+    later: set[tuple[str, str]] = set()
+    lost: set[tuple[str, str]] = set()
+    for row in reversed(found):
+        key = _key_of(row)
+        if row["decision"] == "failed":
+            failed.add(key)
+        if row["decision"] == "chosen" and key not in failed and row["video_key"]:
+            if store.exists(row["video_key"]):
+                return dict(row), lost
+            lost |= {key} - later  # unless it was assessed again since
+        later.add(key)
+    return None, lost
 
 
 def _assessed(found: Iterable[Row]) -> set[tuple[str, str]]:

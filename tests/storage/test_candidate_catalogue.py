@@ -193,6 +193,22 @@ def test_a_video_whose_file_is_gone_does_not_reign(store: Store) -> None:
     assert candidate_catalogue.champion(store, "APT") is None
 
 
+def test_a_choice_whose_file_was_removed_is_assessed_again(store: Store) -> None:
+    """Else no later night has a video to dance, and a worse one would win."""
+    kept = store.save("video", "clip.mp4", b"x")
+    chosen = {"decision": "chosen", "video_key": kept.key, "video_sha256": kept.sha256}
+    lost = {"decision": "chosen", "video_key": "video/gone/clip.mp4", "video_sha256": "0" * 64}
+    times = [NOW + timedelta(hours=hour) for hour in range(4)]
+    rows = [row("oldest", **lost), row("reigns", decided_at=times[1], **chosen)]
+    rows += [row("removed", decided_at=times[2], **lost), row("other", decided_at=times[2])]
+    candidate_catalogue.append(store, rows)
+    known = {("youtube", "oldest"), ("youtube", "reigns"), ("youtube", "other")}
+    assert candidate_catalogue.known(store, "APT") == known
+    again = row("removed", decision="rejected", decided_at=times[3])
+    candidate_catalogue.append(store, [again])  # it is not downloaded every night
+    assert candidate_catalogue.known(store, "APT") == known | {("youtube", "removed")}
+
+
 def test_a_video_that_failed_may_be_tried_again(store: Store) -> None:
     candidate_catalogue.append(
         store, [row("bad", decision="failed"), row("seen", decision="rejected")]
