@@ -106,6 +106,8 @@ def _address(value: str) -> str:
 
 def _store(value: str) -> str:
     scheme, colon, rest = value.partition("://")
+    if (rest or value).startswith("~"):
+        return "a shell expands ~ only outside of quotation marks; write the whole path"
     if not colon:
         return _folder(value)
     if scheme not in STORES:

@@ -17,7 +17,17 @@ BAD = {
     "ROBOJACKSON_CONFIGS": "/nothing",
     "XDG_CACHE_HOME": "/dev/null",
 }
-STORES = ("/dev/null", "/dev/null/x", "s3://", "evil://x", "/etc/passwd/x", "a\x1bb", "x" * 300)
+STORES = (
+    "~/store",
+    "file://~/store",
+    "/dev/null",
+    "/dev/null/x",
+    "s3://",
+    "evil://x",
+    "/etc/passwd/x",
+    "a\x1bb",
+    "x" * 300,
+)
 
 
 @pytest.mark.parametrize("name", BAD)
