@@ -10,6 +10,7 @@ from prefect.artifacts import acreate_table_artifact
 from prefect.logging import get_run_logger
 
 from configs.study_config import Study
+from robojackson.pipeline.run_names import slug_of
 from storage.artifact import Artifact
 from storage.store import Store
 from tasks.study_cell import Cell
@@ -25,7 +26,7 @@ class ProgressTable:
     """The state of every cell, shown on Prefect's pages under one key a study."""
 
     def __init__(self, study: Study, cells: list[Cell]) -> None:
-        self.key = f"ablation-{study.name.lower().replace('_', '-').replace('.', '-')}"
+        self.key = f"ablation-{slug_of(study.name)}"
         self._caption = f"Study {study.name}: {len(cells)} cells of {study.steps_label} steps"
         self._changed = asyncio.Event()
         self._begun = RUNNING if study.executor == "local" else ON_WORKERS

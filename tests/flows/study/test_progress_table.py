@@ -71,3 +71,10 @@ def test_a_server_that_is_away_fails_no_study(
     store_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert versions(monkeypatch, store_folder, away=True) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "key"), [("paper_v1.2", "ablation-paper-v1-2"), ("Tänze", "ablation-tanze")]
+)
+def test_the_key_has_the_letters_that_prefect_takes(name: str, key: str) -> None:
+    assert progress_table.ProgressTable(Study(name=name), []).key == key
