@@ -124,8 +124,8 @@ class _Watch:
         """Return the rate and survival of the training that runs."""
         if self.stage != "training":
             return ""
-        rows = [p for p in self._store.glob(TRAININGS) if p.stat().st_mtime > self._began_unix]
         try:
+            rows = [p for p in self._store.glob(TRAININGS) if p.stat().st_mtime > self._began_unix]
             row = json.loads(max(rows, key=lambda path: path.stat().st_mtime).read_text())
         except (OSError, ValueError):  # none yet, or it has just ended
             return ""

@@ -2,10 +2,13 @@
 
 import io
 import logging
+import threading
 from pathlib import Path
+from typing import Any
 
 import pytest
 from rich.console import Console
+from rich.progress import Progress, TaskID
 
 from flows.cli import dance_bar
 from tasks.train_policy import BUDGET
@@ -26,3 +29,14 @@ def test_on_a_terminal_it_says_what_training_gets_and_no_other_line(
     assert "training gets 2.6 of 6 min; dances of this length need about 10" in result.getvalue()
     assert "512 steps" not in result.getvalue()
     assert not any(isinstance(each, dance_bar._Budget) for each in log.handlers)
+
+
+def test_a_training_that_ends_while_it_is_looked_at_does_not_end_the_bar(tmp_path: Path) -> None:
+    class Store:
+        def glob(self, pattern: str) -> list[Path]:
+            return [tmp_path / "removed" / "progress.json"]
+
+    given: Any = (Progress(), TaskID(0), 1.0, Store(), threading.Event())
+    watch = dance_bar._Watch(*given)
+    watch.at("training")
+    assert watch._training() == ""
