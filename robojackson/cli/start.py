@@ -1,6 +1,7 @@
 """Start a command: nothing heavy is imported before Ctrl-C is guarded."""
 
 import atexit
+import io
 import os
 import sys
 import threading
@@ -33,11 +34,18 @@ def start(command: Callable[[], int]) -> NoReturn:
         sys.exit(1)
     quieten(os.environ)
     set_variables()
+    _replace_letters()
     if sys.platform == "linux":
         os.environ["MUJOCO_GL"] = os.environ.get("MUJOCO_GL") or "disable"
     end.code = guarded(lambda: _run(command))
     end.finish()
     sys.exit(end.code)
+
+
+def _replace_letters() -> None:
+    """Print `?` for a letter that the terminal's encoding has not, as in a locale of Latin-1."""
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")
 
 
 def _wait_for_threads() -> None:

@@ -37,6 +37,17 @@ def test_a_wrong_word_is_named_in_one_line(words: list[str], named: str, tmp_pat
     assert named in done.stderr
 
 
+@pytest.mark.parametrize(("encoding", "shown"), [("utf-8", "► 3"), ("iso-8859-1", "? 3")])
+def test_a_letter_that_the_terminal_has_not_ends_no_command(encoding: str, shown: str) -> None:
+    code = "from robojackson.cli.start import start; start(lambda: print('► 3') or 0)"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, check=False,
+        env=environment(PYTHONIOENCODING=encoding),
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert done.stdout.decode(encoding).strip() == shown
+
+
 def test_ctrl_c_while_the_command_is_imported_is_one_line() -> None:
     code = (
         "import signal, sys\n"
