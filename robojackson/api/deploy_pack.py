@@ -167,10 +167,11 @@ def _require_onboard(policy: Policy) -> None:
     """Refuse what a real robot cannot run.
 
     Raises:
-        BadPolicy: another mode, observation or law.
+        BadPolicy: another mode, observation or law, or feedback of the full state.
     """
-    law = policy.facts.get("control")
-    kind = law.get("law") if isinstance(law, Mapping) else ControlConfig().law
+    held = policy.facts.get("control")
+    law: Mapping[str, object] = held if isinstance(held, Mapping) else {}
+    kind = law.get("law", ControlConfig().law)
     if mode_of(policy) == "track" and observation_of(policy) != "onboard":
         raise BadPolicy(
             f"the policy takes {policy.observation_size} inputs of the full observation, which no "
@@ -180,6 +181,11 @@ def _require_onboard(policy: Policy) -> None:
         raise BadPolicy(
             f"a policy of mode {mode_of(policy)} and law {kind}: a deploy pack needs mode track, "
             "law pd and --set track.observation=onboard"
+        )
+    if law.get("feedback"):
+        raise BadPolicy(
+            "the policy was trained on the feedback along the reference, which needs the place and "
+            "the velocity that no real robot measures: train without track.control.feedback"
         )
 
 

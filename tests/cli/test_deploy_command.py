@@ -77,6 +77,15 @@ def test_another_mode_or_law_is_refused(folder: Path, facts: dict) -> None:
         export(folder / "other.safetensors", "deploy", folder / "pack")
 
 
+def test_a_policy_that_needs_the_feedback_of_the_full_state_is_refused(folder: Path) -> None:
+    """A pack cannot hold it: the robot would get another controller than the one evaluated."""
+    policy = random_policy(stock(), swaying(stock()))
+    control = {**policy.facts["control"], "feedback": 1.0}  # type: ignore[dict-item]
+    Policy(policy.layers, {**policy.facts, "control": control}).save(folder / "fed.safetensors")
+    with pytest.raises(BadPolicy, match=r"without track\.control\.feedback"):
+        export(folder / "fed.safetensors", "deploy", folder / "pack")
+
+
 def test_another_motion_than_the_policys_is_refused(folder: Path) -> None:
     swaying(stock(), cyclic=False).save(folder / "reference.parquet")
     with pytest.raises(BadPolicy, match=r"is not the motion .* give it with --reference"):
