@@ -88,9 +88,9 @@ class Batch:
             before: Targets of the previous control step, which a delayed robot still follows.
         """
         live = [(*self._robots[i], i) for i in np.flatnonzero(active)]
-        step = mujoco.mj_step
+        step, late = mujoco.mj_step, self._law == "torque" and self._delay is not None
         for substep in range(self._substeps):
-            if substep == 0 or self._law == "pd":
+            if substep == 0 or self._law == "pd" or late:
                 controls = self.controls(self._followed(targets, before, substep))
             for model, data, ctrl, i in live:
                 ctrl[:] = controls[i]

@@ -102,7 +102,7 @@ class Simulation:
         residual: Radians that a full action moves each motor's target.
         actuation: Nominal gains and action scale, as written into a policy's file.
         qpos, qvel: State of every copy after the last `step` or `place`.
-        previous: Targets of the previous control step.
+        previous: Targets of the previous control step; at first the own angles, or no torque.
         count, push_at: Counters of the disturbances (`Disturbances`).
         broken: Copies whose state diverged since they were placed, so that MuJoCo reset them.
         points: Positions of the keypoint sites, world, in step with `qpos`.
@@ -166,7 +166,8 @@ class Simulation:
             data.qpos[:], data.qvel[:] = qpos[row], qvel[row]
             mujoco.mj_forward(self._models[i], data)
             self.com[i] = centre_of_mass(self.model, data)
-            self.previous[i] = data.qpos[7:][self.motors.hinge]
+            angles = data.qpos[7:][self.motors.hinge]
+            self.previous[i] = 0.0 if self.control.law == "torque" else angles
         self._gather(indices)
 
     def step(

@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -71,6 +72,25 @@ def test_an_action_that_comes_a_control_step_late_is_the_one_before(robot: Robot
         late.step(now)
         prompt.step(before)
         np.testing.assert_allclose(late.qpos, prompt.qpos, atol=1e-12)
+
+
+@pytest.mark.parametrize("late", [1, 3])
+def test_a_torque_that_comes_some_substeps_late_begins_there(late: int, robot: Robot) -> None:
+    """Not a whole control step late, and after no torque, not one that is an angle."""
+    control, substep_s = ControlConfig(law="torque"), float(robot.model.opt.timestep)
+    sim = Simulation(robot, control, 1, delay_s=late * substep_s)
+    qpos, model = robot.standing[None], robot.model
+    sim.place(np.zeros(1, int), qpos, np.zeros((1, model.nv)))
+    rng, before, data = np.random.default_rng(0), np.zeros(model.nu), mujoco.MjData(model)
+    data.qpos[:] = qpos
+    mujoco.mj_forward(model, data)
+    for torque in rng.uniform(-0.3, 0.3, (3, model.nu)):
+        sim.step(torque[None])
+        for substep in range(sim.control.substeps or 1):
+            data.ctrl[:] = before if substep < late else torque
+            mujoco.mj_step(model, data)
+        before = torque
+        np.testing.assert_allclose(sim.qpos[0], data.qpos, atol=1e-12)
 
 
 def test_noise_is_within_its_bounds_and_the_same_within_a_step(robot: Robot) -> None:
