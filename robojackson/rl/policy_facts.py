@@ -67,6 +67,8 @@ def policy_control(policy: Policy, robot: Robot) -> ControlConfig:
         control = replace(control, feedback=0.0)
     if control.feedback_path is None:  # trained before there was a choice
         control = replace(control, feedback_path="reference")
+    if control.action_factor is None:  # trained before there was one: pushes must not change it
+        control = replace(control, action_factor=1.0)
     _require_same_actuation(policy, robot, control)
     return control
 

@@ -134,8 +134,9 @@ def _evaluate_case(
     case: Case,
 ) -> dict[str, float]:
     """Return means over the rollouts of a case; the driver's gains are the varied robot's."""
-    other = varied(robot, case.variation)
-    driver = replace(driver, control=replace(driver.control, substeps=other.substeps))
+    other, law, factor = varied(robot, case.variation), driver.control, case.variation.gains
+    stiffness = None if law.stiffness is None else factor * law.stiffness
+    driver = replace(driver, control=replace(law, substeps=other.substeps, stiffness=stiffness))
     starts, labels = starts_of(robot, clip, config)
     horizon = clip.horizon(starts.step, config.seconds)
     done = roll_out(

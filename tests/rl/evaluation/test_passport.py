@@ -1,5 +1,7 @@
 """The passport: one line a case, each of which changes what it says."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,8 +9,9 @@ from robojackson.cli.passport_text import passport_lines
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.pipeline.yaml_loader import load
 from robojackson.report.pages.evaluation_text import passport_rows
-from robojackson.rl.config.train_config import EvaluateConfig, TrainConfig
+from robojackson.rl.config.train_config import EvaluateConfig, RandomConfig, TrainConfig
 from robojackson.rl.evaluation import passport as passport_module
+from robojackson.rl.evaluation.controllers import control_of, trained_driver
 from robojackson.rl.evaluation.passport import (
     FIGURES,
     LEAST_SHARE,
@@ -21,7 +24,10 @@ from robojackson.rl.evaluation.passport import (
 from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
 from robojackson.rl.modes.observation import Observer
 from robojackson.rl.policy import Policy
-from robojackson.robot.model import Robot
+from robojackson.rl.sim.feedforward import lead_of
+from robojackson.rl.sim.reference_clip import Clip
+from robojackson.rl.sim.simulation import Simulation
+from robojackson.robot.model import Robot, load_robot
 
 BRIEF = EvaluateConfig(seconds=0.3, phases=2, resets=1, passport=True)
 
@@ -110,6 +116,34 @@ def test_slippery_floor_and_late_actions_change_the_outcome(
     same = [case for case, error in rows.items() if error == nominal]
     # The robot's own integrator, and pushes that come after a second.
     assert same == ["integrator RK4", "pushes every 1 to 3 s"]
+
+
+def test_other_gains_reach_a_policy_with_gains_of_its_own(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    """Gains of `track.control.stiffness` were the same in every case."""
+    control = {"law": "pd", "stiffness": 4.0, "feedback": 0.0, "action_factor": 1.0}
+    policy = Policy(idle(robot).layers, {"robot": "humanoid", "control": control})
+    driver, config = trained_driver(policy, robot, sway), EvaluateConfig(seconds=0.3, phases=1)
+    clip = Clip(sway, lead_of(robot, sway, driver.control))
+    chosen = [case for case in cases(robot, 0) if case.name in (NOMINAL, "gains x 0.8")]
+    errors = [
+        passport_module._evaluate_case(driver, clip, sway, robot, config, case)["site_error_m"]
+        for case in chosen
+    ]
+    softer = replace(driver, control=replace(driver.control, stiffness=3.2))
+    nominal = passport_module._evaluate_case(softer, clip, sway, robot, config, chosen[0])
+    assert errors[0] != errors[1] == nominal["site_error_m"]
+
+
+def test_pushes_do_not_change_what_an_older_policys_actions_are(robot: Robot) -> None:
+    """Its file has no factor: it would act four times as strongly where the passport pushes."""
+    stronger = load_robot(replace(robot.description, robust_action_factor=4.0))
+    control = control_of(idle(stronger), stronger)
+    pushed, calm = (
+        Simulation(stronger, control, 1, random=RandomConfig(pushes=pushes)) for pushes in (1, 0)
+    )
+    np.testing.assert_array_equal(pushed.residual, calm.residual)
 
 
 def test_train_robust_disturbs_what_the_passport_tests() -> None:
