@@ -86,7 +86,7 @@ class Performance:
     def _run(self, i: int, seed: int) -> RunRow:
         parts, length = self.programme.parts, max(1, int(self.length[i]))
         dances = [part for part in parts if part.is_dance]
-        danced = sum(int(self._shown(i, part).sum()) for part in dances)
+        danced = sum(self._shown(i, part) for part in dances)
         whole = sum(part.danced[1] - part.danced[0] for part in dances)
         last = self.step[length - 1, i]
         where = next(part.name for part in parts if last < part.end)
@@ -133,10 +133,11 @@ class Performance:
         """Return the steps at which a run is in a part that it has not abandoned."""
         return np.asarray(self._steps_of(i, part) & ~self.waits[: self.length[i], i])
 
-    def _shown(self, i: int, part: Part) -> Bool[np.ndarray, " L"]:
+    def _shown(self, i: int, part: Part) -> int:
+        """Return how many steps of a dance a run showed; one that it repeated counts once."""
         step = self.step[: self.length[i], i]
         shows = (step >= part.danced[0]) & (step < part.danced[1])
-        return np.asarray(shows & self._within(i, part))
+        return len(np.unique(step[shows & self._within(i, part)]))
 
     def _error(self, i: int, when: Bool[np.ndarray, " L"]) -> float:
         motion, rows = self.programme.motion, np.flatnonzero(when)

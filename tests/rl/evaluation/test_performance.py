@@ -12,6 +12,7 @@ from robojackson.rl.config.performance_config import PerformanceConfig
 from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.evaluation.foresight import ASIDE_M_S, JUMPS_S, Foresight
 from robojackson.rl.evaluation.performance import perform
+from robojackson.rl.evaluation.performance_record import Performance
 from robojackson.rl.evaluation.performers import Moment, Performers, Stage
 from robojackson.rl.sim.motors import Motors
 from robojackson.rl.sim.reference_clip import Clip
@@ -102,6 +103,21 @@ def test_who_is_not_pushed_and_does_not_fall_finishes_and_has_danced_all(robot: 
     assert row["danced_share"] == 1.0
     assert [part["whole"] for part in done.parts()] == [1, 1, 1]
     assert 0.0 < float(row["mpjpe_l_m"]) < 0.1  # type: ignore[arg-type]
+
+
+def test_a_step_that_is_danced_twice_counts_once(robot: Robot) -> None:
+    """A robot that went back half a second had danced more than all of the dance."""
+    plan = programme()
+    step = np.concatenate([np.arange(30), np.arange(25, 35), np.arange(40, STEPS)])
+    count = len(step)
+    states = np.asarray(plan.motion.qpos)[step][:, None]
+    points = np.asarray(plan.motion.keypoints_w)[step][:, None]
+    done = Performance(
+        plan, np.array([count]), np.zeros(1, bool), step[:, None], np.zeros((count, 1), bool),
+        states, points, states[..., :3], np.zeros(1, int), ((),),
+    )  # fmt: skip
+    (row,) = done.runs(0)
+    assert row["danced_share"] == 15 / 20
 
 
 def test_a_robot_that_gives_up_waits_and_goes_on_when_it_is_calm() -> None:
