@@ -45,12 +45,14 @@ class _Pair:
     """The same moments before both cameras.
 
     Attributes:
-        visibility: Visibility, 0..1, zero where a camera has no frame.
+        points: Landmarks before each camera, metres.
         visibility: 0..1, zero where a camera has no frame.
+        valid: Whether a person was detected in either camera.
     """
 
     points: tuple[np.ndarray, np.ndarray]
     visibility: tuple[np.ndarray, np.ndarray]
+    valid: np.ndarray
 
     @property
     def rays(self) -> tuple[np.ndarray, np.ndarray]:
@@ -102,7 +104,9 @@ def _recovered(
         views[0],
         points=_fused(camera, pair),
         depth_m=np.where(both, TRIANGULATED_SD_M, alone),
-        landmarks=replace(views[0].landmarks, visibility=np.maximum(*pair.visibility)),
+        landmarks=replace(
+            views[0].landmarks, visibility=np.maximum(*pair.visibility), valid=pair.valid
+        ),
         pinhole=replace(pinhole, focal_px=pinhole.focal_px * camera.focal[0]),
         ground=None,  # without a scene, balance of triangulated points: 2.8 degrees, network 4.0
     )
@@ -163,9 +167,11 @@ def _together(one: View, two: View, began: float) -> _Pair:
     places = (times - began) * two.track.fps
     inside = (places >= 0.0) & (places <= len(two.points) - 1)
     visibility = resample(two.landmarks.visibility, places) * inside[:, None]
+    detected = inside & (resample(two.landmarks.valid.astype(float), places) > 1.0 - 1e-9)
     return _Pair(
         (one.in_image(), resample(two.in_image(), places)),
         (one.landmarks.visibility, visibility),
+        one.landmarks.valid | detected,
     )
 
 

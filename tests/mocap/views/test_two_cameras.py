@@ -57,6 +57,15 @@ def filmed(points: np.ndarray, like: LandmarkTrack) -> LandmarkTrack:
     )
 
 
+def hidden(track: LandmarkTrack, *parts: slice) -> LandmarkTrack:
+    """Return a track that has no person in some frames."""
+    found = {n: np.array(getattr(track, n)) for n in ("landmarks", "world_landmarks", "visibility")}
+    for array in found.values():
+        for part in parts:
+            array[part] = np.nan
+    return replace(track, **found)
+
+
 def off(joints: np.ndarray, truth: np.ndarray) -> float:
     from robojackson.metrics.pose_error import pa_mpjpe
 
@@ -149,8 +158,26 @@ def test_weak_frames_of_the_first_camera_are_left_out_on_request(
         recover_together(first, second, MocapConfig(leave_out_weak=leave_out))
         for leave_out in (False, True)
     ]
-    assert found[0].valid[40:46].all()
-    assert not found[1].valid[40:46].any()
+    noted = [any("left out" in note for note in motion.notes) for motion in found]
+    assert noted == [False, True]
+    for motion in found:  # the second camera sees what was left out of the first
+        assert motion.valid.all()
+        assert not any("interpolated" in note for note in motion.notes)
+
+
+@pytest.mark.medium
+def test_a_frame_is_filled_in_where_neither_camera_sees_the_person(
+    dancer: np.ndarray, hip_shake: LandmarkTrack
+) -> None:
+    plain = replace(MocapConfig(), temporal=replace(MocapConfig().temporal, enabled=False))
+    first, second = filmed(dancer, hip_shake), filmed(second_frame(dancer)[15:], hip_shake)
+    first = hidden(first, slice(5, 8), slice(40, 46), slice(60, 66))
+    second = hidden(second, slice(60 - 15, 66 - 15))
+    found = recover_together(first, second, plain, 15 / hip_shake.fps)
+    missing = np.flatnonzero(~found.valid)
+    assert set(range(5, 8)) | set(range(60, 66)) <= set(missing.tolist())
+    assert set(missing.tolist()) <= set(range(5, 8)) | set(range(59, 67))
+    assert (found.confidence[40:46] > 0).any(1).all()
 
 
 @pytest.mark.medium
