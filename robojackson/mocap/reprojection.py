@@ -81,8 +81,12 @@ def reprojection_error(
 def weak_frames(sequence: SmplSequence, track: LandmarkTrack) -> np.ndarray:
     """Return the frames with a detected person whose body is far off the picture."""
     error = reprojection_error(sequence, track)
-    off = np.zeros(len(sequence), bool) if error is None else np.nan_to_num(error) > OFF_M
-    return np.asarray(off & np.asarray(sequence.valid, bool))
+    return np.zeros(len(sequence), bool) if error is None else _off(error, sequence)
+
+
+def _off(error: Float[np.ndarray, " T"], sequence: SmplSequence) -> Bool[np.ndarray, " T"]:
+    """Return the frames with a detected person whose error is too large."""
+    return np.asarray((np.nan_to_num(error) > OFF_M) & np.asarray(sequence.valid, bool))
 
 
 def reprojection_record(sequence: SmplSequence, track: LandmarkTrack) -> dict[str, object]:
@@ -91,7 +95,7 @@ def reprojection_record(sequence: SmplSequence, track: LandmarkTrack) -> dict[st
     error = reprojection_error(sequence, track)
     if error is None or np.isnan(error).all():
         return {}
-    weak = stretches(weak_frames(sequence, track))
+    weak = stretches(_off(error, sequence))
     filled = stretches(~np.asarray(sequence.valid, bool))
     return {
         "reprojection": {
