@@ -73,9 +73,6 @@ class PathSearch:
         rule: What the keypoints of the robots must keep.
         reference: The motion as a path.
         rng: Draws the offsets.
-
-    Attributes:
-        breadth: Factor on the number of robots, and, by its root, on their offsets.
     """
 
     def __init__(
@@ -91,10 +88,18 @@ class PathSearch:
         self._reference, self._rng, self._rule = reference, rng, rule
         self._points = rule.points(reference.qpos)
         self._places = feet.places(reference.qpos)
-        self.breadth = 1
+        self._breadth = 1
 
-    def run(self, path: Path, law: Recursion, begin: int) -> tuple[Path, bool]:
-        """Return a simulated path from a step of another on, and whether it reaches the end."""
+    def run(self, path: Path, law: Recursion, begin: int, breadth: int = 1) -> tuple[Path, bool]:
+        """Return a simulated path from a step of another on, and whether it reaches the end.
+
+        Args:
+            path: What is followed.
+            law: The regulator along it.
+            begin: Step from which it is simulated.
+            breadth: Factor on the number of robots, and, by its root, on their offsets.
+        """
+        self._breadth = breadth
         rows = np.zeros(KEPT, int)
         none = np.zeros((1, len(self._action)))
         first = _Beam(path.qpos[[begin]], path.qvel[[begin]], none, np.zeros((1, 2)), np.zeros(1))
@@ -132,7 +137,7 @@ class PathSearch:
         steps: int,
     ) -> tuple[_Beam, _Window]:
         rng, action = self._rng, self._action
-        more = self.breadth * SAMPLES - KEPT
+        more = self._breadth * SAMPLES - KEPT
         parent = np.concatenate([np.arange(KEPT), rng.integers(0, KEPT, more)])
         now = beam.of(parent)
         aim = self._offsets(now, law.gain[t + steps // 2])
@@ -167,7 +172,7 @@ class PathSearch:
     def _offsets(self, beam: _Beam, gain: Float[np.ndarray, "nu X"]) -> Float[np.ndarray, "N nu"]:
         """Draw the offsets of a window; the first robots have none."""
         rng, (n, motors) = self._rng, beam.offset.shape
-        scale = np.sqrt(self.breadth) * rng.choice(OFFSET_SCALES, (n, 1))
+        scale = np.sqrt(self._breadth) * rng.choice(OFFSET_SCALES, (n, 1))
         moved = rng.random((n, motors)) < rng.choice(OFFSET_SHARES, (n, 1))
         offset = scale * self._action * rng.normal(size=(n, motors)) * moved
         along: Bool[np.ndarray, " N"] = np.less(rng.random(n), ALONG)

@@ -92,8 +92,7 @@ def _searched(
     """Return a path that was searched from a motion's, and the system along it."""
     begin, furthest, stalls = 0, 0, 0
     for _ in range(PASSES + round(PASSES_A_S * len(path) * dt)):
-        search.breadth = 1 + stalls
-        found, ended = search.run(path, riccati(linear, action, False), begin)
+        found, ended = search.run(path, riccati(linear, action, False), begin, 1 + stalls)
         end = begin + len(found) - 1
         stalls = 0 if end > furthest + ADVANCE_S / dt else stalls + 1
         furthest = max(furthest, end)

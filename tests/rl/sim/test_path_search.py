@@ -151,11 +151,11 @@ class Falls:
     """A search whose robots always fall after so many steps, wherever they begin."""
 
     def __init__(self, reach: int) -> None:
-        self.reach, self.breadth, self.tried = reach, 1, list[tuple[int, int]]()
+        self.reach, self.tried = reach, list[tuple[int, int]]()
 
-    def run(self, path: Path, law: object, begin: int) -> tuple[Path, bool]:
+    def run(self, path: Path, law: object, begin: int, breadth: int) -> tuple[Path, bool]:
         """Return the path up to the fall."""
-        self.tried.append((begin, self.breadth))
+        self.tried.append((begin, breadth))
         rows = slice(begin, min(self.reach, len(path)))
         return Path(path.qpos[rows], path.qvel[rows], path.targets[rows]), False
 
