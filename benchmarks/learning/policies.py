@@ -187,7 +187,7 @@ def reference_of(name: str, folders: Folders) -> Path:
     move, work = MOVES[name], folders.work / name
     name = move.same_as or name
     reference = work / "reference.parquet"
-    if (work / "gate.json").is_file():
+    if (work / "gate.json").is_file() and reference.is_file():
         require_frozen(name, reference)
         return reference
     frozen = FROZEN / f"{name}.parquet"
