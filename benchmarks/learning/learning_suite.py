@@ -24,9 +24,9 @@ from rich.table import Table
 from benchmarks.learning import checkpoint_cost, races, training_rows
 from benchmarks.learning import speed as learning_speed
 from benchmarks.learning.error_line import errors_in_one_line
-from benchmarks.learning.g1_rows_table import update_document
 from benchmarks.learning.policies import TRAINED, Folders
-from benchmarks.learning.row_bars import LIMBS, USUAL
+from benchmarks.learning.rows.g1_rows_table import update_document
+from benchmarks.learning.rows.row_bars import LIMBS, USUAL
 from benchmarks.learning.summary import AUTHORS_ROBOT, COLUMNS, summary
 
 PARTS = ("speed", "threads", "policies", "survival", "pretraining", "checkpoints", "table")

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.learning.policies import TRAINED, Folders, Move, forced
-from benchmarks.learning.row_bars import LIMBS, bars
-from benchmarks.learning.row_references import standing
+from benchmarks.learning.rows.row_bars import LIMBS, bars
+from benchmarks.learning.rows.row_references import standing
 from robojackson.files import tables
 from robojackson.metrics.seed_statistics import estimate
 from robojackson.pipeline.table_schemas import EVALUATION_RECORD

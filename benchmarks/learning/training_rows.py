@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from queue import SimpleQueue
 
 from benchmarks.learning.policies import MOVES, Folders, budget, must, reference_of, source_of
-from benchmarks.learning.row_references import record_reference
+from benchmarks.learning.rows.row_references import record_reference
 
 STEPS_A_MINUTE = 50_000
 """Control steps that a CPU minute of one core is worth."""

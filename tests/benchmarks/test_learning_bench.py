@@ -8,7 +8,7 @@ import pytest
 from benchmarks.learning import learning_suite, policies, races, tracker_rows, training_rows
 from benchmarks.learning.error_line import errors_in_one_line
 from benchmarks.learning.policies import MOVES, Folders, source_of
-from benchmarks.learning.row_bars import LIMBS, bars
+from benchmarks.learning.rows.row_bars import LIMBS, bars
 from benchmarks.learning.summary import cluster_interval, line, summary
 from benchmarks.learning.training_curve import area, first_at
 from tests.fixtures.row_rollouts import rollouts

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from benchmarks.learning import training_rows
-from benchmarks.learning.g1_rows_table import BEGIN, DOCUMENT, END, g1_rows_table, written_into
 from benchmarks.learning.policies import FROZEN, Folders
-from benchmarks.learning.row_references import record_reference, recorded, standing
+from benchmarks.learning.rows.g1_rows_table import BEGIN, DOCUMENT, END, g1_rows_table, written_into
+from benchmarks.learning.rows.row_references import record_reference, recorded, standing
 from benchmarks.learning.split import load_split
 
 HERE = Folders.at(None)

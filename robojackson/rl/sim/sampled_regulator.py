@@ -19,7 +19,7 @@ from robojackson.rl.sim.regulator import (
     riccati,
 )
 from robojackson.rl.sim.simulation import Simulation
-from robojackson.rl.sim.standing_feet import Feet
+from robojackson.rl.sim.standing_feet import LOW_M, Feet
 from robojackson.robot.model import Robot
 
 PASSES, PASSES_A_S = 6, 2.0
@@ -158,6 +158,9 @@ def settings() -> list[float]:
         AGAIN_S,
         CYCLES_S,
         ENOUGH,
+        TRIES,
+        TRIED_S,
+        LOW_M,
         *path_search.settings(),
         *path_trial.settings(),
     ]

@@ -1,7 +1,7 @@
 """What five CPU-minutes of training on the feedback give, beside the full time with the same seeds.
 
     python -m benchmarks.learning.learning_suite policies --cpu-minutes 5 --by-steps --moves M ...
-    python -m benchmarks.learning.polish_rows [--folder F]
+    python -m benchmarks.learning.rows.polish_rows [--folder F]
 
 The bars are those that the full time has. Differences are paired: a seed is one sample. The second
 command reads kept rows, writes `benchmarks/results/learning_polish.json`, and replaces the table of
@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.learning.g1_rows_table import DOCUMENT, markdown_line, written_between
 from benchmarks.learning.policies import HORIZONS_S, MOVES, Folders
-from benchmarks.learning.row_references import recorded
+from benchmarks.learning.rows.g1_rows_table import DOCUMENT, markdown_line, written_between
+from benchmarks.learning.rows.row_references import recorded
 from benchmarks.learning.summary import Rows, line, mean, of_policy, read_rows
 from robojackson.metrics.seed_statistics import estimate
 
@@ -115,7 +115,7 @@ def main() -> None:
     folder = parser.parse_args().folder
     folders = Folders.at(folder)
     rows = polish_rows(folders)
-    held = {"command": "python -m benchmarks.learning.polish_rows", "rows": rows}
+    held = {"command": "python -m benchmarks.learning.rows.polish_rows", "rows": rows}
     (folders.results / "learning_polish.json").write_text(json.dumps(held, indent=1) + "\n")
     table = polish_table(rows)
     if folder is None:

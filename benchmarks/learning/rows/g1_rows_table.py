@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.learning.policies import MOVES, ROOT
-from benchmarks.learning.row_bars import FEET, HANDS
-from benchmarks.learning.row_references import OLDER
+from benchmarks.learning.rows.row_bars import FEET, HANDS
+from benchmarks.learning.rows.row_references import OLDER
 
 DOCUMENT = ROOT / "docs" / "benchmarks_learning.md"
 BEGIN, END = "<!-- G1 rows: begin -->", "<!-- G1 rows: end -->"
