@@ -68,7 +68,7 @@ class Run:
             return
         with checkpoint_folder.restoring(folder):
             state = json.loads((folder / "run.json").read_text())
-            if state["configuration"] != self._identity():
+            if self.task.completing(state["configuration"]) != self._identity():
                 raise BadConfiguration(
                     f"{folder} belongs to another configuration, reference motion or robot; "
                     "remove it or choose another folder"

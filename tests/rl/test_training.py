@@ -192,6 +192,30 @@ def test_a_checkpoint_of_another_configuration_is_refused(
 
 
 @pytest.mark.medium
+def test_a_robot_whose_yaml_was_changed_between_two_sittings_is_refused(
+    trained: tuple, robot: Robot, sway: ReferenceMotion
+) -> None:
+    """Its model is the same file; the gains are not."""
+    result, _, _, name = trained
+    softer = dataclasses.replace(robot.description, stiffness={".*": 20.0})
+    with pytest.raises(BadConfiguration, match="another configuration"):
+        run(dataclasses.replace(robot, description=softer), sway, brief(name), result.policy.parent)
+
+
+@pytest.mark.medium
+def test_a_checkpoint_from_before_the_yaml_was_kept_is_continued(
+    trained: tuple, robot: Robot, sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    result, _, _, name = trained
+    shutil.copytree(result.policy.parent, tmp_path / "out")
+    (kept,) = (tmp_path / "out").glob("checkpoint*/run.json")
+    state = json.loads(kept.read_text())
+    del state["configuration"]["task"]["description_sha256"]
+    kept.write_text(json.dumps(state))
+    assert run(robot, sway, brief(name), tmp_path / "out").steps == result.steps
+
+
+@pytest.mark.medium
 @pytest.mark.parametrize("part", ["run.json", "networks.*", "environment.npz"])
 def test_a_damaged_checkpoint_is_refused_by_its_name(
     trained: tuple, robot: Robot, sway: ReferenceMotion, tmp_path: Path, part: str
