@@ -112,6 +112,7 @@ def test_the_table_has_a_line_a_move_and_setup_and_what_the_statue_does(folder: 
     assert float(found["walk", "statue"]["return_own"]) == pytest.approx(0.5)
     assert float(found["walk", "statue"]["survived_s"]) == pytest.approx(0.7)
     assert float(found["walk", "statue"]["stand_s"]) == pytest.approx(0.9)
+    assert found["walk", "statue"]["survived_s_low"] == "", "a baseline has no interval"
 
 
 @pytest.mark.medium

@@ -51,6 +51,7 @@ def to_csv(lines: Sequence[Line]) -> bytes:
     rows.writerow(["move", "setup", "seeds", *parts])
     for line in lines:
         found = [line.values.get(name) for name in FIGURES]
-        flat = [v for e in found for v in ((e.mean, e.low, e.high) if e else ("", "", ""))]
-        rows.writerow([line.move, line.setup, line.seeds, *flat])
+        flat = [v for e in found for v in ((e.mean, e.low, e.high) if e else (np.nan,) * 3)]
+        cells = ["" if np.isnan(value) else value for value in flat]
+        rows.writerow([line.move, line.setup, line.seeds, *cells])
     return out.getvalue().encode()
