@@ -54,3 +54,15 @@ def test_a_range_beyond_the_video_is_one_line(tmp_path: Path) -> None:
     ):
         pass
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.medium
+def test_a_range_of_one_frame_names_the_video_and_the_range(tmp_path: Path) -> None:
+    with (
+        pytest.raises(
+            BadConfiguration, match=r"walk\.mp4: 1 frame from 1 s to 1\.02 s, at least 2"
+        ),
+        video_range(CLIP, None, tmp_path / "out", (1.0, 1.02), "base", {}),
+    ):
+        pass
+    assert not (tmp_path / "out").exists()
