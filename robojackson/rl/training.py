@@ -9,6 +9,7 @@ the caller writes the tables.
 import logging
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from robojackson.errors import BadConfiguration, BadPolicy
@@ -17,13 +18,14 @@ from robojackson.rl.config.tqc_config import PRESETS
 from robojackson.rl.config.train_config import TqcConfig, TrainConfig
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.env.vec_env import TrackingVecEnv
+from robojackson.rl.evaluation.polish_choice import better_of
 from robojackson.rl.modes.track_mode import control_of
 from robojackson.rl.pretrained import pretrained
 from robojackson.rl.sim.motors import feedback_path, feedback_share
 from robojackson.rl.sim.sampled_regulator import ENOUGH
 from robojackson.rl.tqc.network_arrays import Networks, chosen, fitted
 from robojackson.rl.tqc.trainers import make_trainer
-from robojackson.rl.training_hooks import BudgetSpent, Hooks
+from robojackson.rl.training_hooks import BudgetSpent, Choice, Hooks, as_trained
 from robojackson.rl.training_run import Run
 from robojackson.rl.training_task import Task, TrainResult
 from robojackson.robot.model import Robot
@@ -72,10 +74,23 @@ def train_policy(
         if not run.finished():
             trainer.learn(run.callback)
     except BudgetSpent:
-        run.checkpoint()
+        run.checkpoint(_choice(tqc, reference, robot, core))
     finally:
         env.close()
     return run.result()
+
+
+def _choice(
+    tqc: TqcConfig,
+    reference: ReferenceMotion | Sequence[ReferenceMotion],
+    robot: Robot,
+    core: TrackingCore,
+) -> Choice:
+    """Return what a polish is written by: the policy or, if that holds more, the feedback alone."""
+    motions, threads = motions_of(reference), core.config.threads
+    if not tqc.zero_init or len(motions) > 1:
+        return as_trained
+    return partial(better_of, reference=motions[0], robot=robot, clip=core.clip, threads=threads)
 
 
 def residual_learning(

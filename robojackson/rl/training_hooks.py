@@ -4,8 +4,16 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from robojackson.rl.modes.rewards import RewardFunction
+from robojackson.rl.policy import Policy
 
 Row = dict[str, float]
+Choice = Callable[[Policy], Policy]
+"""Makes the policy that is written from the one that was trained."""
+
+
+def as_trained(policy: Policy) -> Policy:
+    """Return a policy as it is."""
+    return policy
 
 
 class BudgetSpent(Exception):

@@ -26,7 +26,7 @@ from robojackson.rl.tqc.actor_average import ActorAverage
 from robojackson.rl.tqc.network_arrays import Networks, Tensors
 from robojackson.rl.tqc.trainer import Trainer
 from robojackson.rl.training_budget import TrainingBudget
-from robojackson.rl.training_hooks import BudgetSpent, Hooks, Row
+from robojackson.rl.training_hooks import BudgetSpent, Choice, Hooks, Row, as_trained
 from robojackson.rl.training_task import Task, TrainResult
 
 log = logging.getLogger(__name__)
@@ -125,8 +125,8 @@ class Run:
             self.checkpoint()
             self._saved = time.monotonic()
 
-    def checkpoint(self) -> None:
-        """Write the policy and everything needed to continue, whole or not at all.
+    def checkpoint(self, choice: Choice = as_trained) -> None:
+        """Write the chosen policy and everything needed to continue, whole or not at all.
 
         Raises:
             TrainingDiverged: weights are not finite; nothing is written.
@@ -135,7 +135,7 @@ class Run:
         networks = self.trainer.networks()
         self._require_finite(networks.values())
         self._hooks.saving()
-        write_checkpoint(self.out, self._save, self._results(networks))
+        write_checkpoint(self.out, self._save, self._results(networks, choice))
         self.trainer.saved()
 
     def result(self) -> TrainResult:
@@ -173,12 +173,12 @@ class Run:
             "random": self.core.rng.bit_generator.state,
         }
 
-    def _results(self, networks: Tensors) -> dict[str, bytes]:
+    def _results(self, networks: Tensors, choice: Choice) -> dict[str, bytes]:
         """Return the policy, and the networks that other trainings can start from."""
         facts = self._facts()
         layers = self._average.layers(self.trainer.layers(), self.trainer.updates())
         return {
-            "policy.safetensors": Policy(layers, facts).to_bytes(),
+            "policy.safetensors": choice(Policy(layers, facts)).to_bytes(),
             "networks.safetensors": Networks(networks, facts).to_bytes(),
         }
 

@@ -13,6 +13,7 @@ import pytest
 
 from robojackson.errors import BadConfiguration, BadPolicy, StoreError, TrainingDiverged
 from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.rl import training
 from robojackson.rl.config.train_config import (
     EvaluateConfig,
     PaperConfig,
@@ -179,6 +180,25 @@ def test_a_finished_run_given_more_steps_goes_on(
     assert longer.updates > result.updates
     assert rows[0]["episode"] == len(episodes) + 1
     assert rows[0]["step"] > 320
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize("polish", [True, False])
+def test_a_polish_is_written_by_what_was_chosen_and_no_other_training(
+    robot: Robot,
+    sway: ReferenceMotion,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    polish: bool,
+) -> None:
+    def marked(policy: Policy, **given: object) -> Policy:
+        return dataclasses.replace(policy, facts={**policy.facts, "chosen": sorted(given)})
+
+    monkeypatch.setattr(training, "better_of", marked)
+    config = brief("sbx")
+    config = dataclasses.replace(config, tqc=dataclasses.replace(config.tqc, zero_init=polish))
+    found = load_policy(run(robot, sway, config, tmp_path).policy).facts.get("chosen")
+    assert found == (["clip", "reference", "robot", "threads"] if polish else None)
 
 
 @pytest.mark.medium

@@ -1,0 +1,76 @@
+"""What a polish is written by: the policy, or the feedback alone where that holds more starts."""
+
+import dataclasses
+import logging
+
+import numpy as np
+import pytest
+
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.rl.config.train_config import ControlConfig
+from robojackson.rl.evaluation import polish_choice
+from robojackson.rl.evaluation.rollouts import Driver, Rollouts, Starts
+from robojackson.rl.policy import Policy
+from robojackson.rl.sim.reference_clip import Clip
+from robojackson.robot.model import Robot
+
+CONTROL = ControlConfig()
+STARTS = 49
+
+
+def chosen(
+    robot: Robot,
+    sway: ReferenceMotion,
+    monkeypatch: pytest.MonkeyPatch,
+    lost: dict[str, int],
+) -> Policy:
+    """Return what is taken where so many of the starts of each driver end with a fall."""
+    found = {name: Driver(CONTROL, lambda *_, name=name: np.array(name)) for name in lost}
+    count = {id(found[name]): number for name, number in lost.items()}
+
+    def danced(
+        robot: Robot, clip: Clip, driver: Driver, starts: Starts, horizon: np.ndarray, *_: object
+    ) -> Rollouts:
+        steps, robots = int(horizon.max()), len(starts.step)
+        at = clip.at((starts.step[None] + np.arange(1, steps + 1)[:, None]).ravel())
+        qpos, points = (a.reshape(steps, robots, *a.shape[1:]) for a in (at.qpos, at.points))
+        fell = np.arange(robots) < count[id(driver)]
+        return Rollouts(horizon - fell, fell, horizon, qpos, points, points, qpos, {})
+
+    monkeypatch.setattr(polish_choice, "drivers", lambda *given: found)
+    monkeypatch.setattr(polish_choice, "roll_out", danced)
+    layers = ((np.ones((3, 2)), np.ones(2)), (np.ones((2, 2)), np.ones(2)))
+    policy = Policy(layers, {"control": dataclasses.asdict(CONTROL)})
+    return polish_choice.better_of(policy, sway, robot, Clip(sway), 1)
+
+
+@pytest.mark.medium
+def test_a_policy_that_loses_what_the_feedback_holds_is_left_out(
+    robot: Robot,
+    sway: ReferenceMotion,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    with caplog.at_level(logging.WARNING):
+        policy = chosen(robot, sway, monkeypatch, {"trained": 7, "regulator": 5})
+    assert not policy.act(np.ones((4, 3))).any()
+    held = {"trained": 1 - 7 / STARTS, "feedback": 1 - 5 / STARTS}
+    assert policy.facts["beside_feedback"] == pytest.approx(held)
+    assert "holds 90 % of 49 starts, with the policy 86 %" in caplog.text
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize("lost", [6, 5, 0])
+def test_a_policy_that_is_worse_by_one_start_or_better_is_kept(
+    robot: Robot, sway: ReferenceMotion, monkeypatch: pytest.MonkeyPatch, lost: int
+) -> None:
+    policy = chosen(robot, sway, monkeypatch, {"trained": lost, "regulator": 5})
+    assert policy.act(np.ones((1, 3))).all()
+
+
+def test_a_policy_without_feedback_is_not_tried(
+    robot: Robot, sway: ReferenceMotion, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    policy = chosen(robot, sway, monkeypatch, {"trained": STARTS})
+    assert policy.act(np.ones((1, 3))).all()
+    assert "beside_feedback" not in policy.facts
