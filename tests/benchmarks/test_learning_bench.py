@@ -128,17 +128,23 @@ def test_the_row_of_a_robot_s_own_sensors_has_the_same_motion_and_twice_the_time
     assert policies.reference_of("g1_walk_onboard", Folders.at(tmp_path)).read_bytes() == frozen
 
 
-@pytest.mark.parametrize(("name", "seen"), [("g1_walk", "full"), ("g1_walk_onboard", "onboard")])
-def test_a_row_is_trained_on_its_own_inputs(
-    name: str, seen: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    began: list[str] = []
+@pytest.fixture
+def began(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Return the words of the first command of a row, which is stopped there."""
+    found: list[str] = []
 
     def stop(*words: object, core: int | None = None) -> None:
-        began.extend(map(str, words))
+        found.extend(map(str, words))
         raise SystemExit
 
     monkeypatch.setattr(training_rows, "must", stop)
+    return found
+
+
+@pytest.mark.parametrize(("name", "seen"), [("g1_walk", "full"), ("g1_walk_onboard", "onboard")])
+def test_a_row_is_trained_on_its_own_inputs(
+    name: str, seen: str, began: list[str], tmp_path: Path
+) -> None:
     with pytest.raises(SystemExit):
         training_rows.train_and_judge(name, 0, None, Folders.at(tmp_path), 0)
     assert f"track.observation={seen}" in began
@@ -149,15 +155,8 @@ def test_a_row_is_trained_on_its_own_inputs(
     [(False, ["cpu_minutes=5.0", "steps=250000"]), (True, ["steps=250000"])],
 )
 def test_a_slow_machine_trains_by_steps_alone(
-    by_steps: bool, expected: list[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    by_steps: bool, expected: list[str], began: list[str], tmp_path: Path
 ) -> None:
-    began: list[str] = []
-
-    def stop(*words: object, core: int | None = None) -> None:
-        began.extend(map(str, words))
-        raise SystemExit
-
-    monkeypatch.setattr(training_rows, "must", stop)
     with pytest.raises(SystemExit):
         training_rows.train_and_judge("g1_walk", 0, 5.0, Folders.at(tmp_path), 0, by_steps)
     assert [word for word in began if "steps=" in word or "cpu_minutes=" in word] == expected
