@@ -2,8 +2,9 @@
 
 `out/checkpoint/` and `out/replay/` are the only state; the same call with the same configuration
 continues from it, and ends as if it had never stopped. `out/policy.safetensors` is always the
-newest whole policy. During training the caller receives rows (episodes) and progress dictionaries;
-the caller writes the tables.
+newest whole policy; of a polish that is over, the feedback alone where that is better. During
+training the caller receives rows (episodes) and progress dictionaries; the caller writes the
+tables.
 """
 
 import logging

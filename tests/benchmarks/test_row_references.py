@@ -7,7 +7,13 @@ import pytest
 
 from benchmarks.learning import training_rows
 from benchmarks.learning.policies import FROZEN, Folders
-from benchmarks.learning.rows.g1_rows_table import BEGIN, DOCUMENT, END, g1_rows_table, written_into
+from benchmarks.learning.rows.g1_rows_table import (
+    BEGIN,
+    DOCUMENT,
+    END,
+    g1_rows_table,
+    written_between,
+)
 from benchmarks.learning.rows.row_references import record_reference, recorded, standing
 from benchmarks.learning.split import load_split
 
@@ -81,7 +87,7 @@ def test_every_recorded_row_exists() -> None:
 def test_the_document_has_the_table_of_the_results() -> None:
     rows = json.loads((HERE.results / "learning.json").read_text())["rows"]
     text = DOCUMENT.read_text(encoding="utf-8")
-    assert written_into(text, rows) == text
+    assert written_between(text, BEGIN, END, g1_rows_table(rows)) == text
 
 
 def test_a_missed_bar_is_marked_beside_its_figure() -> None:
@@ -93,5 +99,6 @@ def test_a_missed_bar_is_marked_beside_its_figure() -> None:
 
 
 def test_only_what_lies_between_the_comments_is_replaced() -> None:
-    assert written_into(f"a {BEGIN}old{END} b", []).split(BEGIN)[0] == "a "
-    assert written_into(f"a {BEGIN}old{END} b", []).endswith(f"{END} b")
+    found = written_between(f"a {BEGIN}old{END} b", BEGIN, END, g1_rows_table([]))
+    assert found.split(BEGIN)[0] == "a "
+    assert found.endswith(f"{END} b")

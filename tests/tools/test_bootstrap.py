@@ -38,9 +38,9 @@ def test_a_full_disk_is_refused_in_one_line_before_any_work(tmp_path: Path, free
     assert not (project / ".venv").exists()
 
 
-@pytest.mark.parametrize(("index", "told"), [("", True), ("https://host/cpu", False)])
+@pytest.mark.parametrize(("index", "named"), [("", True), ("https://host/cpu", False)])
 def test_the_size_of_torch_is_named_before_it_is_installed(
-    tmp_path: Path, index: str, told: bool
+    tmp_path: Path, index: str, named: bool
 ) -> None:
     """pip is replaced by one that fails."""
     project = tmp_path / "project"
@@ -63,4 +63,4 @@ def test_the_size_of_torch_is_named_before_it_is_installed(
     assert done.returncode == 1
     (line,) = done.stderr.splitlines()
     assert line.startswith("setup: torch 2.")
-    assert ("TORCH_INDEX=ADDRESS" in line) == told
+    assert ("TORCH_INDEX=ADDRESS" in line) == named

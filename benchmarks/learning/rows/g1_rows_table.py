@@ -25,14 +25,13 @@ Row = Mapping[str, Any]
 
 def g1_rows_table(rows: Iterable[Row]) -> str:
     """Return the table of the G1's rows of `learning.json`."""
-    lines = [markdown_line(COLUMNS), "|---" * len(COLUMNS) + "|"]
-    lines += [markdown_line(_cells(row)) for row in rows if MOVES[row["move"]].robot == "g1"]
+    return markdown_table(COLUMNS, (_cells(r) for r in rows if MOVES[r["move"]].robot == "g1"))
+
+
+def markdown_table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return cells as a Markdown table."""
+    lines = [_line(columns), "|---" * len(columns) + "|", *map(_line, rows)]
     return "\n".join(lines) + "\n"
-
-
-def written_into(text: str, rows: Iterable[Row]) -> str:
-    """Return a document's text with the table of the G1's rows replaced."""
-    return written_between(text, BEGIN, END, g1_rows_table(rows))
 
 
 def written_between(text: str, begin: str, end: str, table: str) -> str:
@@ -42,8 +41,14 @@ def written_between(text: str, begin: str, end: str, table: str) -> str:
 
 
 def update_document(rows: Iterable[Row], path: Path = DOCUMENT) -> None:
-    """Replace the table of a document."""
-    path.write_text(written_into(path.read_text(encoding="utf-8"), rows), encoding="utf-8")
+    """Replace the table of the G1's rows in a document."""
+    replace_table(BEGIN, END, g1_rows_table(rows), path)
+
+
+def replace_table(begin: str, end: str, table: str, path: Path = DOCUMENT) -> None:
+    """Replace what stands between two comments of a document by a table."""
+    text = path.read_text(encoding="utf-8")
+    path.write_text(written_between(text, begin, end, table), encoding="utf-8")
 
 
 def _cells(row: Row) -> list[str]:
@@ -94,6 +99,5 @@ def _mm(metres: float | None) -> str:
     return "-" if metres is None else f"{1e3 * metres:.0f}"
 
 
-def markdown_line(cells: Sequence[str]) -> str:
-    """Return cells as a line of a Markdown table."""
+def _line(cells: Sequence[str]) -> str:
     return f"| {' | '.join(cells)} |"

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.learning.policies import HORIZONS_S, MOVES, Folders
-from benchmarks.learning.rows.g1_rows_table import DOCUMENT, markdown_line, written_between
+from benchmarks.learning.rows.g1_rows_table import markdown_table, replace_table
 from benchmarks.learning.rows.row_references import recorded
 from benchmarks.learning.summary import Rows, line, mean, of_policy, read_rows
 from robojackson.metrics.seed_statistics import estimate
@@ -75,8 +75,7 @@ def _of_seed(rows: Rows, key: str) -> float:
 
 def polish_table(rows: Iterable[Row]) -> str:
     """Return the rows as a Markdown table."""
-    lines = [markdown_line(COLUMNS), "|---" * len(COLUMNS) + "|"]
-    return "\n".join([*lines, *(markdown_line(_cells(row)) for row in rows)]) + "\n"
+    return markdown_table(COLUMNS, map(_cells, rows))
 
 
 def _cells(row: Row) -> list[str]:
@@ -119,8 +118,7 @@ def main() -> None:
     (folders.results / "learning_polish.json").write_text(json.dumps(held, indent=1) + "\n")
     table = polish_table(rows)
     if folder is None:
-        text = DOCUMENT.read_text(encoding="utf-8")
-        DOCUMENT.write_text(written_between(text, BEGIN, END, table), encoding="utf-8")
+        replace_table(BEGIN, END, table)
     print(table)
 
 

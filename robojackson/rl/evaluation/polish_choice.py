@@ -45,7 +45,7 @@ def better_of(
         clip: The motion with its feedback.
         threads: Threads that step the simulations.
     """
-    policy = replace(policy, facts=json.loads(json.dumps(dict(policy.facts))))
+    policy = replace(policy, facts=json.loads(json.dumps(dict(policy.facts))))  # as a file has them
     config = EvaluateConfig(resets=RESETS, seed=SEED, threads=threads)
     found = drivers(policy, reference, robot, config.seed)
     if FEEDBACK not in found:
