@@ -111,8 +111,9 @@ def server(
 
     store = Store.from_environment()
     prepare_server(store)
-    from flows.runtime.result_server import serve
+    from flows.runtime.result_server import netloc, serve
 
-    complain(f"pages http://{host}:{port}, PREFECT_API_URL=http://{host}:{port}/api")
+    address = f"http://{netloc(host, port)}"
+    complain(f"pages {address}, PREFECT_API_URL={address}/api")
     serve(store, host, port)
     return CommandResult({"store": store.root}, text=[])

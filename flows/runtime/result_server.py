@@ -5,7 +5,9 @@ wherever the server does, with any host name. The browser calls the API relative
 the same reason. Everything else is Prefect's: `PREFECT_` variables count as for its own command.
 """
 
+import errno
 import mimetypes
+import os
 import secrets
 import shutil
 import socket
@@ -35,6 +37,8 @@ ISOLATED = {
 }
 """A page of results is its own origin: it cannot read what the browser keeps for Prefect."""
 CHALLENGE = {"WWW-Authenticate": 'Basic realm="RoboJackson"'}
+PORT_REFUSED = (errno.EADDRINUSE, errno.EACCES)
+"""What the system answers where another port would do."""
 UNKNOWN_TYPE = "application/octet-stream"
 
 
@@ -61,14 +65,25 @@ def serve(store: Store, host: str, port: int) -> None:
         )
 
 
+def netloc(host: str, port: int) -> str:
+    """Return a host and a port as they stand in an address: an IPv6 host in brackets."""
+    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+
+
 def _require_free(host: str, port: int) -> None:
+    """Listen for a moment on every address that uvicorn will listen on."""
     try:
-        with socket.create_server((host, port)):
-            return
+        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+        for family, address in dict.fromkeys((each[0], each[4]) for each in found):
+            socket.create_server(address, family=family).close()
     except OSError as cause:
+        is_name = isinstance(cause, socket.gaierror)
+        reason = cause.strerror if is_name else os.strerror(cause.errno or 0)
+        advice = "choose another --port, or end what listens there"
+        if is_name or cause.errno not in PORT_REFUSED:
+            advice = "--host is an address of this machine, such as 127.0.0.1 or ::1"
         raise DeploymentFailed(
-            f"cannot listen on {host}:{port}: {cause.strerror}; choose another --port, or end what "
-            "listens there"
+            f"cannot listen on {netloc(host, port)}: {reason}; {advice}"
         ) from cause
 
 

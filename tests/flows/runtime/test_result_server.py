@@ -4,13 +4,14 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from socket import create_server
+from socket import AddressFamily, create_server
 
 import pytest
 from prefect.settings import PREFECT_SERVER_API_AUTH_STRING, temporary_settings
 
 from flows.runtime import environment
-from flows.runtime.result_server import results
+from flows.runtime.result_server import results, serve
+from robojackson.errors import DeploymentFailed
 from storage.store import Store
 from tests.fixtures.commands import robojackson
 from tests.flows.runtime.browser import Web
@@ -103,6 +104,57 @@ def test_a_port_that_is_taken_is_one_line(tmp_path: Path) -> None:
         f"DeploymentFailed: cannot listen on 127.0.0.1:{port}: Address already" in message_text.err
     )
     assert "Traceback" not in message_text.err
+
+
+@pytest.fixture
+def served(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, int]]:
+    """Where uvicorn would listen."""
+    places: list[tuple[str, int]] = []
+    monkeypatch.setattr(
+        "flows.runtime.result_server.uvicorn.run",
+        lambda app, host, port, **more: places.append((host, port)),
+    )
+    return places
+
+
+def free_port(host: str, family: AddressFamily) -> int:
+    with create_server((host, 0), family=family) as found:
+        port: int = found.getsockname()[1]
+    return port
+
+
+def ipv6() -> bool:
+    """Whether this machine has the address ::1."""
+    try:
+        return free_port("::1", AddressFamily.AF_INET6) > 0
+    except OSError:
+        return False
+
+
+def test_a_host_of_ipv6_is_listened_on(tmp_path: Path, served: list[tuple[str, int]]) -> None:
+    if not ipv6():
+        with pytest.raises(DeploymentFailed, match="--host is an address of this machine"):
+            serve(filled(str(tmp_path)), "::1", 4321)
+        return
+    port = free_port("::1", AddressFamily.AF_INET6)
+    serve(filled(str(tmp_path)), "::1", port)
+    assert served == [("::1", port)]
+    with (
+        create_server(("::1", port), family=AddressFamily.AF_INET6),
+        pytest.raises(
+            DeploymentFailed, match=rf"on \[::1\]:{port}: Address already in use; choose"
+        ),
+    ):
+        serve(filled(str(tmp_path)), "::1", port)
+
+
+@pytest.mark.parametrize("host", ["192.0.2.1", "no-host.invalid", "[::1]"])
+def test_a_host_that_is_not_of_this_machine_is_refused_as_such(
+    host: str, tmp_path: Path, served: list[tuple[str, int]]
+) -> None:
+    with pytest.raises(DeploymentFailed, match="; --host is an address of this machine"):
+        serve(filled(str(tmp_path)), host, 4321)
+    assert served == []
 
 
 PRINTED = """
