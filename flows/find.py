@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from prefect import flow
+from prefect.logging import get_run_logger
 from prefect.task_runners import ThreadPoolTaskRunner
 
 from configs.dance_book import Dance
@@ -26,6 +27,7 @@ from storage import candidate_catalogue
 from storage.artifact import Artifact
 from storage.leftovers import sweep
 from storage.store import Store
+from tasks.download_video import WebVideo, stored_video
 
 HUNTERS: ThreadPoolTaskRunner[Any] = ThreadPoolTaskRunner(max_workers=2 * cores())
 """Downloads wait for servers, assessments for their processes: more threads than cores."""
@@ -97,17 +99,20 @@ def in_good_quality(chosen: Entry, settings: FindConfig) -> Artifact:
 def of_candidate(
     candidate: VideoCandidate, scored: Artifact | None, settings: FindConfig
 ) -> Artifact:
-    """Return the best format of a video, or its scored file when that cannot be downloaded.
+    """Return the best format of a video, or its scored file when that cannot be downloaded, or
+    what an earlier run has downloaded.
 
     Raises:
-        SearchFailed: neither is there.
+        SearchFailed: none is there.
     """
     ((_, video),) = download_candidates([candidate], "dance", settings)
     if isinstance(video, Artifact):
         return video
-    if scored is None:
+    stored = scored or stored_video(Store.from_environment(), WebVideo.of(candidate))
+    if stored is None:
         raise SearchFailed(f"{candidate.title or candidate.video_id}: {video}")
-    return scored
+    get_run_logger().warning("%s: %s: its stored video is used", candidate.url, video)
+    return stored
 
 
 def nothing(found: SearchResult) -> str:

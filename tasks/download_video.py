@@ -7,29 +7,27 @@ waits for the other. What an interrupted download left is continued.
 
 import hashlib
 import json
-import logging
 import shutil
+import sys
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
-
-from prefect.artifacts import create_progress_artifact, update_progress_artifact
-from prefect.context import TaskRunContext
-from prefect.logging import get_run_logger
 
 from robojackson.cli.lifetime.video_process import probed
 from robojackson.clips.video import VideoLimits
 from robojackson.clips.web.download_formats import FormatConfig, Purpose
 from robojackson.clips.web.untrusted_text import clean_text, in_markdown, safe_name
+from robojackson.clips.web.video_candidate import VideoCandidate
 from robojackson.clips.web.yt_dlp_client import Offer, WebConfig, fetch, offer
 from robojackson.errors import StoreError, UnreadableVideo
 from robojackson.pipeline.folder_lock import FOR_EVER, locked
 from storage.artifact import Artifact
 from storage.store import Store
 from tasks.probe_video import SourceFile
+from tasks.runtime.run_logger import run_logger
 from tasks.runtime.stage import stage
 
-FOLDER = "downloads"
+FOLDER, NOTE = "downloads", ".json"
 STEP = 0.1
 """Share of a file between two lines of progress."""
 
@@ -47,6 +45,11 @@ class WebVideo:
     video_id: str
     url: str = field(compare=False)
     title: str = field(compare=False)
+
+    @classmethod
+    def of(cls, found: VideoCandidate) -> "WebVideo":
+        """Return the video of a candidate."""
+        return cls(found.source, found.video_id, found.url, found.title)
 
     @property
     def folder(self) -> str:
@@ -72,11 +75,20 @@ def take_file(file: SourceFile) -> Artifact:
     return Store.from_environment().save("video", f"clip.{suffix}", file.path)
 
 
+def stored_video(store: Store, video: WebVideo) -> Artifact | None:
+    """Return an earlier download of a video, of several formats the one with the largest file."""
+    notes = [key for key in store.list(video.folder) if key.endswith(NOTE)]
+    found = [had for note in notes if (had := _noted(store, note)) is not None]
+    return max(found, key=lambda had: len(store.read(had.key)), default=None)
+
+
 def _earlier_download(store: Store, video: WebVideo, chosen: Offer) -> Artifact | None:
-    """Return the file of an earlier download, if it is there unaltered."""
-    note = f"{video.folder}/{chosen.name}.json"
-    if not store.exists(note):
-        return None
+    """Return the file of an earlier download in one format, if it is there unaltered."""
+    note = f"{video.folder}/{chosen.name}{NOTE}"
+    return _noted(store, note) if store.exists(note) else None
+
+
+def _noted(store: Store, note: str) -> Artifact | None:
     try:
         return store.verify(Artifact(**json.loads(store.read(note))))
     except (StoreError, ValueError, TypeError):
@@ -105,7 +117,7 @@ def _fetched(
         path.unlink()
         raise
     made = store.save("video", f"clip.{chosen.name.rsplit('.', 1)[-1]}", path)
-    store.put(f"{video.folder}/{chosen.name}.json", json.dumps(asdict(made)).encode())
+    store.put(f"{video.folder}/{chosen.name}{NOTE}", json.dumps(asdict(made)).encode())
     return made
 
 
@@ -117,7 +129,7 @@ class _Progress:
         self._key = "download-" + hashlib.sha256(video.folder.encode()).hexdigest()[:12]
         self._artifact: Any = None
         self._logged = 0.0
-        self._in_run = TaskRunContext.get() is not None
+        self._in_run = _in_task()
 
     def __call__(self, done: int, total: int | None) -> None:
         share = min(done / total, 1.0) if total else 0.0
@@ -126,16 +138,24 @@ class _Progress:
         if share >= 1.0 and self._logged >= 1.0:
             return
         self._logged = share
-        self._log().info("%s: %.0f %% of %.1f MB", self._what, 100 * share, (total or 0) / 1e6)
+        run_logger().info("%s: %.0f %% of %.1f MB", self._what, 100 * share, (total or 0) / 1e6)
         if self._in_run:
             self._show(100 * share)
 
     def _show(self, percent: float) -> None:
+        from prefect.artifacts import create_progress_artifact, update_progress_artifact
+
         if self._artifact is None:
             label = in_markdown(self._what)
             self._artifact = create_progress_artifact(percent, key=self._key, description=label)
         else:
             update_progress_artifact(self._artifact, percent)
 
-    def _log(self) -> Any:
-        return get_run_logger() if self._in_run else logging.getLogger(__name__)
+
+def _in_task() -> bool:
+    """Return whether a task of Prefect runs; without one, Prefect is not imported."""
+    if "prefect" not in sys.modules:
+        return False
+    from prefect.context import TaskRunContext
+
+    return TaskRunContext.get() is not None

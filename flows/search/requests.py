@@ -1,5 +1,6 @@
 """Requests to `find` and `refresh`, checked before Prefect is imported."""
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -7,7 +8,7 @@ from typing import Any
 
 from configs.dance_book import Dance, DanceBook
 from configs.find_config import FindConfig
-from robojackson.clips.sources import folder, is_local, page_of
+from robojackson.clips.sources import folder, is_local, page_of, urls
 from robojackson.clips.sources import source as source_of
 from robojackson.clips.web.reachability import require_reachable
 from robojackson.clips.web.untrusted_text import clean_text, web_address
@@ -16,6 +17,7 @@ from robojackson.pipeline.yaml_loader import build, load
 from storage import candidate_catalogue
 from storage.store import Store
 
+log = logging.getLogger(__name__)
 ALL = 10_000
 """Files of a folder are all assessed: they have no view counts."""
 
@@ -54,14 +56,14 @@ def require_online(dance: Dance, config: FindConfig) -> None:
 
 def require_findable(words: str, store: Store) -> None:
     """Raise where a dance that is given by its name can neither be searched nor was found before,
-    or the site of a video that is given by its address cannot be reached.
+    or a video that is given by its address can neither be reached nor was downloaded before.
 
     Raises:
         SearchFailed: as `require_online`.
     """
     settings = load(FindConfig, "finding")
     if address := web_address(words):
-        require_reachable(address, settings.web.proxy)
+        _require_video(address, settings, store)
         return
     dance = load(DanceBook, "dances").find(words.strip())
     try:
@@ -69,6 +71,19 @@ def require_findable(words: str, store: Store) -> None:
     except SearchFailed:
         if candidate_catalogue.champion(store, dance.name) is None:
             raise
+
+
+def _require_video(address: str, settings: FindConfig, store: Store) -> None:
+    """Raise where a video can neither be reached nor was downloaded before."""
+    try:
+        require_reachable(address, settings.web.proxy)
+    except SearchFailed:
+        from tasks.download_video import WebVideo, stored_video
+
+        (found,) = urls.search("", address, 1, settings.web, datetime.now(UTC))
+        if stored_video(store, WebVideo.of(found)) is None:
+            raise
+        log.warning("%s cannot be reached: its stored video is used", found.url)
 
 
 def check_refresh(dances: Sequence[str] | None, config: str, overrides: Mapping[str, Any]) -> None:

@@ -147,8 +147,7 @@ def _submitted(
             return take_file.submit(SourceFile.at(Path(candidate.url)))
         except OSError as cause:
             return clean_text(f"cannot be read ({cause.strerror})")
-    video = WebVideo(candidate.source, candidate.video_id, candidate.url, candidate.title)
-    limits = settings.assessment.video
+    video, limits = WebVideo.of(candidate), settings.assessment.video
     return download_video.submit(video, purpose, settings.formats, settings.web, limits)
 
 

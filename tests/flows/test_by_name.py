@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import shutil
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -123,6 +124,18 @@ def test_an_address_is_downloaded_without_a_search(
     with serving(short_clip.read_bytes()) as web:
         found = files(f"{web.url}/good/my-dance.mp4", near(tmp_path))
     assert found == {"my-dance.mp4": short_clip.read_bytes()}
+
+
+@pytest.mark.medium
+def test_without_a_net_an_address_is_the_video_that_was_downloaded_before(
+    records: None, store_folder: Path, tmp_path: Path, short_clip: Path
+) -> None:
+    """By its record, and where that is lost by the note beside the video."""
+    with serving(short_clip.read_bytes()) as web:
+        address = f"{web.url}/good/my-dance.mp4"
+        first = files(address, near(tmp_path))
+    shutil.rmtree(store_folder / "records", ignore_errors=True)
+    assert files(address, near(tmp_path)) == first
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,8 @@
 """The arguments of `find`, before anything is searched."""
 
+import json
+from dataclasses import asdict
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -7,10 +10,14 @@ import pytest
 from configs.find_config import FindConfig
 from flows.search import requests
 from flows.search.requests import ALL, find_dance, require_findable, require_online
+from robojackson.clips.sources import urls
 from robojackson.errors import SearchFailed
 from storage import candidate_catalogue
 from storage.store import Store
+from tasks.download_video import WebVideo
 from tests.fixtures.commands import LOADED, in_process, robojackson
+
+NOW = datetime(2026, 11, 21, tzinfo=UTC)
 
 
 def test_a_list_of_addresses_needs_no_query(tmp_path: Path) -> None:
@@ -59,6 +66,23 @@ def test_of_an_address_its_own_site_has_to_answer(
     monkeypatch.setattr(requests, "require_reachable", offline)
     with pytest.raises(SearchFailed, match="no connection to https://host/clip"):
         require_findable(" https://host/clip ", Store(tmp_path))
+
+
+def test_a_video_that_was_downloaded_before_needs_no_network(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    address = "https://host/clip.mp4"
+    monkeypatch.setattr(requests, "require_reachable", offline)
+    store, (found,) = Store(tmp_path), urls.search("", address, 1, FindConfig().web, NOW)
+    kept = store.save("video", "clip.mp4", b"of the first dance")
+    store.put(f"{WebVideo.of(found).folder}/only.mp4.json", json.dumps(asdict(kept)).encode())
+    require_findable(address, store)
+    assert f"{address} cannot be reached: its stored video is used" in caplog.text
+    with pytest.raises(SearchFailed, match="no connection to https://host/other"):
+        require_findable("https://host/other.mp4", store)
+    (tmp_path / kept.key).unlink()
+    with pytest.raises(SearchFailed, match="no connection to https://host/clip"):
+        require_findable(address, store)
 
 
 @pytest.mark.medium
