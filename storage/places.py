@@ -9,19 +9,16 @@ from pathlib import Path
 
 import fsspec
 
-from robojackson.files.local_folder import TEMPORARY, LocalFolder, sha256_of
+from robojackson.files.local_folder import TEMPORARY, LocalFolder, folder_of, sha256_of
 
-FILE = "file://"
-"""Before the path of a folder that is given as a URL."""
 PUT_IS_ATOMIC = frozenset(("s3", "s3a", "gs", "gcs", "abfs", "az", "memory"))
 """fsspec protocols in which a file is there whole or not at all."""
 
 
 def place_at(root: str) -> "LocalFolder | Remote":
     """Return the place of an address: a URL is fsspec's, all else is a folder."""
-    if "://" in root and not root.startswith(FILE):
-        return Remote(root)
-    return LocalFolder(Path(root.removeprefix(FILE)))
+    folder = folder_of(root)
+    return Remote(root) if folder is None else LocalFolder(folder)
 
 
 class Remote:

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from robojackson.errors import StoreError
+from robojackson.files.local_folder import folder_of
 from robojackson.pipeline.folder_lock import locked
-from storage.places import FILE
 from storage.store import DEFAULT_ROOT, VARIABLE, Store
 from storage.store_inventory import ARTIFACT, LOCKS, PAGES, WORK, Item, Kind, inventory, root_of
 
@@ -114,8 +114,8 @@ def _store_of(process: Path) -> Path:
     """Return the folder that a process uses as its store."""
     variables = (process / "environ").read_bytes().decode(errors="replace").split("\0")
     named = dict(each.partition("=")[::2] for each in variables)
-    root = (named.get(VARIABLE) or DEFAULT_ROOT).removeprefix(FILE)
-    return (Path(os.readlink(process / "cwd")) / root).resolve()
+    root = named.get(VARIABLE) or DEFAULT_ROOT
+    return (Path(os.readlink(process / "cwd")) / (folder_of(root) or root)).resolve()
 
 
 def _removed(path: Path, is_work: bool) -> bool:

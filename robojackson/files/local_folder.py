@@ -15,6 +15,16 @@ from typing import Any, Protocol
 CHUNK = 1 << 20
 TEMPORARY = ".part-"
 """Prefix of the names of files that are being written."""
+FILE = "file://"
+"""Before the path of a folder that is given as a URL."""
+
+
+def folder_of(root: str) -> Path | None:
+    """Return the folder of this machine that an address names: a path, or `file://` before one;
+    None for any other URL."""
+    if "://" in root and not root.startswith(FILE):
+        return None
+    return Path(root.removeprefix(FILE))
 
 
 class Place(Protocol):

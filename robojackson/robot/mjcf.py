@@ -12,6 +12,7 @@ from pathlib import Path
 import mujoco
 
 from robojackson.errors import BadConfiguration
+from robojackson.files.local_folder import folder_of
 from robojackson.files.memory_limit import limited_memory
 from robojackson.robot.description import KEYPOINTS, TOES, RobotDescription
 from robojackson.robot.model_files import (
@@ -40,11 +41,11 @@ def site_of(model: mujoco.MjModel, key: str) -> int:
 def robots_folder() -> Path:
     """Return where added robots are kept: inside the store, or in the cache where that is no
     folder."""
-    root = os.environ.get(STORE) or "store"
-    if "://" in root:
+    folder = folder_of(os.environ.get(STORE) or "store")
+    if folder is None:
         cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-        return Path(cache) / "robojackson" / "robots"
-    return Path(root) / "robots"
+        folder = Path(cache) / "robojackson"
+    return folder / "robots"
 
 
 def added_folder(description: RobotDescription) -> Path:

@@ -1,6 +1,7 @@
 """Every name of a robot description binds, or the error lists the known ones."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import gymnasium
 import mujoco
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 from robojackson.errors import BadConfiguration, UnknownName
+from robojackson.robot.mjcf import robots_folder
 from robojackson.robot.model import ContactPoint, Robot, load_robot
 from tests.fixtures.robots import description
 
@@ -49,6 +51,23 @@ def test_sides_that_are_not_mirrored_are_refused():
 def test_a_missing_file_is_named():
     with pytest.raises(BadConfiguration, match=r"no such file: /nowhere\.xml"):
         load_robot(replace(description(), mjcf="/nowhere.xml"))
+
+
+@pytest.mark.parametrize("address", ["{folder}", "file://{folder}"])
+def test_added_robots_are_in_the_folder_of_the_store(
+    address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROBOJACKSON_STORE", address.format(folder=tmp_path / "a store"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    assert robots_folder() == tmp_path / "a store" / "robots"
+
+
+def test_added_robots_of_an_object_store_are_in_the_cache(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROBOJACKSON_STORE", "s3://bucket/store")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert robots_folder() == tmp_path / "robojackson" / "robots"
 
 
 def test_lengths_are_those_of_the_mjcf(robot: Robot):

@@ -19,6 +19,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+from robojackson.files.local_folder import folder_of
+
 PATIENCE_S = 2.0
 """Longest wait for a server or a program, seconds."""
 LOCAL = ("127.0.0.1", "localhost", "::1")
@@ -112,9 +114,11 @@ def server_state(environment: Mapping[str, str]) -> str:
 def store_state(environment: Mapping[str, str]) -> str:
     """Return the kind of the store, whether it exists, and the room on its disk."""
     given = environment.get(STORE)
-    if given and "://" in given and not given.startswith("file://"):
-        return f"{given.partition('://')[0]}:// address"
-    folder = Path((given or USUAL_STORE).removeprefix("file://")).absolute()
+    root = given or USUAL_STORE
+    folder = folder_of(root)
+    if folder is None:
+        return f"{root.partition('://')[0]}:// address"
+    folder = folder.absolute()
     name = f"the folder of {STORE}" if given else f"./{USUAL_STORE}"
     there = next(path for path in (folder, *folder.parents) if path.exists())
     try:
