@@ -57,6 +57,7 @@ def line(name: str, move: Move, seconds: float, seeds: Sequence[Rows]) -> dict[s
         "seeds": len(seeds),
         "steps": mean(taken) if None not in taken else None,
         **{key: mean(values) for key, values in by_seed.items()},
+        "mpjpe_rollouts": counted_rollouts([row for rows in trained for row in rows]),
         "strict_success_95": list(cluster_interval(success)),
         "worst_seed": min(success),
         "whole_phases": mean(whole_phases(rows) for rows in trained),
@@ -69,13 +70,31 @@ def line(name: str, move: Move, seconds: float, seeds: Sequence[Rows]) -> dict[s
     found["bars"] = bars(found, name, move)
     found["holds"] = all(found["bars"].values())
     found["beside"] = {
-        policy: {
-            key: mean(r.get(key) for rows in seeds for r in of_policy(rows, policy))
-            for key in COLUMNS
-        }
+        policy: _baseline([r for rows in seeds for r in of_policy(rows, policy)])
         for policy in BESIDE
     }
     return found
+
+
+def _baseline(rows: Rows) -> dict[str, Any]:
+    """Return the means of a baseline's rollouts."""
+    figures = {key: mean(row.get(key) for row in rows) for key in COLUMNS}
+    return figures | {"mpjpe_rollouts": counted_rollouts(rows)}
+
+
+def counted_rollouts(rows: Rows) -> str | None:
+    """Return over how many rollouts `mpjpe_l_m` and `mpjpe_g_m` are means; None where over none.
+
+    The rollouts of Humanoid-v5 and of baselines end with a fall, and only those without one count;
+    other robots that fell are simulated and counted to the horizon.
+    """
+    values = (row.get("mpjpe_l_m") for row in rows)
+    counted = sum(value is not None and bool(np.isfinite(value)) for value in values)
+    if not counted:
+        return None
+    if counted == len(rows):
+        return f"all {counted} rollouts"
+    return f"{counted} of {len(rows)} rollouts, fallen robots left out"
 
 
 def whole_phases(rows: Rows) -> float:

@@ -9,7 +9,7 @@ from benchmarks.learning import learning_suite, policies, races, tracker_rows, t
 from benchmarks.learning.error_line import errors_in_one_line
 from benchmarks.learning.policies import MOVES, Folders, source_of
 from benchmarks.learning.rows.row_bars import LIMBS, bars
-from benchmarks.learning.summary import cluster_interval, line, summary
+from benchmarks.learning.summary import cluster_interval, counted_rollouts, line, summary
 from benchmarks.learning.training_curve import area, first_at
 from tests.fixtures.row_rollouts import rollouts
 
@@ -95,6 +95,20 @@ def test_the_authors_clips_on_the_g1_have_every_bar_of_its_rows() -> None:
     assert missed == ["mpjpe_l <= 22 mm", "acceleration <= 1.5", *gains]
     assert "worst seed >= 0.75" in row["bars"]
     assert not any("head" in bar for bar in row["bars"])
+
+
+def test_a_mean_over_survivors_says_so() -> None:
+    whole = [{"mpjpe_l_m": 0.01}, {"mpjpe_l_m": 0.05}]
+    survivors = [{"mpjpe_l_m": 0.01}, {"mpjpe_l_m": None}, {"mpjpe_l_m": float("nan")}]
+    assert counted_rollouts(whole) == "all 2 rollouts"
+    assert counted_rollouts(survivors) == "1 of 3 rollouts, fallen robots left out"
+    assert counted_rollouts([{}]) is None
+    rows = [{**rollouts(1.0, 1.0)[0], "mpjpe_l_m": value} for value in (0.01, None)]
+    row = line("dance_b", MOVES["dance_b"], 10.0, [rows])
+    assert (row["mpjpe_l_m"], row["mpjpe_rollouts"]) == (
+        0.01,
+        "1 of 2 rollouts, fallen robots left out",
+    )
 
 
 def test_accelerations_that_were_not_recorded_have_no_bar() -> None:
