@@ -6,9 +6,11 @@ A line is the mean over seeds, its band the range of the seeds.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import cycle
 
 import numpy as np
 from jaxtyping import Float
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -67,21 +69,29 @@ def evaluation_plot(
     """
     count = max(len(figures), 1)
     figure, axes = figure_of(2.4 * count + 0.8, 2.8, columns=count)
+    names = dict.fromkeys(name for move in figures for name in baselines.get(move, {}))
+    styles = dict(zip(names, cycle(STYLES), strict=False))
     for panel, (move, setups) in zip(axes, figures.items(), strict=False):
         for place, (setup, values) in enumerate(setups.items()):
             _dots(panel, place, np.asarray(values, float), COLOURS.get(setup, GOOD))
-        known = baselines[move].items()
-        for style, (name, value) in zip(STYLES, known, strict=False):
-            panel.axhline(value, color=INK, lw=1.0, ls=style, label=name)
+        for name, value in baselines.get(move, {}).items():
+            panel.axhline(value, color=INK, lw=1.0, ls=styles[name], label=name)
         panel.set_xticks(range(len(setups)), list(setups), rotation=20, ha="right")
         panel.set_title(move, color=INK, fontsize=9, loc="left")
     _same_height(axes)
     axes[0].set_ylabel(label)
-    if any(baselines.values()):
-        names = axes[0].get_legend_handles_labels()
-        figure.legend(*names, fontsize=7, labelcolor=INK, frameon=False, ncols=4,
+    if names:
+        drawn = dict(pair for panel in axes for pair in _labelled(panel))
+        lines = [drawn[name] for name in names]
+        figure.legend(lines, list(names), fontsize=7, labelcolor=INK, frameon=False, ncols=4,
                       loc="outside upper center")  # fmt: skip
     return figure
+
+
+def _labelled(axes: Axes) -> list[tuple[str, Artist]]:
+    """Return the labels of a panel with what they name."""
+    artists, labels = axes.get_legend_handles_labels()
+    return [(str(label), artist) for label, artist in zip(labels, artists, strict=True)]
 
 
 def _band(
