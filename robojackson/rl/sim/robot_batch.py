@@ -65,6 +65,7 @@ class Batch:
     ) -> None:
         self._motors, self._law, self._substeps = motors, control.law, control.substeps or 1
         self._delay = None if delay is None or not delay.any() else delay[:, None]
+        self._arrival = np.zeros(len(datas), int) if delay is None else delay % self._substeps
         self._robots = [(m, d, d.ctrl) for m, d in zip(models, datas, strict=True)]
         self._state = [d.qpos[7:] for d in datas] + [d.qvel[6:] for d in datas]
         self._gains = np.stack(np.broadcast_arrays(np.atleast_2d(kp), kd))
@@ -84,16 +85,21 @@ class Batch:
     ) -> None:
         """Run one control step of the active robots; law `torque` writes their `com`.
 
+        With law `hold` a robot's torque is computed once, when its targets arrive; before, it keeps
+        the last one, and one that was just placed follows `before`.
+
         Args:
             before: Targets of the previous control step, which a delayed robot still follows.
         """
         live = [(*self._robots[i], i) for i in np.flatnonzero(active)]
-        step, late = mujoco.mj_step, self._law == "torque" and self._delay is not None
+        step, late = mujoco.mj_step, self._delay is not None
+        held = late and self._law == "hold"
         for substep in range(self._substeps):
             if substep == 0 or self._law == "pd" or late:
                 controls = self.controls(self._followed(targets, before, substep))
             for model, data, ctrl, i in live:
-                ctrl[:] = controls[i]
+                if not held or substep == self._arrival[i] or data.time == 0.0:
+                    ctrl[:] = controls[i]
                 step(model, data)
         for model, data, _, i in live:
             if self._law == "torque":

@@ -93,6 +93,36 @@ def test_a_torque_that_comes_some_substeps_late_begins_there(late: int, robot: R
         np.testing.assert_allclose(sim.qpos[0], data.qpos, atol=1e-12)
 
 
+@pytest.mark.parametrize("late", [1, 3, 5])
+def test_a_held_torque_is_computed_once_when_its_targets_arrive(late: int, robot: Robot) -> None:
+    """And kept until the next ones do; a robot that was just placed holds its own angles."""
+    control, substep_s = ControlConfig(law="hold"), float(robot.model.opt.timestep)
+    sim = Simulation(robot, control, 1, delay_s=late * substep_s)
+    model, motors, count = robot.model, sim.motors, sim.control.substeps or 1
+    assert count == 5
+    sim.place(np.zeros(1, int), robot.standing[None], np.full((1, model.nv), 0.1))
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = robot.standing, 0.1
+    own = data.qpos[7:][motors.hinge].copy()
+
+    def torque(targets: np.ndarray) -> np.ndarray:
+        angles, speeds = data.qpos[7:][motors.hinge], data.qvel[6:][motors.hinge]
+        wanted = sim.kp * (targets - angles) - sim.kd * speeds
+        result: np.ndarray = np.clip(wanted, -motors.limit, motors.limit) / motors.gear
+        return result
+
+    rng, waiting = np.random.default_rng(0), {0: own}
+    for number in range(3):
+        targets = own + rng.uniform(-0.2, 0.2, model.nu)
+        waiting[number * count + late] = targets
+        sim.step(targets[None])
+        for substep in range(number * count, (number + 1) * count):
+            if substep in waiting:
+                data.ctrl[:] = torque(waiting[substep])
+            mujoco.mj_step(model, data)
+        np.testing.assert_allclose(sim.qpos[0], data.qpos, atol=1e-12)
+
+
 def test_noise_is_within_its_bounds_and_the_same_within_a_step(robot: Robot) -> None:
     sim = placed(robot, RandomConfig(sensor_noise=1.0))
     qpos, qvel = sim.sensed()
