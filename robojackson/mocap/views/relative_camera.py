@@ -8,9 +8,10 @@ metres, seconds.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
@@ -55,6 +56,7 @@ def calibrate(
     one: Float[np.ndarray, "T 12 3"],
     two: Float[np.ndarray, "T 12 3"],
     trust: Float[np.ndarray, "T 12"],
+    frames: Int[np.ndarray, " T"],
     fps: float,
 ) -> RelativeCamera:
     """Fit the second camera to both cameras' bodies at the same moments.
@@ -62,6 +64,7 @@ def calibrate(
     Args:
         one, two: Body before each camera with its guessed focal length, metres.
         trust: Least visibility of each joint in both cameras, 0..1.
+        frames: Number of each moment's frame, ascending; there may be gaps.
         fps: Frames a second.
     Raises:
         ViewsDisagree: both cameras are at one place.
@@ -73,7 +76,7 @@ def calibrate(
             "alone, or two from different sides"
         )
     rays = [points[..., :2] / points[..., 2:] for points in (one, two)]
-    speed = np.gradient(rays[1], axis=0) * fps
+    speed = _speeds(rays[1], frames) * fps
     root = np.sqrt(trust).reshape(-1)
 
     def seen(x: np.ndarray) -> tuple[RelativeCamera, tuple[np.ndarray, np.ndarray]]:
@@ -94,6 +97,17 @@ def calibrate(
     camera, found = seen(least_squares(misses, np.zeros(9)).x)
     size = np.median(lengths(one) / np.maximum(lengths(triangulate(camera, found)), 1e-6))
     return RelativeCamera(camera.rotation, camera.shift * float(size), camera.focal, camera.late_s)
+
+
+def _speeds(
+    rays: Float[np.ndarray, "T N 2"], frames: Int[np.ndarray, " T"]
+) -> Float[np.ndarray, "T N 2"]:
+    """Return the change a frame within each run of consecutive frames; zero for a single one."""
+    speed, ends = np.zeros_like(rays), np.flatnonzero(np.diff(frames) != 1) + 1
+    for first, past in pairwise([0, *ends, len(frames)]):
+        if past - first > 1:
+            speed[first:past] = np.gradient(rays[first:past], axis=0)
+    return speed
 
 
 def first_guess(

@@ -140,7 +140,8 @@ def _calibrated(one: View, two: View, began_s: float) -> _Calibrated | None:
     if seen.sum() < LEAST_FRAMES:
         return None
     bodies = [points[seen][:, BODY] for points in pair.points]
-    camera = calibrate(bodies[0], bodies[1], pair.both[seen][:, BODY], one.track.fps)
+    trust, frames = pair.both[seen][:, BODY], np.flatnonzero(seen)
+    camera = calibrate(bodies[0], bodies[1], trust, frames, one.track.fps)
     began_s -= camera.late_s
     pair = _together(one, two, began_s)
     off = np.abs(sampson(camera, *(r / f for r, f in zip(pair.rays, camera.focal, strict=True))))

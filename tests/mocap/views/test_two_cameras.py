@@ -101,12 +101,32 @@ def test_points_are_where_their_rays_meet() -> None:
     rng = np.random.default_rng(2)
     points = rng.normal(size=(40, 12, 3)) * 0.5 + [0.0, 0.0, 4.0]
     other = second_frame(points)
-    camera = calibrate(points, other, np.ones((40, 12)), 30.0)
+    camera = calibrate(points, other, np.ones((40, 12)), np.arange(40), 30.0)
     rays = tuple(
         p[..., :2] / p[..., 2:] / f for p, f in zip((points, other), camera.focal, strict=True)
     )
     assert np.abs(sampson(camera, rays[0], rays[1])).max() < 1e-3
     assert np.linalg.norm(triangulate(camera, (rays[0], rays[1])) - points, axis=-1).max() < 0.05
+
+
+def test_a_clip_that_is_late_is_found_although_the_person_is_lost_between_its_frames() -> None:
+    """A speed across a gap is none of the person's."""
+    rng, late_s, fps = np.random.default_rng(3), 0.02, 30.0
+    body, swing, rate, phase = (
+        rng.normal(size=(12, 3)) * 0.5,
+        *(rng.uniform(*bounds, size=(12, 3)) for bounds in ((0.1, 0.4), (2.0, 6.0), (0.0, 6.0))),
+    )
+    frames = np.concatenate([np.arange(6) + start for start in range(0, 400, 50)])
+
+    def at(seconds: np.ndarray) -> np.ndarray:
+        wave = swing * np.sin(rate * seconds[:, None, None] + phase)
+        result: np.ndarray = body + wave + [0.0, 0.0, 4.0]
+        return result
+
+    middle = at(frames / fps).mean((0, 1))
+    other = (at(frames / fps - late_s) - middle) @ TURN.T + middle
+    camera = calibrate(at(frames / fps), other, np.ones((len(frames), 12)), frames, fps)
+    assert camera.late_s == pytest.approx(late_s, abs=0.004)
 
 
 @pytest.mark.medium
