@@ -5,8 +5,10 @@ knows this machine's package index), the wheel's sha256 is checked, and only the
 the licences are unpacked. A folder appears whole or not at all.
 """
 
+import importlib.util
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -16,7 +18,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
-from robojackson.errors import BadConfiguration, DownloadFailed, RoboJacksonError, StoreError
+from robojackson.errors import (
+    BadConfiguration,
+    DownloadFailed,
+    MissingDependency,
+    RoboJacksonError,
+    StoreError,
+)
 from robojackson.files.local_folder import sha256_of_file
 from robojackson.pipeline.robot_descriptions import describe_robot, robot_names
 from robojackson.robot.description import RobotDescription, RobotSource
@@ -43,6 +51,7 @@ def add_robot(name: str) -> dict[str, object]:
 
     Raises:
         BadConfiguration: The robot needs no download.
+        MissingDependency: There is no pip.
         DownloadFailed: No wheel, or not the expected one.
         StoreError: The store is full or cannot be written.
     """
@@ -87,8 +96,19 @@ def _require_room(folder: Path) -> None:
 
 
 def _download(source: RobotSource, folder: Path) -> Path:
-    """Download the wheel by pip from its configured index; return its path."""
+    """Download the wheel by pip from its configured index; return its path.
+
+    Raises:
+        MissingDependency: There is no pip; an environment that uv made has none.
+        DownloadFailed: pip could not.
+    """
     requirement = f"{source.package}=={source.version}"
+    if importlib.util.find_spec("pip") is None:
+        raise MissingDependency(
+            f"{requirement} is downloaded by pip, which this environment lacks: run "
+            f"{shlex.join([sys.executable, '-m', 'ensurepip'])} (or: uv pip install pip), then try "
+            "again"
+        )
     command = [
         *(sys.executable, "-m", "pip", "download", "--no-deps", "--only-binary=:all:"),
         *("--disable-pip-version-check", "--no-input", "--quiet", "-d", str(folder), requirement),

@@ -13,7 +13,13 @@ from PIL import Image
 
 from robojackson.cli import robot_models
 from robojackson.cli.pictures import robot_sheets
-from robojackson.errors import BadConfiguration, DownloadFailed, StoreError, UnknownName
+from robojackson.errors import (
+    BadConfiguration,
+    DownloadFailed,
+    MissingDependency,
+    StoreError,
+    UnknownName,
+)
 from robojackson.pipeline.robot_descriptions import robot_names
 from robojackson.pipeline.yaml_loader import load
 from robojackson.robot.description import RobotDescription, RobotSource
@@ -124,6 +130,16 @@ def test_offline_is_one_line(source, describe, tmp_path: Path, monkeypatch):
     describe(source)
     monkeypatch.setenv("PIP_FIND_LINKS", str(tmp_path / "empty"))
     with pytest.raises(DownloadFailed, match=r"^pip could not download bundle==1.0: .*$"):
+        robot_models.add_robot("machine")
+
+
+def test_an_environment_without_pip_is_told_how_to_get_it(source, describe, monkeypatch):
+    """As one that uv made; it is no fault of the network."""
+    describe(source)
+    monkeypatch.setattr(robot_models.importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(
+        MissingDependency, match=r"which this environment lacks: run .*-m ensurepip"
+    ):
         robot_models.add_robot("machine")
 
 
