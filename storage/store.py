@@ -118,7 +118,7 @@ class Store(FileTree):
         """
         if room_mb:
             self.require_room(room_mb)
-        super().require_writable()
+        self._try_to_write(f"the store {self.root}")
 
     def require_room(self, room_mb: int) -> None:
         """Raise one line where the disk of `here` has less room, millions of bytes."""

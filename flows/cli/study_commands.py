@@ -62,7 +62,7 @@ def metrics(
     from storage.store import Store
     from storage.study_overview import OVERVIEW
 
-    rows = study_tables.query(Store.from_environment(), sql or OVERVIEW)
+    rows = study_tables.query(Store.from_environment(), OVERVIEW if sql is None else sql)
     if not rows:
         words = "no rows; `robojackson ablation` makes some" if sql is None else "no rows"
         return CommandResult({"rows": []}, text=[words])

@@ -79,8 +79,11 @@ class FileTree:
 
     def require_writable(self) -> None:
         """Raise a one-line error where the place is full or refuses a write, before any work."""
+        self._try_to_write(f"the folder {self.root}")
+
+    def _try_to_write(self, named: str) -> None:
         key = f"{TEMPORARY}{os.getpid()}"
-        with in_one_line(f"cannot write the store {self.root}"):
+        with in_one_line(f"cannot write {named}"):
             self.place.put(key, b"robojackson " * 1024)
             self.place.remove(key)
 

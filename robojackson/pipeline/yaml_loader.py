@@ -96,9 +96,10 @@ def find(name_or_path: str | Path) -> Path:
         path = base / f"{given}.yaml"
         if path.is_file() and path.resolve().is_relative_to(base.resolve()):
             return path
-    folder = given.parent.name
+    parent, slash, name = str(name_or_path).rpartition("/")  # Path drops an empty name
+    folder = Path(parent).name
     kind = re.sub("ies$", "y", folder).removesuffix("s") or "configuration"
-    raise UnknownName(kind, given.name, f"configs/{given}.yaml", names(folder))
+    raise UnknownName(kind, name, f"configs/{parent}{slash}{name}.yaml", names(folder))
 
 
 def folders() -> list[Path]:

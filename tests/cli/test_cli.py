@@ -263,6 +263,17 @@ def test_a_full_store_is_reported_before_any_work(monkeypatch, tmp_path: Path) -
     assert "cannot write the store" in err
 
 
+def test_results_where_nothing_can_be_written_name_the_folder_and_no_store() -> None:
+    code, _, err = invoke("mocap", ROOT / "clips" / "hip_shake.mp4", "-o", "/proc/results")
+    assert code == 1
+    assert "StoreError: cannot write the folder /proc: " in err
+
+
+def test_an_empty_question_is_refused() -> None:
+    code, _, err = invoke("metrics", "--sql", "")
+    assert (code, "there is no query in the text" in err) == (1, True)
+
+
 def test_an_override_without_a_value_is_refused() -> None:
     assert "expected KEY=VALUE" in invoke("score", "x.mp4", "--set", "train.seed")[2]
 

@@ -145,6 +145,11 @@ def test_an_override_with_an_unknown_key_is_refused(write) -> None:
         yaml_loader.load(Outer, write(""), {"inner.hight": "1"})
 
 
+def test_an_empty_name_is_one_of_its_folder() -> None:
+    with pytest.raises(UnknownName, match=r"unknown robot '' .*Known: .*humanoid"):
+        yaml_loader.find("robots/")
+
+
 def test_an_unknown_name_lists_the_known_ones() -> None:
     with pytest.raises(UnknownName, match=r"unknown robot 'c3po'.*humanoid"):
         yaml_loader.load(Outer, "robots/c3po")
