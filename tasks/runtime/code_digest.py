@@ -14,6 +14,8 @@ from importlib import import_module, resources
 from importlib.util import find_spec
 from pathlib import Path
 
+from tasks.runtime.parsed_modules import Parsed, ParsedModules
+
 PACKAGE = "robojackson"
 ONE_PARSER = threading.Lock()
 """CPython 3.11 counts the depth of its parser wrongly when several threads parse at once."""
@@ -85,6 +87,8 @@ def _digested(roots: tuple[str, ...], package: str, folder: Path | None) -> _Dig
         files.append(_version(_file_of(name, package, base)))
         if name not in NEVER_CHANGE_A_RESULT:
             total.update(f"{name}\0{_parsed(*files[-1])[0]}\0".encode())
+    with ONE_PARSER:
+        _modules.keep()
     return _Digested(total.hexdigest(), tuple(files))
 
 
@@ -164,14 +168,20 @@ def _is_silent(statement: ast.stmt) -> bool:
 
 
 @lru_cache(maxsize=1024)
-def _parsed(path: Path, changed_ns: int, size: int) -> tuple[str, tuple[tuple[str, int], ...]]:
-    """Return the digest of a file's bare tree, and its imports as (name, level); read once a
-    version."""
+def _parsed(path: Path, changed_ns: int, size: int) -> Parsed:
+    """Return the digest of a file's bare tree, and its imports; read once a version."""
     source = path.read_text(encoding="utf-8")
     with ONE_PARSER:
-        tree = ast.parse(source)
-        names = tuple(_imports(tree))
-        return hashlib.sha256(_bared(tree).encode()).hexdigest(), names
+        return _modules.of(source)
+
+
+def _parse(source: str) -> Parsed:
+    tree = ast.parse(source)
+    names = tuple(_imports(tree))
+    return hashlib.sha256(_bared(tree).encode()).hexdigest(), names
+
+
+_modules = ParsedModules(_parse, Path(__file__))
 
 
 def _version(path: Path) -> tuple[Path, int, int]:

@@ -1,0 +1,72 @@
+"""What was found in the sources of modules, kept in the user's cache: parsing takes seconds."""
+
+import hashlib
+import json
+import os
+import tempfile
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+Parsed = tuple[str, tuple[tuple[str, int], ...]]
+"""Digest of a source, and its imports as (name, level)."""
+MOST = 4000
+"""Sources of a file: a few versions of the library."""
+
+
+class ParsedModules:
+    """What this process and earlier ones found, by the text of the source.
+
+    A folder that cannot be written keeps nothing, and a broken file holds nothing.
+    """
+
+    def __init__(self, parse: Callable[[str], Parsed], recipe: Path) -> None:
+        """Args: `parse` finds it, by the code of the file `recipe`."""
+        self._parse, self._recipe = parse, recipe
+        self._found: dict[str, Parsed] | None = None
+        self._is_new = False
+
+    def of(self, source: str) -> Parsed:
+        """Return what is in a source, parsed only where nobody has before."""
+        if self._found is None:
+            self._found = _read(self._file())
+        key = _digest(source.encode())
+        if key not in self._found:
+            self._found[key] = self._parse(source)
+            self._is_new = True
+        return self._found[key]
+
+    def keep(self) -> None:
+        """Write what is new, and what others have written meanwhile."""
+        if not self._is_new or self._found is None:
+            return
+        self._is_new = False
+        file = self._file()
+        both = {**_read(file), **self._found}
+        rows = dict(list(both.items())[-MOST:])
+        with suppress(OSError):
+            file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            handle, part = tempfile.mkstemp(dir=file.parent, prefix=".part-")
+            with os.fdopen(handle, "w") as out:
+                json.dump(rows, out)
+            Path(part).replace(file)
+
+    def _file(self) -> Path:
+        root = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+        recipe = _digest(self._recipe.read_bytes())
+        return Path(root) / "robojackson" / "parsed" / f"{recipe[:12]}.json"
+
+
+def _read(file: Path) -> dict[str, Parsed]:
+    try:
+        rows = json.loads(file.read_bytes())
+        return {
+            str(key): (str(digest), tuple((str(name), int(level)) for name, level in names))
+            for key, (digest, names) in rows.items()
+        }
+    except (OSError, ValueError, TypeError, AttributeError, RecursionError):
+        return {}
+
+
+def _digest(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
