@@ -29,7 +29,8 @@
 PY := .venv/bin/python
 ARGS ?=
 WORKERS ?= auto
-PYTEST := $(PY) -m pytest -q -n $(WORKERS) --dist loadgroup
+# What takes long begins first: tests/conftest.py sorts, by their marks and not by the number of tests.
+PYTEST := $(PY) -m pytest -q -n $(WORKERS) --dist loadgroup --no-loadscope-reorder
 export OMP_NUM_THREADS ?= 1
 
 .PHONY: badinput dance test test-fast test-stack test-browser coverage bench bench-league bench-learning bench-mocap bench-retarget chaos bench-orchestration bench-pages deploy lint doctor docs wheel clean setup
