@@ -70,7 +70,8 @@ def qpos_of(tilt: float) -> np.ndarray:
 
 @pytest.mark.medium
 def test_a_run_is_that_of_its_seed_whoever_runs_beside_it(robot: Robot) -> None:
-    pushed = replace(CONFIG, runs=2, seed=6, pushes=4.0)
+    whole_s = STEPS * DT  # no need to look ahead beyond the programme's end
+    pushed = replace(CONFIG, runs=2, seed=6, pushes=4.0, ahead_s=whole_s)
     together = perform(Replay(), programme(), robot, pushed)
     alone = perform(Replay(), programme(), robot, replace(pushed, runs=1, seed=7))
     rows = int(alone.length[0])
