@@ -96,10 +96,14 @@ def reached(roots: Iterable[str], package: str, folder: Path) -> list[str]:
     """Return the modules of a package that are reached from the roots, the roots included,
     sorted."""
     found: set[str] = set()
+    seen: set[str] = set()
     waiting = list(roots)
     while waiting:
         name = waiting.pop()
-        if name in found or _is_not_followed(name) or not _is_module(name, package, folder):
+        if name in seen:
+            continue
+        seen.add(name)
+        if _is_not_followed(name) or not _is_module(name, package, folder):
             continue
         found.add(name)
         waiting.extend(_parents(name))
