@@ -27,7 +27,7 @@ class ParsedModules:
         self._is_new = False
 
     def of(self, source: str) -> Parsed:
-        """Return what is in a source, parsed only where nobody has before."""
+        """Return what is in a source, parsed only where it was not before."""
         if self._found is None:
             self._found = _read(self._file())
         key = _digest(source.encode())
