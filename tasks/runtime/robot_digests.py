@@ -17,11 +17,13 @@ def robot_models(parameters: Mapping[str, Any]) -> list[str]:
 
 
 def robot_file(robot: RobotDescription, work: Path) -> Path:
-    """Write the description of a robot for a process; return its path.
+    """Write the description of a robot for a process, in its own order; return its path.
+
+    The order of its contacts is that of a reference motion's columns.
 
     The motion that the process reads does not name its description's place, as it may have been
     made on another machine.
     """
     path = work.absolute() / "robot.yaml"
-    path.write_text(yaml.safe_dump(to_json_types(robot)))
+    path.write_text(yaml.safe_dump(to_json_types(robot), sort_keys=False))
     return path

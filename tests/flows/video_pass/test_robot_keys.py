@@ -1,6 +1,7 @@
 """A robot of a user's own in the stages: known by what it is, never by where it lies."""
 
 import asyncio
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -47,10 +48,13 @@ def test_another_weight_or_another_model_is_another_robot(
 
 
 def test_a_process_reads_the_description_that_the_stage_was_given(tmp_path: Path) -> None:
-    given = describe_robot(str(own_robot(tmp_path / "mine")))
+    described = describe_robot(str(own_robot(tmp_path / "mine")))
+    given = replace(described, contacts=dict(reversed(described.contacts.items())))
+    assert list(given.contacts) != sorted(given.contacts)
     (tmp_path / "work").mkdir()
     read = read_description(robot_file(given, tmp_path / "work"))
     assert read == given
+    assert load_robot(read).contact_names == load_robot(given).contact_names
     assert load_robot(read).sha256 == load_robot(given).sha256
 
 
