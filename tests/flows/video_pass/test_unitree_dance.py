@@ -1,0 +1,28 @@
+"""Whole pass on the Unitree G1, whose model `robojackson robots add g1` brings."""
+
+import asyncio
+import shutil
+from pathlib import Path
+
+import pytest
+
+from flows.dance import dance
+from robojackson.robot.mjcf import robots_folder
+
+G1 = robots_folder().absolute() / "g1"
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not (G1 / "g1.xml").is_file(), reason="robojackson robots add g1")
+def test_the_flow_dances_on_the_unitree_g1(
+    prefect_server: None, short_clip: Path, store_folder: Path
+) -> None:
+    shutil.copytree(G1, store_folder / "robots" / "g1")
+    overrides = {
+        "train.trainer": "sb3",
+        "train.steps": 300,
+        "train.track.control.feedback_path": "reference",
+    }
+    text = asyncio.run(dance(str(short_clip), "smoke", overrides, robot="g1"))
+    assert text["robot"] == "g1"
+    assert Path(text["page"]).is_file()
