@@ -17,7 +17,8 @@ MOST = 4000
 class ParsedModules:
     """What this process and earlier ones found, by the text of the source.
 
-    A folder that cannot be written keeps nothing, and a broken file holds nothing.
+    A folder that cannot be written keeps nothing, a user without a home neither, and a broken file
+    holds nothing.
     """
 
     def __init__(self, parse: Callable[[str], Parsed], recipe: Path) -> None:
@@ -29,7 +30,7 @@ class ParsedModules:
     def of(self, source: str) -> Parsed:
         """Return what is in a source, parsed only where it was not before."""
         if self._found is None:
-            self._found = _read(self._file())
+            self._found = self._kept()
         key = _digest(source.encode())
         if key not in self._found:
             self._found[key] = self._parse(source)
@@ -41,18 +42,24 @@ class ParsedModules:
         if not self._is_new or self._found is None:
             return
         self._is_new = False
-        file = self._file()
-        both = {**_read(file), **self._found}
+        both = {**self._kept(), **self._found}
         rows = dict(list(both.items())[-MOST:])
-        with suppress(OSError):
+        with suppress(OSError, RuntimeError):
+            file = self._file()
             file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
             handle, part = tempfile.mkstemp(dir=file.parent, prefix=".part-")
             with os.fdopen(handle, "w") as out:
                 json.dump(rows, out)
             Path(part).replace(file)
 
+    def _kept(self) -> dict[str, Parsed]:
+        try:
+            return _read(self._file())
+        except RuntimeError:  # a user without a home
+            return {}
+
     def _file(self) -> Path:
-        root = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+        root = os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()
         recipe = _digest(self._recipe.read_bytes())
         return Path(root) / "robojackson" / "parsed" / f"{recipe[:12]}.json"
 

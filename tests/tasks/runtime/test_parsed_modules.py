@@ -86,3 +86,18 @@ def test_a_cache_that_cannot_be_written_keeps_nothing(counted: Counted, tmp_path
     assert modules.of("a")[0] == "A"
     modules.keep()
     assert modules.of("a")[0] == "A"
+
+
+def test_a_user_without_a_home_keeps_nothing(
+    counted: Counted, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+
+    def homeless(path: Path) -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr(Path, "expanduser", homeless)
+    modules = counted.modules()
+    assert modules.of("a")[0] == "A"
+    modules.keep()
+    assert modules.of("a")[0] == "A"
