@@ -1,13 +1,12 @@
 """The task of a training run, and its result."""
 
 import hashlib
-import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from robojackson.motion.reference_motion import ReferenceMotion, motions_of, poses_sha256
-from robojackson.robot.description import RobotDescription
+from robojackson.robot.description import description_sha256
 from robojackson.robot.model import Robot
 
 
@@ -33,20 +32,15 @@ class Task:
         digests = [poses_sha256(motion) for motion in motions_of(reference)]
         joined = hashlib.sha256("".join(digests).encode()).hexdigest()
         found = digests[0] if len(digests) == 1 else joined
-        return Task(robot.description.name, robot.sha256, found, _digest(robot.description))
+        return Task(
+            robot.description.name, robot.sha256, found, description_sha256(robot.description)
+        )
 
     def completing(self, configuration: Mapping[str, object]) -> dict[str, object]:
         """Return the configuration of a checkpoint whose task lacks what older ones did not
         keep."""
         kept = configuration["task"]
         return {**configuration, "task": {**asdict(self), **kept}} if isinstance(kept, dict) else {}
-
-
-def _digest(description: RobotDescription) -> str:
-    """Return the digest of what a robot's YAML says, wherever its files lie and came from."""
-    named = {one.name for one in fields(description) if one.compare} - {"source"}
-    said = {name: value for name, value in asdict(description).items() if name in named}
-    return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,10 @@
 Names are bound to a MuJoCo model by `robot.model.load_robot`. Metres, radians, seconds.
 """
 
+import hashlib
+import json
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import asdict, field, fields
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -209,3 +211,10 @@ class RobotDescription:
     strict: StrictRule = Field(default_factory=StrictRule)
     source: RobotSource | None = None
     file: str = field(default="", compare=False)
+
+
+def description_sha256(description: RobotDescription) -> str:
+    """Return the digest of what a robot's YAML says, wherever its files lie and came from."""
+    named = {one.name for one in fields(description) if one.compare} - {"source"}
+    said = {name: value for name, value in asdict(description).items() if name in named}
+    return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()

@@ -169,7 +169,9 @@ def test_the_code_that_made_the_rows_is_named(folder: Path) -> None:
 @pytest.mark.medium
 def test_what_the_walker_had_learnt_before_is_reported(folder: Path) -> None:
     page = (folder / "index.html").read_text()
-    assert "pretrain begin with networks (walker) that had learnt for 671,296 control steps" in page
+    assert (
+        "pretrain begins with networks (walker) that had learnt for 671,296 control steps" in page
+    )
 
 
 @pytest.mark.medium

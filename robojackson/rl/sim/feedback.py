@@ -9,7 +9,7 @@ import io
 import json
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import asdict, fields, replace
+from dataclasses import fields, replace
 from pathlib import Path
 from zipfile import BadZipFile
 
@@ -34,6 +34,7 @@ from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.regulator import regulator, settings
 from robojackson.rl.sim.simulation import Simulation, resolved
 from robojackson.rl.sim.standing_feet import Feet
+from robojackson.robot.description import description_sha256
 from robojackson.robot.mjcf import robots_folder
 from robojackson.robot.model import Robot
 
@@ -142,10 +143,11 @@ def _digest(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> st
     motors = actuation_facts(robot, control)
     del motors["action_scale"]  # of the policy: the feedback is bounded by the robot's own
     facts = [poses_sha256(motion), robot.sha256, named, actuation_facts(robot, ControlConfig()),
-             motors, settings(), asdict(robot.description)]  # fmt: skip
+             motors, settings(), description_sha256(robot.description),
+             robot.contact_names]  # fmt: skip
     if law.feedback_path == "sampled":
         facts.append(sampled_regulator.settings())
-    digest = hashlib.sha256(json.dumps(facts, sort_keys=True, default=str).encode())
+    digest = hashlib.sha256(json.dumps(facts, sort_keys=True).encode())
     model = robot.model
     for name in VARIED:  # a varied robot has the same name and file
         digest.update(np.ascontiguousarray(getattr(model, name)).tobytes())

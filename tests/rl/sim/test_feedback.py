@@ -111,6 +111,9 @@ def test_gains_are_computed_once_and_again_where_the_file_is_damaged(
     again = feedback.feedback_of(robot, [sway], FED)
     assert feedback.feedback_of(robot, [sway], dataclasses.replace(FED, action_factor=4.0))
     assert not calls, "the range of a policy's actions does not change the feedback"
+    here = dataclasses.replace(robot.description, file="/a/robot.yaml", mjcf="/a/model.xml")
+    assert feedback.feedback_of(dataclasses.replace(robot, description=here), [sway], FED)
+    assert not calls, "the place of a robot's file does not change the feedback"
     assert kept is not None
     assert again is not None
     for one in dataclasses.fields(Gains):
