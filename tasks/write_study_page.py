@@ -181,8 +181,9 @@ def _starts(ask: RunQuery, study: Study) -> list[str]:
         setups.setdefault(json.loads(row["config"])["start"], set()).add(row["setup"])
     setups.pop("scratch", None)
     return [
-        f"{', '.join(sorted(names))} begin{'' if len(names) > 1 else 's'} with networks ({start}) that had learnt for "
-        f"{_steps_of(start, study)} control steps before; curves and steps here do not count them."
+        f"{', '.join(sorted(names))} begin{'' if len(names) > 1 else 's'} with networks ({start}) "
+        f"that had learnt for {_steps_of(start, study)} control steps before; curves and steps "
+        "here do not count them."
         for start, names in setups.items()
     ]
 
