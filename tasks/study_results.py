@@ -8,7 +8,7 @@ import numpy as np
 from configs.study_config import Study
 from robojackson.files.sql_tables import RunQuery
 from robojackson.metrics import learning_curve
-from robojackson.rl.config.evaluate_config import TRAINED, VARIANTS
+from robojackson.rl.config.evaluate_config import HOLD, TRAINED, VARIANTS
 from robojackson.rl.evaluation import verdict
 
 INTERVALS = 40
@@ -82,9 +82,10 @@ def of_evaluations(ask: RunQuery, study: Study) -> Figures:
 
 
 def of_baselines(ask: RunQuery, study: Study) -> Baselines:
-    """Return the same figures by move and baseline policy."""
+    """Return the same figures by move and baseline policy; the feedback without the policy is
+    one."""
     sql = f"SELECT move, policy, {_means(ask)} FROM evaluations WHERE study = $study "
-    given = {"study": study.name, "taught": [TRAINED, *VARIANTS]}
+    given = {"study": study.name, "taught": [TRAINED, HOLD]}
     rows = ask(f"{sql} AND policy NOT IN $taught GROUP BY ALL ORDER BY ALL", given)
     found: Baselines = {move: {} for move in study.moves}
     for row in rows:
@@ -102,7 +103,11 @@ def too_short_moves(ask: RunQuery, study: Study, baselines: Baselines) -> list[s
     easy = {
         move
         for move, found in baselines.items()
-        if any(figures.get("strict_success", 0.0) >= verdict.EASY for figures in found.values())
+        if any(
+            figures.get("strict_success", 0.0) >= verdict.EASY
+            for policy, figures in found.items()
+            if policy not in VARIANTS
+        )
     }
     return [
         m for m in study.moves if m in longest and (m in easy or longest[m] < verdict.SHORTEST_S)

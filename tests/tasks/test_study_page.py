@@ -47,6 +47,7 @@ def publish(store: Store, move: str, setup: str, seed: int) -> None:
     ]  # fmt: skip
     rows = [rollout(names, "trained", WORTH[setup] + 0.01 * seed), rollout(names, "statue", 0.5)]
     rows.append(rollout(names, "hold", 0.4))
+    rows.append({**rollout(names, "regulator", 0.8), "strict_success": 1.0})
     rows.append({**rows[1], "phase": -1, "survived_s": 0.9})
     given = {
         "episodes": store.save("t", "e.parquet", tables.encode_rows(EPISODE_RECORD, episodes)),
@@ -107,7 +108,12 @@ def test_an_effect_is_reported_for_every_move_alone(folder: Path) -> None:
 def test_the_table_has_a_line_a_move_and_setup_and_what_the_statue_does(folder: Path) -> None:
     rows = list(csv.DictReader(io.StringIO((folder / "table.csv").read_text())))
     found = {(row["move"], row["setup"]): row for row in rows}
-    assert set(found) == {(m, s) for m in STUDY.moves for s in ("scratch", "pretrain", "statue")}
+    shown = ("scratch", "pretrain", "statue", "regulator")
+    assert set(found) == {(m, s) for m in STUDY.moves for s in shown}
+    assert float(found["walk", "regulator"]["strict_success"]) == 1.0
+    assert float(found["walk", "scratch"]["strict_success"]) == 0.5, (
+        "not a motion that anyone holds"
+    )
     assert float(found["walk", "pretrain"]["return_own"]) == pytest.approx(3.015)
     assert float(found["walk", "statue"]["return_own"]) == pytest.approx(0.5)
     assert float(found["walk", "statue"]["survived_s"]) == pytest.approx(0.7)

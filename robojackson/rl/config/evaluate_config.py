@@ -4,7 +4,8 @@ from pydantic import Field
 
 from robojackson.config import config_dataclass
 
-TRAINED, VARIANTS = "trained", ("hold", "regulator")
+TRAINED, HOLD, REGULATOR = "trained", "hold", "regulator"
+VARIANTS = (HOLD, REGULATOR)
 """Names in tables: the trained policy, the same under another control law, and the feedback of its
 control law without the policy."""
 

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import PositiveInt
 
 from robojackson.motion.reference_motion import ReferenceMotion
-from robojackson.rl.config.evaluate_config import TRAINED
+from robojackson.rl.config.evaluate_config import HOLD, REGULATOR, TRAINED
 from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.evaluation.rollouts import Driver
 from robojackson.rl.evaluation.tracker_driver import tracker_driver
@@ -51,9 +51,9 @@ def drivers(
     control = control_of(policy, robot)
     found = {TRAINED: trained_driver(policy, robot, reference)}
     if control.law == "pd" and isinstance(policy, Policy):
-        found["hold"] = replace(found[TRAINED], control=replace(control, law="hold"))
+        found[HOLD] = replace(found[TRAINED], control=replace(control, law="hold"))
         if resolved(control, robot).feedback:
-            found["regulator"] = Driver(control, _follow)
+            found[REGULATOR] = Driver(control, _follow)
     usual = control if control.law == "pd" else ControlConfig(substeps=control.substeps)
     return found | _baselines(reference, robot, replace(usual, feedback=0.0), seed)
 
