@@ -26,3 +26,5 @@ def test_the_flow_dances_on_the_unitree_g1(
     text = asyncio.run(dance(str(short_clip), "smoke", overrides, robot="g1"))
     assert text["robot"] == "g1"
     assert Path(text["page"]).is_file()
+    kept = list((store_folder / "feedback").glob("*.npz"))
+    assert len(kept) == 1, "training and evaluation computed the same feedback"
