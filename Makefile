@@ -29,8 +29,7 @@
 PY := .venv/bin/python
 ARGS ?=
 WORKERS ?= auto
-# What takes long begins first: tests/conftest.py sorts, by their marks and not by the number of tests.
-PYTEST := $(PY) -m pytest -q -n $(WORKERS) --dist loadgroup --no-loadscope-reorder
+PYTEST := $(PY) -m pytest -q -n $(WORKERS) --dist loadgroup
 export OMP_NUM_THREADS ?= 1
 
 .PHONY: badinput dance test test-fast test-stack test-browser coverage bench bench-league bench-learning bench-mocap bench-retarget chaos bench-orchestration bench-pages deploy lint doctor docs wheel clean setup

@@ -10,7 +10,6 @@ from hypothesis import settings
 ROOT = Path(__file__).parents[1]
 MOST_WORKERS = 4
 """A worker takes up to 3.5 GB of memory."""
-FAST = 2
 
 settings.register_profile("any-machine", deadline=None)
 settings.load_profile("any-machine")
@@ -26,37 +25,14 @@ def pytest_xdist_auto_num_workers() -> int:
     return min(len(os.sched_getaffinity(0)), MOST_WORKERS)
 
 
-@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out what needs more than a machine has by itself, unless `-m` asks for it by name.
-
-    The others are put into the groups and the order in which the workers take them.
-    """
+    """Leave out what needs more than a machine has by itself, unless `-m` asks for it by name."""
     marks = str(config.getoption("-m"))
     left_out = [marker for marker in ("network", "cluster", "browser") if marker not in marks]
     outside = [item for item in items if any(item.get_closest_marker(m) for m in left_out)]
     if outside:
         config.hook.pytest_deselected(items=outside)
         items[:] = [item for item in items if item not in outside]
-    tiers = dict[Path, int]()
-    for item in items:
-        tiers[item.path] = min(tiers.get(item.path, FAST), tier(item))
-    for item in items:
-        if not item.get_closest_marker("xdist_group") and (tiers[item.path] or shares(item)):
-            item.add_marker(pytest.mark.xdist_group(item.path.relative_to(ROOT).as_posix()))
-    items.sort(key=lambda item: tiers[item.path])
-
-
-def tier(item: pytest.Item) -> int:
-    """Return 0 for a slow test, 1 for one that is marked medium, and `FAST`."""
-    found = (n for n, name in enumerate(("slow", "medium")) if item.get_closest_marker(name))
-    return next(found, FAST)
-
-
-def shares(item: pytest.Item) -> bool:
-    """Return whether a test takes what its file makes once: then one worker runs the file."""
-    fixtures = item._fixtureinfo.name2fixturedefs if isinstance(item, pytest.Function) else {}
-    return any(each[-1].scope == "module" for each in fixtures.values())
 
 
 @pytest.fixture

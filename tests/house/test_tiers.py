@@ -4,7 +4,7 @@ import re
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
@@ -16,11 +16,11 @@ BY_THEMSELVES = {"browser"}
 FAST = "not slow and not medium"
 COLLECT = """
 import sys, pytest
-from tests.house.test_tiers import kinds
 class Names:
     def pytest_collection_finish(self, session):
-        for kind in kinds(session.items):
-            print("collected", *kind)
+        for item in session.items:
+            fast = not any(item.get_closest_marker(name) for name in ("slow", "medium"))
+            print("collected", "fast" if fast else "rest", item.path.parent.as_posix())
 sys.exit(pytest.main(["--collect-only", "-qq", "-p", "no:cacheprovider"], plugins=[Names()]))
 """
 
@@ -36,34 +36,13 @@ def tops(folders: Iterable[str]) -> set[str]:
     return {Path(folder).relative_to(ROOT / "tests").parts[0] for folder in folders}
 
 
-def kinds(items: Sequence[pytest.Item]) -> list[tuple[str, str]]:
-    """Return `fast` or `rest`, and the folder, of every test."""
-    marks = ("slow", "medium")
-    fast = [not any(item.get_closest_marker(name) for name in marks) for item in items]
-    return [
-        ("fast" if each else "rest", item.path.parent.as_posix())
-        for each, item in zip(fast, items, strict=True)
-    ]
-
-
-def collected(session: pytest.Session) -> list[tuple[str, str]]:
-    """Return the kinds of all tests: this session's where it has all, or those of another one."""
-    config = session.config
-    chosen = config.option.keyword or config.option.markexpr or config.option.deselect
-    if not chosen and [Path(name).resolve() for name in config.args] == [ROOT / "tests"]:
-        return kinds(session.items)
+@pytest.mark.slow
+def test_the_fast_tests_are_most_of_all_and_of_every_folder() -> None:
     done = subprocess.run(
         [sys.executable, "-c", COLLECT], cwd=ROOT, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stdout[-2000:]
-    return re.findall(r"(?m)^collected (fast|rest) (\S+)$", done.stdout)
-
-
-@pytest.mark.slow
-def test_the_fast_tests_are_most_of_all_and_of_every_folder(
-    request: pytest.FixtureRequest,
-) -> None:
-    found = collected(request.session)
+    found = re.findall(r"(?m)^collected (fast|rest) (\S+)$", done.stdout)
     count = Counter(tier for tier, _ in found)
     assert count.total() > 3000
     assert count["fast"] / count.total() >= LEAST_SHARE
