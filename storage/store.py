@@ -13,7 +13,7 @@ from pathlib import Path
 
 from robojackson.errors import StoreError
 from robojackson.files.file_tree import FileTree, digest_of, in_one_line
-from robojackson.files.local_folder import LocalFolder, Place
+from robojackson.files.local_folder import LocalFolder, Place, user_cache
 from robojackson.pipeline.folder_lock import A_MOMENT, locked
 from storage.artifact import Artifact
 from storage.places import place_at
@@ -107,8 +107,7 @@ class Store(FileTree):
         """The folder of this machine: the root itself on a disk, else a folder in cache."""
         if isinstance(self.place, LocalFolder):
             return self.place.root
-        cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-        return cache / "robojackson" / hashlib.sha256(self.root.encode()).hexdigest()[:12]
+        return user_cache() / hashlib.sha256(self.root.encode()).hexdigest()[:12]
 
     def require_writable(self, room_mb: int = 0) -> None:
         """Raise the one line of a store that is full or refuses a write, before any work.

@@ -27,6 +27,16 @@ def folder_of(root: str) -> Path | None:
     return Path(root.removeprefix(FILE))
 
 
+def user_cache() -> Path:
+    """Return our folder in the user's cache.
+
+    Raises:
+        RuntimeError: the user has no home.
+    """
+    root = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(root) / "robojackson"
+
+
 class Place(Protocol):
     """Interface of a place that keeps files; keys are relative, `/` between their parts."""
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import mujoco
 
 from robojackson.errors import BadConfiguration
-from robojackson.files.local_folder import folder_of
+from robojackson.files.local_folder import folder_of, user_cache
 from robojackson.files.memory_limit import limited_memory
 from robojackson.robot.description import KEYPOINTS, TOES, RobotDescription
 from robojackson.robot.model_files import (
@@ -42,10 +42,7 @@ def robots_folder() -> Path:
     """Return where added robots are kept: inside the store, or in the cache where that is no
     folder."""
     folder = folder_of(os.environ.get(STORE) or "store")
-    if folder is None:
-        cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-        folder = Path(cache) / "robojackson"
-    return folder / "robots"
+    return (folder or user_cache()) / "robots"
 
 
 def added_folder(description: RobotDescription) -> Path:

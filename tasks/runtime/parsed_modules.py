@@ -1,12 +1,11 @@
 """What was found in the sources of modules, kept in the user's cache: parsing takes seconds."""
 
-import hashlib
 import json
-import os
-import tempfile
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+
+from robojackson.files.local_folder import LocalFolder, sha256_of, sha256_of_file, user_cache
 
 Parsed = tuple[str, tuple[tuple[str, int], ...]]
 """Digest of a source, and its imports as (name, level)."""
@@ -31,7 +30,7 @@ class ParsedModules:
         """Return what is in a source, parsed only where it was not before."""
         if self._found is None:
             self._found = self._kept()
-        key = _digest(source.encode())
+        key = sha256_of(source.encode())
         if key not in self._found:
             self._found[key] = self._parse(source)
             self._is_new = True
@@ -47,10 +46,7 @@ class ParsedModules:
         with suppress(OSError, RuntimeError):
             file = self._file()
             file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            handle, part = tempfile.mkstemp(dir=file.parent, prefix=".part-")
-            with os.fdopen(handle, "w") as out:
-                json.dump(rows, out)
-            Path(part).replace(file)
+            LocalFolder(file.parent).put(file.name, json.dumps(rows).encode())
 
     def _kept(self) -> dict[str, Parsed]:
         try:
@@ -59,9 +55,8 @@ class ParsedModules:
             return {}
 
     def _file(self) -> Path:
-        root = os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()
-        recipe = _digest(self._recipe.read_bytes())
-        return Path(root) / "robojackson" / "parsed" / f"{recipe[:12]}.json"
+        recipe = sha256_of_file(self._recipe)
+        return user_cache() / "parsed" / f"{recipe[:12]}.json"
 
 
 def _read(file: Path) -> dict[str, Parsed]:
@@ -73,7 +68,3 @@ def _read(file: Path) -> dict[str, Parsed]:
         }
     except (OSError, ValueError, TypeError, AttributeError, RecursionError):
         return {}
-
-
-def _digest(data: bytes) -> str:
-    return hashlib.sha256(data).hexdigest()

@@ -15,9 +15,8 @@ from robojackson.report.video.robot_panel import REFERENCE_TINT, RobotView
 from robojackson.report.video.timeline import Timeline, at_frames, reference_qpos
 from robojackson.retarget.retarget_config import RetargetConfig
 from robojackson.retarget.retargeting import retarget_motion
-from robojackson.robot.mjcf import robots_folder
 from robojackson.robot.model import load_robot
-from tests.fixtures.robots import description, human, robot_motion, stock
+from tests.fixtures.robots import G1, description, human, robot_motion, stock
 
 SIZE = 120, 180
 CONFIG = VideoConfig(panel_width=SIZE[0], panel_height=SIZE[1])
@@ -25,9 +24,6 @@ MAGENTA = (1.0, 0.0, 1.0)
 CLIPS = ("hip_shake", "walk", "dance_b")
 EVERY = 6
 """Frames from one that is looked at to the next."""
-G1 = pytest.mark.skipif(
-    not (robots_folder() / "g1" / "g1.xml").is_file(), reason="robojackson robots add g1"
-)
 IN_THE_DARK = """
 <mujoco>
   <visual><headlight active="0"/></visual>

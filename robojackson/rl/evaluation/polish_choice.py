@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from robojackson.motion.reference_motion import ReferenceMotion
-from robojackson.rl.config.evaluate_config import TRAINED
+from robojackson.rl.config.evaluate_config import REGULATOR, TRAINED
 from robojackson.rl.config.train_config import EvaluateConfig
 from robojackson.rl.evaluation.controllers import drivers
 from robojackson.rl.evaluation.rollout_records import RolloutScorer
@@ -29,7 +29,6 @@ RESETS, SEED = 2, 20_261_127
 """Noisy starts a phase, and the seed of their noise, which no evaluation has by default."""
 MARGIN = 0.03
 """Share of the starts by which the feedback alone must be better to be taken: two of 49."""
-FEEDBACK = "regulator"
 
 
 def better_of(
@@ -48,7 +47,7 @@ def better_of(
     policy = replace(policy, facts=json.loads(json.dumps(dict(policy.facts))))  # as a file has them
     config = EvaluateConfig(resets=RESETS, seed=SEED, threads=threads)
     found = drivers(policy, reference, robot, config.seed)
-    if FEEDBACK not in found:
+    if REGULATOR not in found:
         return policy
     starts, labels = starts_of(robot, clip, config)
     horizon = clip.horizon(starts.step, config.seconds)
@@ -59,7 +58,7 @@ def better_of(
         rows = [scorer.row(name, label, done, i) for i, label in enumerate(labels)]
         return summarise(rows)["strict_success"]
 
-    trained, alone = held(TRAINED), held(FEEDBACK)
+    trained, alone = held(TRAINED), held(REGULATOR)
     facts = {**policy.facts, "beside_feedback": {"trained": trained, "feedback": alone}}
     if alone - trained < MARGIN:
         return replace(policy, facts=facts)

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import jax
 
+from robojackson.files.local_folder import user_cache
+
 _PROCESSOR = Path("/proc/cpuinfo")
 _FOLDER = "jax_compilation_cache_dir"
 _ALL_PROGRAMS: dict[str, float] = {
@@ -41,9 +43,8 @@ def keep_compiled_programs() -> None:
 
 def compiled_folder() -> Path:
     """Return the folder of this kind of processor: what runs on one may not run on another."""
-    root = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     kind = hashlib.sha256(_instructions().encode()).hexdigest()[:12]
-    return Path(root) / "robojackson" / "compiled" / kind
+    return user_cache() / "compiled" / kind
 
 
 def is_private(folder: Path) -> bool:

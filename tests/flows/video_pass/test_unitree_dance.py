@@ -7,17 +7,15 @@ from pathlib import Path
 import pytest
 
 from flows.dance import dance
-from robojackson.robot.mjcf import robots_folder
-
-G1 = robots_folder().absolute() / "g1"
+from tests.fixtures.robots import G1, G1_FOLDER
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not (G1 / "g1.xml").is_file(), reason="robojackson robots add g1")
+@G1
 def test_the_flow_dances_on_the_unitree_g1(
     prefect_server: None, short_clip: Path, store_folder: Path
 ) -> None:
-    shutil.copytree(G1, store_folder / "robots" / "g1")
+    shutil.copytree(G1_FOLDER, store_folder / "robots" / "g1")
     overrides = {
         "train.trainer": "sb3",
         "train.steps": 300,

@@ -8,14 +8,9 @@ import pytest
 from robojackson.api.deploy_pack import write_deploy_pack
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.policy import Policy
-from robojackson.robot.mjcf import robots_folder
 from robojackson.robot.model import Robot
 from tests.fixtures.deploy_policies import bare_packages, random_policy, swaying, with_head_on
 from tests.fixtures.robots import stock
-
-G1 = pytest.mark.skipif(
-    not (robots_folder() / "g1" / "g1.xml").is_file(), reason="robojackson robots add g1"
-)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,8 @@ from robojackson.rl.sim.motors import Motors
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.robot.model import load_robot
-from tests.formats.deploy.conftest import G1, Pack, made
+from tests.fixtures.robots import G1
+from tests.formats.deploy.conftest import Pack, made
 
 NAMES = ("policy.onnx", "policy_obs.onnx")
 

@@ -13,7 +13,8 @@ from robojackson.formats.deploy.deployed_policy import places_in_mjcf
 from robojackson.formats.deploy.settings_yaml import UNITREE_TERMS
 from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.robot.model import load_robot
-from tests.formats.deploy.conftest import G1, Pack
+from tests.fixtures.robots import G1
+from tests.formats.deploy.conftest import Pack
 
 
 def settings(pack: Pack) -> dict:
