@@ -29,7 +29,7 @@ KINDS: dict[Kind, str] = {
 """What each kind is, in the order in which they are listed."""
 WORK, PAGES, DOWNLOADS, WALKERS = "work", "dances", "downloads", "pretrain"
 FEEDBACK = "feedback"
-"""Where `rl.sim.feedback` keeps gains."""
+"""Where `rl.feedback.cached_feedback` keeps gains."""
 REFERRING: tuple[Kind, ...] = ("kept", "runs", "cache", "videos")
 """Kinds that refer to artifacts; the first of them that names one decides of which kind it is."""
 LOCKS = (TASK, PROCESS, HELD)

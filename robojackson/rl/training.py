@@ -20,10 +20,10 @@ from robojackson.rl.config.train_config import TqcConfig, TrainConfig
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.env.vec_env import TrackingVecEnv
 from robojackson.rl.evaluation.polish_choice import better_of
+from robojackson.rl.feedback.sampled_regulator import ENOUGH
 from robojackson.rl.modes.track_mode import control_of
 from robojackson.rl.pretrained import pretrained
 from robojackson.rl.sim.motors import feedback_path, feedback_share
-from robojackson.rl.sim.sampled_regulator import ENOUGH
 from robojackson.rl.tqc.network_arrays import Networks, chosen, fitted
 from robojackson.rl.tqc.trainers import make_trainer
 from robojackson.rl.training_hooks import BudgetSpent, Choice, Hooks, as_trained

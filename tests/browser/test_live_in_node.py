@@ -17,15 +17,15 @@ from robojackson.report.web.live_records import RECORDS
 from robojackson.report.web.shown_run import RecordedRun
 from robojackson.rl.evaluation.controllers import control_of, sees_ahead, trained_driver
 from robojackson.rl.evaluation.rollouts import Moment, Starts, roll_out
+from robojackson.rl.feedback import sampled_regulator
+from robojackson.rl.feedback.driven_clip import driven_clip
+from robojackson.rl.feedback.nominal_path import Gains, Progress
+from robojackson.rl.feedback.regulator import regulator
+from robojackson.rl.feedback.standing_feet import Feet
 from robojackson.rl.modes.observation import Observer
 from robojackson.rl.policy import Policy
-from robojackson.rl.sim import sampled_regulator
-from robojackson.rl.sim.nominal_path import Gains, Progress
-from robojackson.rl.sim.preview import driven_clip
 from robojackson.rl.sim.reference_clip import Clip
-from robojackson.rl.sim.regulator import regulator
 from robojackson.rl.sim.simulation import Simulation
-from robojackson.rl.sim.standing_feet import Feet
 from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
 from tests.browser.conftest import made_policy

@@ -10,7 +10,7 @@ import pytest
 
 from robojackson.errors import StoreError
 from robojackson.pipeline.folder_lock import locked
-from robojackson.rl.sim import feedback
+from robojackson.rl.feedback import cached_feedback
 from storage import stage_records
 from storage.artifact import Artifact
 from storage.store import Store
@@ -105,7 +105,7 @@ def test_tables_studies_walkers_and_robots_are_never_removed(store: Store) -> No
 
 
 def test_gains_of_feedback_are_a_cache(store: Store) -> None:
-    gains = store.put(f"{feedback.FOLDER}/0123456789abcdef.npz", b"gains").key
+    gains = store.put(f"{cached_feedback.FOLDER}/0123456789abcdef.npz", b"gains").key
     assert [(item.kind, item.key) for item in inventory(store)] == [("cache", gains)]
     assert not plan(store, USUAL, 0.0).going
     assert [item.key for item in remove(store, plan(store, ("cache",), 0.0))] == [gains]

@@ -11,9 +11,9 @@ import pytest
 import torch
 
 from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.rl.feedback.driven_clip import driven_clip
 from robojackson.rl.modes.observation import Observer
 from robojackson.rl.policy import load_policy
-from robojackson.rl.sim.preview import driven_clip
 from robojackson.rl.sim.reference_clip import STRIDE, Clip
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.robot.fall import Fall

@@ -13,6 +13,8 @@ from robojackson.report.web.live_records import live_records
 from robojackson.report.web.shapes import packed, robot_shape
 from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.evaluation.controllers import Evaluated, control_of, sees_ahead
+from robojackson.rl.feedback.cached_feedback import feedback_of
+from robojackson.rl.feedback.standing_feet import LOW_M
 from robojackson.rl.modes.observation import (
     CLIP,
     HINGE_SPEED_SCALE,
@@ -23,11 +25,9 @@ from robojackson.rl.modes.observation import (
 )
 from robojackson.rl.policy import Policy
 from robojackson.rl.policy_facts import mode_of, observation_of
-from robojackson.rl.sim.feedback import feedback_of
 from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.motors import Motors, gains, residual_scale
 from robojackson.rl.sim.preview import preview_of
-from robojackson.rl.sim.standing_feet import LOW_M
 from robojackson.rl.trackers.policy_tracker import PolicyTracker
 from robojackson.rl.trackers.regulator_tracker import RegulatorTracker
 from robojackson.robot.fall import Fall

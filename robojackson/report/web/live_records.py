@@ -7,7 +7,7 @@ from robojackson.rl.config.train_config import EvaluateConfig
 from robojackson.rl.evaluation.controllers import Evaluated, control_of, sees_ahead, trained_driver
 from robojackson.rl.evaluation.rollouts import Starts
 from robojackson.rl.evaluation.starts import starts_of
-from robojackson.rl.sim.preview import driven_clip
+from robojackson.rl.feedback.driven_clip import driven_clip
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.robot.model import Robot
 

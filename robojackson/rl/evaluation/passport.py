@@ -15,7 +15,7 @@ from robojackson.rl.evaluation.controllers import Evaluated, sees_ahead, trained
 from robojackson.rl.evaluation.rollout_records import RolloutScorer
 from robojackson.rl.evaluation.rollouts import Conditions, Driver, roll_out
 from robojackson.rl.evaluation.starts import starts_of, summarise
-from robojackson.rl.sim.preview import driven_clip
+from robojackson.rl.feedback.driven_clip import driven_clip
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.variation import Variation, varied
 from robojackson.robot.fall import Fall

@@ -16,7 +16,7 @@ from robojackson.rl.config.train_config import RandomConfig
 from robojackson.rl.evaluation.foresight import Foresight
 from robojackson.rl.evaluation.performance_record import Performance
 from robojackson.rl.evaluation.performers import Performers, Stage
-from robojackson.rl.sim.preview import driven_clip
+from robojackson.rl.feedback.driven_clip import driven_clip
 from robojackson.rl.sim.simulation import Simulation, require_same_clock
 from robojackson.rl.trackers.tracker import Tracker
 from robojackson.robot.fall import Fall

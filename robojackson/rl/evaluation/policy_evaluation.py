@@ -37,10 +37,10 @@ from robojackson.rl.evaluation.rollout_records import RolloutScorer
 from robojackson.rl.evaluation.rollouts import Rollouts, Starts, roll_out
 from robojackson.rl.evaluation.starts import starts_of, summarise
 from robojackson.rl.evaluation.verdict import verdict_on, without_short_figures
+from robojackson.rl.feedback.driven_clip import driven_clip
 from robojackson.rl.modes.paper_mode import facing_ahead
 from robojackson.rl.policy import Policy
 from robojackson.rl.policy_facts import fact, is_of_another_motion, mode_of
-from robojackson.rl.sim.preview import driven_clip
 from robojackson.rl.sim.simulation import control_step, require_same_clock
 from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot

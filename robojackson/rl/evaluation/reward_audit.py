@@ -18,9 +18,9 @@ from robojackson.rl.config.train_config import (
 )
 from robojackson.rl.evaluation.reward_meter import RewardMeter
 from robojackson.rl.evaluation.rollouts import Driver, Moment, Starts, roll_out
+from robojackson.rl.feedback.driven_clip import driven_clip
 from robojackson.rl.modes.paper_mode import facing_ahead
 from robojackson.rl.modes.track_mode import control_of
-from robojackson.rl.sim.preview import driven_clip
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.robot.fall import Fall

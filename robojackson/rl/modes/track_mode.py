@@ -16,6 +16,7 @@ from jaxtyping import Float, Int
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.paper_config import BETA
 from robojackson.rl.config.train_config import ControlConfig, RewardConfig, TrackConfig
+from robojackson.rl.feedback.driven_clip import driven_clip
 from robojackson.rl.modes.mode import EpisodeStart, Score
 from robojackson.rl.modes.observation import Observer
 from robojackson.rl.modes.reset_states import (
@@ -36,7 +37,6 @@ from robojackson.rl.modes.rewards import (
     tracked_points,
     tracking_errors,
 )
-from robojackson.rl.sim.preview import driven_clip
 from robojackson.rl.sim.reference_clip import ClipStep
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.robot.fall import Fall

@@ -6,17 +6,11 @@ the hinges' offsets from the stand (rad). It does not depend on the robot's stat
 once.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 from jaxtyping import Float
 
 from robojackson.geometry.rotations import heading, quat_to_matrix
-from robojackson.motion.reference_motion import ReferenceMotion, motions_of
-from robojackson.rl.config.train_config import ControlConfig
-from robojackson.rl.sim.feedback import feedback_of
-from robojackson.rl.sim.feedforward import lead_of
-from robojackson.rl.sim.nominal_path import Progress, no_progress
+from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.robot.model import Robot
 
@@ -51,24 +45,3 @@ def preview_of(reference: ReferenceMotion, robot: Robot) -> Float[np.ndarray, "S
         scaled = DISTANCE_SCALE * np.concatenate([ahead, rise, height], 1)
         parts += [scaled, np.sin(turn)[:, None], np.cos(turn)[:, None], up, angles]
     return np.concatenate(parts, 1)
-
-
-def driven_clip(
-    robot: Robot,
-    references: ReferenceMotion | Sequence[ReferenceMotion],
-    control: ControlConfig,
-    ahead: bool = False,
-    progress: Progress = no_progress,
-) -> Clip:
-    """Return the clip with its feed-forward, its feedback and, if `ahead`, the preview.
-
-    Args:
-        progress: Called with a name, the steps that are done, and all, while the feedback is
-            computed.
-    """
-    motions = motions_of(references)
-    leads = [lead_of(robot, motion, control) for motion in motions]
-    driven = [lead for lead in leads if lead is not None]
-    lead = np.concatenate(driven) if driven else None
-    seen = np.concatenate([preview_of(motion, robot) for motion in motions]) if ahead else None
-    return Clip(motions, lead, seen, feedback_of(robot, motions, control, progress))

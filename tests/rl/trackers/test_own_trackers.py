@@ -12,7 +12,7 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.pipeline.tracker_descriptions import describe_tracker, require_tracker
 from robojackson.rl.config.train_config import EvaluateConfig
 from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
-from robojackson.rl.sim import path_search, path_trial, sampled_regulator
+from robojackson.rl.feedback import path_search, path_trial, sampled_regulator
 from robojackson.rl.trackers.policy_tracker import PolicyTracker
 from robojackson.rl.trackers.regulator_tracker import RegulatorTracker
 from robojackson.rl.trackers.tracker_description import TrackerDescription

@@ -6,14 +6,14 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from robojackson.rl.sim.feedback_law import Feedback
-from robojackson.rl.sim.keypoint_rule import KeypointRule
-from robojackson.rl.sim.nominal_path import Gains, Path
-from robojackson.rl.sim.path_search import LOST_RAD
+from robojackson.rl.feedback.feedback_law import Feedback
+from robojackson.rl.feedback.keypoint_rule import KeypointRule
+from robojackson.rl.feedback.nominal_path import Gains, Path
+from robojackson.rl.feedback.path_search import LOST_RAD
+from robojackson.rl.feedback.regulator import advance
+from robojackson.rl.feedback.standing_feet import Feet
 from robojackson.rl.sim.reference_clip import Clip
-from robojackson.rl.sim.regulator import advance
 from robojackson.rl.sim.simulation import Simulation
-from robojackson.rl.sim.standing_feet import Feet
 from robojackson.rl.sim.tangent import state_difference, state_plus
 from robojackson.robot.model import Robot
 

@@ -12,12 +12,12 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import ControlConfig, EvaluateConfig, TrackConfig
 from robojackson.rl.evaluation.rollouts import Driver, roll_out
 from robojackson.rl.evaluation.starts import starts_of
+from robojackson.rl.feedback import cached_feedback, regulator
+from robojackson.rl.feedback.driven_clip import driven_clip
+from robojackson.rl.feedback.nominal_path import Gains
 from robojackson.rl.modes.track_mode import control_of
 from robojackson.rl.policy import Policy
 from robojackson.rl.policy_facts import policy_control
-from robojackson.rl.sim import feedback, regulator
-from robojackson.rl.sim.nominal_path import Gains
-from robojackson.rl.sim.preview import driven_clip
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.rl.sim.tangent import state_difference, state_plus
 from robojackson.robot.fall import Fall
@@ -84,7 +84,7 @@ def test_feedback_keeps_a_robot_up_that_falls_without_it(
 def test_on_its_nominal_path_the_feedback_adds_its_offset_alone(
     robot: Robot, sway: ReferenceMotion
 ) -> None:
-    found = feedback.feedback_of(robot, [sway], FED)
+    found = cached_feedback.feedback_of(robot, [sway], FED)
     assert found is not None
     row, shift = np.array([3, 50]), np.array([[0.0, 0, 0], [2.0, -1.0, 0]])
     step = found.at(row, shift)
@@ -99,50 +99,51 @@ def test_on_its_nominal_path_the_feedback_adds_its_offset_alone(
 def test_gains_are_computed_once_and_again_where_the_file_is_damaged(
     robot: Robot, sway: ReferenceMotion, store: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    kept = feedback.feedback_of(robot, [sway], FED)
+    kept = cached_feedback.feedback_of(robot, [sway], FED)
     calls: list[int] = []
-    compute = feedback.regulator_of
+    compute = cached_feedback.regulator_of
 
     def counted(*given: Any) -> Gains:
         calls.append(1)
         return compute(*given)
 
-    monkeypatch.setattr(feedback, "regulator_of", counted)
-    again = feedback.feedback_of(robot, [sway], FED)
-    assert feedback.feedback_of(robot, [sway], dataclasses.replace(FED, action_factor=4.0))
+    monkeypatch.setattr(cached_feedback, "regulator_of", counted)
+    again = cached_feedback.feedback_of(robot, [sway], FED)
+    assert cached_feedback.feedback_of(robot, [sway], dataclasses.replace(FED, action_factor=4.0))
     assert not calls, "the range of a policy's actions does not change the feedback"
     here = dataclasses.replace(robot.description, file="/a/robot.yaml", mjcf="/a/model.xml")
-    assert feedback.feedback_of(dataclasses.replace(robot, description=here), [sway], FED)
+    assert cached_feedback.feedback_of(dataclasses.replace(robot, description=here), [sway], FED)
     assert not calls, "the place of a robot's file does not change the feedback"
     assert kept is not None
     assert again is not None
     for one in dataclasses.fields(Gains):
         computed, read = getattr(kept.gains, one.name), getattr(again.gains, one.name)
         np.testing.assert_array_equal(read, computed, f"{one.name}: not the same to the bit")
-    for file in (store / feedback.FOLDER).glob("*.npz"):
+    for file in (store / cached_feedback.FOLDER).glob("*.npz"):
         file.write_bytes(file.read_bytes()[:100])
-    assert feedback.feedback_of(robot, [sway], FED) is not None
+    assert cached_feedback.feedback_of(robot, [sway], FED) is not None
     assert calls == [1]
-    for file in (store / feedback.FOLDER).glob("*.npz"):
+    for file in (store / cached_feedback.FOLDER).glob("*.npz"):
         np.savez(
             file, gain=np.zeros((2, 2)), offset=np.zeros(3), qpos=np.zeros(1), qvel=np.zeros(1)
         )
-    assert feedback.feedback_of(robot, [sway], FED) is not None
+    assert cached_feedback.feedback_of(robot, [sway], FED) is not None
     assert calls == [1, 1], "gains of another shape were taken"
     other = dataclasses.replace(sway, qpos=sway.qpos + [0.0, 0, 0, 0, 0, 0, 0, *[1e-3] * 17])
-    assert feedback.feedback_of(robot, [other], FED) is not None
+    assert cached_feedback.feedback_of(robot, [other], FED) is not None
     assert calls == [1, 1, 1]
 
 
 def test_half_a_share_is_half_the_feedback(robot: Robot, sway: ReferenceMotion) -> None:
     whole, half = (
-        feedback.feedback_of(robot, [sway], dataclasses.replace(FED, feedback=share))
+        cached_feedback.feedback_of(robot, [sway], dataclasses.replace(FED, feedback=share))
         for share in (1.0, 0.5)
     )
     assert whole is not None
     assert half is not None
     np.testing.assert_allclose(half.gains.gain, whole.gains.gain / 2, rtol=1e-5, atol=1e-6)
-    assert feedback.feedback_of(robot, [sway], LED) is None, "the humanoid has none by itself"
+    alone = cached_feedback.feedback_of(robot, [sway], LED)
+    assert alone is None, "the humanoid has none by itself"
 
 
 @pytest.mark.parametrize("kind", ["onboard", "preview"])

@@ -19,8 +19,12 @@ from robojackson.errors import StoreError
 from robojackson.files.file_tree import FileTree
 from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
 from robojackson.rl.config.train_config import ControlConfig
-from robojackson.rl.sim import sampled_regulator
-from robojackson.rl.sim.feedback_law import Feedback
+from robojackson.rl.feedback import sampled_regulator
+from robojackson.rl.feedback.feedback_law import Feedback
+from robojackson.rl.feedback.nominal_path import Gains, Progress, no_progress
+from robojackson.rl.feedback.path_trial import LARGEST_MOVE
+from robojackson.rl.feedback.regulator import regulator, settings
+from robojackson.rl.feedback.standing_feet import Feet
 from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.motors import (
     actuation_facts,
@@ -28,12 +32,8 @@ from robojackson.rl.sim.motors import (
     feedback_share,
     residual_scale,
 )
-from robojackson.rl.sim.nominal_path import Gains, Progress, no_progress
-from robojackson.rl.sim.path_trial import LARGEST_MOVE
 from robojackson.rl.sim.reference_clip import Clip
-from robojackson.rl.sim.regulator import regulator, settings
 from robojackson.rl.sim.simulation import Simulation, resolved
-from robojackson.rl.sim.standing_feet import Feet
 from robojackson.robot.description import description_sha256
 from robojackson.robot.mjcf import robots_folder
 from robojackson.robot.model import Robot

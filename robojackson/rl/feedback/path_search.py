@@ -15,11 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from robojackson.rl.sim.keypoint_rule import KeypointRule
-from robojackson.rl.sim.nominal_path import Path, Recursion
-from robojackson.rl.sim.regulator import advance, weights
+from robojackson.rl.feedback.keypoint_rule import KeypointRule
+from robojackson.rl.feedback.nominal_path import Path, Recursion
+from robojackson.rl.feedback.regulator import advance, weights
+from robojackson.rl.feedback.standing_feet import Feet
 from robojackson.rl.sim.simulation import Simulation
-from robojackson.rl.sim.standing_feet import Feet
 from robojackson.rl.sim.tangent import state_difference
 
 WINDOW, SAMPLES, KEPT, CHILDREN = 8, 320, 32, 8

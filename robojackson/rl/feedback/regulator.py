@@ -15,11 +15,12 @@ from jaxtyping import Float
 from mujoco import rollout
 
 from robojackson.files.processor_cores import cores
-from robojackson.rl.sim.nominal_path import (
+from robojackson.rl.feedback.nominal_path import (
     Gains,
     Linear,
     Path,
     Progress,
+    Pull,
     Recursion,
     no_progress,
 )
@@ -173,27 +174,34 @@ def linearised(
     return Linear(slope[:, :, : 2 * nv], slope[:, :, 2 * nv :], change.mean(1))
 
 
-def riccati(linear: Linear, action: Float[np.ndarray, " nu"], cyclic: bool) -> Recursion:
+def riccati(
+    linear: Linear, action: Float[np.ndarray, " nu"], cyclic: bool, pull: Pull | None = None
+) -> Recursion:
     """Return the feedback whose cost is least over the rest of the motion.
 
     Args:
         linear: The system along a path.
         action: Radians that a full action moves each target.
         cyclic: Whether the path is followed by itself.
+        pull: Towards what the path is pulled, of a path that is not where it shall be.
     """
     steps, size = linear.defect.shape
     cost, effort = weights(action, size)
     gain, offset = np.zeros((steps, len(action), size)), np.zeros((steps, len(action)))
     values, slopes = np.zeros((steps, size, size)), np.zeros((steps, size))
     value, slope = cost, np.zeros(size)
+    pull = pull or Pull(np.zeros((steps, size)), np.zeros((steps, len(action))))
     order = np.tile(np.arange(steps)[::-1], LAPS if cyclic else 1)
     order = order if cyclic else np.concatenate([np.full(STILL, steps - 2), order])
     for t in order:
         a, b, missed = linear.by_state[t], linear.by_target[t], linear.defect[t]
         weighted = effort + b.T @ value @ b
-        both = np.linalg.solve(weighted, b.T @ np.column_stack([value @ a, value @ missed + slope]))
+        wanted = b.T @ np.column_stack([value @ a, value @ missed + slope])
+        wanted[:, -1] += pull.target[t]
+        both = np.linalg.solve(weighted, wanted)
         gain[t], offset[t] = both[:, :-1], both[:, -1]
         slope = (a - b @ gain[t]).T @ (slope + value @ missed)
+        slope += pull.state[t] - gain[t].T @ pull.target[t]
         value = cost + a.T @ value @ (a - b @ gain[t])
         value = (value + value.T) / 2
         values[t], slopes[t] = value, slope

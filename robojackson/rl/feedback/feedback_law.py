@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from robojackson.rl.sim.nominal_path import Gains
-from robojackson.rl.sim.standing_feet import Feet
+from robojackson.rl.feedback.nominal_path import Gains
+from robojackson.rl.feedback.standing_feet import Feet
 from robojackson.rl.sim.tangent import state_difference
 
 

@@ -7,13 +7,13 @@ import pytest
 
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import ControlConfig
-from robojackson.rl.sim.keypoint_rule import KeypointRule
+from robojackson.rl.feedback.driven_clip import driven_clip
+from robojackson.rl.feedback.keypoint_rule import KeypointRule
+from robojackson.rl.feedback.path_trial import Trial
+from robojackson.rl.feedback.regulator import regulator
+from robojackson.rl.feedback.standing_feet import Feet
 from robojackson.rl.sim.motors import residual_scale
-from robojackson.rl.sim.path_trial import Trial
-from robojackson.rl.sim.preview import driven_clip
-from robojackson.rl.sim.regulator import regulator
 from robojackson.rl.sim.simulation import Simulation
-from robojackson.rl.sim.standing_feet import Feet
 from robojackson.robot.model import Robot
 
 LED = ControlConfig(feedforward=1.0, feedback=0.0)
@@ -54,7 +54,7 @@ def test_robots_that_break_the_rule_come_to_the_end_and_do_not_count(
     clip, sim = driven_clip(robot, sway, LED), Simulation(robot, LED, 1)
     action = residual_scale(robot, ControlConfig())
     gains, path, _ = regulator(sim, clip, action, Feet(robot).count)
-    monkeypatch.setattr("robojackson.rl.sim.path_trial.HELD_S", 0.6)
+    monkeypatch.setattr("robojackson.rl.feedback.path_trial.HELD_S", 0.6)
     found = [
         Trial(ruled(robot, sites=sites), sim, clip, action, path).held(gains)
         for sites in (1.0, 1e-4)

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from robojackson.metrics.rollout_score import heading_frame, site_error
-from robojackson.rl.sim.standing_feet import Sites
+from robojackson.rl.feedback.standing_feet import Sites
 from robojackson.robot.model import Robot
 from robojackson.robot.names import FEET, HANDS, PELVIS
 

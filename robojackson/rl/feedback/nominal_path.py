@@ -59,6 +59,20 @@ class Linear:
 
 
 @dataclass(frozen=True)
+class Pull:
+    """Half the slopes of a cost beside the quadratic one, at a path: a path that is off its motion
+    is pulled towards it.
+
+    Attributes:
+        state: By the state.
+        target: By the offset of the targets.
+    """
+
+    state: Float[np.ndarray, "T X"]
+    target: Float[np.ndarray, "T nu"]
+
+
+@dataclass(frozen=True)
 class Recursion:
     """Result of the Riccati recursion: the feedback and the cost of the rest of the motion.
 

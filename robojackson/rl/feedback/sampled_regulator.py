@@ -1,25 +1,27 @@
 """The regulator along a path beside a motion, where the motion itself cannot be held."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from robojackson.rl.sim import path_search, path_trial
-from robojackson.rl.sim.keypoint_rule import KeypointRule
-from robojackson.rl.sim.nominal_path import Gains, Linear, Path, Progress, no_progress
-from robojackson.rl.sim.path_search import RULE_SHARE, PathSearch
-from robojackson.rl.sim.path_trial import Trial
-from robojackson.rl.sim.reference_clip import Clip
-from robojackson.rl.sim.regulator import (
+from robojackson.rl.feedback import path_refinement, path_search, path_trial
+from robojackson.rl.feedback.keypoint_rule import KeypointRule
+from robojackson.rl.feedback.nominal_path import Gains, Linear, Path, Progress, no_progress
+from robojackson.rl.feedback.path_refinement import ROUNDS, refinements
+from robojackson.rl.feedback.path_search import RULE_SHARE, PathSearch
+from robojackson.rl.feedback.path_trial import Trial
+from robojackson.rl.feedback.regulator import (
     following,
     linearised,
     reference_path,
     regulator,
     riccati,
 )
+from robojackson.rl.feedback.standing_feet import LOW_M, Feet
+from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.simulation import Simulation
-from robojackson.rl.sim.standing_feet import LOW_M, Feet
 from robojackson.robot.model import Robot
 
 PASSES, PASSES_A_S = 6, 2.0
@@ -70,11 +72,12 @@ def sampled_regulator(
     for number in range(tries):
         rng = np.random.default_rng([seed, number])
         search = PathSearch(sim, action, feet, rule, reference, rng)
-        path, along = _searched(search, sim, reference, linear, action, clip.dt, progress)
-        found = _gains(sim, clip, action, feet, path, along, reference)
-        now = trial.held(found)
-        if now > held:
-            best, held = found, now
+        searched = _searched(search, sim, reference, linear, action, clip.dt, progress)
+        for path, along in _candidates(searched, sim, reference, action, progress):
+            found = _gains(sim, clip, action, feet, path, along, reference)
+            now = trial.held(found)
+            if now >= held:  # of two that hold as many the later one, which is nearer to the motion
+                best, held = found, now
         if held.strictly >= ENOUGH:
             break
     return replace(best, held=np.array([held.strictly]))
@@ -88,8 +91,9 @@ def _searched(
     action: np.ndarray,
     dt: float,
     progress: Progress,
-) -> tuple[Path, Linear]:
-    """Return a path that was searched from a motion's, and the system along it."""
+) -> tuple[Path, Linear, bool]:
+    """Return a path that was searched from a motion's, the system along it, and whether a robot
+    goes along it to the end."""
     begin, furthest, stalls = 0, 0, 0
     for _ in range(PASSES + round(PASSES_A_S * len(path) * dt)):
         found, ended = search.run(path, riccati(linear, action, False), begin, 1 + stalls)
@@ -105,7 +109,26 @@ def _searched(
         if ended or stalls > STALLS:
             break
         begin = max(0, kept - round(AGAIN_S / dt))
-    return path, linear
+    return path, linear, ended
+
+
+def _candidates(
+    searched: tuple[Path, Linear, bool],
+    sim: Simulation,
+    motion: Path,
+    action: np.ndarray,
+    progress: Progress,
+) -> Iterator[tuple[Path, Linear]]:
+    """Yield what was searched, then, if robots go along it to the end, what is nearer to the
+    motion."""
+    path, linear, ended = searched
+    yield path, linear
+    if not ended:
+        return
+    progress("refined path", 0, ROUNDS)
+    for number, refined in enumerate(refinements(sim, path, linear, motion, action), 1):
+        yield refined
+        progress("refined path", number, ROUNDS)
 
 
 def _repeated(linear: Linear, cycles: int) -> Linear:
@@ -162,5 +185,6 @@ def settings() -> list[float]:
         TRIED_S,
         LOW_M,
         *path_search.settings(),
+        *path_refinement.settings(),
         *path_trial.settings(),
     ]

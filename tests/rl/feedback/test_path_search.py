@@ -5,17 +5,17 @@ import pytest
 
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import ControlConfig
-from robojackson.rl.sim import path_search, sampled_regulator
-from robojackson.rl.sim.keypoint_rule import KeypointRule
+from robojackson.rl.feedback import path_search, sampled_regulator
+from robojackson.rl.feedback.driven_clip import driven_clip
+from robojackson.rl.feedback.keypoint_rule import KeypointRule
+from robojackson.rl.feedback.nominal_path import Gains, Linear, Path
+from robojackson.rl.feedback.path_search import PathSearch
+from robojackson.rl.feedback.path_trial import Held, Trial
+from robojackson.rl.feedback.regulator import advance, regulator, riccati
+from robojackson.rl.feedback.standing_feet import Feet
 from robojackson.rl.sim.motors import residual_scale
-from robojackson.rl.sim.nominal_path import Gains, Linear, Path
-from robojackson.rl.sim.path_search import PathSearch
-from robojackson.rl.sim.path_trial import Held, Trial
-from robojackson.rl.sim.preview import driven_clip
 from robojackson.rl.sim.reference_clip import Clip
-from robojackson.rl.sim.regulator import advance, regulator, riccati
 from robojackson.rl.sim.simulation import Simulation
-from robojackson.rl.sim.standing_feet import Feet
 from robojackson.robot.model import Robot
 
 pytestmark = pytest.mark.medium
@@ -139,7 +139,7 @@ def test_no_search_follows_one_that_holds_nearly_all(
 ) -> None:
     action, held = residual_scale(robot, ControlConfig()), iter([0.0, 0.5, 0.95, 1.0])
     monkeypatch.setattr(sampled_regulator, "regulator", lambda *given: plain)
-    monkeypatch.setattr(sampled_regulator, "_searched", lambda *given: plain[1:])
+    monkeypatch.setattr(sampled_regulator, "_searched", lambda *given: (*plain[1:], False))
     monkeypatch.setattr(sampled_regulator, "_gains", lambda *given: plain[0])
     monkeypatch.setattr(Trial, "held", lambda *given: Held(next(held), 1.0, 1.0))
     found = sampled_regulator.sampled_regulator(robot, sim, clip, action)
