@@ -1,6 +1,5 @@
 """The regulator along a path beside a motion, where the motion itself cannot be held."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -69,17 +68,25 @@ def sampled_regulator(
     reference = reference_path(sim, clip, cycles * clip.steps)
     linear = _repeated(linear, cycles)
     tries = int(np.clip(TRIED_S / (len(reference) * clip.dt), 1, most_tries or TRIES))
+    chosen = None
     for number in range(tries):
         rng = np.random.default_rng([seed, number])
         search = PathSearch(sim, action, feet, rule, reference, rng)
-        searched = _searched(search, sim, reference, linear, action, clip.dt, progress)
-        for path, along in _candidates(searched, sim, reference, action, progress):
-            found = _gains(sim, clip, action, feet, path, along, reference)
-            now = trial.held(found)
-            if now >= held:  # of two that hold as many the later one, which is nearer to the motion
-                best, held = found, now
+        path, along, ended = _searched(search, sim, reference, linear, action, clip.dt, progress)
+        found = _gains(sim, clip, action, feet, path, along, reference)
+        now = trial.held(found)
+        if now > held:
+            best, held, chosen = found, now, (path, along) if ended else None
         if held.strictly >= ENOUGH:
             break
+    for number, (path, along) in enumerate(
+        refinements(sim, *chosen, reference, action) if chosen else ()
+    ):
+        progress("refined path", number + 1, ROUNDS)
+        found = _gains(sim, clip, action, feet, path, along, reference)
+        now = trial.held(found)
+        if now >= held:  # of two that hold as many the later one, which is nearer to the motion
+            best, held = found, now
     return replace(best, held=np.array([held.strictly]))
 
 
@@ -110,25 +117,6 @@ def _searched(
             break
         begin = max(0, kept - round(AGAIN_S / dt))
     return path, linear, ended
-
-
-def _candidates(
-    searched: tuple[Path, Linear, bool],
-    sim: Simulation,
-    motion: Path,
-    action: np.ndarray,
-    progress: Progress,
-) -> Iterator[tuple[Path, Linear]]:
-    """Yield what was searched, then, if robots go along it to the end, what is nearer to the
-    motion."""
-    path, linear, ended = searched
-    yield path, linear
-    if not ended:
-        return
-    progress("refined path", 0, ROUNDS)
-    for number, refined in enumerate(refinements(sim, path, linear, motion, action), 1):
-        yield refined
-        progress("refined path", number, ROUNDS)
 
 
 def _repeated(linear: Linear, cycles: int) -> Linear:

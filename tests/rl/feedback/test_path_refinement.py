@@ -18,7 +18,7 @@ from robojackson.robot.model import Robot
 
 pytestmark = pytest.mark.medium
 LED = ControlConfig(feedforward=1.0, feedback=0.0)
-STEPS = 30
+STEPS = 20
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +82,7 @@ def test_a_path_that_cannot_come_nearer_ends_the_refinement(
 ) -> None:
     path, linear = noisy
     *_, (path, linear) = refinements(sim, path, linear, motion, action)
-    for _ in range(3):
+    for _ in range(5):
         found = list(refinements(sim, path, linear, motion, action))
         if not found:
             return

@@ -120,6 +120,7 @@ def test_the_regulator_that_brings_more_robots_to_the_end_by_the_rule_is_taken(
     monkeypatch.setattr(sampled_regulator, "PASSES_A_S", 0.0)
     monkeypatch.setattr(sampled_regulator, "CYCLES_S", 0.0)
     monkeypatch.setattr(sampled_regulator, "TRIES", 1)
+    monkeypatch.setattr(sampled_regulator, "refinements", lambda *given: ())
     for shares, anchored in (((0.9,), False), ((0.5, 0.4), False), ((0.5, 0.6), True)):
         held = iter(Held(share, 1.0, 1.0) for share in shares)
         monkeypatch.setattr(Trial, "held", lambda *given, held=held: next(held))
@@ -145,6 +146,26 @@ def test_no_search_follows_one_that_holds_nearly_all(
     found = sampled_regulator.sampled_regulator(robot, sim, clip, action)
     assert found.held == 0.95
     assert next(held) == 1.0, "a search more than needed"
+
+
+def test_a_path_nearer_to_the_motion_is_taken_if_it_holds_as_many_robots(
+    robot: Robot,
+    sim: Simulation,
+    clip: Clip,
+    plain: tuple[Gains, Path, Linear],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    action = residual_scale(robot, ControlConfig())
+    refined = [plain[1:], plain[1:]]
+    monkeypatch.setattr(sampled_regulator, "regulator", lambda *given: plain)
+    monkeypatch.setattr(sampled_regulator, "_searched", lambda *given: (*plain[1:], True))
+    monkeypatch.setattr(sampled_regulator, "refinements", lambda *given: refined)
+    monkeypatch.setattr(sampled_regulator, "replace", lambda best, held: best)
+    for shares, taken in (((0.9, 0.9, 0.85), "nearer"), ((0.9, 0.85, 0.95), "nearest")):
+        held, found = iter([0.1, *shares]), iter(["searched", "nearer", "nearest"])
+        monkeypatch.setattr(sampled_regulator, "_gains", lambda *given, found=found: next(found))
+        monkeypatch.setattr(Trial, "held", lambda *given, held=held: Held(next(held), 1.0, 1.0))
+        assert sampled_regulator.sampled_regulator(robot, sim, clip, action) == taken
 
 
 class Falls:
