@@ -33,6 +33,9 @@ and begins earlier."""
 TRIES, TRIED_S, ENOUGH = 6, 45.0, 0.9
 """Searches from the beginning, of which the best is taken: at most so many, and of so long a motion
 in all; and none after one that holds so great a share of its starts."""
+AS_MANY = 0.042
+"""Share of the starts (two of them) by which a path nearer to the motion may hold fewer than the
+best: less than the chance of the starts' noise."""
 CYCLES_S = 4.0
 """A motion that repeats is simulated for so long at least; the last cycle but one is kept."""
 
@@ -79,14 +82,15 @@ def sampled_regulator(
             best, held, chosen = found, now, (path, along) if ended else None
         if held.strictly >= ENOUGH:
             break
+    most = held.strictly
     for number, (path, along) in enumerate(
         refinements(sim, *chosen, reference, action) if chosen else ()
     ):
         progress("refined path", number + 1, ROUNDS)
         found = _gains(sim, clip, action, feet, path, along, reference)
         now = trial.held(found)
-        if now >= held:  # of two that hold as many the later one, which is nearer to the motion
-            best, held = found, now
+        if now.strictly >= most - AS_MANY:
+            best, held, most = found, now, max(most, now.strictly)
     return replace(best, held=np.array([held.strictly]))
 
 
@@ -169,6 +173,7 @@ def settings() -> list[float]:
         AGAIN_S,
         CYCLES_S,
         ENOUGH,
+        AS_MANY,
         TRIES,
         TRIED_S,
         LOW_M,
