@@ -35,7 +35,7 @@ TRIES, TRIED_S, ENOUGH = 6, 45.0, 0.9
 in all; and none after one that holds so great a share of its starts."""
 AS_MANY = 0.042
 """Share of the starts (two of them) by which a path nearer to the motion may hold fewer than the
-best: less than the chance of the starts' noise."""
+best: less than the chance of the starts' noise; where the best holds enough, it has to."""
 CYCLES_S = 4.0
 """A motion that repeats is simulated for so long at least; the last cycle but one is kept."""
 
@@ -89,7 +89,8 @@ def sampled_regulator(
         progress("refined path", number + 1, ROUNDS)
         found = _gains(sim, clip, action, feet, path, along, reference)
         now = trial.held(found)
-        if now.strictly >= most - AS_MANY:
+        least = most - AS_MANY if most < ENOUGH else max(ENOUGH, most - AS_MANY)
+        if now.strictly >= least:
             best, held, most = found, now, max(most, now.strictly)
     return replace(best, held=np.array([held.strictly]))
 

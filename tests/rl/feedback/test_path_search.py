@@ -160,8 +160,14 @@ def test_a_path_nearer_to_the_motion_is_taken_if_it_holds_about_as_many_robots(
     monkeypatch.setattr(sampled_regulator, "regulator", lambda *given: plain)
     monkeypatch.setattr(sampled_regulator, "_searched", lambda *given: (*plain[1:], True))
     monkeypatch.setattr(sampled_regulator, "refinements", lambda *given: refined)
+    monkeypatch.setattr(sampled_regulator, "TRIES", 1)
     monkeypatch.setattr(sampled_regulator, "replace", lambda best, held: best)
-    for shares, taken in (((0.9, 0.87, 0.85), "nearer"), ((0.9, 0.85, 0.95), "nearest")):
+    shares_taken = (
+        ((0.8, 0.77, 0.75), "nearer"),
+        ((0.8, 0.75, 0.85), "nearest"),
+        ((0.9, 0.87, 0.86), "searched"),
+    )
+    for shares, taken in shares_taken:
         held, found = iter([0.1, *shares]), iter(["searched", "nearer", "nearest"])
         monkeypatch.setattr(sampled_regulator, "_gains", lambda *given, found=found: next(found))
         monkeypatch.setattr(Trial, "held", lambda *given, held=held: Held(next(held), 1.0, 1.0))
