@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from robojackson.rl.feedback.nominal_path import Linear, Path, Pull
-from robojackson.rl.feedback.regulator import advance, linearised, riccati, weights
+from robojackson.rl.feedback.regulator import advance, following, linearised, riccati, weights
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.rl.sim.tangent import state_difference
 
@@ -58,8 +58,7 @@ def refinements(
                 break
         if not cost < (1 - LEAST_GAIN) * before:
             return
-        after = [np.concatenate([part[1:], part[-1:]]) for part in (path.qpos, path.qvel)]
-        linear = linearised(sim, path, (after[0], after[1]))
+        linear = linearised(sim, path, following(path))
         yield path, linear
 
 

@@ -67,7 +67,7 @@ def regulator(
         progress: Called with a name, the steps that are done, and all.
     """
     path = reference_path(sim, clip, clip.steps)
-    linear = linearised(sim, path, following(path, clip, clip.cyclic), progress)
+    linear = linearised(sim, path, following(path, clip if clip.cyclic else None), progress)
     found = riccati(linear, action, clip.cyclic)
     places = np.full((clip.steps, feet, 3), np.nan)
     return Gains(found.gain, found.offset, path.qpos, path.qvel, places), path, linear
@@ -83,13 +83,17 @@ def reference_path(sim: Simulation, clip: Clip, length: int) -> Path:
 
 
 def following(
-    path: Path, clip: Clip, cyclic: bool
+    path: Path, cycle: Clip | None = None
 ) -> tuple[Float[np.ndarray, "T nq"], Float[np.ndarray, "T nv"]]:
     """Return the state that follows each one of a path; the last is followed by itself, or by the
-    first, moved by a cycle."""
+    first, moved by a cycle.
+
+    Args:
+        cycle: The motion that repeats, of whose cycle this is the path.
+    """
     qpos, qvel = np.roll(path.qpos, -1, 0), np.roll(path.qvel, -1, 0)
-    if cyclic:
-        ends = clip.at(np.array([0, len(path)])).qpos
+    if cycle is not None:
+        ends = cycle.at(np.array([0, len(path)])).qpos
         qpos[-1, :3] += ends[1, :3] - ends[0, :3]
     else:
         qpos[-1], qvel[-1] = path.qpos[-1], path.qvel[-1]

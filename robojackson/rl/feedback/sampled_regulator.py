@@ -156,7 +156,7 @@ def _gains(
         qpos = path.qpos[rows].copy()
         qpos[:, :3] -= clip.at(np.array([first])).qpos[0, :3] - clip.at(np.array([0])).qpos[0, :3]
         path = Path(qpos, path.qvel[rows], path.targets[rows])
-        linear = linearised(sim, path, following(path, clip, True))
+        linear = linearised(sim, path, following(path, clip))
     law = riccati(linear, action, clip.cyclic)
     lead = path.targets - reference.targets[: len(path)]
     places = feet.places(path.qpos)

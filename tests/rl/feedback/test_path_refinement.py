@@ -9,7 +9,7 @@ from robojackson.rl.feedback import path_refinement
 from robojackson.rl.feedback.driven_clip import driven_clip
 from robojackson.rl.feedback.nominal_path import Linear, Path, Pull
 from robojackson.rl.feedback.path_refinement import refinements
-from robojackson.rl.feedback.regulator import advance, linearised, regulator, riccati
+from robojackson.rl.feedback.regulator import advance, following, linearised, regulator, riccati
 from robojackson.rl.feedback.standing_feet import Feet
 from robojackson.rl.sim.motors import residual_scale
 from robojackson.rl.sim.simulation import Simulation
@@ -51,8 +51,7 @@ def noisy(sim: Simulation, motion: Path, action: np.ndarray) -> tuple[Path, Line
     """A path beside the motion, as a search finds it, and the system along it."""
     offsets = 0.5 * action * np.random.default_rng(0).normal(size=motion.targets.shape)
     path = followed(sim, motion.qpos[0], motion.qvel[0], motion.targets + offsets)
-    after = [np.concatenate([part[1:], part[-1:]]) for part in (path.qpos, path.qvel)]
-    return path, linearised(sim, path, (after[0], after[1]))
+    return path, linearised(sim, path, following(path))
 
 
 def distance(path: Path, motion: Path) -> float:

@@ -1,5 +1,7 @@
 """Sampled paths: what is found is what the physics does, and the regulator along it keeps to it."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -42,6 +44,20 @@ def sim(robot: Robot) -> Simulation:
 @pytest.fixture(scope="module")
 def plain(robot: Robot, sim: Simulation, clip: Clip) -> tuple[Gains, Path, Linear]:
     return regulator(sim, clip, residual_scale(robot, ControlConfig()), Feet(robot).count)
+
+
+@pytest.fixture
+def found(
+    robot: Robot,
+    sim: Simulation,
+    clip: Clip,
+    plain: tuple[Gains, Path, Linear],
+    monkeypatch: pytest.MonkeyPatch,
+) -> Callable[[], Gains]:
+    """What is taken for the motion, whose own regulator is not computed again."""
+    monkeypatch.setattr(sampled_regulator, "regulator", lambda *given: plain)
+    action = residual_scale(robot, ControlConfig())
+    return lambda: sampled_regulator.sampled_regulator(robot, sim, clip, action)
 
 
 def searched(
@@ -108,14 +124,10 @@ def test_feet_that_stand_decide_how_far_a_robot_is_from_its_place(robot: Robot) 
 
 @pytest.mark.slow
 def test_the_regulator_that_brings_more_robots_to_the_end_by_the_rule_is_taken(
-    robot: Robot,
-    sim: Simulation,
-    clip: Clip,
+    found: Callable[[], Gains],
     plain: tuple[Gains, Path, Linear],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    action = residual_scale(robot, ControlConfig())
-    monkeypatch.setattr(sampled_regulator, "regulator", lambda *given: plain)
     monkeypatch.setattr(sampled_regulator, "PASSES", 1)
     monkeypatch.setattr(sampled_regulator, "PASSES_A_S", 0.0)
     monkeypatch.setattr(sampled_regulator, "CYCLES_S", 0.0)
@@ -124,40 +136,32 @@ def test_the_regulator_that_brings_more_robots_to_the_end_by_the_rule_is_taken(
     for shares, anchored in (((0.9,), False), ((0.5, 0.4), False), ((0.5, 0.6), True)):
         held = iter(Held(share, 1.0, 1.0) for share in shares)
         monkeypatch.setattr(Trial, "held", lambda *given, held=held: next(held))
-        found = sampled_regulator.sampled_regulator(robot, sim, clip, action)
-        assert bool(np.isfinite(found.places).all()) == anchored
-        assert found.held == max(shares)
+        gains = found()
+        assert bool(np.isfinite(gains.places).all()) == anchored
+        assert gains.held == max(shares)
         if not anchored:
-            np.testing.assert_array_equal(found.gain, plain[0].gain)
+            np.testing.assert_array_equal(gains.gain, plain[0].gain)
 
 
 def test_no_search_follows_one_that_holds_nearly_all(
-    robot: Robot,
-    sim: Simulation,
-    clip: Clip,
+    found: Callable[[], Gains],
     plain: tuple[Gains, Path, Linear],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    action, held = residual_scale(robot, ControlConfig()), iter([0.0, 0.5, 0.95, 1.0])
-    monkeypatch.setattr(sampled_regulator, "regulator", lambda *given: plain)
+    held = iter([0.0, 0.5, 0.95, 1.0])
     monkeypatch.setattr(sampled_regulator, "_searched", lambda *given: (*plain[1:], False))
     monkeypatch.setattr(sampled_regulator, "_gains", lambda *given: plain[0])
     monkeypatch.setattr(Trial, "held", lambda *given: Held(next(held), 1.0, 1.0))
-    found = sampled_regulator.sampled_regulator(robot, sim, clip, action)
-    assert found.held == 0.95
+    assert found().held == 0.95
     assert next(held) == 1.0, "a search more than needed"
 
 
 def test_a_path_nearer_to_the_motion_is_taken_if_it_holds_about_as_many_robots(
-    robot: Robot,
-    sim: Simulation,
-    clip: Clip,
+    found: Callable[[], Gains],
     plain: tuple[Gains, Path, Linear],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    action = residual_scale(robot, ControlConfig())
     refined = [plain[1:], plain[1:]]
-    monkeypatch.setattr(sampled_regulator, "regulator", lambda *given: plain)
     monkeypatch.setattr(sampled_regulator, "_searched", lambda *given: (*plain[1:], True))
     monkeypatch.setattr(sampled_regulator, "refinements", lambda *given: refined)
     monkeypatch.setattr(sampled_regulator, "TRIES", 1)
@@ -168,10 +172,10 @@ def test_a_path_nearer_to_the_motion_is_taken_if_it_holds_about_as_many_robots(
         ((0.9, 0.87, 0.86), "searched"),
     )
     for shares, taken in shares_taken:
-        held, found = iter([0.1, *shares]), iter(["searched", "nearer", "nearest"])
-        monkeypatch.setattr(sampled_regulator, "_gains", lambda *given, found=found: next(found))
+        held, names = iter([0.1, *shares]), iter(["searched", "nearer", "nearest"])
+        monkeypatch.setattr(sampled_regulator, "_gains", lambda *given, names=names: next(names))
         monkeypatch.setattr(Trial, "held", lambda *given, held=held: Held(next(held), 1.0, 1.0))
-        assert sampled_regulator.sampled_regulator(robot, sim, clip, action) == taken
+        assert found() == taken
 
 
 class Falls:
