@@ -13,6 +13,7 @@ from robojackson.retarget.feasibility.certification import motor_torques
 from robojackson.retarget.feasibility.contact_wrench import Tolerance
 from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.sim.motors import Motors, feedforward_share, gains
+from robojackson.rl.sim.reference_clip import require_usable
 from robojackson.robot.model import Robot
 
 
@@ -20,10 +21,15 @@ def lead_of(
     robot: Robot, reference: ReferenceMotion, control: ControlConfig
 ) -> Float[np.ndarray, "S nu"] | None:
     """Return offsets of the motors' targets at every step of the reference; None without
-    feed-forward."""
+    feed-forward.
+
+    Raises:
+        TrackTooShort, RejectedReference: no robot can follow it.
+    """
     share = feedforward_share(robot, control)
     if not share:
         return None
+    require_usable(reference)
     offset = np.asarray(reference.cycle_offset, float) if reference.cyclic else None
     qpos, hinge = np.asarray(reference.qpos, float), Motors.of(robot.model).hinge
     torque = motor_torques(robot, qpos, reference.dt, offset, Tolerance())[:, hinge]

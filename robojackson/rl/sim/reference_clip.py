@@ -101,7 +101,7 @@ class Clip:
     ) -> None:
         motions = motions_of(references)
         for motion in motions:
-            _require_usable(motion)
+            require_usable(motion)
         self._length = np.array([len(motion) for motion in motions])
         self._first = np.cumsum(self._length) - self._length
         self._cyclic = np.array([motion.cyclic for motion in motions])
@@ -212,7 +212,7 @@ class Clip:
         return self._first[motion] + index, shift, index / length
 
 
-def _require_usable(motion: ReferenceMotion) -> None:
+def require_usable(motion: ReferenceMotion) -> None:
     """Raise for a motion that no robot can follow.
 
     Raises:

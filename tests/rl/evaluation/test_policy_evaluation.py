@@ -18,6 +18,7 @@ from robojackson.rl.evaluation.rollout_records import RolloutScorer
 from robojackson.rl.evaluation.rollouts import Driver, Rollouts, Starts, roll_out
 from robojackson.rl.modes.observation import Observer
 from robojackson.rl.policy import Policy
+from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.motors import actuation_facts
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.robot.fall import Fall
@@ -221,14 +222,19 @@ def test_a_policy_of_another_dance_is_evaluated_with_a_note(
     assert "another reference motion" in caplog.text
 
 
-@pytest.mark.parametrize("steps", [0, 1])
-def test_a_reference_without_motion_is_refused(sway: ReferenceMotion, steps: int) -> None:
+@pytest.mark.parametrize("steps", [0, 1, 2])
+def test_a_reference_without_motion_is_refused(
+    robot: Robot, sway: ReferenceMotion, steps: int
+) -> None:
     cut = {
         name: getattr(sway, name)[:steps]
         for name in ("qpos", "qvel", "keypoints_w", "body_pos_w", "contact", "source_time_s")
     }
+    short = dataclasses.replace(sway, **cut)
     with pytest.raises(TrackTooShort, match=f"has {steps} steps"):
-        Clip(dataclasses.replace(sway, **cut))
+        Clip(short)
+    with pytest.raises(TrackTooShort, match=f"has {steps} steps"):
+        lead_of(robot, short, ControlConfig(feedforward=1.0))
 
 
 def test_a_reference_that_is_not_a_number_is_refused(sway: ReferenceMotion) -> None:
