@@ -17,6 +17,7 @@ INNER_PORTS = (*INNER, "filer.port.grpc", "s3.port.grpc")
 """Options of the ports beside S3's; the gRPC ports would be 10,000 above the others."""
 VOLUME_MB = 64
 """Size of a file of the store's data; the compose file's 1 GB needs 14 GB of free disk."""
+RESTARTS = 2
 GRACE_S = 2.0
 """SeaweedFS takes 15 s to end. What it has acknowledged is in its files before that."""
 SOCKETS = Path("/tmp")  # SeaweedFS's own choice, for any TMPDIR
@@ -58,7 +59,8 @@ def service(
     probe = [word.replace(":9000/", f":{port}/") for word in check]
     if shutil.which(probe[0]) is None:  # the image has wget
         probe = [sys.executable, "-c", f"import urllib.request as u; u.urlopen({probe[-1]!r})"]
-    return Service("s3", command, {**os.environ, **environment}, probe, log, grace_s=GRACE_S)
+    variables = {**os.environ, **environment}
+    return Service("s3", command, variables, probe, log, grace_s=GRACE_S, restarts=RESTARTS)
 
 
 def remove(folder: Path) -> None:

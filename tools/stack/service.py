@@ -1,5 +1,6 @@
 """One service of a stack as a process with a health check, a log, and a group of its own."""
 
+import random
 import re
 import signal
 import socket
@@ -17,6 +18,12 @@ ROOT = Path(__file__).parents[2]
 VARIABLE = re.compile(r"\$\{(\w+)(?:(:[?-])([^}]*))?\}")
 HEALTHY_S = 600.0
 SECONDS_TO_END = 15.0
+LOG_LINES = 15
+"""Of a service that ended: how many last lines of its log its error shows."""
+LISTENING = range(15_000, 32_000)
+"""Ports that Linux gives to no outgoing connection (`ip_local_port_range` begins at 32,768): one
+of those may be taken by any connection of this machine before its service listens on it."""
+_handed_out: set[int] = set()
 
 
 class StackError(RuntimeError):
@@ -35,6 +42,8 @@ class Service:
         log: File that takes its output.
         user: Name of the user that runs it, if another than ours.
         grace_s: Time to end by itself before it is killed.
+        restarts: How often it is started again when it ends with an error before it is healthy, as
+            the compose file's `restart` does.
     """
 
     name: str
@@ -44,6 +53,7 @@ class Service:
     log: Path
     user: str | None = None
     grace_s: float = SECONDS_TO_END
+    restarts: int = 0
     process: subprocess.Popen[bytes] | None = None
 
     def start(self) -> None:
@@ -66,10 +76,10 @@ class Service:
         code = self.process.poll()
         if self.check is None:
             if code:
-                raise StackError(f"{self.name} ended with {code}; see {self.log}")
+                raise self._ended(code)
             return code == 0
         if code is not None:
-            raise StackError(f"{self.name} ended with {code}; see {self.log}")
+            raise self._ended(code)
         run = subprocess.run(self.check, env=self.environment, capture_output=True, check=False)
         return run.returncode == 0
 
@@ -80,10 +90,23 @@ class Service:
             StackError: it ended, or did not become healthy in time.
         """
         end = time.monotonic() + seconds
-        while not self.healthy():
+        left = self.restarts
+        while True:
+            try:
+                if self.healthy():
+                    return
+            except StackError:
+                if not left:
+                    raise
+                left -= 1
+                self.start()
             if time.monotonic() > end:
                 raise StackError(f"{self.name} is not healthy after {seconds:.0f} s; {self.log}")
             time.sleep(0.5)
+
+    def _ended(self, code: int) -> StackError:
+        lines = self.log.read_text(errors="replace").splitlines()[-LOG_LINES:]
+        return StackError("\n".join([f"{self.name} ended with {code}; {self.log}:", *lines]))
 
     @property
     def pids(self) -> set[int]:
@@ -134,7 +157,22 @@ def _variable(found: re.Match[str], given: Mapping[str, str]) -> str:
 
 
 def free_port() -> int:
-    """Return a port on which nothing listens now."""
+    """Return a port on which nothing listens now, each one once.
+
+    Raises:
+        StackError: every port that was tried is taken.
+    """
+    for port in random.SystemRandom().sample(LISTENING, len(LISTENING)):
+        if port not in _handed_out and _is_free(port):
+            _handed_out.add(port)
+            return port
+    raise StackError(f"no port from {LISTENING.start} to {LISTENING.stop - 1} is free")
+
+
+def _is_free(port: int) -> bool:
     with socket.socket() as found:
-        found.bind(("127.0.0.1", 0))
-        return int(found.getsockname()[1])
+        try:
+            found.bind(("127.0.0.1", port))
+        except OSError:
+            return False
+        return True
