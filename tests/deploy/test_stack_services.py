@@ -1,4 +1,4 @@
-"""Services of the stack as processes: ports, restarts, and what an error tells."""
+"""Services of the stack as processes: ports, restarts, and the error of one that ended."""
 
 import os
 import sys
@@ -16,7 +16,7 @@ def service(tmp_path: Path, code: str, restarts: int = 0) -> Service:
     return Service("s3", words, dict(os.environ), check, tmp_path / "log", restarts=restarts)
 
 
-def test_ports_are_handed_out_once_and_are_no_connection_s() -> None:
+def test_a_port_is_handed_out_once_and_to_no_connection() -> None:
     ports = [free_port() for _ in range(200)]
     assert len(set(ports)) == len(ports)
     given = Path("/proc/sys/net/ipv4/ip_local_port_range")
@@ -24,11 +24,11 @@ def test_ports_are_handed_out_once_and_are_no_connection_s() -> None:
     assert all(port in LISTENING and port < first for port in ports)
 
 
-def test_a_service_that_ends_says_what_its_log_says(tmp_path: Path) -> None:
-    broken = service(tmp_path, "import sys; print('address in use'); sys.exit(3)")
-    broken.start()
+def test_the_error_of_a_service_that_ended_shows_its_log(tmp_path: Path) -> None:
+    process = service(tmp_path, "import sys; print('address in use'); sys.exit(3)")
+    process.start()
     with pytest.raises(StackError, match="s3 ended with 3") as found:
-        broken.wait(30)
+        process.wait(30)
     assert "address in use" in str(found.value)
 
 
@@ -45,16 +45,16 @@ time.sleep(60)
 
 
 def test_a_service_is_started_again_as_often_as_it_says(tmp_path: Path) -> None:
-    twice = service(tmp_path, COUNTS, restarts=2)
-    twice.start()
-    twice.wait(30)
-    twice.stop()
+    process = service(tmp_path, COUNTS, restarts=2)
+    process.start()
+    process.wait(30)
+    process.stop()
     assert len(list(tmp_path.glob("try*"))) == 3
 
 
 def test_a_service_is_not_started_more_often(tmp_path: Path) -> None:
-    once = service(tmp_path, COUNTS, restarts=1)
-    once.start()
+    process = service(tmp_path, COUNTS, restarts=1)
+    process.start()
     with pytest.raises(StackError, match="s3 ended with 1"):
-        once.wait(30)
+        process.wait(30)
     assert len(list(tmp_path.glob("try*"))) == 2
