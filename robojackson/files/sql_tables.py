@@ -33,6 +33,8 @@ LIMITS: dict[str, str | bool | int | float | list[str]] = {
 MOST_SECONDS = 30.0
 MOST_ROWS = 100_000
 MOST_MEMORY = 2**29
+ASKING = frozenset({"SELECT", "EXPLAIN", "PRAGMA", "CALL", "MULTI"})
+"""DuckDB's types of statements that answer with rows; `MULTI` is a `PIVOT`."""
 
 
 @contextmanager
@@ -60,6 +62,7 @@ def answering(
                 if not limited:
                     return _rows(connection, sql, given or {}, most=None)
                 with _limits(connection):
+                    _require_query(connection, sql)
                     return _rows(connection, sql, given or {}, MOST_ROWS)
             except duckdb.InterruptException as cause:
                 raise BadTable(
@@ -85,6 +88,13 @@ def _limits(connection: "DuckDBPyConnection") -> Iterator[None]:
             yield
     finally:
         timer.cancel()
+
+
+def _require_query(connection: "DuckDBPyConnection", sql: str) -> None:
+    statements = connection.extract_statements(sql)
+    kind = statements[-1].type.name if statements else "SELECT"
+    if kind not in ASKING:
+        raise BadTable(f"the last statement is {kind}, which has no rows; end with a SELECT")
 
 
 def _rows(connection: "DuckDBPyConnection", sql: str, given: Given, most: int | None) -> Rows:

@@ -30,6 +30,8 @@ UNEXPECTED = ("unexpected_keyword_argument", "extra_forbidden")
 """Kinds of Pydantic's errors about a key that there is not."""
 LARGEST = 2**20
 """Bytes of a file."""
+NAMELESS = 'in "<unicode string>", '
+"""What PyYAML writes for the name of a text."""
 
 
 def load(
@@ -162,7 +164,8 @@ def _parsed(value: object, where: str) -> Any:
     try:
         return require_few(yaml.load(value, Loader=Yaml12))
     except (yaml.YAMLError, ValueError, TypeError, RecursionError) as cause:
-        raise BadConfiguration(f"{where}: {' '.join(str(cause).split())}") from cause
+        reason = " ".join(str(cause).replace(NAMELESS, "at ").split())
+        raise BadConfiguration(f"{where}: {reason}") from cause
 
 
 def _set(values: dict[str, Any], keys: list[str], value: object) -> None:

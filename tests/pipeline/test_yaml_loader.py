@@ -122,7 +122,7 @@ def test_a_number_may_be_written_with_an_exponent(write, text) -> None:
 
 
 def test_a_key_that_stands_twice_is_refused(write) -> None:
-    with pytest.raises(BadConfiguration, match="'seed' is listed twice"):
+    with pytest.raises(BadConfiguration, match="'seed' is listed twice at line 2"):
         yaml_loader.load(Outer, write("seed: 1\nseed: 2\n"))
 
 

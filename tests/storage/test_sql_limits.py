@@ -16,7 +16,9 @@ from storage.store import Store
         ("SELECT repeat('x', 2000000000)", "memory"),
         ("SELECT list(range) FROM range(400000000)", "memory"),
         ("SELECT * FROM range(200000)", "100,000 rows"),
-        ("SET memory_limit = '9GB'", "locked"),
+        ("SET memory_limit = '9GB'; SELECT 1", "locked"),
+        ("SET memory_limit = '9GB'", "SET, which has no rows"),
+        ("DROP TABLE runs", "DROP, which has no rows; end with a SELECT"),
         ("--", "no query"),
     ],
 )
