@@ -38,7 +38,7 @@ NOTES = {
     "g1_cmu_05_18": "trained on the reference of 25 November, without sway, at .93 of its tempo",
 }
 """What differs in trained rows from other rows, or among their seeds."""
-BESIDE = ("g1_dance_b", "g1_dance_a")
+BESIDE = ("g1_dance_a",)
 """Motions whose trainings kept rollouts of the regulator on the same reference and with the same
 share of starts that survive: figures that the table of trackers lacks are taken from them."""
 OF_NOTEBOOK = "its row was replaced by the one with feedback (docs/learning_g1.md#linear-feedback)"
