@@ -18,6 +18,7 @@ INNER_PORTS = (*INNER, "filer.port.grpc", "s3.port.grpc")
 VOLUME_MB = 64
 """Size of a file of the store's data; the compose file's 1 GB needs 14 GB of free disk."""
 RESTARTS = 2
+"""It ends where a port of its eight is taken meanwhile."""
 GRACE_S = 2.0
 """SeaweedFS takes 15 s to end. What it has acknowledged is in its files before that."""
 SOCKETS = Path("/tmp")  # SeaweedFS's own choice, for any TMPDIR

@@ -21,8 +21,8 @@ SECONDS_TO_END = 15.0
 LOG_LINES = 15
 """Of a service that ended: how many last lines of its log its error shows."""
 LISTENING = range(15_000, 32_000)
-"""Ports that Linux gives to no outgoing connection (`ip_local_port_range` begins at 32,768): one
-of those may be taken by any connection of this machine before its service listens on it."""
+"""Ports below those that Linux gives to outgoing connections (`ip_local_port_range`, from 32,768):
+no connection of this machine takes one before its service listens on it."""
 _handed_out: set[int] = set()
 
 

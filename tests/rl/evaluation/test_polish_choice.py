@@ -60,8 +60,8 @@ def test_a_policy_that_loses_what_the_feedback_holds_is_left_out(
         policy = chosen(robot, sway, monkeypatch, {"trained": 7, "regulator": 5})
     assert not policy.act(np.ones((4, 3))).any()
     held = {"trained": 1 - 7 / STARTS, "feedback": 1 - 5 / STARTS}
-    beside = policy.facts["beside_feedback"]
-    assert {name: beside[name] for name in held} == pytest.approx(held)
+    skills = {f"{name}_skill": share for name, share in held.items()}
+    assert policy.facts["beside_feedback"] == pytest.approx({**held, **skills})
     assert "holds 90 % of 49 starts with skill 0.90, with the policy 86 % with 0.86" in caplog.text
 
 
