@@ -245,7 +245,8 @@ def test_the_tracker_acts_as_the_dancer_that_was_taught(tmp_path: Path) -> None:
     robots = rehearsal(4)
     dancer = Dancer(robots.sight.actor_size, robots.seen.shape[1], robots.action.shape[1])
     trainer = ppo.Trainer(dancer, robots, 4, 1e-3)
-    count = learn.learn(trainer, tmp_path, 0.5, 100)
+    average = learn.averaged(dancer)
+    count = learn.learn(trainer, average, tmp_path, 0.5, 100)
     again = Dancer(robots.sight.actor_size, robots.seen.shape[1], robots.action.shape[1])
     assert restore(again, tmp_path / "dancer.npz") == count > 100
     policy = ship.policy_of(tmp_path / "dancer.npz", stock(), 0, 2)
@@ -254,6 +255,10 @@ def test_the_tracker_acts_as_the_dancer_that_was_taught(tmp_path: Path) -> None:
         expected = again.act(again.scale(robots.seen)).numpy()
     seen = robots.seen[:, : robots.sight.actor_size].numpy()
     np.testing.assert_allclose(held.act(seen), expected, atol=1e-4)
+    restore(again, tmp_path / "average.npz")
+    for name, value in again.state_dict().items():
+        np.testing.assert_allclose(value, average.module.state_dict()[name], rtol=1e-3, atol=1e-3)
+    assert int(average.n_averaged) == (count - 100) / trainer.round_steps
     save(again, tmp_path / "dancer.npz", 7)
     assert restore(again, tmp_path / "dancer.npz") == 7
     assert (tmp_path / "curve.csv").read_text().startswith("seconds,steps,reward")

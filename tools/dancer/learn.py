@@ -75,12 +75,17 @@ def main() -> None:
     steps = restore(dancer, given.start) if given.start else 0
     rate = LATER_RATE if given.start else FIRST_RATE
     trainer = Trainer(dancer.to(given.device), rehearsal, HORIZON, rate)
-    average = AveragedModel(dancer, multi_avg_fn=get_ema_multi_avg_fn(AVERAGE), use_buffers=True)
+    average = averaged(dancer)
     steps = learn(trainer, average, given.out, given.seconds, steps)
     for name, one in (("last", dancer), ("average", average.module)):
         held = survival(rehearsal, one, JUDGED_S)
         line = f"{steps} steps, {name} networks: of robots begun anywhere {held:.3f} hold"
         print(f"{line} {JUDGED_S:g} s", flush=True)
+
+
+def averaged(dancer: Dancer) -> AveragedModel:
+    """Return the moving average of a dancer's networks and of its scale of the observations."""
+    return AveragedModel(dancer, multi_avg_fn=get_ema_multi_avg_fn(AVERAGE), use_buffers=True)
 
 
 def learn(trainer: Trainer, average: AveragedModel, out: Path, seconds: float, steps: int) -> int:
