@@ -77,6 +77,7 @@ def main() -> None:
     trainer = Trainer(dancer.to(given.device), rehearsal, HORIZON, rate)
     average = averaged(dancer)
     steps = learn(trainer, average, given.out, given.seconds, steps)
+    assert isinstance(average.module, Dancer)
     for name, one in (("last", dancer), ("average", average.module)):
         held = survival(rehearsal, one, JUDGED_S)
         line = f"{steps} steps, {name} networks: of robots begun anywhere {held:.3f} hold"

@@ -93,7 +93,7 @@ def _array(tensor: torch.Tensor) -> np.ndarray:
     return np.asarray(tensor.detach().double().cpu())
 
 
-def save(dancer: Dancer, path: Path, steps: int) -> None:
+def save(dancer: nn.Module, path: Path, steps: int) -> None:
     """Write the networks, weights in half precision, and the control steps of their training."""
     arrays = {name: tensor.cpu().numpy() for name, tensor in dancer.state_dict().items()}
     halves = {name: array.astype(np.float16) if array.ndim == 2 else array
