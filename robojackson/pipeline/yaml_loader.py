@@ -20,7 +20,7 @@ from pydantic import TypeAdapter, ValidationError
 from robojackson.errors import BadConfiguration, ConflictingValues, UnknownName
 from robojackson.files.foreign_file import read_text
 from robojackson.pipeline.app_folder import CONFIGS, app_folder
-from robojackson.pipeline.yaml_scalars import Yaml12, require_few
+from robojackson.pipeline.yaml_scalars import Yaml12, mistake, require_few
 
 Config = TypeVar("Config")
 SHIPPED = app_folder() / "configs"
@@ -30,8 +30,6 @@ UNEXPECTED = ("unexpected_keyword_argument", "extra_forbidden")
 """Kinds of Pydantic's errors about a key that there is not."""
 LARGEST = 2**20
 """Bytes of a file."""
-NAMELESS = 'in "<unicode string>", '
-"""What PyYAML writes for the name of a text."""
 
 
 def load(
@@ -164,8 +162,7 @@ def _parsed(value: object, where: str) -> Any:
     try:
         return require_few(yaml.load(value, Loader=Yaml12))
     except (yaml.YAMLError, ValueError, TypeError, RecursionError) as cause:
-        reason = " ".join(str(cause).replace(NAMELESS, "at ").split())
-        raise BadConfiguration(f"{where}: {reason}") from cause
+        raise BadConfiguration(f"{where}: {mistake(cause)}") from cause
 
 
 def _set(values: dict[str, Any], keys: list[str], value: object) -> None:

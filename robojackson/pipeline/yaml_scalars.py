@@ -10,6 +10,8 @@ import yaml
 Value = TypeVar("Value")
 MOST_VALUES = 100_000
 """In one text, those of an alias counted wherever it stands."""
+NAMELESS = 'in "<unicode string>", '
+"""What PyYAML writes for the name of a text."""
 
 
 class Yaml12(yaml.SafeLoader):
@@ -79,3 +81,17 @@ def require_few(value: Value) -> Value:
     if count(value) > MOST_VALUES:
         raise ValueError(f"more than {MOST_VALUES:,} values, or one that holds itself")
     return value
+
+
+def mistake(cause: Exception) -> str:
+    """Return in one line what is wrong with a text and where, by the error of reading it."""
+    if not isinstance(cause, yaml.MarkedYAMLError) or cause.problem_mark is None:
+        return " ".join(str(cause).replace(NAMELESS, "at ").split())
+    reason = f"{_place(cause.problem_mark)}: {cause.problem}"
+    if cause.context is None or cause.context_mark is None:
+        return reason
+    return f"{reason} ({cause.context} that begins at {_place(cause.context_mark)})"
+
+
+def _place(mark: yaml.Mark) -> str:
+    return f"line {mark.line + 1}, column {mark.column + 1}"

@@ -122,8 +122,19 @@ def test_a_number_may_be_written_with_an_exponent(write, text) -> None:
 
 
 def test_a_key_that_stands_twice_is_refused(write) -> None:
-    with pytest.raises(BadConfiguration, match="'seed' is listed twice at line 2"):
+    with pytest.raises(
+        BadConfiguration, match=r"yaml: line 2, column 1: key 'seed' is listed twice$"
+    ):
         yaml_loader.load(Outer, write("seed: 1\nseed: 2\n"))
+
+
+def test_a_mistake_is_named_with_its_place_and_without_the_text_around_it(write) -> None:
+    expected = (
+        r"yaml: line 2, column 5: expected ',' or '\]', but got ':' "
+        r"\(while parsing a flow sequence that begins at line 1, column 8\)$"
+    )
+    with pytest.raises(BadConfiguration, match=expected):
+        yaml_loader.load(Outer, write("inner: [a, b\nseed: 3\n"))
 
 
 @pytest.mark.parametrize("text", ["- 1\n- 2\n", "just words", "inner: [", "\tseed: 1"])
