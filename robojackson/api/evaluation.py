@@ -20,6 +20,7 @@ from robojackson.api.arguments import (
     robot_of,
 )
 from robojackson.api.robots import load_robot
+from robojackson.api.trained_policy import TrainedPolicy
 from robojackson.clips import video as video_files
 from robojackson.clips.video import VideoInfo
 from robojackson.errors import BadConfiguration
@@ -86,7 +87,7 @@ class PolicyEvaluation:
 
 
 def evaluate_policy(
-    policy: FilePath | Policy | Tracker,
+    policy: FilePath | Policy | TrainedPolicy | Tracker,
     reference: FilePath | ReferenceMotion,
     robot: RobotLike | None = None,
     *,
@@ -98,7 +99,7 @@ def evaluate_policy(
     """Evaluate a policy on stock physics from many starts, beside baselines that do not dance.
 
     Args:
-        policy: A policy, or the policy.safetensors of a training; or a tracker (`load_tracker`).
+        policy: A training or its policy, or policy.safetensors; or a tracker (`load_tracker`).
         reference: The motion that it was trained on, or its file; any motion for a tracker.
         robot: The one that the motion was made for; None finds it by name.
         config: Starts, horizon and noise.
@@ -116,6 +117,7 @@ def evaluate_policy(
     """
     motion = read_if_path(ReferenceMotion, reference)
     machine = robot_of(motion) if robot is None else require_robot(motion, load_robot(robot))
+    policy = policy.policy if isinstance(policy, TrainedPolicy) else policy
     trained = load_policy(Path(policy)) if isinstance(policy, str | PathLike) else policy
     with counter(progress is True, "evaluation") as count:
         notify: PartProgress = (lambda name, done, total: None) if progress is False else progress  # type: ignore[assignment]

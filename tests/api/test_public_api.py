@@ -178,10 +178,11 @@ def test_a_reward_of_ones_own_is_in_the_table_and_the_policy_is_saved(
         assert row["reward_own"] == pytest.approx(0.5 * row["episode_length"])
     folder = trained.save(tmp_path / "run")
     assert load_policy(folder / "policy.safetensors").action_size == 17
-    again = rj.evaluate_policy(
-        folder / "policy.safetensors", reference, config=EvaluateConfig(0.5, phases=2, resets=1)
-    )
+    short = EvaluateConfig(0.5, phases=2, resets=1)
+    again = rj.evaluate_policy(folder / "policy.safetensors", reference, config=short)
     assert again.summary["rollouts"] == 3.0
+    same = rj.evaluate_policy(trained, reference, config=short)
+    assert str(same.summary) == str(again.summary)  # NaN among them equals nothing
     assert {path.name for path in again.save(tmp_path / "evaluated").iterdir()} == {
         "evaluation.json", "evaluations.parquet", "rollout.parquet",
     }  # fmt: skip
