@@ -117,8 +117,7 @@ def evaluate_policy(
     """
     motion = read_if_path(ReferenceMotion, reference)
     machine = robot_of(motion) if robot is None else require_robot(motion, load_robot(robot))
-    policy = policy.policy if isinstance(policy, TrainedPolicy) else policy
-    trained = load_policy(Path(policy)) if isinstance(policy, str | PathLike) else policy
+    trained = _policy_of(policy)
     with counter(progress is True, "evaluation") as count:
         notify: PartProgress = (lambda name, done, total: None) if progress is False else progress  # type: ignore[assignment]
         if count is not None:
@@ -136,6 +135,16 @@ def evaluate_policy(
     return PolicyEvaluation(
         dict(evaluated.summary), rows, Rollout(motion.dt, evaluated.rollout_qpos)
     )
+
+
+def _policy_of(given: FilePath | Policy | TrainedPolicy | Tracker) -> Policy | Tracker:
+    if isinstance(given, TrainedPolicy):
+        return given.policy
+    if isinstance(given, str | PathLike):
+        return load_policy(Path(given))
+    if not isinstance(given, Policy) and not hasattr(given, "equip"):
+        raise TypeError(f"policy is {given!r:.100}: expected a policy, its file or a tracker")
+    return given
 
 
 def render_video(

@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 from robojackson.api.arguments import FilePath
 from robojackson.errors import BadConfiguration, BadTable, UnknownName
 from robojackson.files.file_tree import FileTree
-from robojackson.files.foreign_file import read_file
+from robojackson.files.foreign_file import read_file, refuse_video
 from robojackson.formats.foreign_motion import (
     Y_UP_TO_WORLD,
     Z_UP_TO_WORLD,
@@ -89,8 +89,10 @@ def holds_a_person(source: Path) -> bool:
         StoreError: no such file.
         BadTable: it is no Parquet file.
     """
+    data = read_file(source)
+    refuse_video(data, source)
     try:
-        return "global_orient" in pq.read_schema(io.BytesIO(read_file(source))).names
+        return "global_orient" in pq.read_schema(io.BytesIO(data)).names
     except (pa.ArrowException, OSError) as cause:
         reason = " ".join(str(cause).split())[:120]
         raise BadTable(f"not a Parquet file ({reason})", source) from cause

@@ -7,6 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from pydantic import ValidationError
+
 from robojackson.api.arguments import (
     FilePath,
     Progress,
@@ -23,7 +25,7 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.pipeline.episode_log import EpisodeLog
 from robojackson.pipeline.folder_lock import locked
 from robojackson.pipeline.run_names import motion_name, require_run_id, run_labels
-from robojackson.pipeline.yaml_loader import load
+from robojackson.pipeline.yaml_loader import load, refusal
 from robojackson.retarget.scorecard_gate import check, scorecard_record
 from robojackson.rl import training
 from robojackson.rl.checkpoint_folder import newest_checkpoint
@@ -92,7 +94,8 @@ def train_policy(
 
     Raises:
         RejectedReference: the robot cannot follow the motion, or its model has changed since.
-        BadConfiguration: a reward that is no number a robot; a checkpoint of another configuration.
+        BadConfiguration: a budget or seed that cannot be; a reward that is no number a robot; a
+            checkpoint of another configuration.
         BadPolicy: the networks to start from do not fit.
         StoreError: another training holds the folder.
         KeyboardInterrupt: Ctrl-C, after a checkpoint was written to `out`.
@@ -155,12 +158,15 @@ def _configured(
     """Return the configuration with what was given over it, and the usual budget where it has
     none."""
     found = config or load(TrainConfig, setup_file(setup))
-    found = replace(
-        found,
-        steps=found.steps if steps is None else steps,
-        minutes=found.minutes if minutes is None else minutes,
-        seed=found.seed if seed is None else seed,
-    )
+    try:
+        found = replace(
+            found,
+            steps=found.steps if steps is None else steps,
+            minutes=found.minutes if minutes is None else minutes,
+            seed=found.seed if seed is None else seed,
+        )
+    except ValidationError as cause:
+        raise refusal(TrainConfig, cause, "train_policy") from cause
     return found if found.has_budget else replace(found, minutes=DEFAULT_MINUTES)
 
 

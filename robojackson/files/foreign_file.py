@@ -1,15 +1,18 @@
 """Read files from outside: one plain file of limited size; JSON of limited depth."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any, NoReturn
 
-from robojackson.errors import RoboJacksonError, StoreError
+from robojackson.errors import BadTable, RoboJacksonError, StoreError
 
 Json = Any
 """What a JSON text may hold."""
 LARGEST = 2**28
 """Bytes of a file that is read into memory; an hour of motion has fewer."""
+VIDEO = re.compile(rb"....ftyp|\x1aE\xdf\xa3|RIFF....AVI ", re.DOTALL)
+"""How an MP4 or MOV, a WebM or MKV, and an AVI begin."""
 
 
 def require_file(
@@ -46,6 +49,20 @@ def read_file(
         return path.read_bytes()
     except OSError as cause:
         raise error(f"cannot be read: {cause.strerror}", path) from cause
+
+
+def refuse_video(data: bytes, where: object) -> None:
+    """Raise an error with the remedy where a video was given as a motion.
+
+    Raises:
+        BadTable: the content is a video.
+    """
+    if VIDEO.match(data):
+        raise BadTable(
+            "a video; `robojackson mocap` recovers its dancer's motion, `robojackson dance` does "
+            "all stages",
+            where,
+        )
 
 
 def read_text(

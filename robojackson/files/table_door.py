@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 from pydantic import ValidationError
 
 from robojackson.errors import BadTable
-from robojackson.files.foreign_file import parse_json
+from robojackson.files.foreign_file import parse_json, refuse_video
 from robojackson.files.table_types import Column, Facts, TableSchema
 
 MAKERS = {"SmplSequence": "mocap", "ReferenceMotion": "retarget"}
@@ -31,6 +31,7 @@ def read_parquet(data: bytes, where: str) -> pa.Table:
     Raises:
         BadTable: not Parquet, damaged, or too large.
     """
+    refuse_video(data, where)
     try:
         plain = pq.ParquetFile(io.BytesIO(data))
         text = _text_columns(plain, where)

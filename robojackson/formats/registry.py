@@ -11,6 +11,7 @@ from typing import TypeVar
 
 from robojackson import formats
 from robojackson.errors import BadTable, UnknownName
+from robojackson.files.foreign_file import refuse_video
 from robojackson.formats.format import (
     Content,
     Format,
@@ -63,13 +64,16 @@ def recognise(data: bytes, where: str) -> Importer:
     for start, cause in KNOWN_TO_FAIL.items():
         if data.startswith(start) and (start or not data):
             raise BadTable(f"{where}: {cause}")
+    refuse_video(data, where)
     content = Content(data, where)
     for importer in importers().values():
         if importer.recognises(content):
             return importer
     if content.pickled:
         raise UnknownName("keys of a pickle", ", ".join(content.pickled)[:200], where, importers())
-    raise UnknownName("kind of file", data[:16].decode("latin1"), where, importers())
+    text = " ".join(data[:16].decode("latin1").split())
+    shown = text if text.isprintable() else data[:16].hex(" ")
+    raise UnknownName("kind of file", shown, where, importers())
 
 
 @cache

@@ -66,7 +66,7 @@ def load(
             in_question = tuple(f"{key}{each}" for each in _conflict(cause))
             named = [g for g in blamed if g.startswith(in_question)]
             where = f"--set {', '.join(named or blamed)}"
-        raise _refusal(cls, cause, where) from cause
+        raise refusal(cls, cause, where) from cause
 
 
 def build(cls: type[Config], values: Mapping[str, object], where: str) -> Config:
@@ -78,7 +78,7 @@ def build(cls: type[Config], values: Mapping[str, object], where: str) -> Config
     try:
         return TypeAdapter(cls).validate_python(dict(values))
     except ValidationError as cause:
-        raise _refusal(cls, cause, where) from cause
+        raise refusal(cls, cause, where) from cause
 
 
 def find(name_or_path: str | Path) -> Path:
@@ -179,7 +179,8 @@ def _conflict(cause: ValidationError) -> tuple[str, ...]:
     return error.keys if isinstance(error, ConflictingValues) else ()
 
 
-def _refusal(cls: type, cause: ValidationError, where: str) -> BadConfiguration:
+def refusal(cls: type, cause: ValidationError, where: str) -> BadConfiguration:
+    """Return the error of the first value that a configuration refuses, in one line."""
     return BadConfiguration(_explain(cls, cause), where, key=".".join(_keys(cause)))
 
 

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -186,6 +187,25 @@ def test_a_reward_of_ones_own_is_in_the_table_and_the_policy_is_saved(
     assert {path.name for path in again.save(tmp_path / "evaluated").iterdir()} == {
         "evaluation.json", "evaluations.parquet", "rollout.parquet",
     }  # fmt: skip
+
+
+@pytest.mark.parametrize("wrong", [{"steps": 0}, {"seed": -1}, {"minutes": -2.0}])
+def test_a_budget_or_seed_that_cannot_be_is_named_in_one_line(
+    wrong: dict[str, Any], reference: rj.ReferenceMotion
+) -> None:
+    (name,) = wrong
+    with pytest.raises(BadConfiguration, match=f"^train_policy: '{name}' is {wrong[name]}: .*than"):
+        rj.train_policy(reference, **wrong)
+
+
+def test_what_is_no_policy_is_named(reference: rj.ReferenceMotion) -> None:
+    with pytest.raises(TypeError, match="policy is 5: expected a policy, its file or a tracker"):
+        rj.evaluate_policy(5, reference)  # type: ignore[arg-type]
+
+
+def test_a_video_that_is_given_as_a_motion_is_named_with_the_remedy() -> None:
+    with pytest.raises(BadTable, match=r"hip_shake\.mp4: a video; `robojackson mocap` recovers"):
+        rj.retarget_motion(CLIP)
 
 
 @pytest.mark.slow

@@ -87,6 +87,19 @@ def foreign_table(folder: Path) -> list[object]:
     return ["retarget", folder / "smpl.parquet", "-o", folder / "out"]
 
 
+def video_as_table(folder: Path) -> list[object]:
+    return ["train", write_video(folder / "clip.mp4", 5), "-o", folder / "out", "--steps", "10"]
+
+
+def video_as_motion_file(folder: Path) -> list[object]:
+    return ["import", write_video(folder / "clip.mp4", 5), "-o", folder / "out"]
+
+
+def video_to_export(folder: Path) -> list[object]:
+    clip = write_video(folder / "clip.mp4", 5)
+    return ["export", clip.rename(folder / "clip.parquet"), "--to", "bvh", "-o", folder / "x.bvh"]
+
+
 def missing_table(folder: Path) -> list[object]:
     return ["train", folder / "reference.parquet", "-o", folder / "out", "--steps", "10"]
 
@@ -112,6 +125,9 @@ def missing_file(folder: Path) -> list[object]:
         (unknown_robot_in_yaml, "unknown robot 'c3po'"),
         (typo_in_yaml, "mine.yaml: unknown key 'mocap.cutof_hz'. Did you mean 'cutoff_hz'?"),
         (foreign_table, "smpl.parquet: not a Parquet file"),
+        (video_as_table, "clip.mp4: a video; `robojackson mocap` recovers its dancer's motion"),
+        (video_as_motion_file, "clip.mp4: a video; `robojackson mocap` recovers"),
+        (video_to_export, "clip.parquet: a video; `robojackson mocap` recovers"),
         (missing_table, "reference.parquet: no such file"),
         (folder_as_table, ": a folder, not a file"),
         (missing_file, "gone.mp4: no such file"),

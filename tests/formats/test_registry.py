@@ -8,6 +8,7 @@ import pytest
 
 from robojackson import formats
 from robojackson.cli.exporting import names
+from robojackson.errors import UnknownName
 from robojackson.formats import registry
 from tests.fixtures.person import person
 
@@ -54,3 +55,12 @@ def test_no_two_modules_declare_the_same_format() -> None:
     kinds = (registry.robot_exporters, registry.person_exporters, registry.policy_exporters)
     declared = sum(len(kind()) for kind in (*kinds, registry.importers))
     assert declared == len(registry._formats())
+
+
+@pytest.mark.parametrize(
+    ("content", "shown"),
+    [(b"# a text\n\n", "'# a text'"), (b"\x00\x01binary", "'00 01 62 69 6e 61 72 79'")],
+)
+def test_an_unknown_file_is_shown_without_control_characters(content: bytes, shown: str) -> None:
+    with pytest.raises(UnknownName, match=rf"kind of file {shown} \(x\.bin\)\. Known: "):
+        registry.recognise(content, "x.bin")
