@@ -53,13 +53,19 @@ def test_the_dancer_trains_on_no_motion_that_evaluates_it(tmp_path: Path) -> Non
         collection(tmp_path)
 
 
-@pytest.mark.parametrize("name", ["long_walk1_0", "cmu_05_07", "unheard_of"])
+@pytest.mark.parametrize("name", ["long_walk1_0", "cmu_05_07", "cmu_05_09_slow", "unheard_of"])
 def test_the_dancer_s_pack_takes_captured_motions_of_the_training_list_alone(
     name: str, tmp_path: Path
 ) -> None:
-    for trainable in ("jog_0", "stealthy_walk1_1", "cmu_05_01", "invented_007"):
+    for trainable in (
+        "jog_0",
+        "stealthy_walk1_1",
+        "cmu_05_01",
+        "cmu_05_01_slow",
+        "invented_007",
+    ):
         robot_motion("hip_shake").save(tmp_path / f"{trainable}.parquet")
-    assert len(collection(tmp_path)) == 4
+    assert len(collection(tmp_path)) == 5
     robot_motion("hip_shake").save(tmp_path / f"{name}.parquet")
     with pytest.raises(ValueError, match="not for training: "):
         collection(tmp_path)

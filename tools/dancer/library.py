@@ -1,10 +1,11 @@
 """Motions that the dancer learns: captured ones of the split's training list, and invented dances.
 
-    python -m tools.dancer.library CAPTURED OUT [--robot g1] [--invented 120] [--part 0/2]
+    python -m tools.dancer.library CAPTURED OUT [--robot g1] [--invented 120] [--slow] [--part 0/2]
 
 CAPTURED holds BVH files of CMU's subject 5 (`05_01.bvh.gz`) and DeepMimic files
 (`humanoid3d_jog.txt.gz`); what `benchmarks/learning/split.yaml` does not list for training is
-refused or passed over. OUT gets one reference motion each; those that are there stay.
+refused or passed over. OUT gets one reference motion each, and with `--slow` a slower one of each
+BVH file, too; those that are there stay.
 """
 
 import argparse
@@ -32,13 +33,16 @@ from tools.pairs import gestures, sources
 FPS, SECONDS = 30.0, 8.0
 INVENTED = "invented_"
 """How the name of an invented dance begins."""
-PART = re.compile(r"_\d$")
-"""The end of the name of a part of one of DeepMimic's motions."""
+SLOW, SLOW_TEMPO = "_slow", 0.75
+"""How the name of a slower copy ends; its tempo."""
+PART = re.compile(rf"(_\d|{SLOW})$")
+"""The end of the name of a part of one of DeepMimic's motions, or of a slower copy."""
 TAILED = 3
 """Every third invented dance begins and ends standing; captured dances do."""
 MOST_INFEASIBLE = 0.25
 """Share of steps that a robot cannot do; motions beyond it are left out."""
-TEMPOS: tuple[Literal["auto"] | float, ...] = ("auto", 0.7)
+Tempos = tuple[Literal["auto"] | float, ...]
+TEMPOS: Tempos = ("auto", 0.7)
 """Tried in turn."""
 Maker = Callable[[], SmplSequence]
 
@@ -67,13 +71,16 @@ def source_of(name: str) -> str | None:
     return None if name.startswith(INVENTED) else PART.sub("", name)
 
 
-def make(name: str, maker: Maker, tails: bool, robot: Robot, out: Path) -> str:
+def make(
+    name: str, maker: Maker, tails: bool, robot: Robot, out: Path, tempos: Tempos = TEMPOS
+) -> str:
     """Retarget one motion; return a line about it."""
     path = out / f"{name}.parquet"
     if path.is_file():
         return f"{name}: there already"
-    sequence, repair = maker(), RepairConfig(target_share=0.95 if name in load_split().train else 0)
-    for tempo in TEMPOS:
+    captured = name.removesuffix(SLOW) in load_split().train
+    sequence, repair = maker(), RepairConfig(target_share=0.95 if captured else 0)
+    for tempo in tempos:
         config = RetargetConfig(
             tails=TailConfig(use="yes" if tails else "no"), repair=repair, tempo=tempo
         )
@@ -104,6 +111,7 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("--robot", default="g1")
     parser.add_argument("--invented", type=int, default=120)
+    parser.add_argument("--slow", action="store_true", help="BVH files at .75 of their tempo, too")
     parser.add_argument("--part", default="0/1", help="i/n: every n-th motion from the i-th")
     given = parser.parse_args()
     given.out.mkdir(parents=True, exist_ok=True)
@@ -112,6 +120,9 @@ def main() -> None:
     for i, (name, maker, tails) in enumerate(sequences(given.captured, given.invented)):
         if i % step == first:
             print(make(name, maker, tails, robot, given.out), flush=True)
+            if given.slow and name in load_split().train:
+                slow = make(name + SLOW, maker, tails, robot, given.out, (SLOW_TEMPO,))
+                print(slow, flush=True)
 
 
 if __name__ == "__main__":
