@@ -38,9 +38,6 @@ NOTES = {
     "g1_cmu_05_18": "trained on the reference of 25 November, without sway, at .93 of its tempo",
 }
 """What differs in trained rows from other rows, or among their seeds."""
-BESIDE = ("g1_dance_a",)
-"""Motions whose trainings kept rollouts of the regulator on the same reference and with the same
-share of starts that survive: figures that the table of trackers lacks are taken from them."""
 OF_NOTEBOOK = "its row was replaced by the one with feedback (docs/learning_g1.md#linear-feedback)"
 WITHOUT_FEEDBACK = {
     "g1_hip_shake": f"100 %, skill .63, 8 mm; {OF_NOTEBOOK}",
@@ -117,15 +114,4 @@ def of_trackers(folders: Folders, move: str) -> Iterator[Row]:
         taken = {figure: last.get(figure) for figure in (*FIGURES, "feet_excess_m_s", "cpu_s")}
         if "velocity_score" not in last:
             note = "velocity and feet not measured: minutes of search again"
-            if move in BESIDE and name == "regulator":
-                taken |= _beside_a_training(folders, move)
-                note = "velocity and feet of 73 starts beside a training"
         yield row(who, move, taken, starts=last["starts"], note=note, **known)
-
-
-def _beside_a_training(folders: Folders, move: str) -> Row:
-    """Return velocity score and excess speed of the feet of the regulator beside a training."""
-    table = pd.read_parquet(folders.row(move, SEEDS[0], 10.0))
-    rollouts = table[table["policy"] == "regulator"]
-    feet = float(rollouts[list(FEET)].to_numpy().mean())
-    return {"velocity_score": float(rollouts["velocity_score"].mean()), "feet_excess_m_s": feet}
