@@ -19,6 +19,7 @@ from robojackson.rl.sim.simulation import Simulation
 from robojackson.robot.fall import Fall
 from tests.fixtures.robots import robot_motion, stock
 from tools.dancer import learn, pack, ppo, ship
+from tools.dancer.imitation import Lessons
 from tools.dancer.mujoco_robots import MujocoRobots
 from tools.dancer.network import Dancer, restore, save
 from tools.dancer.rehearsal import MOST_RATE, Outcome, Rehearsal
@@ -233,7 +234,9 @@ def test_no_value_crosses_the_end_of_an_episode() -> None:
     none = torch.zeros(2, 1)
     reward, value = torch.tensor([[1.0], [2.0]]), torch.tensor([[0.5], [0.25]])
     ended = torch.tensor([[True], [False]])
-    done = ppo.Round(none, none, reward, ended, value, none, none, torch.tensor([4.0]), 0.0, 0.0)
+    done = ppo.Round(
+        none, none, reward, ended, value, none, none, none, none, torch.tensor([4.0]), 0.0, 0.0
+    )
     advantage = ppo.advantages(done)
     late = 2.0 + ppo.GAMMA * 4.0 - 0.25
     np.testing.assert_allclose(advantage[:, 0], [1.0 - 0.5, late], rtol=1e-6)
@@ -246,10 +249,11 @@ def test_the_tracker_acts_as_the_dancer_that_was_taught(tmp_path: Path) -> None:
     dancer = Dancer(robots.sight.actor_size, robots.seen.shape[1], robots.action.shape[1])
     trainer = ppo.Trainer(dancer, robots, 4, 1e-3)
     average = learn.averaged(dancer)
-    count = learn.learn(trainer, average, tmp_path, 0.5, 100)
+    plan = Lessons(trainer, None, None, 0.0, 0.5)
+    count = learn.learn(trainer, average, plan, tmp_path, 0.5, 100)
     again = Dancer(robots.sight.actor_size, robots.seen.shape[1], robots.action.shape[1])
     assert restore(again, tmp_path / "dancer.npz") == count > 100
-    policy = ship.policy_of(tmp_path / "dancer.npz", stock(), 0, 2)
+    policy = ship.policy_of(tmp_path / "dancer.npz", stock(), "preview", 0, 2)
     held = load_policy(policy.save(tmp_path / "dancer.safetensors"))
     with torch.no_grad():
         expected = again.act(again.scale(robots.seen)).numpy()

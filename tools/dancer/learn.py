@@ -2,10 +2,14 @@
 
     pip install -r tools/dancer/requirements.txt
     python -m tools.dancer.learn PACK.npz -o OUT [--seconds 480] [--robots 8192] [--seed 0]
-        [--start OUT/dancer.npz] [--device cuda]
+        [--start OUT/dancer.npz] [--device cuda] [--sees everything]
+        [--experts EXPERTS --imitate 240]
 
 OUT gets, every minute and at the end, `dancer.npz`, which a training goes on from, and
 `average.npz`, the moving average of its networks; and `curve.csv`, a row every twenty rounds.
+With experts (`tools.dancer.experts`) the network imitates them first for some seconds (DAgger), and
+keeps near to them while it learns from rewards; files of experts that come meanwhile are read,
+and `imitated.npz` is the average at the end of the imitation.
 `tools.dancer.ship` writes the tracker's file. An H100 does 380,000 control
 steps a second; `--device cpu`, which needs no Warp, a thousand.
 """
@@ -19,8 +23,10 @@ import numpy as np
 import torch
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
+from tools.dancer.advice import Experts
+from tools.dancer.imitation import Lessons
 from tools.dancer.mujoco_robots import MujocoRobots, Robots
-from tools.dancer.network import Dancer, restore, save
+from tools.dancer.network import HIDDEN, Dancer, hidden_of, restore, save
 from tools.dancer.ppo import Trainer
 from tools.dancer.rehearsal import Rehearsal
 
@@ -63,6 +69,10 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--start", type=Path)
     parser.add_argument("--device", default="cuda")
+    parser.add_argument("--sees", choices=["sensors", "everything"], default="sensors")
+    parser.add_argument("--hidden", nargs="+", type=int, default=HIDDEN, help="widths of layers")
+    parser.add_argument("--experts", type=Path)
+    parser.add_argument("--imitate", type=float, default=0.0, help="seconds of imitation at first")
     given = parser.parse_args()
     given.out.mkdir(parents=True, exist_ok=True)
     torch.manual_seed(given.seed)
@@ -70,13 +80,17 @@ def main() -> None:
     with np.load(given.pack) as file:
         pack = {name: file[name] for name in file.files}
     robots = robots_on(given.device, pack, given.robots)
-    rehearsal = Rehearsal(pack, robots, given.device, given.seed)
-    dancer = Dancer(rehearsal.sight.actor_size, rehearsal.seen.shape[1], rehearsal.action.shape[1])
+    rehearsal = Rehearsal(pack, robots, given.device, given.seed, given.sees == "everything")
+    size, motors = rehearsal.seen.shape[1], rehearsal.action.shape[1]
+    hidden = hidden_of(given.start) if given.start else tuple(given.hidden)
+    dancer = Dancer(rehearsal.sight.actor_size, size, motors, hidden)
     steps = restore(dancer, given.start) if given.start else 0
     rate = LATER_RATE if given.start else FIRST_RATE
-    trainer = Trainer(dancer.to(given.device), rehearsal, HORIZON, rate)
+    experts = Experts(pack, rehearsal.motions, given.device) if given.experts else None
+    trainer = Trainer(dancer.to(given.device), rehearsal, HORIZON, rate, experts)
+    lessons = Lessons(trainer, experts, given.experts, given.imitate, given.seconds)
     average = averaged(dancer)
-    steps = learn(trainer, average, given.out, given.seconds, steps)
+    steps = learn(trainer, average, lessons, given.out, given.seconds, steps)
     assert isinstance(average.module, Dancer)
     for name, one in (("last", dancer), ("average", average.module)):
         held = survival(rehearsal, one, JUDGED_S)
@@ -89,7 +103,14 @@ def averaged(dancer: Dancer) -> AveragedModel:
     return AveragedModel(dancer, multi_avg_fn=get_ema_multi_avg_fn(AVERAGE), use_buffers=True)
 
 
-def learn(trainer: Trainer, average: AveragedModel, out: Path, seconds: float, steps: int) -> int:
+def learn(
+    trainer: Trainer,
+    average: AveragedModel,
+    lessons: Lessons,
+    out: Path,
+    seconds: float,
+    steps: int,
+) -> int:
     """Go on round by round; report, average and save; return the control steps so far."""
 
     def keep() -> None:
@@ -101,6 +122,8 @@ def learn(trainer: Trainer, average: AveragedModel, out: Path, seconds: float, s
     with (out / "curve.csv").open("a", newline="") as file:
         table = csv.writer(file)
         while time.monotonic() - began < seconds:
+            if lessons.plan(time.monotonic() - began):
+                save(average.module, out / "imitated.npz", steps)
             figures = trainer.round()
             average.update_parameters(trainer.dancer)
             steps, number = steps + trainer.round_steps, number + 1

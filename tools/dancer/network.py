@@ -15,6 +15,8 @@ FIRST_DEVIATION = 0.25
 """Standard deviation of the first actions, full actions."""
 LEAST_DEVIATION = 1e-2
 """Added to the deviation of an observation."""
+CONSTANT = 1e-4
+"""Deviation of an observation that was the same in training, as a hidden phase: it has no part."""
 HIDDEN = (1024, 512, 256)
 
 
@@ -84,6 +86,7 @@ class Dancer(nn.Module):
         deviation = np.sqrt(_array(self.scale.variance)[:size]) + LEAST_DEVIATION
         weight, bias = found[0]
         weight = weight / deviation[:, None]
+        weight[deviation < CONSTANT + LEAST_DEVIATION] = 0.0
         found[0] = (weight, bias - mean @ weight)
         return [(weight.astype(np.float32), bias.astype(np.float32)) for weight, bias in found]
 
@@ -101,6 +104,13 @@ def save(dancer: nn.Module, path: Path, steps: int) -> None:
     part = path.with_suffix(".part.npz")
     np.savez(part, steps=np.array(steps), **halves)
     part.replace(path)
+
+
+def hidden_of(path: Path) -> tuple[int, ...]:
+    """Return the widths of the hidden layers of networks that `save` wrote."""
+    with np.load(path) as arrays:
+        actor = [one for one in arrays.files if one.startswith("actor.") and one.endswith("weight")]
+        return tuple(len(arrays[one]) for one in actor[:-1])
 
 
 def restore(dancer: Dancer, path: Path) -> int:

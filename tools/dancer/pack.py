@@ -89,7 +89,7 @@ def pack(robot: Robot, named: Mapping[str, ReferenceMotion]) -> dict[str, np.nda
                                                   for i in robot.keypoint_sites]),
         "mirror_hinge": partner, "mirror_point": partners(robot.keypoint_names),
         "pelvis": np.array(points.pelvis), "limbs": np.array(points.limbs),
-        "feet": np.array(points.feet),
+        "feet": np.array(points.feet), "supports": np.unique(robot.contact_keypoints),
         "substeps": np.array(robot.substeps),
     }  # fmt: skip
     floats = {

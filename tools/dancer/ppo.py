@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import torch
 from torch import nn
 
+from tools.dancer.advice import Experts
 from tools.dancer.device_graph import recorded
 from tools.dancer.network import Dancer
 from tools.dancer.rehearsal import Rehearsal
@@ -30,6 +31,8 @@ class Round:
     value: torch.Tensor
     log_likelihood: torch.Tensor
     mean: torch.Tensor
+    advice: torch.Tensor
+    advised: torch.Tensor
     last_value: torch.Tensor
     lost: float
     over: float
@@ -42,16 +45,27 @@ class Trainer:
         horizon: Control steps of a round.
         rate: First step of Adam; a trained dancer needs a small one, because Adam's first steps
             are as long as its later ones.
+        experts: What is advised where; none advises without them.
+
+    Attributes:
+        imitation: Weight of the squared distance from the experts' advice in the loss.
+        learning: Whether the policy learns from rewards; the critic always does.
     """
 
-    def __init__(self, dancer: Dancer, rehearsal: Rehearsal, horizon: int, rate: float) -> None:
+    def __init__(
+        self, dancer: Dancer, rehearsal: Rehearsal, horizon: int, rate: float,
+        experts: Experts | None = None,
+    ) -> None:  # fmt: skip
+        self._experts, self.imitation, self.learning = experts, 0.0, True
         self.dancer, self._rehearsal, self._horizon = dancer, rehearsal, horizon
         self._rate, on_gpu = rate, rehearsal.seen.is_cuda
         self._optimiser = torch.optim.Adam(dancer.parameters(), lr=rate, fused=on_gpu)
         n, motors = rehearsal.n, len(dancer.log_deviation)
         shapes = {"seen": rehearsal.seen.shape, "action": (n, motors), "mean": (n, motors),
-                  "value": (n,), "log_likelihood": (n,)}  # fmt: skip
+                  "value": (n,), "log_likelihood": (n,), "advice": (n, motors),
+                  "advised": (n,)}  # fmt: skip
         device = rehearsal.seen.device
+        self._led = torch.zeros(n, 1, dtype=torch.bool, device=device)
         self._chosen = {name: torch.zeros(shape, device=device) for name, shape in shapes.items()}
         self._choose = recorded(self._write_choice, device)
 
@@ -99,7 +113,12 @@ class Trainer:
         mean = dancer.act(seen)
         action = mean + dancer.log_deviation.exp() * torch.randn_like(mean)
         log = _log_likelihood(action, mean, dancer.log_deviation)
-        choice = (seen, action, mean, dancer.value(seen), log)
+        advice, advised = torch.zeros_like(mean), torch.zeros(len(mean), device=mean.device)
+        if self._experts is not None:
+            advice, knows = self._rehearsal.advice(self._experts)
+            advised = knows.float()
+            action = torch.where(self._led & knows[:, None], action - mean + advice, action)
+        choice = (seen, action, mean, dancer.value(seen), log, advice, advised)
         for held, one in zip(self._chosen.values(), choice, strict=True):
             held.copy_(one)
 
@@ -111,8 +130,9 @@ class Trainer:
             done.log_likelihood.flatten(),
             self.dancer.log_deviation.detach().clone(),
         )
+        advice, advised = done.advice.flatten(0, 1), done.advised.flatten()
         count = len(goal)
-        figures = torch.zeros(3, device=goal.device)
+        figures = torch.zeros(4, device=goal.device)
         for _ in range(EPOCHS):
             order = torch.randperm(count, device=goal.device)
             for rows in order.chunk(PARTS):
@@ -123,7 +143,12 @@ class Trainer:
                 clipped = ratio.clamp(1 - CLIP, 1 + CLIP)
                 policy = -torch.minimum(ratio * gain, clipped * gain).mean()
                 value = (self.dancer.value(seen[rows]) - goal[rows]).square().mean()
-                loss = policy + VALUE * value - ENTROPY * self.dancer.log_deviation.sum()
+                loss = VALUE * value
+                off = ((now - advice[rows]).square().sum(1) * advised[rows]).mean()
+                if self.learning:
+                    loss = loss + policy - ENTROPY * self.dancer.log_deviation.sum()
+                if self.imitation:
+                    loss = loss + self.imitation * off
                 self._optimiser.zero_grad(set_to_none=True)
                 loss.backward()
                 nn.utils.clip_grad_norm_(self.dancer.parameters(), MOST_GRADIENT)
@@ -131,10 +156,23 @@ class Trainer:
                 apart = _divergence(
                     mean[rows], log_deviation, now.detach(), self.dancer.log_deviation.detach()
                 )
-                figures += torch.stack([policy.detach(), value.detach(), apart])
-            self._adapt(float(apart))
-        policy, value, apart = (figures / (EPOCHS * PARTS)).tolist()
-        return {"policy_loss": policy, "value_loss": value, "divergence": apart}
+                figures += torch.stack([policy.detach(), value.detach(), apart, off.detach()])
+            if self.learning:
+                self._adapt(float(apart))
+        policy, value, apart, off = (figures / (EPOCHS * PARTS)).tolist()
+        return {"policy_loss": policy, "value_loss": value, "divergence": apart, "off": off}
+
+    def lead(self, share: float) -> None:
+        """Let experts choose the actions of a share of the robots."""
+        self._led[:, 0] = torch.arange(len(self._led), device=self._led.device) < share * len(
+            self._led
+        )
+
+    def set_rate(self, rate: float) -> None:
+        """Set the step of Adam."""
+        self._rate = rate
+        for group in self._optimiser.param_groups:
+            group["lr"] = rate
 
     def _adapt(self, divergence: float) -> None:
         if divergence > 2 * DIVERGENCE:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
+from tools.dancer.advice import Experts
 from tools.dancer.device_graph import recorded
 from tools.dancer.mujoco_robots import Robots
 from tools.dancer.rehearsal_reward import Scoring
@@ -53,11 +54,16 @@ class Rehearsal:
     """
 
     def __init__(
-        self, pack: Mapping[str, np.ndarray], robots: Robots, device: str, seed: int
+        self,
+        pack: Mapping[str, np.ndarray],
+        robots: Robots,
+        device: str,
+        seed: int,
+        everything: bool = False,
     ) -> None:
         self._random = torch.Generator(device).manual_seed(seed)
         self.robots, self.motions = robots, Motions(pack, device)
-        self.sight = Sight(pack, self.motions.preview.shape[1], self._random)
+        self.sight = Sight(pack, self.motions.preview.shape[1], self._random, everything)
         self._scoring, self._device, self.n = Scoring(pack, device), device, robots.n
         self._standing, self._scale, self._hinge = (
             torch.as_tensor(pack[name], device=device) for name in ("standing", "scale", "hinge")
@@ -95,6 +101,10 @@ class Rehearsal:
         self.robots.step()
         self._conclude()
         return self._outcome
+
+    def advice(self, experts: Experts) -> tuple[torch.Tensor, torch.Tensor]:
+        """Return what experts advise now, (N, nu), and which robots have an expert, (N,)."""
+        return experts.advise(self.robots, self._motion, self._step)
 
     def calm(self, rows: torch.Tensor) -> None:
         """Begin all episodes again at rows of the motions (N,), without pushes and noise of the

@@ -12,7 +12,8 @@ import torch
 AHEAD_S = (0.1, 0.2, 0.4, 0.7)
 DISTANCE_SCALE = 3.0
 ACROSS = (1.0, -1.0, 1.0)
-"""Mirror of places; that of rotation vectors is the negative."""
+TURN = (1.0, -1.0, 1.0, -1.0)
+"""Mirror of places and of quaternions; that of rotation vectors is the negative of the first."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ class Motions:
 
     def at(self, motion: torch.Tensor, step: torch.Tensor) -> Steps:
         """Return the references; a cyclic motion goes on, another holds its last step."""
-        row, shift, phase = self._split(motion, step)
+        row, shift, phase = self.split(motion, step)
         qpos = self.qpos[row]
         qpos[:, :3] += shift
         points = self.points[row] + shift[:, None]
@@ -78,15 +79,16 @@ class Motions:
 
     def row(self, motion: torch.Tensor, step: torch.Tensor) -> torch.Tensor:
         """Return rows of the joined steps of all motions."""
-        return self._split(motion, step)[0]
+        return self.split(motion, step)[0]
 
     def ended(self, motion: torch.Tensor, step: torch.Tensor) -> torch.Tensor:
         """Return whether a motion that is not cyclic has come to its end."""
         return ~self.cyclic[motion] & (step >= self.length[motion] - 1)
 
-    def _split(
+    def split(
         self, motion: torch.Tensor, step: torch.Tensor
     ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        """Return rows of the joined steps, how far earlier cycles have moved, and the phase."""
         length = self.length[motion]
         cycle = torch.where(self.cyclic[motion], step // length, 0)
         index = torch.minimum(step - cycle * length, length - 1)
@@ -108,7 +110,7 @@ class Motions:
         cos, sin = torch.cos(yaw), torch.sin(yaw)
         parts = []
         for seconds in AHEAD_S:
-            row, shift, _ = self._split(self.motion, here + round(seconds / self.dt))
+            row, shift, _ = self.split(self.motion, here + round(seconds / self.dt))
             there = self.qpos[row]
             place = there[:, :3] + shift
             moved = place[:, :2] - self.qpos[:, :2]
@@ -147,7 +149,7 @@ def _image(pack: Mapping[str, np.ndarray], own: dict[str, torch.Tensor]) -> dict
     hinge = torch.as_tensor(pack["hinge"], device=device)
     motor = torch.argsort(hinge)[partner[hinge]]
     points = torch.as_tensor(pack["mirror_point"], device=device)
-    turn = torch.tensor([1.0, -1.0, 1.0, -1.0], device=device)
+    turn = torch.tensor(TURN, device=device)
     qpos, qvel = own["qpos"], own["qvel"]
     angles, speeds = qpos[:, 7:][:, partner] * sign, qvel[:, 6:][:, partner] * sign
     return {

@@ -1,7 +1,7 @@
 """Write the dancer's policy file, which `configs/trackers/dancer.yaml` names, from its training.
 
 python -m tools.dancer.ship OUT/dancer.npz -o robojackson/assets/dancer_g1.safetensors \
-        --seed 0 --motions 125 [--robot g1]
+        --seed 0 --motions 125 [--robot g1] [--sees everything]
 """
 
 import argparse
@@ -14,21 +14,22 @@ import torch
 
 from robojackson import load_robot
 from robojackson.rl.config.train_config import TrackConfig
-from robojackson.rl.modes.observation import Observer
+from robojackson.rl.modes.observation import Kind, Observer
 from robojackson.rl.policy import Policy
 from robojackson.rl.sim.motors import actuation_facts
 from robojackson.rl.sim.simulation import resolved
 from robojackson.robot.model import Robot
-from tools.dancer.network import Dancer, restore
+from tools.dancer.network import Dancer, hidden_of, restore
 from tools.dancer.pack import CONTROL
 
+KINDS: dict[str, Kind] = {"sensors": "preview", "everything": "full_preview"}
+"""What `learn --sees` names."""
 
-def facts(robot: Robot, seed: int, steps: int, motions: int) -> dict[str, object]:
+
+def facts(robot: Robot, kind: Kind, seed: int, steps: int, motions: int) -> dict[str, object]:
     """Return the facts of a policy's file."""
     control = resolved(CONTROL, robot)
-    environment = json.loads(
-        json.dumps(asdict(TrackConfig(observation="preview", control=CONTROL)))
-    )
+    environment = json.loads(json.dumps(asdict(TrackConfig(observation=kind, control=CONTROL))))
     return {
         "robot": robot.description.name, "model_sha256": robot.sha256, "mode": "track",
         "trainer": "ppo", "seed": seed, "setup": "dancer", "start": "scratch",
@@ -37,12 +38,12 @@ def facts(robot: Robot, seed: int, steps: int, motions: int) -> dict[str, object
     }  # fmt: skip
 
 
-def policy_of(file: Path, robot: Robot, seed: int, motions: int) -> Policy:
+def policy_of(file: Path, robot: Robot, kind: Kind, seed: int, motions: int) -> Policy:
     """Return the policy of a training's `dancer.npz`."""
-    observer = Observer(robot, "preview")
-    dancer = Dancer(observer.actor_size, observer.size, robot.model.nu)
+    observer = Observer(robot, kind)
+    dancer = Dancer(observer.actor_size, observer.size, robot.model.nu, hidden_of(file))
     steps = restore(dancer, file)
-    return Policy(tuple(dancer.layers()), facts(robot, seed, steps, motions))
+    return Policy(tuple(dancer.layers()), facts(robot, kind, seed, steps, motions))
 
 
 def main() -> None:
@@ -52,10 +53,13 @@ def main() -> None:
     parser.add_argument("-o", "--out", type=Path, required=True)
     parser.add_argument("--robot", default="g1")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--sees", choices=KINDS, default="sensors")
     parser.add_argument("--motions", type=int, required=True)
     given = parser.parse_args()
     torch.set_num_threads(1)
-    policy = policy_of(given.training, load_robot(given.robot), given.seed, given.motions)
+    policy = policy_of(
+        given.training, load_robot(given.robot), KINDS[given.sees], given.seed, given.motions
+    )
     path = policy.save(given.out)
     content = path.read_bytes()
     print(f"{path}: {policy!r}, size {len(content)}, sha256 {hashlib.sha256(content).hexdigest()}")

@@ -1,6 +1,7 @@
 """What a rehearsing robot sees: torch twin of `rl.modes.observation`, kind `preview`.
 
-The dancer sees the first part, its critic all. Metres, radians, seconds, scaled to about one.
+The dancer sees the first part or all, its critic all. Metres, radians, seconds, scaled to about
+one.
 """
 
 from collections.abc import Mapping
@@ -13,6 +14,8 @@ from tools.dancer.repertoire import Steps, matrix
 
 SPEED_SCALE, HINGE_SPEED_SCALE, POINT_SCALE, ROOT_SCALE, CLIP = 0.3, 0.1, 2.0, 3.0, 10.0
 USUAL_HEIGHT_M = 1.2
+REST = 15
+"""Numbers that only a simulation knows, beside the keypoints."""
 NOISE = 0.25
 """Of the pack's noise of gyroscope, attitude, hinges and speeds of hinges, uniform between plus and
 minus."""
@@ -27,10 +30,17 @@ class Sight:
     """
 
     def __init__(
-        self, pack: Mapping[str, np.ndarray], preview: int, random: torch.Generator
+        self,
+        pack: Mapping[str, np.ndarray],
+        preview: int,
+        random: torch.Generator,
+        everything: bool = False,
     ) -> None:
         self._random, self._rest = random, torch.as_tensor(pack["rest"], device=random.device)
         self.actor_size = 9 + 4 * len(pack["rest"]) + len(pack["scale"]) + preview
+        if everything:
+            self.actor_size += REST + 3 * len(pack["sites"])
+        self._everything = everything
         self._widths = [NOISE * float(width) for width in pack["sensors"]]
         self.noise = torch.ones((), device=random.device)
 
@@ -46,7 +56,7 @@ class Sight:
         attitude = torch.cat([turn[:, :, 0], turn[:, :, 1]], 1)
         measured = (qvel[:, 3:6], attitude, qpos[:, 7:], qvel[:, 6:])
         gyro, attitude, hinges, speeds = self._sensed(measured)
-        angle = 2 * np.pi * at.phase
+        angle = 2 * np.pi * (0 * at.phase if self._everything else at.phase)
         vectors = torch.stack([qvel[:, :3], at.qpos[:, :3] - qpos[:, :3], at.qvel[:, :3]], 1)
         velocity, offset, travel = (vectors @ turned).unbind(1)
         apart = ((at.points - robots.points) @ turned).flatten(1) * POINT_SCALE

@@ -200,13 +200,13 @@ class TrackConfig:
 
     Attributes:
         observation: Inputs of the policy: `full`, everything that a simulation knows; `onboard`,
-            the measurements of a real robot (the critics see everything); or `preview`, these and
-            the reference ahead.
+            the measurements of a real robot (the critics see everything); `preview`, these and
+            the reference ahead; or `full_preview`, everything and the reference ahead.
         episode_seconds: Time limit of a training episode, s; its end is bootstrapped.
         threads: Threads that step the simulations.
     """
 
-    observation: Literal["full", "onboard", "preview"] = "full"
+    observation: Literal["full", "onboard", "preview", "full_preview"] = "full"
     control: ControlConfig = Field(default_factory=ControlConfig)
     reset: ResetConfig = Field(default_factory=ResetConfig)
     reward: RewardConfig = Field(default_factory=RewardConfig)

@@ -11,7 +11,7 @@ from robojackson.rl.config.evaluate_config import HOLD, REGULATOR, TRAINED
 from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.evaluation.rollouts import Driver
 from robojackson.rl.evaluation.tracker_driver import tracker_driver
-from robojackson.rl.modes.observation import Observer
+from robojackson.rl.modes.observation import AHEAD, Observer
 from robojackson.rl.policy import Policy
 from robojackson.rl.policy_facts import fact, observation_of, policy_control
 from robojackson.rl.sim.motors import Motors, residual_scale
@@ -128,4 +128,4 @@ def sees_ahead(policy: Evaluated) -> bool:
     """Return whether a policy takes a preview of the reference."""
     if not isinstance(policy, Policy):
         return policy.sees_ahead
-    return observation_of(policy) == "preview"
+    return observation_of(policy) in AHEAD

@@ -37,6 +37,7 @@ def refinements(
     linear: Linear,
     motion: Path,
     action: Float[np.ndarray, " nu"],
+    most_rounds: int | None = None,
 ) -> Iterator[tuple[Path, Linear]]:
     """Yield paths nearer and nearer to a motion, with the system along each.
 
@@ -46,8 +47,9 @@ def refinements(
         linear: The system along it.
         motion: The motion as a path.
         action: Radians that a full action moves each target.
+        most_rounds: Paths at most; `ROUNDS` when None.
     """
-    for _ in range(ROUNDS):
+    for _ in range(ROUNDS if most_rounds is None else most_rounds):
         cost = before = _cost(path, motion, action)
         for _ in range(STEPS):
             lower, nearer = _step(sim, path, linear, motion, action)

@@ -48,6 +48,7 @@ def sampled_regulator(
     seed: int = 0,
     progress: Progress = no_progress,
     most_tries: int | None = None,
+    most_rounds: int | None = None,
 ) -> Gains:
     """Return the regulator along a motion, or along a path beside it where that holds it better.
 
@@ -60,6 +61,7 @@ def sampled_regulator(
         seed: Seed of the samples.
         progress: Called with a name, the steps that are done, and all.
         most_tries: Searches from the beginning at most; `TRIES` when None.
+        most_rounds: Rounds of refinement at most; `ROUNDS` when None.
     """
     feet, rule = Feet(robot), KeypointRule(robot, RULE_SHARE)
     best, motion, linear = regulator(sim, clip, action, feet.count, progress)
@@ -84,7 +86,7 @@ def sampled_regulator(
             break
     most = held.strictly
     for number, (path, along) in enumerate(
-        refinements(sim, *chosen, reference, action) if chosen else ()
+        refinements(sim, *chosen, reference, action, most_rounds) if chosen else ()
     ):
         progress("refined path", number + 1, ROUNDS)
         found = _gains(sim, clip, action, feet, path, along, reference)

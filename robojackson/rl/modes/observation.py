@@ -7,7 +7,8 @@ its reference.
 `full` is everything that a simulation knows. `onboard` is the robot's own measurements: gyroscope,
 attitude and joints (the inputs of mjlab's tracking task without state estimation): 9 + 5 numbers a
 hinge, 154 on the Unitree G1. `preview` is these and the reference ahead (`sim.preview`), for
-policies that follow more than one motion. In training, the rest follows for the critics alone.
+policies that follow more than one motion. In training, the rest follows for the critics alone;
+with `full_preview` for the policy, too.
 """
 
 from typing import Literal
@@ -27,8 +28,10 @@ USUAL_HEIGHT_M = 1.2
 A robot of another size observes an offset, which the bias of the first layer takes up. A height of
 its own would change the inputs of every saved policy.
 """
-Kind = Literal["full", "onboard", "preview"]
+Kind = Literal["full", "onboard", "preview", "full_preview"]
 """Kinds of the policy's inputs."""
+AHEAD = ("preview", "full_preview")
+"""Those with the reference ahead."""
 
 
 class Observer:
@@ -46,9 +49,11 @@ class Observer:
         self.size = self.actor_size = 24 + 4 * hinges + motors + points
         if kind != "full":
             self.actor_size = 9 + 4 * hinges + motors
-            if kind == "preview":
+            if kind in AHEAD:
                 self.actor_size += preview_size(hinges)
             self.size = self.actor_size + 15 + points
+            if kind == "full_preview":
+                self.actor_size = self.size
 
     def observe(
         self,

@@ -18,7 +18,7 @@ from robojackson.rl.config.paper_config import BETA
 from robojackson.rl.config.train_config import ControlConfig, RewardConfig, TrackConfig
 from robojackson.rl.feedback.driven_clip import driven_clip
 from robojackson.rl.modes.mode import EpisodeStart, Score
-from robojackson.rl.modes.observation import Observer
+from robojackson.rl.modes.observation import AHEAD, Observer
 from robojackson.rl.modes.reset_states import (
     SettledStates,
     StartPhases,
@@ -63,7 +63,7 @@ class TrackMode:
         rewards: Mapping[str, RewardFunction] = MappingProxyType({}),
     ) -> None:
         self._config, self._rewards = config, rewards
-        ahead, control = config.observation == "preview", control_of(config)
+        ahead, control = config.observation in AHEAD, control_of(config)
         self.clip = driven_clip(robot, reference, control, ahead)
         names = robot.keypoint_names
         self._which = tracked_points(names, tree(robot) if config.reward.bodies else None)

@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from robojackson.errors import BadPolicy
 from robojackson.rl.config.train_config import ControlConfig
-from robojackson.rl.modes.observation import Observer
+from robojackson.rl.modes.observation import AHEAD, Observer
 from robojackson.rl.policy import Policy, load_policy
 from robojackson.rl.policy_facts import fact, observation_of, policy_control
 from robojackson.rl.sim.motors import Motors, residual_scale
@@ -18,7 +18,8 @@ from robojackson.robot.model import Robot
 
 
 class PolicyTracker:
-    """A policy that was trained with `track.observation: preview` (`Tracker` protocol).
+    """A policy that was trained with `track.observation: preview` or `full_preview` (`Tracker`
+    protocol).
 
     Raises:
         BadPolicy: the file is damaged, or its policy does not see the reference ahead.
@@ -26,7 +27,7 @@ class PolicyTracker:
 
     def __init__(self, description: TrackerDescription, path: Path) -> None:
         self.description, self.policy = description, load_policy(path)
-        if observation_of(self.policy) != "preview":
+        if observation_of(self.policy) not in AHEAD:
             raise BadPolicy(f"{path}: a policy of one motion: it does not see the reference ahead")
         self.window: tuple[int, ...] = (1,)
         self.control = fact(self.policy, "control", ControlConfig)
@@ -48,7 +49,7 @@ class _PolicyFollower:
     """N robots with the last action of each."""
 
     def __init__(self, policy: Policy, control: ControlConfig, robot: Robot, n: int) -> None:
-        self._policy, self._observer = policy, Observer(robot, "preview")
+        self._policy, self._observer = policy, Observer(robot, observation_of(policy))
         self._hinge = Motors.of(robot.model).hinge
         self._scale = residual_scale(robot, control)
         self._action: Float[np.ndarray, "N nu"] = np.zeros((n, robot.model.nu))
