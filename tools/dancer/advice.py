@@ -15,8 +15,6 @@ from tools.dancer.repertoire import ACROSS, TURN, Motions
 LOW_M = 0.02
 """As in `rl.feedback.standing_feet`."""
 SMALL = 1e-6
-LEAST_HELD = 0.3
-"""Share of noisy starts that an expert holds by the strict rule at least; others do not advise."""
 MOST_ADVICE = 0.5
 """Root mean square of the advised actions, full ones, up to which the linear law is believed."""
 
@@ -70,7 +68,7 @@ class Experts:
                 rows = slice(self._start[number], self._start[number] + self._length[number])
                 for key, table in self._tables.items():
                     table[rows] = torch.as_tensor(arrays[key]).to(table)
-                self._knows[2 * number : 2 * number + 2] = bool(arrays["held"] >= LEAST_HELD)
+                self._knows[2 * number : 2 * number + 2] = True
             self._taken.add(name)
         return int(self._knows.sum()) // 2
 
