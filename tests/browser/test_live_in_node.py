@@ -22,7 +22,7 @@ from robojackson.rl.feedback.driven_clip import driven_clip
 from robojackson.rl.feedback.nominal_path import Gains, Progress
 from robojackson.rl.feedback.regulator import regulator
 from robojackson.rl.feedback.standing_feet import Feet
-from robojackson.rl.modes.observation import Observer
+from robojackson.rl.modes.observation import AHEAD, Kind, Observer
 from robojackson.rl.policy import Policy
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.simulation import Simulation
@@ -64,12 +64,12 @@ def anchored(
     return replace(gains, places=feet.places(gains.qpos))
 
 
-def seeing_ahead(policy: Policy, run: RecordedRun) -> Policy:
+def seeing_ahead(policy: Policy, run: RecordedRun, kind: Kind) -> Policy:
     """Return an untrained network that observes the robot and the reference ahead."""
-    rng, size = np.random.default_rng(2), Observer(run.robot, "preview").actor_size
+    rng, size = np.random.default_rng(2), Observer(run.robot, kind).actor_size
     first = rng.normal(0, 0.3 / np.sqrt(size), (size, 64)).astype(np.float32)
     layers = ((first, policy.layers[0][1]), policy.layers[1])
-    return Policy(layers, {**policy.facts, "environment": {"observation": "preview"}})
+    return Policy(layers, {**policy.facts, "environment": {"observation": kind}})
 
 
 def in_node(data: Mapping[str, Any], pushes: np.ndarray, folder: Path) -> dict[str, np.ndarray]:
@@ -127,10 +127,11 @@ def test_pushes_are_survived_as_in_python(
     assert abs(theirs[:, 1].mean() - ours[:, 1].mean()) <= max(0.001, ours[:, 1].std() / 2)
 
 
+@pytest.mark.parametrize("kind", AHEAD)
 def test_a_policy_that_sees_ahead_does_the_same_as_in_python(
-    run: RecordedRun, tmp_path: Path
+    run: RecordedRun, kind: Kind, tmp_path: Path
 ) -> None:
-    policy = seeing_ahead(made_policy(run.robot), run)
+    policy = seeing_ahead(made_policy(run.robot), run, kind)
     data = live_data(policy, run.reference, run.robot)
     assert data is not None
     found = in_node(data, np.zeros((RECORDS, 2)), tmp_path)

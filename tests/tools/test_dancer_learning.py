@@ -12,7 +12,7 @@ import torch
 
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.feedback.driven_clip import driven_clip
-from robojackson.rl.modes.observation import Observer
+from robojackson.rl.modes.observation import AHEAD, Kind, Observer
 from robojackson.rl.policy import load_policy
 from robojackson.rl.sim.reference_clip import STRIDE, Clip
 from robojackson.rl.sim.simulation import Simulation
@@ -119,7 +119,8 @@ def test_robots_move_as_those_of_the_environment() -> None:
     np.testing.assert_allclose(robots.points.numpy(), sim.points, atol=2e-4)
 
 
-def test_observations_are_those_of_the_environment() -> None:
+@pytest.mark.parametrize("kind", AHEAD)
+def test_observations_are_those_of_the_environment(kind: Kind) -> None:
     rng = np.random.default_rng(7)
     robot, robots = stock(), MujocoRobots(packed(), N)
     at = clip().at((MOTION // 2 * STRIDE + steps() // 2).numpy())
@@ -129,12 +130,17 @@ def test_observations_are_those_of_the_environment() -> None:
     points = at.points + 0.02 * rng.normal(size=at.points.shape)
     robots.place(torch.ones(N, dtype=torch.bool), *(torch.tensor(x, dtype=torch.float32)
                                                    for x in (qpos, qvel, points)))  # fmt: skip
-    observer, every = Observer(robot, "preview"), Motions(packed(), "cpu")
-    sight = Sight(packed(), every.preview.shape[1], torch.Generator())
+    observer, every = Observer(robot, kind), Motions(packed(), "cpu")
+    everything = kind == "full_preview"
+    sight = Sight(packed(), every.preview.shape[1], torch.Generator(), everything)
     sight.noise.zero_()
     mine = sight.observe(robots, every.at(MOTION, steps() // 2), torch.tensor(action).float())
     own = observer.observe(qpos, qvel, points, at, action)
     assert sight.actor_size == observer.actor_size
+    if everything:  # all but the phase, by which one would know the motion
+        hidden = own.shape[1] - 3 * len(robot.keypoint_names) - 8 + np.arange(2)
+        assert np.ptp(own[:, hidden], axis=0).min() > 0.1
+        own[:, hidden] = [0.0, 1.0]
     np.testing.assert_allclose(mine.numpy(), own, atol=5e-3)
 
 

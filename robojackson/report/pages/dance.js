@@ -111,7 +111,22 @@ const Dance = (() => {
       const gyro = () => { for (let k = 3; k < 6; k++) put(qvel[k] * dance.scales.gyro); };
       const speeds = (values, from) => { for (let k = 6; k < nv; k++) put(values[from + k] * dance.scales.hinge); };
       const done = () => { for (let k = 0; k < nu; k++) put(this.last[k] * 0.5); };
-      if (dance.observation !== 'full') {
+      const upright = () => put(qpos[2] - dance.scales.height, own[6], own[7], own[8], ...local(own, qvel[0], qvel[1], qvel[2]));
+      const phase = () => { const angle = (2 * Math.PI * row) / this.steps; put(Math.sin(angle), Math.cos(angle)); };
+      const place = () => put(...local(own, ...[0, 1, 2].map((k) => this.qpos[aim + k] + moved[k] - qpos[k])).map((value) => value * dance.scales.root));
+      const travel = () => put(...local(own, this.qvel[aimSpeed], this.qvel[aimSpeed + 1], this.qvel[aimSpeed + 2]));
+      const points = () => this.sites.forEach((site, i) => {
+        const from = 3 * (row * this.sites.length + i);
+        const apart = [0, 1, 2].map((k) => this.points[from + k] + moved[k] - sites[3 * site + k]);
+        put(...local(own, ...apart).map((value) => value * dance.scales.point));
+      });
+      if (dance.observation === 'full') {
+        upright(); gyro();
+        for (let k = 7; k < nq; k++) put(qpos[k]);
+        speeds(qvel, 0); phase(); place(); put(...turned);
+        for (let k = 7; k < nq; k++) put(this.qpos[aim + k] - qpos[k]);
+        speeds(this.qvel, aimSpeed); travel(); points(); done();
+      } else {
         gyro(); put(...turned);
         for (let k = 7; k < nq; k++) put(qpos[k] - dance.rest[k - 7]);
         speeds(qvel, 0);
@@ -119,24 +134,7 @@ const Dance = (() => {
         speeds(this.qvel, aimSpeed); done();
         const ahead = this.preview ? this.preview.length / this.steps : 0;
         for (let k = 0; k < ahead; k++) put(this.preview[row * ahead + k]);
-      } else {
-        const angle = (2 * Math.PI * row) / this.steps;
-        put(qpos[2] - dance.scales.height, own[6], own[7], own[8], ...local(own, qvel[0], qvel[1], qvel[2]));
-        gyro();
-        for (let k = 7; k < nq; k++) put(qpos[k]);
-        speeds(qvel, 0);
-        put(Math.sin(angle), Math.cos(angle));
-        const away = [0, 1, 2].map((k) => this.qpos[aim + k] + moved[k] - qpos[k]);
-        put(...local(own, ...away).map((value) => value * dance.scales.root), ...turned);
-        for (let k = 7; k < nq; k++) put(this.qpos[aim + k] - qpos[k]);
-        speeds(this.qvel, aimSpeed);
-        put(...local(own, this.qvel[aimSpeed], this.qvel[aimSpeed + 1], this.qvel[aimSpeed + 2]));
-        this.sites.forEach((site, i) => {
-          const from = 3 * (row * this.sites.length + i);
-          const apart = [0, 1, 2].map((k) => this.points[from + k] + moved[k] - sites[3 * site + k]);
-          put(...local(own, ...apart).map((value) => value * dance.scales.point));
-        });
-        done();
+        if (dance.observation === 'full_preview') { upright(); phase(); place(); travel(); points(); }
       }
       return Float32Array.from(seen, (value) => Math.min(dance.scales.clip, Math.max(-dance.scales.clip, value)));
     }

@@ -30,7 +30,7 @@ its own would change the inputs of every saved policy.
 """
 Kind = Literal["full", "onboard", "preview", "full_preview"]
 """Kinds of the policy's inputs."""
-AHEAD = ("preview", "full_preview")
+AHEAD: tuple[Kind, ...] = ("preview", "full_preview")
 """Those with the reference ahead."""
 
 

@@ -13,6 +13,7 @@ from robojackson.pipeline.tracker_descriptions import describe_tracker, require_
 from robojackson.rl.config.train_config import EvaluateConfig
 from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
 from robojackson.rl.feedback import path_search, path_trial, sampled_regulator
+from robojackson.rl.modes.observation import AHEAD, Kind
 from robojackson.rl.trackers.policy_tracker import PolicyTracker
 from robojackson.rl.trackers.regulator_tracker import RegulatorTracker
 from robojackson.rl.trackers.tracker_description import TrackerDescription
@@ -83,9 +84,12 @@ def test_only_the_regulator_does_without_a_file() -> None:
             replace(REGULATOR, network=network)  # type: ignore[arg-type]
 
 
-def test_a_policy_of_many_motions_is_a_tracker(motion: ReferenceMotion, tmp_path: Path) -> None:
+@pytest.mark.parametrize("kind", AHEAD)
+def test_a_policy_of_many_motions_is_a_tracker(
+    motion: ReferenceMotion, kind: Kind, tmp_path: Path
+) -> None:
     robot: Robot = stock()
-    policy = random_policy(robot, motion, "preview")
+    policy = random_policy(robot, motion, kind)
     path = policy.save(tmp_path / "dancer.safetensors")
     tracker = PolicyTracker(replace(REGULATOR, network="regulator"), path)
     as_tracker = evaluate_policy(tracker, motion, robot, SHORT)
