@@ -1,7 +1,8 @@
 # Two commands on a fresh machine: `make dance` and `make test`. Everything else is for developers.
 #
 #   make dance    the hip-shake clip, from video to a dancing robot (ARGS="--minutes 5" and others)
-#   make test     all tests, one process a core up to four (ARGS="tests/mocap -x"; WORKERS=0 for one process)
+#   make test     all tests, one process a core up to four (ARGS="tests/mocap -x"; WORKERS=0 for one process;
+#                 ARGS="-m 'not heavy'" for what CI runs)
 #   make test-fast  more than four fifths of them, of every folder, within 90 s on two idle cores
 #   make test-stack  the whole stack and the documented server as processes, end to end (half an
 #                 hour; apt-get install postgresql chromium)

@@ -337,6 +337,7 @@ def test_an_answer_for_people_has_one_line_a_figure() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.heavy
 def test_ctrl_c_in_training_is_resumed_by_the_same_command(tmp_path: Path, short_clip) -> None:
     robojackson("mocap", short_clip, "-o", tmp_path)
     robojackson("retarget", tmp_path / "smpl.parquet", "-o", tmp_path, "--config", "smoke")

@@ -39,6 +39,7 @@ def shortened(words: Sequence[str], clip: Path) -> list[str]:
     return [*named, *MORE.get(named[0], ())]
 
 
+@pytest.mark.heavy
 @pytest.mark.timeout(1500)
 def test_the_tutorial_ends_with_a_dancing_robot(
     tmp_path: Path, short_clip: Path, monkeypatch: pytest.MonkeyPatch

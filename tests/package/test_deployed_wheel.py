@@ -42,6 +42,7 @@ def started(command: list[str], folder: Path, environment: dict[str, str]) -> It
                 process.wait()
 
 
+@pytest.mark.heavy
 def test_a_deployed_dance_runs_from_the_wheel(installed: Installed, tmp_path: Path) -> None:
     require_deployed_dance(installed, tmp_path)
 

@@ -24,6 +24,7 @@ def test_a_video_becomes_a_motion(installed: Installed, tmp_path: Path) -> None:
     assert (tmp_path / "motion.bvh").read_text().startswith("HIERARCHY")
 
 
+@pytest.mark.heavy
 def test_a_file_of_amass_becomes_a_dancing_robot(installed: Installed, tmp_path: Path) -> None:
     done = installed.run("python", EXAMPLES / "amass_to_dance.py", "", FEW, cwd=tmp_path)
     assert "TrainedPolicy(robot='humanoid'" in done.stdout
@@ -32,6 +33,7 @@ def test_a_file_of_amass_becomes_a_dancing_robot(installed: Installed, tmp_path:
     assert (tmp_path / "amass_run" / "policy.safetensors").is_file()
 
 
+@pytest.mark.heavy
 def test_a_reward_of_ones_own_is_paid(installed: Installed, tmp_path: Path) -> None:
     done = installed.run("python", EXAMPLES / "own_reward.py", FEW, cwd=tmp_path)
     output = next(line for line in done.stdout.splitlines() if line.startswith("quiet_hands"))

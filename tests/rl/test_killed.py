@@ -55,7 +55,7 @@ def killed(reference: Path, out: Path, trainer: str, rng: np.random.Generator) -
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("trainer", ["sbx", "sb3"])
+@pytest.mark.parametrize("trainer", [pytest.param("sbx", marks=pytest.mark.heavy), "sb3"])
 def test_a_training_killed_at_random_moments_ends_as_one_that_was_not(
     sway: ReferenceMotion, tmp_path: Path, trainer: str
 ) -> None:

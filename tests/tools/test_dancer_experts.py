@@ -14,7 +14,7 @@ from robojackson.rl.feedback.standing_feet import Feet, Sites
 from tests.fixtures.robots import stock
 from tests.tools.test_dancer_learning import Guess, N, motions, packed
 from tools.dancer import experts
-from tools.dancer.advice import Experts
+from tools.dancer.expert_advice import Experts
 from tools.dancer.imitation import Lessons
 from tools.dancer.mujoco_robots import MujocoRobots
 from tools.dancer.network import Dancer

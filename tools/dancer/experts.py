@@ -5,7 +5,7 @@
 EXPERTS gets a file for every reference motion; those that are there stay. Each takes 20 to 30
 CPU-seconds a second of motion: the regulator along a path that is searched once and refined once
 (`rl.feedback`). Gains are kept in eight binary digits, with a scale for every step and number of
-the state. What an expert advises is what the network is told to do where robots come to (DAgger:
+the state. What an expert advises is the label of the states that robots come to (DAgger:
 Ross et al., 2011). World frame, metres, radians, seconds.
 """
 

@@ -3,7 +3,7 @@
 import math
 from pathlib import Path
 
-from tools.dancer.advice import Experts
+from tools.dancer.expert_advice import Experts
 from tools.dancer.ppo import LEAST_RATE, Trainer
 
 DEVIATION = 0.06

@@ -23,7 +23,7 @@ import numpy as np
 import torch
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
-from tools.dancer.advice import Experts
+from tools.dancer.expert_advice import Experts
 from tools.dancer.imitation import Lessons
 from tools.dancer.mujoco_robots import MujocoRobots, Robots
 from tools.dancer.network import HIDDEN, Dancer, hidden_of, restore, save

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import torch
 from torch import nn
 
-from tools.dancer.advice import Experts
 from tools.dancer.device_graph import recorded
+from tools.dancer.expert_advice import Experts
 from tools.dancer.network import Dancer
 from tools.dancer.rehearsal import Rehearsal
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from tools.dancer.advice import Experts
 from tools.dancer.device_graph import recorded
+from tools.dancer.expert_advice import Experts
 from tools.dancer.mujoco_robots import Robots
 from tools.dancer.rehearsal_reward import Scoring
 from tools.dancer.repertoire import Motions, Steps, heading

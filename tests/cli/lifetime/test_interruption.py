@@ -18,6 +18,7 @@ SMALL = ("tqc.n_envs=4", "tqc.warmup=100", "tqc.batch=32", "progress_seconds=0.2
 DANCE = ("dance", CLIP, "--config=smoke", "--set=train.steps=1000000")
 LEARN = (*DANCE, "--trainer=sb3", *(f"--set=train.{setting}" for setting in SMALL))
 WAYS = {"group": (signal.SIGINT, False), "process": (signal.SIGINT, True)}
+EITHER_WAY = ("group", pytest.param("process", marks=pytest.mark.heavy))
 MOMENTS = {
     "import": ("", 0.4),
     "server": ("Starting temporary server", 1.0),
@@ -68,7 +69,7 @@ def answer(end: End) -> tuple[str, ...]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("moment", MOMENTS)
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("way", EITHER_WAY)
 def test_a_dance_that_has_nothing_to_save_ends_at_once(moment: str, way: str, store: Path) -> None:
     end = interrupted(DANCE, store, *MOMENTS[moment], way)
     assert not end.saving
@@ -90,7 +91,7 @@ def test_a_dance_that_learns_saves_its_checkpoint_and_says_so(store: Path) -> No
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["mocap", "retarget", "score", "find", "pretrain"])
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("way", EITHER_WAY)
 def test_a_command_ends_at_once_while_it_is_imported(
     name: str, way: str, motion: Path, tmp_path: Path
 ) -> None:
@@ -118,7 +119,7 @@ def test_a_stage_that_is_interrupted_leaves_no_result_and_is_done_by_the_same_co
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("way", EITHER_WAY)
 def test_a_training_that_has_learnt_nothing_ends_at_once(
     way: str, motion: Path, tmp_path: Path
 ) -> None:
@@ -129,7 +130,7 @@ def test_a_training_that_has_learnt_nothing_ends_at_once(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("way", EITHER_WAY)
 def test_a_training_that_learns_saves_its_checkpoint_and_resumes(
     way: str, motion: Path, tmp_path: Path
 ) -> None:
