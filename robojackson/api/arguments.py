@@ -26,14 +26,32 @@ RobotLike = str | PathLike[str] | RobotDescription | Robot
 Table = TypeVar("Table", LandmarkTrack, SmplSequence, ReferenceMotion)
 
 
+def path_of(given: object, name: str, instead: str = "") -> Path:
+    """Return a path that was given as an argument.
+
+    Args:
+        name: What the argument is.
+        instead: What else it may be, after "a file".
+
+    Raises:
+        TypeError: it is no path.
+    """
+    if isinstance(given, str | PathLike):
+        return Path(given)
+    raise TypeError(f"{name} is {given!r:.100}: expected a file{instead}")
+
+
 def read_if_path(kind: type[Table], given: FilePath | Table) -> Table:
     """Return the value itself, or what its Parquet file holds.
 
     Raises:
         StoreError: no such file.
         BadTable: it holds another table, or a damaged one.
+        TypeError: it is something else.
     """
-    return given if isinstance(given, kind) else kind.load(Path(given))  # type: ignore[arg-type]
+    if isinstance(given, kind):
+        return given
+    return kind.load(path_of(given, "the motion", f" or {kind.__name__}"))
 
 
 def robot_of(reference: ReferenceMotion) -> Robot:

@@ -1,19 +1,15 @@
 """Files of other projects: recognised, read onto our floor, and the formats by name."""
 
-import io
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal, TypeVar
 
-import pyarrow as pa
-import pyarrow.parquet as pq
-
-from robojackson.api.arguments import FilePath
 from robojackson.errors import BadConfiguration, BadTable, UnknownName
 from robojackson.files.file_tree import FileTree
-from robojackson.files.foreign_file import read_file, refuse_video
+from robojackson.files.foreign_file import read_file
+from robojackson.files.table_door import column_names
 from robojackson.formats.foreign_motion import (
     Y_UP_TO_WORLD,
     Z_UP_TO_WORLD,
@@ -29,7 +25,7 @@ from robojackson.mocap.imported_motion import (
 )
 from robojackson.mocap.recover import MocapConfig
 from robojackson.motion.smpl_sequence import SmplSequence
-from robojackson.rl.policy import Policy, load_policy
+from robojackson.rl.policy import load_policy
 
 SLOWEST, FASTEST = 1.0, 1000.0
 """Frames a second."""
@@ -89,13 +85,7 @@ def holds_a_person(source: Path) -> bool:
         StoreError: no such file.
         BadTable: it is no Parquet file.
     """
-    data = read_file(source)
-    refuse_video(data, source)
-    try:
-        return "global_orient" in pq.read_schema(io.BytesIO(data)).names
-    except (pa.ArrowException, OSError) as cause:
-        reason = " ".join(str(cause).split())[:120]
-        raise BadTable(f"not a Parquet file ({reason})", source) from cause
+    return "global_orient" in column_names(read_file(source), source)
 
 
 def format_of(name: str, known: Mapping[str, Exporter], what: str) -> Exporter:
@@ -113,7 +103,7 @@ def format_of(name: str, known: Mapping[str, Exporter], what: str) -> Exporter:
     return known[name]
 
 
-def write_policy(policy: FilePath | Policy, file: Path, to: str) -> Path:
+def write_policy(policy: Path, file: Path, to: str) -> Path:
     """Write a policy in the format of another project, such as `onnx`.
 
     Raises:
@@ -122,10 +112,8 @@ def write_policy(policy: FilePath | Policy, file: Path, to: str) -> Path:
         MissingDependency: the package that writes the format is not installed.
         StoreError: the file cannot be written.
     """
-    held = "this is" if isinstance(policy, Policy) else f"{policy} holds"
-    exporter = format_of(to, policy_exporters(), f"{held} a policy")
-    found = policy if isinstance(policy, Policy) else load_policy(Path(policy))
-    FileTree(file.parent).write(file.name, exporter.write(found))
+    exporter = format_of(to, policy_exporters(), f"{policy} holds a policy")
+    FileTree(file.parent).write(file.name, exporter.write(load_policy(policy)))
     return file
 
 

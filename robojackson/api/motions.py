@@ -9,6 +9,7 @@ from robojackson.api.arguments import (
     Progress,
     RobotLike,
     counter,
+    path_of,
     read_if_path,
     require_robot,
     robot_of,
@@ -86,7 +87,7 @@ def recover_motion(
         ViewsDisagree: the two clips do not show the same dance.
     """
     motion = config or MocapConfig()
-    if isinstance(source, LandmarkTrack) or Path(source).suffix == TABLE:
+    if isinstance(source, LandmarkTrack) or path_of(source, "the video").suffix == TABLE:
         track = read_if_path(LandmarkTrack, source)
     else:
         video = video or source
@@ -180,7 +181,7 @@ def read_motion(
         UnknownName, BadTable: no known format, or a damaged file.
         BadConfiguration: no frame rate, or one that no motion has.
     """
-    path = Path(file)
+    path = path_of(file, "the motion")
     if path.suffix == TABLE:
         return SmplSequence.load(path) if holds_a_person(path) else ReferenceMotion.load(path)
     return read_foreign(path, fps, up, config or MocapConfig()).motion

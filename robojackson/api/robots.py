@@ -1,8 +1,6 @@
 """Robots: a description bound to its MuJoCo model."""
 
-from os import fspath
-
-from robojackson.api.arguments import RobotLike
+from robojackson.api.arguments import RobotLike, path_of
 from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.robot.description import RobotDescription
 from robojackson.robot.model import Robot
@@ -28,4 +26,4 @@ def load_robot(robot: RobotLike = "humanoid") -> Robot:
         return robot
     if isinstance(robot, RobotDescription):
         return bind_robot(robot)
-    return bind_robot(describe_robot(fspath(robot)))
+    return bind_robot(describe_robot(str(path_of(robot, "the robot", ", a name or a robot"))))

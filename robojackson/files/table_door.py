@@ -5,6 +5,9 @@ list of distinct values, since a few bytes can declare the same long text for ev
 """
 
 import io
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -31,8 +34,7 @@ def read_parquet(data: bytes, where: str) -> pa.Table:
     Raises:
         BadTable: not Parquet, damaged, or too large.
     """
-    refuse_video(data, where)
-    try:
+    with _parquet(data, where):
         plain = pq.ParquetFile(io.BytesIO(data))
         text = _text_columns(plain, where)
         # Small files; a thread may outlive this process.
@@ -40,6 +42,24 @@ def read_parquet(data: bytes, where: str) -> pa.Table:
         for name in text:
             _require_little(found.column(name), name, where)
         return found.cast(plain.schema_arrow)
+
+
+def column_names(data: bytes, where: str | Path) -> list[str]:
+    """Return the names of the columns of a Parquet file.
+
+    Raises:
+        BadTable: not Parquet, or damaged.
+    """
+    with _parquet(data, where):
+        return list(pq.read_schema(io.BytesIO(data)).names)
+
+
+@contextmanager
+def _parquet(data: bytes, where: str | Path) -> Iterator[None]:
+    """Raise BadTable where the data are of no Parquet file."""
+    refuse_video(data, where)
+    try:
+        yield
     except (pa.ArrowException, OSError, ValueError) as cause:
         reason = " ".join(str(cause).split())[:120]
         raise BadTable(f"not a Parquet file ({reason})", where) from cause

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -265,3 +266,18 @@ def test_a_repr_is_one_line(name: str, request: pytest.FixtureRequest) -> None:
     assert len(result) < 140
     assert "\n" not in result
     assert "array" not in result
+
+
+@pytest.mark.parametrize(
+    ("function", "what"),
+    [
+        (rj.recover_motion, "the video is None: expected a file"),
+        (rj.read_motion, "the motion is None: expected a file"),
+        (rj.retarget_motion, "the motion is None: expected a file"),
+        (rj.train_policy, "the motion is None: expected a file or ReferenceMotion"),
+        (rj.load_robot, "the robot is None: expected a file, a name or a robot"),
+    ],
+)
+def test_what_is_no_argument_at_all_is_named(function: Callable[[Any], Any], what: str) -> None:
+    with pytest.raises(TypeError, match=what):
+        function(None)
