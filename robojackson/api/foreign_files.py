@@ -25,7 +25,7 @@ from robojackson.mocap.imported_motion import (
 )
 from robojackson.mocap.recover import MocapConfig
 from robojackson.motion.smpl_sequence import SmplSequence
-from robojackson.rl.policy import load_policy
+from robojackson.rl.policy import Policy, load_policy
 
 SLOWEST, FASTEST = 1.0, 1000.0
 """Frames a second."""
@@ -103,8 +103,8 @@ def format_of(name: str, known: Mapping[str, Exporter], what: str) -> Exporter:
     return known[name]
 
 
-def write_policy(policy: Path, file: Path, to: str) -> Path:
-    """Write a policy in the format of another project, such as `onnx`.
+def write_policy(source: Path, file: Path, to: str) -> Policy:
+    """Write a policy in the format of another project, such as `onnx`; return it.
 
     Raises:
         UnknownName: no such format of policies.
@@ -112,9 +112,10 @@ def write_policy(policy: Path, file: Path, to: str) -> Path:
         MissingDependency: the package that writes the format is not installed.
         StoreError: the file cannot be written.
     """
-    exporter = format_of(to, policy_exporters(), f"{policy} holds a policy")
-    FileTree(file.parent).write(file.name, exporter.write(load_policy(policy)))
-    return file
+    exporter = format_of(to, policy_exporters(), f"{source} holds a policy")
+    policy = load_policy(source)
+    FileTree(file.parent).write(file.name, exporter.write(policy))
+    return policy
 
 
 @contextmanager

@@ -67,10 +67,8 @@ def export(
     about: dict[str, Any]
     if source.suffix == POLICY_SUFFIX:
         from robojackson.api.foreign_files import write_policy
-        from robojackson.rl.policy import load_policy
 
-        write_policy(source, out, to)
-        policy = load_policy(source)
+        policy = write_policy(source, out, to)
         about = {"observations": policy.observation_size, "actions": policy.action_size}
         about |= _policy_verdict(out)
     else:

@@ -19,7 +19,7 @@ from tools.dancer.imitation import Lessons
 from tools.dancer.mujoco_robots import MujocoRobots
 from tools.dancer.network import Dancer
 from tools.dancer.ppo import Trainer
-from tools.dancer.repertoire import ACROSS, TURN, Motions
+from tools.dancer.repertoire import Mirror, Motions
 
 STEP = torch.arange(N) * 7 + 5
 FIRST = torch.zeros(N, dtype=torch.long)
@@ -67,22 +67,10 @@ def robots_beside(motion: torch.Tensor) -> MujocoRobots:
     points = Sites(stock(), stock().keypoint_sites).at(qpos)
     state = [torch.tensor(x, dtype=torch.float32) for x in (qpos, qvel, points)]
     if int(motion[0]) % 2:
-        state = mirrored(*state)
+        mirror = Mirror(packed(), "cpu")
+        state = [mirror.qpos(state[0]), mirror.qvel(state[1]), mirror.points(state[2])]
     robots.place(torch.ones(N, dtype=torch.bool), *state)
     return robots
-
-
-def mirrored(qpos: torch.Tensor, qvel: torch.Tensor, points: torch.Tensor) -> list[torch.Tensor]:
-    across, turn = torch.tensor(ACROSS), torch.tensor(TURN)
-    partner, sign, point = (
-        torch.as_tensor(packed()[name]) for name in ("mirror_hinge", "mirror_sign", "mirror_point")
-    )
-    hinges, speeds = (one[:, partner] * sign for one in (qpos[:, 7:], qvel[:, 6:]))
-    return [
-        torch.cat([qpos[:, :3] * across, qpos[:, 3:7] * turn, hinges], 1),
-        torch.cat([qvel[:, :3] * across, -qvel[:, 3:6] * across, speeds], 1),
-        points[:, point] * across,
-    ]
 
 
 def test_experts_advise_what_the_law_of_control_does(folder: Path) -> None:

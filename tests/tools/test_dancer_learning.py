@@ -19,7 +19,6 @@ from robojackson.rl.sim.simulation import Simulation
 from robojackson.robot.fall import Fall
 from tests.fixtures.robots import robot_motion, stock
 from tools.dancer import learn, pack, ppo, ship
-from tools.dancer.imitation import Lessons
 from tools.dancer.mujoco_robots import MujocoRobots
 from tools.dancer.network import Dancer, restore, save
 from tools.dancer.rehearsal import MOST_RATE, Outcome, Rehearsal
@@ -255,8 +254,7 @@ def test_the_tracker_acts_as_the_dancer_that_was_taught(tmp_path: Path) -> None:
     dancer = Dancer(robots.sight.actor_size, robots.seen.shape[1], robots.action.shape[1])
     trainer = ppo.Trainer(dancer, robots, 4, 1e-3)
     average = learn.averaged(dancer)
-    plan = Lessons(trainer, None, None, 0.0, 0.5)
-    count = learn.learn(trainer, average, plan, tmp_path, 0.5, 100)
+    count = learn.learn(trainer, average, None, tmp_path, 0.5, 100)
     again = Dancer(robots.sight.actor_size, robots.seen.shape[1], robots.action.shape[1])
     assert restore(again, tmp_path / "dancer.npz") == count > 100
     policy = ship.policy_of(tmp_path / "dancer.npz", stock(), "preview", 0, 2)

@@ -10,7 +10,7 @@ import numpy as np
 import torch
 
 from tools.dancer.mujoco_robots import Robots
-from tools.dancer.repertoire import ACROSS, TURN, Motions
+from tools.dancer.repertoire import Mirror, Motions
 
 LOW_M = 0.02
 """As in `rl.feedback.standing_feet`."""
@@ -38,24 +38,12 @@ class Experts:
             name: torch.zeros((steps, *shape), device=device) for name, shape in shapes.items()
         }
         self._tables["code"] = torch.zeros((steps, nu, 2 * nv), dtype=torch.int8, device=device)
-        self._feet, self._scale, self._partner, self._sign, self._points, hinge = (
-            torch.as_tensor(pack[name], device=device)
-            for name in (
-                "supports",
-                "scale",
-                "mirror_hinge",
-                "mirror_sign",
-                "mirror_point",
-                "hinge",
-            )
+        self._feet, self._scale = (
+            torch.as_tensor(pack[name], device=device) for name in ("supports", "scale")
         )
-        self._motor, self._motor_sign = (
-            torch.argsort(hinge)[self._partner[hinge]],
-            self._sign[hinge],
-        )
+        self._mirror = Mirror(pack, device)
         self._own_first = torch.as_tensor(np.repeat(self._start, 2), device=device)
         self._knows = torch.zeros(2 * len(self._names), dtype=torch.bool, device=device)
-        self._across, self._turn = (torch.tensor(x, device=device) for x in (ACROSS, TURN))
         self._taken: set[str] = set()
 
     def take(self, folder: Path) -> int:
@@ -79,28 +67,19 @@ class Experts:
         row, shift, _ = self._motions.split(motion, step)
         row = row - self._motions.first[motion] + self._own_first[motion]
         image = (motion % 2 == 1)[:, None]
-        qpos, qvel, feet = self._mirrored(robots, image, shift)
+        mirror, points = self._mirror, robots.points - shift[:, None]
+        qpos = torch.cat([robots.qpos[:, :3] - shift, robots.qpos[:, 3:]], 1)
+        qpos = torch.where(image, mirror.qpos(qpos), qpos)
+        qvel = torch.where(image, mirror.qvel(robots.qvel), robots.qvel)
+        points = torch.where(image[..., None], mirror.points(points), points)
         found = {name: table[row] for name, table in self._tables.items()}
-        apart = self._apart(qpos, qvel, feet, found)
+        apart = self._apart(qpos, qvel, points, found)
         gain = found["code"].float() * found["width"][:, None]
         moved = (gain @ apart[:, :, None])[:, :, 0] + found["offset"]
         action = torch.nan_to_num(-moved / self._scale)
         near = action.square().mean(1) < MOST_ADVICE**2
-        action = torch.where(image, action[:, self._motor] * self._motor_sign, action)
+        action = torch.where(image, mirror.motors(action), action)
         return action.clamp(-1, 1), self._knows[motion] & near
-
-    def _mirrored(
-        self, robots: Robots, image: torch.Tensor, shift: torch.Tensor
-    ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-        """Return the states of robots in the first cycle of the motion itself, and all feet."""
-        qpos, qvel, across = robots.qpos, robots.qvel, self._across
-        place, points = qpos[:, :3] - shift, robots.points - shift[:, None]
-        hinges, speeds = (x[:, self._partner] * self._sign for x in (qpos[:, 7:], qvel[:, 6:]))
-        there = torch.cat([place * across, qpos[:, 3:7] * self._turn, hinges], 1)
-        moving = torch.cat([qvel[:, :3] * across, qvel[:, 3:6] * -across, speeds], 1)
-        spots = torch.where(image[..., None], points[:, self._points] * across, points)
-        own = torch.cat([place, qpos[:, 3:]], 1)
-        return torch.where(image, there, own), torch.where(image, moving, qvel), spots
 
     def _apart(
         self, qpos: torch.Tensor, qvel: torch.Tensor, points: torch.Tensor,

@@ -43,7 +43,7 @@ def _coded(gains: Gains) -> dict[str, np.ndarray]:
     width = np.maximum(np.abs(gains.gain).max(1), 1e-12) / MOST_CODE
     code = np.rint(gains.gain / width[:, None]).astype(np.int8)
     rest = {name: getattr(gains, name) for name in ("offset", "qpos", "qvel", "places")}
-    tables = {"width": width, **rest, "held": gains.held.min()}
+    tables = {"width": width, **rest}
     return {"code": code, **{name: np.asarray(x, np.float32) for name, x in tables.items()}}
 
 

@@ -24,7 +24,6 @@ class Lessons:
 
     Args:
         trainer: Whose settings it changes.
-        experts: None for a training from rewards alone.
         folder: Of the experts' files.
         imitation_s, seconds: Time of the imitation, and of all.
     """
@@ -32,23 +31,20 @@ class Lessons:
     def __init__(
         self,
         trainer: Trainer,
-        experts: Experts | None,
-        folder: Path | None,
+        experts: Experts,
+        folder: Path,
         imitation_s: float,
         seconds: float,
     ) -> None:
         self._trainer, self._experts, self._folder = trainer, experts, folder
         self._imitation_s, self._seconds = imitation_s, seconds
-        self._read_at, self._imitates = 0.0, imitation_s > 0
-        if self._imitates:
-            trainer.learning = False
+        self._read_at, trainer.learning = 0.0, imitation_s <= 0
+        if not trainer.learning:
             trainer.dancer.log_deviation.data.fill_(math.log(DEVIATION))
 
     def plan(self, now_s: float) -> bool:
         """Set what the next round does, some time after the beginning; return whether the imitation
         has just ended."""
-        if self._experts is None or self._folder is None:
-            return False
         if now_s >= self._read_at:
             count = self._experts.take(self._folder)
             print(f"{now_s:.0f} s: {count} motions have an expert", flush=True)
@@ -69,9 +65,9 @@ class Lessons:
     def _learn(self, part: float) -> bool:
         trainer = self._trainer
         trainer.imitation = NEAR * (LAST_NEAR / NEAR) ** part
-        if not self._imitates:
+        if trainer.learning:
             return False
         trainer.set_rate(LEAST_RATE)
         trainer.lead(0.0)
-        self._imitates, trainer.learning = False, True
+        trainer.learning = True
         return True

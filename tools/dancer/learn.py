@@ -88,7 +88,9 @@ def main() -> None:
     rate = LATER_RATE if given.start else FIRST_RATE
     experts = Experts(pack, rehearsal.motions, given.device) if given.experts else None
     trainer = Trainer(dancer.to(given.device), rehearsal, HORIZON, rate, experts)
-    lessons = Lessons(trainer, experts, given.experts, given.imitate, given.seconds)
+    lessons = None
+    if experts is not None:
+        lessons = Lessons(trainer, experts, given.experts, given.imitate, given.seconds)
     average = averaged(dancer)
     steps = learn(trainer, average, lessons, given.out, given.seconds, steps)
     assert isinstance(average.module, Dancer)
@@ -106,7 +108,7 @@ def averaged(dancer: Dancer) -> AveragedModel:
 def learn(
     trainer: Trainer,
     average: AveragedModel,
-    lessons: Lessons,
+    lessons: Lessons | None,
     out: Path,
     seconds: float,
     steps: int,
@@ -122,7 +124,7 @@ def learn(
     with (out / "curve.csv").open("a", newline="") as file:
         table = csv.writer(file)
         while time.monotonic() - began < seconds:
-            if lessons.plan(time.monotonic() - began):
+            if lessons is not None and lessons.plan(time.monotonic() - began):
                 save(average.module, out / "imitated.npz", steps)
             figures = trainer.round()
             average.update_parameters(trainer.dancer)

@@ -164,9 +164,8 @@ class Trainer:
 
     def lead(self, share: float) -> None:
         """Let experts choose the actions of a share of the robots."""
-        self._led[:, 0] = torch.arange(len(self._led), device=self._led.device) < share * len(
-            self._led
-        )
+        self._led.fill_(False)
+        self._led[: round(share * len(self._led))] = True
 
     def set_rate(self, rate: float) -> None:
         """Set the step of Adam."""

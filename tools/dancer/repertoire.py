@@ -140,25 +140,46 @@ def heading(q: torch.Tensor) -> torch.Tensor:
     return torch.atan2(turned[:, 1, 0], turned[:, 0, 0])
 
 
+class Mirror:
+    """States of the robot in a mirror across the world's x-z plane; twice is as it was."""
+
+    def __init__(self, pack: Mapping[str, np.ndarray], device: str) -> None:
+        self._across, self._turn = (torch.tensor(x, device=device) for x in (ACROSS, TURN))
+        self._partner, self._sign, self._point, hinge = (
+            torch.as_tensor(pack[name], device=device)
+            for name in ("mirror_hinge", "mirror_sign", "mirror_point", "hinge")
+        )
+        self._motor = torch.argsort(hinge)[self._partner[hinge]]
+        self._motor_sign = self._sign[hinge]
+
+    def qpos(self, qpos: torch.Tensor) -> torch.Tensor:
+        """Return the mirrored poses, (N, nq)."""
+        hinges = qpos[:, 7:][:, self._partner] * self._sign
+        return torch.cat([qpos[:, :3] * self._across, qpos[:, 3:7] * self._turn, hinges], 1)
+
+    def qvel(self, qvel: torch.Tensor) -> torch.Tensor:
+        """Return the mirrored velocities, (N, nv)."""
+        speeds = qvel[:, 6:][:, self._partner] * self._sign
+        return torch.cat([qvel[:, :3] * self._across, qvel[:, 3:6] * -self._across, speeds], 1)
+
+    def points(self, points: torch.Tensor) -> torch.Tensor:
+        """Return the mirrored keypoints, (N, K, 3)."""
+        return points[:, self._point] * self._across
+
+    def places(self, places: torch.Tensor) -> torch.Tensor:
+        """Return mirrored places, (N, 3)."""
+        return places * self._across
+
+    def motors(self, moved: torch.Tensor) -> torch.Tensor:
+        """Return mirrored offsets of the motors' targets, or actions, (N, nu)."""
+        return moved[:, self._motor] * self._motor_sign
+
+
 def _image(pack: Mapping[str, np.ndarray], own: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
-    """Return the motions in a mirror across the world's x-z plane."""
-    device = own["qpos"].device
-    across = torch.tensor(ACROSS, device=device)
-    partner = torch.as_tensor(pack["mirror_hinge"], device=device)
-    sign = torch.as_tensor(pack["mirror_sign"], device=device)
-    hinge = torch.as_tensor(pack["hinge"], device=device)
-    motor = torch.argsort(hinge)[partner[hinge]]
-    points = torch.as_tensor(pack["mirror_point"], device=device)
-    turn = torch.tensor(TURN, device=device)
-    qpos, qvel = own["qpos"], own["qvel"]
-    angles, speeds = qpos[:, 7:][:, partner] * sign, qvel[:, 6:][:, partner] * sign
-    return {
-        "qpos": torch.cat([qpos[:, :3] * across, qpos[:, 3:7] * turn, angles], 1),
-        "qvel": torch.cat([qvel[:, :3] * across, qvel[:, 3:6] * -across, speeds], 1),
-        "points": own["points"][:, points] * across,
-        "lead": own["lead"][:, motor] * sign[hinge],
-        "offset": own["offset"] * across,
-    }
+    """Return the mirror images of the motions."""
+    mirror = Mirror(pack, str(own["qpos"].device))
+    image = {name: getattr(mirror, name)(own[name]) for name in ("qpos", "qvel", "points")}
+    return image | {"lead": mirror.motors(own["lead"]), "offset": mirror.places(own["offset"])}
 
 
 def _woven(own: torch.Tensor, image: torch.Tensor, ends: np.ndarray) -> torch.Tensor:

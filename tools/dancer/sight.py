@@ -14,7 +14,7 @@ from tools.dancer.repertoire import Steps, matrix
 
 SPEED_SCALE, HINGE_SPEED_SCALE, POINT_SCALE, ROOT_SCALE, CLIP = 0.3, 0.1, 2.0, 3.0, 10.0
 USUAL_HEIGHT_M = 1.2
-REST = 15
+UNMEASURED = 15
 """Numbers that only a simulation knows, beside the keypoints."""
 NOISE = 0.25
 """Of the pack's noise of gyroscope, attitude, hinges and speeds of hinges, uniform between plus and
@@ -39,7 +39,7 @@ class Sight:
         self._random, self._rest = random, torch.as_tensor(pack["rest"], device=random.device)
         self.actor_size = 9 + 4 * len(pack["rest"]) + len(pack["scale"]) + preview
         if everything:
-            self.actor_size += REST + 3 * len(pack["sites"])
+            self.actor_size += UNMEASURED + 3 * len(pack["sites"])
         self._everything = everything
         self._widths = [NOISE * float(width) for width in pack["sensors"]]
         self.noise = torch.ones((), device=random.device)
