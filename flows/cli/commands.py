@@ -133,13 +133,14 @@ def _danced(
         made = replay(source, config, overrides, start, end)
     if made is None:
         from flows.cli.dance_bar import dance_bar, quiet_prefect
+        from flows.runtime.temporary_server import temporary_server
         from storage.store import Store
 
         quiet_prefect()
-        from flows.dance import run
-
         minutes = instant_minutes(settings) if settings.instant else settings.minutes
-        with dance_bar(minutes, Store.from_environment().here):
+        with dance_bar(minutes, Store.from_environment().here), temporary_server():
+            from flows.dance import run
+
             made = run(str(source), config, overrides, start, end)
     return made
 

@@ -30,6 +30,7 @@ def find(
     from configs.find_config import FindConfig
     from flows.cli.verdicts import find_verdict
     from flows.runtime.environment import prepare
+    from flows.runtime.temporary_server import temporary_server
     from flows.search import ranking_table
     from flows.search.requests import find_dance, require_online
     from robojackson.cli.cards import closing
@@ -41,9 +42,10 @@ def find(
     dance = find_dance(query, source, address, top, settings)
     require_online(dance, settings)
     prepare(Store.from_environment())
-    from flows.find import run
+    with temporary_server():
+        from flows.find import run
 
-    found = run(dance, config, overrides)
+        found = run(dance, config, overrides)
     found |= find_verdict(found)
     table = ranking_table.lines(found["candidates"])
     return CommandResult(found, text=[*table, found["summary"], *closing(found)])
@@ -61,6 +63,7 @@ def refresh(
     """Run the nightly search now: for every dance the best new video, up to the robot's motion."""
     from flows.cli.verdicts import refresh_lines, refresh_verdict
     from flows.runtime.environment import prepare
+    from flows.runtime.temporary_server import temporary_server
     from flows.search.requests import check_refresh
     from robojackson.cli.cards import closing
     from storage.store import Store
@@ -68,9 +71,10 @@ def refresh(
     overrides = overrides_from(set_)
     check_refresh(dances or None, config, overrides)
     prepare(Store.from_environment())
-    from flows.refresh import run
+    with temporary_server():
+        from flows.refresh import run
 
-    done = run(dances or None, config, overrides)
+        done = run(dances or None, config, overrides)
     done |= refresh_verdict(done)
     code = 1 if done["failed"] and not done["dances"] else 0
     return CommandResult(done, code, text=[*refresh_lines(done), *closing(done)])

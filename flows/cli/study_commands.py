@@ -29,6 +29,7 @@ def ablation(
     """Train and evaluate moves x setups x seeds, and write a page that compares them."""
     from flows.cli.verdicts import ablation_verdict
     from flows.runtime.environment import prepare
+    from flows.runtime.temporary_server import temporary_server
     from flows.study.study_plan import study_of
     from robojackson.cli.cards import closing
     from storage.store import Store
@@ -37,10 +38,12 @@ def ablation(
     given |= {"steps": steps, "executor": executor, "slots": slots, "robot": yaml_text(robot)}
     requested = study_of(study, overrides_from(set_, given))
     prepare(Store.from_environment())
-    from flows.ablation import run
+    with temporary_server():
+        from flows.ablation import run
+
+        made = run(requested)
     from tasks.write_study_page import LEAST_STEPS
 
-    made = run(requested)
     shortest = min(map(requested.steps_of, requested.moves))
     made |= ablation_verdict(made, shortest, len(requested.seeds), LEAST_STEPS)
     where = [f"page    {made['page']}", f"tables  {made['tables']}"]

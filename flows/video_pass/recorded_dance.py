@@ -1,6 +1,7 @@
 """A dance whose every stage is recorded, answered from the records. No Prefect in memory.
 
-Starting a flow takes ten seconds, nearly all of it Prefect's imports and its temporary server.
+Starting a flow takes seven to ten seconds, nearly all of it Prefect's imports and its temporary
+server.
 """
 
 import asyncio

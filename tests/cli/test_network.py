@@ -12,6 +12,8 @@ from robojackson.mocap.networks.niki import TwistSwing
 from tasks.runtime.stage import identity
 from tests.fixtures.commands import in_process, robojackson
 
+pytestmark = pytest.mark.xdist_group("network")
+
 ROOT = Path(__file__).parents[2]
 
 

@@ -17,6 +17,8 @@ from robojackson.mocap.recover import MocapConfig, recover_motion
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.smpl_sequence import AIR, PLANTED, SmplSequence
 
+pytestmark = pytest.mark.xdist_group("recover")
+
 
 @pytest.fixture(scope="module")
 def motion(hip_shake: LandmarkTrack) -> SmplSequence:

@@ -19,6 +19,8 @@ from robojackson.robot.model import Robot
 from tests.fixtures.commands import robojackson
 from tests.fixtures.hub import serving
 
+pytestmark = pytest.mark.xdist_group("hub")
+
 REPOSITORY = "somebody/Humanoid-v5-TQC-tiny"
 ZIP = f"{REPOSITORY}/resolve/main/humanoid-v5-TQC-tiny.zip"
 BRIEF = {"mode": "paper", "trainer": "sb3", "steps": 16, "tqc.batch": 8}

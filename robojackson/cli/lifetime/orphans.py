@@ -1,6 +1,6 @@
 """Find the processes that a command has started by a mark in their environment, and end them.
 
-Prefect starts its temporary server as a child, which outlives a SIGKILL of its parent. So a small
+A temporary Prefect server is a child, which outlives a SIGKILL of its parent. So a small
 process waits at the other end of a pipe: when the pipe closes without a farewell, it ends every
 process with this flow's mark in its environment. Linux only; elsewhere it does nothing. Imports
 only the standard library.

@@ -10,6 +10,8 @@ import pytest
 from tests.fixtures.commands import robojackson
 from tools.stack.interrupted_command import CLIP, End, Running
 
+pytestmark = pytest.mark.xdist_group("interruption")
+
 ACKNOWLEDGED_S, ENDED_S, SAVED_S = 5.0, 10.0, 40.0
 """Generous multiples of 1 and 3 s, for a busy machine, and what a checkpoint may take."""
 LEARNT = 8
@@ -21,7 +23,7 @@ WAYS = {"group": (signal.SIGINT, False), "process": (signal.SIGINT, True)}
 EITHER_WAY = ("group", pytest.param("process", marks=pytest.mark.heavy))
 MOMENTS = {
     "import": ("", 0.4),
-    "server": ("Starting temporary server", 1.0),
+    "server": ("", 4.0),
     "landmarks": ("Beginning flow run", 1.5),
     "compilation": ("of a perfect dance's reward", 1.0),
 }

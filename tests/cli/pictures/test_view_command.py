@@ -25,6 +25,8 @@ from robojackson.report.video.animation import write_animation
 from robojackson.report.video.encoder import write_video
 from tests.fixtures.commands import in_process
 
+pytestmark = pytest.mark.xdist_group("view_command")
+
 REFERENCE = Path(__file__).parents[3] / "benchmarks/learning/references/hip_shake.parquet"
 FRAMES, FPS, STEPS = 30, 30.0, 60
 

@@ -22,6 +22,8 @@ from tests.fixtures import crossing
 from tests.fixtures.difficult_clips import write
 from tests.fixtures.made_people import SIZE, row_of, seen
 
+pytestmark = pytest.mark.xdist_group("person_windows")
+
 WIDTH, HEIGHT = 1280, 720
 SCALE, CORNER = 0.4, np.array([600, 400])
 FRAMES = 12

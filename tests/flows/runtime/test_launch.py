@@ -16,9 +16,12 @@ from robojackson.errors import DeploymentFailed
 from tests.fixtures.commands import environment
 from tools.stack.interrupted_command import living_with
 
+pytestmark = pytest.mark.xdist_group("launch")
+
 FLOW = """
 import asyncio, sys, typer
 from flows.runtime.environment import prepare
+from flows.runtime.temporary_server import temporary_server
 from robojackson.cli.lifetime.supervisor import guarded
 from storage.store import Store
 from robojackson.cli.console import CommandResult, command
@@ -26,15 +29,16 @@ from robojackson.cli.console import CommandResult, command
 @command
 def start(as_json=False):
     prepare(Store.from_environment())
-    from prefect import flow
-    from flows.runtime.launch import launch
+    with temporary_server():
+        from prefect import flow
+        from flows.runtime.launch import launch
 
-    @flow
-    async def long():
-        print("under way", flush=True)
-        await asyncio.sleep(600)
+        @flow
+        async def long():
+            print("under way", flush=True)
+            await asyncio.sleep(600)
 
-    return CommandResult(launch(long))
+        return CommandResult(launch(long))
 
 app = typer.Typer()
 app.command()(start)
@@ -44,13 +48,19 @@ ENDED_S = 10.0
 """A generous multiple of 3 s, for a busy machine."""
 
 
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a store whose database the first server makes."""
+    return tmp_path_factory.mktemp("launch") / "store"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("send", [os.kill, os.killpg])
 def test_an_interrupted_flow_ends_at_once_and_says_how_to_resume(
-    send: Callable[[int, int], None], how: signal.Signals, tmp_path: Path
+    send: Callable[[int, int], None], how: signal.Signals, store: Path, tmp_path: Path
 ) -> None:
-    script, store = tmp_path / "long.py", tmp_path / "store"
+    script = tmp_path / "long.py"
     script.write_text(FLOW)
     with subprocess.Popen(
         [sys.executable, str(script)],

@@ -12,6 +12,8 @@ from robojackson.report.pages.page_content import TO_COME
 from tests.fixtures.commands import Said, robojackson
 from tests.fixtures.stand_in_tracker import NAME, stand_in, write_yaml
 
+pytestmark = pytest.mark.xdist_group("instant_dance")
+
 SMALL = ("--config", "smoke", "--set", "evaluate.phases=2", "--set", "evaluate.seconds=0.5")
 SMALL += ("--set", "evaluate.resets=2")
 TRAINED = (*SMALL, "--set", "train.steps=300", "--set", "train.trainer=sb3")

@@ -8,6 +8,8 @@ import pytest
 
 from tests.fixtures.commands import Said, robojackson
 
+pytestmark = pytest.mark.xdist_group("recorded_dance")
+
 SHORT = ("--config", "smoke", "--set", "train.steps=300", "--set", "train.trainer=sb3")
 
 

@@ -15,6 +15,8 @@ from robojackson.mocap.views.timing import FPS, find_offsets, rates, sound_offse
 from robojackson.mocap.views.two_cameras import recover_together
 from robojackson.motion.landmark_track import LandmarkTrack
 
+pytestmark = pytest.mark.xdist_group("two_cameras")
+
 TURN = Rotation.from_euler("y", 70.0, degrees=True).as_matrix()
 FLAT = 0.4
 """What both made cameras leave of depth."""

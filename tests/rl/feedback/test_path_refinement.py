@@ -16,7 +16,7 @@ from robojackson.rl.sim.simulation import Simulation
 from robojackson.rl.sim.tangent import state_difference
 from robojackson.robot.model import Robot
 
-pytestmark = pytest.mark.medium
+pytestmark = [pytest.mark.medium, pytest.mark.xdist_group("path_refinement")]
 LED = ControlConfig(feedforward=1.0, feedback=0.0)
 STEPS = 20
 

@@ -20,7 +20,7 @@ from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.robot.model import Robot
 
-pytestmark = pytest.mark.medium
+pytestmark = [pytest.mark.medium, pytest.mark.xdist_group("path_search")]
 LED = ControlConfig(feedforward=1.0, feedback=0.0)
 STEPS = 40
 

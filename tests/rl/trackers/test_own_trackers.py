@@ -23,6 +23,8 @@ from tests.fixtures.deploy_policies import random_policy
 from tests.fixtures.robots import robot_motion, stock
 from tests.fixtures.stand_in_tracker import stand_in
 
+pytestmark = pytest.mark.xdist_group("own_trackers")
+
 SHORT = EvaluateConfig(phases=3, resets=1, seconds=1.5)
 REGULATOR = TrackerDescription(
     name="regulator", robot="humanoid", network="regulator", licence="ours", trained_on="nothing",
