@@ -19,6 +19,7 @@ from robojackson.report.pages.evaluation_text import beat_rows
 from robojackson.report.pages.live_page import live_page
 from robojackson.report.pages.run_page import PageCandidate
 from robojackson.report.video.film import VideoConfig
+from robojackson.report.web.live_data import runs_in_a_browser
 from robojackson.report.web.shown_run import RecordedRun, ShownRun, shown_run, thumbnail
 from robojackson.rl.evaluation.controllers import Evaluated
 from robojackson.rl.policy import load_policy
@@ -180,7 +181,8 @@ def _dancer(store: Store, made: Mapping[str, Artifact]) -> Evaluated | None:
     description = None if name is None else describe_tracker(name)
     if description is None or description.network not in IN_BROWSERS:
         return None
-    return open_tracker(description)
+    tracker = open_tracker(description)
+    return tracker if runs_in_a_browser(tracker) else None
 
 
 def _results(

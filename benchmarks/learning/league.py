@@ -21,6 +21,7 @@ from benchmarks.learning.league_rows import (
     COLUMNS,
     FIGURES,
     INSTANT,
+    INSTANT_ONBOARD,
     OF_MOTION,
     OF_OTHERS,
     ONBOARD,
@@ -49,7 +50,7 @@ MODELS = "holosoma_inference/models/wbt"
 EVALUATION = EvaluateConfig(resets=1)
 NOT_OURS = "we trained nothing on holosoma's motion, which comes with its wheel alone"
 MISSING = {
-    INSTANT: "gains not computed for this motion",
+    **dict.fromkeys((INSTANT, INSTANT_ONBOARD), "gains not computed for this motion"),
     TRAINED: NOT_OURS,
     SCRATCH: NOT_OURS,
     ONBOARD: NOT_OURS,
@@ -71,8 +72,8 @@ reference; figures are means over all starts, those of trainings over all seeds,
   place and velocity that no real robot measures. So its motion is `seen`.
 - **reference replayed**: its angles as targets, led by its torques, with the robot's own gains and
   without feedback (on holosoma's motion: with the gains of its PPO policy).
-- Trained rows of the authors' walk and of CMU 05_18 are on references of 25 November, before they
-  swayed; that of 05_18 is at .93 of its tempo. All other rows of these motions are on today's.
+- **`regulator_onboard`** is the same feedback, whose place and velocity of the root are estimated
+  from joints, attitude, gyroscope and accelerometer.
 """
 
 

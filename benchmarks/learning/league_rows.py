@@ -25,6 +25,7 @@ FIGURES = ("success", "strict_success", "skill", "mpjpe_l_m", "mpjpe_g_alive_m",
 COLUMNS = (*FIGURES, "feet_excess_m_s", "starts", "seeds", "cpu_s", "data", "in_training", "note",
            "why")  # fmt: skip
 INSTANT, REPLAY, TWIST2 = "ours, instant (regulator)", "reference replayed", "twist2"
+INSTANT_ONBOARD = "ours, instant (regulator_onboard)"
 TRAINED, ORDINARY = "ours, regulator polished by training", "ours, ordinary training on regulator"
 SCRATCH, ONBOARD = "ours, from scratch", "ours, from scratch (onboard)"
 POLISHED = "ours, twist2 polished"
@@ -35,6 +36,7 @@ NOTES = {
     "g1_dance_b": "the feedback alone with each seed, which was kept at the training's end",
     "g1_walk": "seed 100 on the feedback along the reference, the others on a sampled path",
     "g1_authors_walk": "the feedback alone, which was kept at the training's end",
+    "g1_cmu_05_09": "the feedback alone, which was kept at the training's end",
     "g1_cmu_05_18": "the feedback alone, which was kept at the training's end",
 }
 """What differs in trained rows from other rows, or among their seeds."""
@@ -103,6 +105,7 @@ def of_trackers(folders: Folders, move: str) -> Iterator[Row]:
     others = OF_OTHERS | ({"in_training": "likely"} if POLICIES[move].cmu else {})
     for who, name, known in (
         (INSTANT, "regulator", OF_MOTION),
+        (INSTANT_ONBOARD, "regulator_onboard", OF_MOTION),
         (TWIST2, "twist2", others),
         (REPLAY, tracker_rows.REPLAY, OF_MOTION),
     ):

@@ -149,12 +149,18 @@ BESIDE = ("qvel", "body_pos_w", "keypoints_w", "contact", "torque_ratio", "sourc
 
 
 def _tracker(given: str | Tracker | None, robot: Robot) -> Tracker:
-    if given is not None and not isinstance(given, str):
-        return given
-    found = require_tracker(robot.description.name, given)
-    if found is None:
-        raise BadPolicy("a performance needs a tracker; `none` is for trainings")
-    return load_tracker(found.name)
+    who = given
+    if who is None or isinstance(who, str):
+        found = require_tracker(robot.description.name, who)
+        if found is None:
+            raise BadPolicy("a performance needs a tracker; `none` is for trainings")
+        who = load_tracker(found.name)
+    if who.description.root_state == "estimated":
+        raise BadPolicy(
+            f"tracker {who.description.name!r} estimates its place along one motion alone; "
+            "a performance needs another, such as regulator"
+        )
+    return who
 
 
 def _motion(

@@ -33,7 +33,7 @@ def lines_before(
     monkeypatch.setattr(performances.performance, "perform", begin)
     with caplog.at_level(logging.WARNING), pytest.raises(Begun):
         performances.perform([motion], "humanoid", tracker=tracker)
-    return caplog.messages
+    return [record.getMessage() for record in caplog.records if record.levelno >= logging.WARNING]
 
 
 def test_the_regulator_s_search_is_announced_in_one_line(

@@ -96,10 +96,13 @@ def live_data(
 
 
 def runs_in_a_browser(policy: Evaluated) -> bool:
-    """Return whether a policy's network is one of ours without extras, or it has none."""
+    """Return whether a policy's network is one of ours without extras, or it has none; a page knows
+    the root's place and velocity, and estimates none."""
     if isinstance(policy, Policy):
         return mode_of(policy) == "track"
-    return isinstance(policy, PolicyTracker | RegulatorTracker)
+    if isinstance(policy, RegulatorTracker):
+        return policy.description.root_state == "exact"
+    return isinstance(policy, PolicyTracker)
 
 
 def _network(policy: Evaluated) -> Policy | None:

@@ -13,6 +13,7 @@ from jaxtyping import Float
 from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.sim.motors import Motors
 from robojackson.rl.trackers.equipment import require_robot
+from robojackson.rl.trackers.leg_odometry import LegOdometry
 from robojackson.rl.trackers.tracker import Follower, TrackerInput
 from robojackson.rl.trackers.tracker_description import TrackerDescription
 from robojackson.robot.model import Robot
@@ -35,19 +36,24 @@ class RegulatorTracker:
     def follow(self, robot: Robot, n: int) -> Follower:
         """Return a follower of n robots."""
         require_robot(robot, self.description)
-        return _RegulatorFollower(robot)
+        estimated = self.description.root_state == "estimated"
+        odometry = LegOdometry(robot, self.description.control_dt) if estimated else None
+        return _RegulatorFollower(robot, odometry)
 
 
 class _RegulatorFollower:
-    """N robots; the feedback has no memory."""
+    """N robots; the feedback has no memory, the odometry has."""
 
-    def __init__(self, robot: Robot) -> None:
-        self._hinge = Motors.of(robot.model).hinge
+    def __init__(self, robot: Robot, odometry: LegOdometry | None) -> None:
+        self._hinge, self._odometry = Motors.of(robot.model).hinge, odometry
 
     def targets(self, seen: TrackerInput) -> Float[np.ndarray, "N nu"]:
         """Return target hinge angles of the PD law, rad, in actuator order."""
         (step,) = seen.window
         targets = step.angles(self._hinge)
         if step.feedback is not None:
-            targets = targets + step.feedback(seen.qpos, seen.qvel)
+            state = (seen.qpos, seen.qvel)
+            if self._odometry is not None:
+                state = self._odometry.estimate(seen)
+            targets = targets + step.feedback(*state)
         return targets

@@ -24,12 +24,15 @@ class TrackerInput:
         qpos, qvel: State, as the sensors measure it.
         points: Keypoint sites, world, m.
         window: The reference at the steps ahead that the tracker requests (`Tracker.window`).
+        force: Specific force that the accelerometer at the root shows, mean over the last control
+            step, frame of the root, m/s^2; None in a performance.
     """
 
     qpos: Float[np.ndarray, "N nq"]
     qvel: Float[np.ndarray, "N nv"]
     points: Float[np.ndarray, "N K 3"]
     window: tuple[ClipStep, ...]
+    force: Float[np.ndarray, "N 3"] | None = None
 
 
 class Follower(Protocol):

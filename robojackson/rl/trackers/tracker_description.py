@@ -41,6 +41,9 @@ class TrackerDescription:
             `regulator`, linear-quadratic feedback without a network. The last two take gains and
             scales from their file or robot: nothing is given from `action_scale` on.
         file: Source of the network; null for `regulator`, which has none.
+        root_state: Place and velocity of the root in the input of `regulator`: `exact`, as a
+            simulation knows them, or `estimated` from the robot's own measurements
+            (`rl.trackers.leg_odometry`).
         fallback: Whether to select it by default only if no other tracker of its robot is
             installed.
         homepage: Address of its authors' description.
@@ -67,6 +70,7 @@ class TrackerDescription:
     homepage: str
     control_dt: Positive
     file: TrackerFile | None = None
+    root_state: Literal["exact", "estimated"] = "exact"
     fallback: bool = False
     action_scale: Positive = 1.0
     action_limit: Positive = 1.0
@@ -81,6 +85,12 @@ class TrackerDescription:
     def _complete(self) -> "TrackerDescription":
         if self.file is None and self.network != "regulator":
             raise ConflictingValues(f"network {self.network!r} needs a file", "network", "file")
+        if self.network != "regulator" and self.root_state != "exact":
+            raise ConflictingValues(
+                f"network {self.network!r} does not see place and velocity of the root",
+                "network",
+                "root_state",
+            )
         if self.network == "twist2" and not self.joints:
             raise ConflictingValues("network 'twist2' needs the joints", "network", "joints")
         return self

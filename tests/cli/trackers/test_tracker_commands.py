@@ -13,6 +13,9 @@ from tests.fixtures.commands import Said, in_process
 from tests.fixtures.stand_in_tracker import NAME, stand_in, write_network, write_yaml
 from tests.fixtures.web_server import Web, serving
 
+FEEDBACK = {"regulator": True, "regulator_onboard": True}
+"""Trackers without a file, which are always here."""
+
 
 @pytest.fixture
 def network(tmp_path: Path) -> Path:
@@ -154,17 +157,19 @@ def test_without_the_file_the_error_is_the_command_that_brings_it(pin, tmp_path:
 
 def test_an_unknown_tracker_lists_those_that_are(pin) -> None:
     pin()
-    with pytest.raises(UnknownName, match=r"unknown tracker 'twist3'.*regulator, standin, twist2"):
+    with pytest.raises(
+        UnknownName, match=r"unknown tracker 'twist3'.*regulator_onboard, standin, twist2"
+    ):
         add_tracker("twist3")
 
 
 def test_the_list_says_robot_licence_training_and_whether_it_is_here(pin, network: Path) -> None:
     pin()
     before, found = listed(), in_process("trackers").out
-    assert before == {"regulator": True, "standin": False, "twist2": False}
+    assert before == {**FEEDBACK, "standin": False, "twist2": False}
     assert all(word in found for word in ("g1", "MIT", "AMASS", "robojackson trackers add twist2"))
     assert in_process("trackers", "add", NAME, "--file", network).code == 0
-    assert listed() == {"regulator": True, "standin": True, "twist2": False}
+    assert listed() == {**FEEDBACK, "standin": True, "twist2": False}
 
 
 def test_a_tracker_without_a_file_has_nothing_to_add() -> None:

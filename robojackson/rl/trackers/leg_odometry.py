@@ -1,0 +1,125 @@
+"""Place and velocity of a robot's root from what it measures: joints, attitude, gyroscope and
+accelerometer.
+
+The soles that carry a robot are taken to move as the reference's: to rest, or to slide as it
+slides. Their speed beside the root is that of the root. The accelerometer bridges what the soles
+do not tell, such as a slip or a step: a speed that is far from the predicted one is heeded less.
+A complementary filter of fixed gains; the measurements are those of M. Bloesch et al., State
+Estimation for Legged Robots (RSS 2012), whose filter weights them by covariances.
+
+World frame, metres, radians, seconds. The floor is at z = 0.
+"""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+from robojackson.geometry.rotations import quat_to_matrix
+from robojackson.rl.trackers.tracker import TrackerInput
+from robojackson.robot.model import Robot
+
+LOW_M = 0.004
+"""Height above the lowest sole point that reduces a point's weight by a factor of e, metres."""
+NEAR_M = 0.03
+"""Height of the reference's sole points above which their speed is that of a swing, metres."""
+SHARE = 0.3
+"""Of the difference from a measured speed or height that is corrected in a control step."""
+DOUBT_M_S, DOUBT_M = 0.05, 0.02
+"""Differences at which only half of that is corrected."""
+
+
+@dataclass(frozen=True)
+class RootState:
+    """Estimates of N roots."""
+
+    place: Float[np.ndarray, "N 3"]
+    velocity: Float[np.ndarray, "N 3"]
+
+
+class LegOdometry:
+    """Estimates of N robots, which begin at the place of their reference.
+
+    The memory is replaced every step, never changed in place: a copy continues by itself.
+    """
+
+    def __init__(self, robot: Robot, dt: float) -> None:
+        self._soles, self._dt = _Soles(robot), dt
+        self._gravity = np.array(robot.model.opt.gravity)
+        self._now: RootState | None = None
+
+    def estimate(
+        self, seen: TrackerInput
+    ) -> tuple[Float[np.ndarray, "N nq"], Float[np.ndarray, "N nv"]]:
+        """Return the measured states with the estimates as place and velocity of the root.
+
+        Args:
+            seen: Input of a tracker whose window begins with the next step; place and velocity of
+                its root are not read.
+        """
+        step = seen.window[0]
+        qpos, qvel = seen.qpos.copy(), seen.qvel.copy()
+        qpos[:, :3] = qvel[:, :3] = 0.0
+        points, speeds = self._soles.at(qpos, qvel)
+        there, sliding = self._soles.at(step.qpos, step.qvel)
+        sliding = np.where(there[:, :, 2:] < NEAR_M, sliding, 0.0) * (1.0, 1.0, 0.0)
+        lowest = points[:, :, 2].min(1)
+        carried = np.exp(-(points[:, :, 2] - lowest[:, None]) / LOW_M)
+        carried /= carried.sum(1, keepdims=True)
+        measured = np.einsum("nc,nci->ni", carried, sliding - speeds)
+        if self._now is None:
+            place = step.qpos[:, :3] - self._dt * step.qvel[:, :3]
+            velocity = _corrected(step.qvel[:, :3], measured, 1.0, DOUBT_M_S)
+        else:
+            if seen.force is None:
+                raise ValueError("leg odometry needs the accelerometer")
+            turned = np.einsum("nij,nj->ni", quat_to_matrix(qpos[:, 3:7]), seen.force)
+            predicted = self._now.velocity + self._dt * (turned + self._gravity)
+            velocity = _corrected(predicted, measured, SHARE, DOUBT_M_S)
+            place = self._now.place + self._dt * velocity
+        place[:, 2:] = _corrected(place[:, 2:], -lowest[:, None], SHARE, DOUBT_M)
+        self._now = RootState(place, velocity)
+        qpos[:, :3], qvel[:, :3] = place, velocity
+        return qpos, qvel
+
+
+def _corrected(
+    value: Float[np.ndarray, "N D"], measured: Float[np.ndarray, "N D"], share: float, doubt: float
+) -> Float[np.ndarray, "N D"]:
+    """Return values moved towards measured ones, by half of the share where these are `doubt`
+    away."""
+    apart = measured - value
+    away = np.linalg.norm(apart, axis=1, keepdims=True)
+    result: np.ndarray = value + share / (1 + (away / doubt) ** 2) * apart
+    return result
+
+
+class _Soles:
+    """The lowest points of a robot's contact balls on a level floor."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot, self._data = robot, mujoco.MjData(robot.model)
+        self._sites = robot.keypoint_sites[robot.contact_keypoints]
+
+    def at(
+        self, qpos: Float[np.ndarray, "N nq"], qvel: Float[np.ndarray, "N nv"]
+    ) -> tuple[Float[np.ndarray, "N C 3"], Float[np.ndarray, "N C 3"]]:
+        """Return their positions, and the velocities of the balls."""
+        robot, model, data = self._robot, self._robot.model, self._data
+        bodies = robot.contact_bodies
+        points = np.empty((len(qpos), len(bodies), 3))
+        speeds = np.empty_like(points)
+        for row in range(len(qpos)):
+            data.qpos[:], data.qvel[:] = qpos[row], qvel[row]
+            mujoco.mj_kinematics(model, data)
+            mujoco.mj_comPos(model, data)
+            mujoco.mj_comVel(model, data)
+            turned = data.xmat[bodies].reshape(-1, 3, 3)
+            centres = np.einsum("cij,cj->ci", turned, robot.contact_offsets)
+            points[row] = data.site_xpos[self._sites] + centres
+            arms = points[row] - data.subtree_com[model.body_rootid[bodies]]
+            spins, moves = data.cvel[bodies, :3], data.cvel[bodies, 3:]
+            speeds[row] = moves + np.cross(spins, arms)
+        points[:, :, 2] -= robot.contact_radii
+        return points, speeds

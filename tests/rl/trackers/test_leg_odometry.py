@@ -1,0 +1,117 @@
+"""Place and velocity of the root from a robot's own measurements."""
+
+import copy
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from robojackson.errors import BadPolicy
+from robojackson.geometry.rotations import quat_to_matrix
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.rl.config.train_config import ControlConfig, EvaluateConfig
+from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
+from robojackson.rl.sim.accelerometer import NOISE_M_S2, Accelerometer
+from robojackson.rl.sim.reference_clip import Clip, ClipStep
+from robojackson.rl.sim.simulation import Simulation
+from robojackson.rl.trackers.leg_odometry import LegOdometry
+from robojackson.rl.trackers.regulator_tracker import RegulatorTracker
+from robojackson.rl.trackers.tracker import TrackerInput
+from robojackson.rl.trackers.tracker_description import TrackerDescription, TrackerFile
+from robojackson.robot.model import Robot
+from tests.fixtures.robots import robot_motion
+
+G = np.array([0.0, 0.0, -9.81])
+EXACT = TrackerDescription(
+    name="exact", robot="humanoid", network="regulator", licence="ours", trained_on="nothing",
+    homepage="here", control_dt=0.015,
+)  # fmt: skip
+
+
+def measured(motion: ReferenceMotion, i: int, clip: Clip) -> TrackerInput:
+    """Return what a robot measures that follows a motion exactly; not a number where it cannot."""
+    qpos, qvel = motion.qpos[i : i + 1].copy(), motion.qvel[i : i + 1].copy()
+    change = (motion.qvel[i, :3] - motion.qvel[max(i - 1, 0), :3]) / motion.dt - G
+    force = change[None] @ quat_to_matrix(qpos[:, 3:7])[0]
+    qpos[:, :3] = qvel[:, :3] = np.nan
+    step: ClipStep = clip.at(np.array([i]))
+    return TrackerInput(qpos, qvel, np.full((1, 14, 3), np.nan), (step,), force)
+
+
+def test_a_motion_with_steps_is_followed_to_centimetres_without_its_root(robot: Robot) -> None:
+    motion = robot_motion("dance_b")
+    clip, odometry, off, place = Clip(motion), LegOdometry(robot, motion.dt), [], np.zeros(3)
+    for i in range(len(motion)):
+        qpos, qvel = odometry.estimate(measured(motion, i, clip))
+        place = qpos[0, :3] - motion.qpos[i, :3]
+        off.append(np.linalg.norm(qvel[0, :3] - motion.qvel[i, :3]))
+    assert np.median(off) < 0.05
+    assert np.abs(place).max() < 0.1
+
+
+def test_a_push_is_noticed_though_the_soles_rest(robot: Robot, sway: ReferenceMotion) -> None:
+    clip, odometry = Clip(sway), LegOdometry(robot, sway.dt)
+    quiet = [measured(sway, 0, clip)] * 3
+    for seen in quiet:
+        _, qvel = odometry.estimate(seen)
+    before = qvel[0, :3]
+    assert quiet[0].force is not None
+    pushed = replace(quiet[0], force=quiet[0].force + [1.0 / sway.dt, 0.0, 0.0])
+    _, qvel = odometry.estimate(pushed)
+    assert 0.9 < np.linalg.norm(qvel[0, :3] - before) < 1.1
+
+
+def test_a_copy_continues_by_itself(robot: Robot, sway: ReferenceMotion) -> None:
+    clip, first = Clip(sway), LegOdometry(robot, sway.dt)
+    first.estimate(measured(sway, 0, clip))
+    second = copy.copy(first)
+    for i in range(1, 5):
+        first.estimate(measured(sway, i, clip))
+    again, _ = second.estimate(measured(sway, 1, clip))
+    fresh = LegOdometry(robot, sway.dt)
+    fresh.estimate(measured(sway, 0, clip))
+    np.testing.assert_array_equal(again, fresh.estimate(measured(sway, 1, clip))[0])
+
+
+def test_the_accelerometer_shows_the_opposite_of_gravity_at_rest_and_nothing_in_a_fall(
+    robot: Robot,
+) -> None:
+    sim = Simulation(robot, ControlConfig(law="torque"), 1)
+    tilted = robot.standing[None].copy()
+    tilted[0, 2], tilted[0, 3:7] = 5.0, [np.cos(0.3), np.sin(0.3), 0.0, 0.0]
+    sim.place(np.array([0]), tilted, np.zeros((1, robot.model.nv)))
+    accelerometer = Accelerometer(sim)
+    at_rest = accelerometer.read()[0]
+    expected = -G @ quat_to_matrix(tilted[:, 3:7])[0]
+    np.testing.assert_allclose(at_rest, expected, atol=5 * NOISE_M_S2)
+    sim.step(np.zeros((1, robot.model.nu)))
+    falling = accelerometer.read()[0]  # springs of the hinges move the root a little
+    assert np.linalg.norm(falling) < 0.3 * np.linalg.norm(G)
+
+
+@pytest.mark.slow
+def test_the_feedback_holds_on_with_estimates(robot: Robot, sway: ReferenceMotion) -> None:
+    found = {}
+    for state in ("exact", "estimated"):
+        tracker = RegulatorTracker(replace(EXACT, root_state=state))
+        tracker.control = replace(tracker.control, feedback_path="reference")
+        config = EvaluateConfig(phases=3, resets=1, seconds=3.0)
+        found[state] = float(
+            str(evaluate_policy(tracker, sway, robot, config).summary["survived_s"])
+        )
+    assert found["estimated"] > 0.8 * found["exact"]
+
+
+def test_only_the_feedback_has_a_root_to_estimate() -> None:
+    file = TrackerFile(name="net.safetensors", size=1, sha256="0" * 64)
+    with pytest.raises(ValidationError, match="does not see place and velocity of the root"):
+        replace(EXACT, network="policy", file=file, root_state="estimated")
+
+
+def test_a_performance_has_no_accelerometer(robot: Robot, sway: ReferenceMotion) -> None:
+    from robojackson.api.performances import perform
+
+    tracker = RegulatorTracker(replace(EXACT, root_state="estimated"))
+    with pytest.raises(BadPolicy, match=r"'exact' .*one motion.*regulator"):
+        perform([sway], robot, tracker=tracker)
