@@ -33,9 +33,11 @@ def temporary_server() -> Iterator[None]:
         DeploymentFailed: the server does not start, or what the flow raises.
     """
     from prefect.settings import (
+        PREFECT_API_REQUEST_TIMEOUT,
         PREFECT_API_URL,
         PREFECT_HOME,
         PREFECT_SERVER_EPHEMERAL_ENABLED,
+        PREFECT_SERVER_EPHEMERAL_STARTUP_TIMEOUT_SECONDS,
         PREFECT_UI_URL,
         temporary_settings,
     )
@@ -44,8 +46,15 @@ def temporary_server() -> Iterator[None]:
         yield
         return
     server = _Server()
-    # Without an address of its pages, which it does not have, no line points to them.
-    with temporary_settings({PREFECT_API_URL: f"{server.address}/api", PREFECT_UI_URL: ""}):
+    settings = {
+        PREFECT_API_URL: f"{server.address}/api",
+        PREFECT_UI_URL: "",  # it has no pages, to which lines would point
+        PREFECT_API_REQUEST_TIMEOUT: max(  # the first request waits for its start
+            float(PREFECT_API_REQUEST_TIMEOUT.value()),
+            float(PREFECT_SERVER_EPHEMERAL_STARTUP_TIMEOUT_SECONDS.value()),
+        ),
+    }
+    with temporary_settings(settings):
         try:
             yield
         except DeploymentFailed as cause:

@@ -1,5 +1,7 @@
 """Geometry of the panels: what stands where in the picture."""
 
+import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -18,6 +20,7 @@ from robojackson.report.video.panel_camera import (
 )
 from robojackson.report.video.robot_panel import RobotView
 from robojackson.report.video.skeleton_panel import skeleton_panel
+from tests.fixtures.commands import ROOT, environment
 
 TINT = (1.0, 0.0, 0.0)
 FRONT = view_of(np.zeros(2), 0.0, 320, 480)
@@ -114,13 +117,48 @@ def test_drawing_leaves_the_model_as_it_was(model: mujoco.MjModel) -> None:
     assert before[2] == model.vis.global_.fovy
 
 
-def test_triton_is_loaded_before_graphics(
-    model: mujoco.MjModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+DRAWN = """
+import sys
+from pathlib import Path
+import numpy as np
+from robojackson.api.robots import load_robot
+from robojackson.report.video.robot_panel import RobotView
+
+def draw():
+    with RobotView(load_robot("humanoid").model, 32, 32, (1.0, 0.0, 0.0)):
+        return "/libLLVM" in Path("/proc/self/maps").read_text()
+"""
+TRITON_FIRST = "draw(); print(sys.modules['triton'].__file__)"
+MESA_FIRST = """
+sys.modules["triton"] = None
+loaded = draw()
+del sys.modules["triton"]
+draw()
+print(loaded == (sys.modules["triton"] is None))
+"""
+
+
+def drawn(code: str, modules: Path) -> str:
+    """Return what a program prints that draws in a process of its own.
+
+    Args:
+        modules: Folder with modules that are found before others.
+    """
+    outer = environment(PYTHONPATH=f"{modules}{os.pathsep}{ROOT}")
+    done = subprocess.run(
+        [sys.executable, "-c", DRAWN + code], capture_output=True, text=True, env=outer, check=True
+    )
+    return done.stdout.strip()
+
+
+@pytest.mark.medium
+def test_triton_is_loaded_before_graphics(tmp_path: Path) -> None:
     """PyTorch's CUDA build brings it; loaded after Mesa's renderer it ends the process."""
     (tmp_path / "triton.py").write_text("")
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.delitem(sys.modules, "triton", raising=False)
-    with RobotView(model, 32, 32, TINT):
-        stand_in = sys.modules.pop("triton")
-    assert stand_in.__file__ == str(tmp_path / "triton.py")
+    assert drawn(TRITON_FIRST, tmp_path) == str(tmp_path / "triton.py")
+
+
+@pytest.mark.medium
+def test_triton_is_never_loaded_after_mesas_renderer(tmp_path: Path) -> None:
+    (tmp_path / "triton.py").write_text("")
+    assert drawn(MESA_FIRST, tmp_path) == "True"

@@ -8,6 +8,7 @@ import contextlib
 import importlib
 import os
 import sys
+from pathlib import Path
 from types import TracebackType
 from typing import Any
 
@@ -120,15 +121,33 @@ def _renderer(model: mujoco.MjModel) -> mujoco.MjrContext:
         raise MissingDependency(message) from cause
 
 
-def _gl_context(width: int, height: int) -> Any:
-    """Return a context of the first backend that works.
+def _load_triton_first() -> None:
+    """Import triton before graphics, or never in this process.
 
     PyTorch's CUDA build imports triton, whose LLVM ends the process with a segmentation fault if
-    Mesa's software renderer has loaded its own LLVM before; the other order works. So triton is
-    imported here, before the optimizer of a later training.
+    Mesa's software renderer has loaded its own LLVM before; the other order works. Where Mesa came
+    first, with MediaPipe for example, PyTorch is told that there is no triton, and does without.
     """
+    if "triton" in sys.modules:
+        return
+    if _has_llvm():
+        sys.modules["triton"] = None  # type: ignore[assignment]
+        return
     with contextlib.suppress(ImportError):
         importlib.import_module("triton")
+
+
+def _has_llvm() -> bool:
+    """Return whether this process has loaded a shared library of LLVM."""
+    try:
+        return "/libLLVM" in Path("/proc/self/maps").read_text()
+    except OSError:
+        return False
+
+
+def _gl_context(width: int, height: int) -> Any:
+    """Return a context of the first backend that works."""
+    _load_triton_first()
     chosen = chosen_backend()
     if sys.platform != "linux" or chosen == "glfw":
         return mujoco.GLContext(width, height)
