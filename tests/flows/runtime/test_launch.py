@@ -13,7 +13,7 @@ import pytest
 
 from flows.runtime import launch
 from robojackson.errors import DeploymentFailed
-from tests.fixtures.commands import environment
+from tests.fixtures.commands import without_server
 from tools.stack.interrupted_command import living_with
 
 pytestmark = pytest.mark.xdist_group("launch")
@@ -66,7 +66,7 @@ def test_an_interrupted_flow_ends_at_once_and_says_how_to_resume(
         [sys.executable, str(script)],
         stderr=subprocess.PIPE,
         text=True,
-        env=environment(ROBOJACKSON_STORE=str(store)),
+        env=without_server(ROBOJACKSON_STORE=str(store)),
         start_new_session=True,
     ) as process:
         assert process.stderr is not None

@@ -14,7 +14,7 @@ from prefect.settings import (
 
 from flows.runtime.server_process import reason
 from flows.runtime.temporary_server import temporary_server
-from tests.fixtures.commands import environment
+from tests.fixtures.commands import without_server
 
 COMMAND = """
 import sys
@@ -37,7 +37,7 @@ with temporary_server():
 
 
 def run(store: Path) -> "subprocess.CompletedProcess[str]":
-    outer = environment(ROBOJACKSON_STORE=str(store), PREFECT_LOGGING_LEVEL="INFO")
+    outer = without_server(ROBOJACKSON_STORE=str(store))
     return subprocess.run(
         [sys.executable, "-c", COMMAND], capture_output=True, text=True, env=outer, check=False
     )
