@@ -126,7 +126,7 @@ def _load_triton_first() -> None:
 
     PyTorch's CUDA build imports triton, whose LLVM ends the process with a segmentation fault if
     Mesa's software renderer has loaded its own LLVM before; the other order works. Where Mesa came
-    first, with MediaPipe for example, PyTorch is told that there is no triton, and does without.
+    first, with MediaPipe for example, triton cannot be imported any more, and PyTorch does without.
     """
     if "triton" in sys.modules:
         return
