@@ -52,10 +52,11 @@ def perform(
 
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     log_to_stderr()
+    overrides = overrides_from(set_, {})
     answer = performance_files.perform(
-        dances, out, robot or usual_robot(), tracker,
+        dances, out, robot or str(overrides.get("robot") or usual_robot()), tracker,
         PerformanceConfig(runs=runs, seed=seed, pushes=pushes), ProgrammeConfig(dance_s=seconds),
-        config, overrides_from(set_, {}), film,
+        config, overrides, film,
     )  # fmt: skip
     text = cards.shown(answer, performance_files.card(answer), verbose)
     return CommandResult(answer, text=text)

@@ -52,7 +52,7 @@ def perform(
     """
     settings = load(PipelineConfig, config, overrides)
     done = performances.perform(
-        list(dances), robot, tracker=tracker, config=how, programme=programme,
+        list(dances), robot, tracker=tracker or settings.tracker, config=how, programme=programme,
         retarget=settings.retarget, progress=True,
     )  # fmt: skip
     done.save(out)

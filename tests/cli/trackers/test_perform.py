@@ -9,7 +9,7 @@ import pytest
 from robojackson.cli.trackers.tracker_files import add_tracker
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.rollout import Rollout
-from tests.fixtures.commands import robojackson
+from tests.fixtures.commands import in_process, robojackson
 from tests.fixtures.robots import robot_motion
 from tests.fixtures.stand_in_tracker import NAME, stand_in, write_yaml
 
@@ -47,6 +47,18 @@ def test_a_performance_leaves_its_tables_and_a_page(dance: Path, tmp_path: Path)
     page = (out / "index.html").read_text()
     assert "&lt;b&gt;" in page
     assert "<b>.parquet" not in page
+
+
+@pytest.mark.parametrize(
+    ("settings", "text"),
+    [(("robot=nobody",), "robot 'nobody'"), (("robot=humanoid", "tracker=xy"), "tracker 'xy'")],
+)
+def test_robot_and_tracker_may_be_given_as_settings(
+    settings: tuple[str, ...], text: str, dance: Path, tmp_path: Path
+) -> None:
+    given = (word for setting in settings for word in ("--set", setting))
+    result = in_process("perform", dance, "-o", tmp_path / "out", *given)
+    assert (result.code, f"UnknownName: unknown {text}" in result.err) == (1, True)
 
 
 @pytest.mark.slow
