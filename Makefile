@@ -30,7 +30,8 @@
 PY := .venv/bin/python
 ARGS ?=
 WORKERS ?= auto
-PYTEST := $(PY) -m pytest -q -n $(WORKERS) --dist loadgroup
+# A worker that crashes ends the run, which names its test: groups wait for ever for another one.
+PYTEST := $(PY) -m pytest -q -n $(WORKERS) --dist loadgroup --max-worker-restart=0
 export OMP_NUM_THREADS ?= 1
 
 .PHONY: badinput dance test test-fast test-stack test-browser coverage bench bench-league bench-learning bench-mocap bench-retarget chaos bench-orchestration bench-pages deploy lint doctor docs wheel clean setup
