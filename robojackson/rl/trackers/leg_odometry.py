@@ -12,13 +12,13 @@ World frame, metres, radians, seconds. The floor is at z = 0.
 
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 from jaxtyping import Float
 
 from robojackson.geometry.rotations import quat_to_matrix
 from robojackson.rl.trackers.tracker import TrackerInput
 from robojackson.robot.model import Robot
+from robojackson.robot.tree_kinematics import point_jacobian, pose, tree
 
 LOW_M = 0.004
 """Height above the lowest sole point that reduces a point's weight by a factor of e, metres."""
@@ -99,27 +99,18 @@ class _Soles:
     """The lowest points of a robot's contact balls on a level floor."""
 
     def __init__(self, robot: Robot) -> None:
-        self._robot, self._data = robot, mujoco.MjData(robot.model)
-        self._sites = robot.keypoint_sites[robot.contact_keypoints]
+        self._tree, self._bodies, self._radii = (
+            tree(robot),
+            robot.contact_bodies,
+            robot.contact_radii,
+        )
 
     def at(
         self, qpos: Float[np.ndarray, "N nq"], qvel: Float[np.ndarray, "N nv"]
     ) -> tuple[Float[np.ndarray, "N C 3"], Float[np.ndarray, "N C 3"]]:
         """Return their positions, and the velocities of the balls."""
-        robot, model, data = self._robot, self._robot.model, self._data
-        bodies = robot.contact_bodies
-        points = np.empty((len(qpos), len(bodies), 3))
-        speeds = np.empty_like(points)
-        for row in range(len(qpos)):
-            data.qpos[:], data.qvel[:] = qpos[row], qvel[row]
-            mujoco.mj_kinematics(model, data)
-            mujoco.mj_comPos(model, data)
-            mujoco.mj_comVel(model, data)
-            turned = data.xmat[bodies].reshape(-1, 3, 3)
-            centres = np.einsum("cij,cj->ci", turned, robot.contact_offsets)
-            points[row] = data.site_xpos[self._sites] + centres
-            arms = points[row] - data.subtree_com[model.body_rootid[bodies]]
-            spins, moves = data.cvel[bodies, :3], data.cvel[bodies, 3:]
-            speeds[row] = moves + np.cross(spins, arms)
-        points[:, :, 2] -= robot.contact_radii
-        return points, speeds
+        posed = pose(self._tree, qpos)
+        jacobian = point_jacobian(self._tree, posed, posed.ball_pos, self._bodies)
+        points = posed.ball_pos.copy()
+        points[:, :, 2] -= self._radii
+        return points, np.einsum("ncij,nj->nci", jacobian, qvel)
