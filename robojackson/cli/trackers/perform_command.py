@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from robojackson.cli.console import CommandResult, command, log_to_stderr
-from robojackson.cli.options import Config, Folder, Json, Set, Verbose, overrides_from
+from robojackson.cli.options import Config, Folder, Json, Set, Verbose, overrides_from, yaml_text
 
 
 @command
@@ -52,11 +52,11 @@ def perform(
 
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     log_to_stderr()
-    overrides = overrides_from(set_, {})
+    given = {"robot": yaml_text(robot or usual_robot()), "tracker": yaml_text(tracker)}
     answer = performance_files.perform(
-        dances, out, robot or str(overrides.get("robot") or usual_robot()), tracker,
+        dances, out,
         PerformanceConfig(runs=runs, seed=seed, pushes=pushes), ProgrammeConfig(dance_s=seconds),
-        config, overrides, film,
+        config, overrides_from(set_, given), film,
     )  # fmt: skip
     text = cards.shown(answer, performance_files.card(answer), verbose)
     return CommandResult(answer, text=text)

@@ -37,8 +37,6 @@ class Answer(Summary):
 def perform(
     dances: Sequence[Path],
     out: Path,
-    robot: str,
-    tracker: str | None,
     how: PerformanceConfig,
     programme: ProgrammeConfig,
     config: str,
@@ -52,11 +50,11 @@ def perform(
     """
     settings = load(PipelineConfig, config, overrides)
     done = performances.perform(
-        list(dances), robot, tracker=tracker or settings.tracker, config=how, programme=programme,
+        list(dances), settings.robot, tracker=settings.tracker, config=how, programme=programme,
         retarget=settings.retarget, progress=True,
     )  # fmt: skip
     done.save(out)
-    shown = FILM if film and _filmed(done, out / FILM, robot, settings) else None
+    shown = FILM if film and _filmed(done, out / FILM, settings) else None
     title = " · ".join(part.name for part in done.programme.parts if part.is_dance)
     performance_page(out / PAGE, title, done.summary, done.parts, done.runs, shown)
     return Answer(
@@ -76,13 +74,13 @@ def card(answer: Answer) -> list[str]:
     return [*console.table(rows, COLUMNS), *places, *cards.closing(dict(answer))]
 
 
-def _filmed(done: Performance, out: Path, robot: str, settings: PipelineConfig) -> bool:
+def _filmed(done: Performance, out: Path, settings: PipelineConfig) -> bool:
     """Film the first run; return whether that could be done."""
     seconds = len(done.rollout.qpos) * done.rollout.dt
     video = replace(settings.render, max_seconds=seconds)
     try:
         render_video(
-            out, done.followed, rollout=done.rollout, robot=robot, config=video,
+            out, done.followed, rollout=done.rollout, robot=settings.robot, config=video,
             title=f"tracker {done.summary['tracker']}", progress=True,
         )  # fmt: skip
     except MissingDependency as cause:

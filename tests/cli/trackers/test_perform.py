@@ -51,7 +51,7 @@ def test_a_performance_leaves_its_tables_and_a_page(dance: Path, tmp_path: Path)
 
 @pytest.mark.parametrize(
     ("settings", "text"),
-    [(("robot=nobody",), "robot 'nobody'"), (("robot=humanoid", "tracker=xy"), "tracker 'xy'")],
+    [(("robot=g2",), "robot 'g2'"), (("robot=humanoid", "tracker=xy"), "tracker 'xy'")],
 )
 def test_robot_and_tracker_may_be_given_as_settings(
     settings: tuple[str, ...], text: str, dance: Path, tmp_path: Path
